@@ -1,0 +1,45 @@
+//! What can go wrong with a sensor, in terms a program can act on.
+//!
+//! Every driver has an error type of its own that says more; [`SensorError::kind`] is the part that is the same
+//! for all of them, as in `embedded-hal`.
+
+use core::convert::Infallible;
+use core::fmt::Debug;
+
+/// The kind of a sensor error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SensorErrorKind {
+    /// The bus refused or garbled the transfer.
+    Bus,
+    /// No new sample within the time the sensor promises.
+    Timeout,
+    /// Another chip, or none, answered.
+    Identification,
+    /// The chip did not accept its configuration.
+    Configuration,
+    /// The chip's self test failed.
+    SelfTest,
+    /// The chip answered with data that cannot be.
+    Data,
+    /// None of the above.
+    Other,
+}
+
+/// An error of a sensor driver.
+pub trait SensorError: Debug {
+    /// The part of the error that is the same for every driver.
+    fn kind(&self) -> SensorErrorKind;
+}
+
+impl SensorError for SensorErrorKind {
+    fn kind(&self) -> SensorErrorKind {
+        *self
+    }
+}
+
+impl SensorError for Infallible {
+    fn kind(&self) -> SensorErrorKind {
+        match *self {}
+    }
+}

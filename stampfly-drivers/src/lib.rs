@@ -1,0 +1,39 @@
+//! Sensors and actuators as the rest of the stack sees them.
+//!
+//! | trait | what it is | who implements it |
+//! |---|---|---|
+//! | [`Imu`] [`Magnetometer`] [`Barometer`] [`RangeFinder`] [`OpticalFlow`] [`PowerMonitor`] | a stream of samples | chip drivers, the simulator |
+//! | [`CommandLink`] | a stream of authenticated commands | radios, mission scripts |
+//! | [`Button`] | a contact | any `embedded_hal::digital::InputPin`, through [`PinButton`] |
+//! | [`MotorOutputs`] | motors | any set of `embedded_hal::pwm::SetDutyCycle`, through [`PwmMotors`] |
+//! | [`Indicator`] | lights and buzzer | boards |
+//! | [`Timebase`] | a clock that can also wait | boards, the simulator |
+//!
+//! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
+//! conversion. Writing to motors is immediate and therefore not. Everything between the two is synchronous and
+//! lives in other crates.
+//!
+//! # Contract of every sensor trait
+//! * `next` resolves when a *new* sample is there; it never returns the same conversion twice.
+//! * [`Sample::at`] is the instant the data is valid for, not the instant it was read.
+//! * Data is in SI units and in the body frame (see the message's documentation).
+//! * An error is about one call; the next call tries again. A driver bounds the time it can hang and then says
+//!   [`SensorErrorKind::Timeout`].
+//! * `next` may be dropped before it resolves (cancelled); the next call starts afresh.
+#![no_std]
+#![allow(async_fn_in_trait, reason = "tasks run on one core; nobody needs the futures to be Send")]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod actuator;
+pub mod error;
+pub mod link;
+pub mod sensor;
+pub mod time;
+
+pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};
+pub use error::{SensorError, SensorErrorKind};
+pub use link::{Button, Command, CommandLink, PinButton};
+pub use sensor::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Sample};
+pub use time::Timebase;

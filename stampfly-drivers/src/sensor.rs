@@ -1,0 +1,67 @@
+//! One trait per kind of sensor.
+
+use crate::SensorError;
+use stampfly_types::Micros;
+use stampfly_types::messages::{BaroData, FlowData, ImuData, MagData, PowerData, TofData};
+
+/// A measurement and the instant it is valid for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample<T> {
+    /// The instant the data is valid for.
+    pub at: Micros,
+    /// The measurement.
+    pub data: T,
+}
+
+macro_rules! sensor_trait {
+    ($(#[$meta:meta])* $Name:ident, $Data:ty) => {
+        $(#[$meta])*
+        pub trait $Name {
+            /// The driver's error.
+            type Error: SensorError;
+
+            /// Waits for the next sample. See the crate's contract of sensor traits.
+            ///
+            /// # Errors
+            /// When this sample is lost; the next call tries again.
+            async fn next(&mut self) -> Result<Sample<$Data>, Self::Error>;
+        }
+
+        impl<T: $Name + ?Sized> $Name for &mut T {
+            type Error = T::Error;
+            async fn next(&mut self) -> Result<Sample<$Data>, Self::Error> {
+                T::next(self).await
+            }
+        }
+    };
+}
+
+sensor_trait! {
+    /// A six-axis inertial measurement unit, at the vehicle's control rate.
+    ///
+    /// A chip that samples faster is decimated by its driver with a filter, never by skipping.
+    Imu, ImuData
+}
+sensor_trait! {
+    /// A magnetometer with its factory compensation applied.
+    Magnetometer, MagData
+}
+sensor_trait! {
+    /// A barometer with its factory compensation applied.
+    Barometer, BaroData
+}
+sensor_trait! {
+    /// A range finder along a fixed beam.
+    ///
+    /// A range that the chip does not vouch for is a sample with `valid: false`, not an error: "nothing in the
+    /// beam" is an answer.
+    RangeFinder, TofData
+}
+sensor_trait! {
+    /// An optical flow sensor. The angles are the sum since the previous sample; none is lost between two calls.
+    OpticalFlow, FlowData
+}
+sensor_trait! {
+    /// A battery monitor.
+    PowerMonitor, PowerData
+}

@@ -1,0 +1,38 @@
+//! The vocabulary of the StampFly flight stack.
+//!
+//! Every other crate of the family depends on this one and on none of its siblings, so what two crates
+//! must agree on lives here and nothing else does:
+//!
+//! * [`time`]: [`Micros`], the only time there is;
+//! * [`frame`]: vectors, quaternions and the conventions they follow;
+//! * [`math`]: the one door to transcendental functions;
+//! * [`message`]: what can travel on the bus and into the log, declared with [`message!`];
+//! * [`messages`]: the messages themselves, sensor to motor.
+//!
+//! # Conventions
+//! SI units and radians. Body frame FRD (x forward, y right, z down), world frame NED, attitude as the
+//! quaternion that turns body vectors into world vectors. An accelerometer measures specific force: level
+//! and still it reads (0, 0, −9.81) m/s².
+//!
+//! # Example
+//! ```
+//! use stampfly_types::{Message, Vec3, messages::ImuData};
+//!
+//! let sample = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::zeros(), temperature: 25.0 };
+//! let words = sample.to_words();
+//! assert_eq!(ImuData::from_words(&words), Some(sample));
+//! ```
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod frame;
+pub mod math;
+pub mod message;
+pub mod messages;
+pub mod time;
+
+pub use frame::{GRAVITY, Quat, Vec3};
+pub use message::{Field, FieldInfo, FieldKind, Message};
+pub use time::Micros;

@@ -1,0 +1,130 @@
+//! The one door to transcendental maths.
+//!
+//! The functions of two C libraries differ in the last bit (glibc and `libm` disagree on 1.3 % of sines and
+//! 9.7 % of exponentials), so a flight recorded on one machine would not replay on another. Everything in the
+//! family calls these wrappers instead, on every target; clippy refuses the platform's own. Arguments outside a
+//! function's domain are clamped to it, because a value rounded to 1.0000001 must not become NaN in flight.
+//!
+//! Cost on x86-64: 2–10 ns each. Not for the inner loop of a filter that can use a rotation instead.
+
+pub use core::f32::consts::{FRAC_PI_2, PI, TAU};
+
+/// Sine of an angle in radians.
+#[must_use]
+pub fn sin(angle: f32) -> f32 {
+    libm::sinf(angle)
+}
+
+/// Cosine of an angle in radians.
+#[must_use]
+pub fn cos(angle: f32) -> f32 {
+    libm::cosf(angle)
+}
+
+/// Sine and cosine of an angle in radians.
+#[must_use]
+pub fn sin_cos(angle: f32) -> (f32, f32) {
+    libm::sincosf(angle)
+}
+
+/// Tangent of an angle in radians.
+#[must_use]
+pub fn tan(angle: f32) -> f32 {
+    libm::tanf(angle)
+}
+
+/// Arc sine; the argument is clamped to ±1.
+#[must_use]
+pub fn asin(ratio: f32) -> f32 {
+    libm::asinf(ratio.clamp(-1.0, 1.0))
+}
+
+/// Arc cosine; the argument is clamped to ±1.
+#[must_use]
+pub fn acos(ratio: f32) -> f32 {
+    libm::acosf(ratio.clamp(-1.0, 1.0))
+}
+
+/// Angle of the point (x, y), −π to π.
+#[must_use]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    libm::atan2f(y, x)
+}
+
+/// Square root; negative arguments give zero.
+#[must_use]
+pub fn sqrt(value: f32) -> f32 {
+    libm::sqrtf(if value < 0.0 { 0.0 } else { value })
+}
+
+/// Cube root.
+#[must_use]
+pub fn cbrt(value: f32) -> f32 {
+    libm::cbrtf(value)
+}
+
+/// e to the power of the argument.
+#[must_use]
+pub fn exp(value: f32) -> f32 {
+    libm::expf(value)
+}
+
+/// Natural logarithm.
+#[must_use]
+pub fn ln(value: f32) -> f32 {
+    libm::logf(value)
+}
+
+/// `base` to the power of `exponent`.
+#[must_use]
+pub fn pow(base: f32, exponent: f32) -> f32 {
+    libm::powf(base, exponent)
+}
+
+/// Nearest integer, halves away from zero.
+#[must_use]
+pub fn round(value: f32) -> f32 {
+    libm::roundf(value)
+}
+
+/// Largest integer not above the argument.
+#[must_use]
+pub fn floor(value: f32) -> f32 {
+    libm::floorf(value)
+}
+
+/// Wraps an angle into (−π, π]. Angles beyond a few thousand turns lose precision, as they do in `f32` anyway.
+///
+/// ```
+/// use stampfly_types::math::{PI, wrap_angle};
+/// assert!((wrap_angle(1.5 * PI) + 0.5 * PI).abs() < 1e-6);
+/// ```
+#[must_use]
+pub fn wrap_angle(angle: f32) -> f32 {
+    let turns = floor((angle + PI) / TAU);
+    let wrapped = angle - turns * TAU;
+    if wrapped <= -PI { wrapped + TAU } else { wrapped }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn arguments_outside_the_domain_are_clamped() {
+        assert_eq!(acos(1.000_000_1), 0.0);
+        assert_eq!(asin(-1.000_000_1), -FRAC_PI_2);
+        assert_eq!(sqrt(-1e-9), 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn wrapped_angles_point_the_same_way(angle in -100.0f32..100.0) {
+            let wrapped = wrap_angle(angle);
+            prop_assert!(wrapped.abs() <= PI + 1e-5);
+            prop_assert!((sin(wrapped) - sin(angle)).abs() < 1e-4);
+            prop_assert!((cos(wrapped) - cos(angle)).abs() < 1e-4);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! What people and programs ask for, on its way from raw input to set-point.
+//!
+//! [`PilotInput`] and [`GuidedCommand`] come from links, [`ButtonEvent`] from the board's button. Arbitration
+//! turns them into one [`CommandSetpoint`]; the navigator turns goals into a jerk-limited [`Setpoint`].
+
+use super::system::FlightMode;
+use crate::{Vec3, message, message_enum, message_flags};
+
+message! {
+    /// One authenticated frame of a pilot's transmitter, normalised. Right and up are positive.
+    pub struct PilotInput {
+        /// Roll stick, −1 to 1, right positive.
+        roll: f32 ["1"],
+        /// Pitch stick, −1 to 1, forward positive (nose down, flying forward).
+        pitch: f32 ["1"],
+        /// Yaw stick, −1 to 1, clockwise seen from above positive.
+        yaw: f32 ["1"],
+        /// Throttle stick, −1 to 1, spring centred: zero holds height in the modes that hold it.
+        throttle: f32 ["1"],
+        /// The flight mode the switches select.
+        mode: FlightMode ["1"],
+        /// Arm switch. Arming needs a rising edge seen by the vehicle.
+        arm: bool ["1"],
+        /// Emergency stop: motors off now, whatever the state.
+        kill: bool ["1"],
+    }
+}
+
+message_enum! {
+    /// What a guided command asks for.
+    pub enum GuidedKind {
+        /// Nothing.
+        None = 0,
+        /// Allow the motors.
+        Arm = 1,
+        /// Land if flying, then stop the motors.
+        Disarm = 2,
+        /// Rise to `position.z` (negative is up) above the present place.
+        TakeOff = 3,
+        /// Append a way-point to the route.
+        WayPoint = 4,
+        /// Forget the route and stay here.
+        Hold = 5,
+        /// Land here.
+        Land = 6,
+        /// Motors off now.
+        Kill = 7,
+    }
+}
+
+message! {
+    /// A command from a program: the ground station, a mission file, a script.
+    pub struct GuidedCommand {
+        /// What is asked.
+        kind: GuidedKind ["1"],
+        /// Goal in the world frame, relative to the origin.
+        position: Vec3 ["m"],
+        /// Goal heading.
+        yaw: f32 ["rad"],
+        /// Highest speed on the way; zero asks for the default.
+        speed: f32 ["m/s"],
+        /// Time to stay at the goal before going on.
+        dwell: f32 ["s"],
+    }
+}
+
+message_enum! {
+    /// What the button did.
+    pub enum ButtonGesture {
+        /// Nothing.
+        None = 0,
+        /// Pressed and let go.
+        Click = 1,
+        /// Two clicks within the double-click time.
+        DoubleClick = 2,
+        /// Held for three seconds: pair.
+        HoldPair = 3,
+        /// Held for five seconds: restart.
+        HoldReset = 4,
+    }
+}
+
+message! {
+    /// A finished gesture on the board's button.
+    pub struct ButtonEvent {
+        /// What happened.
+        gesture: ButtonGesture ["1"],
+        /// How long the button was down.
+        held: f32 ["s"],
+    }
+}
+
+message_enum! {
+    /// Who has authority over the set-point.
+    pub enum CommandSource {
+        /// Nobody: level, hold, no climb.
+        None = 0,
+        /// The pilot's sticks.
+        Pilot = 1,
+        /// Guided commands.
+        Guided = 2,
+        /// The failsafe.
+        Failsafe = 3,
+    }
+}
+
+message! {
+    /// The arbitrated command: one authority, sticks normalised, dead band applied.
+    pub struct CommandSetpoint {
+        /// −1 to 1; meaning depends on the flight mode.
+        throttle: f32 ["1"],
+        /// −1 to 1, right positive.
+        roll: f32 ["1"],
+        /// −1 to 1, forward positive.
+        pitch: f32 ["1"],
+        /// −1 to 1, clockwise positive.
+        yaw: f32 ["1"],
+        /// Whose command it is.
+        source: CommandSource ["1"],
+    }
+}
+
+message_flags! {
+    /// Which parts of a set-point are commanded.
+    pub struct SetpointAxes {
+        /// North and east position, with velocity and acceleration as feed-forward.
+        POSITION_XY = 0,
+        /// Down position, with velocity and acceleration as feed-forward.
+        POSITION_Z = 1,
+        /// North and east velocity only.
+        VELOCITY_XY = 2,
+        /// Down velocity only.
+        VELOCITY_Z = 3,
+        /// Heading.
+        YAW = 4,
+        /// Heading rate only.
+        YAW_RATE = 5,
+    }
+}
+
+message! {
+    /// Where the vehicle should be right now: a point on a jerk-limited path.
+    pub struct Setpoint {
+        /// World NED.
+        position: Vec3 ["m"],
+        /// World NED.
+        velocity: Vec3 ["m/s"],
+        /// World NED.
+        acceleration: Vec3 ["m/s^2"],
+        /// Heading.
+        yaw: f32 ["rad"],
+        /// Heading rate.
+        yaw_rate: f32 ["rad/s"],
+        /// Which of the above are commanded.
+        axes: SetpointAxes ["1"],
+        /// Way-points still ahead, the present one included.
+        remaining: u32 ["1"],
+        /// Has the last way-point been reached and its dwell time passed?
+        arrived: bool ["1"],
+    }
+}

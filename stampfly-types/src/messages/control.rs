@@ -1,0 +1,30 @@
+//! What the controller wants and what the motors get.
+
+use crate::{Vec3, message};
+
+/// The largest number of motors a message can carry.
+pub const MAX_MOTORS: usize = 8;
+
+message! {
+    /// Force and torque the controller asks of the airframe.
+    pub struct ControlOutput {
+        /// Collective thrust along −z of the body.
+        thrust: f32 ["N"],
+        /// Torque about the body axes.
+        torque: Vec3 ["N*m"],
+    }
+}
+
+message! {
+    /// What is sent to the motors.
+    pub struct MotorOutput {
+        /// Duty cycle per motor, 0 to 1. The StampFly's order: front right, rear right, rear left, front left.
+        duty: [f32; MAX_MOTORS] ["1"],
+        /// How many of them exist.
+        count: u8 ["1"],
+        /// May the motors turn? When not, every duty is exactly zero.
+        armed: bool ["1"],
+        /// Share of the torque demand that could not be met, 0 is none: roll, pitch, yaw, thrust.
+        unmet: [f32; 4] ["1"],
+    }
+}

@@ -1,0 +1,141 @@
+//! What the estimator knows, and how well.
+
+use crate::{Quat, Vec3, message, message_flags};
+
+message_flags! {
+    /// Which outputs of an estimate may be used. A cleared bit means the number beside it is a placeholder.
+    pub struct Validity {
+        /// Roll and pitch.
+        TILT = 0,
+        /// Heading, relative to where it was at power-on or to north.
+        HEADING = 1,
+        /// Horizontal velocity.
+        VELOCITY_XY = 2,
+        /// Vertical velocity.
+        VELOCITY_Z = 3,
+        /// Horizontal position relative to the start.
+        POSITION_XY = 4,
+        /// Vertical position relative to the start.
+        POSITION_Z = 5,
+        /// Height above the surface below.
+        HEIGHT = 6,
+    }
+}
+
+message_flags! {
+    /// A set of sensors: the ones that took part, or the ones that were refused.
+    pub struct SensorMask {
+        /// Inertial measurement unit.
+        IMU = 0,
+        /// Downward time-of-flight.
+        TOF = 1,
+        /// Optical flow.
+        FLOW = 2,
+        /// Magnetometer.
+        MAG = 3,
+        /// Barometer.
+        BARO = 4,
+        /// Accelerometer used as an inclinometer.
+        ACCEL_ATTITUDE = 5,
+        /// Zero velocity while known to stand.
+        STATIONARY = 6,
+        /// External position or velocity, such as motion capture.
+        EXTERNAL = 7,
+    }
+}
+
+message! {
+    /// The vehicle's state as the estimator sees it.
+    pub struct StateEstimate {
+        /// Body FRD → world NED.
+        attitude: Quat ["1"],
+        /// World NED, origin where the vehicle was initialised.
+        position: Vec3 ["m"],
+        /// World NED.
+        velocity: Vec3 ["m/s"],
+        /// Body FRD, bias removed.
+        angular_rate: Vec3 ["rad/s"],
+        /// Body FRD, bias removed. Level and still: (0, 0, −9.81).
+        specific_force: Vec3 ["m/s^2"],
+        /// Gyro bias, body FRD.
+        gyro_bias: Vec3 ["rad/s"],
+        /// Accelerometer bias, body FRD.
+        accel_bias: Vec3 ["m/s^2"],
+        /// Height of the body above the surface below.
+        height: f32 ["m"],
+        /// One standard deviation of the horizontal position, root of the trace.
+        position_std_xy: f32 ["m"],
+        /// Which of the above may be used.
+        valid: Validity ["1"],
+        /// Sensors that took part within the last second.
+        sensors: SensorMask ["1"],
+    }
+}
+
+message! {
+    /// How the estimator got on with its sensors: one number per measurement, for plots and failsafe.
+    ///
+    /// A test ratio is innovation² / (gate² · variance): above one the measurement was refused.
+    pub struct EstimatorStatus {
+        /// Innovation of the last range, along the vertical.
+        tof_innovation: f32 ["m"],
+        /// Test ratio of the last range.
+        tof_ratio: f32 ["1"],
+        /// Innovation of the last flow sample, body x and y.
+        flow_innovation: [f32; 2] ["m/s"],
+        /// Test ratio of the last flow sample.
+        flow_ratio: f32 ["1"],
+        /// Innovation of the last barometric altitude.
+        baro_innovation: f32 ["m"],
+        /// Test ratio of the last barometric altitude.
+        baro_ratio: f32 ["1"],
+        /// Innovation of the last magnetic heading.
+        mag_innovation: f32 ["rad"],
+        /// Test ratio of the last magnetic heading.
+        mag_ratio: f32 ["1"],
+        /// Angle between measured and predicted gravity.
+        accel_innovation: f32 ["rad"],
+        /// Test ratio of the last accelerometer attitude.
+        accel_ratio: f32 ["1"],
+        /// Measurements refused since the start: range, flow, baro, mag, accelerometer.
+        refused: [u32; 5] ["1"],
+        /// Measurements offered since the start, in the same order.
+        offered: [u32; 5] ["1"],
+        /// Resets since the start.
+        resets: u32 ["1"],
+        /// Is the estimate lost?
+        diverged: bool ["1"],
+    }
+}
+
+message! {
+    /// What the mode machine asks of the estimator. Level-triggered, except the reset counters.
+    pub struct EstimatorCommand {
+        /// The vehicle stands still on the ground: hold velocity at zero.
+        on_ground: bool ["1"],
+        /// A change of this number asks for position and velocity to be set to zero.
+        origin_resets: u32 ["1"],
+        /// A change of this number asks for a full new start from calibration.
+        full_resets: u32 ["1"],
+    }
+}
+
+message! {
+    /// What the still-calibration found.
+    pub struct CalibrationResult {
+        /// Gyro bias, body FRD.
+        gyro_bias: Vec3 ["rad/s"],
+        /// Mean specific force while still, body FRD: gives the first attitude.
+        specific_force: Vec3 ["m/s^2"],
+        /// Mean magnetic field while still, body FRD; zero without a magnetometer.
+        field: Vec3 ["uT"],
+        /// Barometric altitude of the ground.
+        baro_altitude: f32 ["m"],
+        /// Share of the still period that has been collected, 0 to 1.
+        progress: f32 ["1"],
+        /// Finished: the values above may be used.
+        complete: bool ["1"],
+        /// How often motion restarted the collection.
+        restarts: u32 ["1"],
+    }
+}

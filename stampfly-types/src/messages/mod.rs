@@ -1,0 +1,28 @@
+//! The messages of the flight stack, from sensor to motor.
+//!
+//! | group | messages |
+//! |---|---|
+//! | [`sensor`] | [`ImuData`] [`TofData`] [`FlowData`] [`MagData`] [`BaroData`] [`PowerData`] |
+//! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] |
+//! | [`command`] | [`PilotInput`] [`GuidedCommand`] [`ButtonEvent`] [`CommandSetpoint`] [`Setpoint`] |
+//! | [`control`] | [`ControlOutput`] [`MotorOutput`] |
+//! | [`system`] | [`SystemMode`] [`SystemAlert`] [`VehicleStatus`] [`Signal`] |
+//!
+//! No message carries a time stamp: the bus stamps every sample with the instant its data is valid for.
+
+pub mod command;
+pub mod control;
+pub mod estimate;
+pub mod sensor;
+pub mod system;
+
+pub use command::{
+    ButtonEvent, ButtonGesture, CommandSetpoint, CommandSource, GuidedCommand, GuidedKind, PilotInput, Setpoint,
+    SetpointAxes,
+};
+pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
+pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};
+pub use sensor::{BaroData, FlowData, ImuData, MagData, PowerData, TofData};
+pub use system::{
+    Alerts, ArmBlocks, FlightMode, FlightState, GroundContact, Signal, SystemAlert, SystemMode, Tone, VehicleStatus,
+};

@@ -1,0 +1,83 @@
+//! What sensors report: facts, already in SI units and in the body frame, never a judgement.
+//!
+//! Chip axes, scales and register quirks end in the driver; from here inward a sample means the same for every
+//! vehicle.
+
+use crate::{Vec3, message};
+
+message! {
+    /// One inertial sample.
+    pub struct ImuData {
+        /// Specific force, body FRD. Level and still: (0, 0, −9.81).
+        accel: Vec3 ["m/s^2"],
+        /// Angular rate, body FRD.
+        gyro: Vec3 ["rad/s"],
+        /// Die temperature.
+        temperature: f32 ["degC"],
+    }
+}
+
+message! {
+    /// One range from a time-of-flight sensor, along its own beam.
+    pub struct TofData {
+        /// Distance from the sensor to the nearest surface in the beam.
+        distance: f32 ["m"],
+        /// One standard deviation as the chip reports it; zero when it does not.
+        sigma: f32 ["m"],
+        /// The chip's own range status, unchanged, for the log.
+        status: u8 ["1"],
+        /// Does the driver vouch for the distance?
+        valid: bool ["1"],
+    }
+}
+
+message! {
+    /// Optical flow since the previous sample, after the mounting rotation.
+    ///
+    /// Forward motion counts positive in x, motion to the right positive in y. Rotation is included: pitching up
+    /// (`q` > 0) adds to x, rolling right (`p` > 0) subtracts from y.
+    pub struct FlowData {
+        /// Angle swept along body x.
+        delta_x: f32 ["rad"],
+        /// Angle swept along body y.
+        delta_y: f32 ["rad"],
+        /// Time over which the angles were swept.
+        interval: f32 ["s"],
+        /// Surface quality as the chip counts features, 0 is blind.
+        quality: u8 ["1"],
+        /// Does the driver vouch for the sample?
+        valid: bool ["1"],
+    }
+}
+
+message! {
+    /// One magnetometer sample.
+    pub struct MagData {
+        /// Magnetic flux density, body FRD, factory compensation applied, hard and soft iron not.
+        field: Vec3 ["uT"],
+    }
+}
+
+message! {
+    /// One barometer sample.
+    pub struct BaroData {
+        /// Static pressure.
+        pressure: f32 ["Pa"],
+        /// Die temperature.
+        temperature: f32 ["degC"],
+        /// Pressure altitude above 101 325 Pa in the standard atmosphere.
+        altitude: f32 ["m"],
+    }
+}
+
+message! {
+    /// One sample of the battery monitor.
+    pub struct PowerData {
+        /// Battery voltage under the present load.
+        voltage: f32 ["V"],
+        /// Current out of the battery.
+        current: f32 ["A"],
+        /// Power out of the battery.
+        power: f32 ["W"],
+    }
+}

@@ -1,0 +1,192 @@
+//! State of the whole vehicle: mode, alerts, contact with the ground, signals to people.
+
+use crate::{message, message_enum, message_flags};
+
+message_enum! {
+    /// Where the vehicle is in its life. Failsafe is an event, never a state.
+    pub enum FlightState {
+        /// Sensors and calibration are starting.
+        Init = 0,
+        /// Standing on the ground, motors off.
+        IdleGround = 1,
+        /// Lifted by a hand, motors off.
+        IdleHeld = 2,
+        /// Standing, motors may turn.
+        Armed = 3,
+        /// Climbing to the take-off height.
+        TakeOff = 4,
+        /// In the air under the flight mode.
+        Flying = 5,
+        /// Descending to the ground.
+        Landing = 6,
+    }
+}
+
+message_enum! {
+    /// What the sticks mean while flying.
+    pub enum FlightMode {
+        /// Sticks command angles; throttle commands thrust.
+        Stabilize = 1,
+        /// Sticks command rates; throttle commands thrust.
+        Acro = 0,
+        /// Sticks command angles; throttle commands climb rate.
+        AltHold = 2,
+        /// Sticks command velocities; released, the vehicle holds its place.
+        PosHold = 3,
+    }
+}
+
+message_flags! {
+    /// Why the vehicle will not arm. Empty means it will.
+    pub struct ArmBlocks {
+        /// Still-calibration has not finished.
+        CALIBRATING = 0,
+        /// Not standing on the ground.
+        NOT_ON_GROUND = 1,
+        /// Powered from USB or no battery.
+        NO_BATTERY = 2,
+        /// Battery is low.
+        LOW_BATTERY = 3,
+        /// Attitude is unknown or disagrees with gravity.
+        ATTITUDE = 4,
+        /// A sensor the mode needs is silent.
+        SENSOR = 5,
+        /// The estimate is lost.
+        ESTIMATE = 6,
+        /// Pairing with a transmitter.
+        PAIRING = 7,
+        /// Tilted too far to take off.
+        TILTED = 8,
+        /// The throttle is not at rest.
+        THROTTLE = 9,
+        /// The arm switch was on before the vehicle saw it off.
+        ARM_SWITCH = 10,
+        /// A crash was detected and nobody has acknowledged it.
+        CRASHED = 11,
+    }
+}
+
+message! {
+    /// The mode machine's decision.
+    pub struct SystemMode {
+        /// Where the vehicle is in its life.
+        state: FlightState ["1"],
+        /// The flight mode, in force while flying.
+        mode: FlightMode ["1"],
+        /// May the motors turn?
+        armed: bool ["1"],
+        /// Pairing with a transmitter.
+        pairing: bool ["1"],
+        /// Why arming would be refused right now.
+        blocks: ArmBlocks ["1"],
+        /// Transitions since power-on.
+        transitions: u32 ["1"],
+        /// A change of this number resets the controller.
+        control_resets: u32 ["1"],
+    }
+}
+
+message_flags! {
+    /// Conditions the failsafe has found. Level-triggered: a bit stays while its condition does, and the ones that
+    /// must not be missed stay until the vehicle is disarmed.
+    pub struct Alerts {
+        /// No authentic command for too long.
+        COMM_LOST = 0,
+        /// Acceleration beyond the impact limit.
+        IMPACT = 1,
+        /// Battery at the warning level.
+        LOW_BATTERY = 2,
+        /// Battery at the level where the vehicle must land.
+        CRITICAL_BATTERY = 3,
+        /// Powered from USB, or no battery.
+        USB_POWER = 4,
+        /// The estimate is lost.
+        ESTIMATE_DIVERGED = 5,
+        /// Angular rate beyond the limit.
+        GYRO_ANOMALY = 6,
+        /// No inertial sample for 10 ms.
+        IMU_DEGRADED = 7,
+        /// No inertial sample for 25 ms: motors off.
+        IMU_LOST = 8,
+        /// Upside down or tumbling.
+        TUMBLED = 9,
+        /// No usable range from the ground.
+        TOF_LOST = 10,
+        /// No usable optical flow.
+        FLOW_LOST = 11,
+        /// The estimated tilt disagrees with gravity while standing.
+        TILT_MISMATCH = 12,
+    }
+}
+
+message! {
+    /// The failsafe's findings.
+    pub struct SystemAlert {
+        /// Conditions present now, or latched.
+        active: Alerts ["1"],
+        /// Conditions that became present since power-on, for the log and for people.
+        seen: Alerts ["1"],
+    }
+}
+
+message_enum! {
+    /// Contact with the ground.
+    pub enum GroundContact {
+        /// Standing.
+        Ground = 0,
+        /// Not standing.
+        Air = 1,
+    }
+}
+
+message! {
+    /// What the take-off and landing manager sees, and what it asks of the vertical controller.
+    pub struct VehicleStatus {
+        /// Contact with the ground.
+        contact: GroundContact ["1"],
+        /// Take-off has reached its height and settled.
+        takeoff_complete: bool ["1"],
+        /// Touchdown is confirmed.
+        landed: bool ["1"],
+        /// Upper limit on collective thrust as a share of hover thrust; above one while unlimited.
+        thrust_ceiling: f32 ["1"],
+        /// Descent speed asked for while landing.
+        descent_rate: f32 ["m/s"],
+    }
+}
+
+message_enum! {
+    /// A short tune.
+    pub enum Tone {
+        /// Silence.
+        None = 0,
+        /// Power-on.
+        Start = 1,
+        /// Ready to arm.
+        Ready = 2,
+        /// Armed.
+        Arm = 3,
+        /// Disarmed.
+        Disarm = 4,
+        /// Pairing.
+        Pair = 5,
+        /// Low battery.
+        LowBattery = 6,
+        /// Something is wrong.
+        Error = 7,
+    }
+}
+
+message! {
+    /// What people see and hear.
+    pub struct Signal {
+        /// Colour of the status light, red, green, blue, 0 to 255.
+        status: [u8; 3] ["1"],
+        /// Colour of the two body lights.
+        body: [u8; 3] ["1"],
+        /// Tune to start; repeats are edges of `tone_count`.
+        tone: Tone ["1"],
+        /// A change of this number starts the tune.
+        tone_count: u32 ["1"],
+    }
+}
