@@ -1,0 +1,42 @@
+//! Typed topics on a lock-free broadcast ring, and the table that says who runs when.
+//!
+//! A vehicle is two tables. [`topics!`] says what is published, by whom, how often and for whom; [`schedule!`]
+//! says what runs when. From the first follow a typed publisher (exactly one), a typed subscriber per named reader,
+//! the log's taps and the listing on the command line; from the second the dispatch that every executor shares.
+//!
+//! | need | use |
+//! |---|---|
+//! | newest value, never wait | policy `latest` → [`Latest`] |
+//! | every sample, losses counted per reader | policy `ring(N)` → [`Every`] |
+//! | nothing lost, publisher may be refused | policy `queue(N)` → [`Lossless`] |
+//! | wake a task on publish | [`Hook`], given to `Bus::split` |
+//! | repeat a flight bit for bit | [`Activation`] |
+//!
+//! No `unsafe`, no critical section, no allocation, no `static`: a bus is a value and a test can fly a thousand of
+//! them. Publishing and reading work from interrupts and across cores, on targets without 64-bit atomics.
+//!
+//! Not for: several publishers of one topic (arbitrate first), messages of varying size, or waiting: a reader that
+//! wants to sleep is woken by its executor.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod activation;
+mod ring;
+mod schedule;
+mod sync;
+mod table;
+mod topic;
+
+pub use activation::{Activation, InputRecord, MAX_INPUTS, Runnable};
+pub use schedule::{ActivationInfo, Band, MAX_TRIGGERS, Runnables, Scheduler, Trigger};
+pub use table::{LATEST_DEPTH, TopicInfo};
+pub use topic::{
+    AnyTopic, Every, Full, Hook, Latest, Lossless, Overwriting, Publisher, Sequential, Stamped, Subscriber, Tap, Topic,
+};
+
+#[doc(hidden)]
+pub mod __private {
+    pub use stampfly_types::{Message, Micros};
+}

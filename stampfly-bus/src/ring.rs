@@ -1,0 +1,129 @@
+//! The one primitive: a single-writer broadcast ring of words.
+//!
+//! `N` slots, each with a sequence number and `W` payload words, all of them atomics: there is no data race by
+//! construction and no `unsafe`. The writer never waits and never fails. A reader copies a slot and checks that
+//! its sequence number did not move meanwhile (a seqlock; Boehm, "Can Seqlocks Get Along With Programming
+//! Language Memory Models?", MSPC 2012). Callable from interrupts, correct across cores, no critical section, no
+//! 64-bit atomics.
+//!
+//! Generations count published samples from one; zero means "none yet". They wrap after 2³² samples (124 days at
+//! 400 Hz), which every comparison here allows for.
+//!
+//! Use the typed [`Topic`](crate::Topic) on top; this layer is what loom checks.
+
+use crate::sync::{AtomicU32, Ordering, fence, unless_loom_const};
+use stampfly_types::Micros;
+
+/// One sample's place in the ring.
+struct Slot<const W: usize> {
+    /// `2 · generation` when complete, `2 · generation − 1` while being written.
+    sequence: AtomicU32,
+    at: [AtomicU32; 2],
+    words: [AtomicU32; W],
+}
+
+impl<const W: usize> Slot<W> {
+    unless_loom_const! {
+        fn new() -> Self {
+            Self {
+                sequence: AtomicU32::new(0),
+                at: [const { AtomicU32::new(0) }; 2],
+                words: [const { AtomicU32::new(0) }; W],
+            },
+            Self {
+                sequence: AtomicU32::new(0),
+                at: core::array::from_fn(|_| AtomicU32::new(0)),
+                words: core::array::from_fn(|_| AtomicU32::new(0)),
+            }
+        }
+    }
+}
+
+/// A single-writer broadcast ring: `N` slots (a power of two) of `W` words.
+pub(crate) struct Ring<const N: usize, const W: usize> {
+    /// Newest complete generation.
+    head: AtomicU32,
+    slots: [Slot<W>; N],
+}
+
+/// A copy of a slot.
+pub(crate) struct Copied<const W: usize> {
+    pub(crate) at: Micros,
+    pub(crate) words: [u32; W],
+}
+
+impl<const N: usize, const W: usize> Ring<N, W> {
+    const MASK: u32 = {
+        assert!(
+            N.is_power_of_two() && N >= 2 && N <= 1 << 16,
+            "the depth of a topic is a power of two from 2 to 65536"
+        );
+        N as u32 - 1
+    };
+
+    unless_loom_const! {
+        pub(crate) fn new() -> Self {
+            Self { head: AtomicU32::new(0), slots: [const { Slot::new() }; N] },
+            Self { head: AtomicU32::new(0), slots: core::array::from_fn(|_| Slot::new()) }
+        }
+    }
+
+    /// Newest complete generation, zero before the first.
+    #[inline]
+    pub(crate) fn head(&self) -> u32 {
+        self.head.load(Ordering::Acquire)
+    }
+
+    #[inline]
+    fn slot(&self, generation: u32) -> Option<&Slot<W>> {
+        self.slots.get((generation & Self::MASK) as usize)
+    }
+
+    /// Writes the next sample. Must only ever be called by the one publisher, which hands in the generation it
+    /// wrote last.
+    #[inline]
+    pub(crate) fn write(&self, previous: u32, at: Micros, words: &[u32; W]) -> u32 {
+        let generation = next(previous);
+        let Some(slot) = self.slot(generation) else { return previous };
+        let complete = generation.wrapping_mul(2);
+        slot.sequence.store(complete.wrapping_sub(1), Ordering::Relaxed);
+        // Readers that see any of the words below also see the odd sequence above.
+        fence(Ordering::Release);
+        slot.at[0].store(at.0 as u32, Ordering::Relaxed);
+        slot.at[1].store((at.0 >> 32) as u32, Ordering::Relaxed);
+        for (place, word) in slot.words.iter().zip(words) {
+            place.store(*word, Ordering::Relaxed);
+        }
+        slot.sequence.store(complete, Ordering::Release);
+        self.head.store(generation, Ordering::Release);
+        generation
+    }
+
+    /// Copies the sample of this generation; `None` when it is not there (any more, or yet).
+    #[inline]
+    pub(crate) fn read(&self, generation: u32) -> Option<Copied<W>> {
+        let slot = self.slot(generation)?;
+        let complete = generation.wrapping_mul(2);
+        if slot.sequence.load(Ordering::Acquire) != complete {
+            return None;
+        }
+        let at =
+            Micros(u64::from(slot.at[0].load(Ordering::Relaxed)) | u64::from(slot.at[1].load(Ordering::Relaxed)) << 32);
+        let mut words = [0; W];
+        for (word, place) in words.iter_mut().zip(&slot.words) {
+            *word = place.load(Ordering::Relaxed);
+        }
+        // The words above were read before the sequence below.
+        fence(Ordering::Acquire);
+        (slot.sequence.load(Ordering::Relaxed) == complete).then_some(Copied { at, words })
+    }
+}
+
+/// The generation after this one. Zero is skipped on wrap: it means "none yet".
+#[inline]
+pub(crate) const fn next(generation: u32) -> u32 {
+    match generation.wrapping_add(1) {
+        0 => 1,
+        following => following,
+    }
+}

@@ -1,0 +1,262 @@
+//! The activation table: who runs when, and in which band.
+
+use crate::topic::AnyTopic;
+use stampfly_types::Micros;
+
+/// What activates a runnable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Trigger {
+    /// Something new on any of these topics (indices into the topic table).
+    On(&'static [usize]),
+    /// A fixed period.
+    Every(Micros),
+    /// The activation with this index has just finished.
+    After(usize),
+}
+
+/// Where a runnable runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Band {
+    /// In table order, as one task, ahead of everything else.
+    Flight,
+    /// When the flight band has nothing to do. May be interrupted by it.
+    Background,
+}
+
+/// One line of the activation table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ActivationInfo {
+    /// Name of the runnable.
+    pub name: &'static str,
+    /// First line of its documentation.
+    pub doc: &'static [&'static str],
+    /// What activates it.
+    pub trigger: Trigger,
+    /// Activate it this long after its last activation even if the trigger stays silent.
+    pub at_latest: Option<Micros>,
+    /// Where it runs.
+    pub band: Band,
+    /// Execution time it may take on the target.
+    pub budget: Micros,
+}
+
+/// Decides which activation is due. Holds no clock and runs nothing: executors on a microcontroller, on a host and
+/// in a replay share it, so they agree on `now`.
+///
+/// `now` of an activation is the newest stamp of its topics for `on`, the predecessor's `now` for `after`, and the
+/// scheduled tick for `every` and `or at latest`.
+#[derive(Clone, Debug)]
+pub struct Scheduler<const A: usize, const T: usize> {
+    table: &'static [ActivationInfo; A],
+    /// Heads seen by each activation's triggers.
+    seen: [[u32; MAX_TRIGGERS]; A],
+    /// The `now` of each activation's last run.
+    last: [Micros; A],
+    /// Has this `after` predecessor finished since?
+    released: [Option<Micros>; A],
+}
+
+/// Most topics one `on` can name.
+pub const MAX_TRIGGERS: usize = 4;
+
+impl<const A: usize, const T: usize> Scheduler<A, T> {
+    /// A scheduler at power-on, `start` on the clock. Periods count from there.
+    #[must_use]
+    pub fn new(table: &'static [ActivationInfo; A], start: Micros) -> Self {
+        Self { table, seen: [[0; MAX_TRIGGERS]; A], last: [start; A], released: [None; A] }
+    }
+
+    /// The first activation of this band, in table order, that is due at `clock`: its index and its `now`.
+    #[must_use]
+    pub fn due(&self, band: Band, clock: Micros, heads: &[&dyn AnyTopic; T]) -> Option<(usize, Micros)> {
+        self.table
+            .iter()
+            .enumerate()
+            .filter(|(_, info)| info.band == band)
+            .find_map(|(index, info)| self.triggered(index, info, clock, heads).map(|now| (index, now)))
+    }
+
+    fn triggered(
+        &self,
+        index: usize,
+        info: &ActivationInfo,
+        clock: Micros,
+        heads: &[&dyn AnyTopic; T],
+    ) -> Option<Micros> {
+        let by_trigger = match info.trigger {
+            Trigger::On(topics) => topics
+                .iter()
+                .zip(self.seen.get(index)?)
+                .filter_map(|(topic, seen)| {
+                    let topic = heads.get(*topic)?;
+                    (topic.head() != *seen).then(|| topic.newest_at()).flatten()
+                })
+                .max(),
+            Trigger::After(_) => *self.released.get(index)?,
+            Trigger::Every(period) => self.tick(index, period, clock),
+        };
+        by_trigger.or_else(|| self.tick(index, info.at_latest?, clock))
+    }
+
+    /// The scheduled tick `period` after the last activation, once the clock has reached it.
+    fn tick(&self, index: usize, period: Micros, clock: Micros) -> Option<Micros> {
+        let tick = *self.last.get(index)? + period;
+        (clock >= tick).then_some(tick)
+    }
+
+    /// Notes that an activation is about to read its inputs.
+    pub fn started(&mut self, index: usize, now: Micros, heads: &[&dyn AnyTopic; T]) {
+        if let (Some(info), Some(seen)) = (self.table.get(index), self.seen.get_mut(index))
+            && let Trigger::On(topics) = info.trigger
+        {
+            for (topic, seen) in topics.iter().zip(seen) {
+                *seen = heads.get(*topic).map_or(0, |topic| topic.head());
+            }
+        }
+        if let Some(last) = self.last.get_mut(index) {
+            *last = now;
+        }
+        if let Some(released) = self.released.get_mut(index) {
+            *released = None;
+        }
+    }
+
+    /// Notes that an activation has published: releases the ones that run after it.
+    pub fn finished(&mut self, index: usize, now: Micros) {
+        for (info, released) in self.table.iter().zip(&mut self.released) {
+            if info.trigger == Trigger::After(index) {
+                *released = Some(now);
+            }
+        }
+    }
+
+    /// The next instant at which a period or a deadline makes something due.
+    #[must_use]
+    pub fn next_tick(&self) -> Option<Micros> {
+        self.table
+            .iter()
+            .zip(self.last)
+            .filter_map(|(info, last)| {
+                let period = match info.trigger {
+                    Trigger::Every(period) => Some(period),
+                    _ => info.at_latest,
+                };
+                Some(last + period?)
+            })
+            .min()
+    }
+}
+
+/// A vehicle's runnables, addressed by their line in the activation table. Generated by
+/// [`schedule!`](crate::schedule!).
+pub trait Runnables {
+    /// Copies the inputs of one runnable.
+    fn read(&mut self, index: usize, activation: &mut crate::Activation);
+    /// Steps one runnable.
+    fn run(&mut self, index: usize, activation: &mut crate::Activation);
+}
+
+/// Declares who runs when.
+///
+/// ```text
+/// schedule! {
+///     /// The vehicle's activations.
+///     pub mod plan on wiring;
+///     /// First line of the documentation.
+///     name = Runnable: on topic | topic, flight, 300 us;
+///     name = Runnable: after name or at latest 5 ms, flight, 40 us;
+///     name = Runnable: every 20 ms, background, 80 us;
+/// }
+/// ```
+///
+/// `Runnable` is a type `Runnable<'b>` that implements [`Runnable`](crate::Runnable). From the table follow
+/// `plan::Vehicle<'b>`, a struct with one field per line that implements [`Runnables`], and `plan::ACTIVATIONS`.
+/// The flight band runs in table order, so `after` may only name a line above it; anything else does not compile.
+#[macro_export]
+macro_rules! schedule {
+    ($(#[$meta:meta])* $vis:vis mod $plan:ident on $wiring:ident; $($rows:tt)+) => {
+        $crate::schedule!(@rows [$(#[$meta])* $vis $plan $wiring] [] $($rows)+);
+    };
+
+    // One rule per form of activation; each turns its line into the same shape.
+    (@rows $head:tt [$($done:tt)*] $(#[doc = $doc:literal])+ $name:ident = $Type:ident : on $($topic:ident)|+ or at latest $late:literal $late_unit:ident, $band:ident, $budget:literal us; $($rest:tt)*) => {
+        $crate::schedule!(@rows $head [$($done)* { [$($doc)+] $name $Type (on $($topic)+) (late $late $late_unit) $band $budget }] $($rest)*);
+    };
+    (@rows $head:tt [$($done:tt)*] $(#[doc = $doc:literal])+ $name:ident = $Type:ident : on $($topic:ident)|+ , $band:ident, $budget:literal us; $($rest:tt)*) => {
+        $crate::schedule!(@rows $head [$($done)* { [$($doc)+] $name $Type (on $($topic)+) (never) $band $budget }] $($rest)*);
+    };
+    (@rows $head:tt [$($done:tt)*] $(#[doc = $doc:literal])+ $name:ident = $Type:ident : after $before:ident or at latest $late:literal $late_unit:ident, $band:ident, $budget:literal us; $($rest:tt)*) => {
+        $crate::schedule!(@rows $head [$($done)* { [$($doc)+] $name $Type (after $before) (late $late $late_unit) $band $budget }] $($rest)*);
+    };
+    (@rows $head:tt [$($done:tt)*] $(#[doc = $doc:literal])+ $name:ident = $Type:ident : after $before:ident, $band:ident, $budget:literal us; $($rest:tt)*) => {
+        $crate::schedule!(@rows $head [$($done)* { [$($doc)+] $name $Type (after $before) (never) $band $budget }] $($rest)*);
+    };
+    (@rows $head:tt [$($done:tt)*] $(#[doc = $doc:literal])+ $name:ident = $Type:ident : every $period:literal $period_unit:ident, $band:ident, $budget:literal us; $($rest:tt)*) => {
+        $crate::schedule!(@rows $head [$($done)* { [$($doc)+] $name $Type (every $period $period_unit) (never) $band $budget }] $($rest)*);
+    };
+
+    (@rows [$(#[$meta:meta])* $vis:vis $plan:ident $wiring:ident] [$({ [$($doc:literal)+] $name:ident $Type:ident $trigger:tt $late:tt $band:ident $budget:literal })+]) => {
+        $(#[$meta])*
+        $vis mod $plan {
+            use super::*;
+
+            /// Index of a runnable in the table.
+            #[allow(non_camel_case_types, reason = "a runnable has one spelling everywhere")]
+            #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+            pub enum Id { $($(#[doc = $doc])+ $name),+ }
+
+            /// Number of runnables.
+            pub const COUNT: usize = [$(Id::$name),+].len();
+
+            /// The table itself.
+            pub const ACTIVATIONS: [$crate::ActivationInfo; COUNT] = [$($crate::ActivationInfo {
+                name: stringify!($name),
+                doc: &[$($doc),+],
+                trigger: $crate::schedule!(@trigger $wiring $trigger),
+                at_latest: $crate::schedule!(@late $late),
+                band: $crate::schedule!(@band $band),
+                budget: $crate::__private::Micros($budget),
+            }),+];
+
+            const _: () = {
+                let mut index = 0;
+                while index < COUNT {
+                    if let $crate::Trigger::After(before) = ACTIVATIONS[index].trigger {
+                        assert!(before < index, "`after` may only name a line above");
+                    }
+                    index += 1;
+                }
+            };
+
+            /// Every runnable of one vehicle.
+            pub struct Vehicle<'b> { $($(#[doc = $doc])+ pub $name: $Type<'b>),+ }
+
+            impl $crate::Runnables for Vehicle<'_> {
+                #[inline]
+                fn read(&mut self, index: usize, activation: &mut $crate::Activation) {
+                    $(if index == Id::$name as usize { return $crate::Runnable::read(&mut self.$name, activation) })+
+                }
+                #[inline]
+                fn run(&mut self, index: usize, activation: &mut $crate::Activation) {
+                    $(if index == Id::$name as usize { return $crate::Runnable::run(&mut self.$name, activation) })+
+                }
+            }
+        }
+    };
+
+    (@trigger $wiring:ident (on $($topic:ident)+)) => { $crate::Trigger::On(const {
+        let topics: &[usize] = &[$($wiring::Id::$topic as usize),+];
+        assert!(topics.len() <= $crate::MAX_TRIGGERS, "`on` names too many topics");
+        topics
+    }) };
+    (@trigger $wiring:ident (after $before:ident)) => { $crate::Trigger::After(Id::$before as usize) };
+    (@trigger $wiring:ident (every $period:literal $unit:ident)) => { $crate::Trigger::Every($crate::schedule!(@time $period $unit)) };
+    (@late (never)) => { None };
+    (@late (late $late:literal $unit:ident)) => { Some($crate::schedule!(@time $late $unit)) };
+    (@time $value:literal ms) => { $crate::__private::Micros::from_millis($value) };
+    (@time $value:literal us) => { $crate::__private::Micros($value) };
+    (@band flight) => { $crate::Band::Flight };
+    (@band background) => { $crate::Band::Background };
+}
