@@ -1,0 +1,61 @@
+//! Measurement models, one a file: what a sensor should read in a given state, and how that changes with the state.
+//!
+//! A model returns rows: the predicted reading and the non-zero entries of its Jacobian with respect to the fifteen
+//! error states. Each file derives its Jacobian in a comment and tests it against numerical differentiation.
+
+pub mod baro;
+pub mod flow;
+pub mod gravity;
+pub mod heading;
+pub mod tof;
+
+/// One scalar row of a measurement model with `K` non-zero Jacobian entries (state, value).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row<const K: usize> {
+    /// What the sensor should read.
+    pub predicted: f32,
+    /// Its derivative by the error states.
+    pub jacobian: [(usize, f32); K],
+}
+
+#[cfg(test)]
+pub(crate) mod numeric {
+    //! The check every Jacobian has to pass.
+    use super::Row;
+    use crate::filter::{N, Nominal};
+    use stampfly_types::Vec3;
+
+    /// A state away from every symmetry.
+    pub fn awkward_state() -> Nominal {
+        let mut state = Nominal {
+            position: Vec3::new(0.3, -0.2, -0.8),
+            velocity: Vec3::new(0.4, -0.3, 0.2),
+            gyro_bias: Vec3::new(0.01, -0.02, 0.03),
+            accel_bias: Vec3::new(0.1, 0.05, -0.1),
+            ..Nominal::default()
+        };
+        let mut turn = [0.0; N];
+        turn[6..9].copy_from_slice(&[0.2, -0.25, 0.7]);
+        state.correct(&turn);
+        state
+    }
+
+    /// Compares a row with central differences over all fifteen states.
+    pub fn check<const K: usize>(model: impl Fn(&Nominal) -> Row<K>) {
+        let state = awkward_state();
+        let row = model(&state);
+        for i in 0..N {
+            let step = 1e-2;
+            let shifted = |sign: f32| {
+                let mut by = [0.0; N];
+                by[i] = sign * step;
+                let mut moved = state;
+                moved.correct(&by);
+                model(&moved).predicted
+            };
+            let numeric = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            let stated: f32 = row.jacobian.iter().filter(|(state, _)| *state == i).map(|(_, v)| v).sum();
+            assert!((numeric - stated).abs() < 2e-3, "state {i}: numeric {numeric}, stated {stated}");
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! A complementary filter: gyro for the short run, gravity, range and flow for the long.
+//!
+//! Proves that the estimator can be swapped, and serves where a few hundred bytes and some fifty nanoseconds must do.
+//! It has fixed gains, no covariance, no gates beyond plain limits, and no accelerometer bias: in aggressive flight
+//! its tilt is some degrees worse than the [`Eskf`](crate::Eskf)'s.
+//!
+//! Attitude: Mahony, Hamel, Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE TAC
+//! 53(5), 2008, with the kinematic acceleration of the velocity estimate removed. Height and velocity: third-order
+//! fixed-gain observers.
+
+use crate::estimator::{Estimator, Fusion, Refusal};
+use crate::filter::Nominal;
+use crate::filter::state::{rotate, rotate_back};
+use crate::level::attitude_from_specific_force;
+use stampfly_types::messages::{
+    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
+    StateEstimate, TofData, Validity,
+};
+use stampfly_types::{GRAVITY, Micros, Vec3};
+
+/// Gains of the [`Complementary`] filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ComplementaryConfig {
+    /// Attitude correction by gravity, 1/s.
+    pub gravity_gain: f32,
+    /// Gyro bias correction by gravity, 1/s².
+    pub bias_gain: f32,
+    /// Share of a range's error that goes into height.
+    pub tof_position_gain: f32,
+    /// Share of a range's error that goes into climb rate, 1/s.
+    pub tof_velocity_gain: f32,
+    /// Share of a flow sample's error that goes into velocity.
+    pub flow_gain: f32,
+    /// Share of a flow sample's error that goes into tilt, rad per m/s.
+    pub flow_tilt_gain: f32,
+    /// Distance from the sensor to the ground while standing, m.
+    pub ground_clearance: f32,
+}
+
+impl Default for ComplementaryConfig {
+    fn default() -> Self {
+        Self {
+            gravity_gain: 0.4,
+            bias_gain: 0.02,
+            tof_position_gain: 0.3,
+            tof_velocity_gain: 1.0,
+            flow_gain: 0.04,
+            flow_tilt_gain: 0.002,
+            ground_clearance: 0.03,
+        }
+    }
+}
+
+/// The complementary filter. See the [module](self) documentation and [`Estimator`].
+///
+/// ```
+/// use stampfly_eskf::{Complementary, ComplementaryConfig, Estimator};
+/// use stampfly_types::{Micros, Vec3, messages::{CalibrationResult, ImuData}};
+///
+/// let still = Vec3::new(0.0, 0.0, -9.80665);
+/// let mut filter = Complementary::new(ComplementaryConfig::default());
+/// filter.initialize(Micros::ZERO, &CalibrationResult { specific_force: still, ..Default::default() });
+/// filter.predict(Micros(2_500), &ImuData { accel: still, ..Default::default() });
+/// assert!(filter.estimate().attitude.angle() < 1e-6);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Complementary {
+    config: ComplementaryConfig,
+    state: Nominal,
+    now: Micros,
+    initialized: bool,
+    calibration: CalibrationResult,
+    command: EstimatorCommand,
+    anchor: Option<Vec3>,
+    surface: Option<f32>,
+    rate: Vec3,
+    force: Vec3,
+    tof_fused: Option<Micros>,
+    flow_fused: Option<Micros>,
+    status: EstimatorStatus,
+}
+
+impl Complementary {
+    /// A filter that waits to be initialised.
+    #[must_use]
+    pub fn new(config: ComplementaryConfig) -> Self {
+        Self {
+            config,
+            state: Nominal::default(),
+            now: Micros::ZERO,
+            initialized: false,
+            calibration: CalibrationResult::default(),
+            command: EstimatorCommand::default(),
+            anchor: None,
+            surface: None,
+            rate: Vec3::zeros(),
+            force: Vec3::zeros(),
+            tof_fused: None,
+            flow_fused: None,
+            status: EstimatorStatus::default(),
+        }
+    }
+
+    fn recent(&self, fused: Option<Micros>) -> bool {
+        fused.is_some_and(|at| self.now.since(at) < Micros::from_secs(1))
+    }
+
+    fn turn(&mut self, by: Vec3) {
+        let mut correction = [0.0; crate::filter::N];
+        correction[crate::filter::ATTITUDE..crate::filter::GYRO_BIAS].copy_from_slice(by.as_slice());
+        self.state.correct(&correction);
+    }
+}
+
+impl Estimator for Complementary {
+    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
+        if !calibration.gyro_bias.iter().chain(calibration.specific_force.iter()).all(|v| v.is_finite()) {
+            return;
+        }
+        *self = Self {
+            now: at,
+            initialized: true,
+            calibration: *calibration,
+            command: self.command,
+            anchor: self.command.on_ground.then(Vec3::zeros),
+            ..Self::new(self.config)
+        };
+        self.state.gyro_bias = calibration.gyro_bias;
+        self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
+    }
+
+    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
+        let previous = core::mem::replace(&mut self.command, *command);
+        if command.full_resets != previous.full_resets && self.initialized {
+            let calibration = self.calibration;
+            self.initialize(at, &calibration);
+        }
+        if command.origin_resets != previous.origin_resets {
+            self.surface = self.surface.map(|surface| surface - self.state.position.z);
+            self.state.position = Vec3::zeros();
+            self.state.velocity = Vec3::zeros();
+            self.anchor = None;
+        }
+        match (command.on_ground, self.anchor) {
+            (true, None) => self.anchor = Some(self.state.position),
+            (false, Some(anchor)) => {
+                self.surface.get_or_insert(anchor.z + self.config.ground_clearance);
+                self.anchor = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn predict(&mut self, at: Micros, imu: &ImuData) {
+        let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
+        let dt = at.since(self.now).seconds();
+        if !self.initialized || !usable || dt <= 0.0 {
+            return;
+        }
+        self.now = at;
+        let dt = dt.min(0.5);
+        let motion = self.state.propagate(&imu.accel, &imu.gyro, dt);
+        (self.rate, self.force) = (motion.rate, motion.force);
+        let standing = self.anchor.is_some();
+        if let Some(anchor) = self.anchor {
+            self.state.position = anchor;
+            self.state.velocity = Vec3::zeros();
+        }
+        // In flight over a visible surface flow holds the tilt; otherwise gravity does.
+        if standing || !self.recent(self.flow_fused) {
+            let norm = imu.accel.norm();
+            if (0.8 * GRAVITY..1.2 * GRAVITY).contains(&norm) {
+                let up = rotate_back(&self.state.rotation(), &-Vec3::z());
+                let error = (imu.accel / norm).cross(&up);
+                self.turn(error * (self.config.gravity_gain * dt));
+                self.state.gyro_bias -= error * (self.config.bias_gain * dt);
+                self.status.accel_innovation = error.norm();
+            }
+        }
+        if !self.state.is_finite() {
+            let calibration = self.calibration;
+            self.initialize(at, &calibration);
+            self.status.diverged = true;
+        }
+        self.status.diverged |= self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0;
+    }
+
+    fn fuse_tof(&mut self, _: Micros, tof: &TofData) -> Fusion {
+        let cos_tilt = self.state.rotation()[2][2];
+        if !self.initialized {
+            return Fusion::Refused(Refusal::NotInitialized);
+        }
+        if !tof.valid || !(0.02..=4.0).contains(&tof.distance) {
+            return Fusion::Refused(Refusal::Range);
+        }
+        if cos_tilt < 0.87 {
+            return Fusion::Refused(Refusal::Tilt);
+        }
+        let below = tof.distance * cos_tilt;
+        let surface = *self.surface.get_or_insert(self.state.position.z + below);
+        if let Some(anchor) = self.anchor {
+            self.surface = Some(surface + 0.1 * (anchor.z + below - surface));
+        } else {
+            let error = (surface - below) - self.state.position.z;
+            self.status.tof_innovation = -error;
+            self.state.position.z += self.config.tof_position_gain * error;
+            self.state.velocity.z += self.config.tof_velocity_gain * error;
+        }
+        self.tof_fused = Some(self.now);
+        Fusion::Fused { ratio: 0.0 }
+    }
+
+    fn fuse_flow(&mut self, _: Micros, flow: &FlowData) -> Fusion {
+        if !self.initialized {
+            return Fusion::Refused(Refusal::NotInitialized);
+        }
+        let finite = flow.delta_x.is_finite() && flow.delta_y.is_finite();
+        if !flow.valid || !finite || flow.quality < 25 || !(1e-3..=0.1).contains(&flow.interval) {
+            return Fusion::Refused(Refusal::Quality);
+        }
+        let Some(surface) = self.surface else { return Fusion::Refused(Refusal::Missing) };
+        let rotation = self.state.rotation();
+        let distance = (surface - self.state.position.z) / rotation[2][2].max(0.5);
+        let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
+        let measured = crate::aid::flow::measured_velocity(rate, [self.rate.x, self.rate.y], distance);
+        let body = rotate_back(&rotation, &self.state.velocity);
+        let error = Vec3::new(measured[0] - body.x, measured[1] - body.y, 0.0);
+        self.status.flow_innovation = [error.x, error.y];
+        if self.anchor.is_none() {
+            self.state.velocity += rotate(&rotation, &error) * self.config.flow_gain;
+            // Faster forward than expected means the nose is lower than believed.
+            self.turn(Vec3::new(error.y, -error.x, 0.0) * self.config.flow_tilt_gain);
+        }
+        self.flow_fused = Some(self.now);
+        Fusion::Fused { ratio: 0.0 }
+    }
+
+    fn fuse_baro(&mut self, _: Micros, _: &BaroData) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    fn fuse_mag(&mut self, _: Micros, _: &MagData) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    fn fuse_velocity(&mut self, _: Micros, velocity: &Vec3, _: f32) -> Fusion {
+        if !velocity.iter().all(|v| v.is_finite()) {
+            return Fusion::Refused(Refusal::NotFinite);
+        }
+        self.state.velocity += (velocity - self.state.velocity) * 0.1;
+        self.flow_fused = Some(self.now);
+        Fusion::Fused { ratio: 0.0 }
+    }
+
+    fn estimate(&self) -> StateEstimate {
+        let standing = self.anchor.is_some();
+        let sound = self.initialized && !self.status.diverged;
+        let horizontal = sound && (standing || self.recent(self.flow_fused));
+        let vertical = sound && (standing || self.recent(self.tof_fused));
+        StateEstimate {
+            attitude: self.state.quat(),
+            position: self.state.position,
+            velocity: self.state.velocity,
+            angular_rate: self.rate,
+            specific_force: self.force,
+            gyro_bias: self.state.gyro_bias,
+            accel_bias: self.state.accel_bias,
+            height: self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z,
+            position_std_xy: 0.0,
+            valid: Validity::NONE
+                .set(Validity::TILT | Validity::HEADING, self.initialized)
+                .set(Validity::VELOCITY_XY | Validity::POSITION_XY, horizontal)
+                .set(Validity::VELOCITY_Z | Validity::POSITION_Z, vertical)
+                .set(Validity::HEIGHT, vertical && self.surface.is_some()),
+            sensors: SensorMask::NONE
+                .set(SensorMask::IMU, self.initialized)
+                .set(SensorMask::TOF, self.recent(self.tof_fused))
+                .set(SensorMask::FLOW, self.recent(self.flow_fused))
+                .set(SensorMask::STATIONARY, standing),
+        }
+    }
+
+    fn status(&self) -> EstimatorStatus {
+        self.status
+    }
+}

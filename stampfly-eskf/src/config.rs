@@ -1,0 +1,104 @@
+//! Everything about the error-state Kalman filter that can be tuned, with the reason for each default.
+
+/// Tuning of [`Eskf`](crate::Eskf). One set serves a sensor suite; the defaults are the StampFly's (BMI270, VL53L3CX,
+/// PMW3901, BMP280).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EskfConfig {
+    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for propeller vibration.
+    pub accel_noise: f32,
+    /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
+    pub gyro_noise: f32,
+    /// Gyro bias random walk, rad/s/√s.
+    pub gyro_bias_walk: f32,
+    /// Accelerometer bias random walk, m/s²/√s.
+    pub accel_bias_walk: f32,
+
+    /// First standard deviation of position, m.
+    pub initial_position: f32,
+    /// First standard deviation of velocity, m/s.
+    pub initial_velocity: f32,
+    /// First standard deviation of attitude, rad.
+    pub initial_attitude: f32,
+    /// First standard deviation of the gyro bias after a still-calibration, rad/s.
+    pub initial_gyro_bias: f32,
+    /// First standard deviation of the accelerometer bias, m/s². MEMS start-up biases are 0.1 to 0.4.
+    pub initial_accel_bias: f32,
+
+    /// Standard deviation of a range, m.
+    pub tof_sigma: f32,
+    /// Nearest range used, m.
+    pub tof_min: f32,
+    /// Farthest range used, m.
+    pub tof_max: f32,
+    /// Largest tilt at which the level-surface model holds, as the cosine.
+    pub min_cos_tilt: f32,
+    /// Distance from the sensor to the ground while standing, m: used when the sensor is blind there.
+    pub ground_clearance: f32,
+
+    /// Standard deviation of a flow sample, rad/s: one count in ten milliseconds is 0.22.
+    pub flow_sigma: f32,
+    /// Part of the flow error that grows with speed: scale and distance errors, as a share.
+    pub flow_scale_sigma: f32,
+    /// Smallest surface quality used.
+    pub flow_min_quality: u8,
+    /// Below this distance to the surface flow is not used, m.
+    pub flow_min_distance: f32,
+
+    /// Standard deviation of a barometric altitude, m.
+    pub baro_sigma: f32,
+    /// Use the barometer when the range is missing.
+    pub baro_enable: bool,
+    /// Standard deviation of a magnetic heading, rad.
+    pub mag_sigma: f32,
+    /// Use the magnetometer. Off by default: the StampFly's motor currents bend the field.
+    pub mag_enable: bool,
+
+    /// Standard deviation of the accelerometer as an inclinometer while nothing else holds the tilt, m/s².
+    pub gravity_sigma: f32,
+    /// The same while standing still, m/s².
+    pub still_gravity_sigma: f32,
+    /// Standard deviation of "does not move" while standing, m/s.
+    pub still_velocity_sigma: f32,
+    /// Standard deviation of "is where it started" while standing, m.
+    pub still_position_sigma: f32,
+
+    /// Gates, in standard deviations.
+    pub gate: f32,
+    /// After this long without an accepted sample of a sensor that keeps reporting, the state moves to it, s.
+    pub lockout: f32,
+}
+
+impl Default for EskfConfig {
+    fn default() -> Self {
+        Self {
+            accel_noise: 0.1,
+            gyro_noise: 0.003,
+            gyro_bias_walk: 3e-5,
+            accel_bias_walk: 1e-3,
+            initial_position: 0.01,
+            initial_velocity: 0.05,
+            initial_attitude: 0.05,
+            initial_gyro_bias: 0.003,
+            initial_accel_bias: 0.2,
+            tof_sigma: 0.01,
+            tof_min: 0.02,
+            tof_max: 4.0,
+            min_cos_tilt: 0.8,
+            ground_clearance: 0.03,
+            flow_sigma: 0.1,
+            flow_scale_sigma: 0.05,
+            flow_min_quality: 25,
+            flow_min_distance: 0.02,
+            baro_sigma: 0.3,
+            baro_enable: true,
+            mag_sigma: 0.1,
+            mag_enable: false,
+            gravity_sigma: 1.0,
+            still_gravity_sigma: 0.1,
+            still_velocity_sigma: 0.01,
+            still_position_sigma: 0.005,
+            gate: 4.0,
+            lockout: 0.5,
+        }
+    }
+}

@@ -1,0 +1,650 @@
+//! The error-state Kalman filter as an estimator: which measurement is used when, and what happens when it disagrees.
+//!
+//! The arithmetic lives in [`filter`](crate::filter), the models in [`aid`](crate::aid). Use this for anything that
+//! flies indoors on an inertial sensor, optical flow and a range; use the
+//! [`Complementary`](crate::Complementary) filter where a few hundred bytes must do.
+
+use crate::aid::{self, Row};
+use crate::config::EskfConfig;
+use crate::estimator::{Estimator, Fusion, Refusal};
+use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
+use crate::filter::state::{Motion, Rotation};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Nominal, POSITION, VELOCITY};
+use crate::level::attitude_from_specific_force;
+use stampfly_types::messages::{
+    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
+    StateEstimate, TofData, Validity,
+};
+use stampfly_types::{GRAVITY, Micros, Vec3, math};
+
+/// A sensor counts as taking part this long after its last accepted sample.
+const AIDING_TIMEOUT: Micros = Micros(1_000_000);
+/// Measurements older than this are refused.
+const MAX_DELAY: Micros = Micros(100_000);
+/// Longest inertial step that is integrated; a longer gap is a gap.
+const MAX_STEP: f32 = 0.5;
+/// While standing, the ground is absorbed at every n-th inertial sample.
+const STILL_DIVIDER: u32 = 4;
+
+/// When a sensor was last accepted and last heard of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Aid {
+    heard: Option<Micros>,
+    fused: Option<Micros>,
+    /// Since when it has been refused without a break.
+    gated_since: Option<Micros>,
+}
+
+impl Aid {
+    fn is_recent(&self, now: Micros) -> bool {
+        self.fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
+    }
+}
+
+/// Running mean of inertial samples between two flow samples, or between two looks at gravity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Mean {
+    sum: Vec3,
+    count: f32,
+}
+
+impl Mean {
+    fn add(&mut self, value: &Vec3) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    fn take(&mut self) -> Option<Vec3> {
+        let mean = (self.count > 0.0).then(|| self.sum / self.count);
+        *self = Self::default();
+        mean
+    }
+}
+
+/// The error-state Kalman filter.
+///
+/// ```
+/// use stampfly_eskf::{Eskf, EskfConfig, Estimator};
+/// use stampfly_types::{Micros, Vec3, messages::{CalibrationResult, ImuData, TofData, Validity}};
+///
+/// let still = Vec3::new(0.0, 0.0, -9.80665);
+/// let mut eskf = Eskf::new(EskfConfig::default());
+/// eskf.initialize(Micros::ZERO, &CalibrationResult { specific_force: still, complete: true, ..Default::default() });
+/// for k in 1..=400u64 {
+///     let at = Micros(k * 2_500);
+///     eskf.predict(at, &ImuData { accel: still, ..Default::default() });
+///     if k % 13 == 0 {
+///         eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
+///     }
+/// }
+/// let estimate = eskf.estimate();
+/// assert!(estimate.valid.contains(Validity::HEIGHT));
+/// assert!((estimate.height - 0.5).abs() < 0.01);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Eskf {
+    config: EskfConfig,
+    noise: ProcessNoise,
+    state: Nominal,
+    covariance: Covariance,
+    rotation: Rotation,
+    now: Micros,
+    initialized: bool,
+    calibration: CalibrationResult,
+    command: EstimatorCommand,
+    /// Where the vehicle stands, while it does.
+    anchor: Option<Vec3>,
+    /// World down coordinate of the surface below.
+    surface: Option<f32>,
+    baro_offset: Option<f32>,
+    mag_reference: Option<f32>,
+    steps: u32,
+    imu: ImuData,
+    rate: Vec3,
+    force: Vec3,
+    flow_rates: Mean,
+    accels: Mean,
+    tof: Aid,
+    flow: Aid,
+    baro: Aid,
+    mag: Aid,
+    velocity: Aid,
+    gravity: Aid,
+    status: EstimatorStatus,
+}
+
+/// Position of each sensor in the status message's counters.
+#[derive(Clone, Copy)]
+enum Counter {
+    Tof = 0,
+    Flow = 1,
+    Baro = 2,
+    Mag = 3,
+    Gravity = 4,
+}
+
+impl Eskf {
+    /// A filter that waits to be initialised.
+    #[must_use]
+    pub fn new(config: EskfConfig) -> Self {
+        Self {
+            noise: process_noise(&config),
+            covariance: initial_covariance(&config),
+            config,
+            state: Nominal::default(),
+            rotation: Nominal::default().rotation(),
+            now: Micros::ZERO,
+            initialized: false,
+            calibration: CalibrationResult::default(),
+            command: EstimatorCommand::default(),
+            anchor: None,
+            surface: None,
+            baro_offset: None,
+            mag_reference: None,
+            steps: 0,
+            imu: ImuData::default(),
+            rate: Vec3::zeros(),
+            force: Vec3::zeros(),
+            flow_rates: Mean::default(),
+            accels: Mean::default(),
+            tof: Aid::default(),
+            flow: Aid::default(),
+            baro: Aid::default(),
+            mag: Aid::default(),
+            velocity: Aid::default(),
+            gravity: Aid::default(),
+            status: EstimatorStatus::default(),
+        }
+    }
+
+    /// The covariance of the error state, for consistency checks and plots.
+    #[must_use]
+    pub fn covariance(&self) -> &Covariance {
+        &self.covariance
+    }
+
+    /// The nominal state.
+    #[must_use]
+    pub fn nominal(&self) -> &Nominal {
+        &self.state
+    }
+
+    fn correct(&mut self, projection: &Projection, innovation: f32) {
+        let correction = self.covariance.absorb(projection, innovation);
+        self.state.correct(&correction);
+        self.rotation = self.state.rotation();
+    }
+
+    fn ratio(&self, innovation: f32, variance: f32) -> f32 {
+        innovation * innovation / (self.config.gate * self.config.gate * variance)
+    }
+
+    /// One scalar measurement without a gate: for things that are known, not measured.
+    fn absorb_row<const K: usize>(&mut self, row: Row<K>, measured: f32, sigma: f32) {
+        let projection = self.covariance.project(row.jacobian, sigma * sigma);
+        self.correct(&projection, measured - row.predicted);
+    }
+
+    /// Checks every measurement passes: initialised, finite, neither too old nor from the far future.
+    fn admit(&self, at: Micros, values: &[f32]) -> Result<(), Refusal> {
+        if !self.initialized {
+            return Err(Refusal::NotInitialized);
+        }
+        if !values.iter().all(|v| v.is_finite()) {
+            return Err(Refusal::NotFinite);
+        }
+        if self.now.since(at) > MAX_DELAY || at.since(self.now) > MAX_DELAY {
+            return Err(Refusal::Stale);
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {
+        if let Some(offered) = self.status.offered.get_mut(counter as usize) {
+            *offered = offered.wrapping_add(1);
+        }
+        if matches!(fusion, Fusion::Gated { .. })
+            && let Some(refused) = self.status.refused.get_mut(counter as usize)
+        {
+            *refused = refused.wrapping_add(1);
+        }
+        fusion
+    }
+
+    /// While standing: velocity and position are known, the gyro shows its bias and the accelerometer the tilt.
+    fn absorb_standing(&mut self, anchor: Vec3) {
+        for axis in 0..3 {
+            let velocity = Row { predicted: self.state.velocity[axis], jacobian: [(VELOCITY + axis, 1.0)] };
+            self.absorb_row(velocity, 0.0, self.config.still_velocity_sigma);
+            let position = Row { predicted: self.state.position[axis], jacobian: [(POSITION + axis, 1.0)] };
+            self.absorb_row(position, anchor[axis], self.config.still_position_sigma);
+        }
+    }
+
+    fn absorb_gravity(&mut self, accel: Vec3, sigma: f32) {
+        // The farther from one g, the more it is motion or vibration and the less it is tilt.
+        let excess = accel.norm() - GRAVITY;
+        let variance = sigma * sigma + 10.0 * excess * excess;
+        let rows = aid::gravity::specific_force(&self.state, &self.rotation);
+        let mut worst = 0.0f32;
+        for (axis, row) in rows.iter().enumerate() {
+            let projection = self.covariance.project(row.jacobian, variance);
+            worst = worst.max(self.ratio(accel[axis] - row.predicted, projection.variance));
+        }
+        let predicted = Vec3::new(rows[0].predicted, rows[1].predicted, rows[2].predicted);
+        self.status.accel_innovation = math::acos(accel.dot(&predicted) / (accel.norm() * predicted.norm()).max(1e-3));
+        self.status.accel_ratio = worst;
+        let fusion = if worst <= 1.0 { Fusion::Fused { ratio: worst } } else { Fusion::Gated { ratio: worst } };
+        self.count(Counter::Gravity, fusion);
+        if worst > 1.0 {
+            let since = *self.gravity.gated_since.get_or_insert(self.now);
+            if self.now.since(since).seconds() > 4.0 * self.config.lockout {
+                // It never rights itself otherwise: doubt the attitude until gravity fits in again.
+                for axis in 0..3 {
+                    self.covariance.inflate(ATTITUDE + axis, 0.01);
+                }
+            }
+            return;
+        }
+        self.gravity.gated_since = None;
+        self.gravity.fused = Some(self.now);
+        for axis in 0..3 {
+            let row = aid::gravity::specific_force(&self.state, &self.rotation)[axis];
+            let projection = self.covariance.project(row.jacobian, variance);
+            self.correct(&projection, accel[axis] - row.predicted);
+        }
+    }
+
+    /// Gives up what is not finite and starts again from the last calibration.
+    fn recover(&mut self) {
+        let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
+        self.initialize(at, &calibration);
+        self.status.resets = resets.wrapping_add(1);
+        self.status.diverged = true;
+    }
+
+    fn watch(&mut self) {
+        if !self.state.is_finite() || (self.steps % 128 == 0 && !self.covariance.is_healthy()) {
+            self.recover();
+        } else if self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0 {
+            self.status.diverged = true;
+        }
+    }
+
+    fn holds_velocity(&self) -> bool {
+        self.flow.is_recent(self.now) || self.velocity.is_recent(self.now) || self.anchor.is_some()
+    }
+
+    fn gated(&mut self, aid: impl Fn(&mut Self) -> &mut Aid) -> bool {
+        let now = self.now;
+        let since = *aid(self).gated_since.get_or_insert(now);
+        now.since(since).seconds() > self.config.lockout
+    }
+}
+
+fn process_noise(config: &EskfConfig) -> ProcessNoise {
+    let square = |v: f32| v * v;
+    ProcessNoise {
+        velocity: square(config.accel_noise),
+        attitude: square(config.gyro_noise),
+        gyro_bias: square(config.gyro_bias_walk),
+        accel_bias: square(config.accel_bias_walk),
+    }
+}
+
+fn initial_covariance(config: &EskfConfig) -> Covariance {
+    Covariance::from_sigmas([
+        config.initial_position,
+        config.initial_velocity,
+        config.initial_attitude,
+        config.initial_gyro_bias,
+        config.initial_accel_bias,
+    ])
+}
+
+impl Estimator for Eskf {
+    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
+        let finite = |v: &Vec3| v.iter().all(|x| x.is_finite());
+        if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
+            return;
+        }
+        let fresh = Self::new(self.config);
+        *self = Self { now: at, initialized: true, calibration: *calibration, command: self.command, ..fresh };
+        self.state.gyro_bias = calibration.gyro_bias;
+        self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
+        self.rotation = self.state.rotation();
+        if calibration.field.norm() > 1.0 {
+            self.mag_reference =
+                aid::heading::error(&self.state, &self.rotation, &calibration.field, 0.0).map(|row| row.predicted);
+        }
+        self.anchor = self.command.on_ground.then(Vec3::zeros);
+    }
+
+    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
+        let previous = core::mem::replace(&mut self.command, *command);
+        if command.full_resets != previous.full_resets && self.initialized {
+            let calibration = self.calibration;
+            self.initialize(at, &calibration);
+        }
+        if command.origin_resets != previous.origin_resets {
+            self.surface = self.surface.map(|surface| surface - self.state.position.z);
+            self.baro_offset = self.baro_offset.map(|offset| offset - self.state.position.z);
+            self.state.position = Vec3::zeros();
+            self.state.velocity = Vec3::zeros();
+            for axis in 0..3 {
+                self.covariance.reset(POSITION + axis, self.config.initial_position * self.config.initial_position);
+                self.covariance.reset(VELOCITY + axis, self.config.initial_velocity * self.config.initial_velocity);
+            }
+            self.anchor = None;
+        }
+        match (command.on_ground, self.anchor) {
+            (true, None) => self.anchor = Some(self.state.position),
+            (false, Some(anchor)) => {
+                // Blind on the ground: the surface is one clearance below.
+                self.surface.get_or_insert(anchor.z + self.config.ground_clearance);
+                self.anchor = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn predict(&mut self, at: Micros, imu: &ImuData) {
+        let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
+        let dt = at.since(self.now).seconds();
+        if !self.initialized || !usable || dt <= 0.0 {
+            return;
+        }
+        self.now = at;
+        self.imu = *imu;
+        let motion: Motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
+        self.covariance.propagate(&motion, &self.noise);
+        self.rotation = self.state.rotation();
+        self.rate = motion.rate;
+        self.force = motion.force;
+        self.flow_rates.add(&imu.gyro);
+        self.accels.add(&imu.accel);
+        self.steps = self.steps.wrapping_add(1);
+        if self.steps % STILL_DIVIDER == 0
+            && let Some(accel) = self.accels.take()
+        {
+            if let Some(anchor) = self.anchor {
+                self.absorb_standing(anchor);
+                self.absorb_gravity(accel, self.config.still_gravity_sigma);
+            } else if !self.holds_velocity() {
+                self.absorb_gravity(accel, self.config.gravity_sigma);
+            }
+        }
+        self.watch();
+    }
+
+    fn fuse_tof(&mut self, at: Micros, tof: &TofData) -> Fusion {
+        let fusion = self.try_tof(at, tof).unwrap_or_else(Fusion::Refused);
+        self.count(Counter::Tof, fusion)
+    }
+
+    fn fuse_flow(&mut self, at: Micros, flow: &FlowData) -> Fusion {
+        let fusion = self.try_flow(at, flow).unwrap_or_else(Fusion::Refused);
+        self.count(Counter::Flow, fusion)
+    }
+
+    fn fuse_baro(&mut self, at: Micros, baro: &BaroData) -> Fusion {
+        let fusion = self.try_baro(at, baro).unwrap_or_else(Fusion::Refused);
+        self.count(Counter::Baro, fusion)
+    }
+
+    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion {
+        let fusion = self.try_mag(at, mag).unwrap_or_else(Fusion::Refused);
+        self.count(Counter::Mag, fusion)
+    }
+
+    fn fuse_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Fusion {
+        self.try_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
+    }
+
+    fn estimate(&self) -> StateEstimate {
+        let now = self.now;
+        let standing = self.anchor.is_some();
+        let sound = self.initialized && !self.status.diverged;
+        let horizontal = sound && self.holds_velocity();
+        let vertical =
+            sound && (self.tof.is_recent(now) || self.baro.is_recent(now) || self.velocity.is_recent(now) || standing);
+        let valid = Validity::NONE
+            .set(Validity::TILT, self.initialized)
+            .set(Validity::HEADING, self.initialized)
+            .set(Validity::VELOCITY_XY | Validity::POSITION_XY, horizontal)
+            .set(Validity::VELOCITY_Z | Validity::POSITION_Z, vertical)
+            .set(Validity::HEIGHT, sound && self.surface.is_some() && vertical);
+        let sensors = SensorMask::NONE
+            .set(SensorMask::IMU, self.initialized)
+            .set(SensorMask::TOF, self.tof.is_recent(now))
+            .set(SensorMask::FLOW, self.flow.is_recent(now))
+            .set(SensorMask::BARO, self.baro.is_recent(now))
+            .set(SensorMask::MAG, self.mag.is_recent(now))
+            .set(SensorMask::ACCEL_ATTITUDE, self.gravity.is_recent(now))
+            .set(SensorMask::STATIONARY, standing)
+            .set(SensorMask::EXTERNAL, self.velocity.is_recent(now));
+        let p = &self.covariance;
+        StateEstimate {
+            attitude: self.state.quat(),
+            position: self.state.position,
+            velocity: self.state.velocity,
+            angular_rate: self.rate,
+            specific_force: self.force,
+            gyro_bias: self.state.gyro_bias,
+            accel_bias: self.state.accel_bias,
+            height: self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z,
+            position_std_xy: math::sqrt(p.get(POSITION, POSITION) + p.get(POSITION + 1, POSITION + 1)),
+            valid,
+            sensors,
+        }
+    }
+
+    fn status(&self) -> EstimatorStatus {
+        self.status
+    }
+}
+
+impl Eskf {
+    fn try_tof(&mut self, at: Micros, tof: &TofData) -> Result<Fusion, Refusal> {
+        self.admit(at, &[tof.distance])?;
+        self.tof.heard = Some(self.now);
+        if !tof.valid {
+            return Err(Refusal::Quality);
+        }
+        if !(self.config.tof_min..=self.config.tof_max).contains(&tof.distance) {
+            return Err(Refusal::Range);
+        }
+        if self.rotation[2][2] < self.config.min_cos_tilt {
+            return Err(Refusal::Tilt);
+        }
+        let below = tof.distance * self.rotation[2][2];
+        if let Some(anchor) = self.anchor {
+            // Standing: the range says how far below the sensor the ground is, not where the vehicle is.
+            let seen = anchor.z + below;
+            self.surface = Some(self.surface.map_or(seen, |surface| surface + 0.1 * (seen - surface)));
+            self.tof.fused = Some(self.now);
+            return Ok(Fusion::Fused { ratio: 0.0 });
+        }
+        let surface = *self.surface.get_or_insert(self.state.position.z + below);
+        let delay = self.now.since(at).seconds();
+        let row = aid::tof::range(&self.state, &self.rotation, surface, delay);
+        let sigma = self.config.tof_sigma.max(tof.sigma);
+        let projection = self.covariance.project(row.jacobian, sigma * sigma);
+        let innovation = tof.distance - row.predicted;
+        let ratio = self.ratio(innovation, projection.variance);
+        self.status.tof_innovation = innovation;
+        self.status.tof_ratio = ratio;
+        if ratio > 1.0 {
+            if self.gated(|s| &mut s.tof) {
+                self.state.position.z = surface - below;
+                self.covariance.reset(POSITION + 2, 4.0 * sigma * sigma);
+                self.tof = Aid { heard: Some(self.now), fused: Some(self.now), gated_since: None };
+                self.status.resets = self.status.resets.wrapping_add(1);
+                return Ok(Fusion::Reset);
+            }
+            return Ok(Fusion::Gated { ratio });
+        }
+        self.correct(&projection, innovation);
+        self.tof.fused = Some(self.now);
+        self.tof.gated_since = None;
+        Ok(Fusion::Fused { ratio })
+    }
+
+    fn try_flow(&mut self, at: Micros, flow: &FlowData) -> Result<Fusion, Refusal> {
+        let rates = self.flow_rates.take();
+        self.admit(at, &[flow.delta_x, flow.delta_y, flow.interval])?;
+        self.flow.heard = Some(self.now);
+        if !flow.valid || flow.quality < self.config.flow_min_quality {
+            return Err(Refusal::Quality);
+        }
+        if !(1e-3..=0.1).contains(&flow.interval) {
+            return Err(Refusal::Range);
+        }
+        if self.rotation[2][2] < self.config.min_cos_tilt {
+            return Err(Refusal::Tilt);
+        }
+        let surface = self.surface.ok_or(Refusal::Missing)?;
+        let distance = (surface - self.state.position.z) / self.rotation[2][2];
+        if distance < self.config.flow_min_distance {
+            return Err(Refusal::Range);
+        }
+        let raw = rates.unwrap_or(self.imu.gyro);
+        let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
+        let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
+        let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance);
+        let scale = self.config.flow_scale_sigma;
+        let variance = |row: &Row<6>| {
+            let (base, speed) = (self.config.flow_sigma * distance, scale * row.predicted);
+            base * base + speed * speed
+        };
+        let variances = [variance(&rows[0]), variance(&rows[1])];
+        // Both axes pass or neither does: a single axis locked out drifts unnoticed.
+        let first = self.covariance.project(rows[0].jacobian, variances[0]);
+        let second = self.covariance.project(rows[1].jacobian, variances[1]);
+        let innovation = [measured[0] - rows[0].predicted, measured[1] - rows[1].predicted];
+        let ratio = self.ratio(innovation[0], first.variance).max(self.ratio(innovation[1], second.variance));
+        self.status.flow_innovation = innovation;
+        self.status.flow_ratio = ratio;
+        if ratio > 1.0 {
+            if self.gated(|s| &mut s.flow) {
+                let body = Vec3::new(measured[0], measured[1], 0.0);
+                let world = crate::filter::state::rotate(&self.rotation, &body);
+                self.state.velocity.x = world.x;
+                self.state.velocity.y = world.y;
+                for axis in 0..2 {
+                    self.covariance.reset(VELOCITY + axis, 4.0 * variances[axis] + 0.01);
+                    self.covariance.inflate(ATTITUDE + axis, 0.01);
+                    self.covariance.inflate(ACCEL_BIAS + axis, 0.01);
+                    self.covariance.inflate(GYRO_BIAS + axis, 1e-5);
+                }
+                self.flow = Aid { heard: Some(self.now), fused: Some(self.now), gated_since: None };
+                self.status.resets = self.status.resets.wrapping_add(1);
+                return Ok(Fusion::Reset);
+            }
+            return Ok(Fusion::Gated { ratio });
+        }
+        self.correct(&first, innovation[0]);
+        let row = aid::flow::body_velocity(&self.state, &self.rotation, distance)[1];
+        let projection = self.covariance.project(row.jacobian, variances[1]);
+        self.correct(&projection, measured[1] - row.predicted);
+        self.flow.fused = Some(self.now);
+        self.flow.gated_since = None;
+        Ok(Fusion::Fused { ratio })
+    }
+
+    fn try_baro(&mut self, at: Micros, baro: &BaroData) -> Result<Fusion, Refusal> {
+        self.admit(at, &[baro.altitude])?;
+        self.baro.heard = Some(self.now);
+        if !self.config.baro_enable {
+            return Err(Refusal::NotUsed);
+        }
+        let here = baro.altitude + self.state.position.z;
+        if self.anchor.is_some() || self.tof.is_recent(self.now) {
+            // A better height is at hand: only learn where the barometer's zero has drifted to.
+            self.baro_offset = Some(self.baro_offset.map_or(here, |offset| offset + 0.05 * (here - offset)));
+            return Err(Refusal::NotUsed);
+        }
+        let offset = *self.baro_offset.get_or_insert(here);
+        let row = aid::baro::altitude(&self.state, offset);
+        let projection = self.covariance.project(row.jacobian, self.config.baro_sigma * self.config.baro_sigma);
+        let innovation = baro.altitude - row.predicted;
+        let ratio = self.ratio(innovation, projection.variance);
+        self.status.baro_innovation = innovation;
+        self.status.baro_ratio = ratio;
+        if ratio > 1.0 {
+            if self.gated(|s| &mut s.baro) {
+                self.baro_offset = Some(here);
+                self.baro.gated_since = None;
+                return Ok(Fusion::Reset);
+            }
+            return Ok(Fusion::Gated { ratio });
+        }
+        self.correct(&projection, innovation);
+        self.baro.fused = Some(self.now);
+        self.baro.gated_since = None;
+        Ok(Fusion::Fused { ratio })
+    }
+
+    fn try_mag(&mut self, at: Micros, mag: &MagData) -> Result<Fusion, Refusal> {
+        self.admit(at, mag.field.as_slice())?;
+        self.mag.heard = Some(self.now);
+        if !self.config.mag_enable {
+            return Err(Refusal::NotUsed);
+        }
+        if !(10.0..=100.0).contains(&mag.field.norm()) {
+            return Err(Refusal::Range);
+        }
+        let reference = self.mag_reference.ok_or(Refusal::Missing)?;
+        let row = aid::heading::error(&self.state, &self.rotation, &mag.field, reference).ok_or(Refusal::Range)?;
+        let projection = self.covariance.project(row.jacobian, self.config.mag_sigma * self.config.mag_sigma);
+        let innovation = -row.predicted;
+        let ratio = self.ratio(innovation, projection.variance);
+        self.status.mag_innovation = innovation;
+        self.status.mag_ratio = ratio;
+        if ratio > 1.0 {
+            if self.gated(|s| &mut s.mag) {
+                // The heading is nobody else's to hold: doubt it until the field fits in again.
+                for axis in 0..3 {
+                    self.covariance.inflate(ATTITUDE + axis, 0.1 * self.rotation[2][axis] * self.rotation[2][axis]);
+                }
+            }
+            return Ok(Fusion::Gated { ratio });
+        }
+        self.correct(&projection, innovation);
+        self.mag.fused = Some(self.now);
+        self.mag.gated_since = None;
+        Ok(Fusion::Fused { ratio })
+    }
+
+    fn try_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
+        self.admit(at, &[velocity.x, velocity.y, velocity.z, sigma])?;
+        self.velocity.heard = Some(self.now);
+        let variance = (sigma * sigma).max(1e-6);
+        let mut ratio = 0.0f32;
+        for axis in 0..3 {
+            let projection = self.covariance.project([(VELOCITY + axis, 1.0)], variance);
+            ratio = ratio.max(self.ratio(velocity[axis] - self.state.velocity[axis], projection.variance));
+        }
+        if ratio > 1.0 {
+            if self.gated(|s| &mut s.velocity) {
+                self.state.velocity = *velocity;
+                for axis in 0..3 {
+                    self.covariance.reset(VELOCITY + axis, 4.0 * variance);
+                    self.covariance.inflate(ATTITUDE + axis, 0.01);
+                }
+                self.velocity = Aid { heard: Some(self.now), fused: Some(self.now), gated_since: None };
+                self.status.resets = self.status.resets.wrapping_add(1);
+                return Ok(Fusion::Reset);
+            }
+            return Ok(Fusion::Gated { ratio });
+        }
+        for axis in 0..3 {
+            let projection = self.covariance.project([(VELOCITY + axis, 1.0)], variance);
+            let innovation = velocity[axis] - self.state.velocity[axis];
+            self.correct(&projection, innovation);
+        }
+        self.velocity.fused = Some(self.now);
+        self.velocity.gated_since = None;
+        Ok(Fusion::Fused { ratio })
+    }
+}

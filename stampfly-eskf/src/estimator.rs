@@ -1,0 +1,99 @@
+//! What every estimator of the family offers, and what it answers when it is given a measurement.
+
+use stampfly_types::messages::{
+    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, StateEstimate, TofData,
+};
+use stampfly_types::{Micros, Vec3};
+
+/// What became of a measurement.
+///
+/// The test ratio is innovation² / (gate² · innovation variance): at one the measurement sits on the gate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fusion {
+    /// It went into the estimate.
+    Fused {
+        /// Its test ratio, at most one.
+        ratio: f32,
+    },
+    /// It disagrees with the estimate and was left out.
+    Gated {
+        /// Its test ratio, above one.
+        ratio: f32,
+    },
+    /// It disagreed for so long that the estimate was moved to it.
+    Reset,
+    /// It was not looked at.
+    Refused(Refusal),
+}
+
+/// Why a measurement was not looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The estimator has not been initialised.
+    NotInitialized,
+    /// The driver does not vouch for it, or its quality is too low.
+    Quality,
+    /// A number in it is not finite.
+    NotFinite,
+    /// Outside the sensor's range.
+    Range,
+    /// The vehicle is tilted too far for the sensor's model.
+    Tilt,
+    /// Older than the estimator can still use, or not newer than the last one.
+    Stale,
+    /// Something the model needs is not known (no height for flow, no reference for the magnetometer).
+    Missing,
+    /// This estimator has no use for this sensor, or it is switched off.
+    NotUsed,
+}
+
+impl Fusion {
+    /// Did the measurement change the estimate?
+    #[must_use]
+    pub const fn is_fused(self) -> bool {
+        matches!(self, Self::Fused { .. } | Self::Reset)
+    }
+}
+
+/// An estimator of a vehicle's state.
+///
+/// # Timing
+/// Call [`predict`](Self::predict) for every inertial sample in order, and the `fuse_` functions for other samples
+/// as they arrive, after the inertial sample they follow. Time is an argument: `at` is the instant a sample is valid
+/// for.
+///
+/// # Honesty
+/// [`estimate`](Self::estimate) marks every output that may not be used. Input that is not finite never reaches the
+/// state.
+pub trait Estimator {
+    /// Starts, or starts again, from a still-calibration. Position and velocity become zero.
+    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult);
+
+    /// Obeys the mode machine.
+    fn command(&mut self, at: Micros, command: &EstimatorCommand);
+
+    /// Moves the estimate to `at` with an inertial sample.
+    fn predict(&mut self, at: Micros, imu: &ImuData);
+
+    /// Uses a range to the ground.
+    fn fuse_tof(&mut self, at: Micros, tof: &TofData) -> Fusion;
+
+    /// Uses optical flow.
+    fn fuse_flow(&mut self, at: Micros, flow: &FlowData) -> Fusion;
+
+    /// Uses a barometric altitude.
+    fn fuse_baro(&mut self, at: Micros, baro: &BaroData) -> Fusion;
+
+    /// Uses a magnetic field.
+    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion;
+
+    /// Uses a velocity measured from outside, world NED, with one standard deviation per axis in m/s.
+    fn fuse_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Fusion;
+
+    /// The state, with a validity per output.
+    fn estimate(&self) -> StateEstimate;
+
+    /// How the measurements fared.
+    fn status(&self) -> EstimatorStatus;
+}

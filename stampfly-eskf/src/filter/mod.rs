@@ -1,0 +1,28 @@
+//! The arithmetic of an error-state Kalman filter with fifteen states, and nothing else: no sensors, no gates.
+//!
+//! Error states, in order: position (world), velocity (world), attitude (body, right perturbation), gyro bias,
+//! accelerometer bias. The nominal state is `position`, `velocity`, a quaternion and the two biases. Equations: Solà,
+//! "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, sections 5 and 7, for errors in the
+//! body frame.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`state`] | nominal state, small rotations, injection of a correction |
+//! | [`covariance`] | storage, propagation, scalar update |
+
+pub mod covariance;
+pub mod state;
+
+pub use covariance::{Covariance, N};
+pub use state::Nominal;
+
+/// Index of the first position error state.
+pub const POSITION: usize = 0;
+/// Index of the first velocity error state.
+pub const VELOCITY: usize = 3;
+/// Index of the first attitude error state.
+pub const ATTITUDE: usize = 6;
+/// Index of the first gyro bias error state.
+pub const GYRO_BIAS: usize = 9;
+/// Index of the first accelerometer bias error state.
+pub const ACCEL_BIAS: usize = 12;

@@ -1,0 +1,197 @@
+//! The nominal state and how it moves.
+
+use super::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
+use stampfly_types::{GRAVITY, Quat, Vec3};
+
+/// The nominal state: what the filter believes, without its doubt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nominal {
+    /// World NED, m.
+    pub position: Vec3,
+    /// World NED, m/s.
+    pub velocity: Vec3,
+    /// Body → world, as w, x, y, z.
+    pub attitude: [f32; 4],
+    /// Body, rad/s.
+    pub gyro_bias: Vec3,
+    /// Body, m/s².
+    pub accel_bias: Vec3,
+}
+
+impl Default for Nominal {
+    fn default() -> Self {
+        Self {
+            position: Vec3::zeros(),
+            velocity: Vec3::zeros(),
+            attitude: [1.0, 0.0, 0.0, 0.0],
+            gyro_bias: Vec3::zeros(),
+            accel_bias: Vec3::zeros(),
+        }
+    }
+}
+
+/// A rotation matrix in row order, body → world.
+pub type Rotation = [[f32; 3]; 3];
+
+/// What a propagation step used: the covariance needs the same numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion {
+    /// Attitude in the middle of the step.
+    pub rotation: Rotation,
+    /// Specific force without bias, body.
+    pub force: Vec3,
+    /// Angular rate without bias, body.
+    pub rate: Vec3,
+    /// Length of the step, s.
+    pub dt: f32,
+}
+
+impl Nominal {
+    /// Moves the state by one inertial sample: attitude by half a step, velocity and position with that attitude,
+    /// attitude by the other half. Second order in `dt`.
+    #[inline]
+    pub fn propagate(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) -> Motion {
+        let force = accel - self.accel_bias;
+        let rate = gyro - self.gyro_bias;
+        let half = small_rotation([rate.x * 0.5 * dt, rate.y * 0.5 * dt, rate.z * 0.5 * dt]);
+        let middle = multiply(self.attitude, half);
+        let rotation = rotation_matrix(middle);
+        let mut acceleration = rotate(&rotation, &force);
+        acceleration.z += GRAVITY;
+        self.position += (self.velocity + acceleration * (0.5 * dt)) * dt;
+        self.velocity += acceleration * dt;
+        self.attitude = normalize(multiply(middle, half));
+        Motion { rotation, force, rate, dt }
+    }
+
+    /// Adds an error-state correction to the nominal state.
+    #[inline]
+    pub fn correct(&mut self, correction: &[f32; N]) {
+        let at = |first: usize| Vec3::new(correction[first], correction[first + 1], correction[first + 2]);
+        self.position += at(POSITION);
+        self.velocity += at(VELOCITY);
+        self.gyro_bias += at(GYRO_BIAS);
+        self.accel_bias += at(ACCEL_BIAS);
+        let turn = [correction[ATTITUDE], correction[ATTITUDE + 1], correction[ATTITUDE + 2]];
+        self.attitude = normalize(multiply(self.attitude, small_rotation(turn)));
+    }
+
+    /// The attitude as a matrix, body → world.
+    #[inline]
+    #[must_use]
+    pub fn rotation(&self) -> Rotation {
+        rotation_matrix(self.attitude)
+    }
+
+    /// The attitude as the family's quaternion type.
+    #[must_use]
+    pub fn quat(&self) -> Quat {
+        let [w, x, y, z] = self.attitude;
+        Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z))
+    }
+
+    /// Is every number finite?
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        let sum = self.position.sum() + self.velocity.sum() + self.gyro_bias.sum() + self.accel_bias.sum();
+        (sum + self.attitude.iter().sum::<f32>()).is_finite()
+    }
+}
+
+/// World = matrix · body.
+#[inline]
+#[must_use]
+pub fn rotate(rotation: &Rotation, body: &Vec3) -> Vec3 {
+    let row = |r: &[f32; 3]| r[0] * body.x + r[1] * body.y + r[2] * body.z;
+    Vec3::new(row(&rotation[0]), row(&rotation[1]), row(&rotation[2]))
+}
+
+/// Body = matrixᵀ · world.
+#[inline]
+#[must_use]
+pub fn rotate_back(rotation: &Rotation, world: &Vec3) -> Vec3 {
+    let column = |c: usize| rotation[0][c] * world.x + rotation[1][c] * world.y + rotation[2][c] * world.z;
+    Vec3::new(column(0), column(1), column(2))
+}
+
+#[inline]
+fn rotation_matrix([w, x, y, z]: [f32; 4]) -> Rotation {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+#[inline]
+fn multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+/// The quaternion of a rotation vector, by its series to fourth order: exact to `f32` below 0.3 rad and still a
+/// proper rotation above, after normalisation. No transcendental in the 400 Hz path.
+#[inline]
+fn small_rotation([x, y, z]: [f32; 3]) -> [f32; 4] {
+    let (x, y, z) = (0.5 * x, 0.5 * y, 0.5 * z);
+    let square = x * x + y * y + z * z;
+    let scale = 1.0 - square * (1.0 / 6.0) * (1.0 - square * (1.0 / 20.0));
+    let real = 1.0 - square * 0.5 * (1.0 - square * (1.0 / 12.0));
+    [real, x * scale, y * scale, z * scale]
+}
+
+/// One Newton step towards unit length; falls back to a square root when far away.
+#[inline]
+fn normalize(q: [f32; 4]) -> [f32; 4] {
+    let square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    let off = square - 1.0;
+    let scale =
+        if off.abs() < 1e-3 { 1.0 - 0.5 * off + 0.375 * off * off } else { 1.0 / stampfly_types::math::sqrt(square) };
+    q.map(|v| v * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn attitude_follows_the_exact_exponential(x in -0.3f32..0.3, y in -0.3f32..0.3, z in -0.3f32..0.3) {
+            let exact = Quat::from_scaled_axis(Vec3::new(x, y, z));
+            let series = normalize(small_rotation([x, y, z]));
+            for (a, b) in series.iter().zip([exact.w, exact.i, exact.j, exact.k]) {
+                prop_assert!((a - b).abs() < 1e-6);
+            }
+        }
+
+        #[test]
+        fn quaternion_stays_unit(rates in prop::collection::vec((-35f32..35.0, -35f32..35.0, -35f32..35.0), 1..200)) {
+            let mut state = Nominal::default();
+            for (x, y, z) in rates {
+                state.propagate(&Vec3::new(0.0, 0.0, -9.8), &Vec3::new(x, y, z), 0.0025);
+            }
+            let norm: f32 = state.attitude.iter().map(|v| v * v).sum();
+            prop_assert!((norm - 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn free_fall_and_rest() {
+        let mut state = Nominal::default();
+        for _ in 0..400 {
+            state.propagate(&Vec3::zeros(), &Vec3::zeros(), 0.0025);
+        }
+        assert!((state.velocity.z - GRAVITY).abs() < 1e-3);
+        assert!((state.position.z - 0.5 * GRAVITY).abs() < 1e-3);
+        let mut state = Nominal::default();
+        for _ in 0..400 {
+            state.propagate(&Vec3::new(0.0, 0.0, -GRAVITY), &Vec3::zeros(), 0.0025);
+        }
+        assert_eq!(state.velocity, Vec3::zeros());
+    }
+}

@@ -1,0 +1,27 @@
+//! State estimation for small vehicles.
+//!
+//! | estimator | use it for | size | not for |
+//! |---|---|---|---|
+//! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture | 1.5 kB | – |
+//! | [`Complementary`] | the same where memory and time are short | 0.4 kB | aggressive flight |
+//!
+//! Both implement [`Estimator`], need no allocation and no other crate of the family than `stampfly-types`, and
+//! give the same bits on every machine.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod aid;
+mod complementary;
+mod config;
+mod eskf;
+mod estimator;
+pub mod filter;
+mod level;
+
+pub use complementary::{Complementary, ComplementaryConfig};
+pub use config::EskfConfig;
+pub use eskf::Eskf;
+pub use estimator::{Estimator, Fusion, Refusal};
+pub use level::attitude_from_specific_force;
