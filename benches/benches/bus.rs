@@ -1,0 +1,128 @@
+//! One publish and one read of the IMU message: the bus beside its peers, interleaved in one run.
+//!
+//! `heapless::spsc` moves a value to one reader and no further; `embassy-sync`'s `Watch` and `PubSubChannel` offer
+//! several readers under a critical section. The last lines print the ratios of the medians of seven interleaved
+//! rounds, which is the figure to quote: single rounds vary with whatever else the machine does.
+
+use criterion::{Criterion, criterion_group};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::pubsub::{PubSubChannel, WaitResult};
+use embassy_sync::watch::Watch;
+use heapless::spsc;
+use stampfly_bus::topics;
+use stampfly_types::messages::ImuData;
+use stampfly_types::{Micros, Vec3};
+use std::hint::black_box;
+use std::time::Instant;
+
+topics! {
+    /// What is measured.
+    pub mod wiring;
+    /// A sample.
+    sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe];
+    /// The newest sample.
+    newest_imu: ImuData = latest @ 400 Hz from imu => [estimation];
+}
+
+type Timed = (Micros, ImuData);
+
+fn sample(seed: u64) -> ImuData {
+    let x = seed as f32 * 1e-3;
+    ImuData { accel: Vec3::new(x, -x, -9.81), gyro: Vec3::new(0.5 * x, x, -x), temperature: 25.0 }
+}
+
+/// Runs `each` with every contender's publish-and-read, in turn.
+fn contenders(mut each: impl FnMut(&'static str, &mut dyn FnMut(u64) -> f32)) {
+    let mut bus = wiring::Bus::new();
+    let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu }, .. } = bus.split(None);
+    let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
+    each("stampfly-bus ring", &mut |k| {
+        tx.publish(Micros(k), &sample(k));
+        rx.next().map_or(0.0, |s| s.data.gyro.x)
+    });
+
+    let (mut tx, mut rx) = (newest_imu.tx, newest_imu.estimation);
+    each("stampfly-bus latest", &mut |k| {
+        tx.publish(Micros(k), &sample(k));
+        rx.latest().map_or(0.0, |s| s.data.gyro.x)
+    });
+
+    let mut queue: spsc::Queue<Timed, 16> = spsc::Queue::new();
+    let (mut producer, mut consumer) = queue.split();
+    each("heapless spsc", &mut |k| {
+        let _ = producer.enqueue((Micros(k), sample(k)));
+        consumer.dequeue().map_or(0.0, |s| s.1.gyro.x)
+    });
+
+    let watch: Watch<CriticalSectionRawMutex, Timed, 2> = Watch::new();
+    let (sender, mut receiver) = (watch.sender(), watch.receiver().expect("two receivers"));
+    each("embassy-sync Watch", &mut |k| {
+        sender.send((Micros(k), sample(k)));
+        receiver.try_changed().map_or(0.0, |s| s.1.gyro.x)
+    });
+
+    let channel: PubSubChannel<CriticalSectionRawMutex, Timed, 16, 2, 1> = PubSubChannel::new();
+    let publisher = channel.publisher().expect("one publisher");
+    let mut subscriber = channel.subscriber().expect("two subscribers");
+    each("embassy-sync PubSubChannel", &mut |k| {
+        publisher.publish_immediate((Micros(k), sample(k)));
+        match subscriber.try_next_message() {
+            Some(WaitResult::Message(s)) => s.1.gyro.x,
+            _ => 0.0,
+        }
+    });
+}
+
+fn bench(c: &mut Criterion) {
+    let mut group = c.benchmark_group("publish and read one IMU message");
+    contenders(|name, round| {
+        let mut k = 0;
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                k += 1;
+                black_box(round(black_box(k)))
+            });
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, bench);
+
+/// Medians over seven interleaved rounds, as ratios to the first peer.
+fn ratios() {
+    const ROUNDS: usize = 7;
+    const CALLS: u64 = 2_000_000;
+    let mut times: Vec<(&'static str, Vec<f64>)> = Vec::new();
+    for _ in 0..ROUNDS {
+        contenders(|name, round| {
+            let started = Instant::now();
+            for k in 1..=CALLS {
+                black_box(round(black_box(k)));
+            }
+            let nanoseconds = started.elapsed().as_secs_f64() * 1e9 / CALLS as f64;
+            match times.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, list)) => list.push(nanoseconds),
+                None => times.push((name, vec![nanoseconds])),
+            }
+        });
+    }
+    let medians: Vec<(&str, f64)> = times
+        .iter_mut()
+        .map(|(name, list)| {
+            list.sort_by(f64::total_cmp);
+            (*name, list[ROUNDS / 2])
+        })
+        .collect();
+    let ours = medians[0].1;
+    println!("\nmedian of {ROUNDS} interleaved rounds of {CALLS} calls");
+    for (name, time) in &medians {
+        println!("{name:<28} {time:>7.2} ns   ring / this = {:.2}", ours / time);
+    }
+}
+
+fn main() {
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+    ratios();
+}
