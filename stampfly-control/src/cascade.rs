@@ -1,0 +1,272 @@
+//! The default controller: a cascade of loops, each one file.
+//!
+//! ```text
+//! set-point ─► position ─► acceleration ─┐
+//! set-point ─► altitude ─► thrust        ├─► attitude ─► body rate ─► torque
+//! sticks ────────────────► lean, rates ──┘
+//! ```
+//!
+//! All loops run every step. The path's derivatives are fed forward at every level they reach (velocity, acceleration,
+//! and the rate at which the acceleration turns the vehicle), so that following a path needs no error to begin with.
+
+use stampfly_types::messages::ControlOutput;
+use stampfly_types::{GRAVITY, Micros, Vec3, math};
+
+use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
+use crate::attitude::{self, AttitudeConfig};
+use crate::controller::{ControlInput, Controller};
+use crate::intent::{Heading, Horizontal, Intent, Vertical};
+use crate::position::{PositionConfig, PositionController};
+use crate::rate::{RateConfig, RateController};
+use crate::timing::StepTimer;
+
+/// Gains and limits of all loops. The default is the StampFly.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CascadeConfig {
+    /// Body rate.
+    pub rate: RateConfig,
+    /// Attitude.
+    pub attitude: AttitudeConfig,
+    /// Horizontal position and velocity.
+    pub position: PositionConfig,
+    /// Height, climb and thrust.
+    pub altitude: AltitudeConfig,
+    /// What full stick means.
+    pub sticks: StickConfig,
+}
+
+/// What full stick means in the modes that command angles or rates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StickConfig {
+    /// Lean at full stick, rad.
+    pub lean_max: f32,
+    /// Roll and pitch rate at full stick, rad/s.
+    pub tilt_rate_max: f32,
+    /// Yaw rate at full stick, rad/s.
+    pub yaw_rate_max: f32,
+}
+
+impl Default for StickConfig {
+    fn default() -> Self {
+        Self { lean_max: 0.52, tilt_rate_max: 4.0, yaw_rate_max: 2.5 }
+    }
+}
+
+/// Below this throttle a vehicle under manual thrust that stands on the ground has its motors off.
+const THROTTLE_OFF: f32 = 0.03;
+
+/// The cascade.
+///
+/// ```
+/// use stampfly_control::{CascadeController, ControlInput, Controller};
+/// use stampfly_types::messages::*;
+/// use stampfly_types::{Micros, Vec3};
+///
+/// let mut controller = CascadeController::default();
+/// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
+/// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+/// let status = VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
+/// let setpoint = Setpoint {
+///     position: Vec3::new(1.0, 0.0, 0.0),
+///     axes: SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW,
+///     ..Default::default()
+/// };
+/// let input = ControlInput {
+///     estimate: &estimate, command: &CommandSetpoint::default(), setpoint: &setpoint, mode: &mode, status: &status,
+///     unmet: [0.0; 4],
+/// };
+/// let output = controller.step(Micros(2_500), &input);
+/// assert!(output.torque.y < 0.0, "nose down to fly forward");
+/// assert!(output.thrust > 0.3, "about its weight");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct CascadeController {
+    attitude: AttitudeConfig,
+    sticks: StickConfig,
+    tan_tilt_max: f32,
+    sin_lean_max: f32,
+    rate: RateController,
+    position: PositionController,
+    altitude: AltitudeController,
+    timer: StepTimer,
+    resets: u32,
+    /// The path's acceleration one step ago, while a path is followed: its difference is the path's jerk.
+    path: Option<Vec3>,
+}
+
+impl Default for CascadeController {
+    fn default() -> Self {
+        Self::new(&CascadeConfig::default())
+    }
+}
+
+impl CascadeController {
+    /// A cascade at rest.
+    #[must_use]
+    pub fn new(config: &CascadeConfig) -> Self {
+        Self {
+            attitude: config.attitude,
+            sticks: config.sticks,
+            tan_tilt_max: math::tan(config.position.tilt_max),
+            sin_lean_max: math::sin(config.sticks.lean_max),
+            rate: RateController::new(&config.rate),
+            position: PositionController::new(&config.position),
+            altitude: AltitudeController::new(&config.altitude),
+            timer: StepTimer::default(),
+            resets: 0,
+            path: None,
+        }
+    }
+
+    /// Thrust at hover as learned so far, N.
+    #[must_use]
+    pub fn hover_thrust(&self) -> f32 {
+        self.altitude.hover_thrust()
+    }
+
+    fn thrust(&mut self, intent: &Intent, input: &ControlInput<'_>, cos_tilt: f32, dt: f32) -> f32 {
+        let limits = ThrustLimits {
+            ceiling: input.status.thrust_ceiling,
+            unmet: input.unmet[3],
+            learn: !intent.grounded && input.status.thrust_ceiling > 1.0,
+            // While taking off the ground carries what thrust does not: the integral must be free to find the weight.
+            hold: intent.grounded && input.mode.state != stampfly_types::messages::FlightState::TakeOff,
+        };
+        let (path, estimate) = (input.setpoint, input.estimate);
+        let climb = Climb {
+            error: path.position.z - estimate.position.z,
+            target: path.velocity.z,
+            acceleration: path.acceleration.z,
+            velocity: estimate.velocity.z,
+            cos_tilt,
+        };
+        match intent.vertical {
+            Vertical::Path => self.altitude.step(&climb, &limits, dt),
+            Vertical::Velocity => self.altitude.step(&Climb { error: 0.0, ..climb }, &limits, dt),
+            Vertical::Throttle(throttle) => self.altitude.manual(throttle),
+            Vertical::Descend => self.altitude.descend(&limits),
+        }
+    }
+
+    /// The body's z axis that pushes as asked, in the world frame, and the rate at which the path turns it.
+    fn down_axis(&mut self, intent: &Intent, input: &ControlInput<'_>, dt: f32) -> (Vec3, Vec3) {
+        let (path, estimate) = (input.setpoint, input.estimate);
+        let error = match intent.horizontal {
+            Horizontal::Path => path.position - estimate.position,
+            Horizontal::Velocity => Vec3::zeros(),
+            Horizontal::Lean { forward, right } => {
+                self.path = None;
+                self.position.reset();
+                return (lean(forward, right, self.sin_lean_max, &estimate.attitude), Vec3::zeros());
+            }
+            Horizontal::Rates { .. } | Horizontal::Damp | Horizontal::Nothing => {
+                self.path = None;
+                self.position.reset();
+                return (Vec3::z(), Vec3::zeros());
+            }
+        };
+        let ahead = path.acceleration;
+        let demand = self.position.step(&error, &path.velocity, &ahead, &estimate.velocity, dt, intent.grounded);
+        // Thrust has to carry the weight as well: the axis is the direction of g − a.
+        let carried = (GRAVITY - ahead.z).max(0.5 * GRAVITY);
+        let (x, y) = (demand.x / carried, demand.y / carried);
+        let slope = math::sqrt(x * x + y * y);
+        let shorten = if slope > self.tan_tilt_max { self.tan_tilt_max / slope } else { 1.0 };
+        let (x, y) = (x * shorten, y * shorten);
+        let scale = 1.0 / math::sqrt(1.0 + x * x + y * y);
+        let down = Vec3::new(-x * scale, -y * scale, scale);
+
+        let jerk = self.path.map_or(Vec3::zeros(), |before| (ahead - before) / dt);
+        self.path = Some(ahead);
+        (down, turn_rate(&jerk, carried))
+    }
+}
+
+impl Controller for CascadeController {
+    #[inline]
+    fn step(&mut self, now: Micros, input: &ControlInput<'_>) -> ControlOutput {
+        let dt = self.timer.step(now);
+        if input.mode.control_resets != self.resets {
+            self.resets = input.mode.control_resets;
+            self.reset();
+        }
+        let Some(intent) = Intent::read(input) else {
+            self.reset();
+            return ControlOutput::default();
+        };
+        if let Vertical::Throttle(throttle) = intent.vertical
+            && throttle < THROTTLE_OFF
+            && intent.grounded
+        {
+            self.reset();
+            return ControlOutput::default();
+        }
+
+        let estimate = input.estimate;
+        let tilt_known = !matches!(intent.horizontal, Horizontal::Damp | Horizontal::Nothing);
+        let down_in_body = if tilt_known { attitude::down_in_body(&estimate.attitude) } else { Vec3::z() };
+        let thrust = self.thrust(&intent, input, down_in_body.z, dt);
+        let (down, turning) = self.down_axis(&intent, input, dt);
+
+        let target = match intent.horizontal {
+            Horizontal::Nothing => {
+                self.rate.reset();
+                return ControlOutput { thrust, torque: Vec3::zeros() };
+            }
+            Horizontal::Damp => Vec3::zeros(),
+            Horizontal::Rates { forward, right } => {
+                let yaw = match intent.heading {
+                    Heading::Stick(stick) => stick * self.sticks.yaw_rate_max,
+                    Heading::Rate(rate) | Heading::Hold { rate, .. } => rate,
+                };
+                Vec3::new(right * self.sticks.tilt_rate_max, -forward * self.sticks.tilt_rate_max, yaw)
+            }
+            Horizontal::Path | Horizontal::Velocity | Horizontal::Lean { .. } => {
+                let (heading, yaw_rate) = match intent.heading {
+                    Heading::Hold { yaw, rate } => {
+                        let (sin, cos) = math::sin_cos(0.5 * yaw);
+                        ((cos, sin), rate)
+                    }
+                    Heading::Rate(rate) => (attitude::half_heading(&estimate.attitude), rate),
+                    Heading::Stick(stick) => {
+                        (attitude::half_heading(&estimate.attitude), stick * self.sticks.yaw_rate_max)
+                    }
+                };
+                let wanted = attitude::from_down_axis(&down, heading);
+                let feedback = attitude::rate_towards(&self.attitude, &estimate.attitude, &wanted);
+                feedback + down_in_body * yaw_rate + estimate.attitude.inverse_transform_vector(&turning)
+            }
+        };
+        let torque = self.rate.step(&target, &estimate.angular_rate, dt, input.unmet, intent.grounded);
+        ControlOutput { thrust, torque }
+    }
+
+    fn reset(&mut self) {
+        self.rate.reset();
+        self.position.reset();
+        self.altitude.reset();
+        self.path = None;
+    }
+}
+
+/// The down axis of a vehicle that leans by its sticks, which are relative to its heading.
+fn lean(forward: f32, right: f32, sin_max: f32, attitude: &stampfly_types::Quat) -> Vec3 {
+    let length = math::sqrt(forward * forward + right * right).max(1.0);
+    let (forward, right) = (forward / length * sin_max, right / length * sin_max);
+    let (cos_half, sin_half) = attitude::half_heading(attitude);
+    let (cos, sin) = (cos_half * cos_half - sin_half * sin_half, 2.0 * sin_half * cos_half);
+    Vec3::new(
+        -(forward * cos - right * sin),
+        -(forward * sin + right * cos),
+        math::sqrt(1.0 - forward * forward - right * right),
+    )
+}
+
+/// World-frame rate at which a path with this jerk turns the thrust direction, near level.
+///
+/// The axis tilts with n = (−aₓ, −a_y, g)/g, so it moves with −jerk/g and turns about ẑ × ṅ. A path that jumps (a mode
+/// change) is no path to follow: its jerk is bounded.
+fn turn_rate(jerk: &Vec3, carried: f32) -> Vec3 {
+    const MAX: f32 = 1.5;
+    Vec3::new((jerk.y / carried).clamp(-MAX, MAX), (-jerk.x / carried).clamp(-MAX, MAX), 0.0)
+}

@@ -1,0 +1,228 @@
+//! What the vehicle is asked to do right now, and which of it can be done.
+//!
+//! Flight state, flight mode, commanded axes and validity of the estimate are discrete; the control laws are not.
+//! This file turns the first into a small [`Intent`] so that the laws need not look at them. It is also where
+//! the stack degrades:
+//!
+//! | missing | horizontally | vertically |
+//! |---|---|---|
+//! | position | velocity only | velocity only |
+//! | velocity | level | hover thrust, a little less |
+//! | tilt | damp the rotation | hover thrust, a little less |
+//! | angular rate | no torque | hover thrust, a little less |
+//!
+//! Write a control law against [`Intent`] and it behaves like the others in every mode and every failure.
+
+use stampfly_types::messages::{
+    FlightMode, FlightState, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity,
+};
+use stampfly_types::{Quat, Vec3};
+
+use crate::controller::ControlInput;
+
+/// What is asked, as far as it can be done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intent {
+    /// Roll and pitch.
+    pub horizontal: Horizontal,
+    /// Thrust.
+    pub vertical: Vertical,
+    /// Yaw.
+    pub heading: Heading,
+    /// The vehicle touches the ground: integrators would learn the ground's push, so they must not move.
+    pub grounded: bool,
+}
+
+/// What roll and pitch are for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Horizontal {
+    /// Follow the set-point's path: position, velocity and acceleration.
+    Path,
+    /// Follow the set-point's velocity and acceleration; the position is unknown or not commanded.
+    Velocity,
+    /// Lean by the sticks: forward and right, −1 to 1 of the largest angle. Zero is level.
+    Lean {
+        /// Forward, nose down.
+        forward: f32,
+        /// To the right.
+        right: f32,
+    },
+    /// Turn by the sticks: roll and pitch rate, −1 to 1 of the largest rate; forward pitches the nose down.
+    Rates {
+        /// Pitch rate, nose down positive.
+        forward: f32,
+        /// Roll rate, right wing down positive.
+        right: f32,
+    },
+    /// Tilt is unknown: stop turning.
+    Damp,
+    /// Not even the angular rate is known: no torque.
+    Nothing,
+}
+
+/// What thrust is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Vertical {
+    /// Follow the set-point's path: position, velocity and acceleration.
+    Path,
+    /// Follow the set-point's velocity and acceleration; the position is unknown or not commanded.
+    Velocity,
+    /// Thrust as a share of the largest, 0 to 1.
+    Throttle(f32),
+    /// The vertical state is unknown: come down slowly on hover thrust.
+    Descend,
+}
+
+/// What yaw is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Heading {
+    /// Keep a heading, radians, while turning at a rate, rad/s.
+    Hold {
+        /// Heading.
+        yaw: f32,
+        /// Its rate of change.
+        rate: f32,
+    },
+    /// Turn at a rate about the vertical, rad/s.
+    Rate(f32),
+    /// Turn by the stick about the body's z axis, −1 to 1 of the largest rate.
+    Stick(f32),
+}
+
+impl Intent {
+    /// Reads the intent; `None` when the motors have nothing to do: on the ground, held, or not armed.
+    #[must_use]
+    pub fn read(input: &ControlInput<'_>) -> Option<Self> {
+        let in_motion = match input.mode.state {
+            FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => false,
+            FlightState::TakeOff | FlightState::Flying | FlightState::Landing => true,
+        };
+        if !(in_motion && input.mode.armed) {
+            return None;
+        }
+        let known = Known::read(input.estimate);
+        let path = &input.setpoint;
+        let axes = usable_axes(path);
+        let manual = throttle_commands_thrust(input);
+
+        let horizontal = if !known.rate {
+            Horizontal::Nothing
+        } else if !known.tilt {
+            Horizontal::Damp
+        } else if axes.contains(SetpointAxes::POSITION_XY) && known.position_xy {
+            Horizontal::Path
+        } else if path.axes.intersects(HORIZONTAL) {
+            let follow = axes.intersects(HORIZONTAL) && known.velocity_xy;
+            if follow { Horizontal::Velocity } else { Horizontal::LEVEL }
+        } else {
+            let (forward, right) = (stick(input.command.pitch), stick(input.command.roll));
+            match input.mode.mode {
+                FlightMode::Acro if manual => Horizontal::Rates { forward, right },
+                FlightMode::Acro | FlightMode::Stabilize | FlightMode::AltHold => Horizontal::Lean { forward, right },
+                // The sticks of this mode mean velocities; without a commanded axis they mean nothing.
+                FlightMode::PosHold => Horizontal::LEVEL,
+            }
+        };
+        let vertical = if manual {
+            Vertical::Throttle(stick(input.command.throttle).max(0.0))
+        } else if !(known.velocity_z && axes.intersects(VERTICAL)) {
+            Vertical::Descend
+        } else if axes.contains(SetpointAxes::POSITION_Z) && known.position_z {
+            Vertical::Path
+        } else {
+            Vertical::Velocity
+        };
+        let heading = if axes.contains(SetpointAxes::YAW) && known.tilt && known.heading {
+            Heading::Hold { yaw: path.yaw, rate: path.yaw_rate }
+        } else if axes.intersects(SetpointAxes::YAW | SetpointAxes::YAW_RATE) {
+            Heading::Rate(path.yaw_rate)
+        } else {
+            Heading::Stick(stick(input.command.yaw))
+        };
+        Some(Self { horizontal, vertical, heading, grounded: input.status.contact == GroundContact::Ground })
+    }
+}
+
+impl Horizontal {
+    /// Neither forward nor right.
+    pub const LEVEL: Self = Self::Lean { forward: 0.0, right: 0.0 };
+}
+
+const HORIZONTAL: SetpointAxes = SetpointAxes::POSITION_XY.with(SetpointAxes::VELOCITY_XY);
+const VERTICAL: SetpointAxes = SetpointAxes::POSITION_Z.with(SetpointAxes::VELOCITY_Z);
+
+/// Is the throttle stick a thrust? Never while landing and never in a mode that holds height: there a vertical
+/// set-point that is missing or broken must not turn into "stick at rest, motors off".
+fn throttle_commands_thrust(input: &ControlInput<'_>) -> bool {
+    let by_mode = match input.mode.mode {
+        FlightMode::Acro | FlightMode::Stabilize => input.mode.state != FlightState::Landing,
+        FlightMode::AltHold | FlightMode::PosHold => false,
+    };
+    by_mode && !input.setpoint.axes.intersects(VERTICAL)
+}
+
+/// Which parts of the estimate may be used: declared valid, and numbers.
+struct Known {
+    rate: bool,
+    tilt: bool,
+    heading: bool,
+    velocity_xy: bool,
+    velocity_z: bool,
+    position_xy: bool,
+    position_z: bool,
+}
+
+impl Known {
+    fn read(estimate: &StateEstimate) -> Self {
+        let valid = |bits| estimate.valid.contains(bits);
+        let rate = is_finite(&estimate.angular_rate);
+        let tilt = rate && valid(Validity::TILT) && is_rotation(&estimate.attitude);
+        let (velocity, position) = (&estimate.velocity, &estimate.position);
+        let velocity_xy = tilt && valid(Validity::VELOCITY_XY) && (velocity.x + velocity.y).is_finite();
+        let velocity_z = tilt && valid(Validity::VELOCITY_Z) && velocity.z.is_finite();
+        Self {
+            rate,
+            tilt,
+            heading: valid(Validity::HEADING),
+            velocity_xy,
+            velocity_z,
+            position_xy: velocity_xy && valid(Validity::POSITION_XY) && (position.x + position.y).is_finite(),
+            position_z: velocity_z && valid(Validity::POSITION_Z) && position.z.is_finite(),
+        }
+    }
+}
+
+/// The commanded axes whose numbers are numbers.
+fn usable_axes(path: &Setpoint) -> SetpointAxes {
+    let (position, velocity, acceleration) = (&path.position, &path.velocity, &path.acceleration);
+    let flat = (velocity.x + velocity.y + acceleration.x + acceleration.y).is_finite();
+    let upright = (velocity.z + acceleration.z).is_finite();
+    let yaw = (path.yaw + path.yaw_rate).is_finite();
+    let mut broken = SetpointAxes::NONE;
+    for (fine, axes) in [
+        (flat, HORIZONTAL),
+        ((position.x + position.y).is_finite(), SetpointAxes::POSITION_XY),
+        (upright, VERTICAL),
+        (position.z.is_finite(), SetpointAxes::POSITION_Z),
+        (yaw, SetpointAxes::YAW | SetpointAxes::YAW_RATE),
+    ] {
+        if !fine {
+            broken |= axes;
+        }
+    }
+    path.axes.without(broken)
+}
+
+/// A stick within its range; a stick that is no number is at rest.
+fn stick(value: f32) -> f32 {
+    if value.is_finite() { value.clamp(-1.0, 1.0) } else { 0.0 }
+}
+
+fn is_finite(vector: &Vec3) -> bool {
+    (vector.x + vector.y + vector.z).is_finite()
+}
+
+fn is_rotation(attitude: &Quat) -> bool {
+    // False for NaN as well.
+    (attitude.quaternion().norm_squared() - 1.0).abs() < 0.02
+}

@@ -1,0 +1,391 @@
+//! Force and torque to thrust per motor, for any airframe of fixed rotors.
+//!
+//! A rotor at (x, y) that pushes with thrust T along −z adds −y·T of roll, x·T of pitch and ±κ·T of yaw torque (κ:
+//! drag torque per thrust; positive for a rotor that turns counter-clockwise seen from above). Stacked, that is a 4×N
+//! matrix; the mixer is its Moore–Penrose inverse, for four rotors the plain inverse.
+//!
+//! Motors can neither pull nor push without end. When a demand does not fit, it is given up in this order: yaw
+//! first, then thrust, roll and pitch last, because they decide about up and down. What was given up is reported, so
+//! that integrators can stop.
+
+use nalgebra::{Matrix4, Vector4};
+use stampfly_types::messages::{ControlOutput, MAX_MOTORS};
+
+/// Which way a rotor turns, seen from above.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spin {
+    /// Clockwise: its drag turns the body counter-clockwise.
+    Clockwise,
+    /// Counter-clockwise: its drag turns the body clockwise, which is positive yaw.
+    CounterClockwise,
+}
+
+/// One rotor of the airframe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rotor {
+    /// Forward of the centre of mass, m.
+    pub x: f32,
+    /// Right of the centre of mass, m.
+    pub y: f32,
+    /// Sense of rotation.
+    pub spin: Spin,
+    /// Drag torque per thrust, m.
+    pub kappa: f32,
+}
+
+/// Thrust per motor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mixed {
+    /// Thrust per motor, N; zero beyond `count`.
+    pub thrust: [f32; MAX_MOTORS],
+    /// How many motors there are.
+    pub count: u8,
+    /// Shares of the demand that were given up: roll, pitch, yaw (0 to 1) and thrust. The last is negative when more
+    /// thrust than asked was needed for roll and pitch.
+    pub unmet: [f32; 4],
+}
+
+/// Anything that distributes force and torque over motors.
+///
+/// # Contract
+/// * Every thrust is finite and within the motors' limits, whatever the demand.
+/// * A demand that fits is met exactly; otherwise `unmet` says what is missing.
+pub trait Mixer {
+    /// Distributes the demand.
+    fn mix(&self, demand: &ControlOutput) -> Mixed;
+}
+
+/// Why an airframe cannot be flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum GeometryError {
+    /// Fewer than four rotors, or more than [`MAX_MOTORS`].
+    Count,
+    /// Some combination of thrust, roll, pitch and yaw cannot be produced, or a number is not finite.
+    Uncontrollable,
+    /// Equal thrust on all rotors would tip it over: some rotor has no positive share in collective thrust.
+    Unbalanced,
+}
+
+impl core::fmt::Display for GeometryError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Count => "between four and eight rotors are needed",
+            Self::Uncontrollable => "the rotors cannot produce every torque",
+            Self::Unbalanced => "every rotor must share in collective thrust",
+        })
+    }
+}
+
+impl core::error::Error for GeometryError {}
+
+/// One rotor's share of each demand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Shares {
+    thrust: f32,
+    roll: f32,
+    pitch: f32,
+    yaw: f32,
+}
+
+/// The mixer of a multirotor with fixed, parallel rotors.
+///
+/// ```
+/// use stampfly_control::{Mixer, MultirotorMixer};
+/// use stampfly_types::{Vec3, messages::ControlOutput};
+/// let mixer = MultirotorMixer::stampfly();
+/// let right = mixer.mix(&ControlOutput { thrust: 0.36, torque: Vec3::new(1e-3, 0.0, 0.0) });
+/// let [front_right, rear_right, rear_left, front_left, ..] = right.thrust;
+/// assert!(front_left > front_right && rear_left > rear_right, "more on the left rolls to the right");
+/// assert_eq!(right.unmet, [0.0; 4]);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct MultirotorMixer {
+    shares: [Shares; MAX_MOTORS],
+    count: usize,
+    thrust_max: f32,
+}
+
+impl MultirotorMixer {
+    /// The StampFly's rotors: front right, rear right, rear left, front left. κ is the coast-down measurement.
+    pub const STAMPFLY_ROTORS: [Rotor; 4] = {
+        const D: f32 = 0.023;
+        const KAPPA: f32 = 4.10e-3;
+        [
+            Rotor { x: D, y: D, spin: Spin::CounterClockwise, kappa: KAPPA },
+            Rotor { x: -D, y: D, spin: Spin::Clockwise, kappa: KAPPA },
+            Rotor { x: -D, y: -D, spin: Spin::CounterClockwise, kappa: KAPPA },
+            Rotor { x: D, y: -D, spin: Spin::Clockwise, kappa: KAPPA },
+        ]
+    };
+    /// What one StampFly motor can do at 95 % duty on a full battery, N.
+    pub const STAMPFLY_THRUST_MAX: f32 = 0.168;
+
+    /// The StampFly's mixer.
+    #[must_use]
+    pub fn stampfly() -> Self {
+        // The inverse of a square X can be written down, so this cannot fail. A test holds it against `from_rotors`.
+        let mut shares = [Shares::default(); MAX_MOTORS];
+        for (share, rotor) in shares.iter_mut().zip(Self::STAMPFLY_ROTORS) {
+            *share =
+                Shares { thrust: 0.25, roll: -0.25 / rotor.y, pitch: 0.25 / rotor.x, yaw: 0.25 / signed_kappa(&rotor) };
+        }
+        Self { shares, count: Self::STAMPFLY_ROTORS.len(), thrust_max: Self::STAMPFLY_THRUST_MAX }
+    }
+
+    /// The mixer of any airframe whose motors can push with 0 to `thrust_max` N each.
+    ///
+    /// # Errors
+    /// When there are too few or too many rotors or they cannot control the vehicle.
+    pub fn from_rotors(rotors: &[Rotor], thrust_max: f32) -> Result<Self, GeometryError> {
+        if !(4..=MAX_MOTORS).contains(&rotors.len()) {
+            return Err(GeometryError::Count);
+        }
+        if !(thrust_max > 0.0 && thrust_max.is_finite()) {
+            return Err(GeometryError::Uncontrollable);
+        }
+        // Torque in units of the airframe's own size, or the inverse of a small vehicle drowns in rounding.
+        let arm = rotors.iter().fold(0.0f32, |arm, r| arm.max(r.x.abs()).max(r.y.abs()));
+        let drag = rotors.iter().fold(0.0f32, |drag, r| drag.max(r.kappa.abs()));
+        if !(arm > 0.0 && drag > 0.0 && arm.is_finite() && drag.is_finite()) {
+            return Err(GeometryError::Uncontrollable);
+        }
+        let column = |rotor: &Rotor| Vector4::new(1.0, -rotor.y / arm, rotor.x / arm, signed_kappa(rotor) / drag);
+        let gram = rotors.iter().map(column).fold(Matrix4::zeros(), |sum, c| sum + c * c.transpose());
+        // The determinant of a well-spread airframe is of the order of N⁴; a singular one leaves only rounding.
+        if !(gram.determinant() > 1e-4) {
+            return Err(GeometryError::Uncontrollable);
+        }
+        let inverse = gram.try_inverse().ok_or(GeometryError::Uncontrollable)?;
+        let mut shares = [Shares::default(); MAX_MOTORS];
+        for (share, rotor) in shares.iter_mut().zip(rotors) {
+            let row = inverse * column(rotor);
+            if !(row.x > 1e-3) {
+                return Err(GeometryError::Unbalanced);
+            }
+            *share = Shares { thrust: row.x, roll: row.y / arm, pitch: row.z / arm, yaw: row.w / drag };
+        }
+        Ok(Self { shares, count: rotors.len(), thrust_max })
+    }
+
+    /// Largest share of `tilt` (each rotor's part of roll and pitch) for which some collective thrust keeps every
+    /// motor within its limits.
+    fn tilt_scale(&self, tilt: &[f32; MAX_MOTORS]) -> f32 {
+        let mut scale = 1.0f32;
+        let rotors = || self.shares.iter().zip(tilt).take(self.count);
+        // Collective u must satisfy −s·p_i ≤ a_i·u and a_j·u ≤ max − s·p_j for all pairs.
+        for (lower, p_lower) in rotors() {
+            for (upper, p_upper) in rotors() {
+                let spread = p_upper / upper.thrust - p_lower / lower.thrust;
+                let room = self.thrust_max / upper.thrust;
+                if scale * spread > room {
+                    scale = room / spread;
+                }
+            }
+        }
+        scale
+    }
+
+    /// The collective thrusts for which every motor can deliver this much roll and pitch.
+    fn collective_range(&self, tilt: &[f32; MAX_MOTORS]) -> (f32, f32) {
+        let (mut low, mut high) = (0.0f32, f32::MAX);
+        for (share, part) in self.shares.iter().zip(tilt).take(self.count) {
+            let invers = 1.0 / share.thrust;
+            low = low.max(-part * invers);
+            high = high.min((self.thrust_max - part) * invers);
+        }
+        (low, high)
+    }
+}
+
+impl Mixer for MultirotorMixer {
+    #[inline]
+    fn mix(&self, demand: &ControlOutput) -> Mixed {
+        // Far beyond any airframe, and small enough that no product below overflows.
+        let number = |value: f32| if value.is_finite() { value.clamp(-1e6, 1e6) } else { 0.0 };
+        let wanted = number(demand.thrust);
+        let (roll, pitch, yaw) = (number(demand.torque.x), number(demand.torque.y), number(demand.torque.z));
+
+        let mut tilt = [0.0; MAX_MOTORS];
+        for (part, share) in tilt.iter_mut().zip(&self.shares).take(self.count) {
+            *part = share.roll * roll + share.pitch * pitch;
+        }
+        let (mut low, mut high) = self.collective_range(&tilt);
+        let mut tilt_scale = 1.0;
+        if low > high {
+            tilt_scale = self.tilt_scale(&tilt);
+            tilt.iter_mut().for_each(|part| *part *= tilt_scale);
+            (low, high) = self.collective_range(&tilt);
+        }
+        // Rounding may leave the range inside out by one bit.
+        let collective = wanted.min(high).max(low);
+
+        let mut mixed = Mixed { count: self.count as u8, ..Mixed::default() };
+        let mut yaw_scale = 1.0f32;
+        for ((thrust, share), part) in mixed.thrust.iter_mut().zip(&self.shares).zip(&tilt).take(self.count) {
+            *thrust = (share.thrust * collective + part).clamp(0.0, self.thrust_max);
+            let twist = share.yaw * yaw;
+            let room = if twist > 0.0 { self.thrust_max - *thrust } else { *thrust };
+            if yaw_scale * twist.abs() > room {
+                yaw_scale = room / twist.abs();
+            }
+        }
+        for (thrust, share) in mixed.thrust.iter_mut().zip(&self.shares).take(self.count) {
+            *thrust = (*thrust + yaw_scale * share.yaw * yaw).clamp(0.0, self.thrust_max);
+        }
+        let missing = wanted - collective;
+        let unmet_thrust = if missing == 0.0 { 0.0 } else { (missing / wanted.abs().max(1e-3)).clamp(-1.0, 1.0) };
+        mixed.unmet = [1.0 - tilt_scale, 1.0 - tilt_scale, 1.0 - yaw_scale, unmet_thrust];
+        mixed
+    }
+}
+
+fn signed_kappa(rotor: &Rotor) -> f32 {
+    match rotor.spin {
+        Spin::CounterClockwise => rotor.kappa,
+        Spin::Clockwise => -rotor.kappa,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use stampfly_types::Vec3;
+    use std::vec::Vec;
+
+    /// Thrust and torque that the rotors produce: the definition, not the inverse.
+    fn produced(rotors: &[Rotor], mixed: &Mixed) -> ControlOutput {
+        rotors.iter().zip(mixed.thrust).fold(ControlOutput::default(), |sum, (rotor, thrust)| ControlOutput {
+            thrust: sum.thrust + thrust,
+            torque: sum.torque + Vec3::new(-rotor.y, rotor.x, signed_kappa(rotor)) * thrust,
+        })
+    }
+
+    fn hexacopter() -> Vec<Rotor> {
+        (0..6)
+            .map(|n| {
+                let angle = f64::from(n) * core::f64::consts::FRAC_PI_3 + 0.3;
+                Rotor {
+                    x: 0.2 * angle.cos() as f32,
+                    y: 0.2 * angle.sin() as f32,
+                    spin: if n % 2 == 0 { Spin::Clockwise } else { Spin::CounterClockwise },
+                    kappa: 0.016,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_closed_form_is_the_inverse() {
+        let general = MultirotorMixer::from_rotors(&MultirotorMixer::STAMPFLY_ROTORS, 0.168).expect("flies");
+        let closed = MultirotorMixer::stampfly();
+        for (a, b) in general.shares.iter().zip(&closed.shares) {
+            for (a, b) in [(a.thrust, b.thrust), (a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)] {
+                assert!((a - b).abs() <= 1e-4 * b.abs(), "{a} against {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn airframes_that_cannot_fly_are_refused() {
+        let rotors = MultirotorMixer::STAMPFLY_ROTORS;
+        assert_eq!(MultirotorMixer::from_rotors(&rotors[..3], 0.2), Err(GeometryError::Count));
+        let one_way = rotors.map(|rotor| Rotor { spin: Spin::Clockwise, ..rotor });
+        assert_eq!(MultirotorMixer::from_rotors(&one_way, 0.2), Err(GeometryError::Uncontrollable));
+        let in_line = rotors.map(|rotor| Rotor { y: 0.0, ..rotor });
+        assert_eq!(MultirotorMixer::from_rotors(&in_line, 0.2), Err(GeometryError::Uncontrollable));
+        let broken = rotors.map(|rotor| Rotor { x: f32::NAN, ..rotor });
+        assert_eq!(MultirotorMixer::from_rotors(&broken, 0.2), Err(GeometryError::Uncontrollable));
+        let beside = rotors.map(|rotor| Rotor { x: rotor.x + 0.1, ..rotor });
+        assert_eq!(MultirotorMixer::from_rotors(&beside, 0.2), Err(GeometryError::Unbalanced));
+    }
+
+    #[test]
+    fn broken_demands_are_zero() {
+        let mixer = MultirotorMixer::stampfly();
+        let mixed = mixer.mix(&ControlOutput { thrust: f32::NAN, torque: Vec3::repeat(f32::INFINITY) });
+        assert_eq!(mixed.thrust, [0.0; MAX_MOTORS]);
+    }
+
+    prop_compose! {
+        fn demands()(thrust in -0.2f32..1.2, x in -0.02f32..0.02, y in -0.02f32..0.02, z in -0.004f32..0.004)
+            -> ControlOutput
+        {
+            ControlOutput { thrust, torque: Vec3::new(x, y, z) }
+        }
+    }
+
+    /// Checks all promises for one airframe; `scale` brings the demand to its size.
+    fn keeps_its_promises(rotors: &[Rotor], thrust_max: f32, demand: &ControlOutput) -> Result<(), TestCaseError> {
+        let mixer = MultirotorMixer::from_rotors(rotors, thrust_max).expect("flies");
+        let mixed = mixer.mix(demand);
+        let got = produced(rotors, &mixed);
+        let arm = rotors.iter().fold(0.0f32, |arm, r| arm.max(r.x.abs()).max(r.y.abs()));
+        let fine = 1e-4 * thrust_max;
+        for thrust in mixed.thrust {
+            prop_assert!((0.0..=thrust_max).contains(&thrust));
+        }
+        // Roll and pitch keep their direction, and their size unless no collective at all could give it.
+        let kept = 1.0 - mixed.unmet[0];
+        prop_assert!((got.torque.x - kept * demand.torque.x).abs() < fine * arm);
+        prop_assert!((got.torque.y - kept * demand.torque.y).abs() < fine * arm);
+        let part: Vec<f32> = mixer
+            .shares
+            .iter()
+            .take(rotors.len())
+            .map(|s| s.roll * demand.torque.x + s.pitch * demand.torque.y)
+            .collect();
+        let feasible = (0..1000).any(|n| {
+            let collective = n as f32 / 999.0 * thrust_max * rotors.len() as f32;
+            mixer.shares.iter().zip(&part).all(|(s, p)| (0.0..=thrust_max).contains(&(s.thrust * collective + p)))
+        });
+        prop_assert!(!feasible || mixed.unmet[0] < 1e-4, "roll and pitch were possible and given up");
+        prop_assert!(mixed.unmet[0] == 0.0 || !feasible);
+        // Yaw keeps its sign.
+        let yaw_kept = 1.0 - mixed.unmet[2];
+        prop_assert!((-1e-6..=1.0).contains(&yaw_kept));
+        prop_assert!((got.torque.z - yaw_kept * demand.torque.z).abs() < fine * 0.02);
+        // Thrust: the report is right.
+        let missing = mixed.unmet[3] * demand.thrust.abs().max(1e-3);
+        if mixed.unmet[3].abs() < 1.0 {
+            prop_assert!((demand.thrust - got.thrust - missing).abs() < 10.0 * fine);
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn the_stampfly_keeps_its_promises(demand in demands()) {
+            keeps_its_promises(&MultirotorMixer::STAMPFLY_ROTORS, 0.168, &demand)?;
+        }
+
+        #[test]
+        fn a_hexacopter_keeps_them_too(demand in demands()) {
+            let bigger = ControlOutput { thrust: demand.thrust * 20.0, torque: demand.torque * 100.0 };
+            keeps_its_promises(&hexacopter(), 4.0, &bigger)?;
+        }
+
+        #[test]
+        fn a_demand_that_fits_is_met_exactly(
+            thrust in 0.25f32..0.45, x in -1e-3f32..1e-3, y in -1e-3f32..1e-3, z in -2e-4f32..2e-4,
+        ) {
+            let demand = ControlOutput { thrust, torque: Vec3::new(x, y, z) };
+            let mixed = MultirotorMixer::stampfly().mix(&demand);
+            let got = produced(&MultirotorMixer::STAMPFLY_ROTORS, &mixed);
+            prop_assert_eq!(mixed.unmet, [0.0; 4]);
+            prop_assert!((got.thrust - thrust).abs() < 1e-6);
+            prop_assert!((got.torque - demand.torque).norm() < 1e-8);
+        }
+
+        #[test]
+        fn any_bits_give_possible_thrusts(thrust: f32, x: f32, y: f32, z: f32) {
+            let mixed = MultirotorMixer::stampfly().mix(&ControlOutput { thrust, torque: Vec3::new(x, y, z) });
+            for thrust in mixed.thrust {
+                prop_assert!((0.0..=MultirotorMixer::STAMPFLY_THRUST_MAX).contains(&thrust));
+            }
+            prop_assert!(mixed.unmet.iter().all(|share| share.is_finite()));
+        }
+    }
+}
