@@ -1,0 +1,40 @@
+//! Messages only this vehicle needs, declared beside its topic table.
+
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightState};
+use stampfly_types::{Vec3, message};
+
+message! {
+    /// The board's button as its pin shows it, not debounced.
+    pub struct ButtonContact {
+        /// Closed?
+        pressed: bool ["1"],
+    }
+}
+
+message! {
+    /// What a ground station needs to know, at a rate a radio can carry.
+    pub struct TelemetryFrame {
+        /// Where the vehicle is in its life.
+        state: FlightState ["1"],
+        /// The flight mode.
+        mode: FlightMode ["1"],
+        /// May the motors turn?
+        armed: bool ["1"],
+        /// Why arming would be refused.
+        blocks: ArmBlocks ["1"],
+        /// What the failsafe has found.
+        alerts: Alerts ["1"],
+        /// Estimated position, world NED.
+        position: Vec3 ["m"],
+        /// Estimated velocity, world NED.
+        velocity: Vec3 ["m/s"],
+        /// Estimated roll, pitch, yaw.
+        attitude: Vec3 ["rad"],
+        /// Battery voltage.
+        battery: f32 ["V"],
+        /// Way-points still ahead.
+        remaining: u32 ["1"],
+        /// Is the route finished?
+        arrived: bool ["1"],
+    }
+}

@@ -1,0 +1,73 @@
+//! Who publishes what for whom: the vehicle's topics, one line each.
+//!
+//! The first twelve are document 000's, at its rates. The log reads every topic through its tap and is not named.
+//! `docs/topics.md` and `stampfly topics` are printed from this table.
+
+use crate::messages::{ButtonContact, TelemetryFrame};
+use stampfly_bus::topics;
+use stampfly_types::messages::*;
+
+topics! {
+    /// The StampFly's topics.
+    pub mod wiring;
+
+    // Sensing.
+    /// Inertial sample, body FRD, specific force; every sample.
+    sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe, calibration];
+    /// Range to the ground.
+    sensor_tof: TofData = ring(8) @ 30 Hz from tof => [estimation, failsafe];
+    /// Range ahead. Reserved: nothing reads it yet.
+    sensor_tof_front: TofData = ring(8) @ 30 Hz from tof_front => [];
+    /// Optical flow since the previous sample.
+    sensor_flow: FlowData = ring(16) @ 100 Hz from flow => [estimation, failsafe];
+    /// Magnetic field.
+    sensor_mag: MagData = ring(8) @ 25 Hz from mag => [estimation, calibration];
+    /// Air pressure.
+    sensor_baro: BaroData = ring(8) @ 50 Hz from baro => [estimation, calibration];
+    /// Battery.
+    sensor_power: PowerData = ring(8) @ 10 Hz from power => [failsafe, actuation, mode, telemetry];
+
+    // Commands.
+    /// Frames from the pilot's transmitter.
+    command_pilot: PilotInput = ring(8) @ 50 Hz from link => [command, failsafe, mode];
+    /// Commands from programs; none may be lost.
+    command_guided: GuidedCommand = queue(16) @ on event from link => [command, failsafe, mode, navigation];
+    /// The button's pin.
+    button_contact: ButtonContact = latest @ 50 Hz from button_pin => [button];
+    /// What the button meant.
+    button_event: ButtonEvent = ring(4) @ on event from button => [mode];
+    /// The arbitrated sticks.
+    command_setpoint: CommandSetpoint = latest @ 50 Hz from command => [navigation, control];
+
+    // Estimation.
+    /// What the still-calibration has found so far.
+    calibration: CalibrationResult = latest @ 400 Hz from calibration => [estimation, mode];
+    /// Attitude, velocity, position, and which of them may be used.
+    estimate_state: StateEstimate = latest @ 400 Hz from estimation => [failsafe, mode, landing, navigation, control, telemetry];
+    /// How each sensor agreed with the estimate.
+    estimate_status: EstimatorStatus = latest @ 400 Hz from estimation => [failsafe];
+    /// What the mode machine asks of the estimator.
+    estimator_command: EstimatorCommand = latest @ 400 Hz from mode => [estimation];
+
+    // Decisions.
+    /// Conditions the failsafe has found.
+    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, notification, telemetry];
+    /// State, mode, armed.
+    system_mode: SystemMode = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry];
+    /// Contact with the ground, and what take-off and landing ask for.
+    vehicle_status: VehicleStatus = latest @ 400 Hz from landing => [mode, navigation, control];
+
+    // Control.
+    /// The point on the path where the vehicle should be now.
+    setpoint: Setpoint = latest @ 400 Hz from navigation => [landing, control, telemetry];
+    /// Thrust and torque.
+    control_output: ControlOutput = latest @ 400 Hz from control => [landing, actuation];
+    /// Duty of every motor.
+    actuator_motor: MotorOutput = latest @ 400 Hz from actuation => [control, motors];
+
+    // People.
+    /// Lights and sound.
+    signal: Signal = latest @ 30 Hz from notification => [indicator];
+    /// What the ground station sees.
+    telemetry: TelemetryFrame = latest @ 50 Hz from telemetry => [link];
+}

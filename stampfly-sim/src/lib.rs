@@ -1,0 +1,24 @@
+//! A simulated StampFly behind the same traits as the real one.
+//!
+//! * [`time`]: virtual time and a deterministic executor;
+//! * [`plant`]: the vehicle as a body with motors, a battery, a floor and the air;
+//! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
+//! * [`Simulation`]: all of it from one [`SimulationConfig`].
+//!
+//! Everything is a value: no global, no wall clock, no thread. A process can hold as many vehicles as memory allows,
+//! and the same seed gives the same bits, in debug and release builds and on every machine.
+//!
+//! Not for other vehicles yet: the plant is a quadcopter with the StampFly's layout, though every number of it can be
+//! set by name.
+
+mod noise;
+pub mod plant;
+pub mod sensors;
+mod simulation;
+pub mod time;
+mod vibration;
+mod world;
+
+pub use noise::Noise;
+pub use simulation::{Simulation, SimulationConfig};
+pub use world::{Truth, World};

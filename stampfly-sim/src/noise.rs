@@ -1,0 +1,135 @@
+//! Randomness: the only place in the whole stack that has any.
+//!
+//! Every model that needs chance owns a [`Noise`], made from the simulation's seed and the model's own stream
+//! number. Streams of one seed are independent, so adding a sensor or reading one more often changes no number
+//! that another sees. The generator is ChaCha with 8 rounds; normal variates come from Marsaglia's polar method
+//! (Marsaglia and Bray 1964) over the `libm` crate, so they have the same bits on every machine, which the
+//! platform's logarithm would not give.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Which model a stream of numbers belongs to. The number is part of what makes a flight reproducible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u64)]
+pub(crate) enum Stream {
+    Airframe = 1,
+    Wind = 2,
+    Imu = 3,
+    Vibration = 4,
+    BottomTof = 5,
+    FrontTof = 6,
+    Flow = 7,
+    Mag = 8,
+    Baro = 9,
+    Power = 10,
+}
+
+/// A seeded stream of random numbers.
+///
+/// ```
+/// use stampfly_sim::Noise;
+/// let mut first = Noise::new(7, 0);
+/// let mut again = Noise::new(7, 0);
+/// let mut other = Noise::new(7, 1);
+/// let value = first.normal();
+/// assert_eq!(value, again.normal());
+/// assert_ne!(value, other.normal());
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    generator: ChaCha8Rng,
+    /// The polar method makes two variates at a time.
+    spare: Option<f64>,
+}
+
+impl Noise {
+    /// Stream number `stream` of `seed`.
+    #[must_use]
+    pub fn new(seed: u64, stream: u64) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(stream);
+        Self { generator, spare: None }
+    }
+
+    pub(crate) fn stream(seed: u64, stream: Stream) -> Self {
+        Self::new(seed, stream as u64)
+    }
+
+    /// Uniform between 0 (included) and 1 (excluded).
+    pub fn unit(&mut self) -> f64 {
+        // 53 bits, the mantissa of an f64.
+        (self.generator.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    /// Uniform between −`bound` and +`bound`.
+    pub fn within(&mut self, bound: f64) -> f64 {
+        bound * (2.0 * self.unit() - 1.0)
+    }
+
+    /// True with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.unit() < probability
+    }
+
+    /// Standard normal: mean 0, standard deviation 1.
+    pub fn normal(&mut self) -> f64 {
+        if let Some(spare) = self.spare.take() {
+            return spare;
+        }
+        loop {
+            // One draw of 64 bits makes both coordinates; 32 bits each reach beyond six standard deviations.
+            let bits = self.generator.next_u64();
+            let x = f64::from(bits as u32 as i32) * (1.0 / 2_147_483_648.0);
+            let y = f64::from((bits >> 32) as u32 as i32) * (1.0 / 2_147_483_648.0);
+            let s = x * x + y * y;
+            if s > 0.0 && s < 1.0 {
+                let scale = libm::sqrt(-2.0 * libm::log(s) / s);
+                self.spare = Some(y * scale);
+                return x * scale;
+            }
+        }
+    }
+
+    /// Three standard normal variates.
+    pub fn normal3(&mut self) -> nalgebra::Vector3<f64> {
+        let (x, y, z) = (self.normal(), self.normal(), self.normal());
+        nalgebra::Vector3::new(x, y, z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_variates_have_the_moments_of_a_normal_distribution() {
+        let mut noise = Noise::new(1, 2);
+        let n = 200_000;
+        let mut moments = [0.0; 4];
+        let mut beyond_three = 0;
+        for _ in 0..n {
+            let x = noise.normal();
+            beyond_three += u32::from(x.abs() > 3.0);
+            for (power, moment) in moments.iter_mut().enumerate() {
+                *moment += x.powi(power as i32 + 1) / f64::from(n);
+            }
+        }
+        // Tolerances: five standard errors of each moment.
+        let error = 5.0 / f64::from(n).sqrt();
+        assert!(moments[0].abs() < error, "mean {}", moments[0]);
+        assert!((moments[1] - 1.0).abs() < error * 2f64.sqrt(), "variance {}", moments[1]);
+        assert!(moments[2].abs() < error * 15f64.sqrt(), "skew {}", moments[2]);
+        assert!((moments[3] - 3.0).abs() < error * 96f64.sqrt(), "kurtosis {}", moments[3]);
+        assert!((430..=650).contains(&beyond_three), "0.27 % lie beyond three: {beyond_three}");
+    }
+
+    #[test]
+    fn uniform_variates_fill_their_range() {
+        let mut noise = Noise::new(3, 4);
+        let values: Vec<f64> = (0..10_000).map(|_| noise.within(2.0)).collect();
+        assert!(values.iter().all(|v| v.abs() <= 2.0));
+        let mean = values.iter().sum::<f64>() / 1e4;
+        assert!(mean.abs() < 0.06 && values.iter().any(|v| *v > 1.99) && values.iter().any(|v| *v < -1.99));
+    }
+}

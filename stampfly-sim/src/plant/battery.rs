@@ -1,0 +1,116 @@
+//! One lithium cell of the high-voltage kind.
+//!
+//! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that acts slowly.
+//! Temperature and ageing are left out; set the resistances and the capacity instead.
+
+use super::PlantParameters;
+
+/// Open-circuit voltage of a LiHV cell at 0, 10, …, 100 % of charge (typical discharge curve at rest).
+const OPEN_CIRCUIT: [f64; 11] = [3.20, 3.58, 3.67, 3.72, 3.76, 3.81, 3.88, 3.97, 4.08, 4.20, 4.35];
+
+/// The battery.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Battery {
+    /// Coulombs drawn since the start.
+    drawn: f64,
+    current: f64,
+    polarisation: f64,
+    voltage: f64,
+    initial: f64,
+    capacity: f64,
+    resistance: f64,
+    slow_resistance: f64,
+    time_constant: f64,
+}
+
+impl Battery {
+    pub(crate) fn new(parameters: &PlantParameters) -> Self {
+        let mut battery = Self {
+            drawn: 0.0,
+            current: 0.0,
+            polarisation: 0.0,
+            voltage: 0.0,
+            initial: parameters.battery_charge,
+            capacity: parameters.battery_capacity * 3600.0,
+            resistance: parameters.battery_resistance,
+            slow_resistance: parameters.battery_polarisation,
+            time_constant: parameters.battery_time_constant,
+        };
+        battery.step(0.0, parameters.board_current);
+        battery
+    }
+
+    /// Draws `current` amperes for `dt` seconds.
+    pub(crate) fn step(&mut self, dt: f64, current: f64) {
+        self.current = current;
+        self.drawn += current * dt;
+        self.polarisation += (current * self.slow_resistance - self.polarisation) * (dt / self.time_constant);
+        self.voltage = (self.open_circuit() - current * self.resistance - self.polarisation).max(0.0);
+    }
+
+    /// Terminal voltage under the present load, volts.
+    #[must_use]
+    pub fn voltage(&self) -> f64 {
+        self.voltage
+    }
+
+    /// Present current, amperes.
+    #[must_use]
+    pub fn current(&self) -> f64 {
+        self.current
+    }
+
+    /// Charge drawn since the start, coulombs.
+    #[must_use]
+    pub fn drawn(&self) -> f64 {
+        self.drawn
+    }
+
+    /// State of charge, 0 to 1.
+    #[must_use]
+    pub fn charge(&self) -> f64 {
+        (self.initial - self.drawn / self.capacity).max(0.0)
+    }
+
+    /// Voltage without load at the present state of charge, volts.
+    #[must_use]
+    pub fn open_circuit(&self) -> f64 {
+        let position = self.charge().min(1.0) * 10.0;
+        let below = (position as usize).min(9);
+        let (low, high) = (OPEN_CIRCUIT[below], OPEN_CIRCUIT[below + 1]);
+        low + (high - low) * (position - below as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn voltage_sags_at_once_then_slowly_and_comes_back() {
+        let mut battery = Battery::new(&PlantParameters { board_current: 0.0, ..Default::default() });
+        assert_eq!(battery.voltage(), 4.35);
+        battery.step(0.001, 4.0);
+        assert!((battery.voltage() - (4.35 - 0.24)).abs() < 1e-3, "{}", battery.voltage());
+        for _ in 0..30_000 {
+            battery.step(0.001, 4.0);
+        }
+        let sag = battery.open_circuit() - battery.voltage();
+        assert!((sag - 4.0 * 0.06 - 4.0 * 0.03 * (1.0 - (-3f64).exp())).abs() < 1e-3, "{sag}");
+        for _ in 0..100_000 {
+            battery.step(0.001, 0.0);
+        }
+        assert!((battery.voltage() - battery.open_circuit()).abs() < 1e-4);
+        assert!((battery.drawn() - 4.0 * 30.001).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_empty_battery_stays_empty() {
+        let mut battery = Battery::new(&PlantParameters { battery_charge: 0.01, ..Default::default() });
+        for _ in 0..1_000 {
+            battery.step(1.0, 4.0);
+        }
+        assert_eq!(battery.charge(), 0.0);
+        assert_eq!(battery.open_circuit(), OPEN_CIRCUIT[0]);
+    }
+}

@@ -1,0 +1,94 @@
+//! A flat floor at world z = 0 and the four feet that stand on it.
+//!
+//! A foot is a spring and a damper along the vertical, and a spring to the place where it stuck with Coulomb's limit
+//! along the horizontal: a vehicle that stands, stands still instead of creeping. The floor does not pull.
+
+use super::PlantParameters;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Feet, in units of the foot offset (x, y).
+const FEET: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+
+/// The floor as the vehicle feels it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ground {
+    /// Where each foot stuck to the floor, world north and east; `None` in the air.
+    anchors: [Option<(f64, f64)>; 4],
+    feet: [Vector3<f64>; 4],
+    stiffness: f64,
+    damping: f64,
+    friction: f64,
+    effect_gain: f64,
+    effect_height: f64,
+}
+
+impl Ground {
+    pub(crate) fn new(p: &PlantParameters) -> Self {
+        // The feet are so long that the origin stands at `ground_height` once the springs carry the weight.
+        let sink = p.mass * p.gravity / (4.0 * p.foot_stiffness);
+        Self {
+            anchors: [None; 4],
+            feet: FEET.map(|(x, y)| Vector3::new(x * p.foot_offset, y * p.foot_offset, p.ground_height + sink)),
+            stiffness: p.foot_stiffness,
+            damping: p.foot_damping,
+            friction: p.foot_friction,
+            effect_gain: p.ground_effect_gain,
+            effect_height: p.ground_effect_height,
+        }
+    }
+
+    /// Does any foot touch the floor?
+    #[must_use]
+    pub fn contact(&self) -> bool {
+        self.anchors.iter().any(Option::is_some)
+    }
+
+    /// Factor on the thrust of rotors at `height` metres above the floor.
+    #[must_use]
+    pub(crate) fn lift(&self, height: f64) -> f64 {
+        if height > 8.0 * self.effect_height {
+            return 1.0;
+        }
+        1.0 + self.effect_gain * libm::exp(-height.max(0.0) / self.effect_height)
+    }
+
+    /// Force (world) and torque (body) of the floor on the vehicle.
+    pub(crate) fn push(
+        &mut self,
+        position: &Vector3<f64>,
+        velocity: &Vector3<f64>,
+        attitude: &UnitQuaternion<f64>,
+        rate: &Vector3<f64>,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
+        let reach = self.feet[0].norm();
+        if -position.z > reach {
+            self.anchors = [None; 4];
+            return (force, torque);
+        }
+        for (foot, anchor) in self.feet.iter().zip(&mut self.anchors) {
+            let place = position + attitude * foot;
+            if place.z <= 0.0 {
+                *anchor = None;
+                continue;
+            }
+            let speed = velocity + attitude * rate.cross(foot);
+            let normal = (self.stiffness * place.z + self.damping * speed.z).max(0.0);
+            let stuck = anchor.get_or_insert((place.x, place.y));
+            let (mut x, mut y) = (
+                self.stiffness * (stuck.0 - place.x) - self.damping * speed.x,
+                self.stiffness * (stuck.1 - place.y) - self.damping * speed.y,
+            );
+            let (wanted, limit) = ((x * x + y * y).sqrt(), self.friction * normal);
+            if wanted > limit {
+                // Slide: the anchor follows so that its spring holds just what friction allows.
+                (x, y) = (x * limit / wanted, y * limit / wanted);
+                *stuck = (place.x + x / self.stiffness, place.y + y / self.stiffness);
+            }
+            let here = Vector3::new(x, y, -normal);
+            force += here;
+            torque += foot.cross(&attitude.inverse_transform_vector(&here));
+        }
+        (force, torque)
+    }
+}

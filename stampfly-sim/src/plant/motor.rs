@@ -1,0 +1,221 @@
+//! Four brushed motors with fixed propellers.
+//!
+//! A motor turns duty and battery voltage into rotor speed; a propeller turns speed into thrust and drag torque:
+//!
+//! ```text
+//! current  I = (duty·Vbat − Km·ω) / Rm, never negative: the switch is one-sided and a brake needs a second one
+//! speed    J·dω/dt = Km·I − Cq·ω² − Dm·ω − Qf
+//! thrust   T = Ct·ω²
+//! ```
+//!
+//! `Km`, `Dm` and `Qf` are not parameters of their own: the steady voltage curve V(ω) = Am·ω² + Bm·ω + Cm that was
+//! measured fixes them for a given resistance (set dω/dt = 0 and compare powers of ω). The winding's inductance
+//! is left out, its time constant being some ten microseconds.
+
+use super::PlantParameters;
+use crate::noise::Noise;
+use nalgebra::Vector3;
+
+/// Number of rotors.
+pub const ROTORS: usize = 4;
+
+/// Where the rotors sit, in units of the rotor offset: front right, rear right, rear left, front left (x, y).
+const PLACES: [(f64, f64); ROTORS] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+
+/// Which way they turn about the body's z axis (down): −1 is counter-clockwise seen from above.
+const SPINS: [f64; ROTORS] = [-1.0, 1.0, -1.0, 1.0];
+
+/// What the rotors do to the body in one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct RotorLoads {
+    /// Sum of thrusts, newtons, along −z of the body.
+    pub thrust: f64,
+    /// Torque about the body's axes, gyroscopic part not included.
+    pub torque: Vector3<f64>,
+    /// Angular momentum of the rotors along body z.
+    pub momentum_z: f64,
+    /// Current out of the battery.
+    pub current: f64,
+}
+
+/// The four motors with their propellers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rotors {
+    duty: [f64; ROTORS],
+    speed: [f64; ROTORS],
+    thrust_coefficient: [f64; ROTORS],
+    torque_coefficient: f64,
+    resistance: f64,
+    motor_constant: f64,
+    viscous: f64,
+    friction: f64,
+    inertia: f64,
+    /// Rotor places relative to the centre of mass.
+    places: [(f64, f64); ROTORS],
+    hover_speed: f64,
+}
+
+impl Rotors {
+    /// Rotors at rest. Their differences come from `noise`.
+    pub(crate) fn new(parameters: &PlantParameters, noise: &mut Noise) -> Self {
+        let p = parameters;
+        let spread = p.manufacturing_spread;
+        let per_volt = p.torque_coefficient / p.motor_voltage_a;
+        let motor_constant = per_volt * p.motor_resistance;
+        // One propeller in three hundred is 6 % off; the centre of mass lies within a millimetre.
+        let thrust_coefficient = [(); ROTORS].map(|()| p.thrust_coefficient * (1.0 + 0.02 * spread * noise.normal()));
+        let centre = (0.0004 * spread * noise.normal(), 0.0004 * spread * noise.normal());
+        Self {
+            duty: [0.0; ROTORS],
+            speed: [0.0; ROTORS],
+            thrust_coefficient,
+            torque_coefficient: p.torque_coefficient,
+            resistance: p.motor_resistance,
+            motor_constant,
+            viscous: ((p.motor_voltage_b - motor_constant) * per_volt).max(0.0),
+            friction: p.motor_voltage_c * per_volt,
+            inertia: p.rotor_inertia,
+            places: PLACES.map(|(x, y)| (x * p.rotor_offset - centre.0, y * p.rotor_offset - centre.1)),
+            hover_speed: (p.mass * p.gravity / (ROTORS as f64 * p.thrust_coefficient)).sqrt(),
+        }
+    }
+
+    /// Sets the duty cycles, 0 to 1.
+    pub(crate) fn set_duty(&mut self, duty: [f64; ROTORS]) {
+        self.duty = duty;
+    }
+
+    /// Sets the rotor speeds, rad/s.
+    pub(crate) fn set_speed(&mut self, speed: [f64; ROTORS]) {
+        self.speed = speed;
+    }
+
+    /// Duty cycles.
+    #[must_use]
+    pub fn duty(&self) -> [f64; ROTORS] {
+        self.duty
+    }
+
+    /// Rotor speeds, rad/s, always positive.
+    #[must_use]
+    pub fn speed(&self) -> [f64; ROTORS] {
+        self.speed
+    }
+
+    /// The speed at which ideal rotors carry the vehicle, rad/s.
+    #[must_use]
+    pub fn hover_speed(&self) -> f64 {
+        self.hover_speed
+    }
+
+    /// One step of `dt` seconds on `voltage`, with the thrust multiplied by `lift`.
+    pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64) -> RotorLoads {
+        let mut loads = RotorLoads::default();
+        for (i, spin) in SPINS.into_iter().enumerate() {
+            let (speed, duty) = (self.speed[i], self.duty[i]);
+            let current = ((duty * voltage - self.motor_constant * speed) / self.resistance).max(0.0);
+            let drag = self.torque_coefficient * speed * speed;
+            let net = self.motor_constant * current - drag - self.viscous * speed - self.friction;
+            let next = (speed + net / self.inertia * dt).max(0.0);
+            let acceleration = (next - speed) / dt;
+            self.speed[i] = next;
+
+            let thrust = self.thrust_coefficient[i] * speed * speed * lift;
+            let (x, y) = self.places[i];
+            loads.thrust += thrust;
+            loads.torque += Vector3::new(-y * thrust, x * thrust, -spin * (drag + self.inertia * acceleration));
+            loads.momentum_z += spin * self.inertia * speed;
+            loads.current += duty * current;
+        }
+        loads
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::Noise;
+
+    fn ideal() -> Rotors {
+        Rotors::new(&PlantParameters { manufacturing_spread: 0.0, ..Default::default() }, &mut Noise::new(0, 0))
+    }
+
+    fn settle(rotors: &mut Rotors, voltage: f64) -> RotorLoads {
+        let mut loads = RotorLoads::default();
+        for _ in 0..1600 {
+            loads = rotors.step(1.0 / 1600.0, voltage, 1.0);
+        }
+        loads
+    }
+
+    #[test]
+    fn steady_speed_follows_the_measured_voltage_curve() {
+        for voltage in [0.5, 1.0, 2.0, 3.0, 4.0] {
+            let mut rotors = ideal();
+            rotors.set_duty([1.0; 4]);
+            settle(&mut rotors, voltage);
+            let w = rotors.speed()[0];
+            let curve = 6.0368e-8 * w * w + 6.699042e-4 * w + 1.53e-2;
+            assert!((curve - voltage).abs() < 1e-3, "{voltage} V gives {w} rad/s, which needs {curve} V");
+        }
+    }
+
+    #[test]
+    fn hover_needs_the_weight_and_about_two_thirds_of_the_duty() {
+        let mut rotors = ideal();
+        let w = rotors.hover_speed();
+        let voltage = 6.0368e-8 * w * w + 6.699042e-4 * w + 1.53e-2;
+        for (battery, expected) in [(3.7, 0.69), (4.2, 0.61)] {
+            let duty = voltage / battery;
+            assert!((duty - expected).abs() < 0.01, "{duty} at {battery} V");
+            rotors.set_duty([duty; 4]);
+            let loads = settle(&mut rotors, battery);
+            assert!((loads.thrust / (0.0368 * 9.80665) - 1.0).abs() < 2e-3, "{}", loads.thrust);
+            assert!(loads.torque.norm() < 1e-9 && loads.momentum_z.abs() < 1e-9, "balanced");
+            assert!((3.0..5.0).contains(&loads.current), "four minutes on 300 mAh: {} A", loads.current);
+        }
+    }
+
+    #[test]
+    fn a_small_step_at_hover_has_a_time_constant_of_twenty_milliseconds() {
+        let mut rotors = ideal();
+        rotors.set_duty([0.62; 4]);
+        settle(&mut rotors, 4.15);
+        let before = rotors.speed()[0];
+        rotors.set_duty([0.63; 4]);
+        let mut trace = Vec::new();
+        for _ in 0..320 {
+            rotors.step(1.0 / 1600.0, 4.15, 1.0);
+            trace.push(rotors.speed()[0] - before);
+        }
+        let goal = trace[319] * (1.0 - (-1f64).exp());
+        let constant = trace.iter().filter(|gain| **gain < goal).count() as f64 / 1600.0;
+        assert!((0.016..0.022).contains(&constant), "{constant} s");
+    }
+
+    #[test]
+    fn each_motor_pushes_the_body_the_way_the_mixer_expects() {
+        // Roll, pitch, yaw signs: front right (-,+,+), rear right (-,-,-), rear left (+,-,+), front left (+,+,-).
+        let signs = [(-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0)];
+        for (motor, (roll, pitch, yaw)) in signs.into_iter().enumerate() {
+            let mut rotors = ideal();
+            let mut duty = [0.0; 4];
+            duty[motor] = 0.6;
+            rotors.set_duty(duty);
+            let t = settle(&mut rotors, 4.0).torque;
+            assert!(t.x * roll > 1e-4 && t.y * pitch > 1e-4 && t.z * yaw > 1e-5, "motor {motor}: {t:?}");
+        }
+    }
+
+    #[test]
+    fn a_motor_that_is_switched_off_coasts_to_a_stop() {
+        let mut rotors = ideal();
+        rotors.set_duty([0.6; 4]);
+        settle(&mut rotors, 4.0);
+        rotors.set_duty([0.0; 4]);
+        let loads = rotors.step(1.0 / 1600.0, 4.0, 1.0);
+        assert_eq!(loads.current, 0.0, "no current flows back");
+        settle(&mut rotors, 4.0);
+        assert_eq!(rotors.speed(), [0.0; 4]);
+    }
+}

@@ -1,0 +1,104 @@
+//! Moving air: a constant wind plus gusts.
+//!
+//! Gusts are a first-order Gauss-Markov process per world axis, the simplest relative of Dryden's spectra: right in
+//! strength and duration, wrong in the finer shape of the spectrum, which a vehicle of this size cannot tell.
+
+use crate::noise::Noise;
+use nalgebra::Vector3;
+use stampfly_types::Vec3;
+
+/// How the air moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WindConfig {
+    /// Constant part, world NED, m/s: where the air goes to.
+    pub mean: Vec3,
+    /// Standard deviation of the gusts along north and east, m/s; down has half of it.
+    pub gust: f32,
+    /// Correlation time of the gusts, s.
+    pub correlation: f32,
+}
+
+impl Default for WindConfig {
+    /// A room with people in it: no constant wind, gusts of 0.5 m/s lasting about 1.5 s.
+    fn default() -> Self {
+        Self { mean: Vec3::zeros(), gust: 0.5, correlation: 1.5 }
+    }
+}
+
+impl WindConfig {
+    /// Still air.
+    pub const CALM: Self = Self { mean: Vec3::new(0.0, 0.0, 0.0), gust: 0.0, correlation: 1.5 };
+}
+
+/// Physics steps between two steps of the gusts: they are slow.
+const DECIMATION: u32 = 4;
+
+/// The air at the vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wind {
+    noise: Noise,
+    mean: Vector3<f64>,
+    gust: Vector3<f64>,
+    keep: f64,
+    drive: Vector3<f64>,
+    countdown: u32,
+}
+
+impl Wind {
+    /// `dt` is the length of one physics step, seconds.
+    pub(crate) fn new(config: &WindConfig, dt: f64, mut noise: Noise) -> Self {
+        let deviation = f64::from(config.gust) * Vector3::new(1.0, 1.0, 0.5);
+        let keep = libm::exp(-dt * f64::from(DECIMATION) / f64::from(config.correlation).max(1e-3));
+        let gust = deviation.component_mul(&noise.normal3());
+        // This drive keeps the variance where it starts.
+        let drive = deviation * (1.0 - keep * keep).sqrt();
+        Self { noise, mean: config.mean.cast(), gust, keep, drive, countdown: DECIMATION }
+    }
+
+    pub(crate) fn step(&mut self) {
+        self.countdown -= 1;
+        if self.countdown == 0 {
+            self.countdown = DECIMATION;
+            if self.drive.x > 0.0 {
+                self.gust = self.gust * self.keep + self.drive.component_mul(&self.noise.normal3());
+            }
+        }
+    }
+
+    /// Velocity of the air, world NED, m/s.
+    #[must_use]
+    pub fn velocity(&self) -> Vector3<f64> {
+        self.mean + self.gust
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gusts_have_the_strength_and_the_duration_asked_for() {
+        let config = WindConfig { gust: 0.5, correlation: 0.2, ..Default::default() };
+        let mut wind = Wind::new(&config, 0.001, Noise::new(5, 0));
+        let (mut sum, mut lagged, n) = (0.0, 0.0, 400_000);
+        let mut past = std::collections::VecDeque::from(vec![0.0; 200]);
+        for _ in 0..n {
+            wind.step();
+            let x = wind.velocity().x;
+            sum += x * x / f64::from(n);
+            lagged += x * past.pop_front().expect("filled") / f64::from(n);
+            past.push_back(x);
+        }
+        assert!((sum.sqrt() - 0.5).abs() < 0.05, "{}", sum.sqrt());
+        assert!((lagged / sum - (-1f64).exp()).abs() < 0.08, "{}", lagged / sum);
+    }
+
+    #[test]
+    fn calm_is_calm() {
+        let mut wind = Wind::new(&WindConfig::CALM, 0.001, Noise::new(5, 0));
+        for _ in 0..100 {
+            wind.step();
+        }
+        assert_eq!(wind.velocity(), Vector3::zeros());
+    }
+}

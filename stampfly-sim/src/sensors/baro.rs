@@ -1,0 +1,86 @@
+//! The barometer, BMP280: new conversions at some 13 Hz, a slow drift, and the propellers' own pressure.
+
+use super::schedule::Schedule;
+use crate::noise::{Noise, Stream};
+use crate::time::Clock;
+use crate::world::World;
+use core::convert::Infallible;
+use stampfly_drivers::{Barometer, Sample};
+use stampfly_types::Micros;
+use stampfly_types::messages::BaroData;
+
+/// Conversion time plus 62.5 ms of standby.
+const RATE: f64 = 13.5;
+const READ_OUT: Micros = Micros(400);
+/// Pressure at the floor, Pa.
+const FLOOR_PRESSURE: f64 = 101_000.0;
+/// Standard deviation of one conversion after the chip's filter, Pa: 6 cm, what the static records show.
+const DEVIATION: f64 = 0.7;
+/// Resolution, Pa.
+const RESOLUTION: f64 = 0.16;
+/// Drift by weather and warming, Pa/√s.
+const DRIFT: f64 = 0.12;
+/// Pressure change in the propellers' wash at hover, Pa, and how much more of it near the floor.
+const WASH: f64 = 2.5;
+const WASH_FLOOR: f64 = 2.0;
+/// Height over which the floor's share fades, m.
+const WASH_HEIGHT: f64 = 0.2;
+
+/// Pressure altitude in the standard atmosphere (ICAO doc 7488, troposphere), m.
+fn altitude(pressure: f64) -> f64 {
+    44_330.77 * (1.0 - libm::pow(pressure / 101_325.0, 0.190_263))
+}
+
+/// The model of the barometer. Implements [`Barometer`].
+#[derive(Debug)]
+pub struct BaroModel {
+    world: World,
+    clock: Clock,
+    noise: Noise,
+    schedule: Schedule,
+    drift: f64,
+    start: Micros,
+}
+
+impl BaroModel {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64) -> Self {
+        let mut noise = Noise::stream(seed, Stream::Baro);
+        Self {
+            schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
+            // Specimens differ by a metre or ten.
+            drift: 60.0 * noise.normal(),
+            noise,
+            start: clock.now(),
+            world: world.clone(),
+            clock: clock.clone(),
+        }
+    }
+}
+
+impl Barometer for BaroModel {
+    type Error = Infallible;
+
+    async fn next(&mut self) -> Result<Sample<BaroData>, Infallible> {
+        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.0 as f64);
+        let at = self.schedule.instant(number);
+        self.clock.sleep_until(at + READ_OUT).await;
+        self.schedule.reported(number);
+        let motion = self.world.motion_at(at);
+        let hover = self.world.inspect(|plant| plant.rotors().hover_speed());
+        let height = -motion.position.z;
+        // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa per metre.
+        let still = FLOOR_PRESSURE - 11.77 * height;
+        let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
+        let wash = WASH * thrust * (1.0 + WASH_FLOOR * libm::exp(-height.max(0.0) / WASH_HEIGHT));
+        self.drift += DRIFT * (self.schedule.period() * 1e-6).sqrt() * self.noise.normal();
+        let pressure = still + wash + self.drift + DEVIATION * self.noise.normal();
+        let pressure = (pressure / RESOLUTION).round() * RESOLUTION;
+        let minutes = at.since(self.start).seconds() / 60.0;
+        let data = BaroData {
+            pressure: pressure as f32,
+            temperature: 25.0 + 8.0 * minutes / (minutes + 2.0),
+            altitude: altitude(pressure) as f32,
+        };
+        Ok(Sample { at, data })
+    }
+}

@@ -1,0 +1,135 @@
+//! The optical flow sensor, PMW3901: it compares pictures at 121 Hz and adds up counts; the driver reads them at
+//! 100 Hz, so a read holds the motion of one picture or of two.
+
+use super::schedule::Schedule;
+use crate::noise::{Noise, Stream};
+use crate::plant::Motion;
+use crate::time::Clock;
+use crate::world::World;
+use core::convert::Infallible;
+use stampfly_drivers::{OpticalFlow, Sample};
+use stampfly_types::Micros;
+use stampfly_types::messages::FlowData;
+
+/// Pictures per second.
+const FRAME_RATE: f64 = 121.0;
+/// Reads per second, by the processor's clock.
+const READ_RATE: f64 = 100.0;
+/// Angle of one count, rad.
+const COUNT: f64 = 0.00222;
+/// Below this height the picture is out of focus (data sheet).
+const FOCUS: f64 = 0.08;
+/// Here nothing of the motion is left in the picture: the vehicle stands.
+const BLIND: f64 = 0.035;
+/// Above this height quality falls, to nothing at [`FAR`].
+const DIM: f64 = 2.5;
+const FAR: f64 = 4.5;
+/// The driver vouches for a sample from this quality on.
+const MINIMUM_QUALITY: u8 = 25;
+
+/// The model of the flow sensor. Implements [`OpticalFlow`].
+///
+/// `Sample::at` is the instant of the read, all the driver can know; the newest picture is on average half a picture
+/// older.
+#[derive(Debug)]
+pub struct FlowModel {
+    world: World,
+    clock: Clock,
+    noise: Noise,
+    frames: Schedule,
+    reads: Schedule,
+    /// Number of the next picture.
+    frame: u64,
+    last_read: Micros,
+    /// Counts not yet read, with the fraction that is carried on.
+    counts: [f64; 2],
+    /// Scale and mounting error of this specimen: rows x and y.
+    mounting: [[f64; 2]; 2],
+    texture: f64,
+}
+
+impl FlowModel {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64) -> Self {
+        let mut noise = Noise::stream(seed, Stream::Flow);
+        let start = clock.now();
+        let (scale_x, scale_y) = (1.0 + noise.within(0.03), 1.0 + noise.within(0.03));
+        let (sin, cos) = libm::sincos(noise.within(1f64.to_radians()));
+        Self {
+            frames: Schedule::new(start, FRAME_RATE, 0.02, &mut noise),
+            reads: Schedule::new(start, READ_RATE, 0.0, &mut noise),
+            frame: 0,
+            last_read: start,
+            counts: [0.0; 2],
+            mounting: [[scale_x * cos, scale_x * sin], [-scale_y * sin, scale_y * cos]],
+            texture: 140.0 + noise.within(40.0),
+            noise,
+            world: world.clone(),
+            clock: clock.clone(),
+        }
+    }
+
+    /// Adds the motion from the previous picture to picture `number`.
+    fn expose(&mut self, number: u64) {
+        let end = self.frames.instant(number);
+        let period = self.frames.period();
+        let begin = Micros(end.0 - (period as u64).min(end.0));
+        let middle = Micros(begin.0 + end.0.saturating_sub(begin.0) / 2);
+        let motions = [begin, middle, end].map(|instant| self.world.motion_at(instant));
+        let rates = motions.map(|motion| angular_flow(&motion));
+        let height = slant_height(&motions[1]);
+        let sharp = ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
+        let deviation = 0.25 + 0.15 * height.min(FAR);
+        // Simpson's rule over the picture.
+        let swept: [f64; 2] =
+            core::array::from_fn(|axis| (rates[0][axis] + 4.0 * rates[1][axis] + rates[2][axis]) / 6.0 * period * 1e-6);
+        let seen = f64::from(u8::from(height < FAR));
+        for (row, counts) in self.mounting.iter().zip(&mut self.counts) {
+            let angle = row[0] * swept[0] + row[1] * swept[1];
+            *counts += seen * (sharp * angle / COUNT + deviation * self.noise.normal());
+        }
+    }
+
+    fn quality(&mut self, instant: Micros) -> u8 {
+        let height = slant_height(&self.world.motion_at(instant));
+        let near = 0.5 + 0.5 * ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
+        let far = 1.0 - ((height - DIM) / (FAR - DIM)).clamp(0.0, 1.0);
+        (self.texture * near * far * (1.0 + 0.04 * self.noise.normal())) as u8
+    }
+}
+
+/// Distance along the optical axis to the floor, m; very large when the sensor looks at the horizon.
+fn slant_height(motion: &Motion) -> f64 {
+    let down = (motion.attitude * nalgebra::Vector3::z()).z;
+    if down > 0.1 { (-motion.position.z / down).max(0.001) } else { 1e3 }
+}
+
+/// Angular rate of the picture, body x and y, in the convention of [`FlowData`].
+fn angular_flow(motion: &Motion) -> [f64; 2] {
+    let velocity = motion.attitude.inverse_transform_vector(&motion.velocity);
+    let height = slant_height(motion);
+    [velocity.x / height + motion.rate.y, velocity.y / height - motion.rate.x]
+}
+
+impl OpticalFlow for FlowModel {
+    type Error = Infallible;
+
+    async fn next(&mut self) -> Result<Sample<FlowData>, Infallible> {
+        let number = self.reads.upcoming(self.clock.now(), 0.0);
+        let at = self.reads.instant(number);
+        self.clock.sleep_until(at).await;
+        self.reads.reported(number);
+        while self.frames.instant(self.frame) <= at {
+            self.expose(self.frame);
+            self.frame += 1;
+        }
+        let whole = self.counts.map(|counts| counts.round().clamp(-32768.0, 32767.0));
+        for (counts, whole) in self.counts.iter_mut().zip(whole) {
+            *counts -= whole;
+        }
+        let interval = at.since(self.last_read).seconds();
+        self.last_read = at;
+        let quality = self.quality(at);
+        let [delta_x, delta_y] = whole.map(|counts| (counts * COUNT) as f32);
+        Ok(Sample { at, data: FlowData { delta_x, delta_y, interval, quality, valid: quality >= MINIMUM_QUALITY } })
+    }
+}

@@ -1,0 +1,163 @@
+//! The inertial sensor, a BMI270 as the StampFly uses it: ±8 g, ±2000 °/s, 1600 Hz into a FIFO that is read in
+//! fours and decimated to 400 Hz.
+
+use super::decimator::Decimator;
+use super::schedule::Schedule;
+use crate::noise::{Noise, Stream};
+use crate::time::Clock;
+use crate::vibration::Vibration;
+use crate::world::World;
+use core::convert::Infallible;
+use nalgebra::{Matrix3, Vector3};
+use stampfly_drivers::Sample;
+use stampfly_types::messages::ImuData;
+use stampfly_types::{GRAVITY, Micros, Vec3};
+
+/// Counts per m/s² at ±8 g.
+const ACCEL_SCALE: f64 = 4096.0 / GRAVITY as f64;
+/// Counts per rad/s at ±2000 °/s.
+const GYRO_SCALE: f64 = 16.4 * 180.0 / core::f64::consts::PI;
+const RATE: f64 = 1600.0;
+/// Samples in one FIFO read.
+const GROUP: usize = 4;
+/// Interrupt and burst read after the last sample of a group.
+const LATENCY: Micros = Micros(120);
+/// A reader later than this has lost samples (the world's memory is 80 ms).
+const MEMORY: Micros = Micros(60_000);
+
+/// Noise per sample: density times the square root of half the rate. Densities per axis from a static record
+/// (x, y, z): accelerometer in m/s²/√Hz, gyroscope in rad/s/√Hz.
+const ACCEL_DENSITY: [f64; 3] = [0.00110, 0.00118, 0.00137];
+const GYRO_DENSITY: [f64; 3] = [0.000143, 0.000142, 0.000142];
+/// Turn-on offset of the accelerometer, standard deviation per axis, m/s².
+const ACCEL_BIAS: f64 = 0.12;
+/// Turn-on offset of the gyroscope, bound per axis: 1 °/s.
+const GYRO_BIAS: f64 = 0.017_453;
+/// Wander of the offsets, per √s.
+const ACCEL_WALK: f64 = 3e-4;
+const GYRO_WALK: f64 = 2e-5;
+
+/// The model of the inertial sensor. Implements [`Imu`](stampfly_drivers::Imu) at 400 Hz.
+///
+/// `Sample::at` is the instant in the middle of the decimation filter, three chip samples (1.9 ms) before the newest
+/// one; with the read-out it is 2 ms old when it is delivered.
+#[derive(Debug)]
+pub struct ImuModel {
+    world: World,
+    clock: Clock,
+    noise: Noise,
+    vibration: Vibration,
+    schedule: Schedule,
+    decimator: Decimator,
+    /// Number of the first chip sample of the next group.
+    cursor: u64,
+    start: Micros,
+    accel_bias: Vector3<f64>,
+    gyro_bias: Vector3<f64>,
+    /// Misalignment and scale.
+    accel_matrix: Matrix3<f64>,
+    gyro_matrix: Matrix3<f64>,
+}
+
+impl ImuModel {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
+        let mut noise = Noise::stream(seed, Stream::Imu);
+        let start = clock.now();
+        let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
+        // Half a degree between the axes, half a per cent of scale.
+        let mut matrix = || Matrix3::identity() + Matrix3::from_fn(|_, _| noise.within(0.005));
+        let (accel_matrix, gyro_matrix) = (matrix(), matrix());
+        let hover_speed = world.inspect(|plant| plant.rotors().hover_speed());
+        Self {
+            vibration: Vibration::new(
+                vibration,
+                schedule.period() * 1e-6,
+                hover_speed,
+                Noise::stream(seed, Stream::Vibration),
+            ),
+            schedule,
+            decimator: Decimator::default(),
+            cursor: 0,
+            start,
+            accel_bias: noise.normal3() * ACCEL_BIAS,
+            gyro_bias: Vector3::from_fn(|_, _| noise.within(GYRO_BIAS)),
+            accel_matrix,
+            gyro_matrix,
+            noise,
+            world: world.clone(),
+            clock: clock.clone(),
+        }
+    }
+
+    /// The present offsets, which an estimator has to find: accelerometer (m/s²) and gyroscope (rad/s), without the
+    /// rectification of vibration.
+    #[must_use]
+    pub fn bias(&self) -> (Vec3, Vec3) {
+        (self.accel_bias.cast(), self.gyro_bias.cast())
+    }
+
+    /// Chip sample `number` in counts: accelerometer x, y, z, gyroscope x, y, z.
+    fn convert(&mut self, number: u64) -> [i16; 6] {
+        let motion = self.world.motion_at(self.schedule.instant(number));
+        let shake = self.vibration.step(&motion.rotor_speed);
+        let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
+        let gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
+        let per_sample = (RATE / 2.0).sqrt();
+        core::array::from_fn(|channel| {
+            let (value, density, scale) = if channel < 3 {
+                (accel[channel], ACCEL_DENSITY[channel], ACCEL_SCALE)
+            } else {
+                (gyro[channel - 3], GYRO_DENSITY[channel - 3], GYRO_SCALE)
+            };
+            let counts = (value + shake[channel] + density * per_sample * self.noise.normal()) * scale;
+            // The conversion saturates, as the chip does.
+            (counts + 0.5f64.copysign(counts)) as i16
+        })
+    }
+
+    /// The next group of four as it comes out of the FIFO, with the instant of its first sample.
+    ///
+    /// For comparisons with recordings that were filtered in other ways; flight code wants
+    /// [`Imu::next`](stampfly_drivers::Imu::next).
+    pub async fn next_group(&mut self) -> (Micros, [[i16; 6]; GROUP]) {
+        let now = self.clock.now();
+        if now.since(self.schedule.instant(self.cursor)) > MEMORY {
+            // Overrun: the oldest samples are gone, and what the filter remembers with them.
+            let first = self.schedule.upcoming(now, MEMORY.0 as f64 * 0.5);
+            self.cursor = first;
+            self.decimator = Decimator::default();
+        }
+        let last = self.cursor + GROUP as u64 - 1;
+        self.clock.sleep_until(self.schedule.instant(last) + LATENCY).await;
+        let first = self.cursor;
+        self.cursor += GROUP as u64;
+        let group = core::array::from_fn(|i| self.convert(first + i as u64));
+        let wander = (GROUP as f64 / RATE).sqrt();
+        self.accel_bias += self.noise.normal3() * (ACCEL_WALK * wander);
+        self.gyro_bias += self.noise.normal3() * (GYRO_WALK * wander);
+        (self.schedule.instant(first), group)
+    }
+}
+
+/// Counts, possibly fractions of them, in SI units.
+#[must_use]
+pub fn counts_to_si(counts: [f64; 6]) -> (Vec3, Vec3) {
+    let [ax, ay, az, gx, gy, gz] = counts;
+    ((Vector3::new(ax, ay, az) / ACCEL_SCALE).cast(), (Vector3::new(gx, gy, gz) / GYRO_SCALE).cast())
+}
+
+impl stampfly_drivers::Imu for ImuModel {
+    type Error = Infallible;
+
+    async fn next(&mut self) -> Result<Sample<ImuData>, Infallible> {
+        loop {
+            let (at, group) = self.next_group().await;
+            let Some(sum) = self.decimator.push(&group) else { continue };
+            let (accel, gyro) = counts_to_si(sum);
+            // The die warms by ten degrees within a few minutes.
+            let minutes = at.since(self.start).seconds() / 60.0;
+            let temperature = 25.0 + 10.0 * minutes / (minutes + 2.0);
+            return Ok(Sample { at, data: ImuData { accel, gyro, temperature } });
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The StampFly's chips as functions of the world: what they report, when, and how wrong.
+//!
+//! Each model implements the trait of `stampfly-drivers` that the hardware's driver implements, and holds a handle
+//! to the world. Rates, ranges and resolutions are the chips'; each chip's clock is off by up to 2 %; noise,
+//! offsets and mounting errors are drawn from the seed. No model ever fails: faults are wrapped around them.
+//!
+//! | model | chip | rate | trait |
+//! |---|---|---|---|
+//! | [`ImuModel`] | BMI270 | 1600 → 400 Hz | `Imu` |
+//! | [`RangeModel`] | VL53L3CX | 30 Hz | `RangeFinder` |
+//! | [`FlowModel`] | PMW3901 | 100 Hz | `OpticalFlow` |
+//! | [`MagModel`] | BMM150 | 25 Hz | `Magnetometer` |
+//! | [`BaroModel`] | BMP280 | 13.5 Hz | `Barometer` |
+//! | [`PowerModel`] | INA3221 | 10 Hz | `PowerMonitor` |
+
+mod actuators;
+mod baro;
+mod decimator;
+mod flow;
+pub mod imu;
+mod mag;
+mod power;
+mod schedule;
+pub mod tof;
+
+pub use actuators::{ButtonModel, IndicatorRecorder, MotorModel};
+pub use baro::BaroModel;
+pub use flow::FlowModel;
+pub use imu::ImuModel;
+pub use mag::MagModel;
+pub use power::PowerModel;
+pub use tof::{Mount, RangeModel};
+
+use crate::time::Clock;
+use crate::world::World;
+
+/// Everything that is soldered to the board.
+#[derive(Debug)]
+pub struct Sensors {
+    /// Inertial measurement unit.
+    pub imu: ImuModel,
+    /// Bottom range finder.
+    pub tof: RangeModel,
+    /// Optical flow.
+    pub flow: FlowModel,
+    /// Magnetometer.
+    pub mag: MagModel,
+    /// Barometer.
+    pub baro: BaroModel,
+    /// Battery monitor.
+    pub power: PowerModel,
+    /// Motors.
+    pub motors: MotorModel,
+    /// Lights and buzzer.
+    pub indicator: IndicatorRecorder,
+    /// The button.
+    pub button: ButtonModel,
+}
+
+impl Sensors {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
+        Self {
+            imu: ImuModel::new(world, clock, seed, vibration),
+            tof: RangeModel::new(world, clock, seed, Mount::Bottom),
+            flow: FlowModel::new(world, clock, seed),
+            mag: MagModel::new(world, clock, seed),
+            baro: BaroModel::new(world, clock, seed),
+            power: PowerModel::new(world, clock, seed),
+            motors: MotorModel::new(world, clock),
+            indicator: IndicatorRecorder::new(clock),
+            button: ButtonModel::default(),
+        }
+    }
+}

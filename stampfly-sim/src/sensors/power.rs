@@ -1,0 +1,64 @@
+//! The battery monitor, INA3221: voltage and mean current ten times a second.
+
+use super::schedule::Schedule;
+use crate::noise::{Noise, Stream};
+use crate::time::Clock;
+use crate::world::World;
+use core::convert::Infallible;
+use stampfly_drivers::{PowerMonitor, Sample};
+use stampfly_types::Micros;
+use stampfly_types::messages::PowerData;
+
+const RATE: f64 = 10.0;
+const READ_OUT: Micros = Micros(300);
+/// Resolution of the voltage, V.
+const VOLTAGE_STEP: f64 = 0.008;
+/// Resolution of the current, A: 40 µV over 10 mΩ.
+const CURRENT_STEP: f64 = 0.004;
+
+/// The model of the battery monitor. Implements [`PowerMonitor`].
+#[derive(Debug)]
+pub struct PowerModel {
+    world: World,
+    clock: Clock,
+    noise: Noise,
+    schedule: Schedule,
+    /// Gain error of the shunt and the amplifier.
+    gain: f64,
+    /// Charge drawn at the previous sample, and when that was.
+    before: (f64, Micros),
+}
+
+impl PowerModel {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64) -> Self {
+        let mut noise = Noise::stream(seed, Stream::Power);
+        Self {
+            schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
+            gain: 1.0 + noise.within(0.02),
+            noise,
+            before: (world.inspect(|plant| plant.battery().drawn()), clock.now()),
+            world: world.clone(),
+            clock: clock.clone(),
+        }
+    }
+}
+
+impl PowerMonitor for PowerModel {
+    type Error = Infallible;
+
+    async fn next(&mut self) -> Result<Sample<PowerData>, Infallible> {
+        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.0 as f64);
+        let at = self.schedule.instant(number);
+        self.clock.sleep_until(at + READ_OUT).await;
+        self.schedule.reported(number);
+        let now = self.clock.now();
+        self.world.advance_to(now);
+        let (voltage, drawn) = self.world.inspect(|plant| (plant.battery().voltage(), plant.battery().drawn()));
+        let mean = (drawn - self.before.0) / f64::from(now.since(self.before.1).seconds()).max(1e-3);
+        self.before = (drawn, now);
+        let voltage = ((voltage + 0.003 * self.noise.normal()) / VOLTAGE_STEP).round() * VOLTAGE_STEP;
+        let current = ((mean * self.gain + 0.003 * self.noise.normal()) / CURRENT_STEP).round() * CURRENT_STEP;
+        let power = voltage * current;
+        Ok(Sample { at, data: PowerData { voltage: voltage as f32, current: current as f32, power: power as f32 } })
+    }
+}

@@ -1,0 +1,117 @@
+//! The range finders, VL53L3CX: one measurement every 33 ms along a fixed beam.
+
+use super::schedule::Schedule;
+use crate::noise::{Noise, Stream};
+use crate::time::Clock;
+use crate::world::World;
+use core::convert::Infallible;
+use nalgebra::Vector3;
+use stampfly_drivers::{RangeFinder, Sample};
+use stampfly_types::Micros;
+use stampfly_types::messages::TofData;
+
+const RATE: f64 = 30.0;
+/// Reading 134 bytes over a 400 kHz bus.
+const READ_OUT: Micros = Micros(3_200);
+/// Shortest range that can be told from the cover glass, m.
+const MINIMUM: f64 = 0.020;
+/// Longest range with enough light coming back, m.
+const MAXIMUM: f64 = 4.0;
+/// Share of measurements lost for no reason that can be seen.
+const DROPOUTS: f64 = 0.003;
+
+/// The chip's range status "valid".
+pub const STATUS_VALID: u8 = 0;
+/// The chip's range status "sigma failure": the repeatability is too poor.
+pub const STATUS_SIGMA: u8 = 1;
+/// The chip's range status "signal failure": too little light came back.
+pub const STATUS_SIGNAL: u8 = 2;
+/// The chip's range status "out of bounds": phase outside the valid range.
+pub const STATUS_OUT_OF_BOUNDS: u8 = 4;
+
+/// Which way a range finder looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mount {
+    /// Down, along +z of the body.
+    Bottom,
+    /// Forward, along +x of the body. There are no walls: it sees the floor when the nose is down, else nothing.
+    Front,
+}
+
+/// The model of a range finder. Implements [`RangeFinder`].
+///
+/// `Sample::at` is the middle of the measurement; the sample is delivered one read-out after its end.
+#[derive(Debug)]
+pub struct RangeModel {
+    world: World,
+    clock: Clock,
+    noise: Noise,
+    schedule: Schedule,
+    beam: Vector3<f64>,
+    /// Offset of this specimen, m.
+    offset: f64,
+}
+
+impl RangeModel {
+    /// A range finder looking down or forward.
+    #[must_use]
+    pub fn new(world: &World, clock: &Clock, seed: u64, mount: Mount) -> Self {
+        let (stream, beam) = match mount {
+            Mount::Bottom => (Stream::BottomTof, Vector3::z()),
+            Mount::Front => (Stream::FrontTof, Vector3::x()),
+        };
+        let mut noise = Noise::stream(seed, stream);
+        Self {
+            schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
+            offset: noise.within(0.003),
+            noise,
+            beam,
+            world: world.clone(),
+            clock: clock.clone(),
+        }
+    }
+
+    /// The true distance along the beam to the floor at `instant`; `None` when the beam misses it.
+    #[must_use]
+    pub fn true_distance(&self, instant: Micros) -> Option<f64> {
+        let motion = self.world.motion_at(instant);
+        let slope = (motion.attitude * self.beam).z;
+        (slope > 1e-3).then(|| -motion.position.z / slope)
+    }
+
+    fn measure(&mut self, instant: Micros) -> TofData {
+        let distance = self.true_distance(instant);
+        // The same number of draws whatever happens, so that one flight's noise does not depend on its course.
+        let (lost, normal) = (self.noise.chance(DROPOUTS), self.noise.normal());
+        let invalid = |status| TofData { distance: 0.0, sigma: 0.0, status, valid: false };
+        let Some(distance) = distance.filter(|d| *d <= MAXIMUM * 1.2) else { return invalid(STATUS_SIGNAL) };
+        let sigma = 0.0008 + 0.0008 * distance + 0.0004 * distance * distance;
+        // Whole millimetres, as the chip counts them.
+        let reading = ((distance + self.offset + sigma * normal) * 1000.0).round().max(0.0) / 1000.0;
+        let status = if lost {
+            STATUS_SIGMA
+        } else if distance < MINIMUM {
+            STATUS_OUT_OF_BOUNDS
+        } else if distance > MAXIMUM {
+            STATUS_SIGNAL
+        } else {
+            STATUS_VALID
+        };
+        TofData { distance: reading as f32, sigma: sigma as f32, status, valid: status == STATUS_VALID }
+    }
+}
+
+impl RangeFinder for RangeModel {
+    type Error = Infallible;
+
+    async fn next(&mut self) -> Result<Sample<TofData>, Infallible> {
+        let period = self.schedule.period();
+        let latency = period + READ_OUT.0 as f64;
+        let number = self.schedule.upcoming(self.clock.now(), latency);
+        let begin = self.schedule.instant(number);
+        self.clock.sleep_until(begin + Micros(latency as u64)).await;
+        self.schedule.reported(number);
+        let at = begin + Micros((0.5 * period) as u64);
+        Ok(Sample { at, data: self.measure(at) })
+    }
+}

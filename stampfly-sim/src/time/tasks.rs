@@ -1,0 +1,261 @@
+//! A deterministic executor on virtual time.
+//!
+//! It polls whatever is due at an instant and then jumps to the next one. Tasks that are due together run in the
+//! order of (deadline, spawning), so the same program always interleaves the same way. A task may also wait for
+//! another task, through any channel that uses wakers; it then runs again within the same instant.
+
+use super::Clock;
+use core::future::Future;
+use core::pin::{Pin, pin};
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::task::{Context, Poll, Waker};
+use stampfly_types::Micros;
+use std::sync::Arc;
+use std::task::Wake;
+
+/// A task's door bell: rung by whatever else than time the task waits for.
+///
+/// Atomic because [`Waker`] has to be `Send`; there is still only one thread.
+struct Bell {
+    rung: AtomicBool,
+    any_rung: Arc<AtomicBool>,
+}
+
+impl Wake for Bell {
+    fn wake(self: Arc<Self>) {
+        self.wake_by_ref();
+    }
+
+    fn wake_by_ref(self: &Arc<Self>) {
+        self.rung.store(true, Ordering::Relaxed);
+        self.any_rung.store(true, Ordering::Relaxed);
+    }
+}
+
+struct Task<'a> {
+    future: Pin<Box<dyn Future<Output = ()> + 'a>>,
+    deadline: Option<Micros>,
+    bell: Arc<Bell>,
+    waker: Waker,
+}
+
+/// A set of tasks that share a [`Clock`].
+///
+/// ```
+/// use std::cell::RefCell;
+/// use stampfly_sim::time::{Clock, Tasks};
+/// use stampfly_types::Micros;
+///
+/// let clock = Clock::new(Micros::ZERO);
+/// let seen = RefCell::new(Vec::new());
+/// let (log, watch) = (&seen, &clock);
+/// let mut tasks = Tasks::new(clock.clone());
+/// for (name, period) in [("slow", 50), ("fast", 20)] {
+///     tasks.spawn(async move {
+///         for tick in 1..=2 {
+///             watch.sleep_until(Micros::from_millis(tick * period)).await;
+///             log.borrow_mut().push((watch.now().0 / 1000, name));
+///         }
+///     });
+/// }
+/// tasks.run_until(Micros::from_millis(90));
+/// drop(tasks);
+/// assert_eq!(clock.now(), Micros::from_millis(90));
+/// assert_eq!(seen.into_inner(), [(20, "fast"), (40, "fast"), (50, "slow")]);
+/// ```
+pub struct Tasks<'a> {
+    clock: Clock,
+    tasks: Vec<Option<Task<'a>>>,
+    any_rung: Arc<AtomicBool>,
+}
+
+impl<'a> Tasks<'a> {
+    /// No tasks yet.
+    #[must_use]
+    pub fn new(clock: Clock) -> Self {
+        Self { clock, tasks: Vec::new(), any_rung: Arc::new(AtomicBool::new(false)) }
+    }
+
+    /// Adds a task. It is polled for the first time at the next step, at the instant the clock shows then.
+    pub fn spawn(&mut self, future: impl Future<Output = ()> + 'a) {
+        let bell = Arc::new(Bell { rung: AtomicBool::new(true), any_rung: self.any_rung.clone() });
+        self.any_rung.store(true, Ordering::Relaxed);
+        let waker = Waker::from(bell.clone());
+        self.tasks.push(Some(Task { future: Box::pin(future), deadline: None, bell, waker }));
+    }
+
+    /// How many tasks have not finished.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.tasks.iter().flatten().count()
+    }
+
+    /// Has every task finished?
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The instant of the next step; `None` when no task waits for time.
+    #[must_use]
+    pub fn next_deadline(&self) -> Option<Micros> {
+        if self.any_rung.load(Ordering::Relaxed) { Some(self.clock.now()) } else { self.earliest() }
+    }
+
+    /// Runs everything that is due at the next deadline, and returns that instant.
+    ///
+    /// `None`, and nothing done, when no task waits for time.
+    pub fn step(&mut self) -> Option<Micros> {
+        self.clock.advance_to(self.next_deadline()?);
+        self.answer_bells();
+        while let Some((_, index)) = self.first_due() {
+            self.poll(index);
+            self.answer_bells();
+        }
+        Some(self.clock.now())
+    }
+
+    /// Runs everything that is due up to and including `instant`, where the clock then stands.
+    pub fn run_until(&mut self, instant: Micros) {
+        while self.next_deadline().is_some_and(|deadline| deadline <= instant) {
+            self.step();
+        }
+        self.clock.advance_to(instant);
+    }
+
+    fn earliest(&self) -> Option<Micros> {
+        self.tasks.iter().flatten().filter_map(|task| task.deadline).min()
+    }
+
+    /// The task with the smallest (deadline, spawn order) whose deadline has passed.
+    fn first_due(&self) -> Option<(Micros, usize)> {
+        let now = self.clock.now();
+        let deadlines =
+            self.tasks.iter().enumerate().filter_map(|(index, task)| Some((task.as_ref()?.deadline?, index)));
+        deadlines.filter(|(deadline, _)| *deadline <= now).min()
+    }
+
+    /// Polls the tasks that were woken by something else than time, in spawn order, until none is left.
+    fn answer_bells(&mut self) {
+        while self.any_rung.swap(false, Ordering::Relaxed) {
+            for index in 0..self.tasks.len() {
+                if self.tasks[index].as_ref().is_some_and(|task| task.bell.rung.swap(false, Ordering::Relaxed)) {
+                    self.poll(index);
+                }
+            }
+        }
+    }
+
+    fn poll(&mut self, index: usize) {
+        let Some(task) = &mut self.tasks[index] else { return };
+        self.clock.take_wanted();
+        match task.future.as_mut().poll(&mut Context::from_waker(&task.waker)) {
+            Poll::Ready(()) => self.tasks[index] = None,
+            Poll::Pending => task.deadline = self.clock.take_wanted(),
+        }
+    }
+}
+
+/// Runs one future to its end, moving the clock from one of its deadlines to the next.
+///
+/// # Panics
+/// When the future waits for something that is not the clock: nothing else could ever happen.
+pub fn block_on<T>(clock: &Clock, future: impl Future<Output = T>) -> T {
+    let mut future = pin!(future);
+    let mut context = Context::from_waker(Waker::noop());
+    loop {
+        clock.take_wanted();
+        if let Poll::Ready(value) = future.as_mut().poll(&mut context) {
+            return value;
+        }
+        clock.advance_to(clock.take_wanted().expect("the future waits for something that is not the clock"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+    use std::collections::VecDeque;
+    use std::future::poll_fn;
+
+    #[test]
+    fn tasks_due_together_run_in_spawn_order() {
+        let clock = Clock::new(Micros::ZERO);
+        let order = RefCell::new(String::new());
+        let mut tasks = Tasks::new(clock.clone());
+        for name in ['a', 'b', 'c'] {
+            let (clock, order) = (clock.clone(), &order);
+            tasks.spawn(async move {
+                for tick in 1..=3 {
+                    clock.sleep_until(Micros(tick * 10)).await;
+                    order.borrow_mut().push(name);
+                }
+            });
+        }
+        assert_eq!(tasks.next_deadline(), Some(Micros::ZERO), "fresh tasks are due now");
+        while tasks.step().is_some() {}
+        assert!(tasks.is_empty());
+        assert_eq!(clock.now(), Micros(30));
+        assert_eq!(*order.borrow(), "abcabcabc");
+    }
+
+    #[test]
+    fn a_task_that_waits_for_another_runs_within_the_same_instant() {
+        let clock = Clock::new(Micros::ZERO);
+        let queue: RefCell<(VecDeque<u32>, Option<Waker>)> = RefCell::default();
+        let got = RefCell::new(Vec::new());
+        let mut tasks = Tasks::new(clock.clone());
+        tasks.spawn(async {
+            loop {
+                let value = poll_fn(|context| {
+                    let mut queue = queue.borrow_mut();
+                    queue.1 = Some(context.waker().clone());
+                    queue.0.pop_front().map_or(Poll::Pending, Poll::Ready)
+                })
+                .await;
+                got.borrow_mut().push((clock.now(), value));
+            }
+        });
+        tasks.spawn(async {
+            for value in 1..=2 {
+                clock.sleep_until(Micros(100 * u64::from(value))).await;
+                queue.borrow_mut().0.push_back(value);
+                if let Some(waker) = queue.borrow_mut().1.take() {
+                    waker.wake();
+                }
+            }
+        });
+        tasks.run_until(Micros(1_000));
+        assert_eq!(tasks.next_deadline(), None);
+        assert_eq!(*got.borrow(), [(Micros(100), 1), (Micros(200), 2)]);
+    }
+
+    #[test]
+    fn a_sleep_that_was_dropped_leaves_no_deadline() {
+        let clock = Clock::new(Micros::ZERO);
+        let mut tasks = Tasks::new(clock.clone());
+        let sleeper = clock.clone();
+        tasks.spawn(async move {
+            let mut polled = false;
+            poll_fn(move |_| if std::mem::replace(&mut polled, true) { Poll::Ready(()) } else { Poll::Pending }).await;
+            sleeper.sleep_until(Micros(5)).await;
+        });
+        assert_eq!(tasks.step(), Some(Micros::ZERO));
+        assert_eq!(tasks.next_deadline(), None, "it waits for a bell that nobody rings");
+        assert_eq!(tasks.len(), 1);
+    }
+
+    #[test]
+    fn delays_round_up_and_never_end_early() {
+        use embedded_hal_async::delay::DelayNs;
+        let clock = Clock::new(Micros(7));
+        let mut delay = clock.clone();
+        block_on(&clock, delay.delay_ns(1));
+        assert_eq!(clock.now(), Micros(8));
+        block_on(&clock, delay.delay_ms(2));
+        assert_eq!(clock.now(), Micros(2_008));
+        clock.advance_to(Micros::ZERO);
+        assert_eq!(clock.now(), Micros(2_008), "time does not go back");
+    }
+}

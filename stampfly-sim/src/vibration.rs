@@ -1,0 +1,203 @@
+//! What turning propellers do to an inertial sensor.
+//!
+//! Three parts per axis, all growing with the square of rotor speed like every aerodynamic and centrifugal force:
+//! tones at each rotor's speed and at twice that (imbalance, two blades passing an arm), broadband noise (flow,
+//! brushes), and broadband noise through a resonance of the airframe. On top, the accelerometer reads a little
+//! less than gravity while it shakes: the rectification that all the recorded flights show (about +0.8 m/s² on z).
+//!
+//! It is sampled at the chip's own rate and before any decimation, so what folds back below the control loop's
+//! Nyquist frequency is real folding, at frequencies that follow the rotors. The amplitudes are fitted to recorded
+//! flights; `cargo run --release -p stampfly-sim --example spectra` repeats the comparison.
+
+use crate::noise::Noise;
+use crate::plant::ROTORS;
+
+/// Axes: accelerometer x, y, z, then gyroscope x, y, z.
+const AXES: usize = 6;
+
+/// Strength of the vibration on one axis with all rotors at hover speed.
+struct Profile {
+    /// Standard deviation of the broadband part per sample.
+    broadband: f64,
+    /// Resonance of the airframe: frequency and bandwidth in Hz, standard deviation.
+    resonance: (f64, f64, f64),
+    /// Root mean square of the tones at once and twice the rotors' speed, all rotors together.
+    tones: [f64; 2],
+    /// Constant offset.
+    rectification: f64,
+}
+
+/// Fitted to the flight records, m/s² and rad/s.
+const PROFILES: [Profile; AXES] = [
+    Profile { broadband: 5.4, resonance: (160.0, 80.0, 2.0), tones: [2.0, 1.5], rectification: 0.0 },
+    Profile { broadband: 1.2, resonance: (140.0, 50.0, 0.9), tones: [1.0, 0.5], rectification: 0.0 },
+    Profile { broadband: 6.2, resonance: (150.0, 60.0, 1.5), tones: [2.0, 1.5], rectification: 0.8 },
+    Profile { broadband: 0.020, resonance: (170.0, 50.0, 0.018), tones: [0.02, 0.02], rectification: 0.0 },
+    Profile { broadband: 0.028, resonance: (110.0, 40.0, 0.015), tones: [0.03, 0.02], rectification: 0.0 },
+    Profile { broadband: 0.015, resonance: (150.0, 100.0, 0.004), tones: [0.01, 0.01], rectification: 0.0 },
+];
+
+/// A resonance as a two-pole filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Resonator {
+    feedback: [f64; 2],
+    gain: f64,
+    past: [f64; 2],
+}
+
+impl Resonator {
+    /// Unit variance for white noise of unit variance in.
+    fn new(frequency: f64, bandwidth: f64, dt: f64) -> Self {
+        use core::f64::consts::{PI, TAU};
+        let radius = libm::exp(-PI * bandwidth * dt);
+        let (a1, a2) = (2.0 * radius * libm::cos(TAU * frequency * dt), radius * radius);
+        // Output variance of y = a1·y₁ − a2·y₂ + x (Box and Jenkins, second-order autoregression).
+        let variance = (1.0 + a2) / ((1.0 - a2) * ((1.0 + a2) * (1.0 + a2) - a1 * a1));
+        Self { feedback: [a1, -a2], gain: 1.0 / variance.sqrt(), past: [0.0; 2] }
+    }
+
+    fn step(&mut self, input: f64) -> f64 {
+        let output = self.feedback[0] * self.past[0] + self.feedback[1] * self.past[1] + input;
+        self.past = [output, self.past[0]];
+        output * self.gain
+    }
+}
+
+/// Vibration of one inertial sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Vibration {
+    noise: Noise,
+    factor: f64,
+    dt: f64,
+    /// 1 / hover speed, s/rad.
+    per_hover: f64,
+    /// Phase of each rotor as a point on the unit circle.
+    phase: [(f64, f64); ROTORS],
+    /// Cosine and sine weight of each tone of each rotor on each axis.
+    weights: [[[(f64, f64); AXES]; 2]; ROTORS],
+    resonators: [Resonator; AXES],
+}
+
+impl Vibration {
+    /// `factor` scales everything (the rectification by its square); `dt` is the sample period in seconds.
+    pub(crate) fn new(factor: f64, dt: f64, hover_speed: f64, mut noise: Noise) -> Self {
+        let phase = [(); ROTORS].map(|()| libm::sincos(noise.within(core::f64::consts::PI))).map(|(s, c)| (c, s));
+        let weights = [(); ROTORS].map(|()| {
+            // No two propellers are balanced alike.
+            let balance = 1.0 + noise.within(0.5);
+            core::array::from_fn(|harmonic| {
+                core::array::from_fn(|axis| {
+                    let (sin, cos) = libm::sincos(noise.within(core::f64::consts::PI));
+                    // Four rotors add in power; a tone's amplitude is √2 of its root mean square.
+                    let amplitude = balance * PROFILES[axis].tones[harmonic] * (2.0 / ROTORS as f64).sqrt();
+                    (amplitude * cos, amplitude * sin)
+                })
+            })
+        });
+        let resonators = PROFILES.map(|profile| Resonator::new(profile.resonance.0, profile.resonance.1, dt));
+        Self { noise, factor, dt, per_hover: 1.0 / hover_speed, phase, weights, resonators }
+    }
+
+    /// The next sample, accelerometer (m/s²) then gyroscope (rad/s), at these rotor speeds (rad/s).
+    pub(crate) fn step(&mut self, rotor_speed: &[f64; ROTORS]) -> [f64; AXES] {
+        let mut total = [0.0; AXES];
+        let mut power = 0.0;
+        if self.factor <= 0.0 {
+            return total;
+        }
+        for (rotor, speed) in rotor_speed.iter().enumerate() {
+            let (cos, sin) = turned(self.phase[rotor], speed * self.dt);
+            self.phase[rotor] = (cos, sin);
+            let share = (speed * self.per_hover) * (speed * self.per_hover);
+            power += share / ROTORS as f64;
+            let harmonics = [(cos, sin), (cos * cos - sin * sin, 2.0 * sin * cos)];
+            for ((cos, sin), weights) in harmonics.iter().zip(&self.weights[rotor]) {
+                for (sum, (a, b)) in total.iter_mut().zip(weights) {
+                    *sum += share * (a * cos + b * sin);
+                }
+            }
+        }
+        if power < 1e-4 {
+            return [0.0; AXES];
+        }
+        for ((sum, profile), resonator) in total.iter_mut().zip(&PROFILES).zip(&mut self.resonators) {
+            let white = self.noise.normal();
+            *sum += power * (profile.broadband * white + profile.resonance.2 * resonator.step(white));
+            *sum *= self.factor;
+            *sum += self.factor * self.factor * power * profile.rectification;
+        }
+        total
+    }
+}
+
+/// The point on the unit circle, turned by `angle` radians (0 to 8).
+///
+/// Sine and cosine of an eighth of the angle by series, then three doublings; the result is pulled back onto the
+/// circle, so errors do not add up. Some thirty multiplications, the same on every machine.
+fn turned((cos, sin): (f64, f64), angle: f64) -> (f64, f64) {
+    let x = angle * 0.125;
+    let xx = x * x;
+    let mut s = x * (1.0 - xx / 6.0 * (1.0 - xx / 20.0 * (1.0 - xx / 42.0)));
+    let mut c = 1.0 - xx / 2.0 * (1.0 - xx / 12.0 * (1.0 - xx / 30.0 * (1.0 - xx / 56.0)));
+    for _ in 0..3 {
+        (c, s) = (c * c - s * s, 2.0 * s * c);
+    }
+    let (c, s) = (cos * c - sin * s, sin * c + cos * s);
+    let pull = 1.5 - 0.5 * (c * c + s * s);
+    (c * pull, s * pull)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOVER: f64 = 3000.0;
+
+    fn run(factor: f64, speed: f64, samples: usize) -> Vec<[f64; AXES]> {
+        let mut vibration = Vibration::new(factor, 1.0 / 1600.0, HOVER, Noise::new(1, 1));
+        (0..samples).map(|_| vibration.step(&[speed; ROTORS])).collect()
+    }
+
+    fn deviation(samples: &[[f64; AXES]], axis: usize) -> f64 {
+        let n = samples.len() as f64;
+        let mean = samples.iter().map(|s| s[axis]).sum::<f64>() / n;
+        (samples.iter().map(|s| (s[axis] - mean) * (s[axis] - mean)).sum::<f64>() / n).sqrt()
+    }
+
+    #[test]
+    fn nothing_shakes_with_the_rotors_still_or_the_factor_zero() {
+        assert!(run(1.0, 0.0, 100).iter().flatten().all(|v| *v == 0.0));
+        assert!(run(0.0, HOVER, 100).iter().flatten().all(|v| *v == 0.0));
+    }
+
+    #[test]
+    fn strength_grows_with_the_square_of_speed_and_with_the_factor() {
+        let hover = run(1.0, HOVER, 20_000);
+        let (half, double) = (run(1.0, HOVER / 2.0, 20_000), run(2.0, HOVER, 20_000));
+        for axis in 0..AXES {
+            let reference = deviation(&hover, axis);
+            assert!((deviation(&half, axis) / reference - 0.25).abs() < 0.02, "axis {axis}");
+            assert!((deviation(&double, axis) / reference - 2.0).abs() < 1e-9, "axis {axis}");
+        }
+    }
+
+    #[test]
+    fn phasors_stay_on_the_circle_and_at_the_right_angle() {
+        let mut point = (1.0, 0.0);
+        for step in 1..=100_000u32 {
+            point = turned(point, 2.345);
+            if step % 10_000 == 0 {
+                let (sin, cos) = libm::sincos(2.345 * f64::from(step));
+                assert!((point.0 - cos).abs() < 1e-3 && (point.1 - sin).abs() < 1e-3, "step {step}: {point:?}");
+                assert!((point.0 * point.0 + point.1 * point.1 - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn resonators_keep_unit_variance() {
+        let (mut noise, mut resonator) = (Noise::new(2, 2), Resonator::new(140.0, 40.0, 1.0 / 1600.0));
+        let variance = (0..200_000).map(|_| resonator.step(noise.normal())).map(|y| y * y).sum::<f64>() / 2e5;
+        assert!((variance - 1.0).abs() < 0.05, "{variance}");
+    }
+}

@@ -1,0 +1,127 @@
+//! The world that all sensors of one vehicle share.
+//!
+//! A [`World`] is a handle: clones see the same vehicle. Physics runs lazily, up to the instant somebody asks for,
+//! and the recent past is kept, so a sensor may report what was true in the middle of its exposure although another
+//! one has already been read later. Many worlds fit in one process; none knows of another.
+
+use crate::plant::{DT, Motion, Plant, ROTORS, STEP};
+use core::cell::RefCell;
+use stampfly_types::{Micros, Quat, Vec3, message};
+use std::rc::Rc;
+
+message! {
+    /// What is really the case: the reference for every estimate.
+    pub struct Truth {
+        /// Body FRD → world NED.
+        attitude: Quat ["1"],
+        /// World NED, floor at zero.
+        position: Vec3 ["m"],
+        /// World NED.
+        velocity: Vec3 ["m/s"],
+        /// Body FRD.
+        angular_rate: Vec3 ["rad/s"],
+        /// Specific force without any sensor's error, body FRD.
+        specific_force: Vec3 ["m/s^2"],
+        /// Velocity of the air, world NED.
+        wind: Vec3 ["m/s"],
+        /// Rotor speeds: front right, rear right, rear left, front left.
+        rotor_speed: [f32; 4] ["rad/s"],
+        /// Battery voltage under load.
+        battery_voltage: f32 ["V"],
+        /// Battery current.
+        battery_current: f32 ["A"],
+        /// Does a foot touch the floor?
+        contact: bool ["1"],
+    }
+}
+
+/// Steps of the past that are kept: 80 ms, longer than any sensor's exposure and read-out.
+const HISTORY: usize = 128;
+
+#[derive(Debug)]
+struct State {
+    plant: Plant,
+    start: Micros,
+    /// Steps done since the start.
+    steps: u64,
+    /// Motion after step k at index k modulo its length.
+    history: Box<[Motion; HISTORY]>,
+}
+
+impl State {
+    fn advance_to(&mut self, instant: Micros) {
+        let wanted = instant.since(self.start).0 / STEP.0;
+        while self.steps < wanted {
+            self.plant.step();
+            self.steps += 1;
+            self.history[self.steps as usize % HISTORY] = *self.plant.motion();
+        }
+    }
+
+    fn motion_at(&mut self, instant: Micros) -> Motion {
+        self.advance_to(instant);
+        let since_start = instant.since(self.start).0;
+        let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
+        let step = (since_start / STEP.0).max(oldest);
+        let rest = since_start.saturating_sub(step * STEP.0) as f64 * 1e-6;
+        self.history[step as usize % HISTORY].after(rest.min(DT), self.plant.parameters().gravity)
+    }
+}
+
+/// A shared handle to one vehicle in its surroundings.
+#[derive(Clone, Debug)]
+pub struct World(Rc<RefCell<State>>);
+
+impl World {
+    /// A world whose time begins at `start`.
+    #[must_use]
+    pub fn new(plant: Plant, start: Micros) -> Self {
+        let history = Box::new([*plant.motion(); HISTORY]);
+        Self(Rc::new(RefCell::new(State { plant, start, steps: 0, history })))
+    }
+
+    /// Runs the physics up to `instant`. The past does not change.
+    pub fn advance_to(&self, instant: Micros) {
+        self.0.borrow_mut().advance_to(instant);
+    }
+
+    /// The motion at `instant`: in the future, which then becomes the present, or up to 80 ms in the past.
+    ///
+    /// Between two physics steps it is carried on from the earlier one, so that a motor command given at the same
+    /// instant still acts on the next step.
+    #[must_use]
+    pub fn motion_at(&self, instant: Micros) -> Motion {
+        self.0.borrow_mut().motion_at(instant)
+    }
+
+    /// Applies duty cycles, 0 to 1, from `instant` on.
+    pub fn set_duty(&self, instant: Micros, duty: [f64; ROTORS]) {
+        let mut state = self.0.borrow_mut();
+        state.advance_to(instant);
+        state.plant.set_duty(duty);
+    }
+
+    /// Looks at the plant as it is after the last step.
+    pub fn inspect<T>(&self, look: impl FnOnce(&Plant) -> T) -> T {
+        look(&self.0.borrow().plant)
+    }
+
+    /// The truth at `instant`.
+    #[must_use]
+    pub fn truth_at(&self, instant: Micros) -> Truth {
+        let motion = self.motion_at(instant);
+        let state = self.0.borrow();
+        Truth {
+            attitude: motion.attitude.cast(),
+            position: motion.position.cast(),
+            velocity: motion.velocity.cast(),
+            angular_rate: motion.rate.cast(),
+            specific_force: motion.specific_force.cast(),
+            wind: state.plant.wind().velocity().cast(),
+            rotor_speed: motion.rotor_speed.map(|speed| speed as f32),
+            battery_voltage: state.plant.battery().voltage() as f32,
+            battery_current: motion.current as f32,
+            contact: state.plant.ground().contact(),
+        }
+    }
+}
