@@ -22,7 +22,7 @@ message! {
         angular_rate: Vec3 ["rad/s"],
         /// Specific force without any sensor's error, body FRD.
         specific_force: Vec3 ["m/s^2"],
-        /// Velocity of the air, world NED.
+        /// Velocity of the air at the vehicle, world NED.
         wind: Vec3 ["m/s"],
         /// Rotor speeds: front right, rear right, rear left, front left.
         rotor_speed: [f32; 4] ["rad/s"],
@@ -117,7 +117,7 @@ impl World {
             velocity: motion.velocity.cast(),
             angular_rate: motion.rate.cast(),
             specific_force: motion.specific_force.cast(),
-            wind: state.plant.wind().velocity().cast(),
+            wind: state.plant.wind().velocity(-motion.position.z).cast(),
             rotor_speed: motion.rotor_speed.map(|speed| speed as f32),
             battery_voltage: state.plant.battery().voltage() as f32,
             battery_current: motion.current as f32,

@@ -148,7 +148,7 @@ impl Plant {
         self.battery.step(DT, current);
 
         // Air: rotors lose thrust and drag along with their speed, the body drags by itself.
-        let air = m.attitude.inverse_transform_vector(&(m.velocity - self.wind.velocity()));
+        let air = m.attitude.inverse_transform_vector(&(m.velocity - self.wind.velocity(-m.position.z)));
         let speed = m.rotor_speed;
         let share = (speed[0] + speed[1] + speed[2] + speed[3]) / (ROTORS as f64 * self.rotors.hover_speed());
         let linear = Vector3::new(p.drag_horizontal, p.drag_horizontal, p.drag_vertical) * share;

@@ -10,7 +10,7 @@ use stampfly_types::Vec3;
 /// How the air moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindConfig {
-    /// Constant part, world NED, m/s: where the air goes to.
+    /// Constant part high above the floor, world NED, m/s: where the air goes to.
     pub mean: Vec3,
     /// Standard deviation of the gusts along north and east, m/s; down has half of it.
     pub gust: f32,
@@ -32,6 +32,9 @@ impl WindConfig {
 
 /// Physics steps between two steps of the gusts: they are slow.
 const DECIMATION: u32 = 4;
+
+/// Height at which half of the wind is left, m.
+const BOUNDARY_LAYER: f64 = 0.3;
 
 /// The air at the vehicle.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,10 +68,13 @@ impl Wind {
         }
     }
 
-    /// Velocity of the air, world NED, m/s.
+    /// Velocity of the air at `height` metres above the floor, world NED, m/s.
+    ///
+    /// The floor holds the air back: at a foot's height a tenth of the wind is left.
     #[must_use]
-    pub fn velocity(&self) -> Vector3<f64> {
-        self.mean + self.gust
+    pub fn velocity(&self, height: f64) -> Vector3<f64> {
+        let height = height.max(0.0);
+        (self.mean + self.gust) * (height / (height + BOUNDARY_LAYER))
     }
 }
 
@@ -84,7 +90,7 @@ mod tests {
         let mut past = std::collections::VecDeque::from(vec![0.0; 200]);
         for _ in 0..n {
             wind.step();
-            let x = wind.velocity().x;
+            let x = wind.velocity(1e9).x;
             sum += x * x / f64::from(n);
             lagged += x * past.pop_front().expect("filled") / f64::from(n);
             past.push_back(x);
@@ -99,6 +105,6 @@ mod tests {
         for _ in 0..100 {
             wind.step();
         }
-        assert_eq!(wind.velocity(), Vector3::zeros());
+        assert_eq!(wind.velocity(1.0), Vector3::zeros());
     }
 }

@@ -1,0 +1,37 @@
+//! A pilot that sees the truth: the smallest control law that can hover, climb and land.
+//!
+//! Proportional and derivative action only, on quantities no real vehicle knows. It exists to try the simulator.
+
+use stampfly_sim::Truth;
+use stampfly_types::messages::MotorOutput;
+use stampfly_types::{GRAVITY, Vec3};
+
+const MASS: f32 = 0.0368;
+const OFFSET: f32 = 0.023;
+const YAW_ARM: f32 = 4.1e-3;
+
+/// Motor duties that bring the vehicle to the origin's vertical at `down` metres (negative is up).
+pub fn fly(truth: &Truth, down: f32) -> MotorOutput {
+    let error = Vec3::new(-truth.position.x, -truth.position.y, (down - truth.position.z).clamp(-0.3, 0.3));
+    let wanted =
+        error.component_mul(&Vec3::new(1.5, 1.5, 6.0)) - truth.velocity.component_mul(&Vec3::new(2.0, 2.0, 4.0));
+    // Thrust direction in the body frame, as a small tilt to correct.
+    let force = truth.attitude.inverse_transform_vector(&(wanted.map(|a| a.clamp(-3.0, 3.0)) - Vec3::z() * GRAVITY));
+    let north = truth.attitude.inverse_transform_vector(&Vec3::x());
+    let thrust = -force.z * MASS;
+    let (roll, pitch) = (force.y / GRAVITY, -force.x / GRAVITY);
+    let rate = truth.angular_rate;
+    let torque = Vec3::new(
+        9.16e-6 * (300.0 * roll - 25.0 * rate.x),
+        13.3e-6 * (300.0 * pitch - 25.0 * rate.y),
+        20.4e-6 * (20.0 * north.y - 10.0 * rate.z),
+    );
+    let mut output = MotorOutput { count: 4, armed: true, ..Default::default() };
+    let signs = [(-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0)];
+    for (duty, (x, y, z)) in output.duty.iter_mut().zip(signs) {
+        let share = 0.25 * (thrust + (x * torque.x + y * torque.y) / OFFSET + z * torque.z / YAW_ARM);
+        let speed = f64::from(share.max(0.0) / 1e-8).sqrt() as f32;
+        *duty = (6.0368e-8 * speed * speed + 6.699042e-4 * speed + 1.53e-2) / truth.battery_voltage.max(2.5);
+    }
+    output
+}
