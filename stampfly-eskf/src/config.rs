@@ -21,8 +21,12 @@ pub struct EskfConfig {
     pub initial_attitude: f32,
     /// First standard deviation of the gyro bias after a still-calibration, rad/s.
     pub initial_gyro_bias: f32,
-    /// First standard deviation of the accelerometer bias, m/s². MEMS start-up biases are 0.1 to 0.4.
+    /// First standard deviation of the accelerometer bias, m/s². MEMS start-up biases are 0.1 to 0.4, but most of the
+    /// horizontal part already went into the first attitude.
     pub initial_accel_bias: f32,
+    /// How far vibration may move the accelerometer's vertical zero when the motors start, m/s². Recorded StampFly
+    /// flights average −8.7 to −9.2 instead of −9.8.
+    pub vibration_bias: f32,
 
     /// Standard deviation of a range, m.
     pub tof_sigma: f32,
@@ -71,7 +75,7 @@ pub struct EskfConfig {
 impl Default for EskfConfig {
     fn default() -> Self {
         Self {
-            accel_noise: 0.1,
+            accel_noise: 0.3,
             gyro_noise: 0.003,
             gyro_bias_walk: 3e-5,
             accel_bias_walk: 1e-3,
@@ -79,7 +83,8 @@ impl Default for EskfConfig {
             initial_velocity: 0.05,
             initial_attitude: 0.05,
             initial_gyro_bias: 0.003,
-            initial_accel_bias: 0.2,
+            initial_accel_bias: 0.1,
+            vibration_bias: 0.8,
             tof_sigma: 0.01,
             tof_min: 0.02,
             tof_max: 4.0,
@@ -98,7 +103,7 @@ impl Default for EskfConfig {
             still_velocity_sigma: 0.01,
             still_position_sigma: 0.005,
             gate: 4.0,
-            lockout: 0.5,
+            lockout: 0.2,
         }
     }
 }

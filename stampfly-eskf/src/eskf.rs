@@ -343,6 +343,8 @@ impl Estimator for Eskf {
                 // Blind on the ground: the surface is one clearance below.
                 self.surface.get_or_insert(anchor.z + self.config.ground_clearance);
                 self.anchor = None;
+                let vibration = self.config.vibration_bias;
+                self.covariance.inflate(ACCEL_BIAS + 2, vibration * vibration);
             }
             _ => {}
         }
@@ -478,6 +480,9 @@ impl Eskf {
             if self.gated(|s| &mut s.tof) {
                 self.state.position.z = surface - below;
                 self.covariance.reset(POSITION + 2, 4.0 * sigma * sigma);
+                // Whatever carried the height away was a velocity: let the next ranges find it.
+                self.covariance.reset(VELOCITY + 2, 1.0);
+                self.covariance.inflate(ACCEL_BIAS + 2, 0.04);
                 self.tof = Aid { heard: Some(self.now), fused: Some(self.now), gated_since: None };
                 self.status.resets = self.status.resets.wrapping_add(1);
                 return Ok(Fusion::Reset);

@@ -1,0 +1,94 @@
+//! The flight loop: runs what is due, in table order, and lets somebody watch.
+//!
+//! Shared by every executor. On a microcontroller it is called by the task that the bus's hook wakes; on a host by
+//! the virtual clock. It reads no clock: the caller says what time it is.
+
+use crate::plan::plan;
+use crate::wiring::wiring;
+use stampfly_bus::{Activation, AnyTopic, Band, Runnables, Scheduler};
+use stampfly_types::Micros;
+
+/// Somebody who wants to know about activations: the log, a profiler.
+pub trait Observer {
+    /// A runnable has read its inputs and is about to run.
+    fn starting(&mut self, _index: usize) {}
+
+    /// A runnable has published.
+    fn finished(&mut self, index: usize, activation: &Activation);
+}
+
+/// Nobody watches.
+impl Observer for () {
+    fn finished(&mut self, _: usize, _: &Activation) {}
+}
+
+/// A background activation that has read its inputs and not yet run.
+#[derive(Debug)]
+pub struct Pending {
+    index: usize,
+    activation: Activation,
+}
+
+/// The vehicle's runnables with the scheduler that drives them.
+pub struct FlightLoop<'b> {
+    vehicle: plan::Vehicle<'b>,
+    scheduler: Scheduler<{ plan::COUNT }, { wiring::COUNT }>,
+    heads: [&'b dyn AnyTopic; wiring::COUNT],
+}
+
+impl<'b> FlightLoop<'b> {
+    /// A vehicle at power-on.
+    #[must_use]
+    pub fn new(vehicle: plan::Vehicle<'b>, heads: [&'b dyn AnyTopic; wiring::COUNT], start: Micros) -> Self {
+        Self { vehicle, scheduler: Scheduler::new(&plan::ACTIVATIONS, start), heads }
+    }
+
+    /// Is anything due in this band?
+    #[must_use]
+    pub fn is_due(&self, band: Band, clock: Micros) -> bool {
+        self.scheduler.due(band, clock, &self.heads).is_some()
+    }
+
+    /// Runs everything that is due in this band. Returns whether anything ran.
+    pub fn run_band(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> bool {
+        let mut any = false;
+        while let Some(pending) = self.start_next(band, clock) {
+            self.finish(pending, observer);
+            any = true;
+        }
+        any
+    }
+
+    /// Lets the next due activation of this band read its inputs. Whatever is published before
+    /// [`finish`](Self::finish) belongs to its next activation, as if it had been interrupted.
+    pub fn start_next(&mut self, band: Band, clock: Micros) -> Option<Pending> {
+        let (index, now) = self.scheduler.due(band, clock, &self.heads)?;
+        let mut activation = Activation::live(now);
+        self.scheduler.started(index, now, &self.heads);
+        self.vehicle.read(index, &mut activation);
+        Some(Pending { index, activation })
+    }
+
+    /// Runs what has read its inputs.
+    pub fn finish(&mut self, pending: Pending, observer: &mut impl Observer) {
+        let Pending { index, mut activation } = pending;
+        observer.starting(index);
+        self.vehicle.run(index, &mut activation);
+        self.scheduler.finished(index, activation.now());
+        observer.finished(index, &activation);
+    }
+
+    /// Repeats a recorded activation.
+    pub fn replay(&mut self, index: usize, mut activation: Activation, observer: &mut impl Observer) {
+        self.vehicle.read(index, &mut activation);
+        observer.starting(index);
+        self.vehicle.run(index, &mut activation);
+        observer.finished(index, &activation);
+    }
+
+    /// The next instant at which a period or a deadline makes something due.
+    #[must_use]
+    pub fn next_tick(&self) -> Option<Micros> {
+        self.scheduler.next_tick()
+    }
+}
