@@ -10,24 +10,11 @@ use stampfly_log::ulog::{
 use stampfly_types::Micros;
 
 /// A log written by hand from the format description and read without complaint by `pyulog` 1.3.0.
-const HAND_BUILT: &str = "554c6f6701123501e803000000000000280042000000000000000000000000000000000000000000\
-    0000000000000000000000000000000000000054004661747469747564653a75696e7436345f742074696d657374616d703b666c6f6174\
-    5b345d20713b666c6f617420726f6c6c3b75696e74385f74206d6f64653b75696e74385f745b335d205f70616464696e67303b16004910\
-    636861725b355d207379735f6e616d6578636f70741300490e636861725b345d207665725f68775349544c1100500c666c6f6174205241\
-    54455f50cdcc4c3e15005010696e7433325f742043544c5f46524551a00f00000b004100000061747469747564651f00440000e8030000\
-    000000000000803f00000000000000000000000000000000020800532f731320250cbb121f00440000ac0d0000000000000000803f0000\
-    00000000000000000000cdcccc3d021f0044000070170000000000000000803f000000000000000000000000cdcc4c3e020e004c36b80b\
-    00000000000061726d656402004f0c001100500c666c6f617420524154455f509a99993e";
-
-fn hand_built() -> Vec<u8> {
-    let digits: Vec<u32> = HAND_BUILT.chars().map(|digit| digit.to_digit(16).unwrap()).collect();
-    digits.chunks_exact(2).map(|pair| (pair[0] * 16 + pair[1]) as u8).collect()
-}
+const HAND_BUILT: &[u8] = include_bytes!("hand_built.ulog");
 
 #[test]
 fn the_hand_built_log_is_read() {
-    let log = hand_built();
-    let reader = Reader::new(&log).unwrap();
+    let reader = Reader::new(HAND_BUILT).unwrap();
     assert_eq!(reader.started(), Micros(1_000));
     let messages: Vec<_> = reader.map(Result::unwrap).collect();
     assert_eq!(messages[0], Message::FlagBits(FlagBits::default()));
@@ -67,7 +54,7 @@ fn the_hand_built_log_is_read() {
 
 /// A header, and flags that name one appended part.
 fn head(appended: u64, incompatible: u8) -> Vec<u8> {
-    let mut log = hand_built()[..16].to_vec();
+    let mut log = HAND_BUILT[..16].to_vec();
     log.extend([40, 0, b'B', 0, 0, 0, 0, 0, 0, 0, 0, incompatible, 0, 0, 0, 0, 0, 0, 0]);
     log.extend(appended.to_le_bytes());
     log.extend([0; 16]);
@@ -189,18 +176,22 @@ fn a_log_cut_off_anywhere_gives_all_that_was_whole() {
 }
 
 #[test]
-fn one_flipped_bit_never_costs_more_than_the_way_to_the_next_mark() {
+fn one_flipped_bit_costs_no_more_than_the_way_to_the_next_mark() {
     let log = small_log();
     let (total, _) = read_all(&log);
-    for offset in 59..log.len() {
+    let mut reader = Reader::new(&log).unwrap();
+    let first_mark = loop {
+        if reader.next().unwrap() == Ok(Message::Sync) {
+            break reader.offset();
+        }
+    };
+    // Behind the first mark there is one every seventeen messages; a wrong size may swallow the next one as well.
+    for offset in first_mark..log.len() {
         for bit in 0..8 {
             let mut damaged = log.clone();
             damaged[offset] ^= 1 << bit;
-            let (intact, broken) = read_all(&damaged);
-            // The definitions carry no mark; behind them there is one every twenty messages or so.
-            if Reader::new(&log).unwrap().nth(40).is_some() && offset > log.len() / 2 {
-                assert!(intact + broken + 70 > total, "byte {offset} bit {bit}: {intact} and {broken} of {total}");
-            }
+            let (intact, _) = read_all(&damaged);
+            assert!(intact + 2 * 17 >= total, "byte {offset} bit {bit}: {intact} of {total}");
         }
     }
 }

@@ -18,7 +18,8 @@ pub enum ReadErrorKind {
     Incompatible,
     /// A message of this type is not what its type promises. It was skipped.
     Malformed(u8),
-    /// The file, or the part before appended data, ends inside a message, or a message claims to be longer.
+    /// The file, or the part before appended data, ends inside a message; or the message's size is damaged, for it
+    /// reaches that end or over a sync mark.
     Truncated,
     /// No message of ULog has this type, so the place where messages begin has been lost.
     LostFraming(u8),
@@ -119,10 +120,18 @@ impl<'a> Reader<'a> {
     fn resume(&self, at: usize) -> usize {
         let end = self.part_end(at);
         let rest = self.bytes.get(at + 1..end).unwrap_or_default();
-        let [s0, s1, s2, s3, s4, s5, s6, s7] = SYNC_MAGIC;
-        let mark = [8, 0, b'S', s0, s1, s2, s3, s4, s5, s6, s7];
-        rest.windows(mark.len()).position(|window| window == mark).map_or(end, |skipped| at + 1 + skipped)
+        find_mark(rest).map_or(end, |skipped| at + 1 + skipped)
     }
+}
+
+/// Payloads from this size on are searched for sync marks: a damaged size swallows them.
+const SUSPICIOUS: usize = 256;
+
+/// Where a whole sync message begins.
+fn find_mark(bytes: &[u8]) -> Option<usize> {
+    let [s0, s1, s2, s3, s4, s5, s6, s7] = SYNC_MAGIC;
+    let mark = [8, 0, b'S', s0, s1, s2, s3, s4, s5, s6, s7];
+    bytes.windows(mark.len()).position(|window| window == mark)
 }
 
 impl<'a> Iterator for Reader<'a> {
@@ -136,7 +145,9 @@ impl<'a> Iterator for Reader<'a> {
         let part = self.bytes.get(offset..self.part_end(offset))?;
         let mut take = Take(part);
         let (size, kind) = (take.u16(), take.u8());
-        let payload = size.and_then(|size| take.bytes(usize::from(size)));
+        let payload = size
+            .and_then(|size| take.bytes(usize::from(size)))
+            .filter(|payload| payload.len() < SUSPICIOUS || find_mark(payload).is_none());
         let (Some(kind), Some(payload)) = (kind, payload) else {
             self.at = self.resume(offset);
             return Some(Err(ReadError { offset, kind: ReadErrorKind::Truncated }));

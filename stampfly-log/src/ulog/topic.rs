@@ -53,8 +53,7 @@ impl Topic {
     /// Number of bytes of a sample in the log.
     #[must_use]
     pub fn size(&self) -> usize {
-        TOPIC_HEAD_SIZE
-            + self.fields.iter().map(|field| stored(field)).map(|(scalar, count)| scalar.size() * count).sum::<usize>()
+        TOPIC_HEAD_SIZE + self.fields.iter().map(stored).map(|(scalar, count)| scalar.size() * count).sum::<usize>()
     }
 
     /// The words of a sample, from its payload. Exactly the words that were written.
