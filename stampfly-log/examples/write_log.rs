@@ -1,0 +1,76 @@
+//! Writes a small flight log, to look at with public tools:
+//!
+//! ```sh
+//! cargo run -p stampfly-log --example write_log -- flight.ulg
+//! ulog_info flight.ulg
+//! ulog2csv flight.ulg
+//! ```
+
+use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic};
+use stampfly_log::{Activation, ActivationTopic, FlightHash, Input};
+use stampfly_types::messages::{FlightState, ImuData, PowerData, SystemMode};
+use stampfly_types::{GRAVITY, Message, Micros, Vec3, math};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+
+const TOPICS: &[Topic] = &[
+    Topic { name: "sensor_imu", fields: ImuData::FIELDS },
+    Topic { name: "sensor_power", fields: PowerData::FIELDS },
+    Topic { name: "system_mode", fields: SystemMode::FIELDS },
+];
+const IMU: usize = 0;
+const POWER: usize = 1;
+const MODE: usize = 2;
+const ACTIVATIONS: &[ActivationTopic] = &[ActivationTopic { name: "estimation", index: 0, inputs: 1 }];
+
+/// On a vehicle this is a radio link or a ring of memory; here it is a file.
+struct Disk(BufWriter<File>);
+
+impl Sink for Disk {
+    type Error = std::io::Error;
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.0.write_all(bytes)
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "flight.ulg".to_owned());
+    let mut log = Definitions::start(Disk(BufWriter::new(File::create(&path)?)), Micros(0))?;
+    log.info("sys_name", "StampFly")?;
+    log.info("ver_hw", "example")?;
+    log.parameter("loop_rate", 400.into())?;
+    log.parameter("rate_roll_p", 0.65.into())?;
+
+    let mut log = log.data(TOPICS, ACTIVATIONS)?;
+    let mut hash = FlightHash::new();
+    let mut publish = |log: &mut stampfly_log::ulog::Writer<'_, Disk>, topic: usize, sample: Sample<'_>| {
+        hash.publish(topic as u16, sample.generation, sample.at, sample.words);
+        log.sample(topic, &sample)
+    };
+    for step in 0..2_000u32 {
+        let at = Micros(u64::from(step) * 2_500);
+        let (sin, cos) = math::sin_cos(math::TAU * at.seconds());
+        let imu = ImuData { accel: Vec3::new(sin, cos, -GRAVITY), gyro: Vec3::new(0.0, 0.0, sin), temperature: 31.5 };
+        publish(&mut log, IMU, Sample { at, generation: step + 1, words: &imu.to_words() })?;
+        let mut record = Activation::new(0, at);
+        record.read(Input { generation: step + 1, taken: 1 })?;
+        log.activation(&record)?;
+        if step % 40 == 0 {
+            let power = PowerData { voltage: 4.1 - 0.1 * at.seconds(), current: 2.0, power: 8.0 };
+            publish(&mut log, POWER, Sample { at, generation: step / 40 + 1, words: &power.to_words() })?;
+        }
+        if step % 400 == 0 {
+            log.sync()?;
+            let state = if step < 800 { FlightState::IdleGround } else { FlightState::Armed };
+            let mode = SystemMode { state, armed: step >= 800, ..Default::default() };
+            publish(&mut log, MODE, Sample { at, generation: step / 400 + 1, words: &mode.to_words() })?;
+        }
+        if step == 800 {
+            log.text(Level::Info, at, "armed")?;
+            log.parameter("rate_roll_p", 0.6.into())?;
+        }
+    }
+    log.into_sink().0.flush()?;
+    println!("{path}: {} messages, flight hash {:016x}", hash.messages(), hash.finish());
+    Ok(())
+}

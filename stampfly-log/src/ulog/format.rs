@@ -1,0 +1,251 @@
+//! Formats: what the bytes of a sample mean, as the file itself says.
+//!
+//! [`Format::columns`] is the way from a sample's bytes to numbers for plots: one [`Column`] per scalar, arrays
+//! spread out. To get the exact words of one of our own messages back, use [`Topic::decode`](super::Topic::decode).
+
+use core::fmt;
+
+/// A basic ULog type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    /// `int8_t`
+    I8,
+    /// `uint8_t`
+    U8,
+    /// `int16_t`
+    I16,
+    /// `uint16_t`
+    U16,
+    /// `int32_t`
+    I32,
+    /// `uint32_t`
+    U32,
+    /// `int64_t`
+    I64,
+    /// `uint64_t`
+    U64,
+    /// `float`
+    F32,
+    /// `double`
+    F64,
+    /// `bool`
+    Bool,
+    /// `char`
+    Char,
+}
+
+impl Scalar {
+    const ALL: [(Self, &'static str, usize); 12] = [
+        (Self::I8, "int8_t", 1),
+        (Self::U8, "uint8_t", 1),
+        (Self::I16, "int16_t", 2),
+        (Self::U16, "uint16_t", 2),
+        (Self::I32, "int32_t", 4),
+        (Self::U32, "uint32_t", 4),
+        (Self::I64, "int64_t", 8),
+        (Self::U64, "uint64_t", 8),
+        (Self::F32, "float", 4),
+        (Self::F64, "double", 8),
+        (Self::Bool, "bool", 1),
+        (Self::Char, "char", 1),
+    ];
+
+    /// The type with this ULog name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(_, known, _)| *known == name).map(|(scalar, ..)| *scalar)
+    }
+
+    fn row(self) -> (&'static str, usize) {
+        Self::ALL.iter().find(|(scalar, ..)| *scalar == self).map_or(("", 0), |(_, name, size)| (*name, *size))
+    }
+
+    /// The type's ULog name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.row().0
+    }
+
+    /// Bytes of one value.
+    #[must_use]
+    pub fn size(self) -> usize {
+        self.row().1
+    }
+
+    /// One value from the front of `bytes`, as `f64`: exact for everything but 64-bit integers beyond 2⁵³.
+    #[must_use]
+    pub fn read(self, bytes: &[u8]) -> Option<f64> {
+        Some(match self {
+            Self::I8 => f64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U8 | Self::Bool | Self::Char => f64::from(*bytes.first()?),
+            Self::I16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U16 => f64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I32 => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U32 => f64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I64 => i64::from_le_bytes(*bytes.first_chunk()?) as f64,
+            Self::U64 => u64::from_le_bytes(*bytes.first_chunk()?) as f64,
+            Self::F32 => f64::from(f32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::F64 => f64::from_le_bytes(*bytes.first_chunk()?),
+        })
+    }
+}
+
+/// Why a format cannot be laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FieldError<'a> {
+    /// Not `type name` or `type[count] name`.
+    Syntax(&'a str),
+    /// A type that is none of the basic ones: a nested format, or unknown.
+    Nested(&'a str),
+}
+
+impl fmt::Display for FieldError<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Syntax(text) => write!(f, "`{text}` is no field declaration"),
+            Self::Nested(name) => write!(f, "type `{name}` is not a basic one"),
+        }
+    }
+}
+
+impl core::error::Error for FieldError<'_> {}
+
+/// One field of a format as written: `float[3] position`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Declaration<'a> {
+    /// Type name, without the brackets.
+    pub type_name: &'a str,
+    /// Number of elements, if an array.
+    pub count: Option<usize>,
+    /// Field name.
+    pub name: &'a str,
+}
+
+impl<'a> Declaration<'a> {
+    /// Takes `type name` or `type[count] name` apart. Info and parameter keys are written the same way.
+    #[must_use]
+    pub fn parse(text: &'a str) -> Option<Self> {
+        let (type_text, name) = text.trim_ascii().split_once(' ')?;
+        let name = name.trim_ascii();
+        let (type_name, count) = match type_text.split_once('[') {
+            Some((type_name, rest)) => (type_name, Some(rest.strip_suffix(']')?.parse().ok()?)),
+            None => (type_text, None),
+        };
+        (!type_name.is_empty() && !name.is_empty()).then_some(Self { type_name, count, name })
+    }
+}
+
+/// The layout of one kind of sample.
+///
+/// ```
+/// use stampfly_log::ulog::{Format, Scalar};
+/// let format = Format { name: "wind", fields: "uint64_t timestamp;float[2] speed;uint8_t[4] _padding0;bool ok;" };
+/// let columns: Vec<_> = format.columns().collect::<Result<_, _>>()?;
+/// assert_eq!(columns.iter().map(|c| (c.field, c.index, c.offset)).collect::<Vec<_>>(), [
+///     ("timestamp", None, 0), ("speed", Some(0), 8), ("speed", Some(1), 12), ("ok", None, 20),
+/// ]);
+/// # Ok::<(), stampfly_log::ulog::FieldError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Format<'a> {
+    /// The format's name; topics refer to it.
+    pub name: &'a str,
+    /// `type field;type field;…`
+    pub fields: &'a str,
+}
+
+impl<'a> Format<'a> {
+    /// The fields as declared, padding included.
+    pub fn declarations(&self) -> impl Iterator<Item = Result<Declaration<'a>, FieldError<'a>>> + use<'a> {
+        self.fields
+            .split(';')
+            .filter(|text| !text.trim_ascii().is_empty())
+            .map(|text| Declaration::parse(text).ok_or(FieldError::Syntax(text)))
+    }
+
+    /// One column per scalar, in byte order, padding left out. Ends after the first error, because the offsets
+    /// behind a field of unknown size are unknown.
+    #[must_use]
+    pub fn columns(&self) -> Columns<'a> {
+        Columns { rest: self.fields, field: None, offset: 0 }
+    }
+}
+
+/// Where one scalar of a sample lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Column<'a> {
+    /// The field's name.
+    pub field: &'a str,
+    /// Place in the array, if the field is one.
+    pub index: Option<usize>,
+    /// Type of the value.
+    pub scalar: Scalar,
+    /// Byte offset in the sample.
+    pub offset: usize,
+}
+
+impl Column<'_> {
+    /// The value in a sample's payload; `None` when the payload is too short.
+    #[must_use]
+    pub fn read(&self, payload: &[u8]) -> Option<f64> {
+        self.scalar.read(payload.get(self.offset..)?)
+    }
+}
+
+/// See [`Format::columns`].
+#[derive(Clone, Debug)]
+pub struct Columns<'a> {
+    rest: &'a str,
+    field: Option<(Declaration<'a>, Scalar, usize)>,
+    offset: usize,
+}
+
+impl<'a> Columns<'a> {
+    fn end(&mut self, error: FieldError<'a>) -> Option<Result<Column<'a>, FieldError<'a>>> {
+        self.rest = "";
+        self.field = None;
+        Some(Err(error))
+    }
+}
+
+impl<'a> Iterator for Columns<'a> {
+    type Item = Result<Column<'a>, FieldError<'a>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some((declaration, scalar, index)) = self.field {
+                if index < declaration.count.unwrap_or(1) {
+                    let offset = self.offset;
+                    self.offset = self.offset.saturating_add(scalar.size());
+                    self.field = Some((declaration, scalar, index + 1));
+                    let index = declaration.count.map(|_| index);
+                    return Some(Ok(Column { field: declaration.name, index, scalar, offset }));
+                }
+                self.field = None;
+            }
+            if self.rest.is_empty() {
+                return None;
+            }
+            let (text, rest) = self.rest.split_once(';').unwrap_or((self.rest, ""));
+            self.rest = rest;
+            if text.trim_ascii().is_empty() {
+                continue;
+            }
+            let Some(declaration) = Declaration::parse(text) else { return self.end(FieldError::Syntax(text)) };
+            let Some(scalar) = Scalar::from_name(declaration.type_name) else {
+                return self.end(FieldError::Nested(declaration.type_name));
+            };
+            // No sample is longer than a message, so a larger array is a broken file, not a long loop.
+            let count = declaration.count.unwrap_or(1);
+            if count > usize::from(u16::MAX) {
+                return self.end(FieldError::Syntax(text));
+            }
+            if declaration.name.starts_with("_padding") {
+                self.offset = self.offset.saturating_add(count * scalar.size());
+            } else {
+                self.field = Some((declaration, scalar, 0));
+            }
+        }
+    }
+}

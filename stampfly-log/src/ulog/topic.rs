@@ -1,0 +1,172 @@
+//! Topics: from the words of a message to the bytes of a sample and back, without loss.
+
+use super::cursor::Cursor;
+use super::{Scalar, TOPIC_HEAD, TOPIC_HEAD_SIZE, Take};
+use core::fmt::{self, Write};
+use stampfly_types::{FieldInfo, FieldKind, Micros};
+
+/// A topic as the log knows it: a name and the schema of its message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// The topic's name; letters, digits and underscores.
+    pub name: &'static str,
+    /// The schema, [`Message::FIELDS`](stampfly_types::Message::FIELDS).
+    pub fields: &'static [FieldInfo],
+}
+
+/// One published message, as the log takes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample<'a> {
+    /// The instant the data is valid for.
+    pub at: Micros,
+    /// The topic's running number of this sample.
+    pub generation: u32,
+    /// The message's words.
+    pub words: &'a [u32],
+}
+
+/// When a sample was valid, and which one of its topic it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// The instant the data is valid for.
+    pub at: Micros,
+    /// The topic's running number of this sample.
+    pub generation: u32,
+}
+
+/// Why words are no sample of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum WordsError {
+    /// Too many or too few.
+    Count,
+    /// A word does not fit into the field's type.
+    Range(&'static str),
+}
+
+impl Topic {
+    /// Number of words of the topic's message.
+    #[must_use]
+    pub fn words(&self) -> usize {
+        self.fields.iter().map(|field| field.words).sum()
+    }
+
+    /// Number of bytes of a sample in the log.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        TOPIC_HEAD_SIZE + self.fields.iter().map(stored).map(|(scalar, count)| scalar.size() * count).sum::<usize>()
+    }
+
+    /// The words of a sample, from its payload. Exactly the words that were written.
+    ///
+    /// `None` when the payload or `words` has not the size of this topic; `words` is then unspecified. Check with
+    /// [`is_format`](Self::is_format) that the log means the same topic.
+    pub fn decode(&self, payload: &[u8], words: &mut [u32]) -> Option<Stamp> {
+        if payload.len() != self.size() || words.len() != self.words() {
+            return None;
+        }
+        let mut take = Take(payload);
+        let stamp = Stamp { at: Micros(take.u64()?), generation: take.u32()? };
+        let mut words = words.iter_mut();
+        for field in self.fields {
+            let (scalar, count) = stored(field);
+            for _ in 0..count {
+                let word = words.next()?;
+                match scalar {
+                    Scalar::U8 => *word = u32::from(take.u8()?),
+                    Scalar::U16 => *word = u32::from(take.u16()?),
+                    Scalar::I16 => *word = i32::from(take.u16()?.cast_signed()).cast_unsigned(),
+                    Scalar::U64 => {
+                        *word = take.u32()?;
+                        *words.next()? = take.u32()?;
+                    }
+                    _ => *word = take.u32()?,
+                }
+            }
+        }
+        Some(stamp)
+    }
+
+    /// Is this format the one a log of ours has for this topic?
+    #[must_use]
+    pub fn is_format(&self, format: &super::Format<'_>) -> bool {
+        let mut rest = Expect(format.fields);
+        format.name == self.name && self.write_fields(&mut rest).is_ok() && rest.0.is_empty()
+    }
+
+    /// Writes `uint64_t timestamp;uint32_t generation;…`.
+    pub(super) fn write_fields(&self, out: &mut impl Write) -> fmt::Result {
+        out.write_str(TOPIC_HEAD)?;
+        self.fields.iter().try_for_each(|field| {
+            let (scalar, count) = stored(field);
+            match count {
+                0 => Ok(()),
+                1 => write!(out, "{} {};", scalar.name(), field.name),
+                _ => write!(out, "{}[{count}] {};", scalar.name(), field.name),
+            }
+        })
+    }
+
+    /// Writes a sample's payload.
+    #[inline]
+    pub(super) fn encode(&self, sample: &Sample<'_>, out: &mut Cursor<'_>) -> Result<(), WordsError> {
+        out.put(&sample.at.0.to_le_bytes());
+        out.put(&sample.generation.to_le_bytes());
+        let mut rest = sample.words;
+        for field in self.fields {
+            let (words, after) = rest.split_at_checked(field.words).ok_or(WordsError::Count)?;
+            rest = after;
+            match stored(field).0 {
+                Scalar::U8 => put_narrow(out, words, |word| u8::try_from(word).ok().map(u8::to_le_bytes)),
+                Scalar::U16 => put_narrow(out, words, |word| u16::try_from(word).ok().map(u16::to_le_bytes)),
+                Scalar::I16 => {
+                    put_narrow(out, words, |word| i16::try_from(word.cast_signed()).ok().map(i16::to_le_bytes))
+                }
+                // Two words of a 64-bit number are low first, as little-endian bytes are.
+                _ => put_narrow(out, words, |word| Some(word.to_le_bytes())),
+            }
+            .ok_or(WordsError::Range(field.name))?;
+        }
+        if rest.is_empty() { Ok(()) } else { Err(WordsError::Count) }
+    }
+}
+
+#[inline]
+fn put_narrow<const N: usize>(
+    out: &mut Cursor<'_>,
+    words: &[u32],
+    bytes: impl Fn(u32) -> Option<[u8; N]>,
+) -> Option<()> {
+    words.iter().try_for_each(|word| bytes(*word).map(|bytes| out.put(&bytes)))
+}
+
+/// How a field is stored: the type and the number of elements.
+#[inline]
+fn stored(field: &FieldInfo) -> (Scalar, usize) {
+    let scalar = match field.kind {
+        FieldKind::F32 => Scalar::F32,
+        FieldKind::U32 | FieldKind::Flags(_) => Scalar::U32,
+        FieldKind::I32 => Scalar::I32,
+        FieldKind::U16 => Scalar::U16,
+        FieldKind::I16 => Scalar::I16,
+        FieldKind::U8 | FieldKind::Bool => Scalar::U8,
+        FieldKind::U64 => Scalar::U64,
+        FieldKind::Enum(names) => match names.iter().map(|(_, number)| *number).max() {
+            Some(0x1_0000..) => Scalar::U32,
+            Some(0x100..) => Scalar::U16,
+            _ => Scalar::U8,
+        },
+        // A kind younger than this crate: its words as they are.
+        _ => return (Scalar::U32, field.words),
+    };
+    (scalar, field.count)
+}
+
+/// Accepts exactly the text it holds, piece by piece.
+struct Expect<'a>(&'a str);
+
+impl Write for Expect<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0 = self.0.strip_prefix(text).ok_or(fmt::Error)?;
+        Ok(())
+    }
+}

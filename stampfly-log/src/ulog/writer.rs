@@ -1,0 +1,491 @@
+//! Writing a log, message by message, into anything that takes bytes.
+//!
+//! A log has two parts: definitions (facts, parameters, formats) and data. [`Definitions`] writes the first and
+//! becomes a [`Writer`] for the second, so nobody can define something too late.
+//!
+//! The writer allocates nothing and never blocks. When the sink cannot keep up it refuses a message as a whole; the
+//! writer counts it and puts a dropout mark before the next message that gets through, so a reader knows that and
+//! for how long data is missing. For a sink that must never lose anything, stop at the first error instead.
+
+use super::cursor::Cursor;
+use super::topic::WordsError;
+use super::{
+    FlagBits, HEADER, Level, MAGIC, NAMES_PREFIX, ParameterValue, SYNC_MAGIC, Sample, Topic, UNITS_PREFIX, VERSION,
+    put_u16,
+};
+use crate::trace::{Activation, ActivationTopic, TOPIC_PREFIX};
+use core::fmt::{self, Write};
+use stampfly_types::{FieldInfo, FieldKind, Micros};
+
+/// The largest message the writer makes, header included. It keeps a buffer of this size.
+pub const MAX_MESSAGE: usize = 2048;
+/// Size and type in front of each payload.
+const MESSAGE_HEAD: usize = 3;
+
+/// Where a log goes.
+///
+/// # Contract
+/// * Takes all of `bytes` or, with an error, none of them.
+/// * The pieces are whole messages, at most [`MAX_MESSAGE`] long, so a sink may drop one without harm.
+pub trait Sink {
+    /// The sink's error.
+    type Error;
+
+    /// Takes the next bytes of the log.
+    ///
+    /// # Errors
+    /// When there is no room or the medium fails.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
+}
+
+impl<S: Sink> Sink for &mut S {
+    type Error = S::Error;
+    fn write(&mut self, bytes: &[u8]) -> Result<(), S::Error> {
+        (**self).write(bytes)
+    }
+}
+
+/// A sink in memory. When full it refuses.
+#[derive(Debug)]
+pub struct Ram<'a> {
+    memory: &'a mut [u8],
+    used: usize,
+}
+
+/// The memory of a [`Ram`] has no room for this message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Full;
+
+impl fmt::Display for Full {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the log's memory is full")
+    }
+}
+
+impl core::error::Error for Full {}
+
+impl<'a> Ram<'a> {
+    /// An empty log in this memory.
+    pub fn new(memory: &'a mut [u8]) -> Self {
+        Self { memory, used: 0 }
+    }
+
+    /// The log so far.
+    #[must_use]
+    pub fn written(&self) -> &[u8] {
+        self.memory.get(..self.used).unwrap_or_default()
+    }
+}
+
+impl Sink for Ram<'_> {
+    type Error = Full;
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Full> {
+        let end = self.used + bytes.len();
+        self.memory.get_mut(self.used..end).ok_or(Full)?.copy_from_slice(bytes);
+        self.used = end;
+        Ok(())
+    }
+}
+
+/// Why a message was not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum WriteError<E> {
+    /// The sink refused it.
+    Sink(E),
+    /// It is longer than [`MAX_MESSAGE`].
+    TooLong,
+    /// More topics than a log can number.
+    TooManyTopics,
+    /// No such topic or activation.
+    UnknownTopic,
+    /// The number of words or inputs is not the topic's.
+    WordCount,
+    /// A word does not fit into the field of this name.
+    OutOfRange(&'static str),
+}
+
+impl<E: fmt::Display> fmt::Display for WriteError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sink(error) => error.fmt(f),
+            Self::TooLong => write!(f, "the message is longer than {MAX_MESSAGE} bytes"),
+            Self::TooManyTopics => f.write_str("more topics than a log can number"),
+            Self::UnknownTopic => f.write_str("the topic was not declared"),
+            Self::WordCount => f.write_str("the sample has not the size of its topic"),
+            Self::OutOfRange(field) => write!(f, "a word does not fit into field `{field}`"),
+        }
+    }
+}
+
+impl<E: fmt::Display + fmt::Debug> core::error::Error for WriteError<E> {}
+
+/// Makes messages in its buffer and hands them to the sink.
+struct Output<S> {
+    sink: S,
+    buffer: [u8; MAX_MESSAGE],
+}
+
+impl<S: Sink> Output<S> {
+    /// Makes one message and writes it.
+    #[inline]
+    fn message(&mut self, kind: u8, body: impl FnOnce(&mut Cursor<'_>)) -> Result<(), WriteError<S::Error>> {
+        self.try_message(kind, |out| {
+            body(out);
+            Ok(())
+        })
+    }
+
+    /// Makes one message and writes it, unless making it fails.
+    #[inline]
+    fn try_message(
+        &mut self,
+        kind: u8,
+        body: impl FnOnce(&mut Cursor<'_>) -> Result<(), WordsError>,
+    ) -> Result<(), WriteError<S::Error>> {
+        let mut cursor = Cursor::new(&mut self.buffer);
+        cursor.put(&[0, 0, kind]);
+        body(&mut cursor).map_err(|error| match error {
+            WordsError::Count => WriteError::WordCount,
+            WordsError::Range(field) => WriteError::OutOfRange(field),
+        })?;
+        let length = cursor.finish().ok_or(WriteError::TooLong)?;
+        put_u16(&mut self.buffer, (length - MESSAGE_HEAD) as u16);
+        self.sink.write(self.buffer.get(..length).unwrap_or_default()).map_err(WriteError::Sink)
+    }
+
+    /// A text info whose key is `prefix` + `name` and whose value `text` writes.
+    fn info(
+        &mut self,
+        key: fmt::Arguments<'_>,
+        text: impl Fn(&mut dyn Write) -> fmt::Result,
+    ) -> Result<(), WriteError<S::Error>> {
+        let mut length = Count(0);
+        let mut key_length = Count(0);
+        // Counting and the cursor never fail: what does not fit is reported when the message is finished.
+        let _ = text(&mut length);
+        let _ = write!(key_length, "char[{}] {key}", length.0);
+        let key_length = u8::try_from(key_length.0).map_err(|_| WriteError::TooLong)?;
+        self.message(b'I', |out| {
+            out.put(&[key_length]);
+            let _ = write!(out, "char[{}] {key}", length.0);
+            let _ = text(out);
+        })
+    }
+
+    fn parameter(&mut self, name: &str, value: ParameterValue) -> Result<(), WriteError<S::Error>> {
+        let (type_name, bytes) = match value {
+            ParameterValue::Float(value) => ("float", value.to_le_bytes()),
+            ParameterValue::Int32(value) => ("int32_t", value.to_le_bytes()),
+        };
+        let length = u8::try_from(type_name.len() + 1 + name.len()).map_err(|_| WriteError::TooLong)?;
+        self.message(b'P', |out| {
+            out.put(&[length]);
+            let _ = write!(out, "{type_name} {name}");
+            out.put(&bytes);
+        })
+    }
+}
+
+/// The first part of a log: facts and parameters.
+///
+/// ```
+/// use stampfly_log::ulog::{Definitions, Ram, Topic};
+/// use stampfly_types::{Message, Micros, messages::ImuData};
+///
+/// const TOPICS: &[Topic] = &[Topic { name: "sensor_imu", fields: ImuData::FIELDS }];
+/// let mut memory = [0; 4096];
+/// let mut log = Definitions::start(Ram::new(&mut memory), Micros(0))?;
+/// log.info("sys_name", "StampFly")?;
+/// log.parameter("rate_roll_p", 0.6.into())?;
+/// let log = log.data(TOPICS, &[])?;
+/// assert_eq!(log.sink().written()[..4], *b"ULog");
+/// # Ok::<(), stampfly_log::ulog::WriteError<stampfly_log::ulog::Full>>(())
+/// ```
+pub struct Definitions<S>(Output<S>);
+
+impl<S: Sink> Definitions<S> {
+    /// Starts a log at the instant `at`.
+    ///
+    /// # Errors
+    /// When the sink refuses the first bytes.
+    pub fn start(mut sink: S, at: Micros) -> Result<Self, WriteError<S::Error>> {
+        let mut header = [0; HEADER];
+        let mut cursor = Cursor::new(&mut header);
+        cursor.put(&MAGIC);
+        cursor.put(&[VERSION]);
+        cursor.put(&at.0.to_le_bytes());
+        sink.write(&header).map_err(WriteError::Sink)?;
+        let mut output = Output { sink, buffer: [0; MAX_MESSAGE] };
+        output.message(b'B', |out| {
+            let flags = FlagBits::default();
+            out.put(&flags.compatible);
+            out.put(&flags.incompatible);
+            flags.appended.iter().for_each(|offset| out.put(&offset.to_le_bytes()));
+        })?;
+        Ok(Self(output))
+    }
+
+    /// Notes a fact. Viewers know `sys_name`, `ver_hw`, `ver_sw` and `ver_sw_branch`.
+    ///
+    /// # Errors
+    /// When the sink refuses, or key and text are too long together.
+    pub fn info(&mut self, key: &str, text: &str) -> Result<(), WriteError<S::Error>> {
+        self.0.info(format_args!("{key}"), |out| out.write_str(text))
+    }
+
+    /// Notes a parameter's value at the start.
+    ///
+    /// # Errors
+    /// When the sink refuses, or the name is longer than about 245 bytes.
+    pub fn parameter(&mut self, name: &str, value: ParameterValue) -> Result<(), WriteError<S::Error>> {
+        self.0.parameter(name, value)
+    }
+
+    /// Writes what explains these topics and starts the data.
+    ///
+    /// A topic's number, for [`Writer::sample`], is its place in `topics`.
+    ///
+    /// # Errors
+    /// When the sink refuses, a topic has a sample or a description longer than [`MAX_MESSAGE`], or there are more
+    /// than 65 536 topics.
+    pub fn data<'t>(
+        mut self,
+        topics: &'t [Topic],
+        activations: &'t [ActivationTopic],
+    ) -> Result<Writer<'t, S>, WriteError<S::Error>> {
+        let output = &mut self.0;
+        for topic in topics {
+            if topic.size() + MESSAGE_HEAD + 2 > MAX_MESSAGE {
+                return Err(WriteError::TooLong);
+            }
+            output.message(b'F', |out| {
+                let _ = write!(out, "{}:", topic.name);
+                let _ = topic.write_fields(out);
+            })?;
+            if topic.fields.iter().any(|field| field.unit != "1") {
+                output.info(format_args!("{UNITS_PREFIX}{}", topic.name), |out| write_units(topic.fields, out))?;
+            }
+            for field in topic.fields {
+                if let FieldKind::Enum(names) | FieldKind::Flags(names) = field.kind {
+                    let key = format_args!("{NAMES_PREFIX}{}/{}", topic.name, field.name);
+                    output.info(key, |out| write_names(names, out))?;
+                }
+            }
+        }
+        for activation in activations {
+            output.message(b'F', |out| {
+                let _ = write!(out, "{TOPIC_PREFIX}{}:", activation.name);
+                let _ = activation.write_fields(out);
+            })?;
+        }
+        let names = topics.iter().map(|topic| ("", topic.name));
+        let names = names.chain(activations.iter().map(|activation| (TOPIC_PREFIX, activation.name)));
+        for (id, (prefix, name)) in names.enumerate() {
+            let id = u16::try_from(id).map_err(|_| WriteError::TooManyTopics)?;
+            output.message(b'A', |out| {
+                out.put(&[0]);
+                out.put(&id.to_le_bytes());
+                let _ = write!(out, "{prefix}{name}");
+            })?;
+        }
+        Ok(Writer { output: self.0, topics, activations, losing_since: None, lost: 0 })
+    }
+}
+
+/// The second part of a log: what happened.
+///
+/// See [`Definitions`] for how to get one and the [crate documentation](crate) for an example.
+pub struct Writer<'t, S> {
+    output: Output<S>,
+    topics: &'t [Topic],
+    activations: &'t [ActivationTopic],
+    losing_since: Option<Micros>,
+    lost: u32,
+}
+
+impl<S: Sink> Writer<'_, S> {
+    /// Writes one sample of the topic with this place in the table.
+    ///
+    /// # Errors
+    /// When the sink refuses (counted as lost), there is no such topic, or the words are none of its samples.
+    pub fn sample(&mut self, topic: usize, sample: &Sample<'_>) -> Result<(), WriteError<S::Error>> {
+        let schema = *self.topics.get(topic).ok_or(WriteError::UnknownTopic)?;
+        self.record(sample.at, b'D', |out| {
+            out.put(&(topic as u16).to_le_bytes());
+            schema.encode(sample, out)
+        })
+    }
+
+    /// Writes one activation.
+    ///
+    /// # Errors
+    /// When the sink refuses (counted as lost), no activation topic has this index, or the number of inputs differs.
+    pub fn activation(&mut self, record: &Activation) -> Result<(), WriteError<S::Error>> {
+        let mut topics = self.activations.iter().enumerate();
+        let (place, topic) = topics.find(|(_, topic)| topic.index == record.index).ok_or(WriteError::UnknownTopic)?;
+        if topic.inputs != record.inputs().len() {
+            return Err(WriteError::WordCount);
+        }
+        let id = (self.topics.len() + place) as u16;
+        self.record(record.now, b'D', |out| {
+            out.put(&id.to_le_bytes());
+            record.encode(&mut |bytes| out.put(bytes));
+            Ok(())
+        })
+    }
+
+    /// Writes a line of text.
+    ///
+    /// # Errors
+    /// When the sink refuses (counted as lost) or the line is too long.
+    pub fn text(&mut self, level: Level, at: Micros, line: &str) -> Result<(), WriteError<S::Error>> {
+        self.record(at, b'L', |out| {
+            out.put(&[level.to_char()]);
+            out.put(&at.0.to_le_bytes());
+            out.put(line.as_bytes());
+            Ok(())
+        })
+    }
+
+    /// Notes that a parameter has this value from now on.
+    ///
+    /// # Errors
+    /// When the sink refuses, or the name is longer than about 245 bytes.
+    pub fn parameter(&mut self, name: &str, value: ParameterValue) -> Result<(), WriteError<S::Error>> {
+        self.output.parameter(name, value)
+    }
+
+    /// Writes a mark at which a reader of a damaged log can find its way back. Once a second is plenty.
+    ///
+    /// # Errors
+    /// When the sink refuses.
+    pub fn sync(&mut self) -> Result<(), WriteError<S::Error>> {
+        self.output.message(b'S', |out| out.put(&SYNC_MAGIC))
+    }
+
+    /// How many messages the sink has refused so far.
+    #[must_use]
+    pub const fn lost(&self) -> u32 {
+        self.lost
+    }
+
+    /// The sink.
+    #[must_use]
+    pub const fn sink(&self) -> &S {
+        &self.output.sink
+    }
+
+    /// Ends the log and gives the sink back. The log is complete at every moment; nothing is written here.
+    #[must_use]
+    pub fn into_sink(self) -> S {
+        self.output.sink
+    }
+
+    /// Writes a message that belongs to the instant `at`, after a dropout mark if messages were lost before it.
+    #[inline]
+    fn record(
+        &mut self,
+        at: Micros,
+        kind: u8,
+        body: impl FnOnce(&mut Cursor<'_>) -> Result<(), WordsError>,
+    ) -> Result<(), WriteError<S::Error>> {
+        let mut result = Ok(());
+        if let Some(since) = self.losing_since {
+            let millis = u16::try_from(at.since(since).0 / 1_000).unwrap_or(u16::MAX).max(1);
+            result = self.output.message(b'O', |out| out.put(&millis.to_le_bytes()));
+            if result.is_ok() {
+                self.losing_since = None;
+            }
+        }
+        if result.is_ok() {
+            result = self.output.try_message(kind, body);
+        }
+        if let Err(WriteError::Sink(_)) = result {
+            self.lost = self.lost.saturating_add(1);
+            self.losing_since.get_or_insert(at);
+        }
+        result
+    }
+}
+
+/// Counts what is written to it.
+struct Count(usize);
+
+impl Write for Count {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0 += text.len();
+        Ok(())
+    }
+}
+
+fn write_units(fields: &[FieldInfo], out: &mut dyn Write) -> fmt::Result {
+    separated(fields.iter().filter(|field| field.unit != "1").map(|field| (field.name, field.unit)), out)
+}
+
+fn write_names(names: &[(&str, u32)], out: &mut dyn Write) -> fmt::Result {
+    separated(names.iter().copied(), out)
+}
+
+/// `key=value key=value …`
+fn separated<'a, V: fmt::Display>(pairs: impl Iterator<Item = (&'a str, V)>, out: &mut dyn Write) -> fmt::Result {
+    for (index, (key, value)) in pairs.enumerate() {
+        let space = if index == 0 { "" } else { " " };
+        write!(out, "{space}{key}={value}")?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ulog::{Message, Reader};
+    use std::vec::Vec;
+
+    struct Bytes(Vec<u8>);
+    impl Sink for Bytes {
+        type Error = core::convert::Infallible;
+        fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+            self.0.extend_from_slice(bytes);
+            Ok(())
+        }
+    }
+
+    /// The file `pyulog` 1.3.0 reads without complaint, made by hand from the format description. Its topic is not
+    /// one of ours (no generation), so format and data go through the message level.
+    #[test]
+    fn a_hand_built_log_is_written_byte_for_byte() {
+        let mut log = Definitions::start(Bytes(Vec::new()), Micros(1_000)).unwrap();
+        log.0
+            .message(b'F', |out| {
+                out.put(b"attitude:uint64_t timestamp;float[4] q;float roll;uint8_t mode;uint8_t[3] _padding0;");
+            })
+            .unwrap();
+        log.info("sys_name", "xcopt").unwrap();
+        log.info("ver_hw", "SITL").unwrap();
+        log.parameter("RATE_P", 0.2.into()).unwrap();
+        log.parameter("CTL_FREQ", 4_000.into()).unwrap();
+        log.0.message(b'A', |out| out.put(b"\0\0\0attitude")).unwrap();
+        let mut log = log.data(&[], &[]).unwrap();
+        for (at, roll) in [(1_000u64, 0.0f32), (3_500, 0.1), (6_000, 0.2)] {
+            if at == 3_500 {
+                log.sync().unwrap();
+            }
+            log.record(Micros(at), b'D', |out| {
+                out.put(&[0, 0]);
+                out.put(&at.to_le_bytes());
+                [1.0f32, 0.0, 0.0, 0.0, roll].iter().for_each(|value| out.put(&value.to_le_bytes()));
+                out.put(&[2]);
+                Ok(())
+            })
+            .unwrap();
+        }
+        log.text(Level::Info, Micros(3_000), "armed").unwrap();
+        log.output.message(b'O', |out| out.put(&12u16.to_le_bytes())).unwrap();
+        log.parameter("RATE_P", 0.3.into()).unwrap();
+        let written = log.into_sink().0;
+        let expected = include_bytes!("../../tests/hand_built.ulog");
+        assert_eq!(written, expected);
+        assert!(Reader::new(&written).unwrap().all(|message| !matches!(message, Err(_) | Ok(Message::Unknown { .. }))));
+    }
+}
