@@ -1,0 +1,100 @@
+//! What a press of the button meant.
+//!
+//! Debounced over 50 ms. A press shorter than three seconds is a click, a second one within 400 ms makes it a double
+//! click; holding reports once at three seconds (pair) and once at five (restart), while the button is still down.
+
+use stampfly_types::Micros;
+use stampfly_types::messages::{ButtonEvent, ButtonGesture};
+
+const DEBOUNCE: Micros = Micros::from_millis(50);
+const DOUBLE_CLICK: Micros = Micros::from_millis(400);
+const HOLD_PAIR: Micros = Micros::from_secs(3);
+const HOLD_RESET: Micros = Micros::from_secs(5);
+
+/// Turns a contact into gestures.
+///
+/// ```
+/// use stampfly_mode::ButtonDecoder;
+/// use stampfly_types::{Micros, messages::ButtonGesture};
+/// let mut button = ButtonDecoder::default();
+/// let mut gestures = Vec::new();
+/// for ms in (0..2_000).step_by(20) {
+///     gestures.extend(button.step(Micros::from_millis(ms), (100..300).contains(&ms)).map(|event| event.gesture));
+/// }
+/// assert_eq!(gestures, [ButtonGesture::Click]);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ButtonDecoder {
+    /// The contact's raw level and since when it has had it.
+    raw: bool,
+    raw_since: Micros,
+    /// The debounced level and since when.
+    pressed: bool,
+    pressed_since: Micros,
+    /// What this press has already reported.
+    reported: ButtonGesture,
+    /// A click that may still become a double click, and how long it was.
+    click: Option<(Micros, f32)>,
+}
+
+impl ButtonDecoder {
+    /// Takes the contact's level; call at 50 Hz or faster.
+    pub fn step(&mut self, now: Micros, contact: bool) -> Option<ButtonEvent> {
+        if contact != self.raw {
+            (self.raw, self.raw_since) = (contact, now);
+        }
+        if self.raw != self.pressed && now.since(self.raw_since) >= DEBOUNCE {
+            self.pressed = self.raw;
+            let held = self.raw_since.since(self.pressed_since).seconds();
+            self.pressed_since = self.raw_since;
+            if self.pressed {
+                self.reported = ButtonGesture::None;
+            } else if self.reported == ButtonGesture::None {
+                if self.click.take().is_some() {
+                    return Some(ButtonEvent { gesture: ButtonGesture::DoubleClick, held });
+                }
+                self.click = Some((now, held));
+            }
+        }
+        if self.pressed {
+            let (held, event) = (now.since(self.pressed_since), self.reported);
+            let reached = match held {
+                held if held >= HOLD_RESET => ButtonGesture::HoldReset,
+                held if held >= HOLD_PAIR => ButtonGesture::HoldPair,
+                _ => ButtonGesture::None,
+            };
+            if reached > event {
+                self.reported = reached;
+                return Some(ButtonEvent { gesture: reached, held: held.seconds() });
+            }
+            return None;
+        }
+        let (at, held) = self.click?;
+        if now.since(at) < DOUBLE_CLICK {
+            return None;
+        }
+        self.click = None;
+        Some(ButtonEvent { gesture: ButtonGesture::Click, held })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn gestures(pressed: impl Fn(u64) -> bool) -> Vec<ButtonGesture> {
+        let mut button = ButtonDecoder::default();
+        let events = (0..12_000).step_by(20).filter_map(|ms| button.step(Micros::from_millis(ms), pressed(ms)));
+        events.map(|event| event.gesture).collect()
+    }
+
+    #[test]
+    fn gestures_are_told_apart() {
+        assert_eq!(gestures(|ms| ms == 100), [], "bounce");
+        assert_eq!(gestures(|ms| (100..300).contains(&ms)), [ButtonGesture::Click]);
+        assert_eq!(gestures(|ms| (100..200).contains(&ms) || (400..500).contains(&ms)), [ButtonGesture::DoubleClick]);
+        assert_eq!(gestures(|ms| (100..3_500).contains(&ms)), [ButtonGesture::HoldPair]);
+        assert_eq!(gestures(|ms| (100..9_000).contains(&ms)), [ButtonGesture::HoldPair, ButtonGesture::HoldReset]);
+    }
+}

@@ -1,0 +1,347 @@
+//! Anomaly detection: conditions in, a set of alerts out. It detects and never acts; the mode machine decides.
+//!
+//! | alert | condition | clears |
+//! |---|---|---|
+//! | `IMPACT` | ‖accel‖ above 3 g, and above six sigma of the present vibration, in two samples running | when disarmed |
+//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running | when disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms, except in ACRO | when disarmed |
+//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms | with the next sample; `IMU_LOST` when disarmed |
+//! | `COMM_LOST` | no command for 500 ms, once there was one | with the next command |
+//! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
+//! | `USB_POWER` | voltage below 3.3 V while disarmed | 0.1 V higher |
+//! | `TOF_LOST`, `FLOW_LOST` | no usable sample for 1 s in the air | with the next one |
+//! | `TILT_MISMATCH` | gravity and estimated tilt 10° apart for 0.5 s on the ground | with agreement |
+//! | `ESTIMATE_DIVERGED` | the estimator says so | when it no longer does |
+//!
+//! Numbers: `safety.*` parameters of the StampFly's reference firmware. Its recorded flights show 2–3 m/s² of
+//! vibration, peaks of 18; the six-sigma condition keeps a badly balanced propeller from looking like a crash.
+
+use stampfly_types::messages::{
+    Alerts, EstimatorStatus, FlightMode, FlightState, ImuData, PowerData, StateEstimate, SystemAlert, SystemMode,
+    Validity,
+};
+use stampfly_types::{GRAVITY, Micros, Vec3, frame, math};
+
+/// Thresholds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FailsafeConfig {
+    /// Impact, m/s².
+    pub impact: f32,
+    /// Impact, in standard deviations of the vibration.
+    pub impact_sigmas: f32,
+    /// Angular rate, rad/s.
+    pub rate: f32,
+    /// Tilt, rad, and for how long, s.
+    pub tumble: [f32; 2],
+    /// Silence of the inertial sensor: degraded, lost.
+    pub imu_silence: [Micros; 2],
+    /// Silence of the command link.
+    pub link_silence: Micros,
+    /// Battery: warn, land, V.
+    pub battery: [f32; 2],
+    /// Below this a disarmed vehicle has no battery, V.
+    pub usb: f32,
+    /// Hysteresis of the battery thresholds, V.
+    pub battery_hysteresis: f32,
+    /// Time constant of the battery low-pass, s.
+    pub battery_time: f32,
+    /// Silence of range and flow in the air.
+    pub aiding_silence: Micros,
+    /// Disagreement of gravity and tilt on the ground, rad, and for how long, s.
+    pub tilt_mismatch: [f32; 2],
+}
+
+impl Default for FailsafeConfig {
+    fn default() -> Self {
+        Self {
+            impact: 3.0 * GRAVITY,
+            impact_sigmas: 6.0,
+            rate: 13.96,
+            tumble: [1.05, 0.3],
+            imu_silence: [Micros::from_millis(10), Micros::from_millis(25)],
+            link_silence: Micros::from_millis(500),
+            battery: [3.4, 3.0],
+            usb: 3.3,
+            battery_hysteresis: 0.1,
+            battery_time: 2.0,
+            aiding_silence: Micros::from_secs(1),
+            tilt_mismatch: [0.1745, 0.5],
+        }
+    }
+}
+
+/// What the failsafe looks at. Times are those of the newest sample, usable or authentic.
+#[derive(Clone, Copy, Debug)]
+pub struct FailsafeInput<'a> {
+    /// Newest inertial sample.
+    pub imu: Option<(Micros, &'a ImuData)>,
+    /// The estimate.
+    pub estimate: &'a StateEstimate,
+    /// The estimator's own opinion.
+    pub status: &'a EstimatorStatus,
+    /// Newest battery sample.
+    pub power: Option<(Micros, &'a PowerData)>,
+    /// Newest command of any kind.
+    pub command: Option<Micros>,
+    /// Newest usable range.
+    pub tof: Option<Micros>,
+    /// Newest usable flow.
+    pub flow: Option<Micros>,
+    /// State and mode one step ago.
+    pub mode: &'a SystemMode,
+}
+
+/// The failsafe.
+///
+/// ```
+/// use stampfly_mode::{Failsafe, FailsafeInput};
+/// use stampfly_types::{Micros, Vec3, messages::*};
+/// let mut failsafe = Failsafe::default();
+/// let imu = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), ..Default::default() };
+/// let quiet = FailsafeInput {
+///     imu: Some((Micros(0), &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
+///     power: None, command: None, tof: None, flow: None, mode: &SystemMode::default(),
+/// };
+/// assert!(failsafe.step(Micros(2_500), &quiet).active.is_empty());
+/// // The sensor says nothing any more.
+/// assert!(failsafe.step(Micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Failsafe {
+    config: FailsafeConfig,
+    active: Alerts,
+    seen: Alerts,
+    last_imu: Option<Micros>,
+    last_step: Option<Micros>,
+    impacts: u32,
+    overspeeds: u32,
+    /// Running mean and variance of ‖accel‖ over about a second.
+    force: [f32; 2],
+    /// Specific force with a time constant of a second, for the tilt on the ground.
+    gravity: Option<Vec3>,
+    tumbled: Option<Micros>,
+    mismatch: Option<Micros>,
+    voltage: Option<f32>,
+    last_power: Option<Micros>,
+}
+
+/// Alerts that stay until the vehicle is disarmed.
+const LATCHED: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
+
+impl Failsafe {
+    /// Nothing wrong yet.
+    #[must_use]
+    pub fn new(config: FailsafeConfig) -> Self {
+        Self { config, ..Self::default() }
+    }
+
+    /// One step; runs on a deadline when there are no samples.
+    pub fn step(&mut self, now: Micros, input: &FailsafeInput<'_>) -> SystemAlert {
+        let disarmed = !input.mode.armed;
+        let mut active = if disarmed { self.active.without(LATCHED) } else { self.active };
+        if let Some((at, imu)) = input.imu
+            && self.last_imu != Some(at)
+        {
+            self.last_imu = Some(at);
+            active = self.inspect_motion(active, imu);
+        }
+        let silence = self.last_imu.map_or(now, |at| now.since(at));
+        let [degraded, lost] = self.config.imu_silence;
+        active = active.set(Alerts::IMU_DEGRADED, silence >= degraded);
+        if silence >= lost {
+            active |= Alerts::IMU_LOST;
+        }
+        active = self.inspect_attitude(active, now, input);
+        active = self.inspect_power(active, input, disarmed);
+        let airborne = matches!(input.mode.state, FlightState::Flying | FlightState::Landing);
+        let silent = |last: Option<Micros>, limit| last.is_none_or(|at| now.since(at) >= limit);
+        active = active
+            .set(Alerts::COMM_LOST, input.command.is_some() && silent(input.command, self.config.link_silence))
+            .set(Alerts::TOF_LOST, airborne && silent(input.tof, self.config.aiding_silence))
+            .set(Alerts::FLOW_LOST, airborne && silent(input.flow, self.config.aiding_silence))
+            .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
+        self.last_step = Some(now);
+        self.active = active;
+        self.seen |= active;
+        SystemAlert { active, seen: self.seen }
+    }
+
+    fn inspect_motion(&mut self, active: Alerts, imu: &ImuData) -> Alerts {
+        let (force, rate) = (imu.accel.norm(), imu.gyro.norm());
+        if !force.is_finite() || !rate.is_finite() {
+            return active;
+        }
+        let [mean, variance] = self.force;
+        let limit = self.config.impact.max(mean + self.config.impact_sigmas * math::sqrt(variance));
+        self.impacts = if force >= limit { self.impacts.saturating_add(1) } else { 0 };
+        self.overspeeds = if rate >= self.config.rate { self.overspeeds.saturating_add(1) } else { 0 };
+        // An impact must not raise its own threshold: outliers enter clipped.
+        let off = force.min(limit) - mean;
+        self.force = [mean + 0.01 * off, variance + 0.0025 * (off * off - variance)];
+        let gravity = self.gravity.get_or_insert(imu.accel);
+        *gravity += (imu.accel - *gravity) * 0.0025;
+        let mut active = active;
+        if self.impacts >= 2 {
+            active |= Alerts::IMPACT;
+        }
+        if self.overspeeds >= 2 {
+            active |= Alerts::GYRO_ANOMALY;
+        }
+        active
+    }
+
+    fn inspect_attitude(&mut self, active: Alerts, now: Micros, input: &FailsafeInput<'_>) -> Alerts {
+        let known = input.estimate.valid.contains(Validity::TILT);
+        let flying = matches!(input.mode.state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
+        let [tilt, time] = self.config.tumble;
+        let over = flying
+            && known
+            && input.mode.mode != FlightMode::Acro
+            && frame::tilt(&input.estimate.attitude) > tilt;
+        let tumbled = lasts(&mut self.tumbled, now, over, time);
+        let [angle, time] = self.config.tilt_mismatch;
+        let standing = input.mode.state == FlightState::IdleGround && known;
+        let apart = standing
+            && self.gravity.is_some_and(|force| {
+                let up = input.estimate.attitude.inverse_transform_vector(&-Vec3::z());
+                math::acos(force.dot(&up) / force.norm().max(1e-3)) > angle
+            });
+        let mismatch = lasts(&mut self.mismatch, now, apart, time);
+        let active = active.set(Alerts::TILT_MISMATCH, mismatch);
+        if tumbled { active | Alerts::TUMBLED } else { active }
+    }
+
+    fn inspect_power(&mut self, active: Alerts, input: &FailsafeInput<'_>, disarmed: bool) -> Alerts {
+        let Some((at, power)) = input.power else { return active };
+        if self.last_power == Some(at) || !power.voltage.is_finite() || power.voltage < 0.1 {
+            return active; // No new reading, or no meter.
+        }
+        let dt = self.last_power.map_or(0.0, |last| at.since(last).seconds());
+        self.last_power = Some(at);
+        let before = self.voltage.unwrap_or(power.voltage);
+        let voltage = before + (power.voltage - before) * (dt / (self.config.battery_time + dt));
+        self.voltage = Some(voltage);
+        let below = |alert: Alerts, limit: f32| {
+            let hysteresis = if active.contains(alert) { self.config.battery_hysteresis } else { 0.0 };
+            voltage <= limit + hysteresis
+        };
+        let [warn, land] = self.config.battery;
+        active
+            .set(Alerts::USB_POWER, below(Alerts::USB_POWER, self.config.usb) && disarmed)
+            .set(Alerts::LOW_BATTERY, below(Alerts::LOW_BATTERY, warn))
+            .set(Alerts::CRITICAL_BATTERY, below(Alerts::CRITICAL_BATTERY, land))
+    }
+}
+
+/// Has the condition held for `seconds` without a break?
+fn lasts(since: &mut Option<Micros>, now: Micros, holds: bool, seconds: f32) -> bool {
+    if !holds {
+        *since = None;
+        return false;
+    }
+    now.since(*since.get_or_insert(now)).seconds() >= seconds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    struct Rig {
+        failsafe: Failsafe,
+        mode: SystemMode,
+        now: u64,
+    }
+
+    impl Rig {
+        fn flying() -> Self {
+            let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+            Self { failsafe: Failsafe::default(), mode, now: 0 }
+        }
+
+        fn sample(&mut self, accel: Vec3, gyro: Vec3) -> Alerts {
+            self.now += 2_500;
+            let now = Micros(self.now);
+            let imu = ImuData { accel, gyro, temperature: 25.0 };
+            let input = FailsafeInput {
+                imu: Some((now, &imu)),
+                estimate: &StateEstimate { valid: Validity::ALL, ..Default::default() },
+                status: &EstimatorStatus::default(),
+                power: None,
+                command: Some(now),
+                tof: Some(now),
+                flow: Some(now),
+                mode: &self.mode,
+            };
+            self.failsafe.step(now, &input).active
+        }
+    }
+
+    const REST: Vec3 = Vec3::new(0.0, 0.0, -GRAVITY);
+
+    #[test]
+    fn a_crash_is_seen_within_two_samples_and_stays() {
+        let mut rig = Rig::flying();
+        for _ in 0..400 {
+            assert!(rig.sample(REST, Vec3::zeros()).is_empty());
+        }
+        assert!(rig.sample(REST * 4.0, Vec3::zeros()).is_empty(), "one sample is a glitch");
+        assert!(rig.sample(REST * 4.0, Vec3::zeros()).contains(Alerts::IMPACT));
+        assert!(rig.sample(REST, Vec3::zeros()).contains(Alerts::IMPACT), "latched");
+        rig.mode.armed = false;
+        assert!(rig.sample(REST, Vec3::zeros()).is_empty(), "until disarmed");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        /// Gaussian vibration of up to four times what was recorded is no crash, once the motors have run a moment.
+        #[test]
+        fn vibration_is_no_impact(seed: u32, sigma in 0.5f32..10.0) {
+            let mut rig = Rig::flying();
+            let mut state = seed | 1;
+            let mut noise = || {
+                let mut sum = 0.0;
+                for _ in 0..12 {
+                    state ^= state << 13; state ^= state >> 17; state ^= state << 5;
+                    sum += state as f32 / u32::MAX as f32;
+                }
+                sum - 6.0
+            };
+            for k in 0..8_000u32 {
+                // Rotors take some tenths of a second to spin up.
+                let strength = sigma * (k as f32 / 200.0).min(1.0);
+                let accel = REST + Vec3::new(noise(), noise() * 0.3, noise()) * strength;
+                prop_assert!(rig.sample(accel, Vec3::zeros()).is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn the_battery_warns_before_it_lands() {
+        let mut failsafe = Failsafe::default();
+        let mode = SystemMode { armed: true, ..Default::default() };
+        let mut step = |k: u64, voltage: f32| {
+            let at = Micros(k * 100_000);
+            let power = PowerData { voltage, ..Default::default() };
+            let imu = ImuData { accel: REST, ..Default::default() };
+            let input = FailsafeInput {
+                imu: Some((at, &imu)),
+                estimate: &StateEstimate::default(),
+                status: &EstimatorStatus::default(),
+                power: Some((at, &power)),
+                command: None,
+                tof: None,
+                flow: None,
+                mode: &mode,
+            };
+            failsafe.step(at, &input).active
+        };
+        for k in 0..50 {
+            assert!(step(k, 3.7).is_empty());
+        }
+        assert!((50..100).map(|k| step(k, 3.35)).last().is_some_and(|a| a == Alerts::LOW_BATTERY));
+        assert!((100..200).map(|k| step(k, 2.9)).last().is_some_and(|a| a.contains(Alerts::CRITICAL_BATTERY)));
+        assert!((200..300).map(|k| step(k, 3.05)).last().is_some_and(|a| a.contains(Alerts::CRITICAL_BATTERY)));
+        assert!((300..400).map(|k| step(k, 3.2)).last().is_some_and(|a| a == Alerts::LOW_BATTERY), "hysteresis");
+    }
+}

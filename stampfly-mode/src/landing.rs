@@ -1,0 +1,251 @@
+//! Take-off and landing: contact with the ground, when take-off is done, when touchdown is sure.
+//!
+//! Everything here reads the estimate and the thrust that was asked for, never a sensor: a range finder that hangs
+//! must not stop a landing. Without a valid height the descent is slow all the way and touchdown is recognised by the
+//! vehicle not sinking although it is asked to.
+//!
+//! Near the ground the thrust ceiling is ramped down, so the vehicle settles instead of floating on its own ground
+//! effect; the ramp also makes the test for touchdown safe: with two thirds of its weight carried, a vehicle that does
+//! not sink stands.
+
+use stampfly_types::messages::{ControlOutput, FlightState, GroundContact, Setpoint, StateEstimate, Validity, VehicleStatus};
+use stampfly_types::Micros;
+
+/// Limits of take-off and landing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LandingConfig {
+    /// Thrust that carries the vehicle, N.
+    pub hover_thrust: f32,
+    /// Rise above the take-off spot that counts as airborne, m.
+    pub airborne_rise: f32,
+    /// Descent speed, m/s.
+    pub descent: f32,
+    /// Descent speed at the ground, m/s.
+    pub touchdown: f32,
+    /// Below this height the descent slows down, m.
+    pub flare_height: f32,
+    /// Below this height the thrust ceiling begins to fall, m.
+    pub ceiling_height: f32,
+    /// Where the ceiling ends, as a share of hover thrust, and how long it takes to get there, s.
+    pub ceiling: [f32; 2],
+    /// Slower than this is not sinking, m/s.
+    pub still_speed: f32,
+    /// Not sinking for this long with the ceiling down is touchdown, s.
+    pub touchdown_time: f32,
+    /// Within this band of its goal take-off has arrived, m.
+    pub takeoff_band: f32,
+    /// Time in the band that completes take-off, and time after which it is complete in any case, s.
+    pub takeoff_time: [f32; 2],
+}
+
+impl Default for LandingConfig {
+    fn default() -> Self {
+        Self {
+            hover_thrust: 0.361,
+            airborne_rise: 0.05,
+            descent: 0.3,
+            touchdown: 0.15,
+            flare_height: 0.3,
+            ceiling_height: 0.06,
+            ceiling: [0.6, 0.8],
+            still_speed: 0.08,
+            touchdown_time: 0.3,
+            takeoff_band: 0.06,
+            takeoff_time: [0.4, 8.0],
+        }
+    }
+}
+
+/// What the manager looks at.
+#[derive(Clone, Copy, Debug)]
+pub struct LandingInput<'a> {
+    /// The estimate.
+    pub estimate: &'a StateEstimate,
+    /// The present flight state.
+    pub state: FlightState,
+    /// The set-point one step ago.
+    pub setpoint: &'a Setpoint,
+    /// The controller's demand one step ago.
+    pub demand: &'a ControlOutput,
+}
+
+/// The take-off and landing manager.
+///
+/// ```
+/// use stampfly_mode::{LandingInput, TakeoffLanding};
+/// use stampfly_types::{Micros, messages::*};
+/// let mut manager = TakeoffLanding::default();
+/// // Standing on the floor in LANDING, asked to sink and not sinking: after a while it has landed.
+/// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
+/// let mut landed_at = None;
+/// for k in 0..1000u64 {
+///     let status = manager.step(Micros(2_500 * k), &LandingInput {
+///         estimate: &estimate, state: FlightState::Landing, setpoint: &Setpoint::default(),
+///         demand: &ControlOutput { thrust: 0.2, ..Default::default() },
+///     });
+///     if status.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
+/// }
+/// assert!(landed_at.is_some_and(|t| t > 0.3 && t < 1.5));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct TakeoffLanding {
+    config: LandingConfig,
+    state: FlightState,
+    contact: GroundContact,
+    /// Height of the estimate when the state was entered.
+    entry_height: f32,
+    entered: Micros,
+    /// Since when take-off has been in its band, the descent has stalled, the ceiling has been falling, and the vehicle
+    /// has been still under it.
+    in_band: Option<Micros>,
+    stalled: Option<Micros>,
+    ceiling: Option<Micros>,
+    still: Option<Micros>,
+}
+
+impl Default for TakeoffLanding {
+    fn default() -> Self {
+        Self::new(LandingConfig::default())
+    }
+}
+
+/// How long a condition has held without a break, s.
+fn lasting(since: &mut Option<Micros>, now: Micros, holds: bool) -> f32 {
+    if !holds {
+        *since = None;
+        return 0.0;
+    }
+    now.since(*since.get_or_insert(now)).seconds()
+}
+
+impl TakeoffLanding {
+    /// A manager of a vehicle that stands.
+    #[must_use]
+    pub fn new(config: LandingConfig) -> Self {
+        Self {
+            config,
+            state: FlightState::Init,
+            contact: GroundContact::Ground,
+            entry_height: 0.0,
+            entered: Micros::ZERO,
+            in_band: None,
+            stalled: None,
+            ceiling: None,
+            still: None,
+        }
+    }
+
+    fn enter(&mut self, now: Micros, input: &LandingInput<'_>) {
+        self.state = input.state;
+        self.entered = now;
+        self.entry_height = input.estimate.height;
+        (self.in_band, self.stalled, self.ceiling, self.still) = (None, None, None, None);
+    }
+
+    /// One step, at the control rate.
+    pub fn step(&mut self, now: Micros, input: &LandingInput<'_>) -> VehicleStatus {
+        if input.state != self.state {
+            self.enter(now, input);
+        }
+        let config = self.config;
+        let estimate = input.estimate;
+        let height_known = estimate.valid.contains(Validity::HEIGHT);
+        let mut status = VehicleStatus {
+            thrust_ceiling: 2.0,
+            descent_rate: config.descent,
+            ..VehicleStatus::default()
+        };
+        match self.state {
+            FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => {
+                self.contact = GroundContact::Ground;
+            }
+            FlightState::TakeOff => {
+                let rise = estimate.height - self.entry_height;
+                if rise > config.airborne_rise || estimate.velocity.z < -2.0 * config.still_speed {
+                    self.contact = GroundContact::Air;
+                }
+                let path = input.setpoint;
+                let arrived = self.contact == GroundContact::Air
+                    && path.velocity.z.abs() < 0.02
+                    && (path.position.z - estimate.position.z).abs() < config.takeoff_band
+                    && estimate.velocity.z.abs() < 2.0 * config.still_speed;
+                let in_band = lasting(&mut self.in_band, now, arrived);
+                let [settle, limit] = config.takeoff_time;
+                status.takeoff_complete = in_band >= settle || now.since(self.entered).seconds() > limit;
+            }
+            FlightState::Flying => self.contact = GroundContact::Air,
+            FlightState::Landing => {
+                let flare = (estimate.height / config.flare_height).clamp(0.0, 1.0);
+                status.descent_rate = if height_known {
+                    config.touchdown + (config.descent - config.touchdown) * flare
+                } else {
+                    config.touchdown
+                };
+                let sinking = estimate.velocity.z > config.still_speed;
+                let stalled = lasting(&mut self.stalled, now, !sinking) > 1.0;
+                let low = height_known && estimate.height < config.ceiling_height;
+                let [share, ramp] = config.ceiling;
+                let falling = lasting(&mut self.ceiling, now, low || stalled);
+                if self.ceiling.is_some() {
+                    status.thrust_ceiling = 1.0 - (1.0 - share) * (falling / ramp).min(1.0);
+                }
+                let unloaded = input.demand.thrust < 0.8 * config.hover_thrust && status.thrust_ceiling < 0.85;
+                let still = lasting(&mut self.still, now, unloaded && estimate.velocity.z.abs() < config.still_speed);
+                status.landed = still >= config.touchdown_time;
+                if status.landed {
+                    self.contact = GroundContact::Ground;
+                }
+            }
+        }
+        status.contact = self.contact;
+        status
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::Vec3;
+
+    fn run(
+        seconds: f32,
+        state: FlightState,
+        mut estimate: impl FnMut(f32) -> StateEstimate,
+        thrust: f32,
+    ) -> Option<f32> {
+        let mut manager = TakeoffLanding::default();
+        (0..(seconds * 400.0) as u64).find_map(|k| {
+            let t = k as f32 * 0.0025;
+            let input = LandingInput {
+                estimate: &estimate(t),
+                state,
+                setpoint: &Setpoint::default(),
+                demand: &ControlOutput { thrust, ..Default::default() },
+            };
+            manager.step(Micros(2_500 * k), &input).landed.then_some(t)
+        })
+    }
+
+    #[test]
+    fn sinking_is_never_landed() {
+        let sinking = |t: f32| StateEstimate {
+            height: 1.0 - 0.2 * t,
+            velocity: Vec3::new(0.0, 0.0, 0.2),
+            valid: Validity::ALL,
+            ..Default::default()
+        };
+        assert_eq!(run(5.0, FlightState::Landing, sinking, 0.2), None);
+    }
+
+    #[test]
+    fn hovering_low_in_flight_is_never_landed() {
+        let low = |_: f32| StateEstimate { height: 0.04, valid: Validity::ALL, ..Default::default() };
+        assert_eq!(run(20.0, FlightState::Flying, low, 0.2), None);
+    }
+
+    #[test]
+    fn touchdown_is_recognised_without_any_height() {
+        let blind = |_: f32| StateEstimate { height: 7.0, valid: Validity::TILT, ..Default::default() };
+        assert!(run(5.0, FlightState::Landing, blind, 0.2).is_some());
+    }
+}

@@ -1,0 +1,498 @@
+//! State management: the only place where the vehicle changes state.
+//!
+//! [`next`] is the whole table: one total function from state and event to state. [`ModeMachine::step`] finds out
+//! which events have happened, most urgent first, takes at most one transition a step, and runs what leaving and
+//! entering a state means (resets of controller and estimator). The failsafe is an event, never a state.
+//!
+//! ```text
+//! INIT ─ready─► IDLE_GROUND ◄─lifted/set down─► IDLE_HELD
+//!                 │ arm                 ▲ disarm, emergency
+//!                 ▼                     │ (from every state below)
+//!               ARMED ─take off─► TAKEOFF ─complete─► FLYING ─land─► LANDING ─touchdown─► IDLE_GROUND
+//! ```
+
+use crate::arming;
+use stampfly_types::Micros;
+use stampfly_types::messages::{
+    Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightState, GroundContact, GuidedKind,
+    PilotInput, StateEstimate, SystemMode, Validity, VehicleStatus,
+};
+
+/// Something that may change the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// Sensors, calibration and estimate are ready.
+    Ready,
+    /// A hand has lifted the vehicle.
+    Lifted,
+    /// It stands again.
+    SetDown,
+    /// Arming was asked for and nothing speaks against it.
+    Arm,
+    /// Take-off was asked for.
+    TakeOff,
+    /// The take-off height is reached.
+    TakeOffComplete,
+    /// Landing was asked for, or the failsafe demands it.
+    Land,
+    /// Touchdown is sure.
+    Touchdown,
+    /// Disarming was asked for.
+    Disarm,
+    /// Motors off now.
+    Emergency,
+}
+
+impl Event {
+    /// Every event, most urgent first: the order in which [`ModeMachine::step`] looks at them.
+    pub const ALL: [Self; 10] = [
+        Self::Emergency,
+        Self::Disarm,
+        Self::Touchdown,
+        Self::Land,
+        Self::TakeOffComplete,
+        Self::TakeOff,
+        Self::Arm,
+        Self::SetDown,
+        Self::Lifted,
+        Self::Ready,
+    ];
+}
+
+/// The transition table. `holds_height` says whether the flight mode holds height by itself: then a disarm in the air
+/// lands first.
+#[must_use]
+pub const fn next(state: FlightState, event: Event, holds_height: bool) -> Option<FlightState> {
+    use Event as E;
+    use FlightState as S;
+    match (state, event) {
+        (S::Init, E::Ready) => Some(S::IdleGround),
+        (S::IdleGround, E::Lifted) => Some(S::IdleHeld),
+        (S::IdleHeld, E::SetDown) => Some(S::IdleGround),
+        (S::IdleGround, E::Arm) => Some(S::Armed),
+        (S::Armed, E::TakeOff) => Some(S::TakeOff),
+        (S::TakeOff, E::TakeOffComplete) => Some(S::Flying),
+        (S::TakeOff | S::Flying, E::Land) => Some(S::Landing),
+        (S::TakeOff | S::Flying, E::Disarm) => Some(if holds_height { S::Landing } else { S::IdleGround }),
+        (S::Landing, E::Touchdown | E::Disarm) | (S::Armed, E::Disarm | E::Land) => Some(S::IdleGround),
+        (S::Armed | S::TakeOff | S::Flying | S::Landing, E::Emergency) => Some(S::IdleGround),
+        (S::Init, E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
+        | (S::Init, E::Disarm | E::Emergency)
+        | (S::IdleGround, E::Ready | E::SetDown | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
+        | (S::IdleGround, E::Disarm | E::Emergency)
+        | (S::IdleHeld, E::Ready | E::Lifted | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
+        | (S::IdleHeld, E::Disarm | E::Emergency)
+        | (S::Armed, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOffComplete | E::Touchdown)
+        | (S::TakeOff, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::Touchdown)
+        | (S::Flying, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Touchdown)
+        | (S::Landing, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land) => None,
+    }
+}
+
+/// May the motors turn in this state?
+#[must_use]
+pub const fn is_armed(state: FlightState) -> bool {
+    matches!(state, FlightState::Armed | FlightState::TakeOff | FlightState::Flying | FlightState::Landing)
+}
+
+/// A command from a program or the board, since the last step.
+pub type Command = GuidedKind;
+
+/// What the machine looks at.
+#[derive(Clone, Copy, Debug)]
+pub struct ModeInput<'a> {
+    /// The failsafe's findings.
+    pub alerts: Alerts,
+    /// The estimate.
+    pub estimate: &'a StateEstimate,
+    /// The still-calibration.
+    pub calibration: &'a CalibrationResult,
+    /// Take-off and landing.
+    pub status: &'a VehicleStatus,
+    /// The pilot's newest frame, if it is fresh.
+    pub pilot: Option<&'a PilotInput>,
+    /// Commands since the last step, in order.
+    pub commands: &'a [Command],
+    /// A gesture on the button since the last step.
+    pub button: Option<ButtonGesture>,
+}
+
+/// What the machine decides.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ModeOutput {
+    /// State, mode, armed.
+    pub mode: SystemMode,
+    /// What the estimator is to do.
+    pub estimator: EstimatorCommand,
+}
+
+/// Alerts that stop the motors in any state.
+const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
+/// Alerts that demand a landing at once.
+const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
+/// How long the vehicle hovers without a link before it lands.
+const HOVER_WITHOUT_LINK: Micros = Micros::from_secs(3);
+/// Time between arming and take-off when the pilot's mode takes off by itself.
+const SPOOL: Micros = Micros::from_millis(300);
+/// An armed vehicle that is not told to take off is disarmed after this long.
+const ARMED_TIMEOUT: Micros = Micros::from_secs(10);
+/// Height above the ground that means somebody has lifted the vehicle, m, and below which it stands again.
+const HELD_HEIGHT: [f32; 2] = [0.15, 0.08];
+/// Manual throttle that takes off.
+const THROTTLE_TAKE_OFF: f32 = 0.1;
+
+/// The mode machine.
+///
+/// ```
+/// use stampfly_mode::{ModeInput, ModeMachine};
+/// use stampfly_types::{Micros, messages::*};
+/// let mut machine = ModeMachine::default();
+/// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
+/// let calibration = CalibrationResult { complete: true, ..Default::default() };
+/// let status = VehicleStatus::default();
+/// let mut input = ModeInput {
+///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, status: &status,
+///     pilot: None, commands: &[], button: None,
+/// };
+/// assert_eq!(machine.step(Micros(0), &input).mode.state, FlightState::IdleGround);
+/// input.commands = &[GuidedKind::Arm];
+/// assert!(machine.step(Micros(2_500), &input).mode.armed);
+/// input.commands = &[GuidedKind::Kill];
+/// assert!(!machine.step(Micros(5_000), &input).mode.armed);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ModeMachine {
+    output: ModeOutput,
+    entered: Micros,
+    /// The mode asked for; the one in force may be a fallback.
+    wanted: FlightMode,
+    /// Arm switch of the pilot's last frame; `None` until it has been seen off.
+    switch: Option<bool>,
+    /// Armed by pilot or button, which take off by themselves in modes that hold height.
+    takes_off: bool,
+    crashed: bool,
+    silent_since: Option<Micros>,
+    was_diverged: bool,
+}
+
+impl ModeMachine {
+    /// One step, at the control rate.
+    pub fn step(&mut self, now: Micros, input: &ModeInput<'_>) -> ModeOutput {
+        let switch = self.pilot_switch(input);
+        self.choose_mode(input);
+        let mode = &mut self.output.mode;
+        if let Some(gesture) = input.button {
+            match gesture {
+                ButtonGesture::HoldPair if !is_armed(mode.state) => mode.pairing = !mode.pairing,
+                _ => {}
+            }
+        }
+        mode.blocks = arming::blocks(mode.state, mode.pairing, self.crashed, switch.is_stale, input);
+        let happened = self.happened(now, input, &switch);
+        if self.acknowledges(input, &switch) {
+            self.crashed = false;
+        }
+        let holds_height = matches!(self.output.mode.mode, FlightMode::AltHold | FlightMode::PosHold);
+        let transition = Event::ALL.into_iter().zip(happened).filter(|(_, happened)| *happened);
+        if let Some((event, state)) = transition
+            .filter_map(|(event, _)| next(self.output.mode.state, event, holds_height).map(|state| (event, state)))
+            .next()
+        {
+            self.leave_and_enter(now, event, state, input);
+        }
+        if input.alerts.contains(Alerts::ESTIMATE_DIVERGED) && !self.was_diverged {
+            self.output.estimator.full_resets = self.output.estimator.full_resets.wrapping_add(1);
+        }
+        self.was_diverged = input.alerts.contains(Alerts::ESTIMATE_DIVERGED);
+        self.output
+    }
+
+    /// Which of [`Event::ALL`] have happened, in the same order.
+    fn happened(&mut self, now: Micros, input: &ModeInput<'_>, switch: &Switch) -> [bool; 10] {
+        let mode = &self.output.mode;
+        let commanded = |kind: Command| input.commands.contains(&kind);
+        let clicked = input.button == Some(ButtonGesture::Click);
+        let armed = is_armed(mode.state);
+        let height_known = input.estimate.valid.contains(Validity::HEIGHT);
+        let [held, standing] = HELD_HEIGHT;
+
+        if input.alerts.contains(Alerts::COMM_LOST) && armed {
+            self.silent_since.get_or_insert(now);
+        } else {
+            self.silent_since = None;
+        }
+        let abandoned = self.silent_since.is_some_and(|since| now.since(since) >= HOVER_WITHOUT_LINK);
+        let waited = now.since(self.entered);
+        let manual = matches!(mode.mode, FlightMode::Acro | FlightMode::Stabilize);
+        let throttle_up = input.pilot.is_some_and(|pilot| pilot.throttle > THROTTLE_TAKE_OFF);
+        let lifts_off = if manual { throttle_up } else { self.takes_off && waited >= SPOOL };
+        let airborne_by_hand = manual && input.status.contact == GroundContact::Air;
+        [
+            input.alerts.intersects(CUT) || commanded(Command::Kill) || input.pilot.is_some_and(|pilot| pilot.kill),
+            commanded(Command::Disarm)
+                || switch.falls
+                || (clicked && armed)
+                || (mode.state == FlightState::Armed && waited >= ARMED_TIMEOUT),
+            input.status.landed,
+            commanded(Command::Land) || abandoned || input.alerts.intersects(LAND),
+            input.status.takeoff_complete || airborne_by_hand,
+            commanded(Command::TakeOff) || lifts_off,
+            (commanded(Command::Arm) || switch.rises || clicked) && mode.blocks.is_empty(),
+            height_known && input.estimate.height < standing,
+            height_known && input.estimate.height > held,
+            input.calibration.complete && input.estimate.valid.contains(Validity::TILT),
+        ]
+    }
+
+    /// Callbacks of leaving one state and entering another, in one place.
+    fn leave_and_enter(&mut self, now: Micros, event: Event, state: FlightState, input: &ModeInput<'_>) {
+        let ModeOutput { mode, estimator } = &mut self.output;
+        let left = mode.state;
+        mode.state = state;
+        mode.armed = is_armed(state);
+        mode.transitions = mode.transitions.wrapping_add(1);
+        self.entered = now;
+        match state {
+            FlightState::IdleGround => {
+                mode.control_resets = mode.control_resets.wrapping_add(1);
+                if left == FlightState::IdleHeld {
+                    estimator.full_resets = estimator.full_resets.wrapping_add(1);
+                }
+                self.crashed |= event == Event::Emergency && input.alerts.intersects(CUT);
+            }
+            FlightState::Armed => {
+                mode.control_resets = mode.control_resets.wrapping_add(1);
+                // Positions count from the take-off spot.
+                estimator.origin_resets = estimator.origin_resets.wrapping_add(1);
+                self.takes_off = !input.commands.contains(&Command::Arm);
+            }
+            FlightState::Init
+            | FlightState::IdleHeld
+            | FlightState::TakeOff
+            | FlightState::Flying
+            | FlightState::Landing => {}
+        }
+        estimator.on_ground = matches!(state, FlightState::IdleGround | FlightState::Armed);
+    }
+
+    /// The mode in force: the one asked for, or the best one the estimate allows.
+    fn choose_mode(&mut self, input: &ModeInput<'_>) {
+        if let Some(pilot) = input.pilot {
+            self.wanted = pilot.mode;
+        } else if input.commands.iter().any(|command| *command != Command::None) {
+            self.wanted = FlightMode::PosHold;
+        }
+        let valid = input.estimate.valid;
+        let height = valid.contains(Validity::VELOCITY_Z);
+        let place = height && valid.contains(Validity::VELOCITY_XY);
+        self.output.mode.mode = match self.wanted {
+            FlightMode::PosHold if place => FlightMode::PosHold,
+            FlightMode::PosHold | FlightMode::AltHold if height => FlightMode::AltHold,
+            FlightMode::PosHold | FlightMode::AltHold | FlightMode::Stabilize => FlightMode::Stabilize,
+            FlightMode::Acro => FlightMode::Acro,
+        };
+    }
+
+    fn pilot_switch(&mut self, input: &ModeInput<'_>) -> Switch {
+        let Some(pilot) = input.pilot else { return Switch::default() };
+        let before = self.switch;
+        if before.is_some() || !pilot.arm {
+            self.switch = Some(pilot.arm);
+        }
+        Switch {
+            rises: before == Some(false) && pilot.arm,
+            falls: before == Some(true) && !pilot.arm,
+            is_stale: before.is_none() && pilot.arm,
+        }
+    }
+
+    /// Somebody has come to look at a crashed vehicle.
+    fn acknowledges(&self, input: &ModeInput<'_>, switch: &Switch) -> bool {
+        let idle = !is_armed(self.output.mode.state);
+        idle && (switch.falls || input.button.is_some() || input.commands.contains(&Command::Disarm))
+    }
+}
+
+/// What the pilot's arm switch did.
+#[derive(Clone, Copy, Debug, Default)]
+struct Switch {
+    rises: bool,
+    falls: bool,
+    is_stale: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// A situation the machine can be put into.
+    struct World {
+        estimate: StateEstimate,
+        calibration: CalibrationResult,
+        status: VehicleStatus,
+        alerts: Alerts,
+        pilot: Option<PilotInput>,
+        now: u64,
+    }
+
+    impl World {
+        fn ready() -> Self {
+            Self {
+                estimate: StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() },
+                calibration: CalibrationResult { complete: true, ..Default::default() },
+                status: VehicleStatus::default(),
+                alerts: Alerts::NONE,
+                pilot: None,
+                now: 0,
+            }
+        }
+
+        fn step(&mut self, machine: &mut ModeMachine, commands: &[Command]) -> ModeOutput {
+            self.now += 2_500;
+            let input = ModeInput {
+                alerts: self.alerts,
+                estimate: &self.estimate,
+                calibration: &self.calibration,
+                status: &self.status,
+                pilot: self.pilot.as_ref(),
+                commands,
+                button: None,
+            };
+            machine.step(Micros(self.now), &input)
+        }
+    }
+
+    fn in_state(state: FlightState) -> (ModeMachine, World) {
+        let (mut machine, mut world) = (ModeMachine::default(), World::ready());
+        let path: &[(Command, fn(&mut World))] = &[
+            (Command::None, |_| {}),
+            (Command::Arm, |_| {}),
+            (Command::TakeOff, |_| {}),
+            (Command::None, |world| world.status.takeoff_complete = true),
+            (Command::Land, |world| world.status.takeoff_complete = false),
+        ];
+        for (command, change) in path {
+            if machine.output.mode.state == state {
+                break;
+            }
+            change(&mut world);
+            world.step(&mut machine, &[*command]);
+        }
+        if state == FlightState::IdleHeld {
+            (machine, world) = in_state(FlightState::IdleGround);
+            world.estimate.height = 0.5;
+            world.step(&mut machine, &[]);
+        }
+        world.status.takeoff_complete = false;
+        assert_eq!(machine.output.mode.state, state);
+        (machine, world)
+    }
+
+    #[test]
+    fn every_state_can_be_reached_and_every_armed_one_ends_on_the_ground() {
+        for &state in FlightState::ALL {
+            let (mut machine, mut world) = in_state(state);
+            world.status.landed = state == FlightState::Landing;
+            for command in [Command::Kill, Command::None] {
+                world.step(&mut machine, &[command]);
+            }
+            assert!(!machine.output.mode.armed, "kill from {state:?}");
+        }
+    }
+
+    /// Every state × every single alert and pair of alerts × every command: motors never start, a cutting alert always
+    /// stops them within the step, and only transitions of the table are taken.
+    #[test]
+    fn exhaustive_single_step() {
+        let bits: Vec<Alerts> = (0..13).map(|bit| Alerts::NAMES[bit].1).map(bits_to_alerts).collect();
+        let mut sets = vec![Alerts::NONE];
+        for (i, a) in bits.iter().enumerate() {
+            sets.extend(bits[i..].iter().map(|b| *a | *b));
+        }
+        let mut seen = BTreeSet::new();
+        for &state in FlightState::ALL {
+            let start = in_state(state);
+            for &alerts in &sets {
+                for &command in GuidedKind::ALL {
+                    let (mut machine, mut world) = (start.0.clone(), World { ..copy(&start.1) });
+                    world.alerts = alerts;
+                    let output = world.step(&mut machine, &[command]).mode;
+                    assert_eq!(output.armed, is_armed(output.state));
+                    if alerts.intersects(CUT) {
+                        assert!(!output.armed, "{state:?} {alerts:?} {command:?}");
+                    }
+                    if output.armed && !is_armed(state) {
+                        assert!(state == FlightState::IdleGround && command == Command::Arm && output.blocks.is_empty());
+                    }
+                    let legal = Event::ALL.iter().any(|e| next(state, *e, true) == Some(output.state));
+                    assert!(output.state == state || legal, "{state:?} → {:?}", output.state);
+                    seen.insert((state, output.state));
+                }
+            }
+        }
+        assert!(seen.len() > 12, "the exploration moved: {seen:?}");
+    }
+
+    fn bits_to_alerts(mask: u32) -> Alerts {
+        use stampfly_types::Field;
+        Alerts::read(&[mask]).expect("a named bit")
+    }
+
+    fn copy(world: &World) -> World {
+        World {
+            estimate: world.estimate,
+            calibration: world.calibration,
+            status: world.status,
+            alerts: world.alerts,
+            pilot: world.pilot,
+            now: world.now,
+        }
+    }
+
+    #[test]
+    fn a_switch_that_was_on_at_boot_does_not_arm() {
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
+        for _ in 0..10 {
+            assert!(!world.step(&mut machine, &[]).mode.armed);
+        }
+        world.pilot = Some(PilotInput { arm: false, mode: FlightMode::PosHold, ..Default::default() });
+        world.step(&mut machine, &[]);
+        world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
+        assert!(world.step(&mut machine, &[]).mode.armed, "off, then on");
+    }
+
+    #[test]
+    fn a_lost_link_hovers_then_lands() {
+        let (mut machine, mut world) = in_state(FlightState::Flying);
+        world.alerts = Alerts::COMM_LOST;
+        let landed_after = (0..2_000).find(|_| world.step(&mut machine, &[]).mode.state == FlightState::Landing);
+        assert_eq!(landed_after, Some(1_200), "3 s at 400 Hz");
+        world.alerts = Alerts::NONE;
+        assert_eq!(world.step(&mut machine, &[]).mode.state, FlightState::Landing, "a link that returns is no reason to stop");
+    }
+
+    #[test]
+    fn modes_fall_back_to_what_is_known() {
+        let (mut machine, mut world) = in_state(FlightState::Flying);
+        assert_eq!(machine.output.mode.mode, FlightMode::PosHold);
+        world.estimate.valid = Validity::ALL.without(Validity::VELOCITY_XY);
+        assert_eq!(world.step(&mut machine, &[]).mode.mode, FlightMode::AltHold);
+        world.estimate.valid = Validity::TILT;
+        assert_eq!(world.step(&mut machine, &[]).mode.mode, FlightMode::Stabilize);
+    }
+
+    #[test]
+    fn a_crash_has_to_be_acknowledged() {
+        let (mut machine, mut world) = in_state(FlightState::Flying);
+        world.alerts = Alerts::IMPACT;
+        world.step(&mut machine, &[]);
+        world.alerts = Alerts::NONE;
+        assert!(!world.step(&mut machine, &[Command::Arm]).mode.armed);
+        world.step(&mut machine, &[Command::Disarm]);
+        assert!(world.step(&mut machine, &[Command::Arm]).mode.armed);
+    }
+}

@@ -1,0 +1,141 @@
+//! What people see and hear: one table for lights, one for tunes.
+//!
+//! The status light tells the state, the two body lights the flight mode, as on the StampFly. Rows of a table are
+//! looked at from the top; the first one that applies wins.
+
+use stampfly_types::Micros;
+use stampfly_types::messages::{Alerts, FlightMode, FlightState, Signal, SystemMode, Tone};
+
+/// How a light shows its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Blink {
+    Solid,
+    /// One second.
+    Slow,
+    /// A quarter of a second.
+    Fast,
+}
+
+type Colour = [u8; 3];
+
+const OFF: Colour = [0, 0, 0];
+const WHITE: Colour = [32, 32, 32];
+const RED: Colour = [32, 0, 0];
+const GREEN: Colour = [0, 32, 0];
+const BLUE: Colour = [0, 0, 32];
+const CYAN: Colour = [0, 32, 32];
+const MAGENTA: Colour = [32, 0, 32];
+const ORANGE: Colour = [32, 16, 0];
+const LIME: Colour = [16, 32, 0];
+
+/// The signaller.
+///
+/// ```
+/// use stampfly_mode::Signaller;
+/// use stampfly_types::{Micros, messages::*};
+/// let mut signaller = Signaller::default();
+/// let idle = SystemMode { state: FlightState::IdleGround, ..Default::default() };
+/// let shown = signaller.step(Micros(0), &idle, Alerts::NONE);
+/// assert!(shown.status[1] > 0 && shown.status[0] == 0, "green: ready");
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Signaller {
+    last_state: Option<FlightState>,
+    last_warning: Option<Micros>,
+    tone: Tone,
+    tone_count: u32,
+}
+
+/// A low battery is called out again after this long.
+const REPEAT: Micros = Micros::from_secs(10);
+
+impl Signaller {
+    /// What to show now; call at about 30 Hz.
+    pub fn step(&mut self, now: Micros, mode: &SystemMode, alerts: Alerts) -> Signal {
+        let low = alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY);
+        let fault = alerts.intersects(Alerts::IMU_LOST | Alerts::ESTIMATE_DIVERGED | Alerts::TILT_MISMATCH);
+        if self.last_state != Some(mode.state) {
+            let tone = match (self.last_state, mode.state) {
+                (None, _) => Tone::Start,
+                (Some(FlightState::Init), FlightState::IdleGround) => Tone::Ready,
+                (_, FlightState::Armed) => Tone::Arm,
+                (Some(FlightState::IdleHeld), FlightState::IdleGround) => Tone::None,
+                (_, FlightState::IdleGround) => Tone::Disarm,
+                _ => Tone::None,
+            };
+            self.last_state = Some(mode.state);
+            self.start(tone);
+        } else if low && self.last_warning.is_none_or(|at| now.since(at) >= REPEAT) {
+            self.last_warning = Some(now);
+            self.start(Tone::LowBattery);
+        }
+
+        let status = [
+            (fault, RED, Blink::Fast),
+            (low, CYAN, Blink::Slow),
+            (mode.pairing, BLUE, Blink::Fast),
+            (mode.state == FlightState::Init, MAGENTA, Blink::Slow),
+            (mode.state == FlightState::IdleGround, GREEN, Blink::Solid),
+            (mode.state == FlightState::IdleHeld, CYAN, Blink::Fast),
+            (mode.state == FlightState::Armed, GREEN, Blink::Slow),
+            (mode.state == FlightState::TakeOff, WHITE, Blink::Fast),
+            (mode.state == FlightState::Flying, GREEN, Blink::Solid),
+            (mode.state == FlightState::Landing, ORANGE, Blink::Slow),
+        ];
+        let in_the_air = matches!(mode.state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
+        let rhythm = if in_the_air { Blink::Slow } else { Blink::Solid };
+        let body = [
+            (low, CYAN, Blink::Fast),
+            (mode.state == FlightState::Init, WHITE, Blink::Solid),
+            (mode.mode == FlightMode::Acro, BLUE, rhythm),
+            (mode.mode == FlightMode::Stabilize, LIME, rhythm),
+            (mode.mode == FlightMode::AltHold, ORANGE, rhythm),
+            (mode.mode == FlightMode::PosHold, MAGENTA, rhythm),
+        ];
+        Signal { status: first(&status, now), body: first(&body, now), tone: self.tone, tone_count: self.tone_count }
+    }
+
+    fn start(&mut self, tone: Tone) {
+        if tone != Tone::None {
+            self.tone = tone;
+            self.tone_count = self.tone_count.wrapping_add(1);
+        }
+    }
+}
+
+fn first(rows: &[(bool, Colour, Blink)], now: Micros) -> Colour {
+    let Some((_, colour, blink)) = rows.iter().find(|(applies, ..)| *applies) else { return OFF };
+    let on = match blink {
+        Blink::Solid => true,
+        Blink::Slow => now.0 / 500_000 % 2 == 0,
+        Blink::Fast => now.0 / 125_000 % 2 == 0,
+    };
+    if on { *colour } else { OFF }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_shows_something_and_warnings_win() {
+        for &state in FlightState::ALL {
+            let mode = SystemMode { state, ..Default::default() };
+            let mut signaller = Signaller::default();
+            assert_ne!(signaller.step(Micros(0), &mode, Alerts::NONE).status, OFF, "{state:?}");
+            assert_eq!(signaller.step(Micros(0), &mode, Alerts::LOW_BATTERY).status, CYAN);
+            assert_eq!(signaller.step(Micros(0), &mode, Alerts::LOW_BATTERY | Alerts::IMU_LOST).status, RED);
+        }
+    }
+
+    #[test]
+    fn a_warning_repeats_every_ten_seconds() {
+        let mut signaller = Signaller::default();
+        let mode = SystemMode { state: FlightState::Flying, ..Default::default() };
+        let mut count = 0;
+        for second in 0..30 {
+            count = signaller.step(Micros::from_secs(second), &mode, Alerts::LOW_BATTERY).tone_count;
+        }
+        assert_eq!(count, 4, "the start, and three warnings");
+    }
+}
