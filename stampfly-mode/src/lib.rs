@@ -1,2 +1,2 @@
+//! Mode machine, failsafe, take-off and landing.
 #![no_std]
-//! x
