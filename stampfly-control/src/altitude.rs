@@ -7,7 +7,8 @@
 
 use stampfly_types::GRAVITY;
 
-use crate::pid::{Integration, Pid, PidGains};
+use crate::pid::{Pid, PidGains};
+use crate::rate::integration;
 
 /// Gains and limits of the vertical loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +123,7 @@ impl AltitudeController {
         let correction =
             (self.config.height_gain * climb.error).clamp(-self.config.correction_max, self.config.correction_max);
         // Down is positive, thrust is up: thrust that falls short means an acceleration below what was asked.
-        let integration = crate::rate::integration(limits.unmet, -1.0, limits.hold);
+        let integration = integration(limits.unmet, -1.0, limits.hold);
         let target = climb.target + correction;
         let feedback = self.climb.step(target, climb.velocity, dt, integration);
         if limits.learn && (target - climb.velocity).abs() < Self::STEADY {

@@ -10,6 +10,7 @@ pub mod cascade;
 pub mod controller;
 pub mod filter;
 pub mod geometric;
+pub mod guidance;
 pub mod intent;
 pub mod mixer;
 pub mod motor;

@@ -153,14 +153,15 @@ impl MultirotorMixer {
         let column = |rotor: &Rotor| Vector4::new(1.0, -rotor.y / arm, rotor.x / arm, signed_kappa(rotor) / drag);
         let gram = rotors.iter().map(column).fold(Matrix4::zeros(), |sum, c| sum + c * c.transpose());
         // The determinant of a well-spread airframe is of the order of N⁴; a singular one leaves only rounding.
-        if !(gram.determinant() > 1e-4) {
+        let determinant = gram.determinant();
+        if determinant.is_nan() || determinant < 1e-4 {
             return Err(GeometryError::Uncontrollable);
         }
         let inverse = gram.try_inverse().ok_or(GeometryError::Uncontrollable)?;
         let mut shares = [Shares::default(); MAX_MOTORS];
         for (share, rotor) in shares.iter_mut().zip(rotors) {
             let row = inverse * column(rotor);
-            if !(row.x > 1e-3) {
+            if row.x < 1e-3 {
                 return Err(GeometryError::Unbalanced);
             }
             *share = Shares { thrust: row.x, roll: row.y / arm, pitch: row.z / arm, yaw: row.w / drag };
@@ -190,9 +191,9 @@ impl MultirotorMixer {
     fn collective_range(&self, tilt: &[f32; MAX_MOTORS]) -> (f32, f32) {
         let (mut low, mut high) = (0.0f32, f32::MAX);
         for (share, part) in self.shares.iter().zip(tilt).take(self.count) {
-            let invers = 1.0 / share.thrust;
-            low = low.max(-part * invers);
-            high = high.min((self.thrust_max - part) * invers);
+            let inverse = 1.0 / share.thrust;
+            low = low.max(-part * inverse);
+            high = high.min((self.thrust_max - part) * inverse);
         }
         (low, high)
     }

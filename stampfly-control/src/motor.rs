@@ -68,6 +68,8 @@ pub struct MotorConfig {
     pub nominal_voltage: f32,
     /// A reading below this is no battery, V.
     pub lowest_voltage: f32,
+    /// A reading above this is no battery either, V.
+    pub highest_voltage: f32,
     /// Time constant of the battery low-pass, s.
     pub voltage_time: f32,
     /// Largest duty.
@@ -84,6 +86,7 @@ impl Default for MotorConfig {
             curve: MotorCurve::default(),
             nominal_voltage: 3.7,
             lowest_voltage: 2.5,
+            highest_voltage: 5.0,
             voltage_time: 0.5,
             duty_max: 0.95,
             slew_max: 40.0,
@@ -139,7 +142,8 @@ impl MotorStage {
         let per_volt = 1.0 / battery;
         for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(usize::from(mixed.count)) {
             let wanted = (self.config.curve.voltage(thrust) * per_volt).min(self.config.duty_max);
-            *duty += (wanted - *duty).clamp(-step, step);
+            // The last clamp is for the rounding of the sum.
+            *duty = (*duty + (wanted - *duty).clamp(-step, step)).clamp(0.0, self.config.duty_max);
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
     }
@@ -151,7 +155,7 @@ impl MotorStage {
     }
 
     fn battery(&mut self, reading: Option<f32>, dt: f32) -> f32 {
-        let plausible = reading.filter(|v| v.is_finite() && *v >= self.config.lowest_voltage);
+        let plausible = reading.filter(|v| (self.config.lowest_voltage..=self.config.highest_voltage).contains(v));
         // Without a plausible reading the filter drifts to nominal: a sensor that dies must not freeze a sag.
         let target = plausible.unwrap_or(self.config.nominal_voltage);
         let before = self.voltage.unwrap_or(target);
@@ -182,7 +186,7 @@ mod tests {
 
     #[test]
     fn implausible_batteries_count_as_nominal() {
-        for reading in [None, Some(0.0), Some(2.4), Some(f32::NAN), Some(f32::INFINITY), Some(-4.0)] {
+        for reading in [None, Some(0.0), Some(2.4), Some(f32::NAN), Some(f32::INFINITY), Some(-4.0), Some(12.0)] {
             let mut motors = MotorStage::default();
             motors.step(Micros::ZERO, &mixed(0.09), reading, true);
             assert_eq!(motors.battery_voltage(), 3.7, "{reading:?}");

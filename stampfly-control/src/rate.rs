@@ -66,7 +66,7 @@ impl RateController {
     pub fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3 {
         let [roll, pitch, yaw] = &mut self.axes;
         let [unmet_roll, unmet_pitch, unmet_yaw, _] = unmet;
-        let mut axis = |pid: &mut Pid, target, measured, unmet, last| {
+        let axis = |pid: &mut Pid, target, measured, unmet, last| {
             pid.step(target, measured, dt, integration(unmet, last, grounded))
         };
         self.torque = Vec3::new(

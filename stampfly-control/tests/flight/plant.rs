@@ -1,0 +1,236 @@
+//! A quadcopter of its own: rigid body, first-order motors, drag, wind, ground. Written from the equations of motion
+//! and sharing nothing with the controllers, so that an error here and an error there do not cancel.
+
+use stampfly_control::{Mixed, Mixer, MultirotorMixer};
+use stampfly_types::messages::{
+    CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, Setpoint, StateEstimate, SystemMode,
+    Validity, VehicleStatus,
+};
+use stampfly_types::{GRAVITY, Micros, Quat, Vec3};
+
+use stampfly_control::{ControlInput, Controller};
+
+/// What can differ from the vehicle the gains were chosen for.
+#[derive(Clone, Copy, Debug)]
+pub struct Airframe {
+    pub mass: f32,
+    pub inertia: Vec3,
+    pub motor_lag: f32,
+    /// Delay of measurements, control periods.
+    pub delay: usize,
+    /// Amplitude of the noise on rates, rad/s, velocity, m/s, and position, m.
+    pub noise: [f32; 3],
+    /// Thrust of each motor over what was commanded.
+    pub motor_gain: [f32; 4],
+}
+
+impl Default for Airframe {
+    fn default() -> Self {
+        Self {
+            mass: 0.0368,
+            inertia: Vec3::new(9.16e-6, 13.3e-6, 20.4e-6),
+            motor_lag: 0.018,
+            // 3 ms of filter and one period of computing, rounded up.
+            delay: 2,
+            noise: [0.0; 3],
+            motor_gain: [1.0; 4],
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct State {
+    pub position: Vec3,
+    pub velocity: Vec3,
+    pub attitude: Quat,
+    pub rate: Vec3,
+    pub thrust: [f32; 4],
+}
+
+/// One vehicle under one controller.
+pub struct Flight<C> {
+    pub airframe: Airframe,
+    pub controller: C,
+    pub state: State,
+    pub now: Micros,
+    pub mode: SystemMode,
+    pub status: VehicleStatus,
+    pub command: CommandSetpoint,
+    pub setpoint: Setpoint,
+    pub valid: Validity,
+    pub wind: Vec3,
+    pub output: ControlOutput,
+    pub mixed: Mixed,
+    mixer: MultirotorMixer,
+    history: Vec<StateEstimate>,
+    specific_force: Vec3,
+    random: u32,
+}
+
+pub const PERIOD: Micros = Micros(2_500);
+const SUBSTEPS: u32 = 5;
+
+impl<C: Controller> Flight<C> {
+    /// Hovering at 1 m over the origin.
+    pub fn hovering(controller: C, airframe: Airframe) -> Self {
+        let thrust = [airframe.mass * GRAVITY / 4.0; 4];
+        let mut flight = Self::standing(controller, airframe);
+        flight.state.position.z = -1.0;
+        flight.state.thrust = thrust;
+        flight.mode.state = FlightState::Flying;
+        flight.status.contact = GroundContact::Air;
+        flight.setpoint.position.z = -1.0;
+        flight
+    }
+
+    /// Standing on the ground at the origin, armed and about to take off.
+    pub fn standing(controller: C, airframe: Airframe) -> Self {
+        use stampfly_types::messages::SetpointAxes as Axes;
+        Self {
+            airframe,
+            controller,
+            state: State {
+                position: Vec3::zeros(),
+                velocity: Vec3::zeros(),
+                attitude: Quat::identity(),
+                rate: Vec3::zeros(),
+                thrust: [0.0; 4],
+            },
+            now: Micros::from_secs(5),
+            mode: SystemMode {
+                state: FlightState::TakeOff,
+                mode: FlightMode::PosHold,
+                armed: true,
+                ..SystemMode::default()
+            },
+            status: VehicleStatus { thrust_ceiling: 2.0, ..VehicleStatus::default() },
+            command: CommandSetpoint::default(),
+            setpoint: Setpoint { axes: Axes::POSITION_XY | Axes::POSITION_Z | Axes::YAW, ..Setpoint::default() },
+            valid: Validity::ALL,
+            wind: Vec3::zeros(),
+            output: ControlOutput::default(),
+            mixed: Mixed::default(),
+            mixer: MultirotorMixer::stampfly(),
+            history: Vec::new(),
+            specific_force: Vec3::new(0.0, 0.0, -GRAVITY),
+            random: 12345,
+        }
+    }
+
+    /// The newest estimate that has reached the controller.
+    pub fn estimate(&self) -> StateEstimate {
+        let index = self.history.len().saturating_sub(1 + self.airframe.delay);
+        self.history.get(index).copied().unwrap_or_else(|| self.measure())
+    }
+
+    /// One control period.
+    pub fn step(&mut self) {
+        let measured = self.noisy();
+        self.history.push(measured);
+        let estimate = self.estimate();
+        let input = ControlInput {
+            estimate: &estimate,
+            command: &self.command,
+            setpoint: &self.setpoint,
+            mode: &self.mode,
+            status: &self.status,
+            unmet: self.mixed.unmet,
+        };
+        self.output = self.controller.step(self.now, &input);
+        assert!(
+            self.output.thrust.is_finite() && self.output.torque.iter().all(|t| t.is_finite()),
+            "{:?} from {input:?}",
+            self.output
+        );
+        self.mixed = self.mixer.mix(&self.output);
+        for _ in 0..SUBSTEPS {
+            self.integrate(PERIOD.seconds() / SUBSTEPS as f32);
+        }
+        self.now += PERIOD;
+    }
+
+    /// Steps for `seconds` and gives each state to `watch`.
+    pub fn fly(&mut self, seconds: f32, mut watch: impl FnMut(&mut Self)) {
+        for _ in 0..(seconds / PERIOD.seconds()).round() as u32 {
+            self.step();
+            watch(self);
+        }
+    }
+
+    fn measure(&self) -> StateEstimate {
+        StateEstimate {
+            attitude: self.state.attitude,
+            position: self.state.position,
+            velocity: self.state.velocity,
+            angular_rate: self.state.rate,
+            specific_force: self.specific_force,
+            height: -self.state.position.z,
+            valid: self.valid,
+            ..StateEstimate::default()
+        }
+    }
+
+    fn noisy(&mut self) -> StateEstimate {
+        let mut estimate = self.measure();
+        let [rate, velocity, position] = self.airframe.noise;
+        estimate.angular_rate += self.random_vector() * rate;
+        estimate.velocity += self.random_vector() * velocity;
+        estimate.position += self.random_vector() * position;
+        estimate
+    }
+
+    /// Uniform in a cube of standard deviation one per axis; a linear congruential generator is random enough here.
+    pub fn random_vector(&mut self) -> Vec3 {
+        let mut next = || {
+            self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((self.random >> 8) as f32 / (1 << 23) as f32 - 1.0) * 1.732
+        };
+        Vec3::new(next(), next(), next())
+    }
+
+    fn integrate(&mut self, dt: f32) {
+        let body = &mut self.state;
+        let mut force = 0.0;
+        let mut torque = Vec3::zeros();
+        for (n, rotor) in MultirotorMixer::STAMPFLY_ROTORS.iter().enumerate() {
+            let wanted = self.mixed.thrust[n] * self.airframe.motor_gain[n];
+            body.thrust[n] += (wanted - body.thrust[n]) * (dt / self.airframe.motor_lag);
+            let thrust = body.thrust[n];
+            let drag = match rotor.spin {
+                stampfly_control::Spin::CounterClockwise => rotor.kappa,
+                stampfly_control::Spin::Clockwise => -rotor.kappa,
+            };
+            force += thrust;
+            torque += Vec3::new(-rotor.y * thrust, rotor.x * thrust, drag * thrust);
+        }
+        let airspeed = body.velocity - self.wind;
+        let drag = -airspeed * 0.1 * airspeed.norm();
+        let push = body.attitude * Vec3::new(0.0, 0.0, -force) + drag;
+        let mut acceleration = push / self.airframe.mass + Vec3::new(0.0, 0.0, GRAVITY);
+        self.specific_force = body.attitude.inverse() * (push / self.airframe.mass);
+        let on_ground = body.position.z >= 0.0;
+        if on_ground && acceleration.z > 0.0 {
+            // The ground carries the rest and holds the feet.
+            acceleration = Vec3::zeros();
+            body.velocity = Vec3::zeros();
+            body.position.z = 0.0;
+            body.rate = Vec3::zeros();
+            return;
+        }
+        body.velocity += acceleration * dt;
+        body.position += body.velocity * dt;
+        let momentum = self.airframe.inertia.component_mul(&body.rate);
+        let turning = (torque - body.rate.cross(&momentum) - body.rate * (1e-5 * body.rate.norm()))
+            .component_div(&self.airframe.inertia);
+        body.rate += turning * dt;
+        body.attitude *= Quat::new(body.rate * dt);
+        body.attitude.renormalize();
+    }
+}
+
+/// Wind that wanders: first-order noise of 0.8 s correlation and the given standard deviation per axis.
+pub fn gust<C: Controller>(flight: &mut Flight<C>, standard_deviation: f32) {
+    const SHARE: f32 = 0.0025 / 0.8;
+    let kick = flight.random_vector();
+    flight.wind += -flight.wind * SHARE + kick * (standard_deviation * (2.0 * SHARE).sqrt());
+}
