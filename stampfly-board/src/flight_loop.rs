@@ -3,8 +3,8 @@
 //! Shared by every executor. On a microcontroller it is called by the task that the bus's hook wakes; on a host by
 //! the virtual clock. It reads no clock: the caller says what time it is.
 
-use crate::plan::plan;
-use crate::wiring::wiring;
+use crate::plan;
+use crate::wiring;
 use stampfly_bus::{Activation, AnyTopic, Band, Runnables, Scheduler};
 use stampfly_types::Micros;
 

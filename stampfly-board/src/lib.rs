@@ -1,1 +1,26 @@
-//! wip
+//! The StampFly assembled.
+//!
+//! Two tables say it all: [`wiring`], who publishes what for whom, and [`plan`], who runs when. The rest is adapters:
+//! one [runnable](runnables) a component, about as long as the component has inputs, and the
+//! [assembly](vehicle::assemble) that hands every end of every topic to its owner.
+//!
+//! Firmware and simulation run this same code; they differ in who drives the [`FlightLoop`] and in what stands behind
+//! the traits of `stampfly-drivers`.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod activation_table;
+mod config;
+mod flight_loop;
+pub mod messages;
+pub mod parameters;
+pub mod runnables;
+mod topic_table;
+pub mod vehicle;
+
+pub use activation_table::plan;
+pub use config::VehicleConfig;
+pub use flight_loop::{FlightLoop, Observer, Pending};
+pub use topic_table::wiring;

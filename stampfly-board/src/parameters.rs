@@ -163,7 +163,8 @@ mod tests {
             let changed = if parameter.get(&config) == parameter.min { parameter.max } else { parameter.min };
             parameter.set(&mut config, changed).expect("the range includes its ends");
             for other in PARAMETERS {
-                let expected = if other.name == parameter.name { changed } else { other.get(&VehicleConfig::default()) };
+                let expected =
+                    if other.name == parameter.name { changed } else { other.get(&VehicleConfig::default()) };
                 assert_eq!(other.get(&config), expected, "{} changed {}", parameter.name, other.name);
             }
         }

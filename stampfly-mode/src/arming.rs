@@ -22,7 +22,13 @@ const MAX_TILT: f32 = 0.35;
 /// | `ARM_SWITCH` | the arm switch has been on since before the vehicle saw it off |
 /// | `CRASHED` | a crash nobody has acknowledged by a disarm command or the button |
 #[must_use]
-pub fn blocks(state: FlightState, pairing: bool, crashed: bool, stale_switch: bool, input: &ModeInput<'_>) -> ArmBlocks {
+pub fn blocks(
+    state: FlightState,
+    pairing: bool,
+    crashed: bool,
+    stale_switch: bool,
+    input: &ModeInput<'_>,
+) -> ArmBlocks {
     let alerts = input.alerts;
     let manual = |mode| matches!(mode, FlightMode::Acro | FlightMode::Stabilize);
     let throttle_up = input.pilot.is_some_and(|pilot| manual(pilot.mode) && pilot.throttle > 0.05);
@@ -41,8 +47,5 @@ pub fn blocks(state: FlightState, pairing: bool, crashed: bool, stale_switch: bo
         .set(ArmBlocks::PAIRING, pairing)
         .set(ArmBlocks::THROTTLE, throttle_up)
         .set(ArmBlocks::ARM_SWITCH, stale_switch)
-        .set(
-            ArmBlocks::CRASHED,
-            crashed || alerts.intersects(Alerts::IMPACT | Alerts::GYRO_ANOMALY | Alerts::TUMBLED),
-        )
+        .set(ArmBlocks::CRASHED, crashed || alerts.intersects(Alerts::IMPACT | Alerts::GYRO_ANOMALY | Alerts::TUMBLED))
 }

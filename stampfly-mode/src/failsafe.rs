@@ -194,10 +194,8 @@ impl Failsafe {
         let known = input.estimate.valid.contains(Validity::TILT);
         let flying = matches!(input.mode.state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
         let [tilt, time] = self.config.tumble;
-        let over = flying
-            && known
-            && input.mode.mode != FlightMode::Acro
-            && frame::tilt(&input.estimate.attitude) > tilt;
+        let over =
+            flying && known && input.mode.mode != FlightMode::Acro && frame::tilt(&input.estimate.attitude) > tilt;
         let tumbled = lasts(&mut self.tumbled, now, over, time);
         let [angle, time] = self.config.tilt_mismatch;
         let standing = input.mode.state == FlightState::IdleGround && known;
@@ -255,7 +253,8 @@ mod tests {
 
     impl Rig {
         fn flying() -> Self {
-            let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+            let mode =
+                SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
             Self { failsafe: Failsafe::default(), mode, now: 0 }
         }
 

@@ -8,8 +8,10 @@
 //! effect; the ramp also makes the test for touchdown safe: with two thirds of its weight carried, a vehicle that does
 //! not sink stands.
 
-use stampfly_types::messages::{ControlOutput, FlightState, GroundContact, Setpoint, StateEstimate, Validity, VehicleStatus};
 use stampfly_types::Micros;
+use stampfly_types::messages::{
+    ControlOutput, FlightState, GroundContact, Setpoint, StateEstimate, Validity, VehicleStatus,
+};
 
 /// Limits of take-off and landing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,11 +152,8 @@ impl TakeoffLanding {
         let config = self.config;
         let estimate = input.estimate;
         let height_known = estimate.valid.contains(Validity::HEIGHT);
-        let mut status = VehicleStatus {
-            thrust_ceiling: 2.0,
-            descent_rate: config.descent,
-            ..VehicleStatus::default()
-        };
+        let mut status =
+            VehicleStatus { thrust_ceiling: 2.0, descent_rate: config.descent, ..VehicleStatus::default() };
         match self.state {
             FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => {
                 self.contact = GroundContact::Ground;

@@ -1,2 +1,36 @@
-//! Mode machine, failsafe, take-off and landing.
+//! What the vehicle is doing, whether it may, and who decides.
+//!
+//! | module | decides | steps |
+//! |---|---|---|
+//! | [`machine`] | state and flight mode: the only place where they change | 400 Hz |
+//! | [`arming`] | whether the motors may be armed, and if not, why | inside the machine |
+//! | [`failsafe`] | what is wrong: detects, never acts | 400 Hz |
+//! | [`landing`] | contact with the ground, take-off and landing | 400 Hz |
+//! | [`authority`] | whose sticks count | 50 Hz |
+//! | [`calibration`] | when it was still for long enough | 400 Hz |
+//! | [`button`] | what a press meant | 50 Hz |
+//! | [`signal`] | what people see and hear | 30 Hz |
+//!
+//! Detection and decision are apart: the failsafe reports conditions, the machine acts on them. All of it is plain
+//! data stepped with the time as an argument.
 #![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod arming;
+pub mod authority;
+pub mod button;
+pub mod calibration;
+pub mod failsafe;
+pub mod landing;
+pub mod machine;
+pub mod signal;
+
+pub use authority::{Authority, AuthorityConfig};
+pub use button::ButtonDecoder;
+pub use calibration::{StillCalibration, StillnessConfig};
+pub use failsafe::{Failsafe, FailsafeConfig, FailsafeInput};
+pub use landing::{LandingConfig, LandingInput, TakeoffLanding};
+pub use machine::{Command, ModeInput, ModeMachine, ModeOutput};
+pub use signal::Signaller;

@@ -425,7 +425,9 @@ mod tests {
                         assert!(!output.armed, "{state:?} {alerts:?} {command:?}");
                     }
                     if output.armed && !is_armed(state) {
-                        assert!(state == FlightState::IdleGround && command == Command::Arm && output.blocks.is_empty());
+                        assert!(
+                            state == FlightState::IdleGround && command == Command::Arm && output.blocks.is_empty()
+                        );
                     }
                     let legal = Event::ALL.iter().any(|e| next(state, *e, true) == Some(output.state));
                     assert!(output.state == state || legal, "{state:?} → {:?}", output.state);
@@ -472,7 +474,11 @@ mod tests {
         let landed_after = (0..2_000).find(|_| world.step(&mut machine, &[]).mode.state == FlightState::Landing);
         assert_eq!(landed_after, Some(1_200), "3 s at 400 Hz");
         world.alerts = Alerts::NONE;
-        assert_eq!(world.step(&mut machine, &[]).mode.state, FlightState::Landing, "a link that returns is no reason to stop");
+        assert_eq!(
+            world.step(&mut machine, &[]).mode.state,
+            FlightState::Landing,
+            "a link that returns is no reason to stop"
+        );
     }
 
     #[test]

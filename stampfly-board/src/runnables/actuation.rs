@@ -1,7 +1,7 @@
 //! Actuation: thrust and torque in, motor duty out. The last place where a motor can be kept still.
 
 use crate::config::VehicleConfig;
-use crate::wiring::wiring;
+use crate::wiring;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::{Mixer, MotorStage, MultirotorMixer};
 use stampfly_types::Micros;

@@ -1,7 +1,7 @@
 //! Control: state and set-point in, thrust and torque out.
 
 use crate::config::VehicleConfig;
-use crate::wiring::wiring;
+use crate::wiring;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::{CascadeController, ControlInput, Controller, GeometricController};
 use stampfly_types::messages::*;

@@ -1,7 +1,7 @@
 //! Estimation: inertial samples and everything else in, state out.
 
 use crate::config::VehicleConfig;
-use crate::wiring::wiring;
+use crate::wiring;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_eskf::{Complementary, Eskf, Estimator};

@@ -25,7 +25,7 @@ topics! {
     /// Air pressure.
     sensor_baro: BaroData = ring(8) @ 50 Hz from baro => [estimation, calibration];
     /// Battery.
-    sensor_power: PowerData = ring(8) @ 10 Hz from power => [failsafe, actuation, mode, telemetry];
+    sensor_power: PowerData = ring(8) @ 10 Hz from power => [failsafe, actuation, telemetry];
 
     // Commands.
     /// Frames from the pilot's transmitter.

@@ -4,7 +4,7 @@
 //! control. Budgets are for the ESP32-S3 at 240 MHz.
 
 use crate::runnables::*;
-use crate::wiring::wiring;
+use crate::wiring;
 use stampfly_bus::schedule;
 
 schedule! {

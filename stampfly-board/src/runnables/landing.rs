@@ -1,0 +1,64 @@
+//! Take-off and landing manager: the estimate in, contact with the ground out.
+
+use crate::wiring;
+use stampfly_bus::{Activation, Runnable};
+use stampfly_mode::{LandingInput, TakeoffLanding};
+use stampfly_types::messages::*;
+
+/// See the [module](self) documentation.
+pub struct LandingManager<'b> {
+    ports: LandingPorts<'b>,
+    manager: TakeoffLanding,
+    estimate: StateEstimate,
+    mode: SystemMode,
+    setpoint: Setpoint,
+    demand: ControlOutput,
+}
+
+/// The ends it owns.
+pub struct LandingPorts<'b> {
+    /// The state.
+    pub estimate: wiring::estimate_state::Rx<'b>,
+    /// State and mode one step ago.
+    pub mode: wiring::system_mode::Rx<'b>,
+    /// The path one step ago.
+    pub setpoint: wiring::setpoint::Rx<'b>,
+    /// The demand one step ago.
+    pub demand: wiring::control_output::Rx<'b>,
+    /// What was found.
+    pub status: wiring::vehicle_status::Tx<'b>,
+}
+
+impl<'b> LandingManager<'b> {
+    /// A manager of a vehicle that stands.
+    #[must_use]
+    pub fn new(ports: LandingPorts<'b>) -> Self {
+        Self {
+            ports,
+            manager: TakeoffLanding::default(),
+            estimate: StateEstimate::default(),
+            mode: SystemMode::default(),
+            setpoint: Setpoint::default(),
+            demand: ControlOutput::default(),
+        }
+    }
+}
+
+impl Runnable for LandingManager<'_> {
+    fn read(&mut self, activation: &mut Activation) {
+        self.estimate = activation.latest(&mut self.ports.estimate).map(|s| s.data).unwrap_or_default();
+        self.mode = activation.latest(&mut self.ports.mode).map(|s| s.data).unwrap_or_default();
+        self.setpoint = activation.latest(&mut self.ports.setpoint).map(|s| s.data).unwrap_or_default();
+        self.demand = activation.latest(&mut self.ports.demand).map(|s| s.data).unwrap_or_default();
+    }
+
+    fn run(&mut self, activation: &mut Activation) {
+        let input = LandingInput {
+            estimate: &self.estimate,
+            state: self.mode.state,
+            setpoint: &self.setpoint,
+            demand: &self.demand,
+        };
+        self.ports.status.publish(activation.now(), &self.manager.step(activation.now(), &input));
+    }
+}

@@ -1,0 +1,184 @@
+//! The assembly: every end of every topic handed to whoever owns it, once.
+
+use crate::config::VehicleConfig;
+use crate::plan;
+use crate::runnables::*;
+use crate::wiring;
+
+/// The ends that belong to the world outside the runnables: drivers, links, motors, lights.
+pub struct Outside<'b> {
+    /// From the inertial sensor.
+    pub imu: wiring::sensor_imu::Tx<'b>,
+    /// From the range finder.
+    pub tof: wiring::sensor_tof::Tx<'b>,
+    /// From the front range finder.
+    pub tof_front: wiring::sensor_tof_front::Tx<'b>,
+    /// From the flow sensor.
+    pub flow: wiring::sensor_flow::Tx<'b>,
+    /// From the magnetometer.
+    pub mag: wiring::sensor_mag::Tx<'b>,
+    /// From the barometer.
+    pub baro: wiring::sensor_baro::Tx<'b>,
+    /// From the battery monitor.
+    pub power: wiring::sensor_power::Tx<'b>,
+    /// From the pilot's radio.
+    pub pilot: wiring::command_pilot::Tx<'b>,
+    /// From programs.
+    pub guided: wiring::command_guided::Tx<'b>,
+    /// From the button's pin.
+    pub button: wiring::button_contact::Tx<'b>,
+    /// To the motors.
+    pub motors: wiring::actuator_motor::Rx<'b>,
+    /// To the lights and the buzzer.
+    pub indicator: wiring::signal::Rx<'b>,
+    /// To the ground station.
+    pub telemetry: wiring::telemetry::Rx<'b>,
+}
+
+/// Builds the vehicle from the ends of a fresh bus.
+#[must_use]
+pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::Vehicle<'b>, Outside<'b>) {
+    // Taken apart without `..`: an end that nobody gets is an unused variable.
+    let wiring::Ports {
+        sensor_imu,
+        sensor_tof,
+        sensor_tof_front,
+        sensor_flow,
+        sensor_mag,
+        sensor_baro,
+        sensor_power,
+        command_pilot,
+        command_guided,
+        button_contact,
+        button_event,
+        command_setpoint,
+        calibration,
+        estimate_state,
+        estimate_status,
+        estimator_command,
+        system_alert,
+        system_mode,
+        vehicle_status,
+        setpoint,
+        control_output,
+        actuator_motor,
+        signal,
+        telemetry,
+    } = ports;
+    let vehicle = plan::Vehicle {
+        estimation: Estimation::new(
+            EstimationPorts {
+                imu: sensor_imu.estimation,
+                tof: sensor_tof.estimation,
+                flow: sensor_flow.estimation,
+                mag: sensor_mag.estimation,
+                baro: sensor_baro.estimation,
+                calibration: calibration.estimation,
+                command: estimator_command.estimation,
+                state: estimate_state.tx,
+                status: estimate_status.tx,
+            },
+            config,
+        ),
+        failsafe: FailsafeMonitor::new(FailsafePorts {
+            imu: sensor_imu.failsafe,
+            tof: sensor_tof.failsafe,
+            flow: sensor_flow.failsafe,
+            power: sensor_power.failsafe,
+            pilot: command_pilot.failsafe,
+            guided: command_guided.failsafe,
+            estimate: estimate_state.failsafe,
+            status: estimate_status.failsafe,
+            mode: system_mode.failsafe,
+            alert: system_alert.tx,
+        }),
+        landing: LandingManager::new(LandingPorts {
+            estimate: estimate_state.landing,
+            mode: system_mode.landing,
+            setpoint: setpoint.landing,
+            demand: control_output.landing,
+            status: vehicle_status.tx,
+        }),
+        mode: ModeManager::new(ModePorts {
+            alert: system_alert.mode,
+            estimate: estimate_state.mode,
+            calibration: calibration.mode,
+            status: vehicle_status.mode,
+            pilot: command_pilot.mode,
+            guided: command_guided.mode,
+            button: button_event.mode,
+            mode: system_mode.tx,
+            estimator: estimator_command.tx,
+        }),
+        navigation: Navigation::new(NavigationPorts {
+            guided: command_guided.navigation,
+            mode: system_mode.navigation,
+            estimate: estimate_state.navigation,
+            status: vehicle_status.navigation,
+            command: command_setpoint.navigation,
+            setpoint: setpoint.tx,
+        }),
+        control: Control::new(
+            ControlPorts {
+                estimate: estimate_state.control,
+                command: command_setpoint.control,
+                setpoint: setpoint.control,
+                mode: system_mode.control,
+                status: vehicle_status.control,
+                motors: actuator_motor.control,
+                output: control_output.tx,
+            },
+            config,
+        ),
+        actuation: Actuation::new(
+            ActuationPorts {
+                control: control_output.actuation,
+                mode: system_mode.actuation,
+                power: sensor_power.actuation,
+                motor: actuator_motor.tx,
+            },
+            config,
+        ),
+        calibration: Calibration::new(CalibrationPorts {
+            imu: sensor_imu.calibration,
+            mag: sensor_mag.calibration,
+            baro: sensor_baro.calibration,
+            result: calibration.tx,
+        }),
+        command: Command::new(CommandPorts {
+            pilot: command_pilot.command,
+            guided: command_guided.command,
+            setpoint: command_setpoint.tx,
+        }),
+        button: ButtonReader::new(ButtonPorts { contact: button_contact.button, event: button_event.tx }),
+        notification: Notification::new(NotificationPorts {
+            mode: system_mode.notification,
+            alert: system_alert.notification,
+            signal: signal.tx,
+        }),
+        telemetry: Telemetry::new(TelemetryPorts {
+            mode: system_mode.telemetry,
+            alert: system_alert.telemetry,
+            estimate: estimate_state.telemetry,
+            setpoint: setpoint.telemetry,
+            power: sensor_power.telemetry,
+            frame: telemetry.tx,
+        }),
+    };
+    let outside = Outside {
+        imu: sensor_imu.tx,
+        tof: sensor_tof.tx,
+        tof_front: sensor_tof_front.tx,
+        flow: sensor_flow.tx,
+        mag: sensor_mag.tx,
+        baro: sensor_baro.tx,
+        power: sensor_power.tx,
+        pilot: command_pilot.tx,
+        guided: command_guided.tx,
+        button: button_contact.tx,
+        motors: actuator_motor.motors,
+        indicator: signal.indicator,
+        telemetry: telemetry.link,
+    };
+    (vehicle, outside)
+}
