@@ -30,7 +30,7 @@ message! {
         battery_voltage: f32 ["V"],
         /// Battery current.
         battery_current: f32 ["A"],
-        /// Does a foot touch the floor?
+        /// Does anything touch the floor?
         contact: bool ["1"],
     }
 }

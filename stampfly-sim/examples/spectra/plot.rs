@@ -52,7 +52,7 @@ pub fn draw(cases: &[&str], spectra: &[[[Spectrum; 6]; 2]]) -> String {
             let y = |level: f64| top + PANEL.1 * (decades.1 - level.log10()) / (decades.1 - decades.0);
             put(format!(
                 r#"<text x="{left}" y="{}" font-weight="bold">{}, {}</text>"#,
-                top - 7.0,
+                top - 12.0,
                 AXES[3 * sensor + axis],
                 cases[case]
             ));
