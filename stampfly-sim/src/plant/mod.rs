@@ -91,6 +91,21 @@ pub struct Pose {
 }
 
 /// The vehicle in its surroundings.
+///
+/// ```
+/// use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
+///
+/// // One second at full power from a hover.
+/// let pose = Pose::hovering(1.0);
+/// let parameters = PlantParameters { manufacturing_spread: 0.0, ..Default::default() };
+/// let mut plant = Plant::new(&parameters, &WindConfig::CALM, Some(&pose), 1);
+/// plant.set_duty([1.0; 4]);
+/// for _ in 0..1600 {
+///     plant.step();
+/// }
+/// assert!(plant.motion().position.z < -3.0, "z points down");
+/// assert!(plant.battery().voltage() < plant.battery().open_circuit());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plant {
     parameters: PlantParameters,
