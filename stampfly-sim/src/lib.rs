@@ -22,3 +22,8 @@ mod world;
 pub use noise::Noise;
 pub use simulation::{Simulation, SimulationConfig};
 pub use world::{Truth, World};
+
+/// The README's example, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

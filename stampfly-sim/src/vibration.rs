@@ -29,36 +29,42 @@ struct Profile {
 
 /// Fitted to the flight records, m/s² and rad/s.
 const PROFILES: [Profile; AXES] = [
-    Profile { broadband: 5.4, resonance: (160.0, 80.0, 2.0), tones: [2.0, 1.5], rectification: 0.0 },
-    Profile { broadband: 1.2, resonance: (140.0, 50.0, 0.9), tones: [1.0, 0.5], rectification: 0.0 },
-    Profile { broadband: 6.2, resonance: (150.0, 60.0, 1.5), tones: [2.0, 1.5], rectification: 0.8 },
-    Profile { broadband: 0.020, resonance: (170.0, 50.0, 0.018), tones: [0.02, 0.02], rectification: 0.0 },
-    Profile { broadband: 0.028, resonance: (110.0, 40.0, 0.015), tones: [0.03, 0.02], rectification: 0.0 },
-    Profile { broadband: 0.015, resonance: (150.0, 100.0, 0.004), tones: [0.01, 0.01], rectification: 0.0 },
+    Profile { broadband: 5.7, resonance: (165.0, 70.0, 2.0), tones: [2.0, 1.5], rectification: 0.0 },
+    Profile { broadband: 1.2, resonance: (145.0, 50.0, 1.1), tones: [0.7, 0.7], rectification: 0.0 },
+    Profile { broadband: 7.4, resonance: (150.0, 60.0, 1.5), tones: [1.5, 1.5], rectification: 0.8 },
+    Profile { broadband: 0.017, resonance: (165.0, 60.0, 0.022), tones: [0.010, 0.015], rectification: 0.0 },
+    Profile { broadband: 0.020, resonance: (115.0, 60.0, 0.021), tones: [0.010, 0.015], rectification: 0.0 },
+    Profile { broadband: 0.0165, resonance: (165.0, 80.0, 0.005), tones: [0.005, 0.008], rectification: 0.0 },
 ];
 
-/// A resonance as a two-pole filter.
+/// A resonance: two poles, and zeros at zero and at half the sample rate, so that its skirts fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Resonator {
     feedback: [f64; 2],
     gain: f64,
-    past: [f64; 2],
+    inputs: [f64; 2],
+    outputs: [f64; 2],
 }
 
 impl Resonator {
-    /// Unit variance for white noise of unit variance in.
+    /// Unit variance out for white noise of unit variance in.
     fn new(frequency: f64, bandwidth: f64, dt: f64) -> Self {
         use core::f64::consts::{PI, TAU};
         let radius = libm::exp(-PI * bandwidth * dt);
-        let (a1, a2) = (2.0 * radius * libm::cos(TAU * frequency * dt), radius * radius);
-        // Output variance of y = a1·y₁ − a2·y₂ + x (Box and Jenkins, second-order autoregression).
-        let variance = (1.0 + a2) / ((1.0 - a2) * ((1.0 + a2) * (1.0 + a2) - a1 * a1));
-        Self { feedback: [a1, -a2], gain: 1.0 / variance.sqrt(), past: [0.0; 2] }
+        let (a1, a2) = (2.0 * radius * libm::cos(TAU * frequency * dt), -radius * radius);
+        // Variance and autocorrelation of the second-order autoregression w = a1·w₁ + a2·w₂ + x (Box and Jenkins),
+        // from which the output is the difference w − w₂.
+        let variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) * (1.0 - a2) - a1 * a1));
+        let lag_two = a1 * a1 / (1.0 - a2) + a2;
+        let gain = 1.0 / (2.0 * variance * (1.0 - lag_two)).sqrt();
+        Self { feedback: [a1, a2], gain, inputs: [0.0; 2], outputs: [0.0; 2] }
     }
 
     fn step(&mut self, input: f64) -> f64 {
-        let output = self.feedback[0] * self.past[0] + self.feedback[1] * self.past[1] + input;
-        self.past = [output, self.past[0]];
+        let poles = self.feedback[0] * self.outputs[0] + self.feedback[1] * self.outputs[1];
+        let output = poles + input - self.inputs[1];
+        self.inputs = [input, self.inputs[0]];
+        self.outputs = [output, self.outputs[0]];
         output * self.gain
     }
 }

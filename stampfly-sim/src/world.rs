@@ -30,7 +30,7 @@ message! {
         battery_voltage: f32 ["V"],
         /// Battery current.
         battery_current: f32 ["A"],
-        /// Does a foot touch the floor?
+        /// Does anything touch the floor?
         contact: bool ["1"],
     }
 }
@@ -69,6 +69,19 @@ impl State {
 }
 
 /// A shared handle to one vehicle in its surroundings.
+///
+/// ```
+/// use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
+/// use stampfly_sim::World;
+/// use stampfly_types::Micros;
+///
+/// let pose = Pose { rotors: 0.0, ..Pose::hovering(2.0) };
+/// let plant = Plant::new(&PlantParameters::default(), &WindConfig::CALM, Some(&pose), 1);
+/// let world = World::new(plant, Micros::ZERO);
+/// let later = world.truth_at(Micros::from_millis(100)).velocity.z;
+/// let earlier = world.truth_at(Micros::from_millis(50)).velocity.z;
+/// assert!((later - 0.98).abs() < 0.01 && (earlier - 0.49).abs() < 0.01, "the recent past is kept");
+/// ```
 #[derive(Clone, Debug)]
 pub struct World(Rc<RefCell<State>>);
 

@@ -1,20 +1,29 @@
-//! A flat floor at world z = 0 and the four feet that stand on it.
+//! A flat floor at world z = 0, the four feet that stand on it and the four corners that hit it in a crash.
 //!
-//! A foot is a spring and a damper along the vertical, and a spring to the place where it stuck with Coulomb's limit
-//! along the horizontal: a vehicle that stands, stands still instead of creeping. The floor does not pull.
+//! Each point is a spring and a damper along the vertical, and a spring to the place where it stuck with Coulomb's
+//! limit along the horizontal: a vehicle that stands, stands still instead of creeping. The floor does not pull.
 
 use super::PlantParameters;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Feet, in units of the foot offset (x, y).
-const FEET: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+/// Feet and corners, in units of their offset (x, y).
+const SIDES: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+
+/// The upper corners of the frame: distance from body x and y, height above the origin, m (half extents of the
+/// product).
+const CORNER: (f64, f64) = (0.0408, 0.0103);
+
+/// Points that can touch: feet first, then corners.
+const POINTS: usize = 8;
 
 /// The floor as the vehicle feels it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
-    /// Where each foot stuck to the floor, world north and east; `None` in the air.
-    anchors: [Option<(f64, f64)>; 4],
-    feet: [Vector3<f64>; 4],
+    /// Where each point stuck to the floor, world north and east; `None` in the air.
+    anchors: [Option<(f64, f64)>; POINTS],
+    points: [Vector3<f64>; POINTS],
+    /// Distance of the farthest point from the origin.
+    reach: f64,
     stiffness: f64,
     damping: f64,
     friction: f64,
@@ -26,9 +35,15 @@ impl Ground {
     pub(crate) fn new(p: &PlantParameters) -> Self {
         // The feet are so long that the origin stands at `ground_height` once the springs carry the weight.
         let sink = p.mass * p.gravity / (4.0 * p.foot_stiffness);
+        let points: [Vector3<f64>; POINTS] = core::array::from_fn(|i| {
+            let (x, y) = SIDES[i % 4];
+            let (offset, down) = if i < 4 { (p.foot_offset, p.ground_height + sink) } else { (CORNER.0, -CORNER.1) };
+            Vector3::new(x * offset, y * offset, down)
+        });
         Self {
-            anchors: [None; 4],
-            feet: FEET.map(|(x, y)| Vector3::new(x * p.foot_offset, y * p.foot_offset, p.ground_height + sink)),
+            anchors: [None; POINTS],
+            points,
+            reach: points.iter().map(Vector3::norm).fold(0.0, f64::max),
             stiffness: p.foot_stiffness,
             damping: p.foot_damping,
             friction: p.foot_friction,
@@ -37,7 +52,7 @@ impl Ground {
         }
     }
 
-    /// Does any foot touch the floor?
+    /// Does anything touch the floor?
     #[must_use]
     pub fn contact(&self) -> bool {
         self.anchors.iter().any(Option::is_some)
@@ -61,18 +76,17 @@ impl Ground {
         rate: &Vector3<f64>,
     ) -> (Vector3<f64>, Vector3<f64>) {
         let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-        let reach = self.feet[0].norm();
-        if -position.z > reach {
-            self.anchors = [None; 4];
+        if -position.z > self.reach {
+            self.anchors = [None; POINTS];
             return (force, torque);
         }
-        for (foot, anchor) in self.feet.iter().zip(&mut self.anchors) {
-            let place = position + attitude * foot;
+        for (point, anchor) in self.points.iter().zip(&mut self.anchors) {
+            let place = position + attitude * point;
             if place.z <= 0.0 {
                 *anchor = None;
                 continue;
             }
-            let speed = velocity + attitude * rate.cross(foot);
+            let speed = velocity + attitude * rate.cross(point);
             let normal = (self.stiffness * place.z + self.damping * speed.z).max(0.0);
             let stuck = anchor.get_or_insert((place.x, place.y));
             let (mut x, mut y) = (
@@ -87,7 +101,7 @@ impl Ground {
             }
             let here = Vector3::new(x, y, -normal);
             force += here;
-            torque += foot.cross(&attitude.inverse_transform_vector(&here));
+            torque += point.cross(&attitude.inverse_transform_vector(&here));
         }
         (force, torque)
     }

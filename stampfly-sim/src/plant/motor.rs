@@ -15,6 +15,7 @@
 use super::PlantParameters;
 use crate::noise::Noise;
 use nalgebra::Vector3;
+use stampfly_types::GRAVITY;
 
 /// Number of rotors.
 pub const ROTORS: usize = 4;
@@ -76,7 +77,7 @@ impl Rotors {
             friction: p.motor_voltage_c * per_volt,
             inertia: p.rotor_inertia,
             places: PLACES.map(|(x, y)| (x * p.rotor_offset - centre.0, y * p.rotor_offset - centre.1)),
-            hover_speed: (p.mass * p.gravity / (ROTORS as f64 * p.thrust_coefficient)).sqrt(),
+            hover_speed: (p.mass * f64::from(GRAVITY) / (ROTORS as f64 * p.thrust_coefficient)).sqrt(),
         }
     }
 
@@ -102,7 +103,7 @@ impl Rotors {
         self.speed
     }
 
-    /// The speed at which ideal rotors carry the vehicle, rad/s.
+    /// The speed at which ideal rotors carry the vehicle on Earth, rad/s.
     #[must_use]
     pub fn hover_speed(&self) -> f64 {
         self.hover_speed

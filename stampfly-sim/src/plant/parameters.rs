@@ -117,7 +117,7 @@ parameters! {
         motor_voltage_a = 6.0368e-8 ["V*s^2/rad^2"] in 1e-9 ..= 1e-6, "Steady motor voltage: coefficient of speed squared (flight anchored).";
         motor_voltage_b = 6.699042e-4 ["V*s/rad"] in 1e-5 ..= 1e-2, "Steady motor voltage: coefficient of speed (flight anchored).";
         motor_voltage_c = 1.53e-2 ["V"] in 0.0 ..= 1.0, "Steady motor voltage: constant part, friction (flight anchored).";
-        motor_resistance = 0.70 ["ohm"] in 0.05 ..= 5.0, "Winding, switch and leads; chosen so that the battery lasts the four minutes it does, since the voltage curve leaves it free.";
+        motor_resistance = 0.76 ["ohm"] in 0.05 ..= 5.0, "Winding, switch and leads; chosen so that the battery lasts the four minutes it does, since the voltage curve leaves it free.";
         rotor_inertia = 1.375e-8 ["kg*m^2"] in 1e-10 ..= 1e-6, "Moment of inertia of motor and propeller (coast-down); gives a lag of 20 ms at hover.";
         manufacturing_spread = 1.0 ["1"] in 0.0 ..= 5.0, "Scales the per-seed differences between rotors and the offset of the centre of mass; 0 is the perfect vehicle.";
         drag_horizontal = 0.015 ["N*s/m"] in 0.0 ..= 1.0, "Rotor drag along body x and y at hover speed of the rotors (typical for the size).";
@@ -131,10 +131,10 @@ parameters! {
         battery_time_constant = 10.0 ["s"] in 0.1 ..= 1000.0, "Time constant of the polarisation.";
         board_current = 0.15 ["A"] in 0.0 ..= 2.0, "What everything but the motors draws.";
         ground_height = 0.03 ["m"] in 0.005 ..= 0.2, "Height of the body's origin, and of the bottom range finder, when standing (range finder logs).";
-        foot_offset = 0.020 ["m"] in 0.005 ..= 0.2, "Distance of each foot from the body's x and y axis.";
-        foot_stiffness = 900.0 ["N/m"] in 10.0 ..= 3000.0, "Spring of one foot on the floor.";
-        foot_damping = 2.9 ["N*s/m"] in 0.0 ..= 6.0, "Damper of one foot on the floor.";
-        foot_friction = 0.6 ["1"] in 0.0 ..= 2.0, "Friction coefficient of the feet.";
+        foot_offset = 0.030 ["m"] in 0.005 ..= 0.2, "Distance of each foot from the body's x and y axis.";
+        foot_stiffness = 700.0 ["N/m"] in 10.0 ..= 1000.0, "Spring of one foot or corner on the floor.";
+        foot_damping = 2.0 ["N*s/m"] in 0.0 ..= 3.0, "Damper of one foot or corner on the floor.";
+        foot_friction = 0.6 ["1"] in 0.0 ..= 2.0, "Friction coefficient of feet and corners.";
         ground_effect_gain = 0.10 ["1"] in 0.0 ..= 1.0, "Extra thrust with the rotors at the floor.";
         ground_effect_height = 0.05 ["m"] in 0.001 ..= 1.0, "Height over which the ground effect fades by e.";
     }

@@ -27,8 +27,8 @@ const MEMORY: Micros = Micros(60_000);
 
 /// Noise per sample: density times the square root of half the rate. Densities per axis from a static record
 /// (x, y, z): accelerometer in m/s²/√Hz, gyroscope in rad/s/√Hz.
-const ACCEL_DENSITY: [f64; 3] = [0.00110, 0.00118, 0.00137];
-const GYRO_DENSITY: [f64; 3] = [0.000143, 0.000142, 0.000142];
+const ACCEL_DENSITY: [f64; 3] = [0.00113, 0.00122, 0.00141];
+const GYRO_DENSITY: [f64; 3] = [0.000146, 0.000145, 0.000148];
 /// Turn-on offset of the accelerometer, standard deviation per axis, m/s².
 const ACCEL_BIAS: f64 = 0.12;
 /// Turn-on offset of the gyroscope, bound per axis: 1 °/s.

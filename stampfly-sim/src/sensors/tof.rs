@@ -41,6 +41,21 @@ pub enum Mount {
 /// The model of a range finder. Implements [`RangeFinder`].
 ///
 /// `Sample::at` is the middle of the measurement; the sample is delivered one read-out after its end.
+///
+/// ```
+/// use stampfly_drivers::RangeFinder;
+/// use stampfly_sim::sensors::{Mount, RangeModel};
+/// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
+///
+/// let mut simulation = Simulation::new(&SimulationConfig::default());
+/// let Ok(sample) = block_on(&simulation.clock, simulation.sensors.tof.next());
+/// assert!(sample.data.valid && (sample.data.distance - 0.03).abs() < 0.01, "standing");
+///
+/// // A second one, looking forward, for vehicles that have it.
+/// let mut front = RangeModel::new(&simulation.world, &simulation.clock, 1, Mount::Front);
+/// let Ok(sample) = block_on(&simulation.clock, front.next());
+/// assert!(!sample.data.valid, "no wall in sight");
+/// ```
 #[derive(Debug)]
 pub struct RangeModel {
     world: World,

@@ -1,0 +1,197 @@
+//! The plant against what mechanics says about it.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
+
+const STEPS_PER_SECOND: u32 = 1600;
+
+fn perfect() -> PlantParameters {
+    PlantParameters { manufacturing_spread: 0.0, ..Default::default() }
+}
+
+fn calm(parameters: &PlantParameters, pose: Option<&Pose>) -> Plant {
+    Plant::new(parameters, &WindConfig::CALM, pose, 1)
+}
+
+fn run(plant: &mut Plant, seconds: f64) {
+    for _ in 0..(seconds * f64::from(STEPS_PER_SECOND)) as u32 {
+        plant.step();
+    }
+}
+
+#[test]
+fn free_fall_is_exact_without_air() {
+    let parameters = PlantParameters { drag_quadratic: 0.0, ..perfect() };
+    let pose = Pose { velocity: Vector3::new(1.0, -2.0, -3.0), rotors: 0.0, ..Pose::hovering(50.0) };
+    let mut plant = calm(&parameters, Some(&pose));
+    run(&mut plant, 2.0);
+    let motion = plant.motion();
+    let expected = Vector3::new(2.0, -4.0, -50.0 - 6.0 + 0.5 * 9.80665 * 4.0);
+    assert!((motion.position - expected).norm() < 1e-9, "{}", motion.position);
+    assert!(motion.specific_force.norm() < 1e-12, "falling is weightless");
+}
+
+#[test]
+fn falling_through_air_ends_at_the_speed_where_drag_is_the_weight() {
+    let parameters = perfect();
+    let mut plant = calm(&parameters, Some(&Pose { rotors: 0.0, ..Pose::hovering(500.0) }));
+    run(&mut plant, 10.0);
+    let expected = (parameters.mass * parameters.gravity / parameters.drag_quadratic).sqrt();
+    assert!((plant.motion().velocity.z - expected).abs() < 0.01 * expected, "{}", plant.motion().velocity.z);
+}
+
+#[test]
+fn a_body_spinning_free_keeps_angular_momentum_and_energy() {
+    let parameters = PlantParameters { drag_quadratic: 0.0, drag_rotation: 0.0, gravity: 0.0, ..perfect() };
+    let pose = Pose { rotors: 0.0, rate: Vector3::new(3.0, 12.0, -5.0), ..Pose::hovering(10.0) };
+    let mut plant = calm(&parameters, Some(&pose));
+    let inertia = Vector3::new(parameters.inertia_x, parameters.inertia_y, parameters.inertia_z);
+    let momentum = |p: &Plant| p.motion().attitude * inertia.component_mul(&p.motion().rate);
+    let energy = |p: &Plant| 0.5 * p.motion().rate.dot(&inertia.component_mul(&p.motion().rate));
+    let (momentum_before, energy_before) = (momentum(&plant), energy(&plant));
+    run(&mut plant, 1.0);
+    assert!((momentum(&plant) - momentum_before).norm() < 1e-4 * momentum_before.norm());
+    assert!((energy(&plant) / energy_before - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn a_vehicle_that_stands_stands_perfectly_still() {
+    let mut plant = calm(&PlantParameters::default(), None);
+    for _ in 0..STEPS_PER_SECOND {
+        plant.step();
+        let motion = plant.motion();
+        assert!(plant.ground().contact());
+        assert!((motion.specific_force - Vector3::new(0.0, 0.0, -9.80665)).norm() < 1e-9, "{}", motion.specific_force);
+        assert!(motion.rate.norm() < 1e-12 && motion.velocity.norm() < 1e-12);
+    }
+    assert!((plant.motion().position.z + 0.03).abs() < 1e-9);
+}
+
+#[test]
+fn a_dropped_vehicle_comes_to_rest_on_its_feet() {
+    let pose = Pose {
+        attitude: UnitQuaternion::from_euler_angles(0.2, -0.1, 1.0),
+        velocity: Vector3::new(0.2, 0.1, 0.0),
+        rotors: 0.0,
+        ..Pose::hovering(0.15)
+    };
+    let mut plant = calm(&PlantParameters::default(), Some(&pose));
+    run(&mut plant, 3.0);
+    let motion = plant.motion();
+    assert!(motion.velocity.norm() < 1e-6 && motion.rate.norm() < 1e-6, "{motion:?}");
+    assert!((motion.attitude * Vector3::z()).z > 0.9999, "upright but for what friction holds: {motion:?}");
+    assert!((motion.position.z + 0.03).abs() < 1e-4);
+}
+
+#[test]
+fn a_crashed_vehicle_lies_on_its_back_above_the_floor() {
+    let pose = Pose { attitude: UnitQuaternion::from_euler_angles(2.9, 0.1, 0.0), rotors: 0.0, ..Pose::hovering(0.5) };
+    let mut plant = calm(&PlantParameters::default(), Some(&pose));
+    run(&mut plant, 5.0);
+    let motion = plant.motion();
+    assert!((motion.attitude * Vector3::z()).z < -0.99 && motion.velocity.norm() < 1e-3, "{motion:?}");
+    assert!((motion.position.z + 0.0103).abs() < 1e-3 && plant.ground().contact());
+}
+
+#[test]
+fn friction_holds_on_the_floor_up_to_its_limit() {
+    // A steady wind that pushes with less, then with more than what friction holds.
+    let parameters = PlantParameters { drag_quadratic: 0.1, ..perfect() };
+    let slip = |speed: f32| {
+        let wind = WindConfig { mean: stampfly_types::Vec3::x() * speed, ..WindConfig::CALM };
+        let mut plant = Plant::new(&parameters, &wind, None, 1);
+        run(&mut plant, 2.0);
+        plant.motion().position.x
+    };
+    // At the height of the body a eleventh of the wind is left: 10 m/s push with 0.08 N, 25 m/s with 0.5 N; 0.22 N hold.
+    assert!(slip(10.0).abs() < 1e-3, "{}", slip(10.0));
+    assert!(slip(25.0) > 0.05, "{}", slip(25.0));
+}
+
+#[test]
+fn the_floor_adds_lift_and_the_extra_fades_with_height() {
+    let thrust = |height: f64| {
+        let mut plant = calm(&perfect(), Some(&Pose::hovering(height)));
+        plant.step();
+        -plant.motion().specific_force.z / 9.80665
+    };
+    assert!((thrust(0.05) - 1.0 - 0.1 * (-1f64).exp()).abs() < 1e-3, "{}", thrust(0.05));
+    assert!((thrust(1.0) - 1.0).abs() < 1e-3, "{}", thrust(1.0));
+}
+
+#[test]
+fn speeding_up_a_rotor_pushes_the_body_the_other_way_before_drag_does() {
+    let mut plant = calm(&perfect(), Some(&Pose { rotors: 0.5, ..Pose::hovering(5.0) }));
+    // The counter-clockwise pair gets power: their drag and their acceleration both turn the body clockwise.
+    plant.set_duty([0.8, 0.0, 0.8, 0.0]);
+    plant.step();
+    let acceleration = plant.motion().angular_acceleration.z;
+    let w = 0.5 * plant.rotors().hover_speed();
+    let drag_alone = 2.0 * 4.1e-11 * w * w / 20.4e-6;
+    assert!(acceleration > 3.0 * drag_alone, "{acceleration} rad/s² against {drag_alone} from drag");
+}
+
+#[test]
+fn rotors_turning_one_way_deflect_a_pitch_into_a_roll() {
+    // Only the clockwise pair turns: its angular momentum points down, so pitching up rolls the vehicle: −ω × h.
+    let parameters = PlantParameters { drag_vertical: 0.0, drag_rotation: 0.0, drag_quadratic: 0.0, ..perfect() };
+    let mut plant = calm(&parameters, Some(&Pose { rotors: 0.0, ..Pose::hovering(50.0) }));
+    plant.set_duty([0.0, 0.6, 0.0, 0.6]);
+    run(&mut plant, 0.3);
+    let still = plant.motion().angular_acceleration.x;
+    let momentum = 1.375e-8 * (plant.rotors().speed()[1] + plant.rotors().speed()[3]);
+    let pose = Pose { rate: Vector3::new(0.0, 2.0, 0.0), rotors: 0.0, ..Pose::hovering(50.0) };
+    let mut plant = calm(&parameters, Some(&pose));
+    plant.set_duty([0.0, 0.6, 0.0, 0.6]);
+    let mut rolled = 0.0;
+    for _ in 0..480 {
+        plant.step();
+        rolled += plant.motion().angular_acceleration.x / 1600.0;
+    }
+    assert!(still.abs() < 1e-9);
+    // Pitch rate stays near 2 rad/s while the momentum builds up; the sign is the point, the size a bound.
+    let limit = -2.0 * momentum / 9.16e-6 * 0.3;
+    assert!(rolled < 0.0 && rolled > 2.0 * limit, "{rolled} against {limit}");
+}
+
+#[test]
+fn a_hover_drains_the_battery_in_about_four_minutes() {
+    let mut plant = calm(&perfect(), Some(&Pose::hovering(1000.0)));
+    let mut seconds = 0;
+    while plant.battery().charge() > 0.1 && seconds < 1000 {
+        let w = plant.rotors().hover_speed();
+        let duty = (6.0368e-8 * w * w + 6.699042e-4 * w + 1.53e-2) / plant.battery().voltage();
+        plant.set_duty([duty.min(1.0); 4]);
+        run(&mut plant, 1.0);
+        seconds += 1;
+    }
+    assert!((200..=300).contains(&seconds), "{seconds} s");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn no_duty_and_no_attitude_breaks_the_numbers(
+        duty: [f64; 4],
+        rate in proptest::array::uniform3(-40.0f64..40.0),
+        angles in proptest::array::uniform3(-3.0f64..3.0),
+        height in 0.0f64..2.0,
+        seed: u64,
+    ) {
+        let pose = Pose {
+            attitude: UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]),
+            rate: Vector3::from(rate),
+            ..Pose::hovering(height)
+        };
+        let mut plant = Plant::new(&PlantParameters::default(), &WindConfig::default(), Some(&pose), seed);
+        plant.set_duty(duty.map(|d| if d.is_finite() { d.abs().fract() } else { 0.5 }));
+        run(&mut plant, 1.0);
+        let motion = plant.motion();
+        prop_assert!((motion.attitude.norm() - 1.0).abs() < 1e-12);
+        prop_assert!(motion.position.iter().chain(motion.rate.iter()).all(|x| x.is_finite()));
+        prop_assert!(motion.velocity.norm() < 60.0 && motion.rate.norm() < 400.0, "{:?}", motion);
+        prop_assert!(motion.rotor_speed.iter().all(|w| (0.0..6000.0).contains(w)));
+    }
+}
