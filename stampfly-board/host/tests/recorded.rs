@@ -86,8 +86,8 @@ fn stampfly_logs_are_read_whole() {
         assert!((1.0..51.0).contains(&rate(log.baro.len())), "{name}: baro at {} Hz", rate(log.baro.len()));
         assert_eq!(log.device.as_ref().map(Vec::len), Some(log.timing.rows), "{name}");
         assert!(log.truth.is_empty());
-        let down = mean(log.imu.iter().map(|s| s.data.accel)).z;
-        assert!((-10.3..-9.0).contains(&down), "{name}: {down} m/s² along z");
+        let down = mean(log.imu.iter().take(100).map(|s| s.data.accel)).z;
+        assert!((-10.3..-9.3).contains(&down), "{name}: {down} m/s² along z");
     }
     assert_eq!(logs.iter().filter(|(_, log)| !log.mag.is_empty()).count(), 6, "25 columns");
 }
@@ -122,8 +122,8 @@ fn stampfly_flights_are_read_whole_and_in_order() {
         assert_eq!(flight.imu.len() + timing.repeated + timing.backwards + timing.not_finite, timing.rows, "{name}");
         assert!(flight.imu.windows(2).all(|pair| pair[0].at < pair[1].at), "{name}");
         assert!((29.0..31.0).contains(&flight.duration().seconds()), "{name}");
-        let down = mean(flight.imu.iter().map(|s| s.data.accel)).z;
-        assert!((-10.5..-9.0).contains(&down), "{name}: {down} m/s² along z");
+        let down = mean(flight.imu.iter().take(100).map(|s| s.data.accel)).z;
+        assert!((-10.3..-9.3).contains(&down), "{name}: {down} m/s² along z");
     }
     // Sent in batches of four under one stamp, each sample a new one: 400 Hz come back.
     let batched = load("stampfly_flights/stampfly_fft_20260113T231806.csv");
@@ -149,7 +149,8 @@ fn nanobench_frames_agree_with_physics() {
         let force = mean_force(flight);
         assert!((-10.3..-9.3).contains(&force.z) && force.xy().norm() < 0.6, "{name}: {force:?}");
         let correlation = rate_correlation(flight, Micros::from_millis(50));
-        assert!(correlation.min() > 0.55, "{name}: {correlation:?}");
+        // Slow circles hardly turn about z, hence the low bound; a wrong axis or sign gives zero or less.
+        assert!(correlation.min() > 0.3 && correlation.sum() > 1.6, "{name}: {correlation:?}");
         // The velocity is the derivative of the position, in the same frame.
         let (mut error, mut speed) = (0.0, 0.0);
         for pair in flight.truth.windows(11).step_by(10) {
@@ -164,6 +165,8 @@ fn nanobench_frames_agree_with_physics() {
         assert!(up < -0.5, "{name}: flies at negative z");
         let own = flight.device.as_ref().unwrap();
         assert!(own.len() > 2_000, "{name}");
+        let lost = name == "B9_trefoil_fast_rep5.npz";
+        assert_eq!(flight.timing.extrapolated > 100, lost, "{name}: {:?}", flight.timing);
         if name == "B3_figure8_slow_rep1.npz" {
             let apart =
                 own.iter().zip(&flight.truth).map(|(own, truth)| own.attitude.angle_to(&truth.attitude.unwrap()));
@@ -192,6 +195,7 @@ fn broad_frames_agree_with_physics() {
         assert!((30_000..35_000).contains(&counted), "{name}: {counted} samples count");
         assert!(missing > 1_000 && trial.truth_gaps > 0 && trial.truth_gaps < missing, "{name}: {}", trial.truth_gaps);
         assert!((trial.duration().seconds() * 285.714 - trial.imu.len() as f32).abs() < 5.0, "{name}");
+        assert_eq!(trial.timing.rows, trial.imu.len(), "{name}");
     }
 }
 

@@ -5,6 +5,7 @@
 //! is half a turn about the line between them.
 
 use super::npz::{Arrays, broken, numbers};
+use super::timing::Clock;
 use super::{DatasetErrorKind, Kind, Recording, TruthPoint, attitude};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{ImuData, MagData};
@@ -42,7 +43,7 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
         let data = ImuData { accel: body(*accel), gyro: body(*gyro), temperature: 25.0 };
         Sample { at: stamp(row), data }
     });
-    let mut recording = Recording::new(Kind::Broad, name, rows.collect());
+    let mut recording = Recording::new(Kind::Broad, name, rows.collect(), Clock::Even);
     let field = field.iter().enumerate().filter(|(_, field)| field.iter().all(|value| value.is_finite()));
     recording.mag =
         field.map(|(row, field)| Sample { at: stamp(row), data: MagData { field: body(*field) } }).collect();

@@ -244,8 +244,8 @@ message! {
 
 impl Recording {
     /// A recording with inertial samples only; their stamps are put in order.
-    fn new(kind: Kind, name: &str, imu: Vec<Sample<ImuData>>) -> Self {
-        let (imu, timing) = timing::put_in_order(imu);
+    fn new(kind: Kind, name: &str, imu: Vec<Sample<ImuData>>, clock: timing::Clock) -> Self {
+        let (imu, timing) = timing::put_in_order(imu, clock);
         Self {
             kind,
             name: name.to_owned(),

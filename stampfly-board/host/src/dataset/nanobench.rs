@@ -2,8 +2,12 @@
 //!
 //! Body FLU and a world with z up, x as the body's x at heading zero; acceleration in g, rates in rad/s (the
 //! recordings say so, and the capture's own rates agree). Half a turn about x leads to FRD and NED, on both sides.
+//!
+//! The files were resampled to 100 Hz. Where the radio log ended before the motion capture did, its columns go on in
+//! straight lines, up to accelerations of 9 g in a vehicle that lies on the floor: that end is cut off.
 
 use super::npz::{Array, Arrays, Elements, broken, numbers};
+use super::timing::{Clock, straight_end};
 use super::{DatasetErrorKind, DevicePoint, Kind, Recording, TruthPoint, attitude};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::ImuData;
@@ -64,11 +68,18 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
 
     let accel = table.columns(["imu_acc_x", "imu_acc_y", "imu_acc_z"])?;
     let gyro = table.columns(["imu_gyro_x", "imu_gyro_y", "imu_gyro_z"])?;
-    let rows = stamps.iter().zip(accel.zip(gyro)).map(|(at, (accel, gyro))| {
-        let data = ImuData { accel: turned(accel) * GRAVITY, gyro: turned(gyro), temperature: 25.0 };
-        Sample { at: *at, data }
-    });
-    let mut recording = Recording::new(Kind::NanoBench, name, rows.collect());
+    let mut rows: Vec<_> = (stamps.iter())
+        .zip(accel.zip(gyro))
+        .map(|(at, (accel, gyro))| {
+            let data = ImuData { accel: turned(accel) * GRAVITY, gyro: turned(gyro), temperature: 25.0 };
+            Sample { at: *at, data }
+        })
+        .collect();
+    let (all, extrapolated) = (rows.len(), straight_end(&rows));
+    rows.truncate(all - extrapolated);
+    let mut recording = Recording::new(Kind::NanoBench, name, rows, Clock::Even);
+    recording.timing.rows = all;
+    recording.timing.extrapolated = extrapolated;
 
     let turn = table.columns(["qw", "qx", "qy", "qz"])?;
     let place = table.columns(["px", "py", "pz"])?.zip(table.columns(["vx", "vy", "vz"])?);

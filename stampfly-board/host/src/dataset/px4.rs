@@ -1,6 +1,7 @@
 //! Input of PX4's EKF2 for its replay test: `time_us,sensor,values…`, body FRD, in the order it arrived.
 
 use super::csv::{Row, rows};
+use super::timing::Clock;
 use super::{DatasetErrorKind, Kind, Recording};
 use stampfly_drivers::Sample;
 use stampfly_types::Vec3;
@@ -54,6 +55,6 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErrorKi
             other => *skipped.entry(other.to_owned()).or_default() += 1,
         }
     }
-    let recording = Recording::new(Kind::Px4Replay, name, imu);
+    let recording = Recording::new(Kind::Px4Replay, name, imu, Clock::Even);
     Ok(Recording { mag, baro, skipped, ..recording })
 }

@@ -1,7 +1,7 @@
 //! What StampFlys recorded themselves. Body FRD, world NED and SI units already; angles in degrees.
 
 use super::csv::{Row, Table};
-use super::timing::Held;
+use super::timing::{Clock, Held};
 use super::{DatasetErrorKind, DevicePoint, Kind, Recording};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{BaroData, FlowData, ImuData, MagData, TofData};
@@ -125,7 +125,7 @@ pub(super) fn read_log(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErr
             }
         }
     }
-    let recording = Recording::new(Kind::StampFlyLog, name, rows);
+    let recording = Recording::new(Kind::StampFlyLog, name, rows, Clock::Raw);
     Ok(Recording { tof, flow, mag, baro, device: Some(poses), ..recording })
 }
 
@@ -161,6 +161,6 @@ pub(super) fn read_flight(name: &str, bytes: &[u8]) -> Result<Recording, Dataset
             }
         }
     }
-    let recording = Recording::new(Kind::StampFlyFlight, name, rows);
+    let recording = Recording::new(Kind::StampFlyFlight, name, rows, Clock::Raw);
     Ok(Recording { tof, mag, device: own.map(|_| poses), ..recording })
 }
