@@ -10,16 +10,19 @@ use stampfly_types::Micros;
 
 /// Somebody who wants to know about activations: the log, a profiler.
 pub trait Observer {
-    /// A runnable has read its inputs and is about to run.
-    fn starting(&mut self, _index: usize) {}
+    /// A runnable has read its inputs. The order of these calls is the order a replay repeats.
+    fn has_read(&mut self, index: usize, activation: &Activation);
+
+    /// A runnable is about to compute.
+    fn starts(&mut self, _index: usize) {}
 
     /// A runnable has published.
-    fn finished(&mut self, index: usize, activation: &Activation);
+    fn finished(&mut self, _index: usize, _activation: &Activation) {}
 }
 
 /// Nobody watches.
 impl Observer for () {
-    fn finished(&mut self, _: usize, _: &Activation) {}
+    fn has_read(&mut self, _: usize, _: &Activation) {}
 }
 
 /// A background activation that has read its inputs and not yet run.
@@ -52,7 +55,7 @@ impl<'b> FlightLoop<'b> {
     /// Runs everything that is due in this band. Returns whether anything ran.
     pub fn run_band(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> bool {
         let mut any = false;
-        while let Some(pending) = self.start_next(band, clock) {
+        while let Some(pending) = self.start_next(band, clock, observer) {
             self.finish(pending, observer);
             any = true;
         }
@@ -61,29 +64,40 @@ impl<'b> FlightLoop<'b> {
 
     /// Lets the next due activation of this band read its inputs. Whatever is published before
     /// [`finish`](Self::finish) belongs to its next activation, as if it had been interrupted.
-    pub fn start_next(&mut self, band: Band, clock: Micros) -> Option<Pending> {
+    pub fn start_next(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> Option<Pending> {
         let (index, now) = self.scheduler.due(band, clock, &self.heads)?;
         let mut activation = Activation::live(now);
         self.scheduler.started(index, now, &self.heads);
         self.vehicle.read(index, &mut activation);
+        observer.has_read(index, &activation);
         Some(Pending { index, activation })
     }
 
     /// Runs what has read its inputs.
     pub fn finish(&mut self, pending: Pending, observer: &mut impl Observer) {
         let Pending { index, mut activation } = pending;
-        observer.starting(index);
+        observer.starts(index);
         self.vehicle.run(index, &mut activation);
         self.scheduler.finished(index, activation.now());
         observer.finished(index, &activation);
     }
 
-    /// Repeats a recorded activation.
-    pub fn replay(&mut self, index: usize, mut activation: Activation, observer: &mut impl Observer) {
+    /// Repeats a recorded activation. Returns it as it went this time.
+    pub fn replay(&mut self, index: usize, mut activation: Activation) -> Activation {
         self.vehicle.read(index, &mut activation);
-        observer.starting(index);
         self.vehicle.run(index, &mut activation);
-        observer.finished(index, &activation);
+        activation
+    }
+
+    /// How many inputs each runnable reads. To be asked before anything has been published: reading is how they are
+    /// counted.
+    #[must_use]
+    pub fn count_inputs(&mut self) -> [usize; plan::COUNT] {
+        core::array::from_fn(|index| {
+            let mut activation = Activation::live(Micros::ZERO);
+            self.vehicle.read(index, &mut activation);
+            activation.inputs().len()
+        })
     }
 
     /// The next instant at which a period or a deadline makes something due.

@@ -10,8 +10,15 @@
 //! This crate uses files, floats in `f64` and an allocator; nothing in it belongs on a vehicle.
 
 pub mod dataset;
+pub mod campaign;
 pub mod flight;
 pub mod flight_log;
+pub mod ground_station;
+pub mod metrics;
+pub mod mission;
+pub mod recorder;
+pub mod replay;
+pub mod simulate;
 
 pub use dataset::Recording;
 pub use flight::Flight;

@@ -1,0 +1,195 @@
+//! The command line.
+
+use crate::Failure;
+use clap::{Args, Parser, Subcommand};
+use stampfly_board::parameters;
+use stampfly_host::mission::Mission;
+use stampfly_host::simulate::FlightConfig;
+use std::path::PathBuf;
+
+/// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
+#[derive(Debug, Parser)]
+#[command(version, about, arg_required_else_help = false)]
+pub struct Arguments {
+    /// What to do; without it, a mission is flown.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What the program can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Fly a mission in simulation and write its log and report.
+    Fly(FlyOptions),
+    /// Fly a log again, bit for bit, from what came from outside.
+    Replay(ReplayOptions),
+    /// List the topics: type, policy, rate, publisher, readers.
+    Topics(TopicsOptions),
+    /// Fly many missions with different seeds and summarise them.
+    Campaign(CampaignOptions),
+}
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Fly(FlyOptions::default())
+    }
+}
+
+/// What decides a simulated flight.
+#[derive(Clone, Debug, Args)]
+pub struct SceneOptions {
+    /// Mission to fly: a file, or one of the built-in `square` and `hover`.
+    #[arg(long, value_name = "FILE", default_value = "square")]
+    pub mission: String,
+    /// Change a number of the simulated vehicle or its surroundings (see `--list`).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub plant: Vec<String>,
+    /// Change a parameter of the flight stack (see `--list`).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub param: Vec<String>,
+    /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
+    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    pub vibration: f64,
+    /// Standard deviation of gusts, m/s.
+    #[arg(long, value_name = "M/S")]
+    pub gust: Option<f32>,
+    /// Mean wind towards north and east, m/s.
+    #[arg(long, value_name = "N,E", value_delimiter = ',', num_args = 2)]
+    pub wind: Vec<f32>,
+    /// Delay and interrupt the executor, by this seed.
+    #[arg(long, value_name = "SEED")]
+    pub jitter: Option<u64>,
+    /// Show what `--plant` and `--param` can change, and their values.
+    #[arg(long)]
+    pub list: bool,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self {
+            mission: "square".into(),
+            plant: Vec::new(),
+            param: Vec::new(),
+            vibration: 1.0,
+            gust: None,
+            wind: Vec::new(),
+            jitter: None,
+            list: false,
+            json: false,
+        }
+    }
+}
+
+/// Options of `fly`.
+#[derive(Clone, Debug, Args)]
+pub struct FlyOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for `flight.ulg` and `flight.html`.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+}
+
+impl Default for FlyOptions {
+    fn default() -> Self {
+        Self { scene: SceneOptions::default(), seed: 1, out: ".".into() }
+    }
+}
+
+/// Options of `campaign`.
+#[derive(Clone, Debug, Args)]
+pub struct CampaignOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// How many flights.
+    #[arg(long, default_value_t = 100)]
+    pub flights: u64,
+    /// Seed of the first flight; the others count up from there.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Options of `replay`.
+#[derive(Clone, Debug, Args)]
+pub struct ReplayOptions {
+    /// The log.
+    pub file: PathBuf,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `topics`.
+#[derive(Clone, Debug, Args)]
+pub struct TopicsOptions {
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// Print Markdown, as in `docs/topics.md`.
+    #[arg(long, conflicts_with = "json")]
+    pub markdown: bool,
+}
+
+/// Splits `name=value`.
+fn assignment(text: &str) -> Result<(&str, f64), Failure> {
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
+    let value = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
+    Ok((name.trim(), value))
+}
+
+impl SceneOptions {
+    /// The flight these options describe.
+    pub fn config(&self, seed: u64) -> Result<FlightConfig, Failure> {
+        let mut config = FlightConfig::reference(seed);
+        config.mission = match self.mission.as_str() {
+            "square" => Mission::parse(stampfly_host::mission::REFERENCE)?,
+            "hover" => Mission::parse(stampfly_host::mission::HOVER)?,
+            path => {
+                let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
+                Mission::parse(&text).map_err(|error| format!("mission {path}: {error}"))?
+            }
+        };
+        if !(0.0..=20.0).contains(&self.vibration) {
+            return Err(format!("--vibration {} is not from 0 to 20", self.vibration).into());
+        }
+        config.simulation.vibration = self.vibration;
+        if let Some(gust) = self.gust {
+            config.simulation.wind.gust = gust;
+        }
+        if let [north, east] = self.wind[..] {
+            config.simulation.wind.mean = [north, east, 0.0].into();
+        }
+        for text in &self.plant {
+            let (name, value) = assignment(text)?;
+            config.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+        }
+        for text in &self.param {
+            let (name, value) = assignment(text)?;
+            parameters::set(&mut config.vehicle, name, value as f32)
+                .map_err(|error| format!("--param {text}: {error}"))?;
+        }
+        config.jitter = self.jitter;
+        Ok(config)
+    }
+
+    /// Prints what can be changed.
+    pub fn print_list(&self, seed: u64) -> Result<(), Failure> {
+        let config = self.config(seed)?;
+        println!("--param");
+        for parameter in parameters::PARAMETERS {
+            let value = parameter.get(&config.vehicle);
+            println!("  {:<30} {value:>12} {:<18} {}", parameter.name, parameter.unit, parameter.meaning);
+        }
+        println!("\n--plant");
+        for row in config.simulation.plant.iter() {
+            println!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.description);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,100 @@
+//! `stampfly fly`: one flight, its log and its report, and one screen about how it went.
+
+use crate::Failure;
+use crate::arguments::FlyOptions;
+use crate::terminal;
+use serde_json::{Map, json};
+use stampfly_board::plan;
+use stampfly_host::metrics::FIGURES;
+use stampfly_host::recorder::Recorder;
+use stampfly_host::simulate::{Outcome, fly};
+use std::path::Path;
+use std::process::ExitCode;
+
+pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
+    if options.scene.list {
+        options.scene.print_list(options.seed)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let config = options.scene.config(options.seed)?;
+    let facts = vec![
+        ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("seed".to_owned(), options.seed.to_string()),
+        ("mission".to_owned(), options.scene.mission.clone()),
+    ];
+    let mut recorder = Recorder::with_log(facts).with_timing();
+    let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
+    let outcome = fly(&config, &mut recorder, &mut |done, state| {
+        bar.set_message(state.name());
+        bar.set_position((done * 1000.0) as u64);
+    });
+    bar.finish_and_clear();
+
+    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
+    let log = options.out.join("flight.ulg");
+    std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
+
+    if options.scene.json {
+        print_json(&outcome);
+    } else {
+        print_screen(&outcome, &recorder, &log);
+    }
+    let good = outcome.metrics.landed && outcome.metrics.disarmed && outcome.finished;
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn print_json(outcome: &Outcome) {
+    let mut object = Map::new();
+    object.insert("landed".into(), json!(outcome.metrics.landed));
+    object.insert("disarmed".into(), json!(outcome.metrics.disarmed));
+    for (name, _, figure) in FIGURES {
+        object.insert(name.into(), json!(figure(&outcome.metrics)));
+    }
+    object.insert("finished".into(), json!(outcome.finished));
+    object.insert("duration_s".into(), json!(outcome.duration.seconds_f64()));
+    object.insert("realtime_factor".into(), json!(outcome.realtime_factor));
+    object.insert("log_hash".into(), json!(format!("{:016x}", outcome.log_hash)));
+    println!("{}", serde_json::Value::Object(object));
+}
+
+fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path) {
+    println!("phases");
+    for phase in &outcome.phases {
+        let mode = if phase.state.name() == "Flying" { format!(" {:?}", phase.mode) } else { String::new() };
+        println!("  {:>9.3} s  {}{mode}", phase.since.seconds_f64(), phase.state.name());
+    }
+    println!("\nfigures");
+    for (name, unit, figure) in FIGURES {
+        match figure(&outcome.metrics) {
+            Some(value) => println!("  {name:<22} {value:>8.3} {unit}"),
+            None => println!("  {name:<22} {:>8}", "–"),
+        }
+    }
+    println!("  {:<22} {:>8.3} deg", "worst tilt", outcome.worst_tilt_deg);
+    let [first, last] = outcome.battery;
+    println!("  {:<22} {first:>8.2} V at the start, {last:.2} V at the end", "battery");
+    println!("\nrunnables, wall time on this machine         mean      longest");
+    for (info, row) in plan::ACTIVATIONS.iter().zip(recorder.timing()) {
+        if row.count > 0 {
+            let mean = row.total_ns as f64 / row.count as f64;
+            println!(
+                "  {:<14} {:>8} activations  {mean:>8.0} ns {:>8.1} us",
+                info.name,
+                row.count,
+                row.longest_ns as f64 / 1e3
+            );
+        }
+    }
+    println!(
+        "\n{:.1} s flown at {:.0} × real time, log hash {:016x}",
+        outcome.duration.seconds_f64(),
+        outcome.realtime_factor,
+        outcome.log_hash
+    );
+    let verdict = match (outcome.metrics.landed, outcome.metrics.disarmed) {
+        (true, true) => "landed and disarmed",
+        (true, false) => "landed, still armed",
+        (false, _) => "DID NOT LAND",
+    };
+    println!("{verdict}\nlog    {}", log.display());
+}

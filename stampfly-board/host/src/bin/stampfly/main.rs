@@ -1,0 +1,32 @@
+//! The program `stampfly`: flies the flight stack on a PC.
+
+mod arguments;
+mod campaign;
+mod fly;
+mod replay;
+mod terminal;
+mod topics;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+/// What a command can end with besides success: something to tell, and an exit code of 1.
+type Failure = Box<dyn std::error::Error>;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match arguments.command.unwrap_or_default() {
+        Command::Fly(options) => fly::run(&options),
+        Command::Replay(options) => replay::run(&options),
+        Command::Topics(options) => topics::run(&options),
+        Command::Campaign(options) => campaign::run(&options),
+    };
+    match result {
+        Ok(code) => code,
+        Err(failure) => {
+            eprintln!("stampfly: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Missions: what a ground station is to ask of the vehicle, one line a step.
+//!
+//! ```text
+//! # comments and empty lines are skipped
+//! arm
+//! takeoff HEIGHT
+//! goto NORTH EAST HEIGHT [yaw DEGREES] [speed M/S] [dwell SECONDS]
+//! hover SECONDS
+//! land
+//! ```
+//!
+//! Positions are metres from the take-off spot, heights above it. A step begins when the one before is done: `arm` when
+//! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `land` when it stands
+//! and is disarmed.
+
+use std::fmt;
+
+/// One step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Wait until nothing speaks against it, then arm.
+    Arm,
+    /// Climb.
+    TakeOff {
+        /// Above the take-off spot, m.
+        height: f32,
+    },
+    /// Fly to a place.
+    GoTo {
+        /// North, east, up, m.
+        place: [f32; 3],
+        /// Heading there, degrees; `None` keeps the last one.
+        yaw: Option<f32>,
+        /// Highest speed, m/s; zero is the vehicle's own choice.
+        speed: f32,
+        /// Time to stay, s.
+        dwell: f32,
+    },
+    /// Stay.
+    Hover {
+        /// How long, s.
+        seconds: f32,
+    },
+    /// Land and disarm.
+    Land,
+}
+
+/// A list of steps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mission {
+    /// In the order to be flown.
+    pub steps: Vec<Step>,
+}
+
+/// Where a mission cannot be understood.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MissionError {
+    /// Line, from one; zero is the mission as a whole.
+    pub line: usize,
+    /// What is wrong.
+    pub message: String,
+}
+
+impl fmt::Display for MissionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            0 => write!(f, "{}", self.message),
+            line => write!(f, "line {line}: {}", self.message),
+        }
+    }
+}
+
+impl std::error::Error for MissionError {}
+
+/// The mission `stampfly fly` flies when none is given.
+pub const REFERENCE: &str = include_str!("../missions/square.mission");
+/// Take-off, a minute of hovering, landing.
+pub const HOVER: &str = include_str!("../missions/hover.mission");
+
+impl Mission {
+    /// Reads a mission.
+    ///
+    /// ```
+    /// use stampfly_host::mission::{Mission, Step};
+    /// let mission: Mission = Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.5 yaw 90\nland\n")?;
+    /// assert_eq!(mission.steps[1], Step::TakeOff { height: 0.5 });
+    /// assert_eq!(Mission::parse("arm\ntakeoff high").unwrap_err().line, 2);
+    /// # Ok::<(), stampfly_host::mission::MissionError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Names the line and what is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, MissionError> {
+        let mut steps = Vec::new();
+        for (index, line) in text.lines().enumerate() {
+            let line = line.split('#').next().unwrap_or_default();
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let [verb, arguments @ ..] = words.as_slice() else { continue };
+            let step = parse_step(verb, arguments).map_err(|message| MissionError { line: index + 1, message })?;
+            steps.push(step);
+        }
+        if steps.is_empty() {
+            return Err(MissionError { line: 0, message: "the mission has no steps".into() });
+        }
+        Ok(Self { steps })
+    }
+}
+
+fn number(word: Option<&&str>, what: &str, range: std::ops::RangeInclusive<f32>) -> Result<f32, String> {
+    let word = word.ok_or_else(|| format!("{what} is missing"))?;
+    let value: f32 = word.parse().map_err(|_| format!("{what}: '{word}' is no number"))?;
+    let (low, high) = (range.start(), range.end());
+    if range.contains(&value) { Ok(value) } else { Err(format!("{what}: {value} is not from {low} to {high}")) }
+}
+
+fn parse_step(verb: &str, arguments: &[&str]) -> Result<Step, String> {
+    let (step, used) = match verb {
+        "arm" => (Step::Arm, 0),
+        "land" => (Step::Land, 0),
+        "takeoff" => (Step::TakeOff { height: number(arguments.first(), "height", 0.1..=10.0)? }, 1),
+        "hover" => (Step::Hover { seconds: number(arguments.first(), "seconds", 0.0..=3600.0)? }, 1),
+        "goto" => return parse_goto(arguments),
+        other => return Err(format!("'{other}' is no step; steps are arm, takeoff, goto, hover, land")),
+    };
+    match arguments.get(used) {
+        Some(extra) => Err(format!("'{extra}' is too much")),
+        None => Ok(step),
+    }
+}
+
+fn parse_goto(arguments: &[&str]) -> Result<Step, String> {
+    let place = [
+        number(arguments.first(), "north", -100.0..=100.0)?,
+        number(arguments.get(1), "east", -100.0..=100.0)?,
+        number(arguments.get(2), "height", 0.1..=10.0)?,
+    ];
+    let (mut yaw, mut speed, mut dwell) = (None, 0.0, 0.0);
+    for pair in arguments[3..].chunks(2) {
+        let value = pair.get(1);
+        match pair[0] {
+            "yaw" => yaw = Some(number(value, "yaw", -360.0..=360.0)?),
+            "speed" => speed = number(value, "speed", 0.05..=5.0)?,
+            "dwell" => dwell = number(value, "dwell", 0.0..=3600.0)?,
+            other => return Err(format!("'{other}' is none of yaw, speed, dwell")),
+        }
+    }
+    Ok(Step::GoTo { place, yaw, speed, dwell })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_built_in_missions_are_missions() {
+        for text in [REFERENCE, HOVER] {
+            let mission = Mission::parse(text).expect("a mission");
+            assert_eq!((mission.steps[0], mission.steps.last()), (Step::Arm, Some(&Step::Land)));
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let message = |text: &str| Mission::parse(text).expect_err("a mistake").to_string();
+        assert_eq!(message("arm\n\nfly 3"), "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, land");
+        assert_eq!(message("takeoff"), "line 1: height is missing");
+        assert_eq!(message("takeoff NaN"), "line 1: height: NaN is not from 0.1 to 10");
+        assert_eq!(message("goto 1 2 0.5 yaw"), "line 1: yaw is missing");
+        assert_eq!(message("land now"), "line 1: 'now' is too much");
+        assert_eq!(message("# nothing"), "the mission has no steps");
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(text in "[a-z0-9 .#\\n-]{0,200}") {
+            let _ = Mission::parse(&text);
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! The host executor: one simulated vehicle with its whole flight stack, on virtual time.
+//!
+//! One thread. Drivers and the ground station are async tasks on the simulator's clock; the runnables run when the
+//! [`FlightLoop`] says they are due. The same configuration gives the same flight, bit for bit.
+//!
+//! With [`FlightConfig::jitter`] the flight band starts late by a seeded amount and interrupts background activations
+//! between reading and publishing, as a preemptive executor on two cores would: generations are skipped, and the log
+//! must still replay.
+
+use crate::ground_station::{self, Progress};
+use crate::metrics::{Collector, Instant, Metrics};
+use crate::mission::Mission;
+use crate::recorder::Recorder;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use stampfly_board::messages::ButtonContact;
+use stampfly_board::vehicle::assemble;
+use stampfly_board::{FlightLoop, Pending, VehicleConfig, wiring};
+use stampfly_bus::Band;
+use stampfly_drivers::{
+    Barometer, Button, Imu, Indicator, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
+};
+use stampfly_sim::sensors::{MotorModel, Sensors};
+use stampfly_sim::time::{Clock, Tasks};
+use stampfly_sim::{Simulation, SimulationConfig, Truth};
+use stampfly_types::messages::{FlightState, Setpoint, StateEstimate, SystemMode};
+use stampfly_types::{Message, Micros, Vec3};
+use std::convert::Infallible;
+use std::time::Instant as WallInstant;
+
+/// All that decides a flight.
+#[derive(Clone, Debug)]
+pub struct FlightConfig {
+    /// The vehicle in its surroundings.
+    pub simulation: SimulationConfig,
+    /// The flight stack.
+    pub vehicle: VehicleConfig,
+    /// What to fly.
+    pub mission: Mission,
+    /// Seed of the executor's delays; `None` for an executor that is never late.
+    pub jitter: Option<u64>,
+    /// The flight is broken off after this long.
+    pub limit: Micros,
+}
+
+impl FlightConfig {
+    /// The reference mission with this seed.
+    #[must_use]
+    pub fn reference(seed: u64) -> Self {
+        Self {
+            simulation: SimulationConfig { seed, ..SimulationConfig::default() },
+            vehicle: VehicleConfig::default(),
+            mission: Mission::parse(crate::mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
+            jitter: None,
+            limit: Micros::from_secs(180),
+        }
+    }
+}
+
+/// A change of state or mode, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phase {
+    /// When it began.
+    pub since: Micros,
+    /// State.
+    pub state: FlightState,
+    /// Mode.
+    pub mode: stampfly_types::messages::FlightMode,
+}
+
+/// How a flight went.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The figures.
+    pub metrics: Metrics,
+    /// States and modes, in order.
+    pub phases: Vec<Phase>,
+    /// Was the mission flown to its end?
+    pub finished: bool,
+    /// Hash over everything that was published.
+    pub log_hash: u64,
+    /// Simulated time.
+    pub duration: Micros,
+    /// Simulated time over wall time.
+    pub realtime_factor: f64,
+    /// Largest true tilt, degrees.
+    pub worst_tilt_deg: f64,
+    /// Battery voltage at the start and at the end, V.
+    pub battery: [f32; 2],
+    /// Was a motor ever sent something that is no number from 0 to 1?
+    pub motors_sane: bool,
+    /// Samples the log missed.
+    pub log_lost: u32,
+}
+
+/// After the mission the vehicle is watched for this long.
+const TAIL: Micros = Micros::from_secs(1);
+
+/// What is watched beside the bus: truth, and the newest of what it is compared with.
+struct Watch {
+    collector: Collector,
+    setpoint: Setpoint,
+    estimate: StateEstimate,
+    mode: SystemMode,
+    phases: Vec<Phase>,
+    worst_tilt: f32,
+    battery: Option<[f32; 2]>,
+    motors_sane: bool,
+    origin: Vec3,
+    truths: u32,
+}
+
+impl Watch {
+    fn new(origin: Vec3) -> Self {
+        Self {
+            collector: Collector::default(),
+            setpoint: Setpoint::default(),
+            estimate: StateEstimate::default(),
+            mode: SystemMode::default(),
+            phases: Vec::new(),
+            worst_tilt: 0.0,
+            battery: None,
+            motors_sane: true,
+            origin,
+            truths: 0,
+        }
+    }
+
+    /// Notes what a topic published. Returns the instant of a new set-point: that is when the truth is due.
+    fn note(&mut self, id: wiring::Id, at: Micros, words: &[u32]) -> Option<Micros> {
+        fn read<M: Message>(words: &[u32], into: &mut M)
+        where
+            M::Words: for<'w> TryFrom<&'w [u32]>,
+        {
+            if let Ok(words) = M::Words::try_from(words)
+                && let Some(message) = M::from_words(&words)
+            {
+                *into = message;
+            }
+        }
+        match id {
+            wiring::Id::setpoint => {
+                read(words, &mut self.setpoint);
+                return Some(at);
+            }
+            wiring::Id::estimate_state => read(words, &mut self.estimate),
+            wiring::Id::system_mode => {
+                read(words, &mut self.mode);
+                let (state, mode) = (self.mode.state, self.mode.mode);
+                if self.phases.last().is_none_or(|last| (last.state, last.mode) != (state, mode)) {
+                    self.phases.push(Phase { since: at, state, mode });
+                }
+            }
+            wiring::Id::actuator_motor => {
+                let duties = words.iter().take(stampfly_types::messages::MAX_MOTORS);
+                self.motors_sane &= duties.map(|word| f32::from_bits(*word)).all(|duty| (0.0..=1.0).contains(&duty));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Compares with the truth at the instant of a set-point.
+    fn compare(&mut self, at: Micros, truth: &mut Truth, recorder: &mut Recorder) {
+        truth.position -= self.origin;
+        self.truths += 1;
+        recorder.truth(at, self.truths, truth);
+        self.worst_tilt = self.worst_tilt.max(stampfly_types::frame::tilt(&truth.attitude));
+        let first = self.battery.map_or(truth.battery_voltage, |[first, _]| first);
+        self.battery = Some([first, truth.battery_voltage]);
+        let (setpoint, estimate, mode) = (self.setpoint, self.estimate, self.mode);
+        self.collector.add(&Instant { at, truth, setpoint: &setpoint, estimate: &estimate, mode: &mode });
+    }
+}
+
+/// Publishes a sensor's samples for as long as it delivers them.
+macro_rules! pump {
+    ($sensor:expr, $publisher:expr) => {{
+        let (mut sensor, mut publisher) = ($sensor, $publisher);
+        async move {
+            loop {
+                let Ok::<Sample<_>, Infallible>(sample) = sensor.next().await;
+                publisher.publish(sample.at, &sample.data);
+            }
+        }
+    }};
+}
+
+/// How late the executor is, drawn from a seed.
+struct Jitter {
+    random: Option<ChaCha8Rng>,
+}
+
+impl Jitter {
+    fn new(seed: Option<u64>) -> Self {
+        Self { random: seed.map(ChaCha8Rng::seed_from_u64) }
+    }
+
+    /// Delay of the flight band: mostly some 100 µs, one time in twenty several milliseconds.
+    fn flight(&mut self) -> Micros {
+        let Some(random) = &mut self.random else { return Micros::ZERO };
+        let draw = u64::from(random.next_u32());
+        Micros(match draw % 20 {
+            0 => 2_000 + draw / 20 % 6_000,
+            1..=3 => 300 + draw / 20 % 1_700,
+            _ => draw / 20 % 300,
+        })
+    }
+
+    /// Time between reading and publishing of a background activation.
+    fn background(&mut self) -> Micros {
+        self.random.as_mut().map_or(Micros::ZERO, |random| Micros(u64::from(random.next_u32()) % 10_000))
+    }
+}
+
+/// Flies one mission. `report` is called about ten times a simulated second with the share of mission steps done.
+///
+/// # Panics
+/// Never by design; a panic here is a defect of the flight stack.
+pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMut(f32, FlightState)) -> Outcome {
+    let started = WallInstant::now();
+    let start = config.simulation.start;
+    let Simulation { clock, world, sensors } = Simulation::new(&config.simulation);
+    let Sensors { imu, tof, flow, mag, baro, power, mut motors, mut indicator, button } = sensors;
+    let mut bus = wiring::Bus::new();
+    let wiring::Split { ports, mut taps, heads } = bus.split(None);
+    let (vehicle, outside) = assemble(ports, &config.vehicle);
+    let (mut duties, mut signals) = (outside.motors, outside.indicator);
+    let mut flight_loop = FlightLoop::new(vehicle, heads, start);
+    recorder.begin(start, flight_loop.count_inputs(), &config.vehicle);
+
+    let progress = Progress::default();
+    let mut tasks = Tasks::new(clock.clone());
+    tasks.spawn(pump!(imu, outside.imu));
+    tasks.spawn(pump!(tof, outside.tof));
+    tasks.spawn(pump!(flow, outside.flow));
+    tasks.spawn(pump!(mag, outside.mag));
+    tasks.spawn(pump!(baro, outside.baro));
+    tasks.spawn(pump!(power, outside.power));
+    tasks.spawn(watch_button(clock.clone(), button, outside.button));
+    tasks.spawn(ground_station::fly(clock.clone(), &config.mission, outside.guided, outside.telemetry, &progress));
+
+    let mut watch = Watch::new(world.truth_at(start).position);
+    let mut jitter = Jitter::new(config.jitter);
+    let mut flight_at: Option<Micros> = None;
+    let mut interrupted: Option<(Micros, Pending)> = None;
+    let mut finished_at: Option<Micros> = None;
+    let mut next_report = start;
+    let end = start + config.limit;
+    loop {
+        let deadlines = [
+            tasks.next_deadline(),
+            flight_loop.next_tick(),
+            flight_at,
+            interrupted.as_ref().map(|(at, _)| *at),
+        ];
+        let Some(next) = deadlines.into_iter().flatten().min() else { break };
+        tasks.run_until(next.max(clock.now()));
+        let now = clock.now();
+        // What came from outside is in the log before the activations that read it.
+        drain(&mut taps, &mut watch, recorder, &world);
+
+        if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
+            flight_at = Some(now + jitter.flight());
+        }
+        if flight_at.is_some_and(|at| at <= now) {
+            flight_at = None;
+            flight_loop.run_band(Band::Flight, now, recorder);
+            drive(&mut duties, &mut motors);
+        }
+        match interrupted.take() {
+            Some((at, pending)) if at <= now => flight_loop.finish(pending, recorder),
+            Some(pending) => interrupted = Some(pending),
+            None => {
+                while let Some(pending) = flight_loop.start_next(Band::Background, now, recorder) {
+                    let takes = jitter.background();
+                    if takes > Micros::ZERO {
+                        interrupted = Some((now + takes, pending));
+                        break;
+                    }
+                    flight_loop.finish(pending, recorder);
+                }
+            }
+        }
+        if let Some(signal) = signals.has_new().then(|| signals.latest()).flatten() {
+            indicator.show(&signal.data);
+        }
+        drain(&mut taps, &mut watch, recorder, &world);
+
+        if now >= next_report {
+            next_report = now + Micros::from_millis(100);
+            report(progress.done.get() as f32 / config.mission.steps.len().max(1) as f32, watch.mode.state);
+        }
+        if progress.finished.get() {
+            let since = *finished_at.get_or_insert(now);
+            if now.since(since) >= TAIL {
+                break;
+            }
+        }
+        if now >= end {
+            break;
+        }
+    }
+    drop(tasks);
+    if let Some((_, pending)) = interrupted {
+        flight_loop.finish(pending, recorder);
+        drain(&mut taps, &mut watch, recorder, &world);
+    }
+    let duration = clock.now().since(start);
+    recorder.end();
+    Outcome {
+        metrics: watch.collector.finish(),
+        phases: watch.phases,
+        finished: progress.finished.get(),
+        log_hash: recorder.hash(),
+        duration,
+        realtime_factor: duration.seconds_f64() / started.elapsed().as_secs_f64(),
+        worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
+        battery: watch.battery.unwrap_or_default(),
+        motors_sane: watch.motors_sane,
+        log_lost: taps.lost(),
+    }
+}
+
+fn drain(taps: &mut wiring::Taps<'_>, watch: &mut Watch, recorder: &mut Recorder, world: &stampfly_sim::World) {
+    let mut due = None;
+    taps.drain(&mut |id, at, generation, words| {
+        recorder.sample(id, at, generation, words);
+        due = watch.note(id, at, words).or(due);
+    });
+    if let Some(at) = due {
+        watch.compare(at, &mut world.truth_at(at), recorder);
+    }
+}
+
+/// Sends new duties to the motors.
+fn drive(from: &mut wiring::actuator_motor::Rx<'_>, motors: &mut MotorModel) {
+    if from.has_new()
+        && let Some(output) = from.latest()
+    {
+        let Ok(()) = motors.write(&output.data);
+    }
+}
+
+/// Looks at the button fifty times a second.
+async fn watch_button(clock: Clock, mut button: impl Button, mut publisher: wiring::button_contact::Tx<'_>) {
+    loop {
+        publisher.publish(clock.now(), &ButtonContact { pressed: button.is_pressed() });
+        clock.sleep_until(clock.now() + Micros::from_millis(20)).await;
+    }
+}
