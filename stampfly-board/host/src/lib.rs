@@ -12,6 +12,8 @@
 pub mod dataset;
 pub mod flight;
 pub mod flight_log;
+pub mod report;
 
 pub use dataset::Recording;
 pub use flight::Flight;
+pub use report::Report;
