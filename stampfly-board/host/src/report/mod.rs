@@ -8,6 +8,7 @@
 
 mod grid;
 mod page;
+mod panels;
 
 use crate::flight::Flight;
 use std::io;
@@ -66,7 +67,8 @@ pub struct Report<'a> {
     pub subtitle: String,
     /// The summary, in order.
     pub metrics: Vec<Metric>,
-    /// What to show. Topics: `sensor_imu`, `sensor_tof`, `sensor_power`, `estimate_state`, `estimate_status`,
+    /// What to show. Topics: `sensor_imu`, `sensor_tof`, `sensor_mag`, `sensor_flow`,
+    /// `sensor_baro`, `sensor_power`, `estimate_state`, `estimate_status`,
     /// `system_mode`, `system_alert`, `setpoint`, `control_output`, `actuator_motor`, `truth` and `device`.
     pub flight: &'a Flight,
 }
