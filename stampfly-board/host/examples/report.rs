@@ -5,7 +5,7 @@
 //! ```
 
 use stampfly_host::report::Metric;
-use stampfly_host::{Report, dataset, flight_log};
+use stampfly_host::{Flight, Report, dataset, flight_log};
 
 #[path = "../tests/made_up/mod.rs"]
 mod made_up;
@@ -23,17 +23,37 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         },
     };
-    let metrics = vec![
-        Metric::new("Flight time", "52.4", "s"),
-        Metric::new("Position error, RMS", "0.041", "m").judged(true),
-        Metric::new("Position error, largest", "0.118", "m").judged(true),
-        Metric::new("Attitude error, RMS", "0.62", "°").judged(true),
-        Metric::new("Tracking error, RMS", "0.087", "m"),
-        Metric::new("Touchdown speed", "0.31", "m/s").judged(false),
-        Metric::new("Battery used", "31", "%"),
-        Metric::new("Control deadline misses", "0", "").judged(true),
-    ];
+    let metrics = metrics(&flight);
     Report { title, subtitle, metrics, flight: &flight }.write(&out)?;
     println!("{out}");
     Ok(())
+}
+
+/// What any flight can be measured by, and what one with an estimate and a reference can.
+fn metrics(flight: &Flight) -> Vec<Metric> {
+    let (start, end) = flight.span().unwrap_or_default();
+    let samples: usize = flight.topics.values().map(|series| series.at.len()).sum();
+    let mut metrics = vec![
+        Metric::new("Duration", format!("{:.1}", end.since(start).seconds()), "s"),
+        Metric::new("Topics", flight.topics.len(), ""),
+        Metric::new("Samples", samples, ""),
+    ];
+    if let Some([mean, largest]) = position_error(flight) {
+        metrics.push(Metric::new("Position error, RMS", format!("{mean:.3}"), "m").judged(mean < 0.1));
+        metrics.push(Metric::new("Position error, largest", format!("{largest:.3}"), "m"));
+    }
+    metrics
+}
+
+/// Root mean square and largest distance of the estimated from the true position.
+fn position_error(flight: &Flight) -> Option<[f64; 2]> {
+    let (estimate, truth) = (flight.topics.get("estimate_state")?, flight.topics.get("truth")?);
+    let (guess, place) = (estimate.columns_of::<3>("position")?, truth.columns_of::<3>("position")?);
+    let squares = estimate.at.iter().enumerate().filter_map(|(row, at)| {
+        let seen = truth.index_at(*at)?;
+        Some((0..3).map(|axis| (guess[axis][row] - place[axis][seen]).powi(2)).sum::<f64>())
+    });
+    let squares: Vec<f64> = squares.filter(|square| square.is_finite()).collect();
+    let largest = squares.iter().copied().reduce(f64::max)?.sqrt();
+    Some([(squares.iter().sum::<f64>() / squares.len() as f64).sqrt(), largest])
 }
