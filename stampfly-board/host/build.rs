@@ -10,9 +10,12 @@ fn main() {
     println!("cargo::rerun-if-env-changed=STAMPFLY_DATA");
     // A build script runs in the folder of its package; the data lie beside the workspace.
     let folder = env::var("STAMPFLY_DATA").unwrap_or_else(|_| "../../../shared/data".to_owned());
-    if let Ok(folder) = Path::new(&folder).canonicalize() {
-        println!("cargo::rerun-if-changed={}", folder.display());
-        println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={}", folder.display());
-        println!("cargo::rustc-cfg=recorded_data");
+    match Path::new(&folder).canonicalize() {
+        Ok(folder) => {
+            println!("cargo::rerun-if-changed={}", folder.display());
+            println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={}", folder.display());
+            println!("cargo::rustc-cfg=recorded_data");
+        }
+        Err(_) => println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={folder}"),
     }
 }

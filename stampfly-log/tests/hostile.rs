@@ -112,7 +112,7 @@ fn nested_and_broken_formats_are_reported() {
     let columns: Vec<_> = nested.columns().collect();
     assert_eq!(columns.len(), 2);
     assert_eq!(columns[1], Err(FieldError::Nested("esc_report")));
-    for fields in ["float", "float[ x", "float[-1] x", "float[99999999] x", "[3] x"] {
+    for fields in ["float", "float[ x", "float[-1] x", "float[99999999] x", "double[9000] x", "[3] x"] {
         let last = Format { name: "x", fields }.columns().last();
         assert!(matches!(last, Some(Err(_))), "{fields}: {last:?}");
     }
@@ -219,6 +219,6 @@ proptest! {
     #[test]
     fn random_formats_are_survived(fields in "[a-z0-9_ ;\\[\\]]{0,60}") {
         let format = Format { name: "x", fields: &fields };
-        prop_assert!(format.columns().take(70_000 * 60).count() < 70_000 * 60);
+        prop_assert!(format.columns().take(70_000).count() < 70_000);
     }
 }

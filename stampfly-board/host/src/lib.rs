@@ -13,12 +13,17 @@ pub mod dataset;
 pub mod campaign;
 pub mod flight;
 pub mod flight_log;
+<<<<<<< HEAD
 pub mod ground_station;
 pub mod metrics;
 pub mod mission;
 pub mod recorder;
 pub mod replay;
 pub mod simulate;
+=======
+pub mod report;
+>>>>>>> log
 
 pub use dataset::Recording;
 pub use flight::Flight;
+pub use report::Report;

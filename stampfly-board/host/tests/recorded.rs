@@ -3,18 +3,20 @@
 //! These need the recorded data; see `build.rs` for how they are found.
 
 use stampfly_host::dataset::{self, Kind, Recording};
-use stampfly_types::{Micros, Quat, Vec3};
+use stampfly_types::{Micros, Quat, Vec3, math};
+
+/// Set by the build script.
+const FOLDER: &str = env!("STAMPFLY_DATA_FOLDER");
 
 /// The recording in this file of the data folder.
 fn load(file: &str) -> Recording {
-    let folder = option_env!("STAMPFLY_DATA_FOLDER").expect("these tests run with recorded data only");
-    dataset::load(format!("{folder}/{file}")).unwrap()
+    dataset::load(format!("{FOLDER}/{file}")).unwrap()
 }
 
 /// Every recording in a folder, by file name.
 fn load_all(folder: &str, ending: &str) -> Vec<(String, Recording)> {
-    let root = option_env!("STAMPFLY_DATA_FOLDER").expect("these tests run with recorded data only");
-    let mut files: Vec<_> = std::fs::read_dir(format!("{root}/{folder}")).unwrap().map(|f| f.unwrap().path()).collect();
+    let mut files: Vec<_> =
+        std::fs::read_dir(format!("{FOLDER}/{folder}")).unwrap().map(|f| f.unwrap().path()).collect();
     files.sort();
     let of_kind = files.into_iter().filter(|file| file.extension().is_some_and(|e| e == ending));
     of_kind
@@ -66,7 +68,7 @@ fn rate_correlation(recording: &Recording, window: Micros) -> Vec3 {
         start = end;
     }
     assert!(count > 200, "only {count} windows");
-    sums[0].component_div(&sums[1].component_mul(&sums[2]).map(f32::abs).map(|v| stampfly_types::math::sqrt(v)))
+    sums[0].component_div(&sums[1].component_mul(&sums[2]).map(f32::abs).map(math::sqrt))
 }
 
 #[test]
@@ -211,8 +213,7 @@ fn px4_replays_are_read_and_their_outputs_are_not() {
     assert!((-10.1..-9.6).contains(&down), "{down}");
     let strength = mean(replay.mag.iter().map(|s| s.data.field)).norm();
     assert!((20.0..70.0).contains(&strength), "{strength} µT is no field of the earth");
-    let folder = option_env!("STAMPFLY_DATA_FOLDER").unwrap();
-    let output = dataset::load(format!("{folder}/px4_ekf2_replay/change_indication__iris_gps.csv")).unwrap_err();
+    let output = dataset::load(format!("{FOLDER}/px4_ekf2_replay/change_indication__iris_gps.csv")).unwrap_err();
     assert!(output.to_string().contains("no known kind of recording begins with `Timestamp,state[0]"), "{output}");
 }
 
@@ -223,8 +224,7 @@ mod damage {
 
     /// The first bytes of a file, cut behind a line.
     fn beginning(file: &str) -> Vec<u8> {
-        let folder = option_env!("STAMPFLY_DATA_FOLDER").expect("these tests run with recorded data only");
-        let mut bytes = std::fs::read(format!("{folder}/{file}")).unwrap();
+        let mut bytes = std::fs::read(format!("{FOLDER}/{file}")).unwrap();
         if !file.ends_with("npz") {
             bytes.truncate(6_000);
         }

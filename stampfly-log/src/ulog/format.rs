@@ -98,6 +98,8 @@ pub enum FieldError<'a> {
     Syntax(&'a str),
     /// A type that is none of the basic ones: a nested format, or unknown.
     Nested(&'a str),
+    /// With this field a sample would be longer than a message can be.
+    TooLong(&'a str),
 }
 
 impl fmt::Display for FieldError<'_> {
@@ -105,6 +107,7 @@ impl fmt::Display for FieldError<'_> {
         match self {
             Self::Syntax(text) => write!(f, "`{text}` is no field declaration"),
             Self::Nested(name) => write!(f, "type `{name}` is not a basic one"),
+            Self::TooLong(text) => write!(f, "with `{text}` a sample is longer than a message"),
         }
     }
 }
@@ -217,7 +220,7 @@ impl<'a> Iterator for Columns<'a> {
             if let Some((declaration, scalar, index)) = self.field {
                 if index < declaration.count.unwrap_or(1) {
                     let offset = self.offset;
-                    self.offset = self.offset.saturating_add(scalar.size());
+                    self.offset += scalar.size();
                     self.field = Some((declaration, scalar, index + 1));
                     let index = declaration.count.map(|_| index);
                     return Some(Ok(Column { field: declaration.name, index, scalar, offset }));
@@ -236,13 +239,14 @@ impl<'a> Iterator for Columns<'a> {
             let Some(scalar) = Scalar::from_name(declaration.type_name) else {
                 return self.end(FieldError::Nested(declaration.type_name));
             };
-            // No sample is longer than a message, so a larger array is a broken file, not a long loop.
+            // A broken file must not become a loop over as many columns as it likes to claim.
             let count = declaration.count.unwrap_or(1);
-            if count > usize::from(u16::MAX) {
-                return self.end(FieldError::Syntax(text));
+            let size = count.saturating_mul(scalar.size());
+            if self.offset.saturating_add(size) > usize::from(u16::MAX) {
+                return self.end(FieldError::TooLong(text));
             }
             if declaration.name.starts_with("_padding") {
-                self.offset = self.offset.saturating_add(count * scalar.size());
+                self.offset += size;
             } else {
                 self.field = Some((declaration, scalar, 0));
             }

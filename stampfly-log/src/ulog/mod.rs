@@ -31,14 +31,16 @@ mod cursor;
 mod format;
 mod message;
 mod reader;
+mod sink;
 mod topic;
 mod writer;
 
 pub use format::{Column, Columns, Declaration, FieldError, Format, Scalar};
 pub use message::{FlagBits, Level, Message, ParameterValue};
 pub use reader::{ReadError, ReadErrorKind, Reader};
+pub use sink::{Full, Ram, Sink, WriteError};
 pub use topic::{Sample, Stamp, Topic};
-pub use writer::{Definitions, Full, MAX_MESSAGE, Ram, Sink, WriteError, Writer};
+pub use writer::{Definitions, Writer};
 
 pub(crate) use cursor::{Take, put_u16};
 
@@ -54,7 +56,9 @@ const SYNC_MAGIC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 const TOPIC_HEAD: &str = "uint64_t timestamp;uint32_t generation;";
 /// Bytes of those.
 const TOPIC_HEAD_SIZE: usize = 12;
-/// Info keys of units and names begin with these.
+/// Info keys of units begin with this.
 pub const UNITS_PREFIX: &str = "units/";
-/// See [`UNITS_PREFIX`].
+/// Info keys of names of values and flags begin with this.
 pub const NAMES_PREFIX: &str = "names/";
+/// The largest message the writer makes, header included. It keeps a buffer of this size.
+pub const MAX_MESSAGE: usize = 2048;

@@ -1,1 +1,90 @@
-//! x
+//! A flight as one HTML page: the path in space, plots on a shared time axis, events and figures.
+//!
+//! The page is a single file without any reference to the outside: it opens from a disk, offline, and can be sent by
+//! mail. A minute of flight takes about a megabyte. Topics that a flight does not have leave their panels out.
+//!
+//! Samples are brought onto one time grid of at most 100 Hz and 16 bits, which is what a screen can show. For
+//! numbers to calculate with, use the [`Flight`].
+
+mod grid;
+mod page;
+mod panels;
+
+use crate::flight::Flight;
+use std::io;
+use std::path::Path;
+
+/// One line of the summary.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Metric {
+    /// What was measured.
+    pub name: String,
+    /// The figure, formatted.
+    pub value: String,
+    /// Its unit, or nothing.
+    pub unit: String,
+    /// Did it meet its limit, if it has one?
+    pub passed: Option<bool>,
+}
+
+impl Metric {
+    /// A figure without a limit.
+    pub fn new(name: impl Into<String>, value: impl ToString, unit: impl Into<String>) -> Self {
+        Self { name: name.into(), value: value.to_string(), unit: unit.into(), passed: None }
+    }
+
+    /// The same figure, judged.
+    #[must_use]
+    pub fn judged(self, passed: bool) -> Self {
+        Self { passed: Some(passed), ..self }
+    }
+}
+
+/// What goes into a page.
+///
+/// ```
+/// use stampfly_host::{Flight, Report, report::Metric};
+/// use stampfly_types::{Micros, messages::StateEstimate};
+///
+/// let mut flight = Flight::default();
+/// for step in 0..100 {
+///     flight.push("estimate_state", Micros::from_millis(step * 10), &StateEstimate::default());
+/// }
+/// let report = Report {
+///     title: "Hover".to_owned(),
+///     subtitle: "one second on the ground".to_owned(),
+///     metrics: vec![Metric::new("Drift", "0.00", "m").judged(true)],
+///     flight: &flight,
+/// };
+/// let html = report.html();
+/// assert!(html.starts_with("<!doctype html>") && html.contains("Drift"));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Report<'a> {
+    /// The page's heading.
+    pub title: String,
+    /// A line below it: where the flight comes from.
+    pub subtitle: String,
+    /// The summary, in order.
+    pub metrics: Vec<Metric>,
+    /// What to show. Topics: `sensor_imu`, `sensor_tof`, `sensor_mag`, `sensor_flow`,
+    /// `sensor_baro`, `sensor_power`, `estimate_state`, `estimate_status`,
+    /// `system_mode`, `system_alert`, `setpoint`, `control_output`, `actuator_motor`, `truth` and `device`.
+    pub flight: &'a Flight,
+}
+
+impl Report<'_> {
+    /// The page.
+    #[must_use]
+    pub fn html(&self) -> String {
+        page::html(self)
+    }
+
+    /// Writes the page to a file.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        std::fs::write(path, self.html())
+    }
+}

@@ -1,0 +1,75 @@
+//! The page itself: template, style, script and data become one file.
+
+use super::grid::{Channel, Grid};
+use super::panels::{Actor, Band, Builder, Panel};
+use super::{Metric, Report};
+use serde::Serialize;
+
+/// The page's script, in the order its parts need each other.
+const SCRIPT: &str = concat!(
+    "'use strict';\n(() => {\n",
+    include_str!("data.js"),
+    include_str!("plots.js"),
+    include_str!("space.js"),
+    include_str!("player.js"),
+    "})();\n",
+);
+
+#[derive(Serialize)]
+struct Page {
+    /// Seconds of the first point.
+    start: f64,
+    /// Seconds between points.
+    step: f64,
+    points: u64,
+    channels: Vec<Channel>,
+    panels: Vec<Panel>,
+    bands: Vec<Band>,
+    events: Vec<(f64, String)>,
+    scene: Vec<Actor>,
+}
+
+/// Puts the page together.
+pub(super) fn html(report: &Report<'_>) -> String {
+    let span = report.flight.span().unwrap_or_default();
+    let grid = Grid::new(span);
+    let mut builder = Builder::new(report.flight, grid);
+    builder.all_panels();
+    let scene = builder.scene();
+    let page = Page {
+        start: grid.start.seconds_f64(),
+        step: grid.step as f64 * 1e-6,
+        points: grid.points,
+        bands: builder.bands(),
+        events: report.flight.events.iter().map(|event| (event.at.seconds_f64(), event.text.clone())).collect(),
+        scene,
+        channels: builder.channels,
+        panels: builder.panels,
+    };
+    // Numbers, strings and lists always have a JSON form; `<` could end the script element they stand in.
+    let data = serde_json::to_string(&page).unwrap_or_default().replace('<', "\\u003c");
+    format!(
+        include_str!("page.html"),
+        style = include_str!("page.css"),
+        script = SCRIPT,
+        title = escape(&report.title),
+        subtitle = escape(&report.subtitle),
+        metrics = report.metrics.iter().map(metric).collect::<String>(),
+        data = data,
+    )
+}
+
+fn metric(metric: &Metric) -> String {
+    let verdict = match metric.passed {
+        None => "",
+        Some(true) => " class=\"passed\"",
+        Some(false) => " class=\"failed\"",
+    };
+    let [name, value, unit] = [&metric.name, &metric.value, &metric.unit].map(|text| escape(text));
+    format!("<tr{verdict}><th scope=\"row\">{name}</th><td><b>{value}</b> <span>{unit}</span></td></tr>\n")
+}
+
+/// Text as it may stand in HTML.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
