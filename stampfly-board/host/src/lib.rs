@@ -2,6 +2,11 @@
 //!
 //! | module | what it is |
 //! |---|---|
+//! | [`simulate`] | one simulated vehicle with its whole flight stack, on virtual time |
+//! | [`mission`], [`ground_station`] | what to fly, and who asks the vehicle for it |
+//! | [`metrics`] | how good a flight was |
+//! | [`campaign`] | many flights in parallel |
+//! | [`recorder`], [`replay`] | the log of a flight, and the flight again from its log |
 //! | [`flight`] | a flight as columns over time, with units and names |
 //! | [`flight_log`] | a flight from a ULog file of any origin |
 //! | [`dataset`] | recorded sensor data with or without a reference, from five public formats, in our conventions |
@@ -9,20 +14,17 @@
 //!
 //! This crate uses files, floats in `f64` and an allocator; nothing in it belongs on a vehicle.
 
-pub mod dataset;
 pub mod campaign;
+pub mod dataset;
 pub mod flight;
 pub mod flight_log;
-<<<<<<< HEAD
 pub mod ground_station;
 pub mod metrics;
 pub mod mission;
 pub mod recorder;
 pub mod replay;
-pub mod simulate;
-=======
 pub mod report;
->>>>>>> log
+pub mod simulate;
 
 pub use dataset::Recording;
 pub use flight::Flight;
