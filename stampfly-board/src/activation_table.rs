@@ -27,7 +27,7 @@ schedule! {
     actuation = Actuation: after control, flight, 40 us;
 
     /// Still-calibration.
-    calibration = Calibration: on sensor_imu, background, 40 us;
+    calibration = Calibration: every 20 ms, background, 40 us;
     /// Command arbitration.
     command = Command: every 20 ms, background, 30 us;
     /// Button gestures.

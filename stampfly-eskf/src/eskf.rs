@@ -23,6 +23,8 @@ const AIDING_TIMEOUT: Micros = Micros(1_000_000);
 const MAX_DELAY: Micros = Micros(100_000);
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
+/// How well the heading is known where it is defined to be zero, rad.
+const HEADING_SIGMA: f32 = 1e-3;
 /// While standing, the ground is absorbed at every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
 
@@ -255,6 +257,14 @@ impl Eskf {
         }
     }
 
+    /// Heading counts from where the vehicle was initialised, so it is known there. Doubting it would let every error of
+    /// the flow sensor turn the vehicle's idea of north.
+    fn know_heading(&mut self) {
+        let up = self.rotation[2];
+        let row = Row { predicted: 0.0, jacobian: [(ATTITUDE, up[0]), (ATTITUDE + 1, up[1]), (ATTITUDE + 2, up[2])] };
+        self.absorb_row(row, 0.0, HEADING_SIGMA);
+    }
+
     /// Gives up what is not finite and starts again from the last calibration.
     fn recover(&mut self) {
         let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
@@ -318,6 +328,7 @@ impl Estimator for Eskf {
                 aid::heading::error(&self.state, &self.rotation, &calibration.field, 0.0).map(|row| row.predicted);
         }
         self.anchor = self.command.on_ground.then(Vec3::zeros);
+        self.know_heading();
     }
 
     fn command(&mut self, at: Micros, command: &EstimatorCommand) {

@@ -7,7 +7,7 @@
 //! | `alt_rms_m` | height of the truth against the set-point, root mean square, over the same time |
 //! | `takeoff_overshoot_m` | highest truth above the take-off height, from take-off to three seconds into flight |
 //! | `touchdown_speed_mps` | true sink rate at the first contact of the landing |
-//! | `hover_tilt_max_deg` | largest true tilt while the set-point rests in POS_HOLD |
+//! | `hover_tilt_max_deg` | largest true tilt while hovering: in POS_HOLD, the set-point at rest for a second or more |
 //! | `hover_drift_m` | farthest the truth got, horizontally, from where the longest rest of the set-point began |
 //! | `land_error_m` | horizontal distance of the truth from the take-off spot at the end |
 //!
@@ -96,6 +96,8 @@ struct Rest {
     farthest: f32,
 }
 
+/// A vehicle that has just been stopped is not hovering yet.
+const SETTLE: Micros = Micros::from_secs(1);
 /// Time into FLYING that still counts as take-off.
 const TAKEOFF_TAIL: Micros = Micros::from_secs(3);
 
@@ -149,9 +151,11 @@ impl Collector {
         }
         let resting = holding && setpoint.velocity.norm() < 1e-3 && setpoint.yaw_rate.abs() < 1e-3;
         if resting {
-            let tilt = frame::tilt(&truth.attitude).to_degrees();
-            self.tilt = Some(self.tilt.map_or(tilt, |t| t.max(tilt)));
             let rest = self.rest.get_or_insert(Rest { since: at, from: truth.position, farthest: 0.0 });
+            if at.since(rest.since) >= SETTLE {
+                let tilt = frame::tilt(&truth.attitude).to_degrees();
+                self.tilt = Some(self.tilt.map_or(tilt, |t| t.max(tilt)));
+            }
             let away = truth.position - rest.from;
             rest.farthest = rest.farthest.max(away.xy().norm());
         } else {

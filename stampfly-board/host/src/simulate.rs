@@ -209,7 +209,9 @@ impl Jitter {
 
     /// Time between reading and publishing of a background activation.
     fn background(&mut self) -> Micros {
-        self.random.as_mut().map_or(Micros::ZERO, |random| Micros(u64::from(random.next_u32()) % 10_000))
+        let Some(random) = &mut self.random else { return Micros::ZERO };
+        let draw = u64::from(random.next_u32());
+        Micros(if draw % 10 == 0 { draw / 10 % 10_000 } else { draw / 10 % 500 })
     }
 }
 
@@ -250,7 +252,8 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     loop {
         let deadlines = [
             tasks.next_deadline(),
-            flight_loop.next_tick(),
+            // A tick that has passed is waiting for an executor that is late.
+            flight_loop.next_tick().filter(|tick| *tick > clock.now()),
             flight_at,
             interrupted.as_ref().map(|(at, _)| *at),
         ];

@@ -181,14 +181,14 @@ impl SceneOptions {
     /// Prints what can be changed.
     pub fn print_list(&self, seed: u64) -> Result<(), Failure> {
         let config = self.config(seed)?;
-        println!("--param");
+        outln!("--param");
         for parameter in parameters::PARAMETERS {
             let value = parameter.get(&config.vehicle);
-            println!("  {:<30} {value:>12} {:<18} {}", parameter.name, parameter.unit, parameter.meaning);
+            outln!("  {:<30} {value:>12} {:<18} {}", parameter.name, parameter.unit, parameter.meaning);
         }
-        println!("\n--plant");
+        outln!("\n--plant");
         for row in config.simulation.plant.iter() {
-            println!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.description);
+            outln!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.description);
         }
         Ok(())
     }

@@ -41,18 +41,18 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
             object.insert(name.into(), json!(spread));
         }
         object.insert("realtime_factor".into(), json!(simulated / wall));
-        println!("{}", serde_json::Value::Object(object));
+        outln!("{}", serde_json::Value::Object(object));
     } else {
-        println!("{:<22} {:>9} {:>9} {:>9}", "", "median", "95 %", "worst");
+        outln!("{:<22} {:>9} {:>9} {:>9}", "", "median", "95 %", "worst");
         for (name, unit, spread) in spreads(&flights) {
             match spread {
-                Some(s) => println!("{name:<22} {:>9.3} {:>9.3} {:>9.3} {unit}", s.p50, s.p95, s.max),
-                None => println!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
+                Some(s) => outln!("{name:<22} {:>9.3} {:>9.3} {:>9.3} {unit}", s.p50, s.p95, s.max),
+                None => outln!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
             }
         }
-        println!("\n{landed} of {} flights landed and disarmed; {:.0} × real time", flights.len(), simulated / wall);
+        outln!("\n{landed} of {} flights landed and disarmed; {:.0} × real time", flights.len(), simulated / wall);
         if !failed.is_empty() {
-            println!("seeds that did not: {failed:?}");
+            outln!("seeds that did not: {failed:?}");
         }
     }
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -54,30 +54,30 @@ fn print_json(outcome: &Outcome) {
     object.insert("duration_s".into(), json!(outcome.duration.seconds_f64()));
     object.insert("realtime_factor".into(), json!(outcome.realtime_factor));
     object.insert("log_hash".into(), json!(format!("{:016x}", outcome.log_hash)));
-    println!("{}", serde_json::Value::Object(object));
+    outln!("{}", serde_json::Value::Object(object));
 }
 
 fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path) {
-    println!("phases");
+    outln!("phases");
     for phase in &outcome.phases {
         let mode = if phase.state.name() == "Flying" { format!(" {:?}", phase.mode) } else { String::new() };
-        println!("  {:>9.3} s  {}{mode}", phase.since.seconds_f64(), phase.state.name());
+        outln!("  {:>9.3} s  {}{mode}", phase.since.seconds_f64(), phase.state.name());
     }
-    println!("\nfigures");
+    outln!("\nfigures");
     for (name, unit, figure) in FIGURES {
         match figure(&outcome.metrics) {
-            Some(value) => println!("  {name:<22} {value:>8.3} {unit}"),
-            None => println!("  {name:<22} {:>8}", "–"),
+            Some(value) => outln!("  {name:<22} {value:>8.3} {unit}"),
+            None => outln!("  {name:<22} {:>8}", "–"),
         }
     }
-    println!("  {:<22} {:>8.3} deg", "worst tilt", outcome.worst_tilt_deg);
+    outln!("  {:<22} {:>8.3} deg", "worst tilt", outcome.worst_tilt_deg);
     let [first, last] = outcome.battery;
-    println!("  {:<22} {first:>8.2} V at the start, {last:.2} V at the end", "battery");
-    println!("\nrunnables, wall time on this machine         mean      longest");
+    outln!("  {:<22} {first:>8.2} V at the start, {last:.2} V at the end", "battery");
+    outln!("\nrunnables, wall time on this machine         mean      longest");
     for (info, row) in plan::ACTIVATIONS.iter().zip(recorder.timing()) {
         if row.count > 0 {
             let mean = row.total_ns as f64 / row.count as f64;
-            println!(
+            outln!(
                 "  {:<14} {:>8} activations  {mean:>8.0} ns {:>8.1} us",
                 info.name,
                 row.count,
@@ -85,7 +85,7 @@ fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path) {
             );
         }
     }
-    println!(
+    outln!(
         "\n{:.1} s flown at {:.0} × real time, log hash {:016x}",
         outcome.duration.seconds_f64(),
         outcome.realtime_factor,
@@ -96,5 +96,5 @@ fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path) {
         (true, false) => "landed, still armed",
         (false, _) => "DID NOT LAND",
     };
-    println!("{verdict}\nlog    {}", log.display());
+    outln!("{verdict}\nlog    {}", log.display());
 }

@@ -1,5 +1,10 @@
 //! The program `stampfly`: flies the flight stack on a PC.
 
+/// `println!` that does not panic when the reader has gone.
+macro_rules! outln {
+    ($($text:tt)*) => { crate::terminal::print(&format!("{}\n", format_args!($($text)*))) };
+}
+
 mod arguments;
 mod campaign;
 mod fly;

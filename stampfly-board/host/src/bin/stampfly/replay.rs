@@ -18,7 +18,7 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
                 "recorded": difference.recorded, "replayed": difference.replayed,
             })
         });
-        println!(
+        outln!(
             "{}",
             json!({
                 "identical": result.difference.is_none(), "activations": result.activations,
@@ -27,11 +27,11 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
         );
     } else {
         match &result.difference {
-            None => println!(
+            None => outln!(
                 "{path}: identical: {} activations repeated, {} samples compared bit for bit",
                 result.activations, result.samples
             ),
-            Some(difference) => println!("{path}: differs: {difference}"),
+            Some(difference) => outln!("{path}: differs: {difference}"),
         }
     }
     Ok(if result.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -1,6 +1,7 @@
-//! Progress on standard error: a bar where somebody is looking, nothing where nobody is.
+//! The terminal: text on standard output, progress on standard error where somebody is looking.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::Write;
 
 /// A bar of `steps` steps.
 pub fn bar(steps: u64, template: &str) -> ProgressBar {
@@ -9,4 +10,10 @@ pub fn bar(steps: u64, template: &str) -> ProgressBar {
         bar.set_style(style.progress_chars("━╸ "));
     }
     bar
+}
+
+/// Prints text. A reader that has seen enough (`| head`) is no error.
+pub fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }

@@ -21,12 +21,12 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
                 })
             })
             .collect();
-        println!("{}", json!({ "topics": rows }));
+        outln!("{}", json!({ "topics": rows }));
     } else if options.markdown {
-        println!("| topic | message | policy | rate | publisher | readers | what |\n|---|---|---|---|---|---|---|");
+        outln!("| topic | message | policy | rate | publisher | readers | what |\n|---|---|---|---|---|---|---|");
         for topic in &TOPICS {
             let doc: Vec<_> = topic.doc.iter().map(|line| line.trim()).collect();
-            println!(
+            outln!(
                 "| `{}` | `{}` | {} ({}) | {} | {} | {} | {} |",
                 topic.name,
                 topic.message,
@@ -39,10 +39,10 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
             );
         }
     } else {
-        println!("{:<18} {:<18} {:<11} {:<9} {:<13} readers", "topic", "type", "policy", "rate", "publisher");
+        outln!("{:<18} {:<18} {:<11} {:<9} {:<13} readers", "topic", "type", "policy", "rate", "publisher");
         for topic in &TOPICS {
             let policy = format!("{}({})", topic.policy, topic.depth);
-            println!(
+            outln!(
                 "{:<18} {:<18} {policy:<11} {:<9} {:<13} {}",
                 topic.name,
                 topic.message,
@@ -51,7 +51,7 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
                 topic.readers.join(", ")
             );
         }
-        println!("\n{} topics; the log reads all of them.", TOPICS.len());
+        outln!("\n{} topics; the log reads all of them.", TOPICS.len());
     }
     Ok(ExitCode::SUCCESS)
 }
