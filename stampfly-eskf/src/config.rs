@@ -85,7 +85,7 @@ impl Default for EskfConfig {
             initial_attitude: 0.05,
             initial_gyro_bias: 0.003,
             initial_accel_bias: 0.1,
-            vibration_bias: 0.8,
+            vibration_bias: 2.0,
             tof_sigma: 0.01,
             tof_min: 0.02,
             tof_max: 4.0,

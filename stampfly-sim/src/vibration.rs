@@ -85,7 +85,7 @@ pub(crate) struct Vibration {
 }
 
 impl Vibration {
-    /// `factor` scales everything (the rectification by its square); `dt` is the sample period in seconds.
+    /// `factor` scales all of the recorded disturbance alike, its rectified part included; `dt` is the sample period in seconds.
     pub(crate) fn new(factor: f64, dt: f64, hover_speed: f64, mut noise: Noise) -> Self {
         let phase = [(); ROTORS].map(|()| libm::sincos(noise.within(core::f64::consts::PI))).map(|(s, c)| (c, s));
         let weights = [(); ROTORS].map(|()| {
@@ -130,7 +130,7 @@ impl Vibration {
             let white = self.noise.normal();
             *sum += power * (profile.broadband * white + profile.resonance.2 * resonator.step(white));
             *sum *= self.factor;
-            *sum += self.factor * self.factor * power * profile.rectification;
+            *sum += self.factor * power * profile.rectification;
         }
         total
     }
