@@ -292,6 +292,18 @@ impl Eskf {
     }
 }
 
+/// A flow row that says nothing about the heading. In theory flow shows it while the vehicle accelerates; in practice a
+/// degree of mounting error and the beat of pictures and reads turn the vehicle's idea of north by degrees a minute,
+/// where a calibrated gyro alone keeps it within one.
+fn without_heading(mut row: Row<6>) -> Row<6> {
+    for (state, value) in &mut row.jacobian {
+        if *state == ATTITUDE + 2 {
+            *value = 0.0;
+        }
+    }
+    row
+}
+
 fn process_noise(config: &EskfConfig) -> ProcessNoise {
     let square = |v: f32| v * v;
     ProcessNoise {
@@ -527,7 +539,7 @@ impl Eskf {
         let raw = rates.unwrap_or(self.imu.gyro);
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
-        let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance);
+        let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance).map(without_heading);
         // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
         // by itself makes large readings count less and the velocity too small.
         let variance = |row: &Row<6>, turning: f32| {
@@ -562,7 +574,7 @@ impl Eskf {
             return Ok(Fusion::Gated { ratio });
         }
         self.correct(&first, innovation[0]);
-        let row = aid::flow::body_velocity(&self.state, &self.rotation, distance)[1];
+        let row = without_heading(aid::flow::body_velocity(&self.state, &self.rotation, distance)[1]);
         let projection = self.covariance.project(row.jacobian, variances[1]);
         self.correct(&projection, measured[1] - row.predicted);
         self.flow.fused = Some(self.now);
