@@ -40,9 +40,9 @@ impl Default for AltitudeConfig {
     /// The StampFly: 36.8 g, 0.672 N at full duty on a full battery.
     fn default() -> Self {
         Self {
-            height_gain: 2.2,
+            height_gain: 2.5,
             correction_max: 0.8,
-            velocity: PidGains { kp: 6.0, ti: 1.2, td: 0.0, eta: 0.125 },
+            velocity: PidGains { kp: 7.0, ti: 0.8, td: 0.0, eta: 0.125 },
             acceleration_max: 5.0,
             hover_thrust: 0.0368 * GRAVITY,
             learning_time: 8.0,

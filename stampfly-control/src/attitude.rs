@@ -24,9 +24,9 @@ pub struct AttitudeConfig {
 }
 
 impl Default for AttitudeConfig {
-    /// A quarter to a third of the rate loop's bandwidth.
+    /// About a third of the rate loop's bandwidth.
     fn default() -> Self {
-        Self { tilt_gain: 12.0, heading_gain: 5.0, tilt_rate_max: 5.0, heading_rate_max: 2.0 }
+        Self { tilt_gain: 13.0, heading_gain: 5.0, tilt_rate_max: 5.0, heading_rate_max: 2.0 }
     }
 }
 

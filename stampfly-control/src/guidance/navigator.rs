@@ -44,7 +44,7 @@ pub struct NavigatorConfig {
     pub turn_rate: f32,
     /// Sticks and commands keep the height over the place of take-off between these, m.
     pub height: (f32, f32),
-    /// A way-point is reached when the path ends there and the vehicle is this close, m.
+    /// A way-point is reached when the path ends there, heading included, and the vehicle is this close, m.
     pub reached: f32,
     /// The path waits when the vehicle is farther away than this, m.
     pub leash: f32,
@@ -361,7 +361,7 @@ impl Navigator {
         let leg = *self.leg.get_or_insert_with(|| self.path.leg_to(goal, way_point.speed));
         self.path.follow(&leg, dt);
         let close = (input.estimate.position - goal).norm() <= self.config.reached;
-        if self.path.ends(&leg) && (close || self.reached_at.is_some()) {
+        if self.path.ends(&leg) && self.path.faces(way_point.yaw) && (close || self.reached_at.is_some()) {
             let since = *self.reached_at.get_or_insert(now);
             if now.since(since) >= Micros::from_seconds(way_point.dwell) {
                 self.route.advance();
