@@ -53,8 +53,15 @@ fn situation() -> Situation {
 fn control(c: &mut Criterion) {
     let s = situation();
     let mixer = MultirotorMixer::stampfly();
-    let input = |unmet| ControlInput {
-        estimate: &s.estimate,
+    // Errors of alternating sign: a flight that is under control, no integrator at its limit.
+    let other_side = StateEstimate {
+        position: 2.0 * s.setpoint.position - s.estimate.position,
+        velocity: 2.0 * s.setpoint.velocity - s.estimate.velocity,
+        angular_rate: -s.estimate.angular_rate,
+        ..s.estimate
+    };
+    let input = |now: Micros, unmet| ControlInput {
+        estimate: if now.0 / 2_500 % 2 == 0 { &s.estimate } else { &other_side },
         command: &s.command,
         setpoint: &s.setpoint,
         mode: &s.mode,
@@ -67,7 +74,7 @@ fn control(c: &mut Criterion) {
         let mut unmet = [0.0; 4];
         b.iter(|| {
             now += Micros(2_500);
-            let mixed = mixer.mix(&cascade.step(now, &black_box(input(unmet))));
+            let mixed = mixer.mix(&cascade.step(now, &black_box(input(now, unmet))));
             unmet = mixed.unmet;
             mixed
         });
@@ -76,10 +83,10 @@ fn control(c: &mut Criterion) {
     c.bench_function("geometric and mixer", |b| {
         b.iter(|| {
             now += Micros(2_500);
-            mixer.mix(&geometric.step(now, &black_box(input([0.0; 4]))))
+            mixer.mix(&geometric.step(now, &black_box(input(now, [0.0; 4]))))
         });
     });
-    let output = cascade.step(now, &input([0.0; 4]));
+    let output = cascade.step(now, &input(now, [0.0; 4]));
     c.bench_function("mixer", |b| b.iter(|| mixer.mix(&black_box(output))));
     let mixed = mixer.mix(&output);
     let mut motors = MotorStage::default();

@@ -6,12 +6,12 @@ mod plant;
 
 use plant::{Airframe, Flight, Spread, gust};
 use stampfly_control::guidance::{Navigator, NavigatorInput};
-use stampfly_control::{CascadeConfig, CascadeController, Controller, GeometricController};
+use stampfly_control::{CascadeConfig, CascadeController, ControlInput, Controller, GeometricController};
 use stampfly_types::messages::{
     CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, SetpointAxes, StateEstimate,
-    Validity,
+    SystemMode, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, frame};
+use stampfly_types::{GRAVITY, Micros, Quat, Vec3, frame, math};
 
 const GUSTS: f32 = 0.5;
 
@@ -194,7 +194,7 @@ fn steps_of_lean_are_quick_and_damped() {
         let (mut largest, mut risen) = (0.0f32, None);
         let start = flight.now;
         // Half stick on the sine: the lean is asin(0.5 sin(0.52)).
-        let target = (0.5 * 0.52f32.sin()).asin();
+        let target = math::asin(0.5 * math::sin(0.52));
         flight.fly(1.0, |f| {
             let [roll, ..] = frame::roll_pitch_yaw(&f.state.attitude);
             largest = largest.max(roll);
@@ -340,10 +340,10 @@ fn poison_never_reaches_the_output() {
                         _ => (stick.roll, stick.throttle) = (value, value),
                     }
                     for mode in FlightMode::ALL {
-                        let mode = stampfly_types::messages::SystemMode { mode: *mode, ..f.mode };
+                        let mode = SystemMode { mode: *mode, ..f.mode };
                         let out = f.controller.step(
                             f.now,
-                            &stampfly_control::ControlInput {
+                            &ControlInput {
                                 estimate: &estimate,
                                 command: &stick,
                                 setpoint: &setpoint,
@@ -377,7 +377,7 @@ fn both_quaternions_of_an_attitude_give_the_same_torque() {
     let output = |estimate: &StateEstimate| {
         CascadeController::default().step(
             flight.now,
-            &stampfly_control::ControlInput {
+            &ControlInput {
                 estimate,
                 command: &flight.command,
                 setpoint: &flight.setpoint,

@@ -5,14 +5,12 @@
 
 use std::collections::VecDeque;
 
-use stampfly_control::{Mixed, Mixer, MultirotorMixer};
+use stampfly_control::{ControlInput, Controller, Mixed, Mixer, MultirotorMixer, Spin};
 use stampfly_types::messages::{
     CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, Setpoint, StateEstimate, SystemMode,
     Validity, VehicleStatus,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3};
-
-use stampfly_control::{ControlInput, Controller};
+use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
 
 /// What can differ from the vehicle the gains were chosen for.
 #[derive(Clone, Copy, Debug)]
@@ -203,8 +201,8 @@ impl<C: Controller> Flight<C> {
             body.thrust[n] += (wanted - body.thrust[n]) * (dt / self.airframe.motor_lag);
             let thrust = body.thrust[n];
             let drag = match rotor.spin {
-                stampfly_control::Spin::CounterClockwise => rotor.kappa,
-                stampfly_control::Spin::Clockwise => -rotor.kappa,
+                Spin::CounterClockwise => rotor.kappa,
+                Spin::Clockwise => -rotor.kappa,
             };
             force += thrust;
             torque += Vec3::new(-rotor.y * thrust, rotor.x * thrust, drag * thrust);
@@ -237,7 +235,7 @@ impl<C: Controller> Flight<C> {
 pub fn gust<C: Controller>(flight: &mut Flight<C>, speed: f32) {
     const SHARE: f32 = 0.0025 / 0.8;
     let kick = flight.random_vector();
-    flight.wind += -flight.wind * SHARE + kick * (speed * (2.0 / 3.0 * SHARE).sqrt());
+    flight.wind += -flight.wind * SHARE + kick * (speed * math::sqrt(2.0 / 3.0 * SHARE));
 }
 
 /// Root mean square and largest magnitude of a series.
