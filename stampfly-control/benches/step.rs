@@ -61,7 +61,7 @@ fn control(c: &mut Criterion) {
         ..s.estimate
     };
     let input = |now: Micros, unmet| ControlInput {
-        estimate: if now.0 / 2_500 % 2 == 0 { &s.estimate } else { &other_side },
+        estimate: if (now.0 / 2_500).is_multiple_of(2) { &s.estimate } else { &other_side },
         command: &s.command,
         setpoint: &s.setpoint,
         mode: &s.mode,
