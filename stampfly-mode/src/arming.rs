@@ -50,6 +50,9 @@ const COS_TILT_MAX: f32 = 0.939_69;
 /// The throttle is at rest within this much of its rest.
 const THROTTLE_REST: f32 = 0.1;
 
+/// What the failsafe sees of a crash that is going on.
+const CRASH: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED);
+
 type Check = fn(&ArmingFacts) -> bool;
 
 /// The reasons against arming, and how to find them.
@@ -68,7 +71,7 @@ const CHECKS: [(ArmBlocks, Check); 12] = [
     (ArmBlocks::TILTED, |f| cos_tilt(&f.attitude).is_nan() || cos_tilt(&f.attitude) < COS_TILT_MAX),
     (ArmBlocks::THROTTLE, throttle_raised),
     (ArmBlocks::ARM_SWITCH, |f| f.switch_stuck),
-    (ArmBlocks::CRASHED, |f| f.crashed),
+    (ArmBlocks::CRASHED, |f| f.crashed || f.alerts.intersects(CRASH)),
 ];
 
 /// Every reason against arming right now.
@@ -133,7 +136,7 @@ mod tests {
     #[test]
     fn every_reason_stands_alone() {
         let tilted = Quat::from_euler_angles(0.0, 0.4, 0.0);
-        let cases: [(ArmBlocks, ArmingFacts); 18] = [
+        let cases: [(ArmBlocks, ArmingFacts); 19] = [
             (ArmBlocks::NONE, ready()),
             (ArmBlocks::CALIBRATING, ArmingFacts { calibrated: false, ..ready() }),
             (ArmBlocks::NOT_ON_GROUND, ArmingFacts { contact: GroundContact::Air, ..ready() }),
@@ -155,6 +158,7 @@ mod tests {
             (ArmBlocks::THROTTLE, ArmingFacts { throttle: -0.5, ..ready() }),
             (ArmBlocks::ARM_SWITCH, ArmingFacts { switch_stuck: true, ..ready() }),
             (ArmBlocks::CRASHED, ArmingFacts { crashed: true, ..ready() }),
+            (ArmBlocks::CRASHED, ArmingFacts { alerts: Alerts::GYRO_ANOMALY, ..ready() }),
         ];
         for (expected, facts) in cases {
             assert_eq!(blocks(&facts), expected, "{facts:?}");

@@ -262,12 +262,14 @@ impl Failsafe {
     }
 
     fn battery(&mut self, input: &FailsafeInput<'_>) -> Alerts {
-        /// No cell of a flying vehicle is below this; the sensor is.
-        const IMPOSSIBLE_IN_FLIGHT: f32 = 2.0;
+        /// No battery that keeps a vehicle in the air reads less; its sensor may.
+        const LEAST_IN_FLIGHT: f32 = 2.0;
+        /// No battery of a vehicle of this kind reads more.
+        const MOST: f32 = 60.0;
+        let least = if input.mode.armed { LEAST_IN_FLIGHT } else { 0.0 };
         if let Some(power) = input.power
             && self.battery_at != Some(power.at)
-            && power.data.voltage.is_finite()
-            && (!input.mode.armed || power.data.voltage > IMPOSSIBLE_IN_FLIGHT)
+            && (least..=MOST).contains(&power.data.voltage)
         {
             let span = self.battery_at.map_or(Micros::ZERO, |last| power.at.since(last)).seconds();
             let before = self.battery.unwrap_or(power.data.voltage);

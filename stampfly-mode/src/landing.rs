@@ -43,8 +43,8 @@ pub struct LandingConfig {
     pub ceiling_rate: f32,
     /// A landing that takes longer than this, and the time its height needs, is stalled.
     pub stalled: Micros,
-    /// Thrust ceiling of a stalled landing, share of hover thrust.
-    pub stalled_ceiling: f32,
+    /// Thrust ceiling of a stalled landing to begin with, share of hover thrust, and how fast it comes down, 1/s.
+    pub stalled_ceiling: (f32, f32),
     /// Thrust below this share of hover thrust does not carry the vehicle.
     pub touchdown_thrust: f32,
     /// For how long the evidence for a touchdown must hold.
@@ -64,7 +64,7 @@ impl Default for LandingConfig {
             ceiling_min: 0.7,
             ceiling_rate: 0.3,
             stalled: Micros::from_secs(4),
-            stalled_ceiling: 0.93,
+            stalled_ceiling: (0.96, 0.03),
             touchdown_thrust: 0.8,
             touchdown_time: Micros::from_millis(300),
         }
@@ -277,26 +277,28 @@ impl LandingManager {
         }
     }
 
-    /// Down to the lowest ceiling when it no longer sinks close to the ground (the cushion of air, or the ground
-    /// itself), and to just below hover thrust when the whole landing takes too long.
+    /// The ceiling comes down when the vehicle no longer sinks close to the ground (the cushion of air, or the ground
+    /// itself), and much more slowly when nobody knows how high it is, or when the whole landing takes too long, which
+    /// means the same: thrust that falls by 3 % a second sinks at less than 1 m/s for the first metre and a half.
     fn lower_ceiling(&mut self, now: Micros, seen: &Seen, span: f32) {
         let close = seen.rise.is_some_and(|rise| rise < self.config.ceiling_height);
         let sinks = seen.sink.is_none_or(|sink| sink >= 0.1);
         let (slowest, ..) = self.config.descent;
         let expected = self.config.stalled + Micros::from_seconds(self.landing_from / slowest);
-        let stalled = self.landing_since.is_some_and(|since| now.since(since) > expected);
-        let lowest = if close && (!sinks || stalled) {
-            self.config.ceiling_min
-        } else if stalled {
+        let late = self.landing_since.is_some_and(|since| now.since(since) > expected);
+        let blind = seen.rise.is_none() && seen.sink.is_none();
+        let (from, rate) = if close && !sinks {
+            (1.0, self.config.ceiling_rate)
+        } else if late || blind {
             self.config.stalled_ceiling
-        } else if close {
-            // It sinks as it should: leave the ceiling where it is.
-            return;
         } else {
-            self.ceiling = Self::UNLIMITED;
+            // Near the ground a ceiling that has come down stays; it belongs to a landing that is nearly over.
+            if !close {
+                self.ceiling = Self::UNLIMITED;
+            }
             return;
         };
-        self.ceiling = (self.ceiling.min(1.0) - self.config.ceiling_rate * span).max(lowest);
+        self.ceiling = (self.ceiling.min(from) - rate * span).max(self.config.ceiling_min);
     }
 
     fn descent_rate(&self, seen: &Seen) -> f32 {

@@ -415,6 +415,8 @@ impl ModeMachine {
         let facts = Facts { blocks: self.output.mode.blocks, manual: !holds_height(self.output.mode.mode) };
         for event in asked.events.iter() {
             match next(self.state(), event, &facts) {
+                // Where an emergency has nothing to stop, it still keeps anything from starting.
+                Decision::Stay | Decision::Refuse(_) if event <= Event::Crash => return,
                 Decision::Stay | Decision::Refuse(_) => {}
                 Decision::Go(to) => {
                     self.go(now, to, event, asked);
