@@ -23,7 +23,7 @@ pub struct AltitudeConfig {
     pub acceleration_max: f32,
     /// Thrust at hover to begin with, N.
     pub hover_thrust: f32,
-    /// Time constant with which hover thrust is learned, s. Infinite means never.
+    /// Time constant with which hover thrust is learned, s. Zero or infinite means never.
     pub learning_time: f32,
     /// Largest learned deviation from `hover_thrust`, as a share of it.
     pub learning_range: f32,
@@ -40,9 +40,9 @@ impl Default for AltitudeConfig {
     /// The StampFly: 36.8 g, 0.672 N at full duty on a full battery.
     fn default() -> Self {
         Self {
-            height_gain: 2.2,
+            height_gain: 2.5,
             correction_max: 0.8,
-            velocity: PidGains { kp: 6.0, ti: 1.2, td: 0.0, eta: 0.125 },
+            velocity: PidGains { kp: 7.0, ti: 0.8, td: 0.0, eta: 0.125 },
             acceleration_max: 5.0,
             hover_thrust: 0.0368 * GRAVITY,
             learning_time: 8.0,
@@ -99,6 +99,8 @@ pub struct AltitudeController {
     config: AltitudeConfig,
     climb: Pid,
     hover_thrust: f32,
+    /// One over the learning time, 1/s.
+    learning_rate: f32,
 }
 
 impl AltitudeController {
@@ -114,6 +116,7 @@ impl AltitudeController {
             config: *config,
             climb: Pid::new(config.velocity, config.acceleration_max),
             hover_thrust: config.hover_thrust,
+            learning_rate: if config.learning_time > 0.0 { 1.0 / config.learning_time } else { 0.0 },
         }
     }
 
@@ -129,7 +132,7 @@ impl AltitudeController {
         if limits.learn && (target - climb.velocity).abs() < Self::STEADY {
             self.learn(dt);
         }
-        let wanted = self.hover_thrust * (1.0 - (climb.acceleration + feedback) / GRAVITY)
+        let wanted = self.hover_thrust * (1.0 - (climb.acceleration + feedback) * (1.0 / GRAVITY))
             / climb.cos_tilt.max(Self::COS_TILT_MIN);
         // Upside down, thrust only pushes into the ground.
         let wanted = if climb.cos_tilt > 0.0 { wanted } else { 0.0 };
@@ -159,18 +162,16 @@ impl AltitudeController {
         self.climb.reset();
     }
 
-    /// Moves a little of the integral into the hover thrust. Both together ask for the same thrust as before.
+    /// Moves a little of the integral into the hover thrust. Both together ask for the same thrust as before:
+    /// h(1 − i/g) stays what it is when h grows by the share s·(−i/g) and i shrinks by s·i·(1 − i/g), up to s².
     fn learn(&mut self, dt: f32) {
         let integral = self.climb.integral();
-        let share = dt / self.config.learning_time;
-        let range = self.config.learning_range * self.config.hover_thrust;
-        let hover = self.hover_thrust * (1.0 - share * integral / GRAVITY);
-        let hover = hover.clamp(self.config.hover_thrust - range, self.config.hover_thrust + range);
-        // hover × (1 − i/g) is the thrust the integral stands for; solve for i with the new hover thrust.
-        let kept = GRAVITY * (1.0 - self.hover_thrust * (1.0 - integral / GRAVITY) / hover);
-        if hover.is_finite() && kept.is_finite() {
+        let relative = integral * (1.0 / GRAVITY);
+        let share = dt * self.learning_rate;
+        let hover = self.hover_thrust * (1.0 - share * relative);
+        if (hover - self.config.hover_thrust).abs() <= self.config.learning_range * self.config.hover_thrust {
             self.hover_thrust = hover;
-            self.climb.set_integral(kept);
+            self.climb.set_integral(integral - share * integral * (1.0 - relative));
         }
     }
 

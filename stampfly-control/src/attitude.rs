@@ -24,9 +24,9 @@ pub struct AttitudeConfig {
 }
 
 impl Default for AttitudeConfig {
-    /// A quarter to a third of the rate loop's bandwidth.
+    /// About a third of the rate loop's bandwidth.
     fn default() -> Self {
-        Self { tilt_gain: 12.0, heading_gain: 5.0, tilt_rate_max: 5.0, heading_rate_max: 2.0 }
+        Self { tilt_gain: 13.0, heading_gain: 5.0, tilt_rate_max: 5.0, heading_rate_max: 2.0 }
     }
 }
 
@@ -52,12 +52,13 @@ pub fn rate_towards(config: &AttitudeConfig, attitude: &Quat, target: &Quat) -> 
         return Vec3::new(config.tilt_rate_max, 0.0, 0.0);
     }
     // Twice the vector part is the angle for small errors, and grows slower than it for large ones.
-    let tilt = 2.0 * config.tilt_gain / upright;
-    let heading = 2.0 * config.heading_gain / upright * shortest(w, z);
+    let twice = 2.0 / upright;
+    let tilt = config.tilt_gain * twice;
+    let heading = config.heading_gain * twice * shortest(w, z);
     let mut rate = Vec3::new(tilt * (w * x - y * z), tilt * (w * y + x * z), 0.0);
-    let length = math::sqrt(rate.x * rate.x + rate.y * rate.y);
-    if length > config.tilt_rate_max {
-        rate *= config.tilt_rate_max / length;
+    let squared = rate.x * rate.x + rate.y * rate.y;
+    if squared > config.tilt_rate_max * config.tilt_rate_max {
+        rate *= config.tilt_rate_max / math::sqrt(squared);
     }
     rate.z = heading.clamp(-config.heading_rate_max, config.heading_rate_max);
     rate

@@ -9,8 +9,8 @@
 //! All loops run every step. The path's derivatives are fed forward at every level they reach (velocity, acceleration,
 //! and the rate at which the acceleration turns the vehicle), so that following a path needs no error to begin with.
 
-use stampfly_types::messages::ControlOutput;
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::messages::{ControlOutput, FlightState};
+use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
 
 use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
 use crate::attitude::{self, AttitudeConfig};
@@ -130,7 +130,7 @@ impl CascadeController {
             unmet: input.unmet[3],
             learn: !intent.grounded && input.status.thrust_ceiling > 1.0,
             // While taking off the ground carries what thrust does not: the integral must be free to find the weight.
-            hold: intent.grounded && input.mode.state != stampfly_types::messages::FlightState::TakeOff,
+            hold: intent.grounded && input.mode.state != FlightState::TakeOff,
         };
         let (path, estimate) = (input.setpoint, input.estimate);
         let climb = Climb {
@@ -169,16 +169,19 @@ impl CascadeController {
         let demand = self.position.step(&error, &path.velocity, &ahead, &estimate.velocity, dt, intent.grounded);
         // Thrust has to carry the weight as well: the axis is the direction of g − a.
         let carried = (GRAVITY - ahead.z).max(0.5 * GRAVITY);
-        let (x, y) = (demand.x / carried, demand.y / carried);
-        let slope = math::sqrt(x * x + y * y);
-        let shorten = if slope > self.tan_tilt_max { self.tan_tilt_max / slope } else { 1.0 };
-        let (x, y) = (x * shorten, y * shorten);
+        let per_weight = 1.0 / carried;
+        let (mut x, mut y) = (demand.x * per_weight, demand.y * per_weight);
+        let slope_squared = x * x + y * y;
+        if slope_squared > self.tan_tilt_max * self.tan_tilt_max {
+            let shorten = self.tan_tilt_max / math::sqrt(slope_squared);
+            (x, y) = (x * shorten, y * shorten);
+        }
         let scale = 1.0 / math::sqrt(1.0 + x * x + y * y);
         let down = Vec3::new(-x * scale, -y * scale, scale);
 
         let jerk = self.path.map_or(Vec3::zeros(), |before| (ahead - before) / dt);
         self.path = Some(ahead);
-        (down, turn_rate(&jerk, carried))
+        (down, turn_rate(&jerk, per_weight))
     }
 }
 
@@ -250,7 +253,7 @@ impl Controller for CascadeController {
 }
 
 /// The down axis of a vehicle that leans by its sticks, which are relative to its heading.
-fn lean(forward: f32, right: f32, sin_max: f32, attitude: &stampfly_types::Quat) -> Vec3 {
+fn lean(forward: f32, right: f32, sin_max: f32, attitude: &Quat) -> Vec3 {
     let length = math::sqrt(forward * forward + right * right).max(1.0);
     let (forward, right) = (forward / length * sin_max, right / length * sin_max);
     let (cos_half, sin_half) = attitude::half_heading(attitude);
@@ -266,7 +269,7 @@ fn lean(forward: f32, right: f32, sin_max: f32, attitude: &stampfly_types::Quat)
 ///
 /// The axis tilts with n = (−aₓ, −a_y, g)/g, so it moves with −jerk/g and turns about ẑ × ṅ. A path that jumps (a mode
 /// change) is no path to follow: its jerk is bounded.
-fn turn_rate(jerk: &Vec3, carried: f32) -> Vec3 {
+fn turn_rate(jerk: &Vec3, per_weight: f32) -> Vec3 {
     const MAX: f32 = 1.5;
-    Vec3::new((jerk.y / carried).clamp(-MAX, MAX), (-jerk.x / carried).clamp(-MAX, MAX), 0.0)
+    Vec3::new((jerk.y * per_weight).clamp(-MAX, MAX), (-jerk.x * per_weight).clamp(-MAX, MAX), 0.0)
 }

@@ -1,5 +1,27 @@
 //! From state and set-point to motor duty, in exchangeable pieces.
+//!
+//! ```text
+//!  commands ─► Navigator ─► Setpoint ─► Controller ─► ControlOutput ─► Mixer ─► Mixed ─► MotorStage ─► MotorOutput
+//! ```
+//!
+//! Each arrow is a plain value and each box a plain struct that is stepped once per control period, so any of them
+//! can be replaced, tested or used alone:
+//!
+//! * [`guidance`]: where the vehicle should be, moment by moment;
+//! * [`controller`]: the socket for control laws; [`cascade`] (the default, built from [`rate`], [`attitude`],
+//!   [`position`] and [`altitude`]) and [`geometric`] fit it; [`intent`] tells both what the flight mode and the
+//!   estimator's validity ask for;
+//! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry;
+//! * [`motor`]: thrust to duty;
+//! * [`filter`], [`pid`] and [`timing`]: building blocks.
+//!
+//! Units are SI, the body frame is FRD, the world NED (see [`stampfly_types::frame`]). Numbers that are not finite
+//! are stopped at the entrance of each piece: they select a degraded behaviour and never reach a state or an output.
 #![no_std]
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 #[cfg(test)]
 extern crate std;

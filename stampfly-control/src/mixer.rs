@@ -83,6 +83,8 @@ impl core::error::Error for GeometryError {}
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Shares {
     thrust: f32,
+    /// One over `thrust`.
+    collective: f32,
     roll: f32,
     pitch: f32,
     yaw: f32,
@@ -127,8 +129,13 @@ impl MultirotorMixer {
         // The inverse of a square X can be written down, so this cannot fail. A test holds it against `from_rotors`.
         let mut shares = [Shares::default(); MAX_MOTORS];
         for (share, rotor) in shares.iter_mut().zip(Self::STAMPFLY_ROTORS) {
-            *share =
-                Shares { thrust: 0.25, roll: -0.25 / rotor.y, pitch: 0.25 / rotor.x, yaw: 0.25 / signed_kappa(&rotor) };
+            *share = Shares {
+                thrust: 0.25,
+                collective: 4.0,
+                roll: -0.25 / rotor.y,
+                pitch: 0.25 / rotor.x,
+                yaw: 0.25 / signed_kappa(&rotor),
+            };
         }
         Self { shares, count: Self::STAMPFLY_ROTORS.len(), thrust_max: Self::STAMPFLY_THRUST_MAX }
     }
@@ -164,7 +171,13 @@ impl MultirotorMixer {
             if row.x < 1e-3 {
                 return Err(GeometryError::Unbalanced);
             }
-            *share = Shares { thrust: row.x, roll: row.y / arm, pitch: row.z / arm, yaw: row.w / drag };
+            *share = Shares {
+                thrust: row.x,
+                collective: 1.0 / row.x,
+                roll: row.y / arm,
+                pitch: row.z / arm,
+                yaw: row.w / drag,
+            };
         }
         Ok(Self { shares, count: rotors.len(), thrust_max })
     }
@@ -177,8 +190,8 @@ impl MultirotorMixer {
         // Collective u must satisfy −s·p_i ≤ a_i·u and a_j·u ≤ max − s·p_j for all pairs.
         for (lower, p_lower) in rotors() {
             for (upper, p_upper) in rotors() {
-                let spread = p_upper / upper.thrust - p_lower / lower.thrust;
-                let room = self.thrust_max / upper.thrust;
+                let spread = p_upper * upper.collective - p_lower * lower.collective;
+                let room = self.thrust_max * upper.collective;
                 if scale * spread > room {
                     scale = room / spread;
                 }
@@ -191,9 +204,8 @@ impl MultirotorMixer {
     fn collective_range(&self, tilt: &[f32; MAX_MOTORS]) -> (f32, f32) {
         let (mut low, mut high) = (0.0f32, f32::MAX);
         for (share, part) in self.shares.iter().zip(tilt).take(self.count) {
-            let inverse = 1.0 / share.thrust;
-            low = low.max(-part * inverse);
-            high = high.min((self.thrust_max - part) * inverse);
+            low = low.max(-part * share.collective);
+            high = high.min((self.thrust_max - part) * share.collective);
         }
         (low, high)
     }

@@ -18,7 +18,7 @@ use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
     StateEstimate, SystemMode, Validity, VehicleStatus,
 };
-use stampfly_types::{Micros, frame, math};
+use stampfly_types::{Micros, Vec3, frame, math};
 
 use super::{Leg, Path, PathLimits, Refusal, Refused, Route, WayPoint};
 use crate::timing::StepTimer;
@@ -44,7 +44,7 @@ pub struct NavigatorConfig {
     pub turn_rate: f32,
     /// Sticks and commands keep the height over the place of take-off between these, m.
     pub height: (f32, f32),
-    /// A way-point is reached when the path ends there and the vehicle is this close, m.
+    /// A way-point is reached when the path ends there, heading included, and the vehicle is this close, m.
     pub reached: f32,
     /// The path waits when the vehicle is farther away than this, m.
     pub leash: f32,
@@ -147,7 +147,7 @@ impl Navigator {
         Self {
             config: *config,
             timer: StepTimer::default(),
-            path: Path::at(stampfly_types::Vec3::zeros(), 0.0, config.limits),
+            path: Path::at(Vec3::zeros(), 0.0, config.limits),
             route: Route::default(),
             leg: None,
             reached_at: None,
@@ -252,7 +252,7 @@ impl Navigator {
     /// On the ground or in a hand: wherever the vehicle is, is right.
     fn stand(&mut self, entered: bool, input: &NavigatorInput<'_>) {
         let estimate = input.estimate;
-        self.path.place_horizontally(&estimate.position, &stampfly_types::Vec3::zeros());
+        self.path.place_horizontally(&estimate.position, &Vec3::zeros());
         self.path.place_vertically(estimate.position.z, 0.0);
         self.path.face(frame::yaw(&estimate.attitude));
         self.ground = self.path.position().z;
@@ -361,7 +361,7 @@ impl Navigator {
         let leg = *self.leg.get_or_insert_with(|| self.path.leg_to(goal, way_point.speed));
         self.path.follow(&leg, dt);
         let close = (input.estimate.position - goal).norm() <= self.config.reached;
-        if self.path.ends(&leg) && (close || self.reached_at.is_some()) {
+        if self.path.ends(&leg) && self.path.faces(way_point.yaw) && (close || self.reached_at.is_some()) {
             let since = *self.reached_at.get_or_insert(now);
             if now.since(since) >= Micros::from_seconds(way_point.dwell) {
                 self.route.advance();
@@ -419,7 +419,7 @@ impl Navigator {
     fn follow_horizontally(&mut self, input: &NavigatorInput<'_>) {
         let estimate = input.estimate;
         let known = estimate.valid.contains(Validity::VELOCITY_XY);
-        let velocity = if known { estimate.velocity } else { stampfly_types::Vec3::zeros() };
+        let velocity = if known { estimate.velocity } else { Vec3::zeros() };
         self.path.place_horizontally(&estimate.position, &velocity);
     }
 

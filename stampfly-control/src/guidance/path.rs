@@ -183,6 +183,12 @@ impl Path {
         self.north.rests_at(leg.goal.x) && self.east.rests_at(leg.goal.y) && self.down.rests_at(leg.goal.z)
     }
 
+    /// Does the point rest at this heading?
+    #[must_use]
+    pub fn faces(&self, heading: f32) -> bool {
+        self.heading.rests() && wrap_angle(heading - self.heading.position).abs() < 1e-3
+    }
+
     /// Where the point is, m.
     #[must_use]
     pub fn position(&self) -> Vec3 {

@@ -1,14 +1,16 @@
 //! A quadcopter of its own: rigid body, first-order motors, drag, wind, ground. Written from the equations of motion
 //! and sharing nothing with the controllers, so that an error here and an error there do not cancel.
+//!
+//! Drag follows the common model of 0.1·v², which overstates it for so small a vehicle: gusts hit harder than in air.
 
-use stampfly_control::{Mixed, Mixer, MultirotorMixer};
+use std::collections::VecDeque;
+
+use stampfly_control::{ControlInput, Controller, Mixed, Mixer, MultirotorMixer, Spin};
 use stampfly_types::messages::{
     CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, Setpoint, StateEstimate, SystemMode,
     Validity, VehicleStatus,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3};
-
-use stampfly_control::{ControlInput, Controller};
+use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
 
 /// What can differ from the vehicle the gains were chosen for.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +64,7 @@ pub struct Flight<C> {
     pub output: ControlOutput,
     pub mixed: Mixed,
     mixer: MultirotorMixer,
-    history: Vec<StateEstimate>,
+    history: VecDeque<StateEstimate>,
     specific_force: Vec3,
     random: u32,
 }
@@ -111,7 +113,7 @@ impl<C: Controller> Flight<C> {
             output: ControlOutput::default(),
             mixed: Mixed::default(),
             mixer: MultirotorMixer::stampfly(),
-            history: Vec::new(),
+            history: VecDeque::new(),
             specific_force: Vec3::new(0.0, 0.0, -GRAVITY),
             random: 12345,
         }
@@ -119,14 +121,16 @@ impl<C: Controller> Flight<C> {
 
     /// The newest estimate that has reached the controller.
     pub fn estimate(&self) -> StateEstimate {
-        let index = self.history.len().saturating_sub(1 + self.airframe.delay);
-        self.history.get(index).copied().unwrap_or_else(|| self.measure())
+        self.history.front().copied().unwrap_or_else(|| self.measure())
     }
 
     /// One control period.
     pub fn step(&mut self) {
         let measured = self.noisy();
-        self.history.push(measured);
+        self.history.push_back(measured);
+        if self.history.len() > 1 + self.airframe.delay {
+            self.history.pop_front();
+        }
         let estimate = self.estimate();
         let input = ControlInput {
             estimate: &estimate,
@@ -197,8 +201,8 @@ impl<C: Controller> Flight<C> {
             body.thrust[n] += (wanted - body.thrust[n]) * (dt / self.airframe.motor_lag);
             let thrust = body.thrust[n];
             let drag = match rotor.spin {
-                stampfly_control::Spin::CounterClockwise => rotor.kappa,
-                stampfly_control::Spin::Clockwise => -rotor.kappa,
+                Spin::CounterClockwise => rotor.kappa,
+                Spin::Clockwise => -rotor.kappa,
             };
             force += thrust;
             torque += Vec3::new(-rotor.y * thrust, rotor.x * thrust, drag * thrust);
@@ -206,12 +210,11 @@ impl<C: Controller> Flight<C> {
         let airspeed = body.velocity - self.wind;
         let drag = -airspeed * 0.1 * airspeed.norm();
         let push = body.attitude * Vec3::new(0.0, 0.0, -force) + drag;
-        let mut acceleration = push / self.airframe.mass + Vec3::new(0.0, 0.0, GRAVITY);
+        let acceleration = push / self.airframe.mass + Vec3::new(0.0, 0.0, GRAVITY);
         self.specific_force = body.attitude.inverse() * (push / self.airframe.mass);
         let on_ground = body.position.z >= 0.0;
         if on_ground && acceleration.z > 0.0 {
             // The ground carries the rest and holds the feet.
-            acceleration = Vec3::zeros();
             body.velocity = Vec3::zeros();
             body.position.z = 0.0;
             body.rate = Vec3::zeros();
@@ -228,9 +231,29 @@ impl<C: Controller> Flight<C> {
     }
 }
 
-/// Wind that wanders: first-order noise of 0.8 s correlation and the given standard deviation per axis.
-pub fn gust<C: Controller>(flight: &mut Flight<C>, standard_deviation: f32) {
+/// Wind that wanders: first-order noise of 0.8 s correlation whose speed has the given root mean square.
+pub fn gust<C: Controller>(flight: &mut Flight<C>, speed: f32) {
     const SHARE: f32 = 0.0025 / 0.8;
     let kick = flight.random_vector();
-    flight.wind += -flight.wind * SHARE + kick * (standard_deviation * (2.0 * SHARE).sqrt());
+    flight.wind += -flight.wind * SHARE + kick * (speed * math::sqrt(2.0 / 3.0 * SHARE));
+}
+
+/// Root mean square and largest magnitude of a series.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Spread {
+    sum: f64,
+    count: u32,
+    pub largest: f32,
+}
+
+impl Spread {
+    pub fn add(&mut self, value: f32) {
+        self.sum += f64::from(value) * f64::from(value);
+        self.count += 1;
+        self.largest = self.largest.max(value.abs());
+    }
+
+    pub fn rms(&self) -> f32 {
+        (self.sum / f64::from(self.count.max(1))).sqrt() as f32
+    }
 }
