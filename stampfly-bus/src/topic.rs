@@ -101,7 +101,6 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     }
 }
 
-#[cfg(not(loom))]
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: usize> Default for Topic<T, P, N, W, R> {
     fn default() -> Self {
         Self::new()
