@@ -45,7 +45,7 @@ fn main() -> Result<(), stampfly_control::GeometryError> {
     }
     println!("the integral has learned the bent propeller: {:.0} µNm", -DISTURBANCE * 1e6);
 
-    let thrusts = mixer.mix(&ControlOutput { thrust: WEIGHT, torque: Vec3::new(8e-3, 0.0, 2e-3) });
+    let thrusts = mixer.mix(&ControlOutput { thrust: WEIGHT, torque: Vec3::new(16e-3, 0.0, 3e-3) });
     let [roll, pitch, yaw, thrust] = thrusts.unmet;
     println!("\nmore than the motors can do: {:.3?} N", &thrusts.thrust[..6]);
     println!(

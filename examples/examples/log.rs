@@ -25,7 +25,7 @@ fn write(memory: &mut [u8]) -> Result<usize, Box<dyn std::error::Error>> {
             hash.publish(topic as u16, k, at, words);
         }
     }
-    println!("written, hash {hash:?}");
+    println!("{} samples written, hash {:016x}", hash.messages(), hash.finish());
     Ok(log.into_sink().written().len())
 }
 

@@ -61,7 +61,7 @@ fn main() {
                 if mode.armed { "may turn" } else { "off" }
             );
         } else if world.commands.contains(&GuidedKind::Arm) {
-            println!("{:>9} refused: {:?}", "", mode.blocks);
+            println!("{:>9} refused: {}", "", mode.blocks.names().collect::<Vec<_>>().join(", "));
         }
         before = mode;
         world.commands.clear();

@@ -1,10 +1,11 @@
-//! A hop: full power until it is half a metre up, then a fall, seen by the sensors and as it really was.
+//! A hop: power until the range finder says half a metre, then a fall. Nobody controls the attitude, so it tips over,
+//! which the sensors see, too.
 
 use stampfly_drivers::{Imu, MotorOutputs, RangeFinder};
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
 use stampfly_types::messages::MotorOutput;
+use stampfly_types::{Micros, frame};
 use std::cell::Cell;
 
 fn main() {
@@ -32,17 +33,17 @@ fn main() {
         }
     });
 
-    println!("   time   height    range      felt  rotors");
+    println!("   time   height    range        felt   tilt");
     for tick in 1..=24 {
         tasks.run_until(Micros::from_millis(tick * 50));
         let truth = world.truth_at(clock.now());
         let height = -truth.position.z;
         println!(
-            "{:4} ms {height:6.3} m {:6.3} m {:4.1} m/s² {:6.0} rad/s  {}{}",
+            "{:4} ms {height:6.3} m {:6.3} m {:5.1} m/s² {:4.0}°  {}{}",
             tick * 50,
             range.get(),
             felt.get(),
-            truth.rotor_speed[0],
+            frame::tilt(&truth.attitude).to_degrees(),
             " ".repeat((height.max(0.0) * 40.0) as usize),
             if truth.contact { "_" } else { "o" },
         );
