@@ -36,6 +36,7 @@ fn consume(repository: &Repository, name: &str, place: &Path) -> Result<(), Fail
     fs::copy(&source, folder.join("src/main.rs")).map_err(io)?;
     // The same versions as in the workspace; cargo strikes out what is not needed.
     fs::copy(repository.root.join("Cargo.lock"), folder.join("Cargo.lock")).map_err(io)?;
+    eprintln!("consumer of {name}");
     run_program(
         repository
             .cargo()
