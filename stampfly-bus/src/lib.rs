@@ -19,7 +19,7 @@
 //! wants to sleep is woken by its executor.
 #![no_std]
 
-#[cfg(test)]
+#[cfg(any(test, loom))]
 extern crate std;
 
 mod activation;
@@ -36,7 +36,16 @@ pub use topic::{
     AnyTopic, Every, Full, Hook, Latest, Lossless, Overwriting, Publisher, Sequential, Stamped, Subscriber, Tap, Topic,
 };
 
+#[cfg(loom)]
+#[doc(hidden)]
+pub use sync::weaken;
+
 #[doc(hidden)]
 pub mod __private {
     pub use stampfly_types::{Message, Micros};
 }
+
+/// The README's example, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

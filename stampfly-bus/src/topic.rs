@@ -10,7 +10,7 @@
 //! [`topics!`](crate::topics!), which hands out every end exactly once.
 
 use crate::ring::{Ring, next};
-use crate::sync::{AtomicU32, Ordering, unless_loom_const};
+use crate::sync::{AtomicU32, Ordering, spin_loop, unless_loom_const};
 use core::marker::PhantomData;
 use stampfly_types::{Message, Micros};
 
@@ -74,7 +74,20 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     }
 
     fn subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
-        Subscriber { ring: &self.ring, shared: self.cursors.get(index), cursor: 0, lost: 0, kind: PhantomData }
+        // A bus may have been in use before it was split: a reader starts with what is published from now on, or, where
+        // nothing may be lost, with what was never taken.
+        let shared = self.cursors.get(index);
+        let cursor = shared.map_or_else(|| self.ring.head(), |cursor| cursor.load(Ordering::Relaxed));
+        Subscriber { ring: &self.ring, shared, cursor, lost: 0, kind: PhantomData }
+    }
+
+    /// Makes the topic look as if it had been in use for long, `generation` being the newest sample. For tests.
+    #[doc(hidden)]
+    pub fn __age(&mut self, generation: u32) {
+        self.ring.write(generation.wrapping_sub(1), Micros::ZERO, &[0; W]);
+        for cursor in &self.cursors {
+            cursor.store(generation, Ordering::Relaxed);
+        }
     }
 
     #[doc(hidden)]
@@ -88,7 +101,6 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     }
 }
 
-#[cfg(not(loom))]
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: usize> Default for Topic<T, P, N, W, R> {
     fn default() -> Self {
         Self::new()
@@ -170,8 +182,9 @@ impl<T: Message<Words = [u32; W]>, const N: usize, const W: usize, const R: usiz
     /// [`Full`] gives the value back.
     pub fn publish(&mut self, at: Micros, data: T) -> Result<u32, Full<T>> {
         let full = self.topic.cursors.iter().any(|cursor| {
-            // Acquire: the reader has finished copying what it says it has taken.
-            self.newest.wrapping_sub(cursor.load(Ordering::Acquire)) >= N as u32
+            // Acquire: the reader has finished copying what it says it has taken. The distance is the one between the
+            // sample to be written and the one to be read next, because generations skip zero when they wrap.
+            next(self.newest).wrapping_sub(next(cursor.load(Ordering::Acquire))) >= N as u32
         });
         if full { Err(Full(data)) } else { Ok(self.write(at, &data.to_words())) }
     }
@@ -198,6 +211,7 @@ fn newest<const N: usize, const W: usize>(ring: &Ring<N, W>) -> Option<(u32, cra
         if let Some(copied) = ring.read(head) {
             return Some((head, copied));
         }
+        spin_loop();
     }
 }
 
@@ -212,7 +226,8 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
 
     /// The sample of this generation, if the ring still holds it. Moves the cursor there.
     pub fn at_generation(&mut self, generation: u32) -> Option<Stamped<T>> {
-        if generation == 0 {
+        // The sequence number alone could not tell a generation from the one 2³¹ later, nor 2³¹ from an empty slot.
+        if generation == 0 || self.ring.head().wrapping_sub(generation) > N as u32 {
             return None;
         }
         let copied = self.ring.read(generation)?;
@@ -257,8 +272,11 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
             }
             if pending > N as u32 {
                 let skipped = pending - N as u32;
-                self.lost = self.lost.wrapping_add(skipped);
-                self.cursor = self.cursor.wrapping_add(skipped);
+                let oldest = self.cursor.wrapping_add(skipped);
+                // There never was a generation zero to lose.
+                let wrapped = u32::from(oldest < self.cursor);
+                self.lost = self.lost.wrapping_add(skipped - wrapped);
+                self.cursor = oldest;
             }
             let generation = next(self.cursor);
             if let Some(copied) = self.ring.read(generation) {
@@ -271,6 +289,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
                 self.lost = self.lost.wrapping_add(1);
                 self.cursor = generation;
             }
+            spin_loop();
         }
     }
 
@@ -308,7 +327,7 @@ pub struct Tap<'b, T, const N: usize, const W: usize>(Subscriber<'b, T, Every, N
 impl<'b, T: Message<Words = [u32; W]>, const N: usize, const W: usize> Tap<'b, T, N, W> {
     #[doc(hidden)]
     pub fn __new<P, const R: usize>(topic: &'b Topic<T, P, N, W, R>) -> Self {
-        Self(Subscriber { ring: &topic.ring, shared: None, cursor: 0, lost: 0, kind: PhantomData })
+        Self(Subscriber { ring: &topic.ring, shared: None, cursor: topic.ring.head(), lost: 0, kind: PhantomData })
     }
 
     /// Hands every new sample to `take`: instant, generation, words.

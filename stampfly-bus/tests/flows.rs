@@ -1,5 +1,7 @@
 //! The five data flows of a flight stack, on a small vehicle of their own.
 
+#![cfg(not(loom))]
+
 use proptest::prelude::*;
 use stampfly_bus::{Activation, Band, Runnable, Runnables, Scheduler, schedule, topics};
 use stampfly_types::Micros;

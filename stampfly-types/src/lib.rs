@@ -6,7 +6,7 @@
 //! * [`time`]: [`Micros`], the only time there is;
 //! * [`frame`]: vectors, quaternions and the conventions they follow;
 //! * [`math`]: the one door to transcendental functions;
-//! * [`message`]: what can travel on the bus and into the log, declared with [`message!`];
+//! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`];
 //! * [`messages`]: the messages themselves, sensor to motor.
 //!
 //! # Conventions

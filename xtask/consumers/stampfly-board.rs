@@ -1,0 +1,18 @@
+//! A stranger's program: the vehicle, assembled.
+
+use stampfly_board::vehicle::assemble;
+use stampfly_board::{FlightLoop, VehicleConfig, wiring};
+use stampfly_types::{Micros, messages::ImuData};
+
+fn main() {
+    let mut bus = wiring::Bus::new();
+    let wiring::Split { ports, heads, mut taps } = bus.split(None);
+    let (vehicle, mut outside) = assemble(ports, &VehicleConfig::default());
+    let flight = FlightLoop::new(vehicle, heads, Micros::ZERO);
+    assert_eq!(flight.next_tick(), Some(Micros::from_millis(5)), "the failsafe runs even when no sensor does");
+
+    outside.imu.publish(Micros(2_500), &ImuData::default());
+    let mut logged = Vec::new();
+    taps.drain(&mut |topic, at, _, _| logged.push((topic, at)));
+    assert_eq!(logged, [(wiring::Id::sensor_imu, Micros(2_500))]);
+}

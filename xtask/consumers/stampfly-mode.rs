@@ -1,0 +1,20 @@
+//! A stranger's program: a vehicle that becomes ready.
+
+use stampfly_mode::{ModeInput, ModeMachine};
+use stampfly_types::Micros;
+use stampfly_types::messages::*;
+
+fn main() {
+    let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
+    let calibration = CalibrationResult { complete: true, ..Default::default() };
+    let input = ModeInput {
+        alerts: Alerts::NONE,
+        estimate: &estimate,
+        calibration: &calibration,
+        status: &VehicleStatus::default(),
+        pilot: None,
+        commands: &[],
+        button: None,
+    };
+    assert_eq!(ModeMachine::default().step(Micros(2_500), &input).mode.state, FlightState::IdleGround);
+}

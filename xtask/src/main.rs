@@ -1,0 +1,118 @@
+//! Every check there is, by name: `cargo xtask STEP`.
+//!
+//! | step | asks |
+//! |---|---|
+//! | one of [`STEPS`] | the question in its `about` |
+//! | `ci` | all of them that need nothing but this repository, in order, until one fails |
+//!
+//! One file a step in [`steps`]. A step says what it runs on stderr and fails with a sentence; the exit code is 0, 1
+//! for a failed step, 2 for a wrong command line.
+
+mod ci;
+mod repository;
+mod steps;
+
+use repository::Repository;
+use std::process::ExitCode;
+
+/// Why a step failed, for a person to read.
+type Failure = String;
+
+/// One check.
+struct Step {
+    name: &'static str,
+    /// What it asks, for `--help`.
+    about: &'static str,
+    /// Is it part of `ci`?
+    in_ci: bool,
+    run: fn(&Repository, arguments: &[String]) -> Result<(), Failure>,
+}
+
+/// In the order `ci` runs them: what fails fast and often comes first.
+const STEPS: &[Step] = &[
+    Step { name: "fmt", about: "is everything formatted?", in_ci: true, run: steps::fmt::run },
+    Step { name: "clippy", about: "no warning in any target?", in_ci: true, run: steps::clippy::run },
+    Step { name: "test", about: "does `cargo test` pass, recorded data included?", in_ci: true, run: steps::test::run },
+    Step { name: "doc", about: "does the documentation build without a warning?", in_ci: true, run: steps::doc::run },
+    Step {
+        name: "no-std",
+        about: "do the libraries build for bare metal? (--debian: with Debian's compiler)",
+        in_ci: true,
+        run: steps::no_std::run,
+    },
+    Step { name: "loom", about: "is the bus right in every interleaving?", in_ci: true, run: steps::loom::run },
+    Step {
+        name: "consumers",
+        about: "can each crate be used alone, from outside?",
+        in_ci: true,
+        run: steps::consumers::run,
+    },
+    Step {
+        name: "ulog",
+        about: "do public tools open our log? (optional: the log's path)",
+        in_ci: true,
+        run: steps::ulog::run,
+    },
+    Step {
+        name: "budget",
+        about: "does the 400 Hz chain stay within its instruction budget?",
+        in_ci: true,
+        run: steps::budget::run,
+    },
+    Step {
+        name: "package",
+        about: "would each crate, as committed, build from its package?",
+        in_ci: true,
+        run: steps::package::run,
+    },
+    Step {
+        name: "determinism",
+        about: "do optimised and unoptimised flights publish the same bits?",
+        in_ci: false,
+        run: steps::determinism::run,
+    },
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (name, rest) = match arguments.split_first() {
+        None => return usage(2),
+        Some((name, _)) if matches!(name.as_str(), "--help" | "-h" | "help") => return usage(0),
+        Some(split) => split,
+    };
+    if rest.iter().any(|argument| argument == "--help" || argument == "-h") {
+        return usage(0);
+    }
+    let repository = Repository::find();
+    let outcome = match STEPS.iter().find(|step| step.name == name) {
+        Some(step) => (step.run)(&repository, rest),
+        None if name == "ci" => ci::run(&repository, STEPS),
+        None => {
+            eprintln!("xtask: there is no step `{name}`\n");
+            return usage(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("xtask {name}: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Says what there is: to stdout when asked, to stderr when the command line was wrong.
+fn usage(code: u8) -> ExitCode {
+    let mut text = String::from("Usage: cargo xtask STEP [ARGUMENTS]\n\nSteps:\n");
+    text += "  ci           every step marked *, in this order, until one fails\n";
+    for step in STEPS {
+        let mark = if step.in_ci { '*' } else { ' ' };
+        text += &format!("{mark} {:<12} {}\n", step.name, step.about);
+    }
+    if code == 0 {
+        print!("{text}")
+    } else {
+        eprint!("{text}")
+    }
+    ExitCode::from(code)
+}

@@ -1,0 +1,108 @@
+//! Where the sources are, what the library crates are called, and how a program is run.
+
+use crate::Failure;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Libraries for a PC. Every other one has to build for bare metal.
+const HOST_ONLY: &[&str] = &["stampfly-sim"];
+
+/// The working copy.
+pub struct Repository {
+    /// Its top folder.
+    pub root: PathBuf,
+}
+
+/// A published library of this repository.
+pub struct Library {
+    /// Package name, which is its folder's, too.
+    pub name: String,
+    /// Has it to build for bare metal?
+    pub bare_metal: bool,
+}
+
+impl Repository {
+    /// The one this program was built from.
+    pub fn find() -> Self {
+        let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+        Self { root: package.parent().unwrap_or(package).to_owned() }
+    }
+
+    /// A folder for generated files.
+    pub fn target(&self, name: &str) -> PathBuf {
+        self.root.join("target").join(name)
+    }
+
+    /// Every library crate: the folders `stampfly-*` with a `src/lib.rs`. A new crate is checked without being listed.
+    pub fn libraries(&self) -> Result<Vec<Library>, Failure> {
+        let entries = std::fs::read_dir(&self.root).map_err(|e| format!("{}: {e}", self.root.display()))?;
+        let mut libraries: Vec<Library> = entries
+            .filter_map(|entry| {
+                let entry = entry.ok()?;
+                let name = entry.file_name().into_string().ok()?;
+                let is_library = name.starts_with("stampfly-") && entry.path().join("src/lib.rs").exists();
+                is_library.then(|| Library { bare_metal: !HOST_ONLY.contains(&name.as_str()), name })
+            })
+            .collect();
+        libraries.sort_by(|a, b| a.name.cmp(&b.name));
+        if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
+    }
+
+    /// A command that runs in the top folder.
+    pub fn command(&self, program: &str) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(&self.root);
+        command
+    }
+
+    /// The cargo this program was started by.
+    pub fn cargo(&self) -> Command {
+        self.command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
+    }
+}
+
+/// Says what is run, runs it, and turns a failure into a sentence.
+pub fn run(command: &mut Command) -> Result<(), Failure> {
+    let shown = announce(command);
+    let status = command.status().map_err(|e| format!("`{shown}` could not be started: {e}"))?;
+    if status.success() { Ok(()) } else { Err(format!("`{shown}` ended with {status}")) }
+}
+
+/// Like [`run`], and returns what the program wrote to stdout and to stderr.
+pub fn capture(command: &mut Command) -> Result<(String, String), Failure> {
+    let shown = announce(command);
+    let output = command.stdin(Stdio::null()).output().map_err(|e| format!("`{shown}` could not be started: {e}"))?;
+    let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    if output.status.success() {
+        Ok((out, err))
+    } else {
+        Err(format!("`{shown}` ended with {}\n{out}{err}", output.status))
+    }
+}
+
+/// Is there such a program?
+pub fn exists(program: &str) -> bool {
+    let version = Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    version.is_ok_and(|status| status.success())
+}
+
+/// Installs Debian packages.
+pub fn install(repository: &Repository, packages: &[&str]) -> Result<(), Failure> {
+    let missing = |e| format!("{e}; install {packages:?} by hand");
+    run(repository.command("apt-get").args(["update", "-qq"])).map_err(missing)?;
+    run(repository.command("apt-get").args(["install", "-y", "-qq", "--no-install-recommends"]).args(packages))
+        .map_err(missing)
+}
+
+fn announce(command: &Command) -> String {
+    let mut shown: Vec<String> = command
+        .get_envs()
+        .filter_map(|(key, value)| Some(format!("{}={}", key.to_string_lossy(), value?.to_string_lossy())))
+        .collect();
+    let program = Path::new(command.get_program()).file_name().unwrap_or(command.get_program());
+    shown.push(program.to_string_lossy().into_owned());
+    shown.extend(command.get_args().map(|argument| argument.to_string_lossy().into_owned()));
+    let shown = shown.join(" ");
+    eprintln!("$ {shown}");
+    shown
+}

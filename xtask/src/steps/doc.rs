@@ -1,0 +1,13 @@
+//! `doc`: broken links and malformed documentation are errors.
+
+use crate::Failure;
+use crate::repository::{Repository, run as run_program};
+
+pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+    let mut doc = repository.cargo();
+    doc.env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--quiet"]);
+    for library in repository.libraries()? {
+        doc.args(["-p", &library.name]);
+    }
+    run_program(&mut doc)
+}

@@ -1,0 +1,8 @@
+//! `fmt`: is everything formatted?
+
+use crate::Failure;
+use crate::repository::{Repository, run as run_program};
+
+pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+    run_program(repository.cargo().args(["fmt", "--all", "--check"])).map_err(|e| format!("{e}; run `cargo fmt --all`"))
+}

@@ -1,0 +1,13 @@
+//! One file a step.
+
+pub mod budget;
+pub mod clippy;
+pub mod consumers;
+pub mod determinism;
+pub mod doc;
+pub mod fmt;
+pub mod loom;
+pub mod no_std;
+pub mod package;
+pub mod test;
+pub mod ulog;

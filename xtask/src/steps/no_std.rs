@@ -1,0 +1,53 @@
+//! `no-std`: every library but the simulator builds for bare metal, ARM with and RISC-V without an FPU.
+//!
+//! The targets come from rustup. Where rustup cannot deliver them, Debian's compiler builds the core library from its
+//! own sources instead; it is installed when it is missing.
+
+use crate::Failure;
+use crate::repository::{Repository, capture, exists, install, run as run_program};
+use std::path::Path;
+use std::process::Command;
+
+const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
+const DEBIAN: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+
+pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+    let debian = match arguments {
+        [] => add_targets(repository).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err(),
+        [only] if only == "--debian" => true,
+        _ => return Err(format!("what is {arguments:?}?")),
+    };
+    if debian && !Path::new("/usr/bin/cargo").exists() {
+        install(repository, &DEBIAN)?;
+    }
+    for target in TARGETS {
+        let mut build = if debian { debian_cargo(repository) } else { repository.cargo() };
+        build.args(["build", "--quiet", "--target", target]);
+        if debian {
+            build.args(["-Zbuild-std=core,alloc", "--target-dir", "target/debian"]);
+        }
+        for library in repository.libraries()?.iter().filter(|library| library.bare_metal) {
+            build.args(["-p", &library.name]);
+        }
+        run_program(&mut build)?;
+    }
+    Ok(())
+}
+
+fn add_targets(repository: &Repository) -> Result<(), Failure> {
+    if !exists("rustup") {
+        return Err("there is no rustup".to_owned());
+    }
+    let (installed, _) = capture(repository.command("rustup").args(["target", "list", "--installed"]))?;
+    for target in TARGETS.iter().filter(|target| !installed.lines().any(|line| line == **target)) {
+        run_program(repository.command("rustup").args(["target", "add", target]))?;
+    }
+    Ok(())
+}
+
+/// Full paths, because rustup's come first in `PATH`.
+fn debian_cargo(repository: &Repository) -> Command {
+    let mut cargo = repository.command("/usr/bin/cargo");
+    cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", "/usr/bin/rustc").env_remove("RUSTUP_TOOLCHAIN");
+    cargo
+}

@@ -1,0 +1,27 @@
+//! `package`: each library, as committed, builds from the archive that would be published.
+//!
+//! Works on a fresh clone, so that a file that exists but was never committed is noticed.
+
+use crate::Failure;
+use crate::repository::{Repository, capture, run as run_program};
+use std::fs;
+
+pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+    let (uncommitted, _) = capture(repository.command("git").args(["status", "--porcelain"]))?;
+    if !uncommitted.is_empty() {
+        eprintln!("not committed and therefore not looked at:\n{uncommitted}");
+    }
+    let clone = repository.target("package-clone");
+    let _ = fs::remove_dir_all(&clone);
+    run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
+    let mut package = repository.cargo();
+    package
+        .current_dir(&clone)
+        .args(["package", "--locked", "--quiet", "--target-dir"])
+        .arg(repository.target("packages"));
+    // Together, because they depend on each other and none is published yet.
+    for library in repository.libraries()? {
+        package.args(["-p", &library.name]);
+    }
+    run_program(&mut package)
+}

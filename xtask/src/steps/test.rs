@@ -1,0 +1,27 @@
+//! `test`: the README's `cargo test`, and whether the recorded flights were there.
+//!
+//! Some tests and examples compare with recorded flights, in the folder `STAMPFLY_DATA` names or beside the
+//! repository. Without them the rest still means something on a developer's machine; in continuous integration
+//! (`CI=true`) their absence is an error, so that a green run is never one that looked at nothing.
+
+use crate::Failure;
+use crate::repository::{Repository, run as run_program};
+use std::path::PathBuf;
+
+pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+    let data = std::env::var_os("STAMPFLY_DATA").map_or_else(|| repository.root.join("../shared/data"), PathBuf::from);
+    let data = data.canonicalize().ok().filter(|folder| folder.is_dir());
+    let in_ci = std::env::var("CI").is_ok_and(|value| value == "true");
+    match &data {
+        Some(folder) => eprintln!("recorded data: {}", folder.display()),
+        None if in_ci => return Err("CI=true and no recorded data: set STAMPFLY_DATA to its folder".to_owned()),
+        None => eprintln!("recorded data: none (STAMPFLY_DATA names its folder)"),
+    }
+    let mut test = repository.cargo();
+    if let Some(folder) = data {
+        test.env("STAMPFLY_DATA", folder);
+    }
+    run_program(test.arg("test").args(arguments))?;
+    // Not among the default members, so that `cargo test` at home builds only what flies.
+    run_program(repository.cargo().args(["test", "--quiet", "-p", "xtask"]))
+}

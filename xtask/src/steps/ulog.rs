@@ -1,0 +1,47 @@
+//! `ulog`: the tools of the format's own authors open our log and find samples in it.
+
+use crate::Failure;
+use crate::repository::{Repository, capture, run as run_program};
+use std::fs;
+use std::path::PathBuf;
+
+pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+    let folder = repository.target("ulog");
+    let io = |e: std::io::Error| format!("{}: {e}", folder.display());
+    fs::create_dir_all(&folder).map_err(io)?;
+    let log = match arguments {
+        [] => {
+            let log = folder.join("example.ulg");
+            let mut write = repository.cargo();
+            write.args(["run", "--quiet", "-p", "stampfly-log", "--example", "write_log", "--"]).arg(&log);
+            run_program(&mut write)?;
+            log
+        }
+        [path] => PathBuf::from(path),
+        _ => return Err("one log at a time".to_owned()),
+    };
+
+    let tools = folder.join("python/bin");
+    if !tools.join("ulog_info").exists() {
+        run_program(repository.command("python3").args(["-m", "venv"]).arg(folder.join("python")))?;
+        run_program(repository.command(&tools.join("pip").to_string_lossy()).args(["install", "--quiet", "pyulog"]))?;
+    }
+    let tool = |name: &str| repository.command(&tools.join(name).to_string_lossy());
+
+    let (info, _) = capture(tool("ulog_info").arg(&log))?;
+    println!("{info}");
+    let tables = folder.join("csv");
+    let _ = fs::remove_dir_all(&tables);
+    fs::create_dir_all(&tables).map_err(io)?;
+    run_program(tool("ulog2csv").arg("-o").arg(&tables).arg(&log))?;
+
+    let mut rows = 0;
+    let mut topics = 0;
+    for entry in fs::read_dir(&tables).map_err(io)? {
+        let table = fs::read_to_string(entry.map_err(io)?.path()).map_err(io)?;
+        topics += 1;
+        rows += table.lines().count().saturating_sub(1);
+    }
+    println!("{rows} samples in {topics} tables");
+    if rows == 0 { Err("the tools found no sample".to_owned()) } else { Ok(()) }
+}
