@@ -248,12 +248,8 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let mut next_report = start;
     let end = start + config.limit;
     loop {
-        let deadlines = [
-            tasks.next_deadline(),
-            flight_loop.next_tick(),
-            flight_at,
-            interrupted.as_ref().map(|(at, _)| *at),
-        ];
+        let deadlines =
+            [tasks.next_deadline(), flight_loop.next_tick(), flight_at, interrupted.as_ref().map(|(at, _)| *at)];
         let Some(next) = deadlines.into_iter().flatten().min() else { break };
         tasks.run_until(next.max(clock.now()));
         let now = clock.now();
