@@ -517,12 +517,14 @@ impl Eskf {
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
         let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance);
-        let scale = self.config.flow_scale_sigma;
-        let variance = |row: &Row<6>| {
-            let (base, speed) = (self.config.flow_sigma * distance, scale * row.predicted);
-            base * base + speed * speed
+        // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
+        // by itself makes large readings count less and the velocity too small.
+        let variance = |row: &Row<6>, turning: f32| {
+            let base = self.config.flow_sigma * distance;
+            let scale = self.config.flow_scale_sigma * (row.predicted + turning * distance);
+            base * base + scale * scale
         };
-        let variances = [variance(&rows[0]), variance(&rows[1])];
+        let variances = [variance(&rows[0], raw.y), variance(&rows[1], -raw.x)];
         // Both axes pass or neither does: a single axis locked out drifts unnoticed.
         let first = self.covariance.project(rows[0].jacobian, variances[0]);
         let second = self.covariance.project(rows[1].jacobian, variances[1]);
