@@ -23,6 +23,9 @@ const AIDING_TIMEOUT: Micros = Micros(1_000_000);
 const MAX_DELAY: Micros = Micros(100_000);
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
+/// Doubt beyond which a velocity and a position count as unknown, m/s and m.
+const UNKNOWN_VELOCITY: f32 = 3.0;
+const UNKNOWN_POSITION: f32 = 10.0;
 /// While standing, the ground is absorbed at every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
 
@@ -255,6 +258,23 @@ impl Eskf {
         }
     }
 
+    /// Without anything that measures it, a velocity is the integral of a small error of the tilt and soon larger than
+    /// any that the vehicle can fly. From there on it is not estimated: it stays at zero, and the position where it is,
+    /// until somebody measures it again.
+    fn forget_motion(&mut self) {
+        const LIMITS: [(usize, f32); 2] = [(VELOCITY, UNKNOWN_VELOCITY), (POSITION, UNKNOWN_POSITION)];
+        for (block, limit) in LIMITS {
+            for axis in 0..3 {
+                if self.covariance.get(block + axis, block + axis) > limit * limit {
+                    self.covariance.reset(block + axis, limit * limit);
+                    if block == VELOCITY {
+                        self.state.velocity[axis] = 0.0;
+                    }
+                }
+            }
+        }
+    }
+
     /// Gives up what is not finite and starts again from the last calibration.
     fn recover(&mut self) {
         let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
@@ -374,6 +394,7 @@ impl Estimator for Eskf {
                 self.absorb_gravity(accel, self.config.still_gravity_sigma);
             } else if !self.holds_velocity() {
                 self.absorb_gravity(accel, self.config.gravity_sigma);
+                self.forget_motion();
             }
         }
         self.watch();
