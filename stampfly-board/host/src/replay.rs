@@ -116,8 +116,12 @@ fn is_outside(topic: usize) -> bool {
 }
 
 fn read(bytes: &[u8]) -> Result<Script, ReplayError> {
-    let mut script =
-        Script { entries: Vec::new(), recorded: Recorded::new(), config: VehicleConfig::default(), start: Micros::ZERO };
+    let mut script = Script {
+        entries: Vec::new(),
+        recorded: Recorded::new(),
+        config: VehicleConfig::default(),
+        start: Micros::ZERO,
+    };
     let mut places: BTreeMap<u16, Place> = BTreeMap::new();
     let mut formats: BTreeMap<String, usize> = BTreeMap::new();
     let reader = Reader::new(bytes).map_err(ReplayError::Log)?;

@@ -1,8 +1,10 @@
 //! The command line.
 
 use crate::Failure;
-use clap::{Args, Parser, Subcommand};
-use stampfly_board::parameters;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use stampfly_board::{VehicleConfig, parameters};
+use stampfly_host::dataset::Kind;
+use stampfly_host::estimate::suite;
 use stampfly_host::mission::Mission;
 use stampfly_host::simulate::FlightConfig;
 use std::path::PathBuf;
@@ -27,6 +29,8 @@ pub enum Command {
     Topics(TopicsOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
+    /// Run the estimator over recorded sensor data and say how good it is.
+    Estimate(EstimateOptions),
 }
 
 impl Default for Command {
@@ -136,6 +140,54 @@ pub struct TopicsOptions {
     pub markdown: bool,
 }
 
+/// The estimators of the family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EstimatorChoice {
+    /// Error-state Kalman filter.
+    Eskf,
+    /// Complementary filter.
+    Complementary,
+}
+
+/// Options of `estimate`.
+#[derive(Clone, Debug, Args)]
+pub struct EstimateOptions {
+    /// StampFly logs and captures (CSV), NanoBench and BROAD (NPZ), PX4 replays (CSV).
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Which estimator.
+    #[arg(long, value_enum, default_value = "eskf")]
+    pub estimator: EstimatorChoice,
+    /// Change a parameter of the flight stack (`stampfly fly --list` shows them).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub param: Vec<String>,
+    /// Folder for a report per recording, `estimate_NAME.html`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl EstimateOptions {
+    /// The tuning for one kind of recording, with what the options change.
+    pub fn config(&self, kind: Kind) -> Result<VehicleConfig, Failure> {
+        let mut config = suite(kind);
+        config.estimator = f32::from(u8::from(self.estimator == EstimatorChoice::Complementary));
+        set_parameters(&mut config, &self.param)?;
+        Ok(config)
+    }
+}
+
+/// Applies `--param`.
+fn set_parameters(config: &mut VehicleConfig, texts: &[String]) -> Result<(), Failure> {
+    for text in texts {
+        let (name, value) = assignment(text)?;
+        parameters::set(config, name, value as f32).map_err(|error| format!("--param {text}: {error}"))?;
+    }
+    Ok(())
+}
+
 /// Splits `name=value`.
 fn assignment(text: &str) -> Result<(&str, f64), Failure> {
     let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
@@ -169,11 +221,7 @@ impl SceneOptions {
             let (name, value) = assignment(text)?;
             config.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
-        for text in &self.param {
-            let (name, value) = assignment(text)?;
-            parameters::set(&mut config.vehicle, name, value as f32)
-                .map_err(|error| format!("--param {text}: {error}"))?;
-        }
+        set_parameters(&mut config.vehicle, &self.param)?;
         config.jitter = self.jitter;
         Ok(config)
     }

@@ -7,6 +7,7 @@ macro_rules! outln {
 
 mod arguments;
 mod campaign;
+mod estimate;
 mod fly;
 mod replay;
 mod terminal;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
         Command::Campaign(options) => campaign::run(&options),
+        Command::Estimate(options) => estimate::run(&options),
     };
     match result {
         Ok(code) => code,

@@ -1,0 +1,102 @@
+//! An estimator over recorded data: what it says, and how good that is.
+//!
+//! | recording | what is fused | what it is compared with |
+//! |---|---|---|
+//! | StampFly log | inertial, range, flow, barometer | dead reckoning from the flow |
+//! | StampFly flight capture | inertial, range | – |
+//! | NanoBench | inertial, velocity from motion capture | motion capture, above 0.3 m after three seconds |
+//! | BROAD | inertial, magnetic heading | motion capture, while moving |
+//! | PX4 replay | inertial, barometer | – |
+//!
+//! The same filter with the same code as in flight. Its tuning differs between sensor suites (see [`suite`]), never
+//! between files of one. It is never told that the vehicle stands: that would be half the answer.
+//!
+//! Not for replaying a flight of this stack bit by bit: that is [`crate::replay`].
+
+mod accuracy;
+mod dead_reckoning;
+mod drive;
+mod figures;
+mod start;
+
+pub use accuracy::Accuracy;
+pub use dead_reckoning::{Reach, path, reach};
+pub use drive::{Drive, Instance, Tally, drive};
+pub use figures::Figures;
+pub use start::Start;
+
+use crate::dataset::{Kind, Recording};
+use crate::flight::Flight;
+use stampfly_board::VehicleConfig;
+use stampfly_types::Vec3;
+
+/// An estimate over one recording, with its figures.
+#[derive(Clone, Debug)]
+pub struct Estimated {
+    /// Where it started.
+    pub start: Start,
+    /// What the estimator said, and what became of the samples.
+    pub drive: Drive,
+    /// How good it is.
+    pub figures: Figures,
+}
+
+/// The tuning for recordings of this kind: the vehicle's, but for what its sensors do differently.
+#[must_use]
+pub fn suite(kind: Kind) -> VehicleConfig {
+    let mut config = VehicleConfig::default();
+    match kind {
+        Kind::Broad => {
+            // A hand-held sensor far from any motor: the field is good, and there is no propeller vibration.
+            config.eskf.mag_enable = true;
+        }
+        // The radio log took single samples of a vibrating gyro, stamped up to 30 ms off: they disagree with the rate
+        // that the cameras saw by 0.2 to 0.4 rad/s.
+        Kind::NanoBench => config.eskf.gyro_noise = 0.06,
+        Kind::StampFlyLog | Kind::StampFlyFlight | Kind::Px4Replay => {}
+    }
+    config
+}
+
+/// Runs the estimator over a recording.
+///
+/// ```
+/// use stampfly_host::{dataset, estimate};
+///
+/// let mut text = "timestamp_ms,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n".to_owned();
+/// for row in 0..200 {
+///     text += &format!("{},0,0,0.00{},0,0,-9.81\n", row * 10, row % 2);
+/// }
+/// let recording = dataset::parse("still", text.as_bytes())?;
+/// let estimated = estimate::run(&recording, &estimate::suite(recording.kind));
+/// assert!(!estimated.figures.diverged && estimated.figures.tilt_rmse_deg.is_none());
+/// # Ok::<(), dataset::DatasetErrorKind>(())
+/// ```
+#[must_use]
+pub fn run(recording: &Recording, config: &VehicleConfig) -> Estimated {
+    let start = Start::of(recording);
+    let drive = drive(recording, &start, config);
+    let figures = Figures::of(recording, &start, &drive);
+    Estimated { start, drive, figures }
+}
+
+impl Estimated {
+    /// The recording as a flight, with `estimate_state` and `estimate_status` beside its own topics.
+    #[must_use]
+    pub fn to_flight(&self, recording: &Recording) -> Flight {
+        let mut flight = recording.to_flight();
+        let origin = origin(recording, &self.start);
+        for Instance { at, mut state, status } in self.drive.instances.iter().copied() {
+            state.position += origin;
+            flight.push("estimate_state", at, &state);
+            flight.push("estimate_status", at, &status);
+        }
+        flight
+    }
+}
+
+/// Where the estimator's origin lies in the recording's world.
+fn origin(recording: &Recording, start: &Start) -> Vec3 {
+    let seen = recording.truth.iter().filter(|point| point.at >= start.at).find_map(|point| point.position);
+    seen.unwrap_or_default()
+}
