@@ -24,15 +24,9 @@ pub struct PositionConfig {
 impl Default for PositionConfig {
     fn default() -> Self {
         Self {
-<<<<<<< HEAD
             position_gain: 1.5,
             correction_max: 1.0,
             velocity: PidGains { kp: 3.0, ti: 1.2, td: 0.0, eta: 0.125 },
-=======
-            position_gain: 2.0,
-            correction_max: 1.0,
-            velocity: PidGains { kp: 6.0, ti: 0.7, td: 0.0, eta: 0.125 },
->>>>>>> control
             tilt_max: 0.35,
         }
     }

@@ -23,14 +23,11 @@ const AIDING_TIMEOUT: Micros = Micros(1_000_000);
 const MAX_DELAY: Micros = Micros(100_000);
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
-<<<<<<< HEAD
 /// How well the heading is known where it is defined to be zero, rad.
 const HEADING_SIGMA: f32 = 1e-3;
-=======
 /// Doubt beyond which a velocity and a position count as unknown, m/s and m.
 const UNKNOWN_VELOCITY: f32 = 3.0;
 const UNKNOWN_POSITION: f32 = 10.0;
->>>>>>> estimate
 /// While standing, the ground is absorbed at every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
 
@@ -263,14 +260,14 @@ impl Eskf {
         }
     }
 
-<<<<<<< HEAD
     /// Heading counts from where the vehicle was initialised, so it is known there. Doubting it would let every error of
     /// the flow sensor turn the vehicle's idea of north.
     fn know_heading(&mut self) {
         let up = self.rotation[2];
         let row = Row { predicted: 0.0, jacobian: [(ATTITUDE, up[0]), (ATTITUDE + 1, up[1]), (ATTITUDE + 2, up[2])] };
         self.absorb_row(row, 0.0, HEADING_SIGMA);
-=======
+    }
+
     /// Without anything that measures it, a velocity is the integral of a small error of the tilt and soon larger than
     /// any that the vehicle can fly. From there on it is not estimated: it stays at zero, and the position where it is,
     /// until somebody measures it again.
@@ -286,7 +283,6 @@ impl Eskf {
                 }
             }
         }
->>>>>>> estimate
     }
 
     /// Gives up what is not finite and starts again from the last calibration.
@@ -564,11 +560,7 @@ impl Eskf {
         let raw = rates.unwrap_or(self.imu.gyro);
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
-<<<<<<< HEAD
         let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance).map(without_heading);
-=======
-        let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance);
->>>>>>> estimate
         // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
         // by itself makes large readings count less and the velocity too small.
         let variance = |row: &Row<6>, turning: f32| {

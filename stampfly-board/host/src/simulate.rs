@@ -250,7 +250,6 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let mut next_report = start;
     let end = start + config.limit;
     loop {
-<<<<<<< HEAD
         let deadlines = [
             tasks.next_deadline(),
             // A tick that has passed is waiting for an executor that is late.
@@ -258,10 +257,6 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
             flight_at,
             interrupted.as_ref().map(|(at, _)| *at),
         ];
-=======
-        let deadlines =
-            [tasks.next_deadline(), flight_loop.next_tick(), flight_at, interrupted.as_ref().map(|(at, _)| *at)];
->>>>>>> estimate
         let Some(next) = deadlines.into_iter().flatten().min() else { break };
         tasks.run_until(next.max(clock.now()));
         let now = clock.now();
