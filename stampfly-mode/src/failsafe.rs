@@ -2,7 +2,7 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g, and above six sigma of the present vibration, in two samples running | when disarmed |
+//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing), and above six sigma of the present vibration, in two samples running | when disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running | when disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms, except in ACRO | when disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms | with the next sample; `IMU_LOST` when disarmed |
@@ -27,6 +27,8 @@ use stampfly_types::{GRAVITY, Micros, Vec3, frame, math};
 pub struct FailsafeConfig {
     /// Impact, m/s².
     pub impact: f32,
+    /// Impact while landing, m/s²: a firm touchdown reaches 4 g.
+    pub landing_impact: f32,
     /// Impact, in standard deviations of the vibration.
     pub impact_sigmas: f32,
     /// Angular rate, rad/s.
@@ -55,6 +57,7 @@ impl Default for FailsafeConfig {
     fn default() -> Self {
         Self {
             impact: 3.0 * GRAVITY,
+            landing_impact: 6.0 * GRAVITY,
             impact_sigmas: 6.0,
             rate: 13.96,
             tumble: [1.05, 0.3],
@@ -145,7 +148,7 @@ impl Failsafe {
             && self.last_imu != Some(at)
         {
             self.last_imu = Some(at);
-            active = self.inspect_motion(active, imu);
+            active = self.inspect_motion(active, imu, input.mode.state);
         }
         let silence = self.last_imu.map_or(now, |at| now.since(at));
         let [degraded, lost] = self.config.imu_silence;
@@ -168,7 +171,7 @@ impl Failsafe {
         SystemAlert { active, seen: self.seen }
     }
 
-    fn inspect_motion(&mut self, active: Alerts, imu: &ImuData) -> Alerts {
+    fn inspect_motion(&mut self, active: Alerts, imu: &ImuData, state: FlightState) -> Alerts {
         let rate = imu.gyro.norm();
         if !imu.accel.norm().is_finite() || !rate.is_finite() {
             return active;
@@ -177,7 +180,9 @@ impl Failsafe {
         *blow += (imu.accel - *blow) * 0.3;
         let force = blow.norm();
         let [mean, variance] = self.force;
-        let limit = self.config.impact.max(mean + self.config.impact_sigmas * math::sqrt(variance));
+        let landing = state == FlightState::Landing;
+        let impact = if landing { self.config.landing_impact } else { self.config.impact };
+        let limit = impact.max(mean + self.config.impact_sigmas * math::sqrt(variance));
         self.impacts = if force >= limit { self.impacts.saturating_add(1) } else { 0 };
         self.overspeeds = if rate >= self.config.rate { self.overspeeds.saturating_add(1) } else { 0 };
         // An impact must not raise its own threshold: outliers enter clipped.
@@ -319,6 +324,18 @@ mod tests {
                 let accel = REST + Vec3::new(noise(), noise() * 0.3, noise()) * strength;
                 prop_assert!(rig.sample(accel, Vec3::zeros()).is_empty());
             }
+        }
+    }
+
+    #[test]
+    fn a_firm_touchdown_is_no_crash() {
+        let mut rig = Rig::flying();
+        rig.mode.state = FlightState::Landing;
+        for _ in 0..400 {
+            rig.sample(REST, Vec3::zeros());
+        }
+        for force in [3.0, 6.0, 5.0, 2.0, 1.0, 1.0] {
+            assert!(rig.sample(REST * force, Vec3::zeros()).is_empty());
         }
     }
 

@@ -5,8 +5,10 @@ use crate::arguments::FlyOptions;
 use crate::terminal;
 use serde_json::{Map, json};
 use stampfly_board::plan;
+use stampfly_host::flight_log;
 use stampfly_host::metrics::FIGURES;
 use stampfly_host::recorder::Recorder;
+use stampfly_host::report::{Metric, Report};
 use stampfly_host::simulate::{Outcome, fly};
 use std::path::Path;
 use std::process::ExitCode;
@@ -34,13 +36,42 @@ pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
     let log = options.out.join("flight.ulg");
     std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
 
+    let page = options.out.join("flight.html");
+    write_report(&outcome, recorder.log(), options, &page)?;
+
     if options.scene.json {
         print_json(&outcome);
     } else {
-        print_screen(&outcome, &recorder, &log);
+        print_screen(&outcome, &recorder, &log, &page);
     }
     let good = outcome.metrics.landed && outcome.metrics.disarmed && outcome.finished;
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// The report is made from the log, so it shows what the log holds and nothing else.
+fn write_report(outcome: &Outcome, log: &[u8], options: &FlyOptions, page: &Path) -> Result<(), Failure> {
+    let parsed = flight_log::parse(log)?;
+    let mut metrics: Vec<Metric> = FIGURES
+        .iter()
+        .filter_map(|(name, unit, figure)| Some((name, unit, figure(&outcome.metrics)?)))
+        .map(|(name, unit, value)| Metric::new(*name, format!("{value:.3}"), *unit))
+        .collect();
+    let done = outcome.metrics.landed && outcome.metrics.disarmed;
+    metrics.insert(0, Metric::new("landed, disarmed", if done { "yes" } else { "no" }, "").judged(done));
+    metrics.push(Metric::new("log hash", format!("{:016x}", outcome.log_hash), ""));
+    let report = Report {
+        title: "StampFly flight".into(),
+        subtitle: format!(
+            "simulated, mission {}, seed {}, vibration {}, {:.1} s",
+            options.scene.mission,
+            options.seed,
+            options.scene.vibration,
+            outcome.duration.seconds_f64()
+        ),
+        metrics,
+        flight: &parsed.flight,
+    };
+    report.write(page).map_err(|error| format!("{}: {error}", page.display()).into())
 }
 
 fn print_json(outcome: &Outcome) {
@@ -57,7 +88,7 @@ fn print_json(outcome: &Outcome) {
     outln!("{}", serde_json::Value::Object(object));
 }
 
-fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path) {
+fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path, page: &Path) {
     outln!("phases");
     for phase in &outcome.phases {
         let mode = if phase.state.name() == "Flying" { format!(" {:?}", phase.mode) } else { String::new() };
@@ -96,5 +127,6 @@ fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path) {
         (true, false) => "landed, still armed",
         (false, _) => "DID NOT LAND",
     };
-    outln!("{verdict}\nlog    {}", log.display());
+    outln!("{verdict}\n\nlog     {}   (for example: ulog_info, PlotJuggler, stampfly replay)", log.display());
+    outln!("report  {}   (open it in a browser)", page.display());
 }
