@@ -219,7 +219,7 @@ fn command_at(step: usize) -> Option<GuidedCommand> {
         2_200 => Some(go(GuidedKind::TakeOff, 0.0, 0.0)),
         4_840 => Some(go(GuidedKind::WayPoint, 0.4, 0.0)),
         4_880 => Some(go(GuidedKind::WayPoint, 0.4, 0.4)),
-        _ if step % 40 == 0 => Some(GuidedCommand::default()),
+        _ if step.is_multiple_of(40) => Some(GuidedCommand::default()),
         _ => None,
     }
 }

@@ -33,6 +33,7 @@ const STEPS: &[Step] = &[
     Step { name: "fmt", about: "is everything formatted?", in_ci: true, run: steps::fmt::run },
     Step { name: "clippy", about: "no warning in any target?", in_ci: true, run: steps::clippy::run },
     Step { name: "test", about: "does `cargo test` pass, recorded data included?", in_ci: true, run: steps::test::run },
+    Step { name: "examples", about: "does every example run to its end?", in_ci: true, run: steps::examples::run },
     Step { name: "doc", about: "does the documentation build without a warning?", in_ci: true, run: steps::doc::run },
     Step {
         name: "no-std",

@@ -5,6 +5,7 @@ pub mod clippy;
 pub mod consumers;
 pub mod determinism;
 pub mod doc;
+pub mod examples;
 pub mod fmt;
 pub mod loom;
 pub mod no_std;

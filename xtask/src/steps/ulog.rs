@@ -3,7 +3,6 @@
 use crate::Failure;
 use crate::repository::{Repository, capture, run as run_program};
 use std::fs;
-use std::path::PathBuf;
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
     let folder = repository.target("ulog");
@@ -17,7 +16,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
             run_program(&mut write)?;
             log
         }
-        [path] => PathBuf::from(path),
+        [path] => std::path::absolute(path).map_err(io)?,
         _ => return Err("one log at a time".to_owned()),
     };
 

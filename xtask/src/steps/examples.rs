@@ -1,0 +1,22 @@
+//! `examples`: every example of the examples package still runs to its end.
+
+use crate::Failure;
+use crate::repository::{Repository, capture};
+use std::fs;
+
+pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+    let folder = repository.root.join("examples/examples");
+    let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut names: Vec<String> =
+        entries.filter_map(|entry| Some(entry.ok()?.path().file_stem()?.to_str()?.to_owned())).collect();
+    names.sort();
+    for name in &names {
+        let mut example = repository.cargo();
+        example.args(["run", "--quiet", "-p", "stampfly-examples", "--example", name]);
+        let (printed, _) = capture(&mut example)?;
+        if printed.is_empty() {
+            return Err(format!("the example `{name}` shows nothing"));
+        }
+    }
+    if names.is_empty() { Err(format!("no example in {}", folder.display())) } else { Ok(()) }
+}
