@@ -41,13 +41,13 @@ topics! {
 
     // Estimation.
     /// What the still-calibration has found so far.
-    calibration: CalibrationResult = latest @ 400 Hz from calibration => [estimation, mode];
+    calibration: CalibrationResult = latest @ 50 Hz from calibration => [estimation, mode];
     /// Attitude, velocity, position, and which of them may be used.
     estimate_state: StateEstimate = latest @ 400 Hz from estimation => [failsafe, mode, landing, navigation, control, telemetry];
     /// How each sensor agreed with the estimate.
     estimate_status: EstimatorStatus = latest @ 400 Hz from estimation => [failsafe];
     /// What the mode machine asks of the estimator.
-    estimator_command: EstimatorCommand = latest @ 400 Hz from mode => [estimation];
+    estimator_command: EstimatorCommand = latest @ on event from mode => [estimation];
 
     // Decisions.
     /// Conditions the failsafe has found.

@@ -294,7 +294,7 @@ impl Eskf {
     }
 
     fn watch(&mut self) {
-        if !self.state.is_finite() || (self.steps % 128 == 0 && !self.covariance.is_healthy()) {
+        if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
             self.recover();
         } else if self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0 {
             self.status.diverged = true;
@@ -356,8 +356,7 @@ impl Estimator for Eskf {
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
         self.rotation = self.state.rotation();
         if calibration.field.norm() > 1.0 {
-            self.mag_reference =
-                aid::heading::error(&self.state, &self.rotation, &calibration.field, 0.0).map(|row| row.predicted);
+            self.mag_reference = aid::heading::error(&self.rotation, &calibration.field, 0.0).map(|row| row.predicted);
         }
         self.anchor = self.command.on_ground.then(Vec3::zeros);
         self.know_heading();
@@ -409,7 +408,7 @@ impl Estimator for Eskf {
         self.flow_rates.add(&imu.gyro);
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
-        if self.steps % STILL_DIVIDER == 0
+        if self.steps.is_multiple_of(STILL_DIVIDER)
             && let Some(accel) = self.accels.take()
         {
             if let Some(anchor) = self.anchor {
@@ -582,8 +581,8 @@ impl Eskf {
                 let world = crate::filter::state::rotate(&self.rotation, &body);
                 self.state.velocity.x = world.x;
                 self.state.velocity.y = world.y;
-                for axis in 0..2 {
-                    self.covariance.reset(VELOCITY + axis, 4.0 * variances[axis] + 0.01);
+                for (axis, variance) in variances.into_iter().enumerate() {
+                    self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
                     self.covariance.inflate(ATTITUDE + axis, 0.01);
                     self.covariance.inflate(ACCEL_BIAS + axis, 0.01);
                     self.covariance.inflate(GYRO_BIAS + axis, 1e-5);
@@ -646,7 +645,7 @@ impl Eskf {
             return Err(Refusal::Range);
         }
         let reference = self.mag_reference.ok_or(Refusal::Missing)?;
-        let row = aid::heading::error(&self.state, &self.rotation, &mag.field, reference).ok_or(Refusal::Range)?;
+        let row = aid::heading::error(&self.rotation, &mag.field, reference).ok_or(Refusal::Range)?;
         let projection = self.covariance.project(row.jacobian, self.config.mag_sigma * self.config.mag_sigma);
         let innovation = -row.predicted;
         let ratio = self.ratio(innovation, projection.variance);

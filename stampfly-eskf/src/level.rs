@@ -13,7 +13,8 @@ use stampfly_types::{Vec3, math};
 /// ```
 #[must_use]
 pub fn attitude_from_specific_force(force: &Vec3) -> [f32; 4] {
-    if !(force.norm() > 0.1) {
+    let norm = force.norm();
+    if norm.is_nan() || norm <= 0.1 {
         return [1.0, 0.0, 0.0, 0.0];
     }
     let roll = math::atan2(-force.y, -force.z);

@@ -107,8 +107,8 @@ fn first(rows: &[(bool, Colour, Blink)], now: Micros) -> Colour {
     let Some((_, colour, blink)) = rows.iter().find(|(applies, ..)| *applies) else { return OFF };
     let on = match blink {
         Blink::Solid => true,
-        Blink::Slow => now.0 / 500_000 % 2 == 0,
-        Blink::Fast => now.0 / 125_000 % 2 == 0,
+        Blink::Slow => (now.0 / 500_000).is_multiple_of(2),
+        Blink::Fast => (now.0 / 125_000).is_multiple_of(2),
     };
     if on { *colour } else { OFF }
 }

@@ -41,7 +41,7 @@ impl Link<'_> {
     async fn look(&mut self) -> TelemetryFrame {
         self.clock.sleep_until(self.clock.now() + PERIOD).await;
         self.looks += 1;
-        if self.looks % LIFE_DIVIDER == 0 {
+        if self.looks.is_multiple_of(LIFE_DIVIDER) {
             // A vehicle that takes no more commands misses a sign of life, which is what it should notice.
             let _ = self.commands.publish(self.clock.now(), GuidedCommand::default());
         }

@@ -58,8 +58,11 @@ pub struct Metrics {
     pub hover_drift_m: Option<f64>,
 }
 
+/// One figure: name, unit, and where it is.
+pub type Figure = (&'static str, &'static str, fn(&Metrics) -> Option<f64>);
+
 /// Figures in the order and with the names they are printed in.
-pub const FIGURES: [(&str, &str, fn(&Metrics) -> Option<f64>); 8] = [
+pub const FIGURES: [Figure; 8] = [
     ("pos_rms_m", "m", |m| m.pos_rms_m),
     ("est_pos_rms_m", "m", |m| m.est_pos_rms_m),
     ("alt_rms_m", "m", |m| m.alt_rms_m),

@@ -8,6 +8,7 @@ use stampfly_types::messages::*;
 
 /// The controllers this vehicle can be told to use (`controller.type`).
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "one of them exists, for as long as the vehicle does")]
 enum Choice {
     Cascade(CascadeController),
     Geometric(GeometricController),

@@ -9,6 +9,7 @@ use stampfly_types::messages::*;
 
 /// The estimators this vehicle can be told to use (`estimator.type`).
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "one of them exists, for as long as the vehicle does")]
 enum Choice {
     Eskf(Eskf),
     Complementary(Complementary),

@@ -6,19 +6,19 @@
 //! only this one row is used.
 
 use super::Row;
+use crate::filter::ATTITUDE;
 use crate::filter::state::{Rotation, rotate};
-use crate::filter::{ATTITUDE, Nominal};
 use stampfly_types::{Vec3, math};
 
 /// Heading that the field measures, relative to the reference heading (zero in the true attitude), and its row.
 /// `None` when the field has no usable horizontal part.
 #[must_use]
-pub fn error(state: &Nominal, rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row<3>> {
-    let _ = state;
+pub fn error(rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row<3>> {
     let world = rotate(rotation, field);
     let horizontal = world.x * world.x + world.y * world.y;
-    if !(horizontal > 1.0) {
-        return None; // Less than 1 µT, or not a number.
+    // Less than 1 µT is no direction; neither is what is not a number.
+    if horizontal.is_nan() || horizontal <= 1.0 {
+        return None;
     }
     let [r31, r32, r33] = rotation[2];
     Some(Row {
@@ -30,16 +30,16 @@ pub fn error(state: &Nominal, rotation: &Rotation, field: &Vec3, reference: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::N;
     use crate::filter::state::rotate_back;
+    use crate::filter::{N, Nominal};
 
     /// The row is exact for rotations about the vertical, which is all it claims.
     #[test]
     fn jacobian_matches_a_turn_about_the_vertical() {
         let state = crate::aid::numeric::awkward_state();
         let field = rotate_back(&state.rotation(), &Vec3::new(22.0, -9.0, 38.0));
-        let at = |state: &Nominal| error(state, &state.rotation(), &field, 0.1).expect("a field").predicted;
-        let row = error(&state, &state.rotation(), &field, 0.1).expect("a field");
+        let at = |state: &Nominal| error(&state.rotation(), &field, 0.1).expect("a field").predicted;
+        let row = error(&state.rotation(), &field, 0.1).expect("a field");
         let axis = rotate_back(&state.rotation(), &Vec3::z());
         let step = 0.01;
         let mut turn = [0.0; N];

@@ -29,7 +29,8 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
         match &result.difference {
             None => outln!(
                 "{path}: identical: {} activations repeated, {} samples compared bit for bit",
-                result.activations, result.samples
+                result.activations,
+                result.samples
             ),
             Some(difference) => outln!("{path}: differs: {difference}"),
         }
