@@ -35,7 +35,8 @@ pub trait Runnable {
     fn run(&mut self, activation: &mut Activation);
 }
 
-/// One activation. See the [module](self) documentation.
+/// One activation: its instant, what it read and what it was refused. In flight it writes this down, in a replay it
+/// decides it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Activation {
     now: Micros,
