@@ -9,7 +9,7 @@ use crate::config::EskfConfig;
 use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
 use crate::filter::state::{Motion, Rotation};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Nominal, POSITION, VELOCITY};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Nominal, POSITION, RateHistory, VELOCITY};
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
@@ -44,7 +44,7 @@ impl Aid {
     }
 }
 
-/// Running mean of inertial samples between two flow samples, or between two looks at gravity.
+/// Running mean of inertial samples between two looks at gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Mean {
     sum: Vec3,
@@ -105,7 +105,7 @@ pub struct Eskf {
     imu: ImuData,
     rate: Vec3,
     force: Vec3,
-    flow_rates: Mean,
+    rates: RateHistory,
     accels: Mean,
     tof: Aid,
     flow: Aid,
@@ -148,7 +148,7 @@ impl Eskf {
             imu: ImuData::default(),
             rate: Vec3::zeros(),
             force: Vec3::zeros(),
-            flow_rates: Mean::default(),
+            rates: RateHistory::default(),
             accels: Mean::default(),
             tof: Aid::default(),
             flow: Aid::default(),
@@ -383,7 +383,7 @@ impl Estimator for Eskf {
         self.rotation = self.state.rotation();
         self.rate = motion.rate;
         self.force = motion.force;
-        self.flow_rates.add(&imu.gyro);
+        self.rates.add(at, motion.dt, imu.gyro);
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
         if self.steps % STILL_DIVIDER == 0
@@ -517,7 +517,6 @@ impl Eskf {
     }
 
     fn try_flow(&mut self, at: Micros, flow: &FlowData) -> Result<Fusion, Refusal> {
-        let rates = self.flow_rates.take();
         self.admit(at, &[flow.delta_x, flow.delta_y, flow.interval])?;
         self.flow.heard = Some(self.now);
         if !flow.valid || flow.quality < self.config.flow_min_quality {
@@ -534,7 +533,8 @@ impl Eskf {
         if distance < self.config.flow_min_distance {
             return Err(Refusal::Range);
         }
-        let raw = rates.unwrap_or(self.imu.gyro);
+        let seen = Micros(at.0.saturating_sub((self.config.flow_delay * 1e6) as u64));
+        let raw = self.rates.mean(seen, flow.interval).unwrap_or(self.imu.gyro);
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
         let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance);
