@@ -491,7 +491,10 @@ impl Eskf {
         let surface = *self.surface.get_or_insert(self.state.position.z + below);
         let delay = self.now.since(at).seconds();
         let row = aid::tof::range(&self.state, &self.rotation, surface, delay);
-        let sigma = self.config.tof_sigma.max(tof.sigma);
+        // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the axis
+        // and the one straight down.
+        let cone = tof.distance * (1.0 - self.rotation[2][2]);
+        let sigma = self.config.tof_sigma.max(tof.sigma) + cone;
         let projection = self.covariance.project(row.jacobian, sigma * sigma);
         let innovation = tof.distance - row.predicted;
         let ratio = self.ratio(innovation, projection.variance);
