@@ -70,6 +70,10 @@ pub struct EskfConfig {
     /// Standard deviation of "is where it started" while standing, m.
     pub still_position_sigma: f32,
 
+    /// Doubt in "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the accelerometer noise it is
+    /// the time in which the velocity fades.
+    pub blind_velocity: f32,
+
     /// Gates, in standard deviations.
     pub gate: f32,
     /// After this long without an accepted sample of a sensor that keeps reporting, the state moves to it, s.
@@ -107,6 +111,7 @@ impl Default for EskfConfig {
             still_gravity_sigma: 0.1,
             still_velocity_sigma: 0.01,
             still_position_sigma: 0.005,
+            blind_velocity: 0.2,
             gate: 4.0,
             lockout: 0.2,
         }

@@ -275,6 +275,16 @@ impl Eskf {
         }
     }
 
+    /// Tilted out of sight of the ground, for `dt` seconds: nothing measures the velocity, and the integral of a tilt
+    /// error grows by the second. Vehicles that use their velocity do not fly like this; hands carry them so, slowly.
+    fn absorb_blind(&mut self, dt: f32) {
+        let sigma = self.config.blind_velocity / math::sqrt(dt.max(1e-3));
+        for axis in 0..3 {
+            let velocity = Row { predicted: self.state.velocity[axis], jacobian: [(VELOCITY + axis, 1.0)] };
+            self.absorb_row(velocity, 0.0, sigma);
+        }
+    }
+
     /// Gives up what is not finite and starts again from the last calibration.
     fn recover(&mut self) {
         let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
@@ -395,6 +405,8 @@ impl Estimator for Eskf {
             } else if !self.holds_velocity() {
                 self.absorb_gravity(accel, self.config.gravity_sigma);
                 self.forget_motion();
+            } else if self.rotation[2][2] < self.config.min_cos_tilt && !self.velocity.is_recent(at) {
+                self.absorb_blind(dt * STILL_DIVIDER as f32);
             }
         }
         self.watch();
