@@ -44,6 +44,9 @@ pub struct EskfConfig {
     /// Part of the flow error that grows with the image's motion, as a share. A PMW3901 sees 121 frames a second and is
     /// read a hundred times: a reading holds one frame's motion or two, so it is 17 % low or 65 % high.
     pub flow_scale_sigma: f32,
+    /// How long before its stamp a flow sample's stretch of time ended, s: pictures wait to be compared and read. 4 ms by
+    /// the data sheet, 17 in recorded logs, where the logger is part of it.
+    pub flow_delay: f32,
     /// Smallest surface quality used.
     pub flow_min_quality: u8,
     /// Below this distance to the surface flow is not used, m.
@@ -66,6 +69,10 @@ pub struct EskfConfig {
     pub still_velocity_sigma: f32,
     /// Standard deviation of "is where it started" while standing, m.
     pub still_position_sigma: f32,
+
+    /// Doubt in "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the accelerometer noise it is
+    /// the time in which the velocity fades.
+    pub blind_velocity: f32,
 
     /// Gates, in standard deviations.
     pub gate: f32,
@@ -93,6 +100,7 @@ impl Default for EskfConfig {
             ground_clearance: 0.03,
             flow_sigma: 0.1,
             flow_scale_sigma: 0.35,
+            flow_delay: 0.012,
             flow_min_quality: 25,
             flow_min_distance: 0.02,
             baro_sigma: 0.3,
@@ -103,6 +111,7 @@ impl Default for EskfConfig {
             still_gravity_sigma: 0.1,
             still_velocity_sigma: 0.01,
             still_position_sigma: 0.005,
+            blind_velocity: 0.2,
             gate: 4.0,
             lockout: 0.2,
         }

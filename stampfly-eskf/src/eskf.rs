@@ -9,7 +9,7 @@ use crate::config::EskfConfig;
 use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
 use crate::filter::state::{Motion, Rotation};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Nominal, POSITION, VELOCITY};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Nominal, POSITION, RateHistory, VELOCITY};
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
@@ -46,7 +46,7 @@ impl Aid {
     }
 }
 
-/// Running mean of inertial samples between two flow samples, or between two looks at gravity.
+/// Running mean of inertial samples between two looks at gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Mean {
     sum: Vec3,
@@ -107,7 +107,7 @@ pub struct Eskf {
     imu: ImuData,
     rate: Vec3,
     force: Vec3,
-    flow_rates: Mean,
+    rates: RateHistory,
     accels: Mean,
     tof: Aid,
     flow: Aid,
@@ -150,7 +150,7 @@ impl Eskf {
             imu: ImuData::default(),
             rate: Vec3::zeros(),
             force: Vec3::zeros(),
-            flow_rates: Mean::default(),
+            rates: RateHistory::default(),
             accels: Mean::default(),
             tof: Aid::default(),
             flow: Aid::default(),
@@ -285,6 +285,16 @@ impl Eskf {
         }
     }
 
+    /// Tilted out of sight of the ground, for `dt` seconds: nothing measures the velocity, and the integral of a tilt
+    /// error grows by the second. Vehicles that use their velocity do not fly like this; hands carry them so, slowly.
+    fn absorb_blind(&mut self, dt: f32) {
+        let sigma = self.config.blind_velocity / math::sqrt(dt.max(1e-3));
+        for axis in 0..3 {
+            let velocity = Row { predicted: self.state.velocity[axis], jacobian: [(VELOCITY + axis, 1.0)] };
+            self.absorb_row(velocity, 0.0, sigma);
+        }
+    }
+
     /// Gives up what is not finite and starts again from the last calibration.
     fn recover(&mut self) {
         let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
@@ -405,7 +415,7 @@ impl Estimator for Eskf {
         self.rotation = self.state.rotation();
         self.rate = motion.rate;
         self.force = motion.force;
-        self.flow_rates.add(&imu.gyro);
+        self.rates.add(at, motion.dt, imu.gyro);
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
         if self.steps.is_multiple_of(STILL_DIVIDER)
@@ -417,6 +427,8 @@ impl Estimator for Eskf {
             } else if !self.holds_velocity() {
                 self.absorb_gravity(accel, self.config.gravity_sigma);
                 self.forget_motion();
+            } else if self.rotation[2][2] < self.config.min_cos_tilt && !self.velocity.is_recent(at) {
+                self.absorb_blind(dt * STILL_DIVIDER as f32);
             }
         }
         self.watch();
@@ -513,7 +525,10 @@ impl Eskf {
         let surface = *self.surface.get_or_insert(self.state.position.z + below);
         let delay = self.now.since(at).seconds();
         let row = aid::tof::range(&self.state, &self.rotation, surface, delay);
-        let sigma = self.config.tof_sigma.max(tof.sigma);
+        // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the axis
+        // and the one straight down.
+        let cone = tof.distance * (1.0 - self.rotation[2][2]);
+        let sigma = self.config.tof_sigma.max(tof.sigma) + cone;
         let projection = self.covariance.project(row.jacobian, sigma * sigma);
         let innovation = tof.distance - row.predicted;
         let ratio = self.ratio(innovation, projection.variance);
@@ -539,7 +554,6 @@ impl Eskf {
     }
 
     fn try_flow(&mut self, at: Micros, flow: &FlowData) -> Result<Fusion, Refusal> {
-        let rates = self.flow_rates.take();
         self.admit(at, &[flow.delta_x, flow.delta_y, flow.interval])?;
         self.flow.heard = Some(self.now);
         if !flow.valid || flow.quality < self.config.flow_min_quality {
@@ -556,7 +570,8 @@ impl Eskf {
         if distance < self.config.flow_min_distance {
             return Err(Refusal::Range);
         }
-        let raw = rates.unwrap_or(self.imu.gyro);
+        let seen = Micros(at.0.saturating_sub((self.config.flow_delay * 1e6) as u64));
+        let raw = self.rates.mean(seen, flow.interval).unwrap_or(self.imu.gyro);
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
         let rows = aid::flow::body_velocity(&self.state, &self.rotation, distance).map(without_heading);

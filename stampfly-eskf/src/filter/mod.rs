@@ -9,11 +9,14 @@
 //! |---|---|
 //! | [`state`] | nominal state, small rotations, injection of a correction |
 //! | [`covariance`] | storage, propagation, scalar update |
+//! | [`history`] | rates of the last moments, for sensors that report late |
 
 pub mod covariance;
+pub mod history;
 pub mod state;
 
 pub use covariance::{Covariance, N};
+pub use history::RateHistory;
 pub use state::Nominal;
 
 /// Index of the first position error state.
