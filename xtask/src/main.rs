@@ -69,8 +69,20 @@ const STEPS: &[Step] = &[
     Step {
         name: "determinism",
         about: "do optimised and unoptimised flights publish the same bits?",
-        in_ci: false,
+        in_ci: true,
         run: steps::determinism::run,
+    },
+    Step {
+        name: "docs",
+        about: "do the documents' links and tables agree with the sources? (--fix: make them)",
+        in_ci: true,
+        run: steps::docs::run,
+    },
+    Step {
+        name: "figures",
+        about: "measure the README's figures and write them there",
+        in_ci: false,
+        run: steps::figures::run,
     },
 ];
 

@@ -15,7 +15,8 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         for profile in PROFILES {
             let mut fly = repository.cargo();
             fly.args(["run", "--quiet", "--profile", profile, "--bin", "stampfly", "--"]);
-            let (report, _) = capture(fly.args(["fly", "--seed", seed, "--json"]))?;
+            fly.args(["fly", "--seed", seed, "--json", "--out"]).arg(repository.target("determinism"));
+            let (report, _) = capture(&mut fly)?;
             let hash = log_hash(&report).ok_or_else(|| format!("no `log_hash` in {report}"))?.to_owned();
             println!("seed {seed}, {profile:<12} {hash}");
             of_seed.push(hash);

@@ -1,4 +1,4 @@
-//! `ulog`: the tools of the format's own authors open our log and find samples in it.
+//! `ulog`: the tools of the format's own authors open the log of a flight and find samples in it.
 
 use crate::Failure;
 use crate::repository::{Repository, capture, run as run_program};
@@ -10,11 +10,10 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
     fs::create_dir_all(&folder).map_err(io)?;
     let log = match arguments {
         [] => {
-            let log = folder.join("example.ulg");
-            let mut write = repository.cargo();
-            write.args(["run", "--quiet", "-p", "stampfly-log", "--example", "write_log", "--"]).arg(&log);
-            run_program(&mut write)?;
-            log
+            let mut fly = repository.cargo();
+            fly.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "fly", "--out"]).arg(&folder);
+            run_program(&mut fly)?;
+            folder.join("flight.ulg")
         }
         [path] => std::path::absolute(path).map_err(io)?,
         _ => return Err("one log at a time".to_owned()),

@@ -1,0 +1,38 @@
+//! `figures`: prints the README's figures, each from the command that measures it, and writes them there.
+//!
+//! Takes some minutes. Not part of `ci`: figures are read by people, and the bars they must meet are tests.
+
+use crate::Failure;
+use crate::repository::{Repository, capture};
+use std::fmt::Write;
+use std::fs;
+
+const BEGIN: &str = "<!-- figures: cargo xtask figures -->\n";
+const END: &str = "<!-- end of figures -->";
+
+/// Title, arguments of `stampfly`, and what the reader should know.
+const CAMPAIGNS: &[(&str, &[&str])] = &[
+    ("Reference mission, 100 seeds, gusts of 0.5 m/s", &["campaign", "--flights", "100"]),
+    ("A minute of hovering, 100 seeds", &["campaign", "--flights", "100", "--mission", "hover"]),
+    ("Four times the recorded vibration, 100 seeds", &["campaign", "--flights", "100", "--vibration", "4"]),
+];
+
+pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+    let mut text = String::new();
+    for (title, arguments) in CAMPAIGNS {
+        let (table, _) = stampfly(repository, arguments)?;
+        let _ = write!(text, "{title}: `stampfly {}`\n\n```text\n{table}```\n\n", arguments.join(" "));
+    }
+    let path = repository.root.join("README.md");
+    let readme = fs::read_to_string(&path).map_err(|e| format!("README.md: {e}"))?;
+    let missing = "README.md has no place for the figures";
+    let (head, rest) = readme.split_once(BEGIN).ok_or(missing)?;
+    let (_, tail) = rest.split_once(END).ok_or(missing)?;
+    print!("{text}");
+    fs::write(&path, format!("{head}{BEGIN}{text}{END}{tail}")).map_err(|e| format!("README.md: {e}"))
+}
+
+fn stampfly(repository: &Repository, arguments: &[&str]) -> Result<(String, String), Failure> {
+    let mut command = repository.cargo();
+    capture(command.args(["run", "--quiet", "--release", "--bin", "stampfly", "--"]).args(arguments))
+}
