@@ -84,12 +84,11 @@ fn check_link(before: &str, target: &str, folder: &Path) -> Result<String, Failu
     let word = text.trim_matches('`').rsplit([':', '.', ' ']).next().unwrap_or_default().trim_matches('`');
     let source = fs::read_to_string(&path).map_err(|e| format!("{file}: {e}"))?;
     let defines = |line: &str| {
-        ["fn", "struct", "trait", "mod", "const", "enum", "macro_rules!"]
-            .iter()
-            .any(|keyword| line.contains(&format!("{keyword} {word}")))
+        let keywords = ["fn", "struct", "trait", "mod", "const", "enum", "macro_rules!"];
+        keywords.iter().any(|keyword| has_word(line, &format!("{keyword} {word}")))
     };
     let number: usize = line.parse().unwrap_or_default();
-    let fits = |line: &str| line.contains(word);
+    let fits = |line: &str| has_word(line, word);
     if source.lines().nth(number.wrapping_sub(1)).is_some_and(|line| defines(line)) {
         return Ok(target.to_owned());
     }
@@ -97,6 +96,16 @@ fn check_link(before: &str, target: &str, folder: &Path) -> Result<String, Failu
     let found = lines.clone().find(|(_, line)| defines(line)).or_else(|| lines.find(|(_, line)| fits(line)));
     let (index, _) = found.ok_or_else(|| format!("link to {target}: no line has '{word}'"))?;
     Ok(format!("{file}#L{}", index + 1))
+}
+
+/// Does the line hold these words, not as a part of longer ones?
+fn has_word(line: &str, words: &str) -> bool {
+    let inside = |c: char| c.is_alphanumeric() || c == '_';
+    line.match_indices(words).any(|(at, _)| {
+        let before = line[..at].chars().next_back();
+        let after = line[at + words.len()..].chars().next();
+        !before.is_some_and(inside) && !after.is_some_and(inside)
+    })
 }
 
 #[cfg(test)]
