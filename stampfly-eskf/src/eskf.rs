@@ -244,7 +244,8 @@ impl Eskf {
         if worst > 1.0 {
             let since = *self.gravity.gated_since.get_or_insert(self.now);
             if self.now.since(since).seconds() > 4.0 * self.config.lockout {
-                // It never rights itself otherwise: doubt the attitude until gravity fits in again.
+                // It never rights itself otherwise: doubt the attitude, once per lock-out, until gravity fits in again.
+                self.gravity.gated_since = Some(self.now);
                 for axis in 0..3 {
                     self.covariance.inflate(ATTITUDE + axis, 0.01);
                 }
@@ -668,7 +669,8 @@ impl Eskf {
         self.status.mag_ratio = ratio;
         if ratio > 1.0 {
             if self.gated(|s| &mut s.mag) {
-                // The heading is nobody else's to hold: doubt it until the field fits in again.
+                // The heading is nobody else's to hold: doubt it, once per lock-out, until the field fits in again.
+                self.mag.gated_since = Some(self.now);
                 for axis in 0..3 {
                     self.covariance.inflate(ATTITUDE + axis, 0.1 * self.rotation[2][axis] * self.rotation[2][axis]);
                 }
