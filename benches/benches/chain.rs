@@ -33,7 +33,9 @@ impl Stages {
 }
 
 impl Observer for Stages {
-    fn starting(&mut self, _: usize) {
+    fn has_read(&mut self, _: usize, _: &Activation) {}
+
+    fn starts(&mut self, _: usize) {
         self.begun = Instant::now();
     }
 

@@ -49,37 +49,48 @@ impl<'b> FlightLoop<'b> {
     /// Is anything due in this band?
     #[must_use]
     pub fn is_due(&self, band: Band, clock: Micros) -> bool {
-        self.scheduler.due(band, clock, &self.heads).is_some()
+        self.scheduler.due(band, 0, clock, &self.heads).is_some()
     }
 
-    /// Runs everything that is due in this band. Returns whether anything ran.
+    /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
     pub fn run_band(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> bool {
-        let mut any = false;
-        while let Some(pending) = self.start_next(band, clock, observer) {
-            self.finish(pending, observer);
-            any = true;
+        let mut next = 0;
+        while let Some((index, now)) = self.scheduler.due(band, next, clock, &self.heads) {
+            let mut activation = Activation::live(now);
+            self.start(index, &mut activation, observer);
+            self.complete(index, &mut activation, observer);
+            next = index + 1;
         }
-        any
+        next > 0
+    }
+
+    #[inline]
+    fn start(&mut self, index: usize, activation: &mut Activation, observer: &mut impl Observer) {
+        self.scheduler.started(index, activation.now(), &self.heads);
+        self.vehicle.read(index, activation);
+        observer.has_read(index, activation);
+    }
+
+    #[inline]
+    fn complete(&mut self, index: usize, activation: &mut Activation, observer: &mut impl Observer) {
+        observer.starts(index);
+        self.vehicle.run(index, activation);
+        self.scheduler.finished(index);
+        observer.finished(index, activation);
     }
 
     /// Lets the next due activation of this band read its inputs. Whatever is published before
     /// [`finish`](Self::finish) belongs to its next activation, as if it had been interrupted.
     pub fn start_next(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> Option<Pending> {
-        let (index, now) = self.scheduler.due(band, clock, &self.heads)?;
+        let (index, now) = self.scheduler.due(band, 0, clock, &self.heads)?;
         let mut activation = Activation::live(now);
-        self.scheduler.started(index, now, &self.heads);
-        self.vehicle.read(index, &mut activation);
-        observer.has_read(index, &activation);
+        self.start(index, &mut activation, observer);
         Some(Pending { index, activation })
     }
 
     /// Runs what has read its inputs.
-    pub fn finish(&mut self, pending: Pending, observer: &mut impl Observer) {
-        let Pending { index, mut activation } = pending;
-        observer.starts(index);
-        self.vehicle.run(index, &mut activation);
-        self.scheduler.finished(index, activation.now());
-        observer.finished(index, &activation);
+    pub fn finish(&mut self, mut pending: Pending, observer: &mut impl Observer) {
+        self.complete(pending.index, &mut pending.activation, observer);
     }
 
     /// Repeats a recorded activation. Returns it as it went this time.

@@ -54,8 +54,10 @@ pub struct Scheduler<const A: usize, const T: usize> {
     seen: [[u32; MAX_TRIGGERS]; A],
     /// The `now` of each activation's last run.
     last: [Micros; A],
-    /// Has this `after` predecessor finished since?
-    released: [Option<Micros>; A],
+    /// How often each activation has finished.
+    runs: [u32; A],
+    /// How often each activation's predecessor had finished when it last started.
+    followed: [u32; A],
 }
 
 /// Most topics one `on` can name.
@@ -65,15 +67,20 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
     /// A scheduler at power-on, `start` on the clock. Periods count from there.
     #[must_use]
     pub fn new(table: &'static [ActivationInfo; A], start: Micros) -> Self {
-        Self { table, seen: [[0; MAX_TRIGGERS]; A], last: [start; A], released: [None; A] }
+        Self { table, seen: [[0; MAX_TRIGGERS]; A], last: [start; A], runs: [0; A], followed: [0; A] }
     }
 
-    /// The first activation of this band, in table order, that is due at `clock`: its index and its `now`.
+    /// The first activation of this band from line `first` on that is due at `clock`: its index and its `now`.
+    ///
+    /// An executor that goes through the table once, from each activation to the next, runs a whole chain of `after`s in
+    /// one pass, because `after` only names lines above.
+    #[inline]
     #[must_use]
-    pub fn due(&self, band: Band, clock: Micros, heads: &[&dyn AnyTopic; T]) -> Option<(usize, Micros)> {
+    pub fn due(&self, band: Band, first: usize, clock: Micros, heads: &[&dyn AnyTopic; T]) -> Option<(usize, Micros)> {
         self.table
             .iter()
             .enumerate()
+            .skip(first)
             .filter(|(_, info)| info.band == band)
             .find_map(|(index, info)| self.triggered(index, info, clock, heads).map(|now| (index, now)))
     }
@@ -94,7 +101,10 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
                     (topic.head() != *seen).then(|| topic.newest_at()).flatten()
                 })
                 .max(),
-            Trigger::After(_) => *self.released.get(index)?,
+            Trigger::After(before) => {
+                let runs = *self.runs.get(before)?;
+                (runs != *self.followed.get(index)?).then(|| self.last.get(before).copied()).flatten()
+            }
             Trigger::Every(period) => self.tick(index, period, clock),
         };
         by_trigger.or_else(|| self.tick(index, info.at_latest?, clock))
@@ -107,28 +117,32 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
     }
 
     /// Notes that an activation is about to read its inputs.
+    #[inline]
     pub fn started(&mut self, index: usize, now: Micros, heads: &[&dyn AnyTopic; T]) {
-        if let (Some(info), Some(seen)) = (self.table.get(index), self.seen.get_mut(index))
-            && let Trigger::On(topics) = info.trigger
-        {
-            for (topic, seen) in topics.iter().zip(seen) {
-                *seen = heads.get(*topic).map_or(0, |topic| topic.head());
+        match self.table.get(index).map(|info| info.trigger) {
+            Some(Trigger::On(topics)) => {
+                let seen = self.seen.get_mut(index).into_iter().flatten();
+                for (topic, seen) in topics.iter().zip(seen) {
+                    *seen = heads.get(*topic).map_or(0, |topic| topic.head());
+                }
             }
+            Some(Trigger::After(before)) => {
+                if let (Some(runs), Some(followed)) = (self.runs.get(before), self.followed.get_mut(index)) {
+                    *followed = *runs;
+                }
+            }
+            _ => {}
         }
         if let Some(last) = self.last.get_mut(index) {
             *last = now;
         }
-        if let Some(released) = self.released.get_mut(index) {
-            *released = None;
-        }
     }
 
     /// Notes that an activation has published: releases the ones that run after it.
-    pub fn finished(&mut self, index: usize, now: Micros) {
-        for (info, released) in self.table.iter().zip(&mut self.released) {
-            if info.trigger == Trigger::After(index) {
-                *released = Some(now);
-            }
+    #[inline]
+    pub fn finished(&mut self, index: usize) {
+        if let Some(runs) = self.runs.get_mut(index) {
+            *runs = runs.wrapping_add(1);
         }
     }
 

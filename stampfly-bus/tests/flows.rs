@@ -137,12 +137,12 @@ impl<'b> Rig<'b> {
 
     fn run_due(&mut self, clock: Micros) {
         for band in [Band::Flight, Band::Background] {
-            while let Some((index, now)) = self.scheduler.due(band, clock, &self.heads) {
+            while let Some((index, now)) = self.scheduler.due(band, 0, clock, &self.heads) {
                 let mut activation = Activation::live(now);
                 self.scheduler.started(index, now, &self.heads);
                 self.vehicle.read(index, &mut activation);
                 self.vehicle.run(index, &mut activation);
-                self.scheduler.finished(index, now);
+                self.scheduler.finished(index);
                 self.trace.push((index, activation));
             }
         }
