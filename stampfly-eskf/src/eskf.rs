@@ -307,7 +307,7 @@ impl Eskf {
     fn watch(&mut self) {
         if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
             self.recover();
-        } else if self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0 {
+        } else if self.holds_velocity() && (self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0) {
             self.status.diverged = true;
         }
     }

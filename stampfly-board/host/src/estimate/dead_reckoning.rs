@@ -92,8 +92,13 @@ mod tests {
             .to_owned();
         for n in 0..=200 {
             let ([dx, dy], [p, q, r]) = row(n);
-            let wiggle = 1e-4 * (n % 3) as f64;
-            text += &format!("{},10,{wiggle},0,-9.81,{p},{q},{r},0,{range},100,{dx},{dy}{}\n", n * 10, ",0".repeat(9));
+            // Equal readings in a row would pass for one: let the quality change.
+            let (wiggle, quality) = (1e-4 * (n % 3) as f64, 100 + n % 2);
+            text += &format!(
+                "{},10,{wiggle},0,-9.81,{p},{q},{r},0,{range},{quality},{dx},{dy}{}\n",
+                n * 10,
+                ",0".repeat(9)
+            );
         }
         dataset::parse("made up", text.as_bytes()).expect("a log")
     }
@@ -129,7 +134,7 @@ mod tests {
     #[test]
     fn what_is_no_number_is_not_hidden() {
         let mut reach = Reach::default();
-        [1.0, f32::NAN, 2.0].map(|north| reach.add(north, 0.0));
+        [1.0, f32::NAN, 2.0].iter().for_each(|north| reach.add(*north, 0.0));
         assert!(reach.max_xy_m.is_nan() && reach.end_xy_m == 2.0);
     }
 }
