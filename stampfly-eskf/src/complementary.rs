@@ -51,7 +51,7 @@ impl Default for ComplementaryConfig {
     }
 }
 
-/// The complementary filter. See the [module](self) documentation and [`Estimator`].
+/// The complementary filter: fixed gains, no covariance. See [`Estimator`] for how to call it.
 ///
 /// ```
 /// use stampfly_eskf::{Complementary, ComplementaryConfig, Estimator};

@@ -12,7 +12,7 @@ const STALE_DEMAND: Micros = Micros::from_millis(25);
 /// A battery reading older than this is no reading.
 const STALE_POWER: Micros = Micros::from_secs(1);
 
-/// See the [module](self) documentation.
+/// Actuation: thrust and torque in, motor duty out.
 pub struct Actuation<'b> {
     ports: ActuationPorts<'b>,
     mixer: MultirotorMixer,

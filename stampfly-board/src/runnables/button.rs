@@ -4,7 +4,7 @@ use crate::wiring;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::ButtonDecoder;
 
-/// See the [module](self) documentation.
+/// Button: a contact in, gestures out.
 pub struct ButtonReader<'b> {
     ports: ButtonPorts<'b>,
     decoder: ButtonDecoder,

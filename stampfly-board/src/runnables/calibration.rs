@@ -6,7 +6,7 @@ use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::StillCalibration;
 use stampfly_types::messages::*;
 
-/// See the [module](self) documentation.
+/// Calibration: still samples in, biases and the first attitude out.
 pub struct Calibration<'b> {
     ports: CalibrationPorts<'b>,
     calibration: StillCalibration,

@@ -6,7 +6,7 @@ use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::Authority;
 use stampfly_types::messages::*;
 
-/// See the [module](self) documentation.
+/// Command: every source of commands in, one arbitrated set of sticks out.
 pub struct Command<'b> {
     ports: CommandPorts<'b>,
     authority: Authority,

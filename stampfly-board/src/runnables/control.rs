@@ -14,7 +14,7 @@ enum Choice {
     Geometric(GeometricController),
 }
 
-/// See the [module](self) documentation.
+/// Control: state and set-point in, thrust and torque out.
 pub struct Control<'b> {
     ports: ControlPorts<'b>,
     controller: Choice,

@@ -24,7 +24,7 @@ impl Choice {
     }
 }
 
-/// See the [module](self) documentation.
+/// Estimation: inertial samples and everything else in, state out.
 pub struct Estimation<'b> {
     ports: EstimationPorts<'b>,
     estimator: Choice,

@@ -7,7 +7,7 @@ use stampfly_mode::{Failsafe, FailsafeInput};
 use stampfly_types::Micros;
 use stampfly_types::messages::*;
 
-/// See the [module](self) documentation.
+/// Failsafe: everything that can go wrong in, alerts out.
 pub struct FailsafeMonitor<'b> {
     ports: FailsafePorts<'b>,
     failsafe: Failsafe,

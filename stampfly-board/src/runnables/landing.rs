@@ -5,7 +5,7 @@ use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::{LandingInput, TakeoffLanding};
 use stampfly_types::messages::*;
 
-/// See the [module](self) documentation.
+/// Take-off and landing manager: the estimate in, contact with the ground out.
 pub struct LandingManager<'b> {
     ports: LandingPorts<'b>,
     manager: TakeoffLanding,

@@ -10,7 +10,7 @@ use stampfly_types::messages::*;
 /// A pilot's frame older than this is no frame.
 const STALE_PILOT: Micros = Micros::from_millis(500);
 
-/// See the [module](self) documentation.
+/// State management: alerts, commands and facts in, the vehicle's state out.
 pub struct ModeManager<'b> {
     ports: ModePorts<'b>,
     machine: ModeMachine,

@@ -6,7 +6,7 @@ use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_control::guidance::{Navigator, NavigatorInput};
 use stampfly_types::messages::*;
 
-/// See the [module](self) documentation.
+/// Navigator: commands and state in, the vehicle's path out.
 pub struct Navigation<'b> {
     ports: NavigationPorts<'b>,
     navigator: Navigator,

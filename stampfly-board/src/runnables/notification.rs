@@ -5,7 +5,7 @@ use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::Signaller;
 use stampfly_types::messages::*;
 
-/// See the [module](self) documentation.
+/// Notification: state and alerts in, lights and sound out.
 pub struct Notification<'b> {
     ports: NotificationPorts<'b>,
     signaller: Signaller,

@@ -5,7 +5,7 @@ use crate::wiring;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_types::frame::roll_pitch_yaw;
 
-/// See the [module](self) documentation.
+/// Telemetry: the newest of everything a ground station wants, at a rate a radio can carry.
 pub struct Telemetry<'b> {
     ports: TelemetryPorts<'b>,
     frame: TelemetryFrame,
