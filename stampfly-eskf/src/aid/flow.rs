@@ -2,7 +2,7 @@
 //!
 //! Turned into angular rate and freed of the body's own rotation, flow times distance is the velocity along body x
 //! and y. The reading compared here is therefore z = distance · (flow rate ∓ body rate), the prediction
-//! v_body = Rᵀ·v. For a small body rotation θ, (R(I + [θ]×))ᵀ·v = v_b + [v_b]×·θ, which gives the attitude columns;
+//! v_body = Rᵀ·v. For a small body rotation θ, (R(I + \[θ\]×))ᵀ·v = v_b + \[v_b\]×·θ, which gives the attitude columns;
 //! the velocity columns are the columns of R. The gyro bias enters through the rotation that was removed: with
 //! b the bias, z contains −distance·(ω_m − b), so the prediction gets −distance·b in y's rate for x (and + in x's
 //! rate for y).

@@ -1,7 +1,7 @@
 //! The accelerometer as an inclinometer.
 //!
 //! When the body's own acceleration is small, the specific force is −g seen from the body: f = Rᵀ·(0, 0, −g) + b.
-//! With up = −Rᵀ·e_z·g = f₀, a small body rotation θ gives (I − [θ]×)·f₀ = f₀ + [f₀]×·θ; the accelerometer bias adds
+//! With up = −Rᵀ·e_z·g = f₀, a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds
 //! itself.
 //!
 //! Only for a body that stands, is carried gently, or has nothing better: a multicopter's accelerometer always points

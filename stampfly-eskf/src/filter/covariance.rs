@@ -111,8 +111,8 @@ impl Covariance {
 
     /// P ← F·P·Fᵀ + Q for one inertial step.
     ///
-    /// F = I, plus dt in position ← velocity, −R[f]×dt in velocity ← attitude, −R·dt in velocity ← accelerometer
-    /// bias, −[ω]×dt in attitude ← attitude and −I·dt in attitude ← gyro bias.
+    /// F = I, plus dt in position ← velocity, −R\[f\]×dt in velocity ← attitude, −R·dt in velocity ← accelerometer
+    /// bias, −\[ω\]×dt in attitude ← attitude and −I·dt in attitude ← gyro bias.
     #[inline]
     pub fn propagate(&mut self, motion: &Motion, noise: &ProcessNoise) {
         let Motion { rotation, force, rate, dt } = *motion;
