@@ -192,25 +192,26 @@ impl Known {
     }
 }
 
-/// The commanded axes whose numbers are numbers.
+/// The commanded axes whose numbers are numbers. A position that is none leaves its velocity to follow.
 fn usable_axes(path: &Setpoint) -> SetpointAxes {
     let (position, velocity, acceleration) = (&path.position, &path.velocity, &path.acceleration);
-    let flat = (velocity.x + velocity.y + acceleration.x + acceleration.y).is_finite();
-    let upright = (velocity.z + acceleration.z).is_finite();
-    let yaw = (path.yaw + path.yaw_rate).is_finite();
-    let mut broken = SetpointAxes::NONE;
-    for (fine, axes) in [
-        (flat, HORIZONTAL),
-        ((position.x + position.y).is_finite(), SetpointAxes::POSITION_XY),
-        (upright, VERTICAL),
-        (position.z.is_finite(), SetpointAxes::POSITION_Z),
-        (yaw, SetpointAxes::YAW | SetpointAxes::YAW_RATE),
-    ] {
-        if !fine {
-            broken |= axes;
-        }
+    let mut axes = path.axes;
+    if axes.contains(SetpointAxes::POSITION_XY) && !(position.x + position.y).is_finite() {
+        axes = axes.without(SetpointAxes::POSITION_XY).with(SetpointAxes::VELOCITY_XY);
     }
-    path.axes.without(broken)
+    if axes.contains(SetpointAxes::POSITION_Z) && !position.z.is_finite() {
+        axes = axes.without(SetpointAxes::POSITION_Z).with(SetpointAxes::VELOCITY_Z);
+    }
+    if !(velocity.x + velocity.y + acceleration.x + acceleration.y).is_finite() {
+        axes = axes.without(HORIZONTAL);
+    }
+    if !(velocity.z + acceleration.z).is_finite() {
+        axes = axes.without(VERTICAL);
+    }
+    if !(path.yaw + path.yaw_rate).is_finite() {
+        axes = axes.without(SetpointAxes::YAW | SetpointAxes::YAW_RATE);
+    }
+    axes
 }
 
 /// A stick within its range; a stick that is no number is at rest.
@@ -225,4 +226,121 @@ fn is_finite(vector: &Vec3) -> bool {
 fn is_rotation(attitude: &Quat) -> bool {
     // False for NaN as well.
     (attitude.quaternion().norm_squared() - 1.0).abs() < 0.02
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::messages::{CommandSetpoint, SystemMode, VehicleStatus};
+
+    /// A vehicle in position hold with everything known and commanded, for tests to take something away.
+    struct Case {
+        estimate: StateEstimate,
+        command: CommandSetpoint,
+        setpoint: Setpoint,
+        mode: SystemMode,
+    }
+
+    fn flying(mode: FlightMode, axes: SetpointAxes) -> Case {
+        Case {
+            estimate: StateEstimate { valid: Validity::ALL, ..StateEstimate::default() },
+            command: CommandSetpoint { roll: 0.5, pitch: -0.25, throttle: 0.6, yaw: 0.1, ..CommandSetpoint::default() },
+            setpoint: Setpoint { axes, ..Setpoint::default() },
+            mode: SystemMode { state: FlightState::Flying, mode, armed: true, ..SystemMode::default() },
+        }
+    }
+
+    fn everything() -> Case {
+        flying(FlightMode::PosHold, SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW)
+    }
+
+    fn read(case: &Case) -> Option<Intent> {
+        let status = VehicleStatus { contact: GroundContact::Air, ..VehicleStatus::default() };
+        Intent::read(&ControlInput {
+            estimate: &case.estimate,
+            command: &case.command,
+            setpoint: &case.setpoint,
+            mode: &case.mode,
+            status: &status,
+            unmet: [0.0; 4],
+        })
+    }
+
+    fn axes(case: &Case) -> (Horizontal, Vertical) {
+        let intent = read(case).expect("in flight");
+        (intent.horizontal, intent.vertical)
+    }
+
+    #[test]
+    fn motors_have_work_only_when_armed_and_in_motion() {
+        for state in FlightState::ALL {
+            for armed in [false, true] {
+                let mut case = everything();
+                (case.mode.state, case.mode.armed) = (*state, armed);
+                let in_motion = matches!(state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
+                assert_eq!(read(&case).is_some(), armed && in_motion, "{state:?} {armed}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_estimator_loses_is_given_up_and_no_more() {
+        let without = |lost: Validity| {
+            let mut case = everything();
+            case.estimate.valid = Validity::ALL.without(lost);
+            axes(&case)
+        };
+        let (place, level) = (Horizontal::Path, Horizontal::LEVEL);
+        for (lost, expected) in [
+            (Validity::NONE, (place, Vertical::Path)),
+            (Validity::HEADING, (place, Vertical::Path)),
+            (Validity::POSITION_XY, (Horizontal::Velocity, Vertical::Path)),
+            (Validity::VELOCITY_XY, (level, Vertical::Path)),
+            (Validity::POSITION_Z, (place, Vertical::Velocity)),
+            (Validity::VELOCITY_Z, (place, Vertical::Descend)),
+            (Validity::TILT, (Horizontal::Damp, Vertical::Descend)),
+            (Validity::ALL, (Horizontal::Damp, Vertical::Descend)),
+        ] {
+            assert_eq!(without(lost), expected, "without {:?}", lost.names().collect::<std::vec::Vec<_>>());
+        }
+        let mut case = everything();
+        case.estimate.angular_rate.z = f32::NAN;
+        assert_eq!(axes(&case), (Horizontal::Nothing, Vertical::Descend));
+    }
+
+    #[test]
+    fn a_broken_set_point_never_turns_into_a_throttle() {
+        let mut case = everything();
+        case.setpoint.velocity.z = f32::NAN;
+        assert_eq!(axes(&case), (Horizontal::Path, Vertical::Descend));
+        let mut case = everything();
+        case.setpoint.position.z = f32::INFINITY;
+        assert_eq!(axes(&case), (Horizontal::Path, Vertical::Velocity));
+        let mut case = everything();
+        case.setpoint.acceleration.x = f32::NAN;
+        assert_eq!(axes(&case), (Horizontal::LEVEL, Vertical::Path));
+        // Nor does a set-point that is not there.
+        assert_eq!(axes(&flying(FlightMode::AltHold, SetpointAxes::NONE)).1, Vertical::Descend);
+        let mut case = flying(FlightMode::Stabilize, SetpointAxes::NONE);
+        case.mode.state = FlightState::Landing;
+        assert_eq!(axes(&case).1, Vertical::Descend);
+    }
+
+    #[test]
+    fn sticks_mean_what_the_mode_says() {
+        let lean = Horizontal::Lean { forward: -0.25, right: 0.5 };
+        let rates = Horizontal::Rates { forward: -0.25, right: 0.5 };
+        let throttle = Vertical::Throttle(0.6);
+        assert_eq!(axes(&flying(FlightMode::Acro, SetpointAxes::NONE)), (rates, throttle));
+        assert_eq!(axes(&flying(FlightMode::Stabilize, SetpointAxes::YAW)), (lean, throttle));
+        let alt_hold = flying(FlightMode::AltHold, SetpointAxes::POSITION_Z | SetpointAxes::YAW);
+        assert_eq!(axes(&alt_hold), (lean, Vertical::Path));
+        // A landing out of Acro is flown level, by the set-point.
+        let mut landing = flying(FlightMode::Acro, SetpointAxes::POSITION_Z);
+        landing.mode.state = FlightState::Landing;
+        assert_eq!(axes(&landing), (lean, Vertical::Path));
+        let mut down = flying(FlightMode::Stabilize, SetpointAxes::NONE);
+        (down.command.throttle, down.command.roll) = (-1.0, f32::NAN);
+        assert_eq!(axes(&down), (Horizontal::Lean { forward: -0.25, right: 0.0 }, Vertical::Throttle(0.0)));
+    }
 }
