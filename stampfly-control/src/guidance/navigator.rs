@@ -298,6 +298,11 @@ impl Navigator {
 
     fn fly(&mut self, now: Micros, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         let guided = input.command.source == CommandSource::Guided;
+        if !(guided && input.mode.mode == FlightMode::PosHold) {
+            // A leg is a plan from where the path was; once something else has moved it, the plan is void.
+            self.leg = None;
+            self.reached_at = None;
+        }
         match input.mode.mode {
             FlightMode::Acro | FlightMode::Stabilize => {
                 self.steer_heading(input, dt);
