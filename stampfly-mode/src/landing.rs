@@ -303,7 +303,7 @@ impl LandingManager {
 
     fn descent_rate(&self, seen: &Seen) -> f32 {
         let (slowest, growth, most) = self.config.descent;
-        seen.rise.map_or(slowest, |rise| (slowest + growth * rise).clamp(slowest, most))
+        seen.rise.map_or(slowest, |rise| (slowest + growth * rise).max(slowest).min(most))
     }
 
     fn leave_ground(&mut self, now: Micros, seen: &Seen) {

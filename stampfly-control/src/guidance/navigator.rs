@@ -21,6 +21,7 @@ use stampfly_types::messages::{
 use stampfly_types::{Micros, Vec3, frame, math};
 
 use super::{Leg, Path, PathLimits, Refusal, Refused, Route, WayPoint};
+use crate::bound::within;
 use crate::timing::StepTimer;
 
 /// Speeds, heights and tolerances of the [`Navigator`].
@@ -282,7 +283,7 @@ impl Navigator {
     fn take_off_height(&self) -> f32 {
         let asked = -self.take_off.position.z;
         let height = if asked > 0.0 { asked } else { self.config.take_off_height };
-        height.clamp(self.config.height.0, self.config.height.1)
+        within(height, self.config.height.0, self.config.height.1)
     }
 
     /// Position hold steers with the sticks or stays; the other modes lean with them, and stay while there is no pilot.
@@ -362,7 +363,7 @@ impl Navigator {
             return;
         }
         let mut goal = way_point.position;
-        goal.z = goal.z.clamp(self.ground - self.config.height.1, self.ground - self.config.height.0);
+        goal.z = within(goal.z, self.ground - self.config.height.1, self.ground - self.config.height.0);
         let leg = *self.leg.get_or_insert_with(|| self.path.leg_to(goal, way_point.speed));
         self.path.follow(&leg, dt);
         let close = (input.estimate.position - goal).norm() <= self.config.reached;
