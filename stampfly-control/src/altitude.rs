@@ -7,6 +7,7 @@
 
 use stampfly_types::GRAVITY;
 
+use crate::bound::{symmetric, within};
 use crate::pid::{Pid, PidGains};
 use crate::rate::integration;
 
@@ -123,8 +124,7 @@ impl AltitudeController {
     /// Collective thrust, N, that follows the path.
     #[inline]
     pub fn step(&mut self, climb: &Climb, limits: &ThrustLimits, dt: f32) -> f32 {
-        let correction =
-            (self.config.height_gain * climb.error).clamp(-self.config.correction_max, self.config.correction_max);
+        let correction = symmetric(self.config.height_gain * climb.error, self.config.correction_max);
         // Down is positive, thrust is up: thrust that falls short means an acceleration below what was asked.
         let integration = integration(limits.unmet, -1.0, limits.hold);
         let target = climb.target + correction;
@@ -148,7 +148,7 @@ impl AltitudeController {
     /// Collective thrust, N, for a throttle stick: 0 to 1.
     #[must_use]
     pub fn manual(&self, throttle: f32) -> f32 {
-        (throttle * self.config.thrust_max).clamp(0.0, self.config.thrust_max)
+        within(throttle * self.config.thrust_max, 0.0, self.config.thrust_max)
     }
 
     /// Thrust at hover as learned so far, N.
@@ -178,7 +178,7 @@ impl AltitudeController {
     fn limit(&self, thrust: f32, limits: &ThrustLimits) -> f32 {
         // A ceiling that is no number limits nothing: NaN compares false.
         let ceiling = if limits.ceiling <= 1.0 { limits.ceiling.max(0.0) * self.hover_thrust } else { f32::MAX };
-        if thrust.is_finite() { thrust.clamp(0.0, self.config.thrust_max.min(ceiling)) } else { 0.0 }
+        if thrust.is_finite() { within(thrust, 0.0, self.config.thrust_max.min(ceiling)) } else { 0.0 }
     }
 }
 

@@ -10,6 +10,8 @@
 use nalgebra::Quaternion;
 use stampfly_types::{Quat, Vec3, math};
 
+use crate::bound::symmetric;
+
 /// Gains and limits of the attitude loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeConfig {
@@ -60,7 +62,7 @@ pub fn rate_towards(config: &AttitudeConfig, attitude: &Quat, target: &Quat) -> 
     if squared > config.tilt_rate_max * config.tilt_rate_max {
         rate *= config.tilt_rate_max / math::sqrt(squared);
     }
-    rate.z = heading.clamp(-config.heading_rate_max, config.heading_rate_max);
+    rate.z = symmetric(heading, config.heading_rate_max);
     rate
 }
 

@@ -14,6 +14,7 @@ use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
 
 use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
 use crate::attitude::{self, AttitudeConfig};
+use crate::bound::symmetric;
 use crate::controller::{ControlInput, Controller};
 use crate::intent::{Heading, Horizontal, Intent, Vertical};
 use crate::position::{PositionConfig, PositionController};
@@ -271,5 +272,5 @@ fn lean(forward: f32, right: f32, sin_max: f32, attitude: &Quat) -> Vec3 {
 /// change) is no path to follow: its jerk is bounded.
 fn turn_rate(jerk: &Vec3, per_weight: f32) -> Vec3 {
     const MAX: f32 = 1.5;
-    Vec3::new((jerk.y * per_weight).clamp(-MAX, MAX), (-jerk.x * per_weight).clamp(-MAX, MAX), 0.0)
+    Vec3::new(symmetric(jerk.y * per_weight, MAX), symmetric(-jerk.x * per_weight, MAX), 0.0)
 }

@@ -13,6 +13,7 @@ use stampfly_types::messages::ControlOutput;
 use stampfly_types::{GRAVITY, Micros, Vec3, math};
 
 use crate::attitude;
+use crate::bound::{symmetric, within};
 use crate::cascade::StickConfig;
 use crate::controller::{ControlInput, Controller};
 use crate::intent::{Heading, Horizontal, Intent, Vertical};
@@ -144,7 +145,7 @@ impl GeometricController {
 
         if !intent.grounded {
             let max = config.integral_max;
-            self.integral = (self.integral + position * (config.integral * dt)).map(|i| i.clamp(-max, max));
+            self.integral = (self.integral + position * (config.integral * dt)).map(|i| symmetric(i, max));
         }
         self.integral = pick(self.integral.x, self.integral.y, self.integral.z, flat, upright);
         ahead + position * config.position + velocity * config.velocity + self.integral
@@ -153,7 +154,7 @@ impl GeometricController {
     /// Specific force asked of the motors along the world axes over mass: a − g, within the largest tilt.
     fn specific_force(&mut self, intent: &Intent, input: &ControlInput<'_>, dt: f32) -> Vec3 {
         let demand = self.acceleration(intent, input, dt);
-        let up = (GRAVITY - demand.z).clamp(0.3 * GRAVITY, self.config.thrust_max / self.config.mass);
+        let up = within(GRAVITY - demand.z, 0.3 * GRAVITY, self.config.thrust_max / self.config.mass);
         let (x, y, tan_max) = match intent.horizontal {
             Horizontal::Lean { forward, right } => {
                 let (cos_half, sin_half) = attitude::half_heading(&input.estimate.attitude);
@@ -199,7 +200,8 @@ impl Controller for GeometricController {
             Vertical::Descend => 0.96 * hover,
         };
         let ceiling = if input.status.thrust_ceiling <= 1.0 { input.status.thrust_ceiling * hover } else { f32::MAX };
-        let thrust = if thrust.is_finite() { thrust.clamp(0.0, config.thrust_max.min(ceiling.max(0.0))) } else { 0.0 };
+        let thrust =
+            if thrust.is_finite() { within(thrust, 0.0, config.thrust_max.min(ceiling.max(0.0))) } else { 0.0 };
 
         let (heading, yaw_rate) = match intent.heading {
             Heading::Hold { yaw, rate } => {
@@ -236,7 +238,7 @@ impl Controller for GeometricController {
         let inertia = config.inertia;
         let torque = inertia.component_mul(&wanted) + omega.cross(&inertia.component_mul(&omega));
         let max = config.torque_max;
-        let torque = torque.zip_map(&max, |t, max| if t.is_finite() { t.clamp(-max, max) } else { 0.0 });
+        let torque = torque.zip_map(&max, |t, max| if t.is_finite() { symmetric(t, max) } else { 0.0 });
         ControlOutput { thrust, torque }
     }
 

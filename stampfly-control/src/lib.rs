@@ -41,6 +41,8 @@ pub mod position;
 pub mod rate;
 pub mod timing;
 
+mod bound;
+
 pub use cascade::{CascadeConfig, CascadeController, StickConfig};
 pub use controller::{ControlInput, Controller};
 pub use geometric::{GeometricConfig, GeometricController};

@@ -11,6 +11,8 @@
 use nalgebra::{Matrix4, Vector4};
 use stampfly_types::messages::{ControlOutput, MAX_MOTORS};
 
+use crate::bound::{symmetric, within};
+
 /// Which way a rotor turns, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spin {
@@ -215,7 +217,7 @@ impl Mixer for MultirotorMixer {
     #[inline]
     fn mix(&self, demand: &ControlOutput) -> Mixed {
         // Far beyond any airframe, and small enough that no product below overflows.
-        let number = |value: f32| if value.is_finite() { value.clamp(-1e6, 1e6) } else { 0.0 };
+        let number = |value: f32| if value.is_finite() { symmetric(value, 1e6) } else { 0.0 };
         let wanted = number(demand.thrust);
         let (roll, pitch, yaw) = (number(demand.torque.x), number(demand.torque.y), number(demand.torque.z));
 
@@ -236,7 +238,7 @@ impl Mixer for MultirotorMixer {
         let mut mixed = Mixed { count: self.count as u8, ..Mixed::default() };
         let mut yaw_scale = 1.0f32;
         for ((thrust, share), part) in mixed.thrust.iter_mut().zip(&self.shares).zip(&tilt).take(self.count) {
-            *thrust = (share.thrust * collective + part).clamp(0.0, self.thrust_max);
+            *thrust = within(share.thrust * collective + part, 0.0, self.thrust_max);
             let twist = share.yaw * yaw;
             let room = if twist > 0.0 { self.thrust_max - *thrust } else { *thrust };
             if yaw_scale * twist.abs() > room {
@@ -244,10 +246,10 @@ impl Mixer for MultirotorMixer {
             }
         }
         for (thrust, share) in mixed.thrust.iter_mut().zip(&self.shares).take(self.count) {
-            *thrust = (*thrust + yaw_scale * share.yaw * yaw).clamp(0.0, self.thrust_max);
+            *thrust = within(*thrust + yaw_scale * share.yaw * yaw, 0.0, self.thrust_max);
         }
         let missing = wanted - collective;
-        let unmet_thrust = if missing == 0.0 { 0.0 } else { (missing / wanted.abs().max(1e-3)).clamp(-1.0, 1.0) };
+        let unmet_thrust = if missing == 0.0 { 0.0 } else { symmetric(missing / wanted.abs().max(1e-3), 1.0) };
         mixed.unmet = [1.0 - tilt_scale, 1.0 - tilt_scale, 1.0 - yaw_scale, unmet_thrust];
         mixed
     }

@@ -10,6 +10,7 @@
 use stampfly_types::messages::{MAX_MOTORS, MotorOutput};
 use stampfly_types::{Micros, math};
 
+use crate::bound::{symmetric, within};
 use crate::mixer::Mixed;
 use crate::timing::StepTimer;
 
@@ -143,7 +144,7 @@ impl MotorStage {
         for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(usize::from(mixed.count)) {
             let wanted = (self.config.curve.voltage(thrust) * per_volt).min(self.config.duty_max);
             // The last clamp is for the rounding of the sum.
-            *duty = (*duty + (wanted - *duty).clamp(-step, step)).clamp(0.0, self.config.duty_max);
+            *duty = within(*duty + symmetric(wanted - *duty, step), 0.0, self.config.duty_max);
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
     }

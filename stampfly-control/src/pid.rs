@@ -179,7 +179,14 @@ impl<T: FloatCore> Pid<T> {
     }
 
     fn clamp(&self, value: T) -> T {
-        value.max(-self.limit).min(self.limit)
+        // Comparisons, not `max` and `min`: those spend instructions on NaN, which does not get here.
+        if value > self.limit {
+            self.limit
+        } else if value < -self.limit {
+            -self.limit
+        } else {
+            value
+        }
     }
 }
 

@@ -9,6 +9,8 @@
 
 use stampfly_types::math;
 
+use crate::bound::{symmetric, within};
+
 /// Bounds of motion along one axis; all positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
@@ -84,7 +86,7 @@ impl Axis {
 
     /// One step of `dt` seconds towards a velocity.
     pub fn step_at(&mut self, velocity: f32, bounds: &Bounds, dt: f32) {
-        let velocity = velocity.clamp(-bounds.speed, bounds.speed);
+        let velocity = symmetric(velocity, bounds.speed);
         let reached = (self.velocity - velocity).abs() < Self::SLOW && self.acceleration.abs() <= bounds.jerk * dt;
         *self = if reached {
             Self { position: self.position + velocity * dt, velocity, acceleration: 0.0 }
@@ -140,9 +142,7 @@ impl Axis {
     /// beyond its bounds comes back as fast as jerk allows.
     fn reachable(&self, wanted: f32, bounds: &Bounds, dt: f32) -> f32 {
         let reach = bounds.jerk * dt;
-        wanted
-            .clamp(-bounds.acceleration, bounds.acceleration)
-            .clamp(self.acceleration - reach, self.acceleration + reach)
+        within(symmetric(wanted, bounds.acceleration), self.acceleration - reach, self.acceleration + reach)
     }
 
     /// The state after `dt` seconds of constant jerk that ends at this acceleration.

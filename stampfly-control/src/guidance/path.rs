@@ -9,6 +9,7 @@ use stampfly_types::messages::{Setpoint, SetpointAxes};
 use stampfly_types::{Vec3, math::wrap_angle};
 
 use super::{Axis, Bounds};
+use crate::bound::symmetric;
 
 /// Bounds of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -231,7 +232,7 @@ impl Path {
 
 fn place(axis: &mut Axis, position: f32, velocity: f32, bounds: &Bounds) {
     if position.is_finite() {
-        let velocity = if velocity.is_finite() { velocity.clamp(-bounds.speed, bounds.speed) } else { 0.0 };
+        let velocity = if velocity.is_finite() { symmetric(velocity, bounds.speed) } else { 0.0 };
         *axis = Axis { position, velocity, acceleration: 0.0 };
     }
 }
