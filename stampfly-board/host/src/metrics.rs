@@ -11,7 +11,7 @@
 //! | `hover_drift_m` | farthest the truth got, horizontally, from where the longest rest of the set-point began |
 //! | `land_error_m` | horizontal distance of the truth from the take-off spot at the end |
 //!
-//! Positions count from the take-off spot, truth included.
+//! Positions count from the take-off spot and directions from the heading there, truth included.
 
 use serde::Serialize;
 use stampfly_sim::Truth;

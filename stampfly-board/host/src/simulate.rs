@@ -23,8 +23,8 @@ use stampfly_drivers::{
 use stampfly_sim::sensors::{MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig, Truth};
-use stampfly_types::messages::{FlightState, Setpoint, StateEstimate, SystemMode};
-use stampfly_types::{Message, Micros, Vec3};
+use stampfly_types::messages::{FlightState, MotorOutput, Setpoint, StateEstimate, SystemMode};
+use stampfly_types::{Message, Micros, Quat, Vec3, frame};
 use std::convert::Infallible;
 use std::time::Instant as WallInstant;
 
@@ -87,7 +87,7 @@ pub struct Outcome {
     pub worst_tilt_deg: f64,
     /// Battery voltage at the start and at the end, V.
     pub battery: [f32; 2],
-    /// Was a motor ever sent something that is no number from 0 to 1?
+    /// Was every duty a number from 0 to 1, and 0 while the vehicle was not armed?
     pub motors_sane: bool,
     /// Samples the log missed.
     pub log_lost: u32,
@@ -107,11 +107,13 @@ struct Watch {
     battery: Option<[f32; 2]>,
     motors_sane: bool,
     origin: Vec3,
+    turn: Quat,
     truths: u32,
 }
 
 impl Watch {
-    fn new(origin: Vec3) -> Self {
+    /// Watches a vehicle that stands like this at the start.
+    fn new(start: &Truth) -> Self {
         Self {
             collector: Collector::default(),
             setpoint: Setpoint::default(),
@@ -121,7 +123,8 @@ impl Watch {
             worst_tilt: 0.0,
             battery: None,
             motors_sane: true,
-            origin,
+            origin: start.position,
+            turn: frame::from_yaw(-frame::yaw(&start.attitude)),
             truths: 0,
         }
     }
@@ -152,8 +155,10 @@ impl Watch {
                 }
             }
             wiring::Id::actuator_motor => {
-                let duties = words.iter().take(stampfly_types::messages::MAX_MOTORS);
-                self.motors_sane &= duties.map(|word| f32::from_bits(*word)).all(|duty| (0.0..=1.0).contains(&duty));
+                let mut output = MotorOutput::default();
+                read(words, &mut output);
+                let highest = if self.mode.armed { 1.0 } else { 0.0 };
+                self.motors_sane &= output.duty.iter().all(|duty| (0.0..=highest).contains(duty));
             }
             _ => {}
         }
@@ -161,11 +166,17 @@ impl Watch {
     }
 
     /// Compares with the truth at the instant of a set-point.
+    ///
+    /// Nothing on board knows north: the vehicle's world begins where it stood and ahead of it, so the truth is turned
+    /// and moved into that world first.
     fn compare(&mut self, at: Micros, truth: &mut Truth, recorder: &mut Recorder) {
-        truth.position -= self.origin;
+        truth.position = self.turn * (truth.position - self.origin);
+        truth.velocity = self.turn * truth.velocity;
+        truth.wind = self.turn * truth.wind;
+        truth.attitude = self.turn * truth.attitude;
         self.truths += 1;
         recorder.truth(at, self.truths, truth);
-        self.worst_tilt = self.worst_tilt.max(stampfly_types::frame::tilt(&truth.attitude));
+        self.worst_tilt = self.worst_tilt.max(frame::tilt(&truth.attitude));
         let first = self.battery.map_or(truth.battery_voltage, |[first, _]| first);
         self.battery = Some([first, truth.battery_voltage]);
         let (setpoint, estimate, mode) = (self.setpoint, self.estimate, self.mode);
@@ -242,7 +253,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     tasks.spawn(watch_button(clock.clone(), button, outside.button));
     tasks.spawn(ground_station::fly(clock.clone(), &config.mission, outside.guided, outside.telemetry, &progress));
 
-    let mut watch = Watch::new(world.truth_at(start).position);
+    let mut watch = Watch::new(&world.truth_at(start));
     let mut jitter = Jitter::new(config.jitter);
     let mut flight_at: Option<Micros> = None;
     let mut interrupted: Option<(Micros, Pending)> = None;

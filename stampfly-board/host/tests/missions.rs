@@ -1,0 +1,175 @@
+//! Three hundred missions nobody has thought of: random routes, wind, vehicles, clocks and executors, all of which
+//! have to end with a vehicle that stands where it was sent and is disarmed.
+//!
+//! Every mission follows from its number. To fly one alone, with its log written to the target folder's `tmp`:
+//! `MISSION=17 cargo test -p stampfly-host --test missions -- --nocapture`.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use stampfly_host::campaign::{Flight, run};
+use stampfly_host::mission::{Mission, Step};
+use stampfly_host::recorder::Recorder;
+use stampfly_host::simulate::{FlightConfig, fly};
+use stampfly_mode::machine::{Event, next};
+use stampfly_sim::plant::Pose;
+use stampfly_types::Micros;
+use stampfly_types::messages::FlightState;
+
+/// Numbers from a seed.
+struct Draw(ChaCha8Rng);
+
+impl Draw {
+    /// Between these, all equally likely.
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * f64::from(self.0.next_u32()) / f64::from(u32::MAX)
+    }
+
+    /// True in one of `n` cases.
+    fn one_in(&mut self, n: u32) -> bool {
+        self.0.next_u32().is_multiple_of(n)
+    }
+}
+
+/// What the plant is made of that a workshop gets wrong by a tenth.
+const VARIED: [&str; 14] = [
+    "mass",
+    "inertia_x",
+    "inertia_y",
+    "inertia_z",
+    "rotor_offset",
+    "thrust_coefficient",
+    "torque_coefficient",
+    "motor_voltage_b",
+    "motor_resistance",
+    "rotor_inertia",
+    "drag_horizontal",
+    "drag_vertical",
+    "battery_resistance",
+    "ground_effect_gain",
+];
+
+fn random_route(draw: &mut Draw) -> Mission {
+    let height = draw.within(0.3, 1.2) as f32;
+    let mut steps = vec![Step::Arm, Step::TakeOff { height }];
+    for _ in 0..1 + draw.0.next_u32() % 4 {
+        let place = [draw.within(-1.5, 1.5), draw.within(-1.5, 1.5), draw.within(0.3, 1.2)].map(|m| m as f32);
+        let yaw = if draw.one_in(3) { None } else { Some(draw.within(-180.0, 180.0) as f32) };
+        let speed = if draw.one_in(2) { 0.0 } else { draw.within(0.2, 0.8) as f32 };
+        steps.push(Step::GoTo { place, yaw, speed, dwell: draw.within(0.0, 1.0) as f32 });
+    }
+    steps.push(Step::Land);
+    Mission { steps }
+}
+
+/// Mission `number`, and everything it is flown with.
+fn random_mission(number: u64) -> FlightConfig {
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(number));
+    let mut config = FlightConfig { mission: random_route(&mut draw), ..FlightConfig::reference(number) };
+    let scene = &mut config.simulation;
+    scene.wind.gust = draw.within(0.0, 0.8) as f32;
+    let (speed, towards) = (draw.within(0.0, 0.5), draw.within(0.0, core::f64::consts::TAU));
+    scene.wind.mean = [(speed * libm::cos(towards)) as f32, (speed * libm::sin(towards)) as f32, 0.0].into();
+    scene.vibration = draw.within(0.5, 1.5);
+    for name in VARIED {
+        let nominal = scene.plant.iter().find(|row| row.name == name).expect("a plant parameter").value;
+        scene.plant.set(name, nominal * draw.within(0.9, 1.1)).expect("a tenth more or less is in range");
+    }
+    scene.plant.set("battery_charge", draw.within(0.6, 1.0)).expect("in range");
+    scene.pose = Some(Pose::standing(&scene.plant, draw.within(-core::f64::consts::PI, core::f64::consts::PI)));
+    scene.start = match number % 4 {
+        // 32 bits of microseconds end in flight.
+        0 => Micros((1 << 32) - 10_000_000),
+        1 => Micros(draw.within(0.0, 1e13) as u64),
+        _ => Micros::ZERO,
+    };
+    config.jitter = number.is_multiple_of(6).then_some(number);
+    config
+}
+
+/// How much farther or nearer than the last way-point a vehicle stands that is this far from where it took off.
+fn how_far_off(mission: &Mission, from_take_off: Option<f64>) -> Option<f64> {
+    let last = mission.steps.iter().rev().find_map(|step| match step {
+        Step::GoTo { place: [north, east, _], .. } => Some(f64::from(*north).hypot(f64::from(*east))),
+        _ => None,
+    });
+    Some((from_take_off? - last?).abs())
+}
+
+/// Everything that is wrong with a flight of this mission.
+fn complaints(mission: &Mission, flight: &Flight) -> Vec<String> {
+    let mut found = Vec::new();
+    let outcome = &flight.outcome;
+    let mut check = |holds: bool, what: String| {
+        if !holds {
+            found.push(what);
+        }
+    };
+    check(outcome.finished, "the mission was not flown to its end".into());
+    check(outcome.metrics.landed, "did not land".into());
+    check(outcome.metrics.disarmed, "did not disarm".into());
+    check(outcome.motors_sane, "a motor was sent nonsense".into());
+    check(outcome.log_lost == 0, format!("the log missed {} samples", outcome.log_lost));
+    let bounds = [
+        ("estimate to truth", outcome.metrics.est_pos_rms_m, 0.2),
+        ("truth to set-point", outcome.metrics.pos_rms_m, 0.2),
+        ("height to set-point", outcome.metrics.alt_rms_m, 0.05),
+        ("take-off overshoot", outcome.metrics.takeoff_overshoot_m, 0.16),
+        ("touchdown", outcome.metrics.touchdown_speed_mps, 0.4),
+        ("tilt", Some(outcome.worst_tilt_deg), 30.0),
+        ("where it stands", how_far_off(mission, outcome.metrics.land_error_m), 0.4),
+    ];
+    for (what, value, bound) in bounds {
+        check(value.is_some_and(|value| value <= bound), format!("{what}: {value:?}, may be {bound}"));
+    }
+    let states: Vec<FlightState> = outcome.phases.iter().map(|phase| phase.state).collect();
+    check(states.first() == Some(&FlightState::Init), "does not begin in INIT".into());
+    for pair in states.windows(2).filter(|pair| pair[0] != pair[1]) {
+        let possible =
+            Event::ALL.iter().any(|event| [true, false].iter().any(|h| next(pair[0], *event, *h) == Some(pair[1])));
+        check(possible, format!("{:?} to {:?} is not in the table", pair[0], pair[1]));
+    }
+    found
+}
+
+/// Flies mission `number` again, with a log.
+fn investigate(number: u64) {
+    let config = random_mission(number);
+    let mut recorder = Recorder::with_log(vec![("mission".to_owned(), number.to_string())]);
+    let outcome = fly(&config, &mut recorder, &mut |_, _| {});
+    let log = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mission_{number}.ulg"));
+    std::fs::write(&log, recorder.log()).expect("the target folder can be written");
+    println!("{config:#?}\n{outcome:#?}\nlog: {}", log.display());
+}
+
+#[test]
+fn every_random_mission_ends_on_the_ground_and_disarmed() {
+    let alone: Option<u64> = std::env::var("MISSION").ok().map(|text| text.parse().expect("MISSION is a number"));
+    let numbers = alone.map_or(1..=300, |number| number..=number);
+    alone.into_iter().for_each(investigate);
+
+    let configs: Vec<FlightConfig> = numbers.map(random_mission).collect();
+    let flights = run(&configs, &|_| {});
+    assert_eq!(flights.len(), configs.len());
+    let failed: Vec<String> = flights
+        .iter()
+        .zip(&configs)
+        .filter_map(|(flight, config)| {
+            let complaints = complaints(&config.mission, flight);
+            (!complaints.is_empty()).then(|| format!("MISSION={}: {}", flight.seed, complaints.join("; ")))
+        })
+        .collect();
+    assert!(failed.is_empty(), "{} of {} missions failed:\n{}", failed.len(), flights.len(), failed.join("\n"));
+}
+
+#[test]
+fn the_missions_differ_in_what_they_should_differ_in() {
+    let configs: Vec<FlightConfig> = (1..=300).map(random_mission).collect();
+    let count = |what: &dyn Fn(&FlightConfig) -> bool| configs.iter().filter(|config| what(config)).count();
+    assert!(count(&|config| config.jitter.is_some()) >= 40, "executors that are late");
+    assert!(count(&|config| config.simulation.start.0 == (1 << 32) - 10_000_000) >= 60, "32 bits overflow");
+    for steps in 4..=7 {
+        assert!(count(&|config| config.mission.steps.len() == steps) >= 40, "{steps} steps");
+    }
+    assert!(count(&|config| config.simulation.plant.mass > 0.0386) >= 40, "heavy vehicles");
+    assert!(count(&|config| config.simulation.wind.mean.norm() > 0.3) >= 60, "wind");
+}
