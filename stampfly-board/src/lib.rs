@@ -7,6 +7,7 @@
 //! Firmware and simulation run this same code; they differ in who drives the [`FlightLoop`] and in what stands behind
 //! the traits of `stampfly-drivers`.
 #![no_std]
+#![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 #[cfg(test)]
 extern crate std;

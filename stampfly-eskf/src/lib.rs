@@ -8,6 +8,7 @@
 //! Both implement [`Estimator`], need no allocation and no other crate of the family than `stampfly-types`, and
 //! give the same bits on every machine.
 #![no_std]
+#![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 #[cfg(test)]
 extern crate std;
