@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use stampfly_host::dataset::{self, DatasetErrorKind, Kind};
+use stampfly_host::estimate;
 use std::io::{Cursor, Write};
 
 const LOG_HEADER: &str = "timestamp_ms,dt_ms,raw_accel_x,raw_accel_y,raw_accel_z,raw_gyro_x,raw_gyro_y,raw_gyro_z,\
@@ -94,7 +95,11 @@ fn survives(bytes: &[u8]) -> Result<(), TestCaseError> {
         prop_assert!(!recording.imu.is_empty());
         prop_assert!(recording.imu.windows(2).all(|pair| pair[0].at < pair[1].at));
         prop_assert!(recording.imu.iter().all(|s| s.data.accel.iter().chain(&s.data.gyro).all(|v| v.is_finite())));
-        let _ = recording.to_flight();
+        // Neither may the estimator fall over it, whatever it makes of it.
+        let estimated = estimate::run(&recording, &estimate::suite(recording.kind));
+        prop_assert!(estimated.drive.instances.len() <= recording.imu.len());
+        prop_assert!(serde_json::to_string(&estimated.figures).is_ok());
+        let _ = estimated.to_flight(&recording);
     }
     Ok(())
 }

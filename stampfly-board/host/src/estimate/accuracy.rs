@@ -149,10 +149,11 @@ impl Accuracy {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use stampfly_types::math;
 
     fn tumbling(step: usize) -> Quat {
         let phase = step as f32 * 0.11;
-        Quat::from_euler_angles(0.5 * phase.sin(), 0.4 * (1.3 * phase).cos(), 0.2 * phase)
+        Quat::from_euler_angles(0.5 * math::sin(phase), 0.4 * math::cos(1.3 * phase), 0.2 * phase)
     }
 
     #[test]
@@ -178,7 +179,7 @@ mod tests {
             }
             prop_assert!(accuracy.tilt_aligned().unwrap() < 1e-3, "{:?}", accuracy.tilt_aligned());
             let plain = accuracy.tilt().unwrap();
-            prop_assert!(plain > 0.3 * f64::from(roll.hypot(pitch)).to_degrees() - 1e-3, "{plain}");
+            prop_assert!(plain > 0.3 * f64::from(roll).hypot(f64::from(pitch)).to_degrees() - 1e-3, "{plain}");
         }
 
         #[test]

@@ -97,7 +97,7 @@ impl Figures {
         Self {
             kind: kind_name(recording.kind),
             duration_s: recording.duration().seconds_f64(),
-            diverged: lost || !finite || astray.is_some_and(|astray| !(astray <= LOST)),
+            diverged: lost || !finite || astray.is_some_and(|astray| astray.is_nan() || astray > LOST),
             end_xy_m: travelled.map(|reach| reach.end_xy_m),
             max_xy_m: travelled.map(|reach| reach.max_xy_m),
             flow_dead_reckoning_max_xy_m: by_flow.map(|reach| reach.max_xy_m),

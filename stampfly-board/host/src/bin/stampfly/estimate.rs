@@ -64,8 +64,11 @@ fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {
     Ok(estimated.figures)
 }
 
+/// A figure, if there is one.
+type Value = fn(&Figures) -> Option<f64>;
+
 /// Name, unit, decimals and value of every figure that may be missing.
-const COLUMNS: [(&str, &str, usize, fn(&Figures) -> Option<f64>); 9] = [
+const COLUMNS: [(&str, &str, usize, Value); 9] = [
     ("end", "m", 4, |f| f.end_xy_m),
     ("max", "m", 3, |f| f.max_xy_m),
     ("flow end", "m", 3, |f| f.flow_dead_reckoning_end_xy_m),
