@@ -1,8 +1,10 @@
 //! One publish and one read of the IMU message: the bus beside its peers, interleaved in one run.
 //!
 //! `heapless::spsc` moves a value to one reader and no further; `embassy-sync`'s `Watch` and `PubSubChannel` offer
-//! several readers under a critical section. The last lines print the ratios of the medians of seven interleaved
-//! rounds, which is the figure to quote: single rounds vary with whatever else the machine does.
+//! several readers under a critical section. A reader either looks whether there is something (polling) or has been
+//! waiting for it and is woken (waiting): on the bus the publisher calls a hook, on `Watch` and `PubSubChannel` it
+//! wakes the reader's future. The last lines print the ratios of the medians of seven interleaved rounds, which is the
+//! figure to quote: single rounds vary with whatever else the machine does.
 
 use criterion::{Criterion, criterion_group};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -12,7 +14,11 @@ use heapless::spsc;
 use stampfly_bus::topics;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Micros, Vec3};
+use std::future::Future;
 use std::hint::black_box;
+use std::pin::pin;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll, Waker};
 use std::time::Instant;
 
 topics! {
@@ -22,6 +28,13 @@ topics! {
     sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe];
     /// The newest sample.
     newest_imu: ImuData = latest @ 400 Hz from imu => [estimation];
+}
+
+static WOKEN: AtomicBool = AtomicBool::new(false);
+
+/// What an executor's hook does at least.
+fn wake(_topic: usize) {
+    WOKEN.store(true, Ordering::Release);
 }
 
 type Timed = (Micros, ImuData);
@@ -36,38 +49,73 @@ fn contenders(mut each: impl FnMut(&'static str, &mut dyn FnMut(u64) -> f32)) {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu }, .. } = bus.split(None);
     let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
-    each("stampfly-bus ring", &mut |k| {
+    each("stampfly-bus ring, polling", &mut |k| {
         tx.publish(Micros(k), &sample(k));
         rx.next().map_or(0.0, |s| s.data.gyro.x)
     });
 
     let (mut tx, mut rx) = (newest_imu.tx, newest_imu.estimation);
-    each("stampfly-bus latest", &mut |k| {
+    each("stampfly-bus latest, polling", &mut |k| {
         tx.publish(Micros(k), &sample(k));
         rx.latest().map_or(0.0, |s| s.data.gyro.x)
     });
 
+    let mut bus = wiring::Bus::new();
+    let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu: _newest }, .. } = bus.split(Some(wake));
+    let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
+    each("stampfly-bus ring, waiting", &mut |k| {
+        tx.publish(Micros(k), &sample(k));
+        if WOKEN.swap(false, Ordering::AcqRel) { rx.next().map_or(0.0, |s| s.data.gyro.x) } else { 0.0 }
+    });
+
     let mut queue: spsc::Queue<Timed, 16> = spsc::Queue::new();
     let (mut producer, mut consumer) = queue.split();
-    each("heapless spsc", &mut |k| {
+    each("heapless spsc, polling", &mut |k| {
         let _ = producer.enqueue((Micros(k), sample(k)));
         consumer.dequeue().map_or(0.0, |s| s.1.gyro.x)
     });
 
     let watch: Watch<CriticalSectionRawMutex, Timed, 2> = Watch::new();
     let (sender, mut receiver) = (watch.sender(), watch.receiver().expect("two receivers"));
-    each("embassy-sync Watch", &mut |k| {
+    each("embassy-sync Watch, polling", &mut |k| {
         sender.send((Micros(k), sample(k)));
         receiver.try_changed().map_or(0.0, |s| s.1.gyro.x)
+    });
+
+    let watch: Watch<CriticalSectionRawMutex, Timed, 2> = Watch::new();
+    let (sender, mut receiver) = (watch.sender(), watch.receiver().expect("two receivers"));
+    each("embassy-sync Watch, waiting", &mut |k| {
+        let mut reader = pin!(receiver.changed());
+        let mut context = Context::from_waker(Waker::noop());
+        assert!(reader.as_mut().poll(&mut context).is_pending());
+        sender.send((Micros(k), sample(k)));
+        match reader.poll(&mut context) {
+            Poll::Ready(s) => s.1.gyro.x,
+            Poll::Pending => 0.0,
+        }
     });
 
     let channel: PubSubChannel<CriticalSectionRawMutex, Timed, 16, 2, 1> = PubSubChannel::new();
     let publisher = channel.publisher().expect("one publisher");
     let mut subscriber = channel.subscriber().expect("two subscribers");
-    each("embassy-sync PubSubChannel", &mut |k| {
+    each("embassy-sync PubSub, polling", &mut |k| {
         publisher.publish_immediate((Micros(k), sample(k)));
         match subscriber.try_next_message() {
             Some(WaitResult::Message(s)) => s.1.gyro.x,
+            _ => 0.0,
+        }
+    });
+
+    let channel: PubSubChannel<CriticalSectionRawMutex, Timed, 16, 2, 1> = PubSubChannel::new();
+    let publisher = channel.publisher().expect("one publisher");
+    let mut subscriber = channel.subscriber().expect("two subscribers");
+    each("embassy-sync PubSub, waiting", &mut |k| {
+        let mut reader = pin!(subscriber.next_message());
+        let mut context = Context::from_waker(Waker::noop());
+        assert!(reader.as_mut().poll(&mut context).is_pending());
+        publisher.publish_immediate((Micros(k), sample(k)));
+        match reader.poll(&mut context) {
+            Poll::Ready(WaitResult::Message(s)) => s.1.gyro.x,
             _ => 0.0,
         }
     });
@@ -117,7 +165,7 @@ fn ratios() {
     let ours = medians[0].1;
     println!("\nmedian of {ROUNDS} interleaved rounds of {CALLS} calls");
     for (name, time) in &medians {
-        println!("{name:<28} {time:>7.2} ns   ring / this = {:.2}", ours / time);
+        println!("{name:<30} {time:>7.2} ns   this / ring, polling = {:.2}", time / ours);
     }
 }
 
