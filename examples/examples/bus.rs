@@ -74,12 +74,12 @@ fn main() {
         let distance = 0.5 + 0.2 * math::sin(clock.seconds());
         range.tx.publish(clock, &TofData { distance, valid: true, ..Default::default() });
         for band in [Band::Flight, Band::Background] {
-            while let Some((index, now)) = scheduler.due(band, clock, &heads) {
+            while let Some((index, now)) = scheduler.due(band, 0, clock, &heads) {
                 let mut activation = Activation::live(now);
                 scheduler.started(index, now, &heads);
                 vehicle.read(index, &mut activation);
                 vehicle.run(index, &mut activation);
-                scheduler.finished(index, now);
+                scheduler.finished(index);
             }
         }
     }

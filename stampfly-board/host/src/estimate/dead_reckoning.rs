@@ -29,13 +29,9 @@ impl Reach {
         let away = f64::from(north).hypot(f64::from(east));
         self.end_xy_m = away;
         // A distance that is no number must show, and `max` would hide it.
-        self.max_xy_m = if away.is_nan() {
-            away
-        } else if self.max_xy_m < away {
-            away
-        } else {
-            self.max_xy_m
-        };
+        if away.is_nan() || self.max_xy_m < away {
+            self.max_xy_m = away;
+        }
     }
 }
 
