@@ -365,9 +365,12 @@ mod tests {
         }
     }
 
+    /// A command, and what has to be so before it is given.
+    type Leg = (Command, fn(&mut World));
+
     fn in_state(state: FlightState) -> (ModeMachine, World) {
         let (mut machine, mut world) = (ModeMachine::default(), World::ready());
-        let path: &[(Command, fn(&mut World))] = &[
+        let path: &[Leg] = &[
             (Command::None, |_| {}),
             (Command::Arm, |_| {}),
             (Command::TakeOff, |_| {}),

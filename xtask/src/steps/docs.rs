@@ -89,7 +89,7 @@ fn check_link(before: &str, target: &str, folder: &Path) -> Result<String, Failu
     };
     let number: usize = line.parse().unwrap_or_default();
     let fits = |line: &str| has_word(line, word);
-    if source.lines().nth(number.wrapping_sub(1)).is_some_and(|line| defines(line)) {
+    if source.lines().nth(number.wrapping_sub(1)).is_some_and(&defines) {
         return Ok(target.to_owned());
     }
     let mut lines = source.lines().enumerate();
