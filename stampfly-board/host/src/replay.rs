@@ -202,6 +202,7 @@ pub fn replay(bytes: &[u8]) -> Result<Replay, ReplayError> {
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
     let (vehicle, mut outside) = assemble(ports, &config);
     let mut flight_loop = FlightLoop::new(vehicle, heads, start);
+    let inputs = flight_loop.count_inputs();
     let mut result = Replay { activations: 0, samples: 0, difference: None };
     for entry in entries {
         match entry {
@@ -210,6 +211,9 @@ pub fn replay(bytes: &[u8]) -> Result<Replay, ReplayError> {
                     .ok_or_else(|| ReplayError::Schema(wiring::TOPICS[topic].name.to_owned()))?;
             }
             Entry::Activation { index, record } => {
+                if record.inputs().len() != inputs[index] {
+                    return Err(ReplayError::Schema(format!("{TOPIC_PREFIX}{}", plan::ACTIVATIONS[index].name)));
+                }
                 let inputs: Vec<InputRecord> = record
                     .inputs()
                     .iter()

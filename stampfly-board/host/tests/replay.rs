@@ -1,0 +1,352 @@
+//! A log replays bit for bit, and whatever is not bit for bit is found and named.
+
+use proptest::prelude::*;
+use stampfly_board::plan;
+use stampfly_host::mission::Mission;
+use stampfly_host::recorder::{Recorder, TOPICS};
+use stampfly_host::replay::{Difference, ReplayError, replay};
+use stampfly_host::simulate::{FlightConfig, fly};
+use stampfly_log::ActivationTopic;
+use stampfly_log::ulog::{Definitions, Message, ReadErrorKind, Reader, Sample, Sink, Topic};
+use stampfly_types::messages::{ImuData, PowerData};
+use stampfly_types::{Message as _, Micros};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::LazyLock;
+
+/// Everything in the mission that makes the stack do something.
+fn config(seed: u64, jitter: Option<u64>) -> FlightConfig {
+    let mission = Mission::parse("arm\ntakeoff 0.4\ngoto 0.5 -0.3 0.6 yaw 60\nland").expect("a mission");
+    FlightConfig { mission, jitter, ..FlightConfig::reference(seed) }
+}
+
+fn record(config: &FlightConfig) -> Vec<u8> {
+    let mut recorder = Recorder::with_log(vec![("seed".to_owned(), config.simulation.seed.to_string())]);
+    fly(config, &mut recorder, &mut |_, _| {});
+    recorder.log().to_vec()
+}
+
+/// A flight that landed, once for all tests that damage it.
+static FLIGHT: LazyLock<Vec<u8>> = LazyLock::new(|| record(&config(1, None)));
+
+/// One message of a log that carries a sample: which topic, when, and where its bytes are.
+struct Place {
+    topic: String,
+    at: Micros,
+    payload: Range<usize>,
+}
+
+impl Place {
+    /// The whole message, header and topic number included.
+    fn message(&self) -> Range<usize> {
+        self.payload.start - 5..self.payload.end
+    }
+}
+
+/// Every sample of a log, in file order.
+fn places(log: &[u8]) -> Vec<Place> {
+    let mut names = BTreeMap::new();
+    let mut places = Vec::new();
+    for message in Reader::new(log).expect("a ULog") {
+        match message.expect("an intact message") {
+            Message::Subscription { id, topic, .. } => {
+                names.insert(id, topic.to_owned());
+            }
+            Message::Data { id, payload } => {
+                let start = payload.as_ptr() as usize - log.as_ptr() as usize;
+                let at = Micros(u64::from_le_bytes(*payload.first_chunk().expect("a stamp")));
+                places.push(Place { topic: names[&id].clone(), at, payload: start..start + payload.len() });
+            }
+            _ => {}
+        }
+    }
+    places
+}
+
+/// The first sample of a topic at or after this instant.
+fn find(log: &[u8], topic: &str, at: Micros) -> Place {
+    places(log).into_iter().find(|place| place.topic == topic && place.at >= at).expect("the flight lasts longer")
+}
+
+/// Where a field begins within the payload of a topic's samples.
+fn offset(log: &[u8], topic: &str, field: &str, index: Option<usize>) -> usize {
+    let format = Reader::new(log).expect("a ULog").find_map(|message| match message {
+        Ok(Message::Format(format)) if format.name == topic => Some(format),
+        _ => None,
+    });
+    let mut columns = format.expect("a format").columns().map(|column| column.expect("a basic type"));
+    columns.find(|column| column.field == field && column.index == index).expect("a column").offset
+}
+
+fn without(log: &[u8], range: Range<usize>) -> Vec<u8> {
+    [&log[..range.start], &log[range.end..]].concat()
+}
+
+fn difference(log: &[u8]) -> Difference {
+    replay(log).expect("a log that can be replayed").difference.expect("a difference")
+}
+
+#[test]
+fn flights_replay_bit_for_bit() {
+    for (seed, jitter) in [(1, None), (2, None), (3, Some(1)), (4, Some(2)), (5, Some(3)), (6, Some(4))] {
+        let mut config = config(seed, jitter);
+        // Stamps beyond 32 bits, too.
+        config.simulation.start = Micros(if seed % 2 == 0 { (1 << 32) - 6_000_000 } else { 0 });
+        let log = record(&config);
+        let result = replay(&log).expect("a log that can be replayed");
+        assert_eq!(result.difference, None, "seed {seed}, jitter {jitter:?}");
+        assert!(result.activations > 20_000 && result.samples > 20_000, "{result:?}");
+    }
+}
+
+#[test]
+fn parameters_come_from_the_log() {
+    let mut config = config(1, None);
+    config.vehicle.cascade.altitude.height_gain *= 1.5;
+    config.vehicle.estimator = 1.0;
+    config.limit = Micros::from_secs(8);
+    let result = replay(&record(&config)).expect("a log that can be replayed");
+    assert_eq!(result.difference, None);
+}
+
+/// How disorderly a flight was: activations of the estimator that found more than one inertial sample waiting, and
+/// activations of the background that were interrupted by the flight band between reading and publishing.
+fn disorder(log: &[u8]) -> (usize, usize) {
+    let inputs: BTreeMap<String, usize> = Reader::new(log)
+        .expect("a ULog")
+        .filter_map(|message| match message {
+            Ok(Message::Format(format)) => Some((format.name.to_owned(), ActivationTopic::inputs_of(&format)?)),
+            _ => None,
+        })
+        .collect();
+    let (mut waited, mut interrupted, mut telemetry_reads) = (0, 0, None);
+    for place in places(log) {
+        let payload = &log[place.payload];
+        match place.topic.as_str() {
+            "activation_estimation" => {
+                let record = ActivationTopic::decode(payload, inputs["activation_estimation"]).expect("a record");
+                waited += usize::from(record.inputs()[0].taken > 1);
+                interrupted += usize::from(telemetry_reads == Some(false));
+                telemetry_reads = telemetry_reads.map(|_| true);
+            }
+            "activation_telemetry" => telemetry_reads = Some(false),
+            "telemetry" => telemetry_reads = None,
+            _ => {}
+        }
+    }
+    (waited, interrupted)
+}
+
+/// Without this, replaying flights with jitter would prove no more than replaying flights without.
+#[test]
+fn jitter_does_disturb() {
+    let (waited, interrupted) = disorder(&FLIGHT);
+    assert!(interrupted == 0 && waited < 5, "an executor that is never late: {waited} {interrupted}");
+    let (waited, interrupted) = disorder(&record(&config(1, Some(1))));
+    assert!(waited > 50, "estimation was late {waited} times");
+    assert!(interrupted > 20, "telemetry was interrupted {interrupted} times");
+}
+
+#[test]
+fn one_flipped_bit_is_found_and_named() {
+    let log = &*FLIGHT;
+    let place = find(log, "sensor_imu", Micros::from_secs(7));
+    let accel = offset(log, "sensor_imu", "accel", Some(0));
+    let mut changed = log.clone();
+    changed[place.payload.start + accel + 1] ^= 0x10; // mantissa, 2^-11 of the value
+    let found = difference(&changed);
+    assert_eq!(found.activation, "estimation", "{found}");
+    assert_eq!(found.now, place.at, "{found}");
+    assert_eq!(found.topic, "estimate_state", "{found}");
+    assert!(found.generation > 1_000, "{found}");
+    let field = found.field.split('[').next().unwrap_or_default();
+    let fields = TOPICS.iter().find(|topic| topic.name == found.topic).expect("a topic of ours").fields;
+    assert!(fields.iter().any(|info| info.name == field && info.unit != ""), "{found}");
+    let [recorded, replayed] = [&found.recorded, &found.replayed].map(|text| text.parse::<f32>().expect("numbers"));
+    assert!(recorded != replayed && (recorded - replayed).abs() < 0.1, "{found}");
+    for part in ["estimation", "estimate_state", &found.field, &found.recorded, &found.replayed] {
+        assert!(found.to_string().contains(part), "{found}");
+    }
+}
+
+#[test]
+fn a_changed_parameter_or_output_is_found_too() {
+    let log = &*FLIGHT;
+    let mut changed = log.clone();
+    let name = b"position.pos.kp";
+    let at = log.windows(name.len()).position(|window| window == name).expect("the parameter is in the log");
+    changed[at + name.len() + 1] ^= 0x10;
+    assert_eq!(difference(&changed).activation, "control");
+
+    let place = find(log, "actuator_motor", Micros::from_secs(7));
+    let mut changed = log.clone();
+    changed[place.payload.start + offset(log, "actuator_motor", "duty", Some(2))] ^= 1;
+    let found = difference(&changed);
+    assert_eq!((found.activation.as_str(), found.field.as_str()), ("actuation", "duty[2]"), "{found}");
+}
+
+#[test]
+fn what_is_missing_is_found() {
+    let log = &*FLIGHT;
+    let at = Micros::from_secs(7);
+    for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "command")] {
+        let place = find(log, topic, at);
+        match replay(&without(log, place.message())) {
+            Err(ReplayError::Gap { activation, now }) => {
+                assert_eq!(activation, reader, "{topic}");
+                let late = now.since(place.at).0.max(place.at.since(now).0);
+                assert!(late < 20_000, "{topic} from {}, found missing at {now}", place.at);
+            }
+            other => panic!("a sample of {topic} is missing, and replay says {other:?}"),
+        }
+    }
+    let output = find(log, "setpoint", at);
+    let found = difference(&without(log, output.message()));
+    assert_eq!((found.topic.as_str(), found.recorded.as_str()), ("setpoint", "nothing"), "{found}");
+
+    let activation = find(log, "activation_navigation", at);
+    let found = difference(&without(log, activation.message()));
+    assert_eq!(found.topic, "setpoint", "{found}");
+}
+
+#[test]
+fn the_last_output_missing_its_activation_is_found() {
+    let log = &*FLIGHT;
+    let last = places(log).into_iter().rfind(|place| place.topic == "activation_telemetry").expect("telemetry");
+    let found = difference(&without(log, last.message()));
+    assert_eq!((found.topic.as_str(), found.replayed.as_str()), ("telemetry", "nothing"), "{found}");
+}
+
+#[test]
+fn a_log_that_was_cut_off_is_refused_with_the_place() {
+    let log = &*FLIGHT;
+    let place = find(log, "sensor_imu", Micros::from_secs(7));
+    let cut = place.payload.start + 3;
+    match replay(&log[..cut]) {
+        Err(ReplayError::Log(error)) => {
+            assert_eq!((error.kind, error.offset), (ReadErrorKind::Truncated, place.message().start));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[derive(Default)]
+struct Memory(Vec<u8>);
+
+impl Sink for Memory {
+    type Error = std::convert::Infallible;
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.0.extend_from_slice(bytes);
+        Ok(())
+    }
+}
+
+fn written(
+    topics: &[Topic],
+    activations: &[ActivationTopic],
+    parameter: Option<(&str, f32)>,
+    write: impl FnOnce(&mut stampfly_log::ulog::Writer<'_, Memory>),
+) -> Vec<u8> {
+    let mut head = Definitions::start(Memory::default(), Micros::ZERO).expect("memory");
+    if let Some((name, value)) = parameter {
+        head.parameter(name, value.into()).expect("memory");
+    }
+    let mut log = head.data(topics, activations).expect("memory");
+    write(&mut log);
+    log.into_sink().0
+}
+
+#[test]
+fn logs_of_others_are_refused_with_a_reason() {
+    assert!(
+        matches!(replay(b"PK\x03\x04 no log"), Err(ReplayError::Log(error)) if error.kind == ReadErrorKind::NotULog)
+    );
+    assert!(matches!(replay(b""), Err(ReplayError::Log(_))));
+
+    let foreign = [Topic { name: "vehicle_attitude", fields: PowerData::FIELDS }];
+    let words = PowerData::default().to_words();
+    let sample = Sample { at: Micros(1), generation: 1, words: &words };
+    let log = written(&foreign, &[], None, |log| log.sample(0, &sample).expect("memory"));
+    assert_eq!(replay(&log), Err(ReplayError::NoActivations));
+
+    // Ours, but recorded without activations.
+    let ours = written(&TOPICS, &[], None, |_| {});
+    assert_eq!(replay(&ours), Err(ReplayError::NoActivations));
+
+    // A topic of ours that another version laid out otherwise.
+    let other = [Topic { name: "sensor_imu", fields: PowerData::FIELDS }];
+    let log = written(&other, &[], None, |_| {});
+    assert_eq!(replay(&log), Err(ReplayError::Schema("sensor_imu".into())));
+    let other = [Topic { name: "sensor_power", fields: ImuData::FIELDS }];
+    let log = written(&other, &[], None, |_| {});
+    assert_eq!(replay(&log), Err(ReplayError::Schema("sensor_power".into())));
+
+    // A runnable this program does not have.
+    let activations = [ActivationTopic { name: "warp_drive", index: 0, inputs: 1 }];
+    let log = written(&TOPICS, &activations, None, |_| {});
+    assert_eq!(replay(&log), Err(ReplayError::Schema("activation_warp_drive".into())));
+
+    for parameter in [("no.such.parameter", 1.0), ("position.pos.kp", f32::NAN), ("position.pos.kp", 1e9)] {
+        let log = written(&TOPICS, &[], Some(parameter), |_| {});
+        assert_eq!(replay(&log), Err(ReplayError::Parameter(parameter.0.into())));
+    }
+    for error in [ReplayError::NoActivations, ReplayError::Schema("a".into()), ReplayError::Parameter("b".into())] {
+        assert!(error.to_string().len() > 20, "{error}");
+    }
+}
+
+/// A runnable that reads more than this program's is another version's.
+#[test]
+fn activations_with_other_inputs_are_refused() {
+    let name = plan::ACTIVATIONS[0].name;
+    for inputs in [0, 1, 16] {
+        let activations = [ActivationTopic { name, index: 0, inputs }];
+        let log = written(&TOPICS, &activations, None, |log| {
+            let mut record = stampfly_log::Activation::new(0, Micros(2_500));
+            for _ in 0..inputs {
+                record.read(stampfly_log::Input::default()).expect("room");
+            }
+            log.activation(&record).expect("memory");
+        });
+        assert_eq!(replay(&log), Err(ReplayError::Schema(format!("activation_{name}"))), "{inputs} inputs");
+    }
+}
+
+/// The first second of a flight: small enough to be damaged many times.
+static SECOND: LazyLock<Vec<u8>> =
+    LazyLock::new(|| record(&FlightConfig { limit: Micros::from_secs(1), ..config(1, Some(1)) }));
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    /// Damage is an error, a difference or, where nothing depends on it, nothing. Never a panic.
+    #[test]
+    fn damage_never_panics(
+        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        keep in any::<prop::sample::Index>(),
+        cut in any::<bool>(),
+    ) {
+        let mut log = SECOND.clone();
+        for (index, byte) in damage {
+            let index = index.index(log.len());
+            log[index] = byte;
+        }
+        if cut {
+            log.truncate(keep.index(log.len()));
+        }
+        let _ = replay(&log);
+    }
+
+    /// Damage inside samples, where the framing stays whole and everything is read.
+    #[test]
+    fn damaged_samples_never_panic(damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 1..8)) {
+        static PLACES: LazyLock<Vec<Place>> = LazyLock::new(|| places(&SECOND));
+        let mut log = SECOND.clone();
+        for (index, value) in damage {
+            let payload = &mut log[PLACES[index.index(PLACES.len())].payload.clone()];
+            let start = value as usize % payload.len();
+            payload[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
+        }
+        let _ = replay(&log);
+    }
+}
