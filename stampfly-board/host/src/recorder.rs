@@ -4,7 +4,8 @@
 //! file is the order in which things became visible: what a runnable reads is in the file before the activation that
 //! reads it. Replay relies on that.
 
-use stampfly_board::{Observer, VehicleConfig, parameters, plan, wiring};
+use stampfly_board::vehicle::assemble;
+use stampfly_board::{FlightLoop, Observer, VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
 use stampfly_log::ulog::{Definitions, ParameterValue, Sample, Sink, Topic, Writer};
 use stampfly_log::{ActivationTopic, FlightHash, Input};
@@ -20,6 +21,16 @@ const TRUTH: usize = wiring::COUNT;
 pub static TOPICS: LazyLock<Vec<Topic>> = LazyLock::new(|| {
     let bus = wiring::TOPICS.iter().map(|info| Topic { name: info.name, fields: info.fields });
     bus.chain([Topic { name: "truth", fields: Truth::FIELDS }]).collect()
+});
+
+/// The log's activations. How many inputs each has is counted on a vehicle that never flies.
+static ACTIVATIONS: LazyLock<Vec<ActivationTopic>> = LazyLock::new(|| {
+    let mut bus = wiring::Bus::new();
+    let wiring::Split { ports, heads, .. } = bus.split(None);
+    let (vehicle, _) = assemble(ports, &VehicleConfig::default());
+    let inputs = FlightLoop::new(vehicle, heads, Micros::ZERO).count_inputs();
+    let rows = plan::ACTIVATIONS.iter().zip(inputs).enumerate();
+    rows.map(|(index, (info, inputs))| ActivationTopic { name: info.name, index: index as u8, inputs }).collect()
 });
 
 /// A log in memory.
@@ -83,18 +94,10 @@ impl Recorder {
         Self { timing: Some(vec![Timing::default(); plan::COUNT]), ..self }
     }
 
-    pub(crate) fn begin(&mut self, start: Micros, inputs: [usize; plan::COUNT], config: &VehicleConfig) {
+    pub(crate) fn begin(&mut self, start: Micros, config: &VehicleConfig) {
         if !self.wanted {
             return;
         }
-        let activations: Vec<ActivationTopic> = plan::ACTIVATIONS
-            .iter()
-            .zip(inputs)
-            .enumerate()
-            .map(|(index, (info, inputs))| ActivationTopic { name: info.name, index: index as u8, inputs })
-            .collect();
-        // A handful of rows that live as long as the process: the log's writer borrows them.
-        let activations: &'static [ActivationTopic] = Vec::leak(activations);
         let facts = &self.facts;
         let open = || {
             let mut head = Definitions::start(Memory::default(), start)?;
@@ -105,7 +108,7 @@ impl Recorder {
             for parameter in parameters::PARAMETERS {
                 head.parameter(parameter.name, ParameterValue::Float(parameter.get(config)))?;
             }
-            head.data(&TOPICS, activations)
+            head.data(&TOPICS, &ACTIVATIONS)
         };
         self.log = open().ok();
     }

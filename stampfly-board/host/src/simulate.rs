@@ -240,7 +240,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let (vehicle, outside) = assemble(ports, &config.vehicle);
     let (mut duties, mut signals) = (outside.motors, outside.indicator);
     let mut flight_loop = FlightLoop::new(vehicle, heads, start);
-    recorder.begin(start, flight_loop.count_inputs(), &config.vehicle);
+    recorder.begin(start, &config.vehicle);
 
     let progress = Progress::default();
     let mut tasks = Tasks::new(clock.clone());
