@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
 #[derive(Debug, Parser)]
-#[command(version, about, arg_required_else_help = false)]
+#[command(version)]
 pub struct Arguments {
     /// What to do; without it, a mission is flown.
     #[command(subcommand)]
