@@ -279,7 +279,10 @@ impl ModeMachine {
     fn choose_mode(&mut self, input: &ModeInput<'_>) {
         if let Some(pilot) = input.pilot {
             self.wanted = pilot.mode;
-        } else if input.commands.iter().any(|command| *command != Command::None) {
+        } else if input.commands.iter().any(|command| *command != Command::None)
+            || input.button == Some(ButtonGesture::Click)
+        {
+            // Programs and the button have no sticks: the vehicle holds its place by itself.
             self.wanted = FlightMode::PosHold;
         }
         let valid = input.estimate.valid;
@@ -468,6 +471,26 @@ mod tests {
         world.step(&mut machine, &[]);
         world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
         assert!(world.step(&mut machine, &[]).mode.armed, "off, then on");
+    }
+
+    #[test]
+    fn a_click_takes_off_and_holds_the_place() {
+        let (mut machine, world) = in_state(FlightState::IdleGround);
+        machine.wanted = FlightMode::Stabilize;
+        let mut input = ModeInput {
+            alerts: Alerts::NONE,
+            estimate: &world.estimate,
+            calibration: &world.calibration,
+            status: &world.status,
+            pilot: None,
+            commands: &[],
+            button: Some(ButtonGesture::Click),
+        };
+        let clicked = machine.step(Micros(world.now), &input).mode;
+        assert_eq!((clicked.state, clicked.mode), (FlightState::Armed, FlightMode::PosHold));
+        input.button = None;
+        let later = machine.step(Micros(world.now) + SPOOL, &input).mode;
+        assert_eq!((later.state, later.mode), (FlightState::TakeOff, FlightMode::PosHold));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! | `est_pos_rms_m` | distance of the estimate from the truth, over the same time |
 //! | `alt_rms_m` | height of the truth against the set-point, root mean square, over the same time |
 //! | `takeoff_overshoot_m` | highest truth above the take-off height, from take-off to three seconds into flight |
-//! | `touchdown_speed_mps` | true sink rate at the first contact of the landing |
+//! | `touchdown_speed_mps` | true sink rate at the last instant before the first contact of the landing |
 //! | `hover_tilt_max_deg` | largest true tilt while hovering: in POS_HOLD, the set-point at rest for a second or more |
 //! | `hover_drift_m` | farthest the truth got, horizontally, from where the longest rest of the set-point began |
 //! | `land_error_m` | horizontal distance of the truth from the take-off spot at the end |
@@ -118,8 +118,18 @@ pub struct Collector {
     tilt: Option<f32>,
     rest: Option<Rest>,
     longest: Option<(Micros, f32)>,
-    last: Option<(Vec3, FlightState, bool)>,
+    last: Option<Last>,
     flew: bool,
+}
+
+/// What there is to know about the instant before.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    at: Micros,
+    place: Vec3,
+    sink: f32,
+    state: FlightState,
+    armed: bool,
 }
 
 impl Collector {
@@ -141,7 +151,8 @@ impl Collector {
                 }
             }
             FlightState::Landing if truth.contact && !self.was_in_contact && self.touchdown.is_none() => {
-                self.touchdown = Some(self.last.map_or(truth.velocity.z, |_| truth.velocity.z).max(0.0));
+                // The feet have begun to brake it by the time it is seen to touch.
+                self.touchdown = Some(self.last.map_or(0.0, |last| last.sink).max(0.0));
             }
             _ => {}
         }
@@ -164,7 +175,8 @@ impl Collector {
         } else {
             self.end_rest(at);
         }
-        self.last = Some((truth.position, mode.state, mode.armed));
+        let (place, sink) = (truth.position, truth.velocity.z);
+        self.last = Some(Last { at, place, sink, state: mode.state, armed: mode.armed });
     }
 
     fn raise(&mut self, truth: &Truth) {
@@ -184,22 +196,21 @@ impl Collector {
     /// The figures of the flight so far.
     #[must_use]
     pub fn finish(mut self) -> Metrics {
-        if let Some(rest) = self.rest {
-            self.end_rest(rest.since + Micros(1));
+        if let Some(last) = self.last {
+            self.end_rest(last.at);
         }
-        let (place, state, armed) = self.last.unwrap_or_default();
-        let landed = self.flew && state == FlightState::IdleGround && self.was_in_contact;
+        let landed = self.flew && self.was_in_contact && self.last.is_some_and(|l| l.state == FlightState::IdleGround);
         let overshoot = |highest: f32| Some(f64::from(highest + self.takeoff_goal?));
         Metrics {
             landed,
-            disarmed: !armed,
+            disarmed: self.last.is_none_or(|last| !last.armed),
             pos_rms_m: self.position.get(),
             est_pos_rms_m: self.estimate.get(),
             alt_rms_m: self.altitude.get(),
             takeoff_overshoot_m: self.highest.and_then(overshoot).map(|o| o.max(0.0)),
             touchdown_speed_mps: self.touchdown.map(f64::from),
             hover_tilt_max_deg: self.tilt.map(f64::from),
-            land_error_m: landed.then(|| f64::from(place.xy().norm())),
+            land_error_m: self.last.filter(|_| landed).map(|last| f64::from(last.place.xy().norm())),
             hover_drift_m: self.longest.map(|(_, farthest)| f64::from(farthest)),
         }
     }

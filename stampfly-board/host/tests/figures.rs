@@ -109,9 +109,9 @@ fn recompute(rows: &[Row]) -> BTreeMap<&'static str, f64> {
     let top = highest(rows.iter().filter(climbing).map(|row| -row.truth[2]));
     figures.insert("takeoff_overshoot_m", (top + goal).max(0.0));
 
-    // "true sink rate at the first contact of the landing"
+    // "true sink rate at the last instant before the first contact of the landing"
     let touch = rows.windows(2).find(|pair| pair[1].state == LANDING && pair[1].contact && !pair[0].contact);
-    figures.insert("touchdown_speed_mps", touch.expect("it landed")[1].sink);
+    figures.insert("touchdown_speed_mps", touch.expect("it landed")[0].sink);
 
     // Stretches in which the set-point rested while in POS_HOLD.
     let rests: Vec<&[Row]> = rows

@@ -7,11 +7,16 @@ use stampfly_host::dataset::Kind;
 use stampfly_host::estimate::suite;
 use stampfly_host::mission::Mission;
 use stampfly_host::simulate::FlightConfig;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
 #[derive(Debug, Parser)]
+<<<<<<< HEAD
 #[command(version)]
+=======
+#[command(name = "stampfly", version, about, arg_required_else_help = false)]
+>>>>>>> tests
 pub struct Arguments {
     /// What to do; without it, a mission is flown.
     #[command(subcommand)]
@@ -58,8 +63,8 @@ pub struct SceneOptions {
     #[arg(long, value_name = "M/S")]
     pub gust: Option<f32>,
     /// Mean wind towards north and east, m/s.
-    #[arg(long, value_name = "N,E", value_delimiter = ',', num_args = 2)]
-    pub wind: Vec<f32>,
+    #[arg(long, value_name = "N,E", value_parser = north_and_east, allow_hyphen_values = true)]
+    pub wind: Option<[f32; 2]>,
     /// Delay and interrupt the executor, by this seed.
     #[arg(long, value_name = "SEED")]
     pub jitter: Option<u64>,
@@ -79,7 +84,7 @@ impl Default for SceneOptions {
             param: Vec::new(),
             vibration: 1.0,
             gust: None,
-            wind: Vec::new(),
+            wind: None,
             jitter: None,
             list: false,
             json: false,
@@ -112,7 +117,7 @@ pub struct CampaignOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
     /// How many flights.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub flights: u64,
     /// Seed of the first flight; the others count up from there.
     #[arg(long, default_value_t = 1)]
@@ -188,6 +193,22 @@ fn set_parameters(config: &mut VehicleConfig, texts: &[String]) -> Result<(), Fa
     Ok(())
 }
 
+/// The value, if it is a number in its range.
+fn within<T: PartialOrd + Display>(name: &str, value: T, low: T, high: T) -> Result<T, Failure> {
+    if low <= value && value <= high {
+        Ok(value)
+    } else {
+        Err(format!("{name} {value} is not from {low} to {high}").into())
+    }
+}
+
+/// Reads `N,E`.
+fn north_and_east(text: &str) -> Result<[f32; 2], String> {
+    let parse = |part: &str| part.trim().parse().map_err(|_| format!("'{part}' is no number"));
+    let (north, east) = text.split_once(',').ok_or("a wind has a part towards north and one towards east")?;
+    Ok([parse(north)?, parse(east)?])
+}
+
 /// Splits `name=value`.
 fn assignment(text: &str) -> Result<(&str, f64), Failure> {
     let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
@@ -207,14 +228,13 @@ impl SceneOptions {
                 Mission::parse(&text).map_err(|error| format!("mission {path}: {error}"))?
             }
         };
-        if !(0.0..=20.0).contains(&self.vibration) {
-            return Err(format!("--vibration {} is not from 0 to 20", self.vibration).into());
-        }
-        config.simulation.vibration = self.vibration;
+        config.simulation.vibration = within("--vibration", self.vibration, 0.0, 20.0)?;
         if let Some(gust) = self.gust {
-            config.simulation.wind.gust = gust;
+            config.simulation.wind.gust = within("--gust", gust, 0.0, 20.0)?;
         }
-        if let [north, east] = self.wind[..] {
+        if let Some([north, east]) = self.wind {
+            within("--wind north", north, -20.0, 20.0)?;
+            within("--wind east", east, -20.0, 20.0)?;
             config.simulation.wind.mean = [north, east, 0.0].into();
         }
         for text in &self.plant {

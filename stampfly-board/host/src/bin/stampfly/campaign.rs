@@ -16,9 +16,13 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
     }
     let configs: Result<Vec<FlightConfig>, Failure> = (0..options.flights)
         .map(|index| {
-            let mut config = options.scene.config(options.seed + index)?;
+            let nth = |name: &str, seed: u64| {
+                seed.checked_add(index)
+                    .ok_or_else(|| format!("{name} {seed} leaves no seeds for {} flights", options.flights))
+            };
+            let mut config = options.scene.config(nth("--seed", options.seed)?)?;
             // Every flight has its own delays, too.
-            config.jitter = config.jitter.map(|seed| seed + index);
+            config.jitter = config.jitter.map(|seed| nth("--jitter", seed)).transpose()?;
             Ok(config)
         })
         .collect();

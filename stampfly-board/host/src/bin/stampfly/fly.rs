@@ -19,6 +19,7 @@ pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     let config = options.scene.config(options.seed)?;
+    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
     let facts = vec![
         ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("seed".to_owned(), options.seed.to_string()),
@@ -32,7 +33,6 @@ pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
     });
     bar.finish_and_clear();
 
-    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
     let log = options.out.join("flight.ulg");
     std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
 

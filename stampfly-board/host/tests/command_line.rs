@@ -1,0 +1,292 @@
+//! The program as people and scripts meet it: what it prints where, and what it says when it is asked nonsense.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+const FIGURES: [&str; 8] = [
+    "pos_rms_m",
+    "est_pos_rms_m",
+    "alt_rms_m",
+    "takeoff_overshoot_m",
+    "touchdown_speed_mps",
+    "hover_tilt_max_deg",
+    "land_error_m",
+    "hover_drift_m",
+];
+
+/// A mission that is over soon.
+const HOP: &str = "arm\ntakeoff 0.3\nhover 2\nland\n";
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("command_line").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    folder
+}
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stampfly"));
+    command.current_dir(folder).args(arguments).stdin(Stdio::null());
+    command
+}
+
+struct Ran {
+    code: i32,
+    out: String,
+    err: String,
+}
+
+fn read(output: Output) -> Ran {
+    let text = |bytes| String::from_utf8(bytes).expect("text");
+    let ran =
+        Ran { code: output.status.code().expect("an exit code"), out: text(output.stdout), err: text(output.stderr) };
+    assert!(!ran.err.contains("panicked") && !ran.out.contains("panicked"), "{}", ran.err);
+    ran
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Ran {
+    read(command(folder, arguments).output().expect("the program starts"))
+}
+
+/// Standard output, which has to be one JSON object on one line, of a run that succeeded.
+fn json(ran: &Ran) -> Value {
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert_eq!(ran.out.trim_end().lines().count(), 1, "{}", ran.out);
+    let value: Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert!(value.is_object());
+    value
+}
+
+#[test]
+fn fly_prints_one_json_object_and_writes_log_and_report() {
+    let folder = folder("fly");
+    let value = json(&run(&folder, &["fly", "--seed", "3", "--json", "--out", "deep/er"]));
+    assert_eq!((&value["landed"], &value["disarmed"]), (&Value::Bool(true), &Value::Bool(true)));
+    for name in FIGURES {
+        assert!(value[name].as_f64().is_some_and(|figure| (0.0..10.0).contains(&figure)), "{name}: {value}");
+    }
+    assert!(value["realtime_factor"].as_f64().is_some_and(|factor| factor > 0.5), "{value}");
+    let hash = value["log_hash"].as_str().expect("text");
+    assert!(hash.len() == 16 && u64::from_str_radix(hash, 16).is_ok(), "{hash}");
+
+    let log = std::fs::read(folder.join("deep/er/flight.ulg")).expect("a log");
+    assert!(log.starts_with(b"ULog") && log.len() > 1_000_000);
+    let page = std::fs::read_to_string(folder.join("deep/er/flight.html")).expect("a report");
+    assert!(page.contains(hash) && page.contains("pos_rms_m"));
+
+    let again = json(&run(&folder, &["fly", "--seed", "3", "--json"]));
+    assert_eq!(again["log_hash"], value["log_hash"]);
+    let replayed = json(&run(&folder, &["replay", "--json", "deep/er/flight.ulg"]));
+    assert_eq!(replayed["identical"], Value::Bool(true));
+    assert!(replayed["activations"].as_u64().is_some_and(|count| count > 50_000), "{replayed}");
+}
+
+#[test]
+fn replay_tells_a_difference_by_its_exit_code() {
+    let folder = folder("replay");
+    std::fs::write(folder.join("hop"), HOP).expect("written");
+    assert_eq!(run(&folder, &["fly", "--mission", "hop"]).code, 0);
+    let same = run(&folder, &["replay", "flight.ulg"]);
+    assert!(same.code == 0 && same.out.contains("identical"), "{}", same.out);
+
+    let mut log = std::fs::read(folder.join("flight.ulg")).expect("a log");
+    let name = b"position.pos.kp";
+    let at = log.windows(name.len()).position(|window| window == name).expect("the log has parameters");
+    log[at + name.len() + 1] ^= 0x10;
+    std::fs::write(folder.join("changed.ulg"), &log).expect("written");
+    let other = run(&folder, &["replay", "changed.ulg"]);
+    assert!(other.code == 1 && other.out.contains("activation control"), "{}", other.out);
+    let other = run(&folder, &["replay", "--json", "changed.ulg"]);
+    let value: Value = serde_json::from_str(&other.out).expect("JSON");
+    assert_eq!((other.code, &value["difference"]["activation"]), (1, &Value::from("control")));
+}
+
+#[test]
+fn without_arguments_it_flies() {
+    let folder = folder("nothing");
+    let ran = run(&folder, &[]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    for part in ["phases", "TakeOff", "figures", "landed and disarmed", "flight.ulg", "flight.html"] {
+        assert!(ran.out.contains(part), "{part} is missing:\n{}", ran.out);
+    }
+    assert!(FIGURES.iter().all(|figure| ran.out.contains(figure)), "{}", ran.out);
+    assert!(folder.join("flight.ulg").exists() && folder.join("flight.html").exists());
+    let mut files: Vec<_> =
+        std::fs::read_dir(&folder).expect("a folder").map(|file| file.expect("a file").file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["flight.html", "flight.ulg"]);
+}
+
+#[test]
+fn campaign_prints_spreads() {
+    let folder = folder("campaign");
+    let value = json(&run(&folder, &["campaign", "--flights", "3", "--seed", "7", "--json"]));
+    assert_eq!((&value["flights"], &value["landed"]), (&Value::from(3), &Value::from(3)));
+    for name in FIGURES {
+        let [p50, p95, max] = ["p50", "p95", "max"].map(|part| value[name][part].as_f64().expect("a number"));
+        assert!(0.0 < p50 && p50 <= p95 && p95 <= max, "{name}: {value}");
+    }
+    let text = run(&folder, &["campaign", "--flights", "2"]);
+    assert!(text.code == 0 && text.out.contains("2 of 2 flights landed"), "{}", text.out);
+    assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 0, "a campaign writes no files");
+}
+
+#[test]
+fn a_campaign_that_fails_says_so() {
+    let folder = folder("failing");
+    std::fs::write(folder.join("never"), "arm\ntakeoff 0.5\n").expect("written");
+    let ran = run(&folder, &["campaign", "--flights", "1", "--seed", "9", "--mission", "never", "--json"]);
+    let value: Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert_eq!((ran.code, &value["landed"]), (1, &Value::from(0)), "{value}");
+    assert_eq!(value["failed_seeds"], serde_json::json!([9]));
+}
+
+#[test]
+fn options_reach_the_flight() {
+    let folder = folder("options");
+    std::fs::write(folder.join("hop"), HOP).expect("written");
+    let hash = |options: &[&str]| {
+        let value = json(&run(&folder, &[&["fly", "--json", "--mission", "hop"], options].concat()));
+        value["log_hash"].as_str().expect("text").to_owned()
+    };
+    let mut hashes = vec![
+        hash(&[]),
+        hash(&["--seed", "2"]),
+        hash(&["--plant", "mass=0.037"]),
+        hash(&["--param", "altitude.alt.kp=1.1"]),
+        hash(&["--vibration", "0"]),
+        hash(&["--gust", "0.1"]),
+        hash(&["--wind", "-0.2,0.1"]),
+        hash(&["--jitter", "1"]),
+    ];
+    hashes.sort();
+    hashes.dedup();
+    assert_eq!(hashes.len(), 8);
+}
+
+#[test]
+fn topics_are_listed_as_text_json_and_markdown() {
+    let folder = folder("topics");
+    let value = json(&run(&folder, &["topics", "--json"]));
+    let rows = value["topics"].as_array().expect("a list");
+    assert_eq!(rows.len(), stampfly_board::wiring::COUNT);
+    for row in rows {
+        for key in ["name", "type", "policy", "rate", "publisher", "doc"] {
+            assert!(row[key].as_str().is_some_and(|text| !text.is_empty()), "{key}: {row}");
+        }
+        assert!(row["readers"].is_array() && row["depth"].as_u64() > Some(0));
+        assert!(row["fields"].as_array().is_some_and(|fields| !fields.is_empty()));
+    }
+    let imu = rows.iter().find(|row| row["name"] == "sensor_imu").expect("the table has it");
+    assert_eq!((&imu["type"], &imu["policy"], &imu["rate"]), (&"ImuData".into(), &"ring".into(), &"400 Hz".into()));
+
+    let text = run(&folder, &["topics"]).out;
+    let markdown = run(&folder, &["topics", "--markdown"]).out;
+    assert!(
+        markdown.starts_with("| topic |") && markdown.lines().all(|line| line.starts_with('|') && line.ends_with('|'))
+    );
+    assert_eq!(markdown.lines().count(), rows.len() + 2);
+    for row in rows {
+        let name = row["name"].as_str().expect("text");
+        assert!(text.contains(name) && markdown.contains(&format!("| `{name}` |")), "{name}");
+    }
+}
+
+#[test]
+fn help_is_everywhere() {
+    let folder = folder("help");
+    let top = run(&folder, &["--help"]);
+    for command in ["fly", "replay", "topics", "campaign", "estimate"] {
+        assert!(top.out.contains(command), "{}", top.out);
+        let ran = run(&folder, &[command, "--help"]);
+        assert!(ran.code == 0 && ran.out.contains("Usage: stampfly") && ran.err.is_empty(), "{command}: {}", ran.err);
+    }
+    assert!(run(&folder, &["--version"]).out.starts_with("stampfly "));
+    let list = run(&folder, &["fly", "--list", "--param", "position.pos.kp=1.25"]);
+    assert!(list.code == 0 && list.out.contains("position.pos.kp") && list.out.contains("1.25"));
+    assert!(list.out.contains("mass") && list.out.contains("kg"));
+    assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 0, "nothing was flown");
+}
+
+/// Exit code not zero, nothing on standard output, and all of these words on standard error.
+fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let ran = run(folder, arguments);
+    assert_ne!(ran.code, 0, "{arguments:?} is accepted: {}", ran.out);
+    assert_eq!(ran.out, "", "{arguments:?}");
+    for word in words {
+        assert!(ran.err.contains(word), "{arguments:?}: no '{word}' in: {}", ran.err);
+    }
+    assert!(ran.err.lines().count() < 15, "{arguments:?}: too long: {}", ran.err);
+}
+
+#[test]
+fn nonsense_is_refused_by_name() {
+    let folder = folder("nonsense");
+    for (name, text) in
+        [("broken", "arm\ntakeoff 0.5\ngoto 1 2\nland\n"), ("empty", "# nothing\n"), ("high", "arm\ntakeoff 99\n")]
+    {
+        std::fs::write(folder.join(name), text).expect("written");
+    }
+    std::fs::write(folder.join("binary"), [0xff, 0xfe, 0x00]).expect("written");
+    std::fs::write(folder.join("file"), "in the way").expect("written");
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["flie"], &["flie"]),
+        (&["fly", "--sed", "1"], &["--sed"]),
+        (&["fly", "--seed", "minus one"], &["--seed", "minus one"]),
+        (&["fly", "--seed", "-1"], &["-1"]),
+        (&["fly", "--param", "position.pos.kq=1"], &["position.pos.kq", "no such parameter"]),
+        (&["fly", "--param", "position.pos.kp=1000"], &["position.pos.kp", "from 0.1 to 5"]),
+        (&["fly", "--param", "position.pos.kp=NaN"], &["position.pos.kp", "from 0.1 to 5"]),
+        (&["fly", "--param", "position.pos.kp=fast"], &["position.pos.kp", "fast"]),
+        (&["fly", "--param", "position.pos.kp"], &["position.pos.kp", "NAME=VALUE"]),
+        (&["fly", "--plant", "colour=1"], &["colour"]),
+        (&["fly", "--plant", "mass=-1"], &["mass", "0.01"]),
+        (&["fly", "--plant", "mass=inf"], &["mass"]),
+        (&["fly", "--plant", "mass=NaN"], &["mass"]),
+        (&["fly", "--vibration", "NaN"], &["--vibration", "NaN"]),
+        (&["fly", "--vibration", "-1"], &["-1"]),
+        (&["fly", "--gust", "NaN"], &["--gust", "NaN"]),
+        (&["fly", "--gust=-1"], &["--gust", "-1"]),
+        (&["fly", "--gust", "1e30"], &["--gust"]),
+        (&["fly", "--wind", "NaN,0"], &["--wind", "NaN"]),
+        (&["fly", "--wind", "0,inf"], &["--wind", "inf"]),
+        (&["fly", "--wind", "1"], &["--wind"]),
+        (&["fly", "--wind", "1,2,3"], &["3"]),
+        (&["fly", "--mission", "broken"], &["mission broken", "line 3", "height"]),
+        (&["fly", "--mission", "empty"], &["mission empty", "no steps"]),
+        (&["fly", "--mission", "high"], &["mission high", "line 2", "99"]),
+        (&["fly", "--mission", "binary"], &["mission binary"]),
+        (&["fly", "--mission", "nowhere.txt"], &["nowhere.txt"]),
+        (&["fly", "--mission", "."], &["mission ."]),
+        (&["fly", "--out", "file/below"], &["file/below"]),
+        (&["fly", "--json", "--out", "file"], &["file"]),
+        (&["campaign", "--flights", "0"], &["--flights", "0"]),
+        (&["campaign", "--flights", "3", "--seed", "18446744073709551615"], &["--seed"]),
+        (&["campaign", "--flights", "many"], &["--flights", "many"]),
+        (&["campaign", "--mission", "broken"], &["line 3"]),
+        (&["replay"], &["FILE"]),
+        (&["replay", "nowhere.ulg"], &["nowhere.ulg"]),
+        (&["replay", "broken"], &["broken", "not a ULog"]),
+        (&["replay", "."], &["."]),
+        (&["topics", "--json", "--markdown"], &["--markdown"]),
+    ];
+    for (arguments, words) in cases {
+        refuses(&folder, arguments, words);
+    }
+}
+
+/// `stampfly … | head -0`: the reader is gone before the first line.
+#[test]
+fn a_reader_that_has_gone_is_no_panic() {
+    let folder = folder("closed");
+    std::fs::write(folder.join("hop"), HOP).expect("written");
+    for arguments in [&["topics"][..], &["fly", "--mission", "hop"], &["fly", "--list"], &["--help"]] {
+        let mut child =
+            command(&folder, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("starts");
+        drop(child.stdout.take());
+        let ran = read(child.wait_with_output().expect("it ends"));
+        assert_eq!(ran.err, "", "{arguments:?}");
+    }
+}

@@ -1,0 +1,205 @@
+//! What the vehicle does when something it relies on goes away in flight, and how fast.
+
+mod harness;
+
+use harness::{Seen, run};
+use stampfly_types::Micros;
+use stampfly_types::messages::{Alerts, FlightMode, FlightState, GuidedKind, PilotInput};
+use std::cell::Cell;
+use std::rc::Rc;
+
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
+
+/// The vehicle's inertial sensor may be 2 % slow: a control period, in microseconds.
+const PERIOD: u64 = 2_551;
+
+/// Where a script leaves the instant at which it did what the test is about.
+fn instant() -> (Rc<Cell<Micros>>, Rc<Cell<Micros>>) {
+    let cell = Rc::new(Cell::new(Micros::ZERO));
+    (cell.clone(), cell)
+}
+
+/// It hovers for three seconds after half a second of silence, over its place, then lands there.
+fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Micros) {
+    let landing = seen.entered(FlightState::Landing, silent_since).expect("it lands");
+    let waited = landing.since(silent_since).seconds();
+    assert!((3.45..3.6).contains(&waited), "seed {seed}: landing after {waited} s of silence");
+    let first = seen.alerts.iter().find(|(at, alerts)| *at >= silent_since && alerts.contains(Alerts::COMM_LOST));
+    let noticed = first.expect("silence is noticed").0.since(silent_since).seconds();
+    assert!((0.49..0.52).contains(&noticed), "seed {seed}: noticed after {noticed} s");
+
+    let (mode, truth) = seen.end();
+    assert_eq!((mode.state, mode.armed, truth.contact), (FlightState::IdleGround, false, true), "seed {seed}");
+    let drift = seen.drift(silent_since, landing);
+    assert!(drift < 0.25, "seed {seed}: drifted {drift} m while waiting");
+    let moved = seen.drift(silent_since, Micros(u64::MAX));
+    assert!(moved < 0.4, "seed {seed}: landed {moved} m away");
+    for (at, output) in &seen.motors {
+        assert!(output.duty.iter().all(|duty| (0.0..=1.0).contains(duty)), "seed {seed}: {output:?} at {at}");
+    }
+}
+
+#[test]
+fn a_silent_ground_station() {
+    for seed in SEEDS {
+        let (since, note) = instant();
+        let seen = run(seed, 30.0, |mut hands| {
+            Box::pin(async move {
+                hands.take_off().await;
+                hands.sleep(0.3).await;
+                note.set(hands.command(GuidedKind::None));
+            })
+        });
+        hovers_then_lands(seed, &seen, since.get());
+    }
+}
+
+const STICKS: PilotInput =
+    PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: 0.0, mode: FlightMode::PosHold, arm: false, kill: false };
+
+/// A pilot arms by switch, the vehicle takes off by itself, and frames come at 50 Hz until the pilot is gone while
+/// flying forward.
+#[test]
+fn a_silent_pilot() {
+    for seed in SEEDS {
+        let (since, note) = instant();
+        let seen = run(seed, 35.0, |mut hands| {
+            Box::pin(async move {
+                while hands.telemetry().state != FlightState::IdleGround || !hands.telemetry().blocks.is_empty() {
+                    hands.frame(&STICKS);
+                    hands.sleep(0.02).await;
+                }
+                while hands.telemetry().state != FlightState::Flying {
+                    hands.frame(&PilotInput { arm: true, ..STICKS });
+                    hands.sleep(0.02).await;
+                }
+                for _ in 0..100 {
+                    note.set(hands.frame(&PilotInput { arm: true, pitch: 0.1, ..STICKS }));
+                    hands.sleep(0.02).await;
+                }
+            })
+        });
+        hovers_then_lands(seed, &seen, since.get());
+    }
+}
+
+#[test]
+fn a_link_that_comes_back_in_time() {
+    let (since, note) = instant();
+    let seen = run(1, 25.0, |mut hands| {
+        Box::pin(async move {
+            hands.take_off().await;
+            note.set(hands.command(GuidedKind::None));
+            hands.sleep(2.5).await;
+            hands.wait_for(|_| false).await;
+        })
+    });
+    let lost: Vec<bool> = seen.alerts.iter().map(|(_, alerts)| alerts.contains(Alerts::COMM_LOST)).collect();
+    assert!(lost.contains(&true) && lost.last() == Some(&false), "silence was noticed, and its end");
+    assert_eq!(seen.entered(FlightState::Landing, since.get()), None);
+    assert_eq!(seen.end().0.state, FlightState::Flying);
+}
+
+#[test]
+fn kill_stops_the_motors_within_a_control_period() {
+    for seed in SEEDS {
+        let (since, note) = instant();
+        let seen = run(seed, 15.0, |mut hands| {
+            Box::pin(async move {
+                hands.take_off().await;
+                note.set(hands.command(GuidedKind::Kill));
+            })
+        });
+        let took = seen.motors_off_after(since.get());
+        assert!(took.0 <= PERIOD, "seed {seed}: by command {took}");
+        assert!(!seen.end().0.armed);
+
+        let (since, note) = instant();
+        let seen = run(seed, 15.0, |mut hands| {
+            Box::pin(async move {
+                hands.take_off().await;
+                // At any phase of the control period.
+                hands.sleep(0.01 + 0.000_37 * seed as f32).await;
+                note.set(hands.frame(&PilotInput { kill: true, ..STICKS }));
+            })
+        });
+        let took = seen.motors_off_after(since.get());
+        assert!(took.0 <= PERIOD, "seed {seed}: by the pilot {took}");
+    }
+}
+
+/// The last duty must not be held: 25 ms without a sample and the motors are off, by deadline, for nothing wakes the
+/// flight band any more.
+#[test]
+fn a_silent_inertial_sensor() {
+    for seed in SEEDS {
+        let (since, note) = instant();
+        let seen = run(seed, 20.0, |mut hands| {
+            Box::pin(async move {
+                hands.take_off().await;
+                note.set(hands.clock.now());
+                hands.imu_silent.set(true);
+            })
+        });
+        let took = seen.motors_off_after(since.get());
+        assert!((20_000..=32_500).contains(&took.0), "seed {seed}: {took}");
+        let degraded = seen.alerts.iter().find(|(_, alerts)| alerts.contains(Alerts::IMU_DEGRADED)).expect("noticed").0;
+        assert!(degraded.since(since.get()) <= Micros::from_millis(15), "seed {seed}: {degraded}");
+    }
+}
+
+/// Less than 25 ms is noticed and flown through.
+#[test]
+fn a_hiccup_of_the_inertial_sensor() {
+    let (since, note) = instant();
+    let seen = run(1, 20.0, |mut hands| {
+        Box::pin(async move {
+            hands.take_off().await;
+            note.set(hands.clock.now());
+            hands.imu_silent.set(true);
+            hands.sleep(0.015).await;
+            hands.imu_silent.set(false);
+            hands.sleep(2.0).await;
+            hands.command(GuidedKind::Land);
+            hands.wait_for(|frame| !frame.armed).await;
+        })
+    });
+    assert!(seen.alerts.iter().any(|(_, alerts)| alerts.contains(Alerts::IMU_DEGRADED)));
+    assert!(seen.alerts.iter().all(|(_, alerts)| !alerts.contains(Alerts::IMU_LOST)));
+    assert!(
+        seen.entered(FlightState::Landing, since.get()).is_some_and(|at| at.since(since.get()) > Micros::from_secs(2))
+    );
+    assert_eq!((seen.end().0.state, seen.end().1.contact), (FlightState::IdleGround, true));
+    assert!(seen.drift(since.get(), Micros(u64::MAX)) < 0.3);
+}
+
+/// Nobody but a finger: one click takes off and holds the place, another one lands.
+#[test]
+fn a_button_flies_the_vehicle() {
+    for seed in SEEDS {
+        let (since, note) = instant();
+        let seen = run(seed, 30.0, |mut hands| {
+            Box::pin(async move {
+                while hands.telemetry().state != FlightState::IdleGround || !hands.telemetry().blocks.is_empty() {
+                    hands.sleep(0.1).await;
+                }
+                hands.click().await;
+                hands.sleep(10.0).await;
+                note.set(hands.clock.now());
+                hands.click().await;
+            })
+        });
+        let states: Vec<FlightState> = seen.states().into_iter().map(|(_, state)| state).collect();
+        use FlightState as S;
+        assert_eq!(
+            states,
+            [S::Init, S::IdleGround, S::Armed, S::TakeOff, S::Flying, S::Landing, S::IdleGround],
+            "seed {seed}"
+        );
+        let flying = |mode: &&(Micros, stampfly_types::messages::SystemMode)| mode.1.state == S::Flying;
+        assert!(seen.modes.iter().filter(flying).all(|(_, mode)| mode.mode == FlightMode::PosHold), "seed {seed}");
+        let landing = seen.entered(S::Landing, since.get()).expect("the second click lands");
+        assert!(landing.since(since.get()) < Micros::from_secs(1));
+        assert!(seen.end().1.contact && !seen.end().0.armed);
+    }
+}
