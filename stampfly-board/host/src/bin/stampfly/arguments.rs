@@ -12,11 +12,7 @@ use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
 #[derive(Debug, Parser)]
-<<<<<<< HEAD
-#[command(version)]
-=======
-#[command(name = "stampfly", version, about, arg_required_else_help = false)]
->>>>>>> tests
+#[command(name = "stampfly", version)]
 pub struct Arguments {
     /// What to do; without it, a mission is flown.
     #[command(subcommand)]
