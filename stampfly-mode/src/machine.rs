@@ -368,9 +368,12 @@ mod tests {
         }
     }
 
+    /// What happens to the world before a command.
+    type Change = fn(&mut World);
+
     fn in_state(state: FlightState) -> (ModeMachine, World) {
         let (mut machine, mut world) = (ModeMachine::default(), World::ready());
-        let path: &[(Command, fn(&mut World))] = &[
+        let path: &[(Command, Change)] = &[
             (Command::None, |_| {}),
             (Command::Arm, |_| {}),
             (Command::TakeOff, |_| {}),

@@ -161,7 +161,7 @@ fn one_flipped_bit_is_found_and_named() {
     assert!(found.generation > 1_000, "{found}");
     let field = found.field.split('[').next().unwrap_or_default();
     let fields = TOPICS.iter().find(|topic| topic.name == found.topic).expect("a topic of ours").fields;
-    assert!(fields.iter().any(|info| info.name == field && info.unit != ""), "{found}");
+    assert!(fields.iter().any(|info| info.name == field && !info.unit.is_empty()), "{found}");
     let [recorded, replayed] = [&found.recorded, &found.replayed].map(|text| text.parse::<f32>().expect("numbers"));
     assert!(recorded != replayed && (recorded - replayed).abs() < 0.1, "{found}");
     for part in ["estimation", "estimate_state", &found.field, &found.recorded, &found.replayed] {
