@@ -28,9 +28,10 @@ impl Repository {
         Self { root: package.parent().unwrap_or(package).to_owned() }
     }
 
-    /// A folder for generated files.
+    /// A place in cargo's folder for generated files.
     pub fn target(&self, name: &str) -> PathBuf {
-        self.root.join("target").join(name)
+        let folder = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+        self.root.join(folder).join(name)
     }
 
     /// Every library crate: the folders `stampfly-*` with a `src/lib.rs`. A new crate is checked without being listed.
