@@ -368,21 +368,12 @@ mod tests {
         }
     }
 
-<<<<<<< HEAD
-    /// A command, and what has to be so before it is given.
-    type Leg = (Command, fn(&mut World));
-
-    fn in_state(state: FlightState) -> (ModeMachine, World) {
-        let (mut machine, mut world) = (ModeMachine::default(), World::ready());
-        let path: &[Leg] = &[
-=======
     /// What happens to the world before a command.
     type Change = fn(&mut World);
 
     fn in_state(state: FlightState) -> (ModeMachine, World) {
         let (mut machine, mut world) = (ModeMachine::default(), World::ready());
         let path: &[(Command, Change)] = &[
->>>>>>> tests
             (Command::None, |_| {}),
             (Command::Arm, |_| {}),
             (Command::TakeOff, |_| {}),
