@@ -112,7 +112,7 @@ fn complaints(mission: &Mission, flight: &Flight) -> Vec<String> {
     let bounds = [
         ("estimate to truth", outcome.metrics.est_pos_rms_m, 0.2),
         ("truth to set-point", outcome.metrics.pos_rms_m, 0.2),
-        ("height to set-point", outcome.metrics.alt_rms_m, 0.05),
+        ("height to set-point", outcome.metrics.alt_rms_m, 0.07),
         ("take-off overshoot", outcome.metrics.takeoff_overshoot_m, 0.16),
         ("touchdown", outcome.metrics.touchdown_speed_mps, 0.4),
         ("tilt", Some(outcome.worst_tilt_deg), 30.0),
