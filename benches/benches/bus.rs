@@ -44,124 +44,141 @@ fn sample(seed: u64) -> ImuData {
     ImuData { accel: Vec3::new(x, -x, -9.81), gyro: Vec3::new(0.5 * x, x, -x), temperature: 25.0 }
 }
 
-/// Runs `each` with every contender's publish-and-read, in turn.
-fn contenders(mut each: impl FnMut(&'static str, &mut dyn FnMut(u64) -> f32)) {
+/// Somebody who measures. A trait, so that each contender is measured by code of its own, without a call in between.
+trait Measure {
+    /// Measures one publish and read. What was read goes into a black box whole, so nobody gets away with a part of it.
+    fn contender(&mut self, name: &'static str, round: impl FnMut(u64) -> Option<ImuData>);
+}
+
+/// Hands every contender's publish-and-read to `measure`, in turn.
+fn contenders(measure: &mut impl Measure) {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu }, .. } = bus.split(None);
     let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
-    each("stampfly-bus ring, polling", &mut |k| {
+    measure.contender("stampfly-bus ring, polling", |k| {
         tx.publish(Micros(k), &sample(k));
-        rx.next().map_or(0.0, |s| s.data.gyro.x)
+        rx.next().map(|s| s.data)
     });
 
     let (mut tx, mut rx) = (newest_imu.tx, newest_imu.estimation);
-    each("stampfly-bus latest, polling", &mut |k| {
+    measure.contender("stampfly-bus latest, polling", |k| {
         tx.publish(Micros(k), &sample(k));
-        rx.latest().map_or(0.0, |s| s.data.gyro.x)
+        rx.latest().map(|s| s.data)
     });
 
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu: _newest }, .. } = bus.split(Some(wake));
     let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
-    each("stampfly-bus ring, waiting", &mut |k| {
+    measure.contender("stampfly-bus ring, waiting", |k| {
         tx.publish(Micros(k), &sample(k));
-        if WOKEN.swap(false, Ordering::AcqRel) { rx.next().map_or(0.0, |s| s.data.gyro.x) } else { 0.0 }
+        if WOKEN.swap(false, Ordering::AcqRel) { rx.next().map(|s| s.data) } else { None }
     });
 
     let mut queue: spsc::Queue<Timed, 16> = spsc::Queue::new();
     let (mut producer, mut consumer) = queue.split();
-    each("heapless spsc, polling", &mut |k| {
+    measure.contender("heapless spsc, polling", |k| {
         let _ = producer.enqueue((Micros(k), sample(k)));
-        consumer.dequeue().map_or(0.0, |s| s.1.gyro.x)
+        consumer.dequeue().map(|s| s.1)
     });
 
     let watch: Watch<CriticalSectionRawMutex, Timed, 2> = Watch::new();
     let (sender, mut receiver) = (watch.sender(), watch.receiver().expect("two receivers"));
-    each("embassy-sync Watch, polling", &mut |k| {
+    measure.contender("embassy-sync Watch, polling", |k| {
         sender.send((Micros(k), sample(k)));
-        receiver.try_changed().map_or(0.0, |s| s.1.gyro.x)
+        receiver.try_changed().map(|s| s.1)
     });
 
     let watch: Watch<CriticalSectionRawMutex, Timed, 2> = Watch::new();
     let (sender, mut receiver) = (watch.sender(), watch.receiver().expect("two receivers"));
-    each("embassy-sync Watch, waiting", &mut |k| {
+    measure.contender("embassy-sync Watch, waiting", |k| {
         let mut reader = pin!(receiver.changed());
         let mut context = Context::from_waker(Waker::noop());
         assert!(reader.as_mut().poll(&mut context).is_pending());
         sender.send((Micros(k), sample(k)));
         match reader.poll(&mut context) {
-            Poll::Ready(s) => s.1.gyro.x,
-            Poll::Pending => 0.0,
+            Poll::Ready(s) => Some(s.1),
+            Poll::Pending => None,
         }
     });
 
     let channel: PubSubChannel<CriticalSectionRawMutex, Timed, 16, 2, 1> = PubSubChannel::new();
     let publisher = channel.publisher().expect("one publisher");
     let mut subscriber = channel.subscriber().expect("two subscribers");
-    each("embassy-sync PubSub, polling", &mut |k| {
+    measure.contender("embassy-sync PubSub, polling", |k| {
         publisher.publish_immediate((Micros(k), sample(k)));
         match subscriber.try_next_message() {
-            Some(WaitResult::Message(s)) => s.1.gyro.x,
-            _ => 0.0,
+            Some(WaitResult::Message(s)) => Some(s.1),
+            _ => None,
         }
     });
 
     let channel: PubSubChannel<CriticalSectionRawMutex, Timed, 16, 2, 1> = PubSubChannel::new();
     let publisher = channel.publisher().expect("one publisher");
     let mut subscriber = channel.subscriber().expect("two subscribers");
-    each("embassy-sync PubSub, waiting", &mut |k| {
+    measure.contender("embassy-sync PubSub, waiting", |k| {
         let mut reader = pin!(subscriber.next_message());
         let mut context = Context::from_waker(Waker::noop());
         assert!(reader.as_mut().poll(&mut context).is_pending());
         publisher.publish_immediate((Micros(k), sample(k)));
         match reader.poll(&mut context) {
-            Poll::Ready(WaitResult::Message(s)) => s.1.gyro.x,
-            _ => 0.0,
+            Poll::Ready(WaitResult::Message(s)) => Some(s.1),
+            _ => None,
         }
     });
 }
 
-fn bench(c: &mut Criterion) {
-    let mut group = c.benchmark_group("publish and read one IMU message");
-    contenders(|name, round| {
+struct ByCriterion<'a>(criterion::BenchmarkGroup<'a, criterion::measurement::WallTime>);
+
+impl Measure for ByCriterion<'_> {
+    fn contender(&mut self, name: &'static str, mut round: impl FnMut(u64) -> Option<ImuData>) {
         let mut k = 0;
-        group.bench_function(name, |b| {
+        self.0.bench_function(name, |b| {
             b.iter(|| {
                 k += 1;
-                black_box(round(black_box(k)))
+                round(black_box(k))
             });
         });
-    });
-    group.finish();
+    }
+}
+
+fn bench(c: &mut Criterion) {
+    contenders(&mut ByCriterion(c.benchmark_group("publish and read one IMU message")));
 }
 
 criterion_group!(benches, bench);
 
-/// Medians over seven interleaved rounds, as ratios to the first peer.
-fn ratios() {
-    const ROUNDS: usize = 7;
-    const CALLS: u64 = 2_000_000;
-    let mut times: Vec<(&'static str, Vec<f64>)> = Vec::new();
-    for _ in 0..ROUNDS {
-        contenders(|name, round| {
-            let started = Instant::now();
-            for k in 1..=CALLS {
-                black_box(round(black_box(k)));
-            }
-            let nanoseconds = started.elapsed().as_secs_f64() * 1e9 / CALLS as f64;
-            match times.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, list)) => list.push(nanoseconds),
-                None => times.push((name, vec![nanoseconds])),
-            }
-        });
+const ROUNDS: usize = 7;
+const CALLS: u64 = 2_000_000;
+
+/// Times of every contender, one a round.
+#[derive(Default)]
+struct Interleaved(Vec<(&'static str, Vec<f64>)>);
+
+impl Measure for Interleaved {
+    fn contender(&mut self, name: &'static str, mut round: impl FnMut(u64) -> Option<ImuData>) {
+        let started = Instant::now();
+        for k in 1..=CALLS {
+            black_box(round(black_box(k)));
+        }
+        let nanoseconds = started.elapsed().as_secs_f64() * 1e9 / CALLS as f64;
+        match self.0.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, times)) => times.push(nanoseconds),
+            None => self.0.push((name, vec![nanoseconds])),
+        }
     }
-    let medians: Vec<(&str, f64)> = times
-        .iter_mut()
-        .map(|(name, list)| {
-            list.sort_by(f64::total_cmp);
-            (*name, list[ROUNDS / 2])
-        })
-        .collect();
+}
+
+/// Medians over seven interleaved rounds, as ratios to the first contender.
+fn ratios() {
+    let mut measured = Interleaved::default();
+    for _ in 0..ROUNDS {
+        contenders(&mut measured);
+    }
+    let median = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[ROUNDS / 2]
+    };
+    let medians: Vec<(&str, f64)> = measured.0.iter_mut().map(|(name, times)| (*name, median(times))).collect();
     let ours = medians[0].1;
     println!("\nmedian of {ROUNDS} interleaved rounds of {CALLS} calls");
     for (name, time) in &medians {
