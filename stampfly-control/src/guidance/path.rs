@@ -258,7 +258,9 @@ mod tests {
             while !path.ends(&leg) {
                 path.follow(&leg, DT);
                 let moved = path.position() - from;
-                prop_assert!((moved - along * moved.dot(&along)).norm() < 2e-3, "off the line");
+                // Each step rounds each coordinate to its last bit, and a slow leg takes tens of thousands of steps.
+                let rounding = steps as f32 * 2.0 * f32::EPSILON;
+                prop_assert!((moved - along * moved.dot(&along)).norm() < 2e-3 + rounding, "off the line");
                 prop_assert!(path.velocity().norm() <= speed * 1.001 + 1e-4);
                 prop_assert!(path.velocity().xy().amax() <= 1.001 && path.velocity().z.abs() <= 0.601);
                 steps += 1;
