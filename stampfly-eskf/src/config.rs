@@ -54,14 +54,20 @@ pub struct EskfConfig {
 
     /// Standard deviation of a barometric altitude, m.
     pub baro_sigma: f32,
-    /// Use the barometer when the range is missing.
+    /// Use the barometer.
     pub baro_enable: bool,
-    /// Standard deviation of a magnetic heading, rad.
+    /// How fast the barometer's zero drifts, m/√s: a metre an hour is 0.017.
+    pub baro_walk: f32,
+    /// Standard deviation of a magnetic direction, rad.
     pub mag_sigma: f32,
+    /// What of the magnetic field is used.
+    pub mag_model: MagModel,
     /// Use the magnetometer. Off by default: the StampFly's motor currents bend the field.
     pub mag_enable: bool,
 
-    /// Standard deviation of the accelerometer as an inclinometer while nothing else holds the tilt, m/s².
+    /// When the accelerometer is an inclinometer.
+    pub gravity_use: GravityUse,
+    /// Its standard deviation as one, m/s².
     pub gravity_sigma: f32,
     /// The same while standing still, m/s².
     pub still_gravity_sigma: f32,
@@ -78,6 +84,27 @@ pub struct EskfConfig {
     pub gate: f32,
     /// After this long without an accepted sample of a sensor that keeps reporting, the state moves to it, s.
     pub lockout: f32,
+}
+
+/// What of the magnetic field is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MagModel {
+    /// Its heading only: nearby motors bend it by more than any tilt. See [`aid::heading`](crate::aid::heading).
+    #[default]
+    Heading,
+    /// All three axes, tilt included: nothing bends it. See [`aid::field`](crate::aid::field).
+    Field,
+}
+
+/// When the accelerometer is an inclinometer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GravityUse {
+    /// While nothing measures velocity: otherwise velocity shows the tilt, and better.
+    #[default]
+    WhenUnaided,
+    /// At every inertial sample, less the acceleration that measured velocities show: for a vehicle whose velocity is
+    /// measured badly and whose motors do not shake it.
+    Always,
 }
 
 impl Default for EskfConfig {
@@ -105,8 +132,11 @@ impl Default for EskfConfig {
             flow_min_distance: 0.02,
             baro_sigma: 0.3,
             baro_enable: true,
+            baro_walk: 0.02,
             mag_sigma: 0.1,
+            mag_model: MagModel::Heading,
             mag_enable: false,
+            gravity_use: GravityUse::WhenUnaided,
             gravity_sigma: 1.0,
             still_gravity_sigma: 0.1,
             still_velocity_sigma: 0.01,

@@ -3,49 +3,49 @@
 //! The arithmetic lives in [`filter`](crate::filter), the models in [`aid`](crate::aid). Use this for anything that
 //! flies indoors on an inertial sensor, optical flow and a range; use the
 //! [`Complementary`](crate::Complementary) filter where a few hundred bytes must do.
+//!
+//! | file | what |
+//! |---|---|
+//! | `eskf.rs` | the filter itself, its time, the [`Estimator`] it is |
+//! | `eskf/measurements.rs` | one function a sensor |
+//! | `eskf/assumptions.rs` | what is assumed where nothing measures |
+//! | `eskf/gate.rs` | gates, lock-outs, resets |
 
+mod assumptions;
+mod gate;
 mod measurements;
 
+use crate::aid::baro::Offset;
+use crate::aid::gravity::Acceleration;
 use crate::aid::{self, Row};
-use crate::config::EskfConfig;
+use crate::config::{EskfConfig, GravityUse};
 use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
-use crate::filter::state::{Motion, Rotation};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Nominal, POSITION, RateHistory, VELOCITY};
+use crate::filter::history::REACH;
+use crate::filter::state::{Rotation, multiply, rotate};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, Passage, VELOCITY};
 use crate::level::attitude_from_specific_force;
+use gate::{Gates, Sensor};
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
 
-/// A sensor counts as taking part this long after its last accepted sample.
-const AIDING_TIMEOUT: Micros = Micros(1_000_000);
-/// Measurements older than this are refused.
-const MAX_DELAY: Micros = Micros(100_000);
+/// Measurements from farther ahead than this are refused, s.
+const AHEAD: f32 = 0.02;
+/// Measurements this close to the last inertial sample are compared with the present state, s.
+const PRESENT: f32 = 0.5e-3;
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
-/// How well the heading is known where it is defined to be zero, rad.
-const HEADING_SIGMA: f32 = 1e-3;
-/// Doubt beyond which a velocity and a position count as unknown, m/s and m.
-const UNKNOWN_VELOCITY: f32 = 3.0;
-const UNKNOWN_POSITION: f32 = 10.0;
+/// The state moves with every inertial sample, its doubt with the first sample after this much time, s: at 400 Hz with
+/// every second one. A hundredth of the time in which doubt changes, and half the work. (PX4's EKF2 takes 10 ms.)
+const DOUBT_STEP: f32 = 4e-3;
 /// While standing, the ground is absorbed at every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
-
-/// When a sensor was last accepted, and since when it has not been.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Aid {
-    fused: Option<Micros>,
-    /// Since when it has been refused without a break.
-    gated_since: Option<Micros>,
-}
-
-impl Aid {
-    fn is_recent(&self, now: Micros) -> bool {
-        self.fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
-    }
-}
+/// A vector of more axes is more often far away by chance: its gate, relative to that of one axis, for the same chance
+/// (6·10⁻⁵ at four standard deviations).
+const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
 
 /// Running mean of inertial samples between two looks at gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,7 +93,10 @@ pub struct Eskf {
     noise: ProcessNoise,
     state: Nominal,
     covariance: Covariance,
-    rotation: Rotation,
+    /// What the covariance has yet to follow, and the attitude in which that began.
+    pending: Passage,
+    start: Rotation,
+    history: History,
     now: Micros,
     initialized: bool,
     calibration: CalibrationResult,
@@ -102,21 +105,29 @@ pub struct Eskf {
     anchor: Option<Vec3>,
     /// World down coordinate of the surface below.
     surface: Option<f32>,
-    baro_offset: Option<f32>,
-    mag_reference: Option<f32>,
+    baro_offset: Option<Offset>,
+    baro_seen: Micros,
+    /// Direction of the magnetic field, world.
+    field: Option<Vec3>,
+    acceleration: Acceleration,
     steps: u32,
-    imu: ImuData,
     rate: Vec3,
     force: Vec3,
-    rates: RateHistory,
     accels: Mean,
-    tof: Aid,
-    flow: Aid,
-    baro: Aid,
-    mag: Aid,
-    velocity: Aid,
-    gravity: Aid,
+    gates: Gates,
+    /// Last specific force used as the vertical, and what it should have been.
+    gravity: [Vec3; 2],
     status: EstimatorStatus,
+}
+
+/// The state at the time of a measurement.
+struct Then {
+    state: Nominal,
+    rotation: Rotation,
+    /// What happened since.
+    passage: Passage,
+    /// How long ago that is, s; zero for the present.
+    age: f32,
 }
 
 /// Position of each sensor in the status message's counters.
@@ -138,7 +149,9 @@ impl Eskf {
             covariance: initial_covariance(&config),
             config,
             state: Nominal::default(),
-            rotation: Nominal::default().rotation(),
+            pending: Passage::default(),
+            start: Nominal::default().rotation(),
+            history: History::default(),
             now: Micros::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
@@ -146,19 +159,15 @@ impl Eskf {
             anchor: None,
             surface: None,
             baro_offset: None,
-            mag_reference: None,
+            baro_seen: Micros::ZERO,
+            field: None,
+            acceleration: Acceleration::default(),
             steps: 0,
-            imu: ImuData::default(),
             rate: Vec3::zeros(),
             force: Vec3::zeros(),
-            rates: RateHistory::default(),
             accels: Mean::default(),
-            tof: Aid::default(),
-            flow: Aid::default(),
-            baro: Aid::default(),
-            mag: Aid::default(),
-            velocity: Aid::default(),
-            gravity: Aid::default(),
+            gates: Gates::default(),
+            gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
     }
@@ -175,34 +184,81 @@ impl Eskf {
         &self.state
     }
 
-    fn correct(&mut self, projection: &Projection, innovation: f32) {
-        let correction = self.covariance.absorb(projection, innovation);
-        self.state.correct(&correction);
-        self.rotation = self.state.rotation();
+    /// The state now, as something to compare a measurement with.
+    fn present(&self) -> Then {
+        Then { state: self.state, rotation: self.state.rotation(), passage: Passage::default(), age: 0.0 }
     }
 
-    fn ratio(&self, innovation: f32, variance: f32) -> f32 {
-        innovation * innovation / (self.config.gate * self.config.gate * variance)
-    }
-
-    /// One scalar measurement without a gate: for things that are known, not measured.
-    fn absorb_row<const K: usize>(&mut self, row: Row<K>, measured: f32, sigma: f32) {
-        let projection = self.covariance.project(row.jacobian, sigma * sigma);
-        self.correct(&projection, measured - row.predicted);
-    }
-
-    /// Checks every measurement passes: initialised, finite, neither too old nor from the far future.
-    fn admit(&self, at: Micros, values: &[f32]) -> Result<(), Refusal> {
+    /// Checks every measurement passes: initialised, finite, new, neither too old nor from the future. Gives the state
+    /// it is to be compared with.
+    fn admit(&mut self, sensor: Sensor, at: Micros, values: &[f32]) -> Result<Then, Refusal> {
         if !self.initialized {
             return Err(Refusal::NotInitialized);
         }
         if !values.iter().all(|v| v.is_finite()) {
             return Err(Refusal::NotFinite);
         }
-        if self.now.since(at) > MAX_DELAY || at.since(self.now) > MAX_DELAY {
+        let age = self.now.signed_seconds_since(at);
+        if age > REACH {
             return Err(Refusal::Stale);
         }
-        Ok(())
+        if age < -AHEAD {
+            return Err(Refusal::Future);
+        }
+        if !self.gates.is_new(sensor, at) {
+            return Err(Refusal::Repeated);
+        }
+        if age.abs() < PRESENT {
+            return Ok(self.present());
+        }
+        // Right after the start there is no past to compare with.
+        let passage = self.history.since(age).ok_or(Refusal::Stale)?;
+        let state = passage.before(&self.state);
+        Ok(Then { state, rotation: state.rotation(), passage, age })
+    }
+
+    /// Compares a measurement with the state of its time: what it would do, and its test ratio.
+    #[inline]
+    fn compare<const M: usize>(
+        &self,
+        then: &Then,
+        rows: [Row; M],
+        measured: [f32; M],
+        variances: [f32; M],
+    ) -> (Projection<M>, f32) {
+        let carried = |row: &Row| {
+            if then.age == 0.0 { row.jacobian } else { then.passage.carry(&then.rotation, &row.jacobian) }
+        };
+        let jacobians = rows.each_ref().map(carried);
+        let mut innovations = measured;
+        for (innovation, row) in innovations.iter_mut().zip(&rows) {
+            *innovation -= row.predicted;
+        }
+        let projection = self.covariance.project(&jacobians, innovations, variances);
+        let gate = self.config.gate * self.config.gate * GATE_OF_AXES.get(M).copied().unwrap_or(1.0);
+        let ratio = projection.distance() / gate;
+        (projection, ratio)
+    }
+
+    /// Lets a measurement into the estimate.
+    #[inline]
+    fn absorb<const M: usize>(&mut self, projection: &Projection<M>, ratio: f32) -> Fusion {
+        let correction = self.covariance.absorb(projection);
+        self.state.correct(&correction);
+        Fusion::Fused { ratio }
+    }
+
+    /// Absorbs what is known, not measured: no gate.
+    fn know<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
+        let (projection, ratio) = self.compare(&self.present(), rows, values, [sigma * sigma; M]);
+        self.absorb(&projection, ratio);
+    }
+
+    /// Notes that the state was moved to a sensor that had been locked out.
+    fn moved_to(&mut self, sensor: Sensor) -> Fusion {
+        self.status.resets = self.status.resets.wrapping_add(1);
+        self.status.diverged |= self.gates.reset(sensor, self.now);
+        Fusion::Reset
     }
 
     fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {
@@ -215,86 +271,6 @@ impl Eskf {
             *refused = refused.wrapping_add(1);
         }
         fusion
-    }
-
-    /// While standing: velocity and position are known, the gyro shows its bias and the accelerometer the tilt.
-    fn absorb_standing(&mut self, anchor: Vec3) {
-        for axis in 0..3 {
-            let velocity = Row { predicted: self.state.velocity[axis], jacobian: [(VELOCITY + axis, 1.0)] };
-            self.absorb_row(velocity, 0.0, self.config.still_velocity_sigma);
-            let position = Row { predicted: self.state.position[axis], jacobian: [(POSITION + axis, 1.0)] };
-            self.absorb_row(position, anchor[axis], self.config.still_position_sigma);
-        }
-    }
-
-    fn absorb_gravity(&mut self, accel: Vec3, sigma: f32) {
-        // The farther from one g, the more it is motion or vibration and the less it is tilt.
-        let excess = accel.norm() - GRAVITY;
-        let variance = sigma * sigma + 10.0 * excess * excess;
-        let rows = aid::gravity::specific_force(&self.state, &self.rotation);
-        let mut worst = 0.0f32;
-        for (axis, row) in rows.iter().enumerate() {
-            let projection = self.covariance.project(row.jacobian, variance);
-            worst = worst.max(self.ratio(accel[axis] - row.predicted, projection.variance));
-        }
-        let predicted = Vec3::new(rows[0].predicted, rows[1].predicted, rows[2].predicted);
-        self.status.accel_innovation = math::acos(accel.dot(&predicted) / (accel.norm() * predicted.norm()).max(1e-3));
-        self.status.accel_ratio = worst;
-        let fusion = if worst <= 1.0 { Fusion::Fused { ratio: worst } } else { Fusion::Gated { ratio: worst } };
-        self.count(Counter::Gravity, fusion);
-        if worst > 1.0 {
-            let since = *self.gravity.gated_since.get_or_insert(self.now);
-            if self.now.since(since).seconds() > 4.0 * self.config.lockout {
-                // It never rights itself otherwise: doubt the attitude, once per lock-out, until gravity fits in again.
-                self.gravity.gated_since = Some(self.now);
-                for axis in 0..3 {
-                    self.covariance.inflate(ATTITUDE + axis, 0.01);
-                }
-            }
-            return;
-        }
-        self.gravity.gated_since = None;
-        self.gravity.fused = Some(self.now);
-        for axis in 0..3 {
-            let row = aid::gravity::specific_force(&self.state, &self.rotation)[axis];
-            let projection = self.covariance.project(row.jacobian, variance);
-            self.correct(&projection, accel[axis] - row.predicted);
-        }
-    }
-
-    /// Heading counts from where the vehicle was initialised, so it is known there. Doubting it would let every error of
-    /// the flow sensor turn the vehicle's idea of north.
-    fn know_heading(&mut self) {
-        let up = self.rotation[2];
-        let row = Row { predicted: 0.0, jacobian: [(ATTITUDE, up[0]), (ATTITUDE + 1, up[1]), (ATTITUDE + 2, up[2])] };
-        self.absorb_row(row, 0.0, HEADING_SIGMA);
-    }
-
-    /// Without anything that measures it, a velocity is the integral of a small error of the tilt and soon larger than
-    /// any that the vehicle can fly. From there on it is not estimated: it stays at zero, and the position where it is,
-    /// until somebody measures it again.
-    fn forget_motion(&mut self) {
-        const LIMITS: [(usize, f32); 2] = [(VELOCITY, UNKNOWN_VELOCITY), (POSITION, UNKNOWN_POSITION)];
-        for (block, limit) in LIMITS {
-            for axis in 0..3 {
-                if self.covariance.get(block + axis, block + axis) > limit * limit {
-                    self.covariance.reset(block + axis, limit * limit);
-                    if block == VELOCITY {
-                        self.state.velocity[axis] = 0.0;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Tilted out of sight of the ground, for `dt` seconds: nothing measures the velocity, and the integral of a tilt
-    /// error grows by the second. Vehicles that use their velocity do not fly like this; hands carry them so, slowly.
-    fn absorb_blind(&mut self, dt: f32) {
-        let sigma = self.config.blind_velocity / math::sqrt(dt.max(1e-3));
-        for axis in 0..3 {
-            let velocity = Row { predicted: self.state.velocity[axis], jacobian: [(VELOCITY + axis, 1.0)] };
-            self.absorb_row(velocity, 0.0, sigma);
-        }
     }
 
     /// Gives up what is not finite and starts again from the last calibration.
@@ -314,26 +290,27 @@ impl Eskf {
     }
 
     fn holds_velocity(&self) -> bool {
-        self.flow.is_recent(self.now) || self.velocity.is_recent(self.now) || self.anchor.is_some()
+        let by = [Sensor::Flow, Sensor::Velocity, Sensor::Position];
+        self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
     }
 
-    fn gated(&mut self, aid: impl Fn(&mut Self) -> &mut Aid) -> bool {
-        let now = self.now;
-        let since = *aid(self).gated_since.get_or_insert(now);
-        now.since(since).seconds() > self.config.lockout
-    }
-}
-
-/// A flow row that says nothing about the heading. In theory flow shows it while the vehicle accelerates; in practice a
-/// degree of mounting error and the beat of pictures and reads turn the vehicle's idea of north by degrees a minute,
-/// where a calibrated gyro alone keeps it within one.
-fn without_heading(mut row: Row<6>) -> Row<6> {
-    for (state, value) in &mut row.jacobian {
-        if *state == ATTITUDE + 2 {
-            *value = 0.0;
+    /// What gravity and the ground say, where they are asked.
+    fn assume(&mut self, accel: Vec3, dt: f32) {
+        if let Some(anchor) = self.anchor {
+            self.absorb_standing(anchor);
+            self.absorb_gravity(accel, &Vec3::zeros(), self.config.still_gravity_sigma);
+        } else if !self.holds_velocity() {
+            if self.config.gravity_use == GravityUse::WhenUnaided {
+                self.absorb_gravity(accel, &Vec3::zeros(), self.config.gravity_sigma);
+            }
+            self.forget_motion();
+        } else if self.state.cos_tilt() < self.config.min_cos_tilt
+            && !self.gates.is_recent(Sensor::Velocity, self.now)
+            && !self.gates.is_recent(Sensor::Position, self.now)
+        {
+            self.absorb_blind(dt);
         }
     }
-    row
 }
 
 fn process_noise(config: &EskfConfig) -> ProcessNoise {
@@ -366,10 +343,9 @@ impl Estimator for Eskf {
         *self = Self { now: at, initialized: true, calibration: *calibration, command: self.command, ..fresh };
         self.state.gyro_bias = calibration.gyro_bias;
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
-        self.rotation = self.state.rotation();
-        if calibration.field.norm() > 1.0 {
-            self.mag_reference = aid::heading::error(&self.rotation, &calibration.field, 0.0).map(|row| row.predicted);
-        }
+        self.start = self.state.rotation();
+        self.baro_seen = at;
+        self.field = (calibration.field.norm() > 1.0).then(|| rotate(&self.start, &calibration.field.normalize()));
         self.anchor = self.command.on_ground.then(Vec3::zeros);
         self.know_heading();
     }
@@ -382,7 +358,9 @@ impl Estimator for Eskf {
         }
         if command.origin_resets != previous.origin_resets {
             self.surface = self.surface.map(|surface| surface - self.state.position.z);
-            self.baro_offset = self.baro_offset.map(|offset| offset - self.state.position.z);
+            if let Some(offset) = &mut self.baro_offset {
+                offset.shift(self.state.position.z);
+            }
             self.state.position = Vec3::zeros();
             self.state.velocity = Vec3::zeros();
             for axis in 0..3 {
@@ -411,27 +389,25 @@ impl Estimator for Eskf {
             return;
         }
         self.now = at;
-        self.imu = *imu;
-        let motion: Motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
-        self.covariance.propagate(&motion, &self.noise);
-        self.rotation = self.state.rotation();
+        let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
+        self.history.add(&motion);
+        self.pending.extend(&motion);
+        if self.pending.duration > DOUBT_STEP {
+            self.covariance.propagate(&self.start, &self.pending, &self.noise);
+            self.pending = Passage::default();
+            self.start = self.state.rotation();
+        }
         self.rate = motion.rate;
         self.force = motion.force;
-        self.rates.add(at, motion.dt, imu.gyro);
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
         if self.steps.is_multiple_of(STILL_DIVIDER)
             && let Some(accel) = self.accels.take()
         {
-            if let Some(anchor) = self.anchor {
-                self.absorb_standing(anchor);
-                self.absorb_gravity(accel, self.config.still_gravity_sigma);
-            } else if !self.holds_velocity() {
-                self.absorb_gravity(accel, self.config.gravity_sigma);
-                self.forget_motion();
-            } else if self.rotation[2][2] < self.config.min_cos_tilt && !self.velocity.is_recent(at) {
-                self.absorb_blind(dt * STILL_DIVIDER as f32);
-            }
+            self.assume(accel, dt * STILL_DIVIDER as f32);
+        }
+        if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() {
+            self.absorb_gravity(imu.accel, &self.acceleration.at(at), self.config.gravity_sigma);
         }
         self.watch();
     }
@@ -460,13 +436,21 @@ impl Estimator for Eskf {
         self.try_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
     }
 
+    fn fuse_position(&mut self, at: Micros, position: &Vec3, sigma: f32) -> Fusion {
+        self.try_position(at, position, sigma).unwrap_or_else(Fusion::Refused)
+    }
+
+    fn fuse_attitude(&mut self, at: Micros, attitude: &Quat, sigma: f32) -> Fusion {
+        self.try_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused)
+    }
+
     fn estimate(&self) -> StateEstimate {
-        let now = self.now;
+        let recent = |sensor| self.gates.is_recent(sensor, self.now);
         let standing = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
+        let outside = recent(Sensor::Velocity) || recent(Sensor::Position);
         let horizontal = sound && self.holds_velocity();
-        let vertical =
-            sound && (self.tof.is_recent(now) || self.baro.is_recent(now) || self.velocity.is_recent(now) || standing);
+        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || outside || standing);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
             .set(Validity::HEADING, self.initialized)
@@ -475,13 +459,13 @@ impl Estimator for Eskf {
             .set(Validity::HEIGHT, sound && self.surface.is_some() && vertical);
         let sensors = SensorMask::NONE
             .set(SensorMask::IMU, self.initialized)
-            .set(SensorMask::TOF, self.tof.is_recent(now))
-            .set(SensorMask::FLOW, self.flow.is_recent(now))
-            .set(SensorMask::BARO, self.baro.is_recent(now))
-            .set(SensorMask::MAG, self.mag.is_recent(now))
-            .set(SensorMask::ACCEL_ATTITUDE, self.gravity.is_recent(now))
+            .set(SensorMask::TOF, recent(Sensor::Tof))
+            .set(SensorMask::FLOW, recent(Sensor::Flow))
+            .set(SensorMask::BARO, recent(Sensor::Baro))
+            .set(SensorMask::MAG, recent(Sensor::Mag))
+            .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
             .set(SensorMask::STATIONARY, standing)
-            .set(SensorMask::EXTERNAL, self.velocity.is_recent(now));
+            .set(SensorMask::EXTERNAL, outside || recent(Sensor::Attitude));
         let p = &self.covariance;
         StateEstimate {
             attitude: self.state.quat(),
@@ -499,6 +483,8 @@ impl Estimator for Eskf {
     }
 
     fn status(&self) -> EstimatorStatus {
-        self.status
+        let [measured, predicted] = &self.gravity;
+        let apart = measured.cross(predicted).norm();
+        EstimatorStatus { accel_innovation: math::atan2(apart, measured.dot(predicted)), ..self.status }
     }
 }

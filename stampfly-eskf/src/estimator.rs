@@ -3,11 +3,12 @@
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, StateEstimate, TofData,
 };
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Micros, Quat, Vec3};
 
 /// What became of a measurement.
 ///
-/// The test ratio is innovation² / (gate² · innovation variance): at one the measurement sits on the gate.
+/// The test ratio is the squared Mahalanobis distance of the innovation, yᵀ·S⁻¹·y, divided by the gate's: at one the
+/// measurement sits on the gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fusion {
     /// It went into the estimate.
@@ -40,8 +41,12 @@ pub enum Refusal {
     Range,
     /// The vehicle is tilted too far for the sensor's model.
     Tilt,
-    /// Older than the estimator can still use, or not newer than the last one.
+    /// Older than the estimator can still place: a tenth of a second, or before it started.
     Stale,
+    /// Stamped later than the last inertial sample by more than clocks differ: two hundredths of a second.
+    Future,
+    /// Not newer than the last one of this sensor: the same sample again, or two in the wrong order.
+    Repeated,
     /// Something the model needs is not known (no height for flow, no reference for the magnetometer).
     Missing,
     /// This estimator has no use for this sensor, or it is switched off.
@@ -60,8 +65,9 @@ impl Fusion {
 ///
 /// # Timing
 /// Call [`predict`](Self::predict) for every inertial sample in order, and the `fuse_` functions for other samples
-/// as they arrive, after the inertial sample they follow. Time is an argument: `at` is the instant a sample is valid
-/// for.
+/// as they arrive. Time is an argument: `at` is the instant a sample is valid for. Samples may arrive late: the
+/// [`Eskf`](crate::Eskf) compares them with the state of their own time, up to a tenth of a second ago, and refuses
+/// older ones.
 ///
 /// # Honesty
 /// [`estimate`](Self::estimate) marks every output that may not be used. Input that is not finite never reaches the
@@ -90,6 +96,18 @@ pub trait Estimator {
 
     /// Uses a velocity measured from outside, world NED, with one standard deviation per axis in m/s.
     fn fuse_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Fusion;
+
+    /// Uses a position measured from outside, world NED, m, with one standard deviation for all axes. An estimator without
+    /// a use for it refuses.
+    fn fuse_position(&mut self, _at: Micros, _position: &Vec3, _sigma: f32) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    /// Uses an attitude measured from outside, body → world, with one standard deviation for all axes, rad. An estimator
+    /// without a use for it refuses.
+    fn fuse_attitude(&mut self, _at: Micros, _attitude: &Quat, _sigma: f32) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
 
     /// The state, with a validity per output.
     fn estimate(&self) -> StateEstimate;

@@ -22,7 +22,7 @@ pub mod filter;
 mod level;
 
 pub use complementary::{Complementary, ComplementaryConfig};
-pub use config::EskfConfig;
+pub use config::{EskfConfig, GravityUse, MagModel};
 pub use eskf::Eskf;
 pub use estimator::{Estimator, Fusion, Refusal};
 pub use level::attitude_from_specific_force;

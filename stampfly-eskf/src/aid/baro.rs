@@ -1,7 +1,9 @@
 //! Barometric altitude as vertical position.
 //!
-//! h = −p_z + offset, so the only derivative is −1. Pressure drifts by metres an hour and jumps in propeller wash;
-//! the offset is tracked by the filter while a better height is at hand, and the model is used when it is not.
+//! h = −p_z + offset, so the only derivative by the states is −1. Pressure drifts by metres an hour, so the offset is an
+//! estimate of its own ([`Offset`]): a random walk with a variance, which adds to the sensor's noise as far as the
+//! filter is concerned, and learns from the same innovation. It is kept apart from the fifteen states: what couples
+//! them is a drift of centimetres a minute beside a range that is good to a centimetre.
 
 use super::Row;
 use crate::filter::{Nominal, POSITION};
@@ -9,8 +11,61 @@ use crate::filter::{Nominal, POSITION};
 /// Predicted altitude for an altitude `offset` of the origin, m.
 #[inline]
 #[must_use]
-pub fn altitude(state: &Nominal, offset: f32) -> Row<1> {
-    Row { predicted: offset - state.position.z, jacobian: [(POSITION + 2, -1.0)] }
+pub fn altitude(state: &Nominal, offset: f32) -> Row {
+    Row::new(offset - state.position.z, [(POSITION + 2, -1.0)])
+}
+
+/// What the barometer reads at the origin, and how well that is known.
+///
+/// ```
+/// use stampfly_eskf::aid::baro::Offset;
+/// let mut offset = Offset::new(120.0, 0.1);
+/// // Ten minutes at 0.02 m/√s: half a metre of doubt, so an innovation of half a metre is mostly drift.
+/// offset.drift(600.0, 0.02);
+/// offset.learn(0.5, 0.01);
+/// assert!((offset.value() - 120.45).abs() < 0.05);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset {
+    value: f32,
+    variance: f32,
+}
+
+impl Offset {
+    /// An offset with a first variance, m and m².
+    #[must_use]
+    pub const fn new(value: f32, variance: f32) -> Self {
+        Self { value, variance }
+    }
+
+    /// Altitude of the origin, m.
+    #[must_use]
+    pub const fn value(&self) -> f32 {
+        self.value
+    }
+
+    /// Its variance, m².
+    #[must_use]
+    pub const fn variance(&self) -> f32 {
+        self.variance
+    }
+
+    /// The origin moved down by this much, m.
+    pub fn shift(&mut self, down: f32) {
+        self.value -= down;
+    }
+
+    /// Lets `seconds` of random walk pass, with `walk` in m/√s.
+    pub fn drift(&mut self, seconds: f32, walk: f32) {
+        self.variance += walk * walk * seconds;
+    }
+
+    /// Learns from an innovation whose variance, without this offset's own, is `others`.
+    pub fn learn(&mut self, innovation: f32, others: f32) {
+        let gain = self.variance / (self.variance + others);
+        self.value += gain * innovation;
+        self.variance *= 1.0 - gain;
+    }
 }
 
 #[cfg(test)]

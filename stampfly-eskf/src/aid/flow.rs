@@ -16,33 +16,20 @@ use crate::filter::{ATTITUDE, GYRO_BIAS, Nominal, VELOCITY};
 /// Predicted velocity along body x and along body y, from `distance` metres to the surface along the beam.
 #[inline]
 #[must_use]
-pub fn body_velocity(state: &Nominal, rotation: &Rotation, distance: f32) -> [Row<6>; 2] {
+pub fn body_velocity(state: &Nominal, rotation: &Rotation, distance: f32) -> [Row; 2] {
     let v = rotate_back(rotation, &state.velocity);
-    let column = |c: usize| [rotation[0][c], rotation[1][c], rotation[2][c]];
-    let (x, y) = (column(0), column(1));
+    let [north, east, down] = rotation;
+    let columns = |c: usize| [(VELOCITY, north[c]), (VELOCITY + 1, east[c]), (VELOCITY + 2, down[c])];
+    let ([x0, x1, x2], [y0, y1, y2]) = (columns(0), columns(1));
     [
-        Row {
-            predicted: v.x - distance * state.gyro_bias.y,
-            jacobian: [
-                (VELOCITY, x[0]),
-                (VELOCITY + 1, x[1]),
-                (VELOCITY + 2, x[2]),
-                (ATTITUDE + 1, -v.z),
-                (ATTITUDE + 2, v.y),
-                (GYRO_BIAS + 1, -distance),
-            ],
-        },
-        Row {
-            predicted: v.y + distance * state.gyro_bias.x,
-            jacobian: [
-                (VELOCITY, y[0]),
-                (VELOCITY + 1, y[1]),
-                (VELOCITY + 2, y[2]),
-                (ATTITUDE, v.z),
-                (ATTITUDE + 2, -v.x),
-                (GYRO_BIAS, distance),
-            ],
-        },
+        Row::new(
+            v.x - distance * state.gyro_bias.y,
+            [x0, x1, x2, (ATTITUDE + 1, -v.z), (ATTITUDE + 2, v.y), (GYRO_BIAS + 1, -distance)],
+        ),
+        Row::new(
+            v.y + distance * state.gyro_bias.x,
+            [y0, y1, y2, (ATTITUDE, v.z), (ATTITUDE + 2, -v.x), (GYRO_BIAS, distance)],
+        ),
     ]
 }
 

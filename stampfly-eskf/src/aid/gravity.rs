@@ -1,28 +1,84 @@
 //! The accelerometer as an inclinometer.
 //!
-//! When the body's own acceleration is small, the specific force is −g seen from the body: f = Rᵀ·(0, 0, −g) + b.
-//! With up = −Rᵀ·e_z·g = f₀, a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds
-//! itself.
+//! The specific force is the body's own acceleration less gravity, seen from the body: f = Rᵀ·(a − g) + b. With
+//! f₀ = Rᵀ·(a − g), a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds itself.
 //!
-//! Only for a body that stands, is carried gently, or has nothing better: a multicopter's accelerometer always points
-//! along its thrust, whatever the tilt, so in flight this model pulls the attitude towards level.
+//! The acceleration a must come from elsewhere: zero for a body that stands or is carried gently, the change of a measured
+//! velocity for one that flies (see [`Acceleration`]). Left at zero in flight the model pulls the attitude towards level,
+//! because a multicopter's accelerometer points along its thrust, whatever the tilt.
 
 use super::Row;
-use crate::filter::state::Rotation;
+use crate::filter::state::{Rotation, rotate_back};
 use crate::filter::{ACCEL_BIAS, ATTITUDE, Nominal};
-use stampfly_types::GRAVITY;
+use stampfly_types::{GRAVITY, Micros, Vec3};
 
-/// Predicted specific force along body x, y and z.
+/// Predicted specific force along body x, y and z of a body that accelerates by `acceleration` (world, m/s²).
 #[inline]
 #[must_use]
-pub fn specific_force(state: &Nominal, rotation: &Rotation) -> [Row<3>; 3] {
-    let [fx, fy, fz] = rotation[2].map(|r| -GRAVITY * r);
+pub fn specific_force(state: &Nominal, rotation: &Rotation, acceleration: &Vec3) -> [Row; 3] {
+    let force = Vec3::new(acceleration.x, acceleration.y, acceleration.z - GRAVITY);
+    let f = rotate_back(rotation, &force);
     let bias = state.accel_bias;
     [
-        Row { predicted: fx + bias.x, jacobian: [(ATTITUDE + 1, -fz), (ATTITUDE + 2, fy), (ACCEL_BIAS, 1.0)] },
-        Row { predicted: fy + bias.y, jacobian: [(ATTITUDE, fz), (ATTITUDE + 2, -fx), (ACCEL_BIAS + 1, 1.0)] },
-        Row { predicted: fz + bias.z, jacobian: [(ATTITUDE, -fy), (ATTITUDE + 1, fx), (ACCEL_BIAS + 2, 1.0)] },
+        Row::new(f.x + bias.x, [(ATTITUDE + 1, -f.z), (ATTITUDE + 2, f.y), (ACCEL_BIAS, 1.0)]),
+        Row::new(f.y + bias.y, [(ATTITUDE, f.z), (ATTITUDE + 2, -f.x), (ACCEL_BIAS + 1, 1.0)]),
+        Row::new(f.z + bias.z, [(ATTITUDE, -f.y), (ATTITUDE + 1, f.x), (ACCEL_BIAS + 2, 1.0)]),
     ]
+}
+
+/// Bandwidth and damping of the tracker, rad/s and 1: the α = 0.2 and β = 0.02 at 100 Hz of the StampFly's firmware.
+const BANDWIDTH: f32 = 14.0;
+const DAMPING: f32 = 0.7;
+/// No acceleration beyond this is believed, m/s².
+const LARGEST: f32 = 5.0;
+/// A velocity older than this says nothing about the acceleration.
+const FORGET: Micros = Micros(200_000);
+
+/// The acceleration of the body as a sensor of velocity shows it: an α-β tracker (Kalata, "The Tracking Index", IEEE TAES
+/// 20(2), 1984).
+///
+/// ```
+/// use stampfly_eskf::aid::gravity::Acceleration;
+/// use stampfly_types::{Micros, Vec3};
+/// let mut acceleration = Acceleration::default();
+/// for step in 0..100u64 {
+///     acceleration.see(Micros(step * 10_000), Vec3::x() * (step as f32 * 0.02));
+/// }
+/// assert!((acceleration.at(Micros(990_000)) - 2.0 * Vec3::x()).amax() < 0.05);
+/// assert_eq!(acceleration.at(Micros(2_000_000)), Vec3::zeros());
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Acceleration {
+    seen: Option<Micros>,
+    velocity: Vec3,
+    acceleration: Vec3,
+}
+
+impl Acceleration {
+    /// Takes a measured velocity, world, m/s. A gap starts it again.
+    pub fn see(&mut self, at: Micros, velocity: Vec3) {
+        match self.seen {
+            Some(seen) if at <= seen => return,
+            Some(seen) if at.since(seen) <= FORGET => {
+                let dt = at.since(seen).seconds();
+                let predicted = self.velocity + self.acceleration * dt;
+                let error = velocity - predicted;
+                // Stable for every step that is taken: both gains stay below one.
+                let turn = (BANDWIDTH * dt).min(0.7);
+                self.velocity = predicted + error * (2.0 * DAMPING * turn).min(1.0);
+                let acceleration = self.acceleration + error * (turn * turn / dt);
+                self.acceleration = acceleration.map(|v| v.clamp(-LARGEST, LARGEST));
+            }
+            _ => (self.velocity, self.acceleration) = (velocity, Vec3::zeros()),
+        }
+        self.seen = Some(at);
+    }
+
+    /// The acceleration, world, m/s²; zero when nothing was seen lately.
+    #[must_use]
+    pub fn at(&self, now: Micros) -> Vec3 {
+        if self.seen.is_some_and(|seen| now.since(seen) <= FORGET) { self.acceleration } else { Vec3::zeros() }
+    }
 }
 
 #[cfg(test)]
@@ -33,9 +89,9 @@ mod tests {
     fn jacobian_matches_numerical_differentiation() {
         for axis in 0..3 {
             crate::aid::numeric::check(|state| {
-                let row = specific_force(state, &state.rotation())[axis];
+                let row = specific_force(state, &state.rotation(), &Vec3::new(0.7, -1.2, 0.4))[axis];
                 // In units of g, so that the tolerance means the same as for the other models.
-                Row { predicted: row.predicted * 0.1, jacobian: row.jacobian.map(|(i, v)| (i, v * 0.1)) }
+                Row { predicted: row.predicted * 0.1, jacobian: row.jacobian.map(|v| v * 0.1) }
             });
         }
     }

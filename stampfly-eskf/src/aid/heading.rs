@@ -13,7 +13,7 @@ use stampfly_types::{Vec3, math};
 /// Heading that the field measures, relative to the reference heading (zero in the true attitude), and its row.
 /// `None` when the field has no usable horizontal part.
 #[must_use]
-pub fn error(rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row<3>> {
+pub fn error(rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row> {
     let world = rotate(rotation, field);
     let horizontal = world.x * world.x + world.y * world.y;
     // Less than 1 µT is no direction; neither is what is not a number.
@@ -21,10 +21,10 @@ pub fn error(rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row<3>
         return None;
     }
     let [r31, r32, r33] = rotation[2];
-    Some(Row {
-        predicted: math::wrap_angle(math::atan2(world.y, world.x) - reference),
-        jacobian: [(ATTITUDE, r31), (ATTITUDE + 1, r32), (ATTITUDE + 2, r33)],
-    })
+    Some(Row::new(
+        math::wrap_angle(math::atan2(world.y, world.x) - reference),
+        [(ATTITUDE, r31), (ATTITUDE + 1, r32), (ATTITUDE + 2, r33)],
+    ))
 }
 
 #[cfg(test)]
@@ -48,7 +48,7 @@ mod tests {
         }
         let mut moved = state;
         moved.correct(&turn);
-        let stated: f32 = row.jacobian.iter().map(|(i, v)| v * axis[i - ATTITUDE]).sum();
+        let stated: f32 = (0..3).map(|i| row.jacobian[ATTITUDE + i] * axis[i]).sum();
         assert!(((at(&moved) - at(&state)) / step - stated).abs() < 1e-3);
     }
 }

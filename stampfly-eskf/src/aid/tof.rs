@@ -2,32 +2,26 @@
 //!
 //! With the surface at height zero (down coordinate `surface`) the beam of a tilted body meets it at
 //! d = (surface − p_z) / R₃₃. Derivatives: ∂d/∂p_z = −1/R₃₃; a small body rotation θ changes R₃₃ by
-//! R₃₁·θ_y − R₃₂·θ_x, hence ∂d/∂θ_x = d·R₃₂/R₃₃ and ∂d/∂θ_y = −d·R₃₁/R₃₃. A range that is `delay` seconds old saw the
-//! position p_z − v_z·delay, which adds ∂d/∂v_z = delay/R₃₃.
+//! R₃₁·θ_y − R₃₂·θ_x, hence ∂d/∂θ_x = d·R₃₂/R₃₃ and ∂d/∂θ_y = −d·R₃₁/R₃₃.
 //!
 //! Not for walls, stairs or a beam that leaves the body elsewhere.
 
 use super::Row;
 use crate::filter::state::Rotation;
-use crate::filter::{ATTITUDE, Nominal, POSITION, VELOCITY};
+use crate::filter::{ATTITUDE, Nominal, POSITION};
 
-/// The range a level `surface` (world down coordinate, m) should give, `delay` seconds ago. `rotation[2][2]` must be
-/// positive: the caller has checked the tilt.
+/// The range a level `surface` (world down coordinate, m) should give. `rotation[2][2]` must be positive: the caller has
+/// checked the tilt.
 #[inline]
 #[must_use]
-pub fn range(state: &Nominal, rotation: &Rotation, surface: f32, delay: f32) -> Row<4> {
+pub fn range(state: &Nominal, rotation: &Rotation, surface: f32) -> Row {
     let [r31, r32, r33] = rotation[2];
     let inverse = 1.0 / r33;
-    let predicted = (surface - (state.position.z - state.velocity.z * delay)) * inverse;
-    Row {
+    let predicted = (surface - state.position.z) * inverse;
+    Row::new(
         predicted,
-        jacobian: [
-            (POSITION + 2, -inverse),
-            (VELOCITY + 2, delay * inverse),
-            (ATTITUDE, predicted * r32 * inverse),
-            (ATTITUDE + 1, -predicted * r31 * inverse),
-        ],
-    }
+        [(POSITION + 2, -inverse), (ATTITUDE, predicted * r32 * inverse), (ATTITUDE + 1, -predicted * r31 * inverse)],
+    )
 }
 
 #[cfg(test)]
@@ -36,6 +30,6 @@ mod tests {
 
     #[test]
     fn jacobian_matches_numerical_differentiation() {
-        crate::aid::numeric::check(|state| range(state, &state.rotation(), 0.05, 0.02));
+        crate::aid::numeric::check(|state| range(state, &state.rotation(), 0.05));
     }
 }

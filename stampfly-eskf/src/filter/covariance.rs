@@ -1,12 +1,14 @@
-//! The covariance of the error state: storage, propagation and the scalar update, shaped for speed.
+//! The covariance of the error state: storage, propagation and update, shaped for speed.
 //!
 //! Rows are sixteen wide (the last column stays zero), so every operation runs over whole rows and the compiler
 //! turns them into vector instructions on a host and into tight loops on a microcontroller. Propagation uses the
 //! block structure of F: of the fifteen rows nine change, and of those the last six columns change only by the row
-//! operation. Updates are sequential and scalar: a measurement is a handful of numbers, no matrix is inverted. The
-//! matrix stays exactly symmetric by construction: the update subtracts w·wᵀ, the propagation mirrors one triangle.
+//! operation; the other triangle is a mirror of the first. An update of several axes is sequential and scalar, so no
+//! matrix is inverted, but it makes its directions independent of each other first and then passes over the matrix
+//! once. The matrix stays exactly symmetric by construction: the update subtracts w·wᵀ, the propagation mirrors.
 
-use super::state::Motion;
+use super::passage::Passage;
+use super::state::{Rotation, rotation_matrix};
 use super::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY};
 use stampfly_types::math;
 
@@ -36,13 +38,28 @@ pub struct ProcessNoise {
     pub accel_bias: f32,
 }
 
-/// What a scalar measurement would do to the state: its innovation variance and P·Hᵀ.
+/// What a measurement of `M` axes would do to the state.
+///
+/// The axes are made independent by a Cholesky factorisation of their innovation covariance S = L·Lᵀ: the innovations
+/// become L⁻¹·y, each of variance one, and P·Hᵀ becomes P·Hᵀ·L⁻ᵀ. This is the sequential update (Bierman,
+/// "Factorization Methods for Discrete Sequential Estimation", 1977, section V.3) without touching P before the
+/// measurement has passed its gate.
 #[derive(Clone, Copy, Debug)]
-pub struct Projection {
-    /// P·Hᵀ.
-    ph: Row,
-    /// Innovation variance H·P·Hᵀ + R.
-    pub variance: f32,
+pub struct Projection<const M: usize> {
+    /// Columns of P·Hᵀ·L⁻ᵀ.
+    directions: [Row; M],
+    /// L⁻¹·y.
+    innovations: [f32; M],
+}
+
+impl<const M: usize> Projection<M> {
+    /// Squared Mahalanobis distance yᵀ·S⁻¹·y of the measurement (NIS): χ²-distributed with `M` degrees of freedom when
+    /// the filter is consistent.
+    #[inline]
+    #[must_use]
+    pub fn distance(&self) -> f32 {
+        self.innovations.iter().map(|v| v * v).sum()
+    }
 }
 
 /// Smallest variance a state may claim, so that rounding never makes one zero or negative.
@@ -54,13 +71,19 @@ const FLOOR: [f32; N] = [
     1e-9, 1e-9, 1e-9, // accelerometer bias, (0.03 mm/s²)²
 ];
 
+/// Adds a multiple of a row.
+#[inline]
+fn add(to: &mut Row, factor: f32, row: &Row) {
+    for (cell, value) in to.iter_mut().zip(row) {
+        *cell += factor * value;
+    }
+}
+
 #[inline]
 fn combine<const K: usize>(parts: [(f32, &Row); K]) -> Row {
     let mut out = [0.0; WIDTH];
     for (factor, row) in parts {
-        for (o, v) in out.iter_mut().zip(row) {
-            *o += factor * v;
-        }
+        add(&mut out, factor, row);
     }
     out
 }
@@ -109,26 +132,28 @@ impl Covariance {
         sum.is_finite() && self.rows.iter().enumerate().all(|(i, row)| row[i] > 0.0)
     }
 
-    /// P ← F·P·Fᵀ + Q for one inertial step.
+    /// P ← F·P·Fᵀ + Q over a short passage that began in the attitude `rotation`.
     ///
-    /// F = I, plus dt in position ← velocity, −R\[f\]×dt in velocity ← attitude, −R·dt in velocity ← accelerometer
-    /// bias, −\[ω\]×dt in attitude ← attitude and −I·dt in attitude ← gyro bias.
+    /// F = I, plus τ in position ← velocity, −\[s\]×·R in velocity ← attitude, −R·τ in velocity ← accelerometer bias,
+    /// ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s and ΔR of the [`Passage`]. Terms of second
+    /// order in τ are left out of the position.
     #[inline]
-    pub fn propagate(&mut self, motion: &Motion, noise: &ProcessNoise) {
-        let Motion { rotation, force, rate, dt } = *motion;
-        let mut by_attitude = [[0.0; 3]; 3];
-        let mut by_bias = [[0.0; 3]; 3];
-        for ((a, b), r) in by_attitude.iter_mut().zip(&mut by_bias).zip(&rotation) {
-            // Row of −R[f]×: −(r × f), written out.
-            *a = [
-                -dt * (r[1] * force.z - r[2] * force.y),
-                -dt * (r[2] * force.x - r[0] * force.z),
-                -dt * (r[0] * force.y - r[1] * force.x),
-            ];
-            *b = r.map(|v| -dt * v);
-        }
-        let (wx, wy, wz) = (rate.x * dt, rate.y * dt, rate.z * dt);
-        let turn = [[1.0, wz, -wy], [-wz, 1.0, wx], [wy, -wx, 1.0]];
+    pub fn propagate(&mut self, rotation: &Rotation, passage: &Passage, noise: &ProcessNoise) {
+        let Passage { duration: dt, impulse, .. } = *passage;
+        let [north, east, down] = rotation;
+        let cross = |a: f32, x: &[f32; 3], b: f32, y: &[f32; 3]| {
+            [a * x[0] - b * y[0], a * x[1] - b * y[1], a * x[2] - b * y[2]]
+        };
+        let by_attitude = [
+            cross(impulse.z, east, impulse.y, down),
+            cross(impulse.x, down, impulse.z, north),
+            cross(impulse.y, north, impulse.x, east),
+        ];
+        let by_bias = rotation.map(|row| row.map(|v| -dt * v));
+        let [a, b, c] = rotation_matrix(passage.turn);
+        let turn = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
+
+        let driving = [0.0, noise.velocity, noise.attitude, noise.gyro_bias, noise.accel_bias];
 
         // Rows: T = F·P for the nine rows that change.
         let p = &self.rows;
@@ -154,16 +179,22 @@ impl Covariance {
             ]);
         }
 
-        // Columns: the first nine of T·Fᵀ; the bias columns of T are already final.
+        // Columns: the first nine of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
         for (r, t) in t.iter().enumerate() {
             let mut out = *t;
             for i in 0..3 {
                 let (a, b, c) = (by_attitude[i], by_bias[i], turn[i]);
-                out[i] = t[i] + dt * t[3 + i];
-                out[3 + i] =
-                    t[3 + i] + a[0] * t[6] + a[1] * t[7] + a[2] * t[8] + b[0] * t[12] + b[1] * t[13] + b[2] * t[14];
+                if r < VELOCITY {
+                    out[i] = t[i] + dt * t[3 + i];
+                }
+                if r < ATTITUDE {
+                    out[3 + i] =
+                        t[3 + i] + a[0] * t[6] + a[1] * t[7] + a[2] * t[8] + b[0] * t[12] + b[1] * t[13] + b[2] * t[14];
+                }
                 out[6 + i] = c[0] * t[6] + c[1] * t[7] + c[2] * t[8] - dt * t[9 + i];
             }
+            let grown = out[r] + driving[r / 3] * dt;
+            out[r] = if grown > FLOOR[r] { grown } else { FLOOR[r] };
             self.rows[r] = out;
         }
         // Mirror: the upper triangle is the truth.
@@ -172,40 +203,76 @@ impl Covariance {
                 self.rows[i][j] = self.rows[j][i];
             }
         }
-        for i in 0..3 {
-            self.rows[VELOCITY + i][VELOCITY + i] += noise.velocity * dt;
-            self.rows[ATTITUDE + i][ATTITUDE + i] += noise.attitude * dt;
-            self.rows[GYRO_BIAS + i][GYRO_BIAS + i] += noise.gyro_bias * dt;
-            self.rows[ACCEL_BIAS + i][ACCEL_BIAS + i] += noise.accel_bias * dt;
+        for (i, row) in self.rows.iter_mut().enumerate().skip(GYRO_BIAS) {
+            let grown = row[i] + driving[i / 3] * dt;
+            row[i] = if grown > FLOOR[i] { grown } else { FLOOR[i] };
         }
     }
 
-    /// Projects a scalar measurement whose row H has `K` entries (state, value), with noise variance `r`.
+    /// Projects a measurement of `M` axes: Jacobians by the error states, innovations, and the variance of each axis'
+    /// noise, which must be positive. Entries of a Jacobian that are zero cost next to nothing.
     #[inline]
     #[must_use]
-    pub fn project<const K: usize>(&self, h: [(usize, f32); K], r: f32) -> Projection {
-        let ph = combine(h.map(|(state, value)| (value, &self.rows[state])));
-        let variance = h.iter().map(|(state, value)| value * ph[*state]).sum::<f32>() + r;
-        Projection { ph, variance }
+    pub fn project<const M: usize>(
+        &self,
+        jacobians: &[[f32; N]; M],
+        innovations: [f32; M],
+        variances: [f32; M],
+    ) -> Projection<M> {
+        let mut projection = Projection { directions: [[0.0; WIDTH]; M], innovations };
+        for (axis, (jacobian, noise)) in jacobians.iter().zip(variances).enumerate() {
+            // Models touch few blocks of three states: the others are skipped whole.
+            let blocks = jacobian.as_chunks::<3>().0;
+            let used = |block: usize| blocks[block] != [0.0; 3];
+            let dot = |row: &Row| {
+                let mut sum = 0.0;
+                for block in (0..5).filter(|block| used(*block)) {
+                    let ([a, b, c], first) = (blocks[block], 3 * block);
+                    sum += a * row[first] + b * row[first + 1] + c * row[first + 2];
+                }
+                sum
+            };
+            let mut direction = [0.0; WIDTH];
+            for block in (0..5).filter(|block| used(*block)) {
+                for (value, row) in blocks[block].iter().zip(&self.rows[3 * block..]) {
+                    add(&mut direction, *value, row);
+                }
+            }
+            // What the axes before it already say about this one.
+            let mut innovation = projection.innovations[axis];
+            for before in 0..axis {
+                let known = &projection.directions[before];
+                let shared = dot(known);
+                add(&mut direction, -shared, known);
+                innovation -= shared * projection.innovations[before];
+            }
+            let variance = dot(&direction) + noise;
+            let scale = 1.0 / math::sqrt(variance.max(noise));
+            projection.directions[axis] = direction.map(|v| v * scale);
+            projection.innovations[axis] = innovation * scale;
+        }
+        projection
     }
 
-    /// Absorbs a projected measurement: P ← P − P·Hᵀ·S⁻¹·H·P. Returns the correction for this innovation.
+    /// Absorbs a projected measurement: P ← P − P·Hᵀ·S⁻¹·H·P. Returns the correction of the error state, which goes to
+    /// [`Nominal::correct`](super::Nominal::correct).
     ///
     /// Must follow [`Self::project`] directly; a change of P in between makes the projection stale.
     #[inline]
-    pub fn absorb(&mut self, projection: &Projection, innovation: f32) -> [f32; N] {
-        let inverse = 1.0 / projection.variance;
-        let root = math::sqrt(inverse);
-        let w = projection.ph.map(|v| v * root);
+    pub fn absorb<const M: usize>(&mut self, projection: &Projection<M>) -> [f32; N] {
+        let Projection { directions, innovations } = projection;
         for (i, row) in self.rows.iter_mut().enumerate() {
-            let factor = w[i];
-            for (cell, v) in row.iter_mut().zip(&w) {
-                *cell -= factor * v;
+            for direction in directions {
+                add(row, -direction[i], direction);
             }
-            row[i] = row[i].max(FLOOR[i]);
         }
-        let gain = innovation * inverse;
-        core::array::from_fn(|i| projection.ph[i] * gain)
+        let mut correction = [0.0; N];
+        for (direction, innovation) in directions.iter().zip(innovations) {
+            for (cell, value) in correction.iter_mut().zip(direction) {
+                *cell += innovation * value;
+            }
+        }
+        correction
     }
 }
 
@@ -224,17 +291,16 @@ mod tests {
     }
 
     /// The same step in the text book's form, dense and in double precision.
-    fn reference(p: &Dense, motion: &Motion, noise: &ProcessNoise) -> Dense {
-        let dt = f64::from(motion.dt);
-        let r = nalgebra::Matrix3::from_fn(|i, j| f64::from(motion.rotation[i][j]));
-        let f = motion.force.map(f64::from).cross_matrix();
-        let w = motion.rate.map(f64::from).cross_matrix();
+    fn reference(p: &Dense, rotation: &Rotation, passage: &Passage, noise: &ProcessNoise) -> Dense {
+        let dt = f64::from(passage.duration);
+        let matrix = |m: &Rotation| nalgebra::Matrix3::from_fn(|i, j| f64::from(m[i][j]));
+        let r = matrix(rotation);
         let mut transition = Dense::identity();
         let eye = nalgebra::Matrix3::identity();
         transition.fixed_view_mut::<3, 3>(0, 3).copy_from(&(eye * dt));
-        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&(-r * f * dt));
+        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&-(passage.impulse.map(f64::from).cross_matrix() * r));
         transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&(-r * dt));
-        transition.fixed_view_mut::<3, 3>(6, 6).copy_from(&(eye - w * dt));
+        transition.fixed_view_mut::<3, 3>(6, 6).copy_from(&matrix(&rotation_matrix(passage.turn)).transpose());
         transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&(-eye * dt));
         let mut next = transition * p * transition.transpose();
         for i in 0..3 {
@@ -259,6 +325,14 @@ mod tests {
         worst
     }
 
+    fn jacobian(entries: &[(usize, f32)]) -> [f32; N] {
+        let mut jacobian = [0.0; N];
+        for (state, value) in entries {
+            jacobian[*state] = *value;
+        }
+        jacobian
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
@@ -270,17 +344,34 @@ mod tests {
             let mut state = Nominal::default();
             for step in 0..1000usize {
                 let (x, y, z, a) = rates[step / 50];
-                let motion = state.propagate(&Vec3::new(a, -a, -9.8 + z), &Vec3::new(x, y, z), 0.0025);
-                exact = reference(&exact, &motion, &NOISE);
-                p.propagate(&motion, &NOISE);
+                let (rotation, mut passage) = (state.rotation(), Passage::default());
+                for _ in 0..2 {
+                    passage.extend(&state.propagate(&Vec3::new(a, -a, -9.8 + z), &Vec3::new(x, y, z), 0.0025));
+                }
+                exact = reference(&exact, &rotation, &passage, &NOISE);
+                p.propagate(&rotation, &passage, &NOISE);
                 if step % 4 == 0 {
-                    let h = [(0, 0.2), (4, 0.9), (6, a), (7, x), (10, 0.3)];
-                    let projection = p.project(h, 0.01);
-                    p.absorb(&projection, 0.0);
-                    let mut row = SMatrix::<f64, 1, 15>::zeros();
-                    for (i, v) in h { row[i] = f64::from(v) }
-                    let s = (row * exact * row.transpose())[0] + 0.01;
-                    exact -= exact * row.transpose() * row * exact / s;
+                    let h = [
+                        jacobian(&[(0, 0.2), (4, 0.9), (6, a), (7, x), (10, 0.3)]),
+                        jacobian(&[(3, 0.7), (4, -0.2), (8, z)]),
+                        jacobian(&[(6, 1.0), (7, 0.4), (12, 1.0)]),
+                    ];
+                    let (y, r) = ([0.1, -0.05, 0.02], [0.01, 0.02, 0.05]);
+                    let dense_h = SMatrix::<f64, 3, 15>::from_fn(|i, j| f64::from(h[i][j]));
+                    let noise = nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::from(r.map(f64::from)));
+                    let innovation = nalgebra::Vector3::from(y.map(f64::from));
+                    let s = (dense_h * exact * dense_h.transpose() + noise).try_inverse().unwrap();
+                    let gain = exact * dense_h.transpose() * s;
+
+                    let projection = p.project(&h, y, r);
+                    let distance = (innovation.transpose() * s * innovation)[0];
+                    prop_assert!((f64::from(projection.distance()) / distance - 1.0).abs() < 1e-2);
+                    let correction = p.absorb(&projection);
+                    for (i, (ours, theirs)) in correction.iter().zip((gain * innovation).iter()).enumerate() {
+                        let sigma = exact[(i, i)].sqrt();
+                        prop_assert!((f64::from(*ours) - theirs).abs() < 5e-3 * sigma, "{i}: {ours}, not {theirs}");
+                    }
+                    exact -= gain * dense_h * exact;
                 }
             }
             prop_assert!(scaled_difference(&dense(&p), &exact) < 2e-3, "{}", scaled_difference(&dense(&p), &exact));
@@ -293,8 +384,7 @@ mod tests {
     #[test]
     fn reset_forgets_correlations() {
         let mut p = Covariance::from_sigmas([1.0; 5]);
-        let projection = p.project([(0, 1.0), (3, 1.0)], 0.1);
-        p.absorb(&projection, 0.0);
+        p.absorb(&p.project(&[jacobian(&[(0, 1.0), (3, 1.0)])], [0.0], [0.1]));
         assert!(p.get(0, 3) != 0.0);
         p.reset(3, 4.0);
         assert_eq!((p.get(0, 3), p.get(3, 0), p.get(3, 3)), (0.0, 0.0, 4.0));

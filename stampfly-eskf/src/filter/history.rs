@@ -1,60 +1,132 @@
-//! The angular rates of the last moments, to ask for their mean over a stretch of time that has passed.
+//! The inertial samples of the last tenth of a second, to go back to the time of a late measurement.
 //!
-//! A flow sensor reports what it saw a picture or two ago. The rotation to take out of that is the rotation of then: a
-//! hand that swings by ±5 rad/s twice a second changes the rate by 1 rad/s within those twenty milliseconds.
+//! A flow sensor reports what it saw a picture or two ago, a camera system what it saw fifty milliseconds ago. This
+//! ring keeps how the body turned and what its specific force added, not states: a correction of the present state
+//! is a correction of the past ones, too, without touching them. Samples that come faster than every 2.5 ms are
+//! merged, so the memory reaches back [`REACH`] at any rate of the inertial sensor.
 
-use stampfly_types::{Micros, Vec3};
+use super::Passage;
+use super::state::{Motion, multiply, small_rotation};
+use stampfly_types::Vec3;
 
-/// Samples kept: 40 ms at 400 Hz.
-const DEPTH: usize = 16;
+/// How far back measurements can be placed, s.
+pub const REACH: f32 = 0.1;
+/// A stretch shorter than this takes in the next sample, s. A little less than the 2.5 ms of 400 Hz, for clocks that
+/// run fast.
+const SHORTEST: f32 = 2.4e-3;
+/// Stretches kept: with the one being filled they always reach back far enough.
+const DEPTH: usize = 48;
+const _: () = assert!((DEPTH - 1) as f32 * SHORTEST > REACH);
 
-/// A rate, and the stretch of time it stands for.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Entry {
-    end: Micros,
+/// A stretch of time and what happened in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stretch {
     length: f32,
+    /// Mean rate without bias, body.
     rate: Vec3,
+    turn: [f32; 4],
+    /// World.
+    impulse: Vec3,
 }
 
-/// The last sixteen rates. See the [module](self) documentation.
+const NOTHING: Stretch = Stretch {
+    length: 0.0,
+    rate: Vec3::new(0.0, 0.0, 0.0),
+    turn: [1.0, 0.0, 0.0, 0.0],
+    impulse: Vec3::new(0.0, 0.0, 0.0),
+};
+
+/// The last tenth of a second. See the [module](self) documentation.
 ///
 /// ```
-/// use stampfly_eskf::filter::RateHistory;
-/// use stampfly_types::{Micros, Vec3};
-/// let mut history = RateHistory::default();
-/// history.add(Micros(10_000), 0.01, Vec3::x());
-/// history.add(Micros(20_000), 0.01, Vec3::zeros());
-/// assert_eq!(history.mean(Micros(15_000), 0.01), Some(0.5 * Vec3::x()));
-/// assert_eq!(history.mean(Micros(40_000), 0.01), None);
+/// use stampfly_eskf::filter::{History, Nominal};
+/// use stampfly_types::Vec3;
+/// let (mut state, mut history) = (Nominal::default(), History::default());
+/// for _ in 0..10 {
+///     history.add(&state.propagate(&Vec3::new(0.0, 0.0, -9.80665), &Vec3::x(), 0.0025));
+/// }
+/// // 20 ms ago it had turned by five milliradians.
+/// let then = history.since(0.02).unwrap().before(&state);
+/// assert!((then.quat().angle() - 0.005).abs() < 1e-5);
+/// assert!((history.mean_rate(0.0, 0.01).unwrap() - Vec3::x()).amax() < 1e-5);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RateHistory {
-    entries: [Entry; DEPTH],
-    next: usize,
+#[derive(Clone, Debug, PartialEq)]
+pub struct History {
+    stretches: [Stretch; DEPTH],
+    newest: usize,
 }
 
-impl RateHistory {
-    /// Remembers a rate that held for `length` seconds until `end`.
-    pub fn add(&mut self, end: Micros, length: f32, rate: Vec3) {
-        if let Some(entry) = self.entries.get_mut(self.next) {
-            *entry = Entry { end, length, rate };
+impl Default for History {
+    fn default() -> Self {
+        Self { stretches: [NOTHING; DEPTH], newest: 0 }
+    }
+}
+
+impl History {
+    /// Remembers what an inertial sample did.
+    #[inline]
+    pub fn add(&mut self, motion: &Motion) {
+        if let Some(newest) = self.stretches.get_mut(self.newest)
+            && newest.length < SHORTEST
+        {
+            let length = newest.length + motion.dt;
+            newest.rate = (newest.rate * newest.length + motion.rate * motion.dt) / length;
+            newest.turn = multiply(newest.turn, motion.turn);
+            newest.impulse += motion.impulse;
+            newest.length = length;
+            return;
         }
-        self.next = (self.next + 1) % DEPTH;
+        self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
+        if let Some(place) = self.stretches.get_mut(self.newest) {
+            *place = Stretch { length: motion.dt, rate: motion.rate, turn: motion.turn, impulse: motion.impulse };
+        }
     }
 
-    /// Mean over the `length` seconds until `end`, as far as they are remembered. `None` when no part of them is.
+    /// Newest first.
+    #[inline]
+    fn backwards(&self) -> impl Iterator<Item = &Stretch> {
+        let (older, newer) = self.stretches.split_at(self.newest + 1);
+        older.iter().rev().chain(newer.iter().rev()).take_while(|stretch| stretch.length > 0.0)
+    }
+
+    /// What happened in the last `age` seconds; for a negative age, what will happen if nothing changes. `None` when
+    /// that is longer ago than is remembered.
+    #[inline]
     #[must_use]
-    pub fn mean(&self, end: Micros, length: f32) -> Option<Vec3> {
-        let (mut sum, mut time) = (Vec3::zeros(), 0.0f32);
-        for entry in &self.entries {
-            // Both ends in seconds before `end`, negative when after it.
-            let newer = end.since(entry.end).seconds() - entry.end.since(end).seconds();
-            let older = (newer + entry.length).min(length);
-            let overlap = older - newer.max(0.0);
+    pub fn since(&self, age: f32) -> Option<Passage> {
+        let mut passage = Passage::default();
+        for stretch in self.backwards() {
+            let left = age - passage.duration;
+            if left >= stretch.length {
+                passage.prepend(stretch.length, stretch.turn, stretch.impulse);
+                if passage.duration >= age {
+                    return Some(passage);
+                }
+            } else {
+                passage.prepend(left, small_rotation(stretch.rate * left), stretch.impulse * (left / stretch.length));
+                return Some(passage);
+            }
+        }
+        None
+    }
+
+    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as they are remembered.
+    /// `None` when no part of them is.
+    #[inline]
+    #[must_use]
+    pub fn mean_rate(&self, age: f32, length: f32) -> Option<Vec3> {
+        let (mut sum, mut time, mut end) = (Vec3::zeros(), 0.0, 0.0f32);
+        for stretch in self.backwards() {
+            let begin = end + stretch.length;
+            let overlap = begin.min(age + length) - end.max(age);
             if overlap > 0.0 {
-                sum += entry.rate * overlap;
+                sum += stretch.rate * overlap;
                 time += overlap;
             }
+            if begin >= age + length {
+                break;
+            }
+            end = begin;
         }
         (time > 1e-5).then(|| sum / time)
     }
@@ -63,21 +135,41 @@ impl RateHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::filter::Nominal;
     use proptest::prelude::*;
 
+    /// A rate that grows evenly, 1 rad/s², sampled at this rate; the state and its history after 0.3 s.
+    fn spun_up(rate: f32) -> (Nominal, History) {
+        let (mut state, mut history) = (Nominal::default(), History::default());
+        let dt = 1.0 / rate;
+        for step in 0..(0.3 * rate) as u32 {
+            let gyro = Vec3::x() * ((step as f32 + 0.5) * dt);
+            history.add(&state.propagate(&Vec3::new(0.3, 0.0, -9.8), &gyro, dt));
+        }
+        (state, history)
+    }
+
     proptest! {
-        /// A rate that grows evenly has the mean that it has in the middle of the stretch.
         #[test]
-        fn an_even_change_is_averaged_exactly(end in 20_000u64..38_000, length in 0.004f32..0.012) {
-            let mut history = RateHistory::default();
-            for step in 1..=40u64 {
-                // The mean over a step is the value in its middle.
-                history.add(Micros(step * 2_500), 0.0025, Vec3::x() * (step as f32 - 0.5) * 0.0025);
-            }
-            // Steps 25 to 40 are remembered: 60 to 100 ms.
-            let end = Micros(end + 62_000);
-            let expected = end.seconds() - 0.5 * length;
-            let mean = history.mean(end, length).expect("remembered").x;
+        fn a_tenth_of_a_second_is_remembered_at_any_rate(
+            rate in prop::sample::select(&[100f32, 200.0, 385.0, 400.0, 415.0, 800.0, 1000.0, 1600.0, 8000.0][..]),
+            age in 0.0f32..REACH,
+        ) {
+            let (state, history) = spun_up(rate);
+            let passage = history.since(age);
+            prop_assert!(passage.is_some(), "{age} s at {rate} Hz");
+            let passage = passage.unwrap();
+            prop_assert!((passage.duration - age).abs() < 1e-6);
+            let then = 0.3 - age;
+            let roll = 2.0 * passage.before(&state).attitude[1].asin();
+            prop_assert!((roll - 0.5 * then * then).abs() < 1e-4, "{roll} rad, {age} s ago at {rate} Hz");
+        }
+
+        #[test]
+        fn an_even_change_is_averaged_exactly(age in 0.0f32..0.08, length in 0.004f32..0.02) {
+            let (_, history) = spun_up(400.0);
+            let expected = 0.3 - age - 0.5 * length;
+            let mean = history.mean_rate(age, length).expect("remembered").x;
             // Inside a step the rate is taken as constant.
             prop_assert!((mean - expected).abs() < 0.0013, "{mean}, not {expected}");
         }
@@ -85,7 +177,17 @@ mod tests {
 
     #[test]
     fn what_was_never_seen_is_not_made_up() {
-        let history = RateHistory::default();
-        assert_eq!(history.mean(Micros(5_000), 0.01), None);
+        let history = History::default();
+        assert!(history.since(0.01).is_none() && history.mean_rate(0.0, 0.01).is_none());
+        let (_, history) = spun_up(400.0);
+        assert!(history.since(0.2).is_none() && history.mean_rate(0.2, 0.01).is_none());
+    }
+
+    #[test]
+    fn a_look_ahead_goes_on_as_before() {
+        let (state, history) = spun_up(400.0);
+        let ahead = history.since(-0.01).expect("remembered").before(&state);
+        assert!((ahead.attitude[1] - state.attitude[1] - 0.5 * 0.01 * 0.3).abs() < 1e-4);
+        assert!((ahead.velocity.x - state.velocity.x - 0.003).abs() < 1e-4);
     }
 }

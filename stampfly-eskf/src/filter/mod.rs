@@ -8,15 +8,18 @@
 //! | file | what |
 //! |---|---|
 //! | [`state`] | nominal state, small rotations, injection of a correction |
-//! | [`covariance`] | storage, propagation, scalar update |
-//! | [`history`] | rates of the last moments, for sensors that report late |
+//! | [`covariance`] | storage, propagation, update |
+//! | [`passage`] | what happened between two instants: how errors move, and how to go back |
+//! | [`history`] | the last tenth of a second, for measurements that are late |
 
 pub mod covariance;
 pub mod history;
+pub mod passage;
 pub mod state;
 
 pub use covariance::{Covariance, N};
-pub use history::RateHistory;
+pub use history::History;
+pub use passage::Passage;
 pub use state::Nominal;
 
 /// Index of the first position error state.

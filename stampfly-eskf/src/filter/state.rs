@@ -33,15 +33,17 @@ impl Default for Nominal {
 /// A rotation matrix in row order, body → world.
 pub type Rotation = [[f32; 3]; 3];
 
-/// What a propagation step used: the covariance needs the same numbers.
-#[derive(Clone, Copy, Debug)]
+/// What one inertial sample did: everything else that has to follow the state uses these numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Attitude in the middle of the step.
-    pub rotation: Rotation,
-    /// Specific force without bias, body.
+    /// Specific force without bias, body, m/s².
     pub force: Vec3,
-    /// Angular rate without bias, body.
+    /// Angular rate without bias, body, rad/s.
     pub rate: Vec3,
+    /// Rotation of the body over the step: attitude after = attitude before ⊗ turn.
+    pub turn: [f32; 4],
+    /// Specific force times the length of the step, world, m/s.
+    pub impulse: Vec3,
     /// Length of the step, s.
     pub dt: f32,
 }
@@ -53,15 +55,14 @@ impl Nominal {
     pub fn propagate(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) -> Motion {
         let force = accel - self.accel_bias;
         let rate = gyro - self.gyro_bias;
-        let half = small_rotation([rate.x * 0.5 * dt, rate.y * 0.5 * dt, rate.z * 0.5 * dt]);
+        let half = small_rotation(rate * (0.5 * dt));
         let middle = multiply(self.attitude, half);
-        let rotation = rotation_matrix(middle);
-        let mut acceleration = rotate(&rotation, &force);
-        acceleration.z += GRAVITY;
-        self.position += (self.velocity + acceleration * (0.5 * dt)) * dt;
-        self.velocity += acceleration * dt;
+        let impulse = rotate(&rotation_matrix(middle), &force) * dt;
+        let gained = impulse + Vec3::new(0.0, 0.0, GRAVITY * dt);
+        self.position += (self.velocity + gained * 0.5) * dt;
+        self.velocity += gained;
         self.attitude = normalize(multiply(middle, half));
-        Motion { rotation, force, rate, dt }
+        Motion { force, rate, turn: twice(half), impulse, dt }
     }
 
     /// Adds an error-state correction to the nominal state.
@@ -72,8 +73,7 @@ impl Nominal {
         self.velocity += at(VELOCITY);
         self.gyro_bias += at(GYRO_BIAS);
         self.accel_bias += at(ACCEL_BIAS);
-        let turn = [correction[ATTITUDE], correction[ATTITUDE + 1], correction[ATTITUDE + 2]];
-        self.attitude = normalize(multiply(self.attitude, small_rotation(turn)));
+        self.attitude = normalize(multiply(self.attitude, small_rotation(at(ATTITUDE))));
     }
 
     /// The attitude as a matrix, body → world.
@@ -81,6 +81,14 @@ impl Nominal {
     #[must_use]
     pub fn rotation(&self) -> Rotation {
         rotation_matrix(self.attitude)
+    }
+
+    /// Cosine of the tilt: the world's down seen along the body's.
+    #[inline]
+    #[must_use]
+    pub fn cos_tilt(&self) -> f32 {
+        let [_, x, y, _] = self.attitude;
+        1.0 - 2.0 * (x * x + y * y)
     }
 
     /// The attitude as the family's quaternion type.
@@ -114,8 +122,10 @@ pub fn rotate_back(rotation: &Rotation, world: &Vec3) -> Vec3 {
     Vec3::new(column(0), column(1), column(2))
 }
 
+/// The rotation matrix of a unit quaternion (w, x, y, z).
 #[inline]
-fn rotation_matrix([w, x, y, z]: [f32; 4]) -> Rotation {
+#[must_use]
+pub fn rotation_matrix([w, x, y, z]: [f32; 4]) -> Rotation {
     [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
         [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
@@ -123,8 +133,10 @@ fn rotation_matrix([w, x, y, z]: [f32; 4]) -> Rotation {
     ]
 }
 
+/// The product of two quaternions.
 #[inline]
-fn multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+#[must_use]
+pub fn multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     [
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -136,12 +148,19 @@ fn multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
 /// The quaternion of a rotation vector, by its series to fourth order: exact to `f32` below 0.3 rad and still a
 /// proper rotation above, after normalisation. No transcendental in the 400 Hz path.
 #[inline]
-fn small_rotation([x, y, z]: [f32; 3]) -> [f32; 4] {
-    let (x, y, z) = (0.5 * x, 0.5 * y, 0.5 * z);
+#[must_use]
+pub fn small_rotation(turn: Vec3) -> [f32; 4] {
+    let (x, y, z) = (0.5 * turn.x, 0.5 * turn.y, 0.5 * turn.z);
     let square = x * x + y * y + z * z;
     let scale = 1.0 - square * (1.0 / 6.0) * (1.0 - square * (1.0 / 20.0));
     let real = 1.0 - square * 0.5 * (1.0 - square * (1.0 / 12.0));
     [real, x * scale, y * scale, z * scale]
+}
+
+/// The same rotation twice, for a unit quaternion.
+#[inline]
+fn twice([w, x, y, z]: [f32; 4]) -> [f32; 4] {
+    [2.0 * w * w - 1.0, 2.0 * w * x, 2.0 * w * y, 2.0 * w * z]
 }
 
 /// One Newton step towards unit length; falls back to a square root when far away.
@@ -163,7 +182,7 @@ mod tests {
         #[test]
         fn attitude_follows_the_exact_exponential(x in -0.3f32..0.3, y in -0.3f32..0.3, z in -0.3f32..0.3) {
             let exact = Quat::from_scaled_axis(Vec3::new(x, y, z));
-            let series = normalize(small_rotation([x, y, z]));
+            let series = normalize(small_rotation(Vec3::new(x, y, z)));
             for (a, b) in series.iter().zip([exact.w, exact.i, exact.j, exact.k]) {
                 prop_assert!((a - b).abs() < 1e-6);
             }
@@ -178,6 +197,19 @@ mod tests {
             let norm: f32 = state.attitude.iter().map(|v| v * v).sum();
             prop_assert!((norm - 1.0).abs() < 1e-5);
         }
+    }
+
+    #[test]
+    fn a_step_says_what_it_did() {
+        let before = crate::aid::numeric::awkward_state();
+        let mut after = before;
+        let motion = after.propagate(&Vec3::new(1.0, -2.0, -9.0), &Vec3::new(0.5, 1.0, -3.0), 0.0025);
+        let turned = multiply(before.attitude, motion.turn);
+        for (a, b) in turned.iter().zip(after.attitude) {
+            assert!((a - b).abs() < 1e-6);
+        }
+        let gained = after.velocity - before.velocity - Vec3::new(0.0, 0.0, GRAVITY * motion.dt);
+        assert!((gained - motion.impulse).amax() < 1e-6);
     }
 
     #[test]

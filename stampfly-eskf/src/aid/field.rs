@@ -1,0 +1,38 @@
+//! The magnetic field as a vector: all three axes, tilt included.
+//!
+//! A field m of the world reads m_b = Rᵀ·m in the body; a small body rotation θ gives (I − \[θ\]×)·m_b =
+//! m_b + \[m_b\]×·θ. Everything is divided by the field's strength, so that readings are directions and the noise is
+//! an angle.
+//!
+//! For a vehicle whose motors do not bend the field: a rover, a hand-held sensor, a machine with its magnetometer on a
+//! mast. Otherwise use the [`heading`](super::heading), which leaves the tilt alone.
+
+use super::Row;
+use crate::filter::ATTITUDE;
+use crate::filter::state::{Rotation, rotate_back};
+use stampfly_types::Vec3;
+
+/// Predicted direction of the field along body x, y and z, for the direction `reference` (world, unit length).
+#[inline]
+#[must_use]
+pub fn direction(rotation: &Rotation, reference: &Vec3) -> [Row; 3] {
+    let m = rotate_back(rotation, reference);
+    [
+        Row::new(m.x, [(ATTITUDE + 1, -m.z), (ATTITUDE + 2, m.y)]),
+        Row::new(m.y, [(ATTITUDE, m.z), (ATTITUDE + 2, -m.x)]),
+        Row::new(m.z, [(ATTITUDE, -m.y), (ATTITUDE + 1, m.x)]),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jacobian_matches_numerical_differentiation() {
+        let reference = Vec3::new(22.0, -9.0, 38.0).normalize();
+        for axis in 0..3 {
+            crate::aid::numeric::check(|state| direction(&state.rotation(), &reference)[axis]);
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! A position that is measured from outside, or simply known, in the world's axes.
+//!
+//! It is the state itself: z = p, so the Jacobian is the identity in the three position errors.
+//!
+//! A camera system's position, or the place where a vehicle stands.
+
+use super::Row;
+use crate::filter::{Nominal, POSITION};
+
+/// Predicted position, world, m: the state's own.
+#[inline]
+#[must_use]
+pub fn world(state: &Nominal) -> [Row; 3] {
+    let axis = |i: usize| Row::new(state.position[i], [(POSITION + i, 1.0)]);
+    [axis(0), axis(1), axis(2)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jacobian_matches_numerical_differentiation() {
+        for axis in 0..3 {
+            crate::aid::numeric::check(|state| world(state)[axis]);
+        }
+    }
+}
