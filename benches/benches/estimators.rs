@@ -15,7 +15,7 @@
 //!
 //! Before anything is measured each contender must follow the path, and ours must accept every sample. The last lines
 //! print the ratios of the medians of seven interleaved rounds, which is the figure to quote: single rounds vary with
-//! whatever else the machine does.
+//! whatever else the machine does. `-- medians` prints nothing but them; `cargo xtask peers` makes a table of two runs.
 
 #[path = "estimators/euler.rs"]
 mod euler;
@@ -120,6 +120,7 @@ fn filters(steps: &[Step], measure: &mut impl Measure<[f32; 3]>) {
 fn attitudes(steps: &[Step], measure: &mut impl Measure<[f32; 4]>) {
     let inputs: Vec<Upwards> = steps.iter().map(Upwards::new).collect();
 
+    // The first is what the others are compared with.
     let vector = |v: [f32; 3]| na34::Vector3::from(v);
     let mut filter = ahrs::Madgwick::new(PERIOD, 0.1f32);
     measure.contender("ahrs 0.8, Madgwick", |k| {
