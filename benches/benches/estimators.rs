@@ -26,6 +26,7 @@ use kfilter::measurement::LinearMeasurement;
 use kfilter::{KalmanFilter as _, KalmanPredictInput as _, KalmanUpdate as _};
 use nalgebra_025 as na25;
 use nalgebra_034 as na34;
+use stampfly_benches::acceptance::{MIX, fused_per_step};
 use stampfly_benches::stream::{self, Step, Truth};
 use stampfly_eskf::{Eskf, Estimator};
 use stampfly_types::Vec3;
@@ -300,19 +301,7 @@ fn check(steps: &[Step]) {
     attitudes(steps, &mut Following { steps, error: tilt, allowed: 0.3 });
 
     for (name, configuration) in stream::configurations() {
-        let mut filter = Eskf::new(configuration);
-        filter.initialize(stream::START, &stream::calibration());
-        let mut fused = [0u64; 4];
-        for k in 0..CALLS {
-            let fusions = stream::advance(&mut filter, stream::end_of(k), at(steps, k));
-            for (count, fusion) in fused.iter_mut().zip(fusions) {
-                assert!(fusion.is_none_or(|fusion| fusion.is_fused()), "{name}, step {k}: {fusion:?}");
-                *count += u64::from(fusion.is_some());
-            }
-        }
-        // Range, flow, barometer, magnetometer.
-        assert_eq!(fused.map(|count| count as f64 / CALLS as f64), [0.075, 0.25, 0.125, 0.0625]);
-        assert_eq!(filter.status().resets, 0);
+        assert_eq!(fused_per_step(name, configuration, steps, CALLS), MIX, "{name}");
     }
 }
 
