@@ -9,6 +9,7 @@
 //! for a failed step, 2 for a wrong command line.
 
 mod ci;
+mod ratchet;
 mod repository;
 mod steps;
 
@@ -61,6 +62,12 @@ const STEPS: &[Step] = &[
         run: steps::budget::run,
     },
     Step {
+        name: "cortex-m4f",
+        about: "does the estimator stay within its budget on a Cortex-M4F, with the same bits?",
+        in_ci: true,
+        run: steps::cortex_m4f::run,
+    },
+    Step {
         name: "package",
         about: "would each crate, as committed, build from its package?",
         in_ci: true,
@@ -83,6 +90,12 @@ const STEPS: &[Step] = &[
         about: "measure the README's figures and write them there",
         in_ci: false,
         run: steps::figures::run,
+    },
+    Step {
+        name: "peers",
+        about: "measure the estimator beside its peers (--fix: and write it into its README)",
+        in_ci: false,
+        run: steps::peers::run,
     },
 ];
 

@@ -49,6 +49,17 @@ impl Repository {
         if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
     }
 
+    /// Puts generated text between two marks of a document.
+    pub fn fill(&self, document: &str, begin: &str, end: &str, text: &str) -> Result<(), Failure> {
+        let io = |e: std::io::Error| format!("{document}: {e}");
+        let path = self.root.join(document);
+        let before = std::fs::read_to_string(&path).map_err(io)?;
+        let missing = || format!("{document} has no place for it: {begin}");
+        let (head, rest) = before.split_once(begin).ok_or_else(missing)?;
+        let (_, tail) = rest.split_once(end).ok_or_else(missing)?;
+        std::fs::write(&path, format!("{head}{begin}{text}{end}{tail}")).map_err(io)
+    }
+
     /// A command that runs in the top folder.
     pub fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
@@ -93,6 +104,18 @@ pub fn install(repository: &Repository, packages: &[&str]) -> Result<(), Failure
     run(repository.command("apt-get").args(["update", "-qq"])).map_err(missing)?;
     run(repository.command("apt-get").args(["install", "-y", "-qq", "--no-install-recommends"]).args(packages))
         .map_err(missing)
+}
+
+/// Makes rustup install targets that are missing.
+pub fn add_targets(repository: &Repository, targets: &[&str]) -> Result<(), Failure> {
+    if !exists("rustup") {
+        return Err("there is no rustup".to_owned());
+    }
+    let (installed, _) = capture(repository.command("rustup").args(["target", "list", "--installed"]))?;
+    for target in targets.iter().filter(|target| !installed.lines().any(|line| line == **target)) {
+        run(repository.command("rustup").args(["target", "add", target]))?;
+    }
+    Ok(())
 }
 
 fn announce(command: &Command) -> String {

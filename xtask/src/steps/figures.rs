@@ -5,7 +5,6 @@
 use crate::Failure;
 use crate::repository::{Repository, capture};
 use std::fmt::Write;
-use std::fs;
 
 const BEGIN: &str = "<!-- figures: cargo xtask figures -->\n";
 const END: &str = "<!-- end of figures -->";
@@ -23,13 +22,8 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         let (table, _) = stampfly(repository, arguments)?;
         let _ = write!(text, "{title}: `stampfly {}`\n\n```text\n{table}```\n\n", arguments.join(" "));
     }
-    let path = repository.root.join("README.md");
-    let readme = fs::read_to_string(&path).map_err(|e| format!("README.md: {e}"))?;
-    let missing = "README.md has no place for the figures";
-    let (head, rest) = readme.split_once(BEGIN).ok_or(missing)?;
-    let (_, tail) = rest.split_once(END).ok_or(missing)?;
     print!("{text}");
-    fs::write(&path, format!("{head}{BEGIN}{text}{END}{tail}")).map_err(|e| format!("README.md: {e}"))
+    repository.fill("README.md", BEGIN, END, &text)
 }
 
 fn stampfly(repository: &Repository, arguments: &[&str]) -> Result<(String, String), Failure> {

@@ -3,6 +3,7 @@
 pub mod budget;
 pub mod clippy;
 pub mod consumers;
+pub mod cortex_m4f;
 pub mod determinism;
 pub mod doc;
 pub mod docs;
@@ -12,5 +13,6 @@ pub mod fmt;
 pub mod loom;
 pub mod no_std;
 pub mod package;
+pub mod peers;
 pub mod test;
 pub mod ulog;

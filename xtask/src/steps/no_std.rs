@@ -4,7 +4,7 @@
 //! own sources instead; it is installed when it is missing.
 
 use crate::Failure;
-use crate::repository::{Repository, capture, exists, install, run as run_program};
+use crate::repository::{Repository, add_targets, install, run as run_program};
 use std::path::Path;
 use std::process::Command;
 
@@ -13,7 +13,7 @@ const DEBIAN: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
     let debian = match arguments {
-        [] => add_targets(repository).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err(),
+        [] => add_targets(repository, &TARGETS).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err(),
         [only] if only == "--debian" => true,
         _ => return Err(format!("what is {arguments:?}?")),
     };
@@ -30,17 +30,6 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
             build.args(["-p", &library.name]);
         }
         run_program(&mut build)?;
-    }
-    Ok(())
-}
-
-fn add_targets(repository: &Repository) -> Result<(), Failure> {
-    if !exists("rustup") {
-        return Err("there is no rustup".to_owned());
-    }
-    let (installed, _) = capture(repository.command("rustup").args(["target", "list", "--installed"]))?;
-    for target in TARGETS.iter().filter(|target| !installed.lines().any(|line| line == **target)) {
-        run_program(repository.command("rustup").args(["target", "add", target]))?;
     }
     Ok(())
 }
