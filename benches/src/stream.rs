@@ -19,7 +19,7 @@
 //! Compiled into the benchmark and into the firmware that counts instructions; needs nothing but our two crates. Not for
 //! tests of accuracy: nothing in it is hard.
 
-use stampfly_eskf::{EskfConfig, Estimator, Fusion};
+use stampfly_eskf::{EskfConfig, Estimator, Fusion, GravityUse, MagModel};
 use stampfly_types::messages::{BaroData, CalibrationResult, FlowData, ImuData, MagData, StateEstimate, TofData};
 use stampfly_types::{GRAVITY, Message, Micros, Quat, Vec3, math};
 
@@ -63,9 +63,10 @@ pub struct Truth {
 /// Our filter, in the ways it is measured: a name and a configuration. The first is what the peers are compared with.
 /// One line each is all it takes.
 #[must_use]
-pub fn configurations() -> [(&'static str, EskfConfig); 1] {
-    let all_sensors = EskfConfig { mag_enable: true, ..EskfConfig::default() };
-    [("stampfly-eskf", all_sensors)]
+pub fn configurations() -> [(&'static str, EskfConfig); 2] {
+    let all_sensors = EskfConfig { mag_enable: true, mag_model: MagModel::Field, ..EskfConfig::default() };
+    let gravity = EskfConfig { gravity_use: GravityUse::Always, ..all_sensors };
+    [("stampfly-eskf", all_sensors), ("stampfly-eskf, gravity at every step", gravity)]
 }
 
 /// What a still-calibration just before the first step would have found.

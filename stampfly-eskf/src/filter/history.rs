@@ -138,15 +138,16 @@ mod tests {
     use crate::filter::Nominal;
     use proptest::prelude::*;
 
-    /// A rate that grows evenly, 1 rad/s², sampled at this rate; the state and its history after 0.3 s.
-    fn spun_up(rate: f32) -> (Nominal, History) {
+    /// A rate that grows evenly, 1 rad/s², sampled at this rate: the state, its history and the time after about 0.3 s.
+    fn spun_up(rate: f32) -> (Nominal, History, f32) {
         let (mut state, mut history) = (Nominal::default(), History::default());
         let dt = 1.0 / rate;
-        for step in 0..(0.3 * rate) as u32 {
+        let steps = (0.3 * rate) as u32;
+        for step in 0..steps {
             let gyro = Vec3::x() * ((step as f32 + 0.5) * dt);
             history.add(&state.propagate(&Vec3::new(0.3, 0.0, -9.8), &gyro, dt));
         }
-        (state, history)
+        (state, history, steps as f32 * dt)
     }
 
     proptest! {
@@ -155,20 +156,20 @@ mod tests {
             rate in prop::sample::select(&[100f32, 200.0, 385.0, 400.0, 415.0, 800.0, 1000.0, 1600.0, 8000.0][..]),
             age in 0.0f32..REACH,
         ) {
-            let (state, history) = spun_up(rate);
+            let (state, history, now) = spun_up(rate);
             let passage = history.since(age);
             prop_assert!(passage.is_some(), "{age} s at {rate} Hz");
             let passage = passage.unwrap();
             prop_assert!((passage.duration - age).abs() < 1e-6);
-            let then = 0.3 - age;
+            let then = now - age;
             let roll = 2.0 * passage.before(&state).attitude[1].asin();
             prop_assert!((roll - 0.5 * then * then).abs() < 1e-4, "{roll} rad, {age} s ago at {rate} Hz");
         }
 
         #[test]
         fn an_even_change_is_averaged_exactly(age in 0.0f32..0.08, length in 0.004f32..0.02) {
-            let (_, history) = spun_up(400.0);
-            let expected = 0.3 - age - 0.5 * length;
+            let (_, history, now) = spun_up(400.0);
+            let expected = now - age - 0.5 * length;
             let mean = history.mean_rate(age, length).expect("remembered").x;
             // Inside a step the rate is taken as constant.
             prop_assert!((mean - expected).abs() < 0.0013, "{mean}, not {expected}");
@@ -179,13 +180,13 @@ mod tests {
     fn what_was_never_seen_is_not_made_up() {
         let history = History::default();
         assert!(history.since(0.01).is_none() && history.mean_rate(0.0, 0.01).is_none());
-        let (_, history) = spun_up(400.0);
+        let (_, history, _) = spun_up(400.0);
         assert!(history.since(0.2).is_none() && history.mean_rate(0.2, 0.01).is_none());
     }
 
     #[test]
     fn a_look_ahead_goes_on_as_before() {
-        let (state, history) = spun_up(400.0);
+        let (state, history, _) = spun_up(400.0);
         let ahead = history.since(-0.01).expect("remembered").before(&state);
         assert!((ahead.attitude[1] - state.attitude[1] - 0.5 * 0.01 * 0.3).abs() < 1e-4);
         assert!((ahead.velocity.x - state.velocity.x - 0.003).abs() < 1e-4);
