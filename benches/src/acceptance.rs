@@ -3,15 +3,19 @@
 use crate::stream::{self, Step};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 
-/// Panics unless every sample of so many steps goes into the estimate. Returns how many there were a step: range, flow,
-/// barometer, magnetometer.
+/// Panics unless every sample of so many steps goes into the estimate, after a first pass in which the filter has yet to
+/// find its biases and gather a past to put late samples in. Returns how many there were a step: range, flow, barometer,
+/// magnetometer.
 #[must_use]
 pub fn fused_per_step(name: &str, configuration: EskfConfig, steps: &[Step], count: u64) -> [f64; 4] {
     let mut filter = Eskf::new(configuration);
     filter.initialize(stream::START, &stream::calibration());
     let mut fused = [0u64; 4];
-    for (k, step) in (0..count).zip(steps.iter().cycle()) {
+    for (k, step) in (0..stream::STEPS as u64 + count).zip(steps.iter().cycle()) {
         let fusions = stream::advance(&mut filter, stream::end_of(k), step);
+        if k < stream::STEPS as u64 {
+            continue;
+        }
         for (sum, fusion) in fused.iter_mut().zip(fusions) {
             assert!(fusion.is_none_or(|fusion| fusion.is_fused()), "{name}, step {k}: {fusions:?}");
             *sum += u64::from(fusion.is_some());

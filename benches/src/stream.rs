@@ -9,12 +9,9 @@
 //! |---|---|---|
 //! | inertial | 400 Hz | 1 |
 //! | flow | 100 Hz | 0.25 |
-//! | range | 120 Hz in the first second of four | 0.075 |
-//! | barometer | 100 Hz in the last two | 0.125 |
+//! | range | 30 Hz | 0.075 |
+//! | barometer | 50 Hz | 0.125 |
 //! | magnetometer | 25 Hz | 0.0625 |
-//!
-//! That is the mean mix of a vehicle with a range at 30 Hz and a barometer at 50. They come in turns because our filter
-//! uses a barometer only after a second without a range: so the barometer is filtered and not only looked at.
 //!
 //! Compiled into the benchmark and into the firmware that counts instructions; needs nothing but our two crates. Not for
 //! tests of accuracy: nothing in it is hard.
@@ -142,7 +139,7 @@ pub fn step(k: usize) -> Step {
     };
     let distance = |at: &Truth| (FLOOR - at.position.z) / (at.attitude * Vec3::z()).z;
     // Odd steps for the range and the magnetometer, even ones for flow and barometer, which alternate.
-    let tof = (k < 400 && matches!(k % 10, 1 | 5 | 7)).then(|| TofData {
+    let tof = matches!(k % 40, 1 | 15 | 27).then(|| TofData {
         distance: distance(&path(end - 8)) + noise(6, 0.005),
         sigma: 0.005,
         status: 0,
@@ -160,7 +157,8 @@ pub fn step(k: usize) -> Step {
             valid: true,
         }
     });
-    let baro = (k >= 800 && k.is_multiple_of(4))
+    let baro = k
+        .is_multiple_of(8)
         .then(|| BaroData { altitude: 40.0 - path(end - 4).position.z + noise(9, 0.1), ..BaroData::default() });
     let mag = (k % 16 == 3).then(|| MagData { field: truth.attitude.inverse() * FIELD + noise3(10, 0.5) });
     Step { imu, tof, flow, baro, mag, truth }

@@ -181,21 +181,19 @@ impl Covariance {
 
         // Columns: the first nine of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
         for (r, t) in t.iter().enumerate() {
-            let mut out = *t;
+            let row = &mut self.rows[r];
+            *row = *t;
             for i in 0..3 {
                 let (a, b, c) = (by_attitude[i], by_bias[i], turn[i]);
                 if r < VELOCITY {
-                    out[i] = t[i] + dt * t[3 + i];
+                    row[i] = t[i] + dt * t[3 + i];
                 }
                 if r < ATTITUDE {
-                    out[3 + i] =
+                    row[3 + i] =
                         t[3 + i] + a[0] * t[6] + a[1] * t[7] + a[2] * t[8] + b[0] * t[12] + b[1] * t[13] + b[2] * t[14];
                 }
-                out[6 + i] = c[0] * t[6] + c[1] * t[7] + c[2] * t[8] - dt * t[9 + i];
+                row[6 + i] = c[0] * t[6] + c[1] * t[7] + c[2] * t[8] - dt * t[9 + i];
             }
-            let grown = out[r] + driving[r / 3] * dt;
-            out[r] = if grown > FLOOR[r] { grown } else { FLOOR[r] };
-            self.rows[r] = out;
         }
         // Mirror: the upper triangle is the truth.
         for i in 1..N {
@@ -203,7 +201,7 @@ impl Covariance {
                 self.rows[i][j] = self.rows[j][i];
             }
         }
-        for (i, row) in self.rows.iter_mut().enumerate().skip(GYRO_BIAS) {
+        for (i, row) in self.rows.iter_mut().enumerate() {
             let grown = row[i] + driving[i / 3] * dt;
             row[i] = if grown > FLOOR[i] { grown } else { FLOOR[i] };
         }
@@ -261,10 +259,16 @@ impl Covariance {
     #[inline]
     pub fn absorb<const M: usize>(&mut self, projection: &Projection<M>) -> [f32; N] {
         let Projection { directions, innovations } = projection;
-        for (i, row) in self.rows.iter_mut().enumerate() {
+        for (i, place) in self.rows.iter_mut().enumerate() {
+            let mut row = *place;
             for direction in directions {
-                add(row, -direction[i], direction);
+                // What is not a number is not spread. Also keeps the compiler from working down the columns.
+                if direction[i].is_nan() {
+                    return [f32::NAN; N];
+                }
+                add(&mut row, -direction[i], direction);
             }
+            *place = row;
         }
         let mut correction = [0.0; N];
         for (direction, innovation) in directions.iter().zip(innovations) {
