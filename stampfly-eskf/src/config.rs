@@ -8,6 +8,11 @@ pub struct EskfConfig {
     pub accel_noise: f32,
     /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
     pub gyro_noise: f32,
+    /// What a change of the accelerometer from sample to sample adds to its noise: share of its square, 1. See
+    /// [`Roughness`](crate::filter::Roughness).
+    pub accel_roughness: f32,
+    /// The same for the gyro.
+    pub gyro_roughness: f32,
     /// Gyro bias random walk, rad/s/√s.
     pub gyro_bias_walk: f32,
     /// Accelerometer bias random walk, m/s²/√s.
@@ -112,6 +117,8 @@ impl Default for EskfConfig {
         Self {
             accel_noise: 0.3,
             gyro_noise: 0.003,
+            accel_roughness: 0.0,
+            gyro_roughness: 0.0,
             gyro_bias_walk: 3e-5,
             accel_bias_walk: 1e-3,
             initial_position: 0.01,
@@ -127,7 +134,7 @@ impl Default for EskfConfig {
             ground_clearance: 0.03,
             flow_sigma: 0.1,
             flow_scale_sigma: 0.35,
-            flow_delay: 0.012,
+            flow_delay: 0.004,
             flow_min_quality: 25,
             flow_min_distance: 0.02,
             baro_sigma: 0.3,

@@ -23,7 +23,7 @@ use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
 use crate::filter::history::REACH;
 use crate::filter::state::{Rotation, multiply, rotate};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, Passage, VELOCITY};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, Passage, Roughness, VELOCITY};
 use crate::level::attitude_from_specific_force;
 use gate::{Gates, Sensor};
 use stampfly_types::messages::{
@@ -97,6 +97,8 @@ pub struct Eskf {
     pending: Passage,
     start: Rotation,
     history: History,
+    /// Of the specific force and of the rate.
+    roughness: [Roughness; 2],
     now: Micros,
     initialized: bool,
     calibration: CalibrationResult,
@@ -152,6 +154,7 @@ impl Eskf {
             pending: Passage::default(),
             start: Nominal::default().rotation(),
             history: History::default(),
+            roughness: [Roughness::default(); 2],
             now: Micros::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
@@ -391,9 +394,18 @@ impl Estimator for Eskf {
         self.now = at;
         let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
         self.history.add(&motion);
+        let [force, rate] = &mut self.roughness;
+        force.add(&imu.accel, motion.dt);
+        rate.add(&imu.gyro, motion.dt);
         self.pending.extend(&motion);
         if self.pending.duration > DOUBT_STEP {
-            self.covariance.propagate(&self.start, &self.pending, &self.noise);
+            let [force, rate] = self.roughness.map(|roughness| roughness.mean_square() * motion.dt);
+            let noise = ProcessNoise {
+                velocity: self.noise.velocity + self.config.accel_roughness * force,
+                attitude: self.noise.attitude + self.config.gyro_roughness * rate,
+                ..self.noise
+            };
+            self.covariance.propagate(&self.start, &self.pending, &noise);
             self.pending = Passage::default();
             self.start = self.state.rotation();
         }

@@ -9,17 +9,20 @@
 //! |---|---|
 //! | [`state`] | nominal state, small rotations, injection of a correction |
 //! | [`covariance`] | storage, propagation, update |
+//! | [`roughness`] | how much the inertial signals change between samples: noise that follows vibration |
 //! | [`passage`] | what happened between two instants: how errors move, and how to go back |
 //! | [`history`] | the last tenth of a second, for measurements that are late |
 
 pub mod covariance;
 pub mod history;
 pub mod passage;
+pub mod roughness;
 pub mod state;
 
 pub use covariance::{Covariance, N};
 pub use history::History;
 pub use passage::Passage;
+pub use roughness::Roughness;
 pub use state::Nominal;
 
 /// Index of the first position error state.
