@@ -149,3 +149,58 @@ impl HardIron {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::{Quat, math};
+
+    const EARTH: Vec3 = Vec3::new(16.0, 0.0, 42.0);
+    const DT: f32 = 0.01;
+
+    /// So many seconds in a field with this offset, turning about all axes by ±`swing` rad or not at all.
+    fn seconds(hard_iron: &mut HardIron, time: f32, offset: Vec3, swing: f32) {
+        let config = AttitudeConfig::default();
+        for step in 0..(time / DT) as u32 {
+            let t = step as f32 * DT;
+            let [a, b, c] = [1.1, 1.7, 0.4].map(|rate| swing * math::sin(rate * t));
+            let attitude = Quat::from_euler_angles(a, b, 2.0 * c);
+            let field = attitude.inverse() * EARTH + offset;
+            let level = attitude.to_rotation_matrix();
+            hard_iron.step(&config, level.matrix(), &field, swing > 0.0, DT);
+        }
+    }
+
+    #[test]
+    fn turning_tells_it_and_rest_does_not() {
+        let config = AttitudeConfig::default();
+        let offset = Vec3::new(10.0, -20.0, 5.0);
+        let mut hard_iron = HardIron::new(&config);
+        seconds(&mut hard_iron, 60.0, offset, 0.0);
+        assert_eq!(hard_iron.offset(&config), Vec3::zeros());
+        seconds(&mut hard_iron, 30.0, offset, 0.8);
+        assert!((hard_iron.offset(&config) - offset).norm() < 1.0, "{:?}", hard_iron.offset(&config));
+        assert!((hard_iron.field() - EARTH).norm() < 1.0, "{:?}", hard_iron.field());
+    }
+
+    #[test]
+    fn a_magnet_that_is_put_on_later_is_found_too() {
+        let config = AttitudeConfig::default();
+        let mut hard_iron = HardIron::new(&config);
+        seconds(&mut hard_iron, 60.0, Vec3::zeros(), 0.8);
+        assert_eq!(hard_iron.offset(&config), Vec3::zeros());
+        let offset = Vec3::new(0.0, 15.0, -15.0);
+        seconds(&mut hard_iron, 60.0, offset, 0.8);
+        assert!((hard_iron.offset(&config) - offset).norm() < 2.0, "{:?}", hard_iron.offset(&config));
+    }
+
+    #[test]
+    fn the_doubt_stays_positive_over_an_hour() {
+        let config = AttitudeConfig::default();
+        let mut hard_iron = HardIron::new(&config);
+        for round in 0..36u8 {
+            seconds(&mut hard_iron, 100.0, Vec3::new(f32::from(round % 3) * 9.0, 0.0, 0.0), 0.4);
+            assert!(hard_iron.covariance.symmetric_eigenvalues().min() > 0.0, "{}", hard_iron.covariance);
+        }
+    }
+}

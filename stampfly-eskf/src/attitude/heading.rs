@@ -118,3 +118,73 @@ impl Heading {
         math::wrap_angle(math::atan2(field.y, field.x) + self.value - self.north - self.declination)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f32 = 0.01;
+    const DEGREE: f32 = math::PI / 180.0;
+
+    /// A field that points so far to the east, in degrees.
+    fn pointing(east: f32) -> Vec3 {
+        Vec3::new(16.0 * math::cos(east * DEGREE), 16.0 * math::sin(east * DEGREE), 42.0)
+    }
+
+    fn settled() -> (AttitudeConfig, Heading) {
+        let config = AttitudeConfig::default();
+        let mut heading = Heading::defined_by(&pointing(0.0), config.mag_start_sigma);
+        for _ in 0..2_000 {
+            heading.predict(config.rest_bias_sigma, 0.5, DT);
+            heading.correct(&config, &pointing(0.0), config.mag_sigma, false, DT);
+        }
+        (config, heading)
+    }
+
+    #[test]
+    fn a_known_gyro_follows_slowly_and_an_unknown_one_fast() {
+        let after = |bias_sigma: f32| {
+            let (config, mut heading) = settled();
+            for _ in 0..500 {
+                heading.predict(bias_sigma, 0.5, DT);
+                heading.correct(&config, &pointing(4.0), config.mag_sigma, false, DT);
+            }
+            -heading.value() / DEGREE
+        };
+        let (known, unknown) = (after(0.03 * DEGREE), after(0.5 * DEGREE));
+        assert!(known < 1.5 && unknown > 2.5 && unknown <= 4.0, "{known}° and {unknown}° of 4°");
+    }
+
+    #[test]
+    fn rest_adds_nothing_to_what_is_known() {
+        let config = AttitudeConfig::default();
+        let mut heading = Heading::defined_by(&pointing(0.0), config.mag_start_sigma);
+        for _ in 0..6_000 {
+            heading.predict(0.0, 0.0, DT);
+            heading.correct(&config, &pointing(0.0), config.mag_sigma, true, DT);
+        }
+        assert!((heading.sigma() / config.mag_start_sigma - 1.0).abs() < 1e-3, "{}", heading.sigma());
+    }
+
+    #[test]
+    fn what_a_new_place_adds_is_forgotten_at_home() {
+        let (config, mut heading) = settled();
+        heading.move_to(&config, &pointing(50.0));
+        assert!(heading.value().abs() < 2.0 * DEGREE, "{}", heading.value());
+        let (_, off) = heading.correct(&config, &pointing(50.0), config.mag_sigma, false, DT);
+        assert!(off.abs() < 1e-3, "{off}");
+        heading.come_back();
+        let (_, off) = heading.correct(&config, &pointing(0.0), config.mag_sigma, false, DT);
+        assert!(off.abs() < 2.0 * DEGREE, "{off}");
+    }
+
+    #[test]
+    fn an_unknown_heading_takes_the_field_for_it() {
+        let config = AttitudeConfig::default();
+        let mut heading = Heading::unknown();
+        for _ in 0..100 {
+            heading.correct(&config, &pointing(-170.0), config.mag_sigma, false, DT);
+        }
+        assert!((heading.value() / DEGREE - 170.0).abs() < 1.0, "{}", heading.value());
+    }
+}

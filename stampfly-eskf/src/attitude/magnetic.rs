@@ -89,7 +89,8 @@ impl Magnetic {
             reference: reference.and_then(Field::of),
             home: None,
             candidate: None,
-            agrees_for: 0.0,
+            // What it begins with need not prove itself.
+            agrees_for: f32::MAX,
             home_agrees_for: 0.0,
             candidate_for: 0.0,
         }
@@ -118,6 +119,7 @@ impl Magnetic {
             self.home_agrees_for = if distance < ratio.min(1.0) { self.home_agrees_for + dt } else { 0.0 };
             if self.home_agrees_for >= config.mag_agree_time {
                 (self.reference, self.home) = (Some(home), None);
+                self.agrees_for = self.home_agrees_for;
                 return Verdict::Back;
             }
         }
@@ -145,5 +147,69 @@ impl Magnetic {
             (false, Some(_)) => Verdict::Disturbed { ratio },
             (false, None) => Verdict::Unjudged,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EARTH: Vec3 = Vec3::new(16.0, 0.0, 42.0);
+    const DT: f32 = 0.01;
+
+    /// Verdicts over so many seconds of one field, the body turning at `rate`: how many were clean, and the others' kinds.
+    fn seconds(watch: &mut Magnetic, time: f32, field: Vec3, rate: f32) -> (u32, [u32; 4]) {
+        let config = AttitudeConfig::default();
+        let (mut clean, mut others) = (0, [0; 4]);
+        for _ in 0..(time / DT) as u32 {
+            match watch.step(&config, &field, rate, DT) {
+                Verdict::Clean { .. } => clean += 1,
+                Verdict::Disturbed { .. } => others[0] += 1,
+                Verdict::Renewed | Verdict::Found => others[1] += 1,
+                Verdict::Back => others[2] += 1,
+                Verdict::Unjudged | Verdict::Vertical => others[3] += 1,
+            }
+        }
+        (clean, others)
+    }
+
+    #[test]
+    fn a_turning_body_finds_its_first_reference_and_a_still_one_waits() {
+        let mut watch = Magnetic::new(None);
+        assert_eq!(seconds(&mut watch, 30.0, EARTH, 0.0), (0, [0, 0, 0, 3_000]));
+        let (clean, others) = seconds(&mut watch, 10.0, EARTH, 1.0);
+        assert!(clean > 400 && others[1] == 1, "{clean} {others:?}");
+    }
+
+    #[test]
+    fn stronger_and_steeper_fields_are_disturbed_and_turned_ones_are_not() {
+        let mut watch = Magnetic::new(Some(&EARTH));
+        assert_eq!(seconds(&mut watch, 2.0, EARTH, 1.0), (200, [0; 4]));
+        let (clean, others) = seconds(&mut watch, 5.0, EARTH * 1.2, 1.0);
+        assert!(clean < 20 && others[0] > 480, "{clean} {others:?}");
+        let (clean, _) = seconds(&mut watch, 5.0, Vec3::new(0.0, 16.0, 42.0), 1.0);
+        assert!(clean > 430, "{clean}: no one can tell");
+        let (clean, _) = seconds(&mut watch, 5.0, Vec3::new(4.0, 0.0, 44.8), 1.0);
+        assert!(clean < 20, "{clean}");
+    }
+
+    #[test]
+    fn another_place_is_learned_in_motion_only_and_left_again() {
+        let config = AttitudeConfig::default();
+        let mut watch = Magnetic::new(Some(&EARTH));
+        let elsewhere = EARTH * 1.3;
+        let (_, others) = seconds(&mut watch, 60.0, elsewhere, 0.0);
+        assert_eq!(others[1], 0, "beside a magnet on the table");
+        let (clean, others) = seconds(&mut watch, 2.0 * config.mag_renew_time, elsewhere, 1.0);
+        assert!(clean > 1_000 && others[1] == 1, "{clean} {others:?}");
+        let (clean, others) = seconds(&mut watch, 2.0, EARTH, 1.0);
+        assert!(clean > 100 && others[2] == 1, "{clean} {others:?}");
+    }
+
+    #[test]
+    fn a_field_without_a_level_part_has_no_heading() {
+        let mut watch = Magnetic::new(Some(&EARTH));
+        let verdict = watch.step(&AttitudeConfig::default(), &Vec3::new(0.0, 0.5, 50.0), 0.0, DT);
+        assert_eq!(verdict, Verdict::Vertical);
     }
 }
