@@ -56,7 +56,7 @@ pub struct AttitudeConfig {
     pub mag_sigma: f32,
     /// Bend of the field where the filter starts, rad: it has only been seen there, on a desk with steel feet.
     pub mag_start_sigma: f32,
-    /// Bend of a disturbed field, rad: anything.
+    /// Bend of a disturbed field, rad: little is known, so only an even less known heading follows it.
     pub mag_disturbed_sigma: f32,
     /// Direction of the field in a new place, rad, where it is as different as it takes to be a new reference.
     pub mag_place_sigma: f32,
@@ -105,7 +105,7 @@ impl Default for AttitudeConfig {
             mag_renew_rate: 20.0 * degree,
             mag_sigma: 4.0 * degree,
             mag_start_sigma: 8.0 * degree,
-            mag_disturbed_sigma: 60.0 * degree,
+            mag_disturbed_sigma: 30.0 * degree,
             mag_place_sigma: 20.0 * degree,
             mag_bias_sigma: 0.15 * degree,
             hard_iron: true,
