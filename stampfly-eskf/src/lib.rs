@@ -4,9 +4,11 @@
 //! |---|---|---|---|
 //! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture | 1.5 kB | – |
 //! | [`Complementary`] | the same where memory and time are short | 0.4 kB | aggressive flight |
+//! | [`AttitudeFilter`](attitude::AttitudeFilter) | attitude without position sensors, field bent or not | 1.2 kB | position, velocity |
+//! | [`Mahony`](attitude::Mahony) | the least that levels a multirotor | 20 bytes | unknown gyro bias, heading |
 //!
-//! Both implement [`Estimator`], need no allocation and no other crate of the family than `stampfly-types`, and
-//! give the same bits on every machine.
+//! All but the last implement [`Estimator`]. They need no allocation and no other crate of the family than
+//! `stampfly-types`, and give the same bits on every machine.
 #![no_std]
 #![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
@@ -14,6 +16,7 @@
 extern crate std;
 
 pub mod aid;
+pub mod attitude;
 mod complementary;
 mod config;
 mod eskf;

@@ -174,6 +174,44 @@ fn a_report_is_written_where_asked_for() {
 }
 
 #[test]
+fn every_estimator_can_be_asked_for() {
+    let file = folder("estimators").join("still.csv");
+    std::fs::write(&file, still()).unwrap();
+    for (estimator, sensors) in [("eskf", "gravity"), ("complementary", ""), ("attitude", "")] {
+        let output = stampfly(&[&file, Path::new("--estimator"), Path::new(estimator), Path::new("--json")]);
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let figures = &json["files"][0];
+        assert_eq!(figures["diverged"], false, "{estimator}: {figures}");
+        let looked_at: Vec<_> = figures["rejected"].as_object().unwrap().keys().cloned().collect();
+        assert_eq!(looked_at.join(" "), sensors, "{estimator}: {figures}");
+    }
+}
+
+/// A log in which the flow says two metres a second while the vehicle lies still.
+fn runaway() -> String {
+    let mut text =
+        "timestamp_ms,dt_ms,raw_accel_x,raw_accel_y,raw_accel_z,raw_gyro_x,raw_gyro_y,raw_gyro_z,raw_baro_alt,\
+        raw_tof,raw_flow_squal,raw_flow_dx,raw_flow_dy,dev_pos_x,dev_pos_y,dev_pos_z,dev_vel_x,dev_vel_y,dev_vel_z,\
+        dev_roll_deg,dev_pitch_deg,dev_yaw_deg\n"
+            .to_owned();
+    for n in 0..600 {
+        let counts = if n > 100 { 6 } else { 0 };
+        text += &format!("{},10,0,0.00{},-9.81,0,0,0,0,1.5,100,{counts},0{}\n", n * 10, n % 3, ",0".repeat(9));
+    }
+    text
+}
+
+#[test]
+fn an_attitude_filter_is_not_blamed_for_having_no_position() {
+    let recording = dataset::parse("carried", runaway().as_bytes()).unwrap();
+    let mut config = estimate::suite(recording.kind);
+    config.estimator = estimate::ATTITUDE;
+    let figures = estimate::run(&recording, &config).figures;
+    assert!(!figures.diverged && figures.end_xy_m.is_none(), "{figures:?}");
+    assert_eq!((figures.unused["flow"], figures.unused["tof"]), (1.0, 1.0));
+}
+
+#[test]
 fn a_wrong_option_is_named() {
     let file = folder("option").join("still.csv");
     std::fs::write(&file, still()).unwrap();
@@ -190,17 +228,7 @@ fn a_wrong_option_is_named() {
 
 #[test]
 fn an_estimator_that_runs_away_is_called_lost() {
-    // Flow that says two metres a second while the vehicle lies still.
-    let mut text =
-        "timestamp_ms,dt_ms,raw_accel_x,raw_accel_y,raw_accel_z,raw_gyro_x,raw_gyro_y,raw_gyro_z,raw_baro_alt,\
-        raw_tof,raw_flow_squal,raw_flow_dx,raw_flow_dy,dev_pos_x,dev_pos_y,dev_pos_z,dev_vel_x,dev_vel_y,dev_vel_z,\
-        dev_roll_deg,dev_pitch_deg,dev_yaw_deg\n"
-            .to_owned();
-    for n in 0..600 {
-        let counts = if n > 100 { 6 } else { 0 };
-        text += &format!("{},10,0,0.00{},-9.81,0,0,0,0,1.5,100,{counts},0{}\n", n * 10, n % 3, ",0".repeat(9));
-    }
-    let recording = dataset::parse("runaway", text.as_bytes()).unwrap();
+    let recording = dataset::parse("runaway", runaway().as_bytes()).unwrap();
     assert_eq!(recording.kind, Kind::StampFlyLog);
     let mut config = estimate::suite(recording.kind);
     let kept = estimate::run(&recording, &config).figures;

@@ -1,9 +1,11 @@
 //! Takes an estimator through a recording, sample by sample, in the order a vehicle would have seen them.
 
 use super::start::Start;
+use super::{ATTITUDE, attitude_suite};
 use crate::dataset::Recording;
 use stampfly_board::VehicleConfig;
 use stampfly_drivers::Sample;
+use stampfly_eskf::attitude::AttitudeFilter;
 use stampfly_eskf::{Complementary, Eskf, Estimator, Fusion};
 use stampfly_types::messages::{EstimatorStatus, StateEstimate};
 use stampfly_types::{Micros, Quat, Vec3, frame};
@@ -64,6 +66,8 @@ pub struct Instance {
 pub struct Drive {
     /// One per inertial sample.
     pub instances: Vec<Instance>,
+    /// Does this estimator hold a position? Otherwise its positions are nothing to compare.
+    pub holds_position: bool,
     /// By sensor: `tof`, `flow`, `mag`, `baro`, `velocity`, `gravity`.
     pub tallies: BTreeMap<&'static str, Tally>,
     /// Calls of the estimator a second of wall time.
@@ -91,7 +95,10 @@ fn velocities(recording: &Recording, start: &Start) -> Vec<Sample<Vec3>> {
 /// Runs the estimator that `config` names over a recording.
 #[must_use]
 pub fn drive(recording: &Recording, start: &Start, config: &VehicleConfig) -> Drive {
-    if config.estimator >= 0.5 {
+    if config.estimator >= ATTITUDE {
+        let drive = through(recording, start, AttitudeFilter::new(attitude_suite(recording.kind)));
+        Drive { holds_position: false, ..drive }
+    } else if config.estimator >= 0.5 {
         through(recording, start, Complementary::new(config.complementary))
     } else {
         through(recording, start, Eskf::new(config.eskf))
@@ -145,7 +152,12 @@ fn through(recording: &Recording, start: &Start, mut estimator: impl Estimator) 
     }
     let heading = frame::from_yaw(start.heading);
     instances.iter_mut().for_each(|instance| turn(&mut instance.state, &heading));
-    Drive { instances, tallies, updates_per_s: if wall > 0.0 { updates as f64 / wall } else { 0.0 } }
+    Drive {
+        instances,
+        holds_position: true,
+        tallies,
+        updates_per_s: if wall > 0.0 { updates as f64 / wall } else { 0.0 },
+    }
 }
 
 /// From the estimator's world, which begins at heading zero, into the recording's.

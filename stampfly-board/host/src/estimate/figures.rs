@@ -83,11 +83,8 @@ impl Figures {
         let by_flow = reach(&reckoned);
         let places = drive.instances.iter().any(|now| now.state.valid.contains(Validity::POSITION_XY));
         let travelled = places.then(|| travelled(&drive.instances));
-        let astray = if accuracy.position_max().is_some() {
-            accuracy.position_max()
-        } else {
-            apart(&drive.instances, &reckoned)
-        };
+        let astray =
+            accuracy.position_max().or_else(|| apart(&drive.instances, &reckoned).filter(|_| drive.holds_position));
         let finite = drive.instances.iter().all(|now| is_finite(&now.state));
         let lost = drive.instances.iter().any(|now| now.status.diverged);
         let share = |count: fn(&super::Tally) -> usize| {
@@ -141,7 +138,7 @@ fn accuracy(recording: &Recording, start: &Start, drive: &Drive) -> Accuracy {
             accuracy.attitude(&state.attitude, &attitude);
         }
         // Without velocities a position is a guess that nobody makes.
-        if let (Some(position), Some(velocity)) = (point.position, point.velocity) {
+        if let (Some(position), Some(velocity), true) = (point.position, point.velocity, drive.holds_position) {
             accuracy.position(&(state.position + origin), &position);
             accuracy.velocity(&state.velocity, &velocity);
         }

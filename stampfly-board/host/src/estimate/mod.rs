@@ -5,10 +5,10 @@
 //! | StampFly log | inertial, range, flow, barometer | dead reckoning from the flow |
 //! | StampFly flight capture | inertial, range | – |
 //! | NanoBench | inertial, velocity from motion capture | motion capture, above 0.3 m after three seconds |
-//! | BROAD | inertial, magnetic heading | motion capture, while moving |
+//! | BROAD | inertial, magnetic field: the attitude filter | motion capture, while moving |
 //! | PX4 replay | inertial, barometer | – |
 //!
-//! The same filter with the same code as in flight. Its tuning differs between sensor suites (see [`suite`]), never
+//! The same filter with the same code as in flight; where nothing measures a position, the attitude filter. Its tuning differs between sensor suites (see [`suite`]), never
 //! between files of one. It is never told that the vehicle stands: that would be half the answer.
 //!
 //! Not for replaying a flight of this stack bit by bit: that is [`crate::replay`].
@@ -28,7 +28,11 @@ pub use start::Start;
 use crate::dataset::{Kind, Recording};
 use crate::flight::Flight;
 use stampfly_board::VehicleConfig;
+use stampfly_eskf::attitude::AttitudeConfig;
 use stampfly_types::Vec3;
+
+/// The attitude filter as [`VehicleConfig::estimator`]. No vehicle can be told to use it: it holds no position.
+pub const ATTITUDE: f32 = 2.0;
 
 /// An estimate over one recording, with its figures.
 #[derive(Clone, Debug)]
@@ -47,7 +51,8 @@ pub fn suite(kind: Kind) -> VehicleConfig {
     let mut config = VehicleConfig::default();
     match kind {
         Kind::Broad => {
-            // Far from any motor, in a hand that throws it about: the field may be used, gravity only slowly, and what
+            config.estimator = ATTITUDE;
+            // For the Kalman filter, when it is asked for. Far from any motor, in a hand that throws it about: the field may be used, gravity only slowly, and what
             // looks like a bias of the accelerometer is motion.
             config.eskf.mag_enable = true;
             config.eskf.mag_sigma = 1.0;
@@ -71,6 +76,17 @@ pub fn suite(kind: Kind) -> VehicleConfig {
         Kind::StampFlyFlight | Kind::Px4Replay => {}
     }
     config
+}
+
+/// The attitude filter's tuning for recordings of this kind: its own defaults, but for how late the sensors are.
+#[must_use]
+pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
+    match kind {
+        // Against the cameras' clock, the same within a millisecond in every trial: the gyro's rotation is complete 2.3 ms
+        // after the cameras', and the field fits the earth's best when it is taken for 15 ms old.
+        Kind::Broad => AttitudeConfig { inertial_delay: 0.0023, mag_delay: 0.015, ..AttitudeConfig::default() },
+        _ => AttitudeConfig::default(),
+    }
 }
 
 /// Runs the estimator over a recording.

@@ -4,7 +4,7 @@ use crate::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::{VehicleConfig, parameters};
 use stampfly_host::dataset::Kind;
-use stampfly_host::estimate::suite;
+use stampfly_host::estimate::{ATTITUDE, suite};
 use stampfly_host::mission::Mission;
 use stampfly_host::simulate::FlightConfig;
 use std::fmt::Display;
@@ -148,6 +148,8 @@ pub enum EstimatorChoice {
     Eskf,
     /// Complementary filter.
     Complementary,
+    /// Attitude filter: neither position nor velocity.
+    Attitude,
 }
 
 /// Options of `estimate`.
@@ -156,9 +158,10 @@ pub struct EstimateOptions {
     /// StampFly logs and captures (CSV), NanoBench and BROAD (NPZ), PX4 replays (CSV).
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Which estimator.
-    #[arg(long, value_enum, default_value = "eskf")]
-    pub estimator: EstimatorChoice,
+    /// Which estimator. Without this: the attitude filter where nothing measures a position (BROAD), elsewhere the
+    /// error-state Kalman filter.
+    #[arg(long, value_enum)]
+    pub estimator: Option<EstimatorChoice>,
     /// Change a parameter of the flight stack (`stampfly fly --list` shows them).
     #[arg(long, value_name = "NAME=VALUE")]
     pub param: Vec<String>,
@@ -174,7 +177,12 @@ impl EstimateOptions {
     /// The tuning for one kind of recording, with what the options change.
     pub fn config(&self, kind: Kind) -> Result<VehicleConfig, Failure> {
         let mut config = suite(kind);
-        config.estimator = f32::from(u8::from(self.estimator == EstimatorChoice::Complementary));
+        match self.estimator {
+            Some(EstimatorChoice::Eskf) => config.estimator = 0.0,
+            Some(EstimatorChoice::Complementary) => config.estimator = 1.0,
+            Some(EstimatorChoice::Attitude) => config.estimator = ATTITUDE,
+            None => {}
+        }
         set_parameters(&mut config, &self.param)?;
         Ok(config)
     }

@@ -1,0 +1,195 @@
+//! The gyro's bias, at rest and in motion: a Kalman filter of three states.
+//!
+//! At rest the gyro shows it. In motion gravity does: the attitude drifts with the bias, the filtered specific force
+//! leans over with the attitude, and the rate at which it leans is what the bias does to the two level axes, low-passed.
+//! With R the rotation into the level frame and LP the filter of the specific force:
+//!
+//! > rate of leaning = LP(R·(b − b̂)), so LP(R)·b = rate of leaning + LP(R·b̂)
+//!
+//! Of the vertical axis gravity says nothing. There the bias is drawn, very gently, to where the calibration had it; the
+//! vertical
+//! axis is also what a clean magnetic field keeps turning the heading back by (`drift`).
+//!
+//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.3; the leaning rate is taken from the filter's own
+//! derivative instead of the corrections of single samples, which in `f32` would be mostly rounding.
+
+use super::config::AttitudeConfig;
+use super::low_pass::LowPass;
+use nalgebra::{Matrix3, SVector};
+use stampfly_types::Vec3;
+
+/// Share of the weight of a level axis that the pull on the vertical one has.
+const VERTICAL_WEIGHT: f32 = 1e-4;
+
+/// The heading's drift is believed when it comes from clean fields by more than this share.
+const CLEAN: f32 = 0.8;
+
+/// Estimates the gyro's bias.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GyroBias {
+    value: Vec3,
+    calibrated: Vec3,
+    covariance: Matrix3<f32>,
+    /// Rotation into the level frame in row order, then the level part of the rotated bias.
+    rotated: LowPass<11>,
+    /// Vertical row of that rotation and vertical part of the bias, averaged as the heading correction averages.
+    vertical: Vec3,
+    vertical_bias: f32,
+    /// Share of that average that was corrected by clean fields.
+    clean: f32,
+}
+
+impl GyroBias {
+    /// Starts from a calibration: its bias, and how well it is known, rad/s.
+    pub fn new(config: &AttitudeConfig, calibrated: Vec3, sigma: f32) -> Self {
+        Self {
+            value: calibrated,
+            calibrated,
+            covariance: Matrix3::identity() * (sigma * sigma),
+            rotated: LowPass::new(config.accel_time),
+            vertical: Vec3::zeros(),
+            vertical_bias: 0.0,
+            clean: 0.0,
+        }
+    }
+
+    /// The bias, body, rad/s.
+    pub fn value(&self) -> Vec3 {
+        self.value
+    }
+
+    /// What the start knew, body, rad/s.
+    pub fn calibrated(&self) -> &Vec3 {
+        &self.calibrated
+    }
+
+    /// One standard deviation of the worst axis, rad/s.
+    pub fn sigma(&self) -> f32 {
+        stampfly_types::math::sqrt(self.covariance.diagonal().max())
+    }
+
+    /// One standard deviation along an axis of the body, rad/s.
+    pub fn sigma_along(&self, axis: &Vec3) -> f32 {
+        stampfly_types::math::sqrt(axis.dot(&(self.covariance * axis)))
+    }
+
+    /// Time passes: the bias may have moved. Also keeps what [`motion`](Self::motion) needs, at rest as well.
+    pub fn predict(&mut self, config: &AttitudeConfig, level: &Matrix3<f32>, dt: f32) {
+        let limit = config.initial_bias_sigma * config.initial_bias_sigma;
+        for axis in 0..3 {
+            if let Some(variance) = self.covariance.get_mut((axis, axis)) {
+                // A doubt that calibration left above the limit stays; it does not grow.
+                *variance = (*variance + config.bias_walk * config.bias_walk * dt).min(limit.max(*variance));
+            }
+        }
+        let turned = level * self.value;
+        let rows = level.row_iter().flat_map(|row| [row[0], row[1], row[2]]);
+        let channels = rows.chain([turned.x, turned.y]);
+        self.rotated.step(&SVector::<f32, 11>::from_iterator(channels), dt);
+    }
+
+    /// At rest: this is what the gyro shows.
+    pub fn rest(&mut self, config: &AttitudeConfig, rate: &Vec3, dt: f32) {
+        let noise = noise(config, config.rest_bias_sigma, dt);
+        for (axis, shown) in [Vec3::x(), Vec3::y(), Vec3::z()].iter().zip(rate.iter()) {
+            self.correct(config, axis, *shown, noise);
+        }
+    }
+
+    /// In motion: the filtered specific force leans over at these rates about the level frame's x and y.
+    pub fn motion(&mut self, config: &AttitudeConfig, leaning: [f32; 2], dt: f32) {
+        if !self.rotated.is_settled() {
+            return;
+        }
+        let &[r11, r12, r13, r21, r22, r23, r31, r32, r33, bx, by] = self.rotated.value().as_ref();
+        let noise = noise(config, config.motion_bias_sigma, dt);
+        let [x, y] = leaning;
+        self.correct(config, &Vec3::new(r11, r12, r13), x + bx, noise);
+        self.correct(config, &Vec3::new(r21, r22, r23), y + by, noise);
+        let vertical = Vec3::new(r31, r32, r33);
+        self.correct(config, &vertical, vertical.dot(&self.calibrated), noise / VERTICAL_WEIGHT);
+    }
+
+    /// In motion: a clean field turned the heading by `share` of a disagreement of `off` rad. A heading that keeps
+    /// being turned the same way drifts: to the averaging of the correction this is what leaning is to that of the force.
+    pub fn drift(&mut self, config: &AttitudeConfig, vertical: &Vec3, share: f32, off: f32, dt: f32) {
+        self.vertical += (vertical - self.vertical) * share;
+        self.vertical_bias += (vertical.dot(&self.value) - self.vertical_bias) * share;
+        self.clean += (1.0 - self.clean) * share;
+        if self.clean > CLEAN {
+            let row = self.vertical;
+            let noise = noise(config, config.mag_bias_sigma, dt);
+            self.correct(config, &row, share * off / dt + self.vertical_bias, noise);
+        }
+    }
+
+    /// The heading was not corrected, or by something else than its drift.
+    pub fn interrupt(&mut self, share: f32) {
+        self.clean -= self.clean * share.clamp(0.0, 1.0);
+    }
+
+    /// The scalar measurement `row · bias = measured`.
+    fn correct(&mut self, config: &AttitudeConfig, row: &Vec3, measured: f32, noise: f32) {
+        let spread = self.covariance * row;
+        let gain = spread / (row.dot(&spread) + noise);
+        let limit = config.bias_limit;
+        self.value += gain * (measured - row.dot(&self.value)).clamp(-limit, limit);
+        self.covariance -= gain * spread.transpose();
+        let off = (self.value - self.calibrated).map(|part| part.clamp(-limit, limit));
+        self.value = self.calibrated + off;
+    }
+}
+
+/// Variance of a measurement such that the filter settles at `sigma`, whatever the sampling rate.
+fn noise(config: &AttitudeConfig, sigma: f32, dt: f32) -> f32 {
+    let variance = sigma * sigma;
+    variance * variance / (config.bias_walk * config.bias_walk * dt) + variance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f32 = 0.0025;
+
+    #[test]
+    fn rest_shows_the_bias_and_the_doubt_settles_where_it_is_told() {
+        let config = AttitudeConfig::default();
+        let mut bias = GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma);
+        let truth = Vec3::new(0.01, -0.02, 0.015);
+        for _ in 0..20_000 {
+            bias.predict(&config, &Matrix3::identity(), DT);
+            bias.rest(&config, &truth, DT);
+        }
+        assert!((bias.value() - truth).amax() < 2e-4, "{:?}", bias.value());
+        assert!((bias.sigma() / config.rest_bias_sigma - 1.0).abs() < 0.1, "{}", bias.sigma());
+    }
+
+    #[test]
+    fn no_measurement_takes_it_beyond_its_limit() {
+        let config = AttitudeConfig::default();
+        let calibrated = Vec3::new(0.5, 0.0, 0.0);
+        let mut bias = GyroBias::new(&config, calibrated, config.initial_bias_sigma);
+        for step in 0..4_000u16 {
+            bias.predict(&config, &Matrix3::identity(), DT);
+            bias.motion(&config, [f32::from(step), -1e6], DT);
+        }
+        assert!((bias.value() - calibrated).amax() <= config.bias_limit * 1.001, "{:?}", bias.value());
+    }
+
+    #[test]
+    fn the_doubt_stays_positive_over_hours() {
+        let config = AttitudeConfig::default();
+        let mut bias = GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma);
+        for step in 0..1_000_000u32 {
+            bias.predict(&config, &Matrix3::identity(), DT);
+            if step % 4_000 < 2_000 {
+                bias.rest(&config, &Vec3::zeros(), DT);
+            } else {
+                bias.motion(&config, [0.0; 2], DT);
+            }
+        }
+        assert!(bias.covariance.symmetric_eigenvalues().min() > 0.0, "{}", bias.covariance);
+        assert!((bias.covariance - bias.covariance.transpose()).amax() < 1e-3 * bias.covariance.amax());
+    }
+}

@@ -1,0 +1,142 @@
+//! The attitude filter as an [`Estimator`]: steps from time stamps, and honest about what it does not know.
+//!
+//! It has no position, no velocity and no height, says so in every estimate, and answers the sensors for them with
+//! [`Refusal::NotUsed`]. For a vehicle that must fly on something, when everything else is gone.
+
+use super::filter::AttitudeFilter;
+use crate::estimator::{Estimator, Fusion, Refusal};
+use stampfly_types::messages::{
+    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
+    StateEstimate, TofData, Validity,
+};
+use stampfly_types::{Micros, Vec3, math};
+
+/// Place of the magnetometer in the counters of the status.
+const MAG: usize = 3;
+/// Period of a magnetometer whose first sample this is, s.
+const FIRST_PERIOD: f32 = 0.01;
+/// A field from farther in the future has a wrong stamp.
+const FUTURE: Micros = Micros::from_millis(100);
+/// A sensor took part if it did within this time.
+const RECENT: Micros = Micros::from_secs(1);
+/// A heading that is known worse than this, rad, is not.
+const HEADING_SIGMA: f32 = 0.35;
+
+/// What the trait needs and the filter does not: time, and a record.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Bookkeeping {
+    now: Micros,
+    initialized: bool,
+    calibration: CalibrationResult,
+    command: EstimatorCommand,
+    mag_at: Option<Micros>,
+    mag_fused: Option<Micros>,
+    status: EstimatorStatus,
+}
+
+impl Estimator for AttitudeFilter {
+    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
+        if !calibration.gyro_bias.iter().chain(calibration.specific_force.iter()).all(|v| v.is_finite()) {
+            return;
+        }
+        let command = self.book.command;
+        *self = Self::from_calibration(self.config, calibration);
+        self.book =
+            Bookkeeping { now: at, initialized: true, calibration: *calibration, command, ..Default::default() };
+    }
+
+    /// Only a full reset concerns an attitude: standing still is seen, and there is no position to be set.
+    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
+        let previous = core::mem::replace(&mut self.book.command, *command);
+        if command.full_resets != previous.full_resets && self.book.initialized {
+            let calibration = self.book.calibration;
+            self.initialize(at, &calibration);
+        }
+    }
+
+    fn predict(&mut self, at: Micros, imu: &ImuData) {
+        if self.book.initialized && at > self.book.now {
+            let dt = at.since(self.book.now).seconds();
+            self.book.now = at;
+            self.step(&imu.accel, &imu.gyro, dt);
+        }
+    }
+
+    fn fuse_tof(&mut self, _: Micros, _: &TofData) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    fn fuse_flow(&mut self, _: Micros, _: &FlowData) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    fn fuse_baro(&mut self, _: Micros, _: &BaroData) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion {
+        let book = &self.book;
+        if !book.initialized {
+            return Fusion::Refused(Refusal::NotInitialized);
+        }
+        if book.mag_at.is_some_and(|last| at <= last) || at > book.now + FUTURE {
+            return Fusion::Refused(Refusal::Stale);
+        }
+        // A field that is newer than the last inertial sample is taken for as new.
+        let age = if at < book.now { book.now.since(at).seconds() } else { 0.0 };
+        let dt = book.mag_at.map_or(FIRST_PERIOD, |last| at.since(last).seconds());
+        let fusion = self.field(&mag.field, age, dt);
+        let innovation = self.heading_innovation();
+        let book = &mut self.book;
+        let count = |counters: &mut [u32; 5]| {
+            if let Some(counter) = counters.get_mut(MAG) {
+                *counter = counter.wrapping_add(1);
+            }
+        };
+        match fusion {
+            Fusion::Refused(_) => return fusion,
+            Fusion::Fused { ratio } | Fusion::Gated { ratio } => book.status.mag_ratio = ratio,
+            Fusion::Reset => book.status.resets = book.status.resets.wrapping_add(1),
+        }
+        book.mag_at = Some(at);
+        book.status.mag_innovation = innovation;
+        count(&mut book.status.offered);
+        if fusion.is_fused() {
+            book.mag_fused = Some(at);
+        } else {
+            count(&mut book.status.refused);
+        }
+        fusion
+    }
+
+    fn fuse_velocity(&mut self, _: Micros, _: &Vec3, _: f32) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    fn estimate(&self) -> StateEstimate {
+        let book = &self.book;
+        let recent = book.mag_fused.is_some_and(|at| book.now.since(at) < RECENT);
+        // Without any magnetometer the heading is relative to the start, and as good as the gyro.
+        let heading = book.mag_at.is_none() || self.heading_sigma() < HEADING_SIGMA;
+        StateEstimate {
+            attitude: self.attitude(),
+            angular_rate: self.rate(),
+            specific_force: self.specific_force(),
+            gyro_bias: self.gyro_bias(),
+            valid: Validity::NONE
+                .set(Validity::TILT, book.initialized)
+                .set(Validity::HEADING, book.initialized && heading),
+            sensors: SensorMask::NONE
+                .set(SensorMask::IMU | SensorMask::ACCEL_ATTITUDE, book.initialized)
+                .set(SensorMask::MAG, recent)
+                .set(SensorMask::STATIONARY, self.is_at_rest()),
+            ..StateEstimate::default()
+        }
+    }
+
+    fn status(&self) -> EstimatorStatus {
+        let down = self.attitude_without_field().inverse() * Vec3::z();
+        let seen = -self.specific_force();
+        EstimatorStatus { accel_innovation: math::atan2(seen.cross(&down).norm(), seen.dot(&down)), ..self.book.status }
+    }
+}

@@ -1,0 +1,234 @@
+//! The attitude filter: gyro, accelerometer and magnetometer in, attitude out.
+//!
+//! Use it for a body without a position sensor: a handheld device, a head tracker, a rover's or a glider's attitude, the
+//! fallback of a flying vehicle. Three rotations in a row, each from the sensor that knows it:
+//!
+//! | rotation | from | changes |
+//! |---|---|---|
+//! | body → drifting | gyro without bias | with every sample |
+//! | drifting → level | specific force, low-passed in the drifting frame, where turning does not move it | slowly |
+//! | level → world | magnetic field without hard iron, if it is the earth's | slowly, about the vertical only |
+//!
+//! Tilt therefore owes nothing to the magnetometer but a little gyro bias, and acceleration is averaged over seconds
+//! however fast the body turns. Not for a vehicle whose velocity is measured: the [`Eskf`](crate::Eskf) knows which acceleration is motion.
+//!
+//! Structure after Laidig, Seel, "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic
+//! disturbance rejection", Information Fusion 91, 2023. Different here: sensor delays, hard iron estimated in motion, a
+//! heading gain from what is known of gyro and field, the vertical gyro bias from the field, the way back from another
+//! place, forms that are sound in `f32`, steps of any length.
+
+mod field;
+
+use super::bias::GyroBias;
+use super::config::AttitudeConfig;
+use super::estimator::Bookkeeping;
+use super::hard_iron::HardIron;
+use super::heading::Heading;
+use super::low_pass::LowPass;
+use super::magnetic::Magnetic;
+use super::rest::RestDetector;
+use super::rotation::{from_vector, product, upwards, within};
+use crate::level::attitude_from_specific_force;
+use stampfly_types::messages::CalibrationResult;
+use stampfly_types::{Quat, Vec3, frame};
+
+/// No sensor measures more: rad/s, m/s², µT. Beyond, a sample is an error of transmission.
+const LARGEST_RATE: f32 = 200.0;
+const LARGEST_FORCE: f32 = 2_000.0;
+const LARGEST_FIELD: f32 = 10_000.0;
+/// No sensor's bias is larger, rad/s: such a calibration was made in motion.
+const LARGEST_BIAS: f32 = 0.5;
+/// A longer step is taken for this, s: what happened meanwhile is not known anyway.
+const LONGEST_STEP: f32 = 0.5;
+/// Doubt of a heading that was defined while the body moved, rad.
+const MOVING_START: f32 = 1.0;
+
+/// Attitude from gyro, accelerometer and, if there is one, magnetometer.
+///
+/// ```
+/// use stampfly_eskf::attitude::{AttitudeConfig, AttitudeFilter};
+/// use stampfly_types::{Vec3, frame};
+///
+/// let mut filter = AttitudeFilter::new(AttitudeConfig::default());
+/// // Level and still; the field points north-west and down.
+/// for _ in 0..100 {
+///     filter.step(&Vec3::new(0.0, 0.0, -9.81), &Vec3::zeros(), 0.01);
+///     filter.field(&Vec3::new(15.0, 15.0, 40.0), 0.0, 0.01);
+/// }
+/// let [roll, pitch, yaw] = frame::roll_pitch_yaw(&filter.attitude());
+/// assert!(roll.abs() < 1e-3 && pitch.abs() < 1e-3);
+/// assert!((yaw.to_degrees() + 45.0).abs() < 0.1);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct AttitudeFilter {
+    pub(super) config: AttitudeConfig,
+    /// Body → drifting.
+    strapdown: Quat,
+    /// Drifting → level.
+    level: Quat,
+    /// Specific force in the drifting frame.
+    force: LowPass<3>,
+    bias: GyroBias,
+    rest: RestDetector,
+    magnetic: Magnetic,
+    heading: Heading,
+    hard_iron: HardIron,
+    /// Hard iron that samples are freed of.
+    offset: Vec3,
+    rate: Vec3,
+    accel: Vec3,
+    started: bool,
+    pub(super) book: Bookkeeping,
+}
+
+impl AttitudeFilter {
+    /// A filter that takes its first samples for the start: tilt from the first specific force, heading from the first
+    /// field.
+    #[must_use]
+    pub fn new(config: AttitudeConfig) -> Self {
+        Self {
+            config,
+            strapdown: Quat::identity(),
+            level: Quat::identity(),
+            force: LowPass::new(config.accel_time),
+            bias: GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma),
+            rest: RestDetector::new(&config),
+            magnetic: Magnetic::new(None),
+            heading: Heading::unknown(),
+            hard_iron: HardIron::new(&config),
+            offset: Vec3::zeros(),
+            rate: Vec3::zeros(),
+            accel: Vec3::zeros(),
+            started: false,
+            book: Bookkeeping::default(),
+        }
+    }
+
+    /// A filter that starts from a still-calibration, at heading zero: the calibration's field then points where it
+    /// should. A calibration with numbers that are not finite, or beyond any
+    /// sensor, is ignored.
+    #[must_use]
+    pub fn from_calibration(config: AttitudeConfig, calibration: &CalibrationResult) -> Self {
+        let mut filter = Self::new(config);
+        let CalibrationResult { gyro_bias, specific_force, field, complete, .. } = calibration;
+        let sound = within(gyro_bias, LARGEST_BIAS) && within(specific_force, LARGEST_FORCE);
+        if !sound || specific_force.norm() < 0.1 {
+            return filter;
+        }
+        let [w, x, y, z] = attitude_from_specific_force(specific_force);
+        let level = Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
+        let sigma = if *complete { config.rest_bias_sigma } else { config.initial_bias_sigma };
+        filter.bias = GyroBias::new(&config, *gyro_bias, sigma);
+        if *complete {
+            filter.force = LowPass::settled_at(config.accel_time, *specific_force);
+        }
+        filter.level = level;
+        if within(field, LARGEST_FIELD) && field.norm() > 1.0 {
+            let field = level * field;
+            filter.magnetic = Magnetic::new(complete.then_some(&field));
+            let sigma = if *complete { config.mag_start_sigma } else { MOVING_START };
+            filter.heading = Heading::defined_by(&field, sigma);
+        }
+        filter.started = true;
+        filter
+    }
+
+    /// Takes the specific force, m/s², and rate, rad/s, both body FRD, and the time since the last step, s.
+    ///
+    /// Samples that are not finite or beyond any sensor, and times that are not above zero, change nothing. More than
+    /// half a second is taken for half a second.
+    pub fn step(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) {
+        if dt.is_nan() || dt <= 0.0 || !within(gyro, LARGEST_RATE) || !within(accel, LARGEST_FORCE) {
+            return;
+        }
+        let dt = dt.min(LONGEST_STEP);
+        let config = &self.config;
+        if !self.started {
+            self.started = true;
+            self.level = upwards(accel).unwrap_or_default();
+        }
+        self.rate = gyro - self.bias.value();
+        let half = from_vector(&(self.rate * (0.5 * dt)));
+        let middle = product(&self.strapdown, &half);
+        self.strapdown = product(&middle, &half);
+        // Rate and force are both means over the step, or samples at the same instant: the force belongs to the middle.
+        self.force.step(&(middle * accel), dt);
+        if let Some(correction) = upwards(&(self.level * self.force.value())) {
+            self.level = product(&correction, &self.level);
+        }
+        self.accel = *accel;
+        let turn = (self.level * self.strapdown).to_rotation_matrix();
+        self.bias.predict(config, turn.matrix(), dt);
+        let vertical = turn.matrix().row(2).transpose();
+        self.heading.predict(self.bias.sigma_along(&vertical), self.rate.norm(), dt);
+        self.rest.step(config, accel, gyro, self.bias.calibrated(), dt);
+        if self.rest.is_at_rest(config) {
+            self.bias.rest(config, self.rest.rate(), dt);
+        } else if self.force.is_settled() {
+            let leaning = self.level * self.force.rate();
+            let norm = self.force.value().norm().max(1.0);
+            self.bias.motion(config, [leaning.y / norm, -leaning.x / norm], dt);
+        }
+    }
+
+    /// Body FRD → world NED, at the stamp of the last step. North is magnetic north, or where the calibration was.
+    #[must_use]
+    pub fn attitude(&self) -> Quat {
+        product(&frame::from_yaw(self.heading.value()), &self.attitude_without_field())
+    }
+
+    /// The same without any magnetometer: the heading drifts, the tilt is the same.
+    #[must_use]
+    pub fn attitude_without_field(&self) -> Quat {
+        let ahead = from_vector(&(self.rate * self.config.inertial_delay));
+        product(&product(&self.level, &self.strapdown), &ahead)
+    }
+
+    /// Angular rate without bias, body, rad/s.
+    #[must_use]
+    pub fn rate(&self) -> Vec3 {
+        self.rate
+    }
+
+    /// Gyro bias, body, rad/s.
+    #[must_use]
+    pub fn gyro_bias(&self) -> Vec3 {
+        self.bias.value()
+    }
+
+    /// One standard deviation of the gyro bias, worst axis, rad/s.
+    #[must_use]
+    pub fn gyro_bias_sigma(&self) -> f32 {
+        self.bias.sigma()
+    }
+
+    /// Field of magnetised parts that turn with the sensor, body, µT; zero while it is not told from chance.
+    #[must_use]
+    pub fn hard_iron(&self) -> Vec3 {
+        self.offset
+    }
+
+    /// Is the body at rest?
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.rest.is_at_rest(&self.config)
+    }
+
+    /// One standard deviation of the heading against magnetic north, rad. Above one it is not known.
+    #[must_use]
+    pub fn heading_sigma(&self) -> f32 {
+        self.heading.sigma()
+    }
+
+    /// By how much the last field disagreed with the heading, rad.
+    #[must_use]
+    pub fn heading_innovation(&self) -> f32 {
+        self.heading.innovation()
+    }
+
+    /// The last specific force, body, m/s².
+    #[must_use]
+    pub fn specific_force(&self) -> Vec3 {
+        self.accel
+    }
+}

@@ -1,0 +1,112 @@
+//! What a magnetic field does to the attitude filter.
+//!
+//! First it is freed of the sensor's own magnetised parts, then judged, and then it may turn the heading, as
+//! far as the verdict allows. Nothing here touches the tilt.
+
+use super::super::magnetic::{Magnetic, Verdict};
+use super::super::rotation::{from_vector, product, within};
+use super::{AttitudeFilter, LARGEST_FIELD, LONGEST_STEP, MOVING_START};
+use crate::estimator::{Fusion, Refusal};
+use nalgebra::Matrix3;
+use stampfly_types::Vec3;
+
+/// A magnetometer sample may be this late, s.
+const OLDEST: f32 = 0.1;
+/// Bend of a field that there is no reference for, rad.
+const UNJUDGED: f32 = 0.2;
+/// A new idea of the hard iron is taken into use when it differs by this share of the field.
+const NEW_OFFSET: f32 = 0.05;
+/// Smaller changes are followed within this time, s, and the reference field with them.
+const OFFSET_TIME: f32 = 10.0;
+
+impl AttitudeFilter {
+    /// Takes a magnetic field, body FRD, µT, that was measured `age` seconds before the last step and `dt` seconds
+    /// after the field before it.
+    ///
+    /// Disturbed fields are [`Fusion::Gated`]; a field that has become the new reference is a [`Fusion::Reset`]. Fields
+    /// later than a tenth of a second, not finite, or before the first step, are refused, and so is one without a
+    /// level part.
+    pub fn field(&mut self, field: &Vec3, age: f32, dt: f32) -> Fusion {
+        if !self.started {
+            return Fusion::Refused(Refusal::NotInitialized);
+        }
+        if !field.iter().all(|value| value.is_finite()) {
+            return Fusion::Refused(Refusal::NotFinite);
+        }
+        if !within(field, LARGEST_FIELD) {
+            return Fusion::Refused(Refusal::Range);
+        }
+        if !(0.0..=OLDEST).contains(&age) || dt.is_nan() || dt <= 0.0 {
+            return Fusion::Refused(Refusal::Stale);
+        }
+        let dt = dt.min(LONGEST_STEP);
+        // Where the body was when the field was what this sample says.
+        let late = age + self.config.mag_delay - self.config.inertial_delay;
+        let then = product(&self.strapdown, &from_vector(&(self.rate * -late)));
+        let turn = (self.level * then).to_rotation_matrix();
+        self.remove_hard_iron(turn.matrix(), field, dt);
+        let config = &self.config;
+        let rest = self.rest.is_at_rest(config);
+        let level = turn * (field - self.offset);
+        let vertical = turn.matrix().row(2).transpose();
+        let verdict = self.magnetic.step(config, &level, self.rate.norm(), dt);
+        match verdict {
+            Verdict::Clean { ratio } => {
+                let (share, off) = self.heading.correct(config, &level, config.mag_sigma, rest, dt);
+                self.bias.drift(config, &vertical, share, off, dt);
+                Fusion::Fused { ratio }
+            }
+            Verdict::Disturbed { ratio } => {
+                self.heading.correct(config, &level, config.mag_disturbed_sigma, rest, dt);
+                self.bias.interrupt(dt / config.mag_agree_time);
+                Fusion::Gated { ratio }
+            }
+            Verdict::Unjudged => {
+                // Better than nothing, and nothing is what there is; no more than that while the tilt settles.
+                if !self.force.is_settled() {
+                    self.heading.doubt(MOVING_START);
+                }
+                self.heading.correct(config, &level, UNJUDGED, rest, dt);
+                Fusion::Fused { ratio: 1.0 }
+            }
+            Verdict::Found => {
+                self.heading.doubt(MOVING_START);
+                self.bias.interrupt(1.0);
+                Fusion::Reset
+            }
+            Verdict::Renewed => {
+                self.heading.move_to(config, &level);
+                self.bias.interrupt(1.0);
+                Fusion::Reset
+            }
+            Verdict::Back => {
+                self.heading.come_back();
+                self.bias.interrupt(1.0);
+                Fusion::Reset
+            }
+            Verdict::Vertical => Fusion::Refused(Refusal::Missing),
+        }
+    }
+
+    /// Learns hard iron, and takes a new idea of it into use when it is new enough to matter.
+    fn remove_hard_iron(&mut self, level: &Matrix3<f32>, field: &Vec3, dt: f32) {
+        // A tilt that is still settling would pass for hard iron.
+        if !self.config.hard_iron || !self.force.is_settled() {
+            return;
+        }
+        let turning = self.rate.norm() > self.config.mag_renew_rate;
+        self.hard_iron.step(&self.config, level, field, turning, dt);
+        let offset = self.hard_iron.offset(&self.config);
+        let change = (offset - self.offset).norm();
+        let earth = self.hard_iron.field();
+        if change > NEW_OFFSET * earth.norm() {
+            self.offset = offset;
+            self.magnetic = Magnetic::new(Some(&earth));
+            self.heading.doubt(change / earth.xy().norm().max(1.0));
+            self.heading.come_back();
+            self.bias.interrupt(1.0);
+        } else {
+            self.offset += (offset - self.offset) * (dt / OFFSET_TIME).min(1.0);
+        }
+    }
+}

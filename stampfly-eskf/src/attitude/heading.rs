@@ -1,0 +1,190 @@
+//! Heading by the magnetic field: a Kalman filter of one state, and what a strange field may do to it.
+//!
+//! The gyro's heading drifts as fast as its bias is unknown; a field indoors is bent by some degrees, differently every
+//! second or two. The filter weighs the two by what is known of each, so that a calibrated gyro follows the field over
+//! most of a minute and a new one within seconds. A disturbed field counts very little, and only gets its way when the
+//! gyro has been alone for so long that it knows even less.
+//!
+//! When another field becomes the reference, its direction disagrees with the heading by some angle. How much of
+//! that is the heading's drift and how much is the direction of the new field, is again a matter of the two doubts: the
+//! heading takes its share at once and the rest becomes the declination of the new place. When the
+//! first field is back, the declination is dropped.
+
+use super::config::AttitudeConfig;
+use stampfly_types::{Vec3, math};
+
+/// For how long a bias stays on the same side, s: makes a random walk of it.
+const BIAS_TIME: f32 = 10.0;
+/// Error of the gyro's scale, as a share, and for how long a hand turns one way, s.
+const SCALE_ERROR: f32 = 0.002;
+const TURN_TIME: f32 = 0.5;
+/// For how long a bend stays the same at rest, s.
+const REST_TIME: f32 = 30.0;
+/// More doubt than this, rad², is none: any heading is as likely.
+const NO_IDEA: f32 = 3.0;
+
+/// Heading of the level frame in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Heading {
+    /// Direction of the level part of the reference field in the world, rad.
+    north: f32,
+    /// By how much the reference in use points elsewhere, rad.
+    declination: f32,
+    value: f32,
+    variance: f32,
+    /// The last field's disagreement, rad.
+    off: f32,
+}
+
+impl Heading {
+    /// Nothing is known; north is where the field points.
+    pub fn unknown() -> Self {
+        Self { north: 0.0, declination: 0.0, value: 0.0, variance: NO_IDEA, off: 0.0 }
+    }
+
+    /// The heading is zero by definition, and this is the field then, in the level frame. `sigma`: how far that
+    /// field may be bent, rad.
+    pub fn defined_by(field: &Vec3, sigma: f32) -> Self {
+        Self { north: math::atan2(field.y, field.x), variance: sigma * sigma, ..Self::unknown() }
+    }
+
+    /// Turns the level frame into the world, rad.
+    pub fn value(&self) -> f32 {
+        self.value
+    }
+
+    /// One standard deviation, rad.
+    pub fn sigma(&self) -> f32 {
+        math::sqrt(self.variance)
+    }
+
+    /// By how much the last field disagreed, rad.
+    pub fn innovation(&self) -> f32 {
+        self.off
+    }
+
+    /// Time passes: the gyro is wrong by a bias of this doubt and by its scale at this rate, rad/s.
+    pub fn predict(&mut self, bias_sigma: f32, rate: f32, dt: f32) {
+        let scale = SCALE_ERROR * rate;
+        let walk = bias_sigma * bias_sigma * BIAS_TIME + scale * scale * TURN_TIME;
+        self.variance = (self.variance + walk * dt).min(NO_IDEA);
+    }
+
+    /// The field has been wrong by something of this size, rad.
+    pub fn doubt(&mut self, sigma: f32) {
+        self.variance = (self.variance + sigma * sigma).min(NO_IDEA);
+    }
+
+    /// The first reference is back.
+    pub fn come_back(&mut self) {
+        self.declination = 0.0;
+    }
+
+    /// Another field, in the level frame, is the reference from now on.
+    pub fn move_to(&mut self, config: &AttitudeConfig, field: &Vec3) {
+        self.declination = 0.0;
+        let off = self.disagreement(field);
+        let share = self.share(config);
+        self.value = math::wrap_angle(self.value - share * off);
+        self.declination = (1.0 - share) * off;
+        self.variance *= 1.0 - share;
+    }
+
+    /// Uses a field in the level frame that may be bent by `sigma`, rad. Gives the share of the disagreement, which is
+    /// the second number, rad, that went into the heading.
+    ///
+    /// At rest the bend is the same in every sample: what is known does not become more.
+    pub fn correct(&mut self, config: &AttitudeConfig, field: &Vec3, sigma: f32, rest: bool, dt: f32) -> (f32, f32) {
+        let off = self.disagreement(field);
+        self.off = off;
+        // A field that has turned by more than the heading is in doubt, is bent by that.
+        let sigma = sigma.max(off.abs() * (1.0 - self.share(config)));
+        let time = if rest { REST_TIME } else { config.field_time };
+        let noise = sigma * sigma * (time / dt).max(1.0);
+        let share = self.variance / (self.variance + noise);
+        self.value = math::wrap_angle(self.value - share * off);
+        let least = if rest { self.variance.min(config.mag_start_sigma * config.mag_start_sigma) } else { 0.0 };
+        self.variance = (self.variance * (1.0 - share)).max(least);
+        (share, off)
+    }
+
+    /// Share of the heading in a disagreement with a field that nothing is known of.
+    fn share(&self, config: &AttitudeConfig) -> f32 {
+        self.variance / (self.variance + config.mag_place_sigma * config.mag_place_sigma)
+    }
+
+    /// By how much the field points too far to the east, rad.
+    fn disagreement(&self, field: &Vec3) -> f32 {
+        math::wrap_angle(math::atan2(field.y, field.x) + self.value - self.north - self.declination)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f32 = 0.01;
+    const DEGREE: f32 = math::PI / 180.0;
+
+    /// A field that points so far to the east, in degrees.
+    fn pointing(east: f32) -> Vec3 {
+        Vec3::new(16.0 * math::cos(east * DEGREE), 16.0 * math::sin(east * DEGREE), 42.0)
+    }
+
+    fn settled() -> (AttitudeConfig, Heading) {
+        let config = AttitudeConfig::default();
+        let mut heading = Heading::defined_by(&pointing(0.0), config.mag_start_sigma);
+        for _ in 0..2_000 {
+            heading.predict(config.rest_bias_sigma, 0.5, DT);
+            heading.correct(&config, &pointing(0.0), config.mag_sigma, false, DT);
+        }
+        (config, heading)
+    }
+
+    #[test]
+    fn a_known_gyro_follows_slowly_and_an_unknown_one_fast() {
+        let after = |bias_sigma: f32| {
+            let (config, mut heading) = settled();
+            for _ in 0..500 {
+                heading.predict(bias_sigma, 0.5, DT);
+                heading.correct(&config, &pointing(4.0), config.mag_sigma, false, DT);
+            }
+            -heading.value() / DEGREE
+        };
+        let (known, unknown) = (after(0.03 * DEGREE), after(0.5 * DEGREE));
+        assert!(known < 1.5 && unknown > 2.5 && unknown <= 4.0, "{known}° and {unknown}° of 4°");
+    }
+
+    #[test]
+    fn rest_adds_nothing_to_what_is_known() {
+        let config = AttitudeConfig::default();
+        let mut heading = Heading::defined_by(&pointing(0.0), config.mag_start_sigma);
+        for _ in 0..6_000 {
+            heading.predict(0.0, 0.0, DT);
+            heading.correct(&config, &pointing(0.0), config.mag_sigma, true, DT);
+        }
+        assert!((heading.sigma() / config.mag_start_sigma - 1.0).abs() < 1e-3, "{}", heading.sigma());
+    }
+
+    #[test]
+    fn what_a_new_place_adds_is_forgotten_at_home() {
+        let (config, mut heading) = settled();
+        heading.move_to(&config, &pointing(50.0));
+        assert!(heading.value().abs() < 2.0 * DEGREE, "{}", heading.value());
+        let (_, off) = heading.correct(&config, &pointing(50.0), config.mag_sigma, false, DT);
+        assert!(off.abs() < 1e-3, "{off}");
+        heading.come_back();
+        let (_, off) = heading.correct(&config, &pointing(0.0), config.mag_sigma, false, DT);
+        assert!(off.abs() < 2.0 * DEGREE, "{off}");
+    }
+
+    #[test]
+    fn an_unknown_heading_takes_the_field_for_it() {
+        let config = AttitudeConfig::default();
+        let mut heading = Heading::unknown();
+        for _ in 0..100 {
+            heading.correct(&config, &pointing(-170.0), config.mag_sigma, false, DT);
+        }
+        assert!((heading.value() / DEGREE - 170.0).abs() < 1.0, "{}", heading.value());
+    }
+}

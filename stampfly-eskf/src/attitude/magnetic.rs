@@ -1,0 +1,215 @@
+//! Is the magnetic field the earth's? And if not: which field is it?
+//!
+//! Two things are known of a field without knowing the heading: how strong it is and how far it dips. A sample that differs
+//! from the reference in either is disturbed. A field that differs but stays the same while the body turns, is
+//! another place, and becomes the reference; the first one is remembered, and taken again as soon as it is back.
+//!
+//! What is done about a disturbed field, and about the direction of a new one, is for [`Heading`](super::heading::Heading)
+//! to say. Neither can be told from here: a field that is turned about the vertical and nothing else.
+//!
+//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.5. New: the way back.
+
+use super::config::AttitudeConfig;
+use super::low_pass::LowPass;
+use nalgebra::Vector2;
+use stampfly_types::{Vec3, math};
+
+/// Time constant that takes the noise out of strength and dip, s.
+const SMOOTHING: f32 = 0.05;
+
+/// A field as it is known without a heading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Field {
+    strength: f32,
+    dip: f32,
+}
+
+impl Field {
+    /// Strength and dip of a field in the level frame; `None` where it has no level part.
+    fn of(field: &Vec3) -> Option<Self> {
+        let level = math::sqrt(field.x * field.x + field.y * field.y);
+        (level > 1.0).then(|| Self { strength: field.norm(), dip: math::atan2(field.z, level) })
+    }
+
+    /// How far another field is from this one: at one it is as different as is tolerated.
+    fn distance(&self, config: &AttitudeConfig, other: &Self) -> f32 {
+        let strength = (other.strength - self.strength).abs() / (config.mag_strength_tolerance * self.strength);
+        strength.max((other.dip - self.dip).abs() / config.mag_dip_tolerance)
+    }
+
+    fn follow(&mut self, other: &Self, share: f32) {
+        self.strength += (other.strength - self.strength) * share;
+        self.dip += (other.dip - self.dip) * share;
+    }
+}
+
+/// What a field is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// It is the reference, as far as can be told.
+    Clean {
+        /// Distance from the reference, one at the limit.
+        ratio: f32,
+    },
+    /// It is not.
+    Disturbed {
+        /// Distance from the reference, above one unless it has only just begun to agree again.
+        ratio: f32,
+    },
+    /// There is no reference yet to judge it by.
+    Unjudged,
+    /// It has become the first reference with this sample.
+    Found,
+    /// Another field than before has become the reference with this sample.
+    Renewed,
+    /// The first one is the reference again.
+    Back,
+    /// It has no level part to tell a heading by.
+    Vertical,
+}
+
+/// Watches the field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Magnetic {
+    current: LowPass<2>,
+    reference: Option<Field>,
+    /// The first reference, while another one is in use.
+    home: Option<Field>,
+    candidate: Option<Field>,
+    agrees_for: f32,
+    home_agrees_for: f32,
+    candidate_for: f32,
+}
+
+impl Magnetic {
+    /// Watches for fields like this one in the level frame; without one, waits until a field stays the same.
+    pub fn new(reference: Option<&Vec3>) -> Self {
+        Self {
+            current: LowPass::new(SMOOTHING),
+            reference: reference.and_then(Field::of),
+            home: None,
+            candidate: None,
+            // What it begins with need not prove itself.
+            agrees_for: f32::MAX,
+            home_agrees_for: 0.0,
+            candidate_for: 0.0,
+        }
+    }
+
+    /// Takes a field in the level frame, `dt` seconds after the one before; `rate` is how fast the body turns, rad/s.
+    pub fn step(&mut self, config: &AttitudeConfig, field: &Vec3, rate: f32, dt: f32) -> Verdict {
+        let Some(seen) = Field::of(field) else { return Verdict::Vertical };
+        self.current.step(&Vector2::new(seen.strength, seen.dip), dt);
+        let &[strength, dip] = self.current.value().as_ref();
+        let now = Field { strength, dip };
+        let follow = (dt / config.mag_reference_time).min(1.0);
+
+        let mut ratio = f32::MAX;
+        let mut clean = false;
+        if let Some(reference) = &mut self.reference {
+            ratio = reference.distance(config, &now);
+            self.agrees_for = if ratio < 1.0 { self.agrees_for + dt } else { 0.0 };
+            if self.agrees_for >= config.mag_agree_time {
+                clean = true;
+                reference.follow(&now, follow);
+            }
+        }
+        if let Some(home) = self.home {
+            let distance = home.distance(config, &now);
+            self.home_agrees_for = if distance < ratio.min(1.0) { self.home_agrees_for + dt } else { 0.0 };
+            if self.home_agrees_for >= config.mag_agree_time {
+                (self.reference, self.home) = (Some(home), None);
+                self.agrees_for = self.home_agrees_for;
+                return Verdict::Back;
+            }
+        }
+        match &mut self.candidate {
+            Some(candidate) if candidate.distance(config, &now) < 1.0 => {
+                candidate.follow(&now, follow);
+                if rate >= config.mag_renew_rate {
+                    self.candidate_for += dt;
+                }
+            }
+            candidate => {
+                *candidate = Some(now);
+                self.candidate_for = 0.0;
+            }
+        }
+        let enough = if self.reference.is_none() { config.mag_first_time } else { config.mag_renew_time };
+        if !clean && self.candidate_for >= enough {
+            let before = core::mem::replace(&mut self.reference, self.candidate);
+            self.home = self.home.or(before);
+            (self.agrees_for, self.home_agrees_for) = (config.mag_agree_time, 0.0);
+            return if before.is_some() { Verdict::Renewed } else { Verdict::Found };
+        }
+        match (clean, self.reference) {
+            (true, _) => Verdict::Clean { ratio },
+            (false, Some(_)) => Verdict::Disturbed { ratio },
+            (false, None) => Verdict::Unjudged,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EARTH: Vec3 = Vec3::new(16.0, 0.0, 42.0);
+    const DT: f32 = 0.01;
+
+    /// Verdicts over so many seconds of one field, the body turning at `rate`: how many were clean, and the others' kinds.
+    fn seconds(watch: &mut Magnetic, time: f32, field: Vec3, rate: f32) -> (u32, [u32; 4]) {
+        let config = AttitudeConfig::default();
+        let (mut clean, mut others) = (0, [0; 4]);
+        for _ in 0..(time / DT) as u32 {
+            match watch.step(&config, &field, rate, DT) {
+                Verdict::Clean { .. } => clean += 1,
+                Verdict::Disturbed { .. } => others[0] += 1,
+                Verdict::Renewed | Verdict::Found => others[1] += 1,
+                Verdict::Back => others[2] += 1,
+                Verdict::Unjudged | Verdict::Vertical => others[3] += 1,
+            }
+        }
+        (clean, others)
+    }
+
+    #[test]
+    fn a_turning_body_finds_its_first_reference_and_a_still_one_waits() {
+        let mut watch = Magnetic::new(None);
+        assert_eq!(seconds(&mut watch, 30.0, EARTH, 0.0), (0, [0, 0, 0, 3_000]));
+        let (clean, others) = seconds(&mut watch, 10.0, EARTH, 1.0);
+        assert!(clean > 400 && others[1] == 1, "{clean} {others:?}");
+    }
+
+    #[test]
+    fn stronger_and_steeper_fields_are_disturbed_and_turned_ones_are_not() {
+        let mut watch = Magnetic::new(Some(&EARTH));
+        assert_eq!(seconds(&mut watch, 2.0, EARTH, 1.0), (200, [0; 4]));
+        let (clean, others) = seconds(&mut watch, 5.0, EARTH * 1.2, 1.0);
+        assert!(clean < 20 && others[0] > 480, "{clean} {others:?}");
+        let (clean, _) = seconds(&mut watch, 5.0, Vec3::new(0.0, 16.0, 42.0), 1.0);
+        assert!(clean > 430, "{clean}: no one can tell");
+        let (clean, _) = seconds(&mut watch, 5.0, Vec3::new(4.0, 0.0, 44.8), 1.0);
+        assert!(clean < 20, "{clean}");
+    }
+
+    #[test]
+    fn another_place_is_learned_in_motion_only_and_left_again() {
+        let config = AttitudeConfig::default();
+        let mut watch = Magnetic::new(Some(&EARTH));
+        let elsewhere = EARTH * 1.3;
+        let (_, others) = seconds(&mut watch, 60.0, elsewhere, 0.0);
+        assert_eq!(others[1], 0, "beside a magnet on the table");
+        let (clean, others) = seconds(&mut watch, 2.0 * config.mag_renew_time, elsewhere, 1.0);
+        assert!(clean > 1_000 && others[1] == 1, "{clean} {others:?}");
+        let (clean, others) = seconds(&mut watch, 2.0, EARTH, 1.0);
+        assert!(clean > 100 && others[2] == 1, "{clean} {others:?}");
+    }
+
+    #[test]
+    fn a_field_without_a_level_part_has_no_heading() {
+        let mut watch = Magnetic::new(Some(&EARTH));
+        let verdict = watch.step(&AttitudeConfig::default(), &Vec3::new(0.0, 0.5, 50.0), 0.0, DT);
+        assert_eq!(verdict, Verdict::Vertical);
+    }
+}

@@ -1,0 +1,79 @@
+//! Mahony's filter for gyro and accelerometer, in the form small flight controllers have always flown.
+//!
+//! Gravity as the accelerometer sees it and as the attitude predicts it differ by a rotation; a share of that rotation is
+//! added to the gyro's rate. One gain, four numbers of state, thirty multiplications. Use it to level a multirotor that
+//! has little else to do; it knows no gyro bias (a bias of b leaves a tilt of b/gain), takes every acceleration for gravity,
+//! and its heading is the integral of the gyro.
+//!
+//! Mahony, Hamel, Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE TAC 53(5), 2008,
+//! without the integral term; integrated by one Euler step and normalised, as T. Nakagawa's STM32 flight controller does
+//! (2021). His page prints gravity's first two components with the signs of the inverse rotation, which would settle
+//! upside down; here they are right.
+
+use super::rotation::within;
+use stampfly_types::{Quat, Vec3, math};
+
+/// The filter: an attitude and a gain.
+///
+/// ```
+/// use stampfly_eskf::attitude::Mahony;
+/// use stampfly_types::{Vec3, frame};
+///
+/// let mut filter = Mahony::new(0.5);
+/// // Held still, rolled by 30°.
+/// let force = Vec3::new(0.0, -0.5, -0.866_025) * 9.81;
+/// for _ in 0..400 * 20 {
+///     filter.step(&force, &Vec3::zeros(), 0.0025);
+/// }
+/// assert!((frame::roll_pitch_yaw(&filter.attitude())[0].to_degrees() - 30.0).abs() < 0.1);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mahony {
+    gain: f32,
+    attitude: Quat,
+}
+
+impl Mahony {
+    /// Level, heading zero. `gain` in 1/s: rate of correction for a tilt error of a radian. 0.5 is usual.
+    #[must_use]
+    pub fn new(gain: f32) -> Self {
+        Self { gain, attitude: Quat::identity() }
+    }
+
+    /// Body FRD → world NED; heading relative to where the filter started.
+    #[must_use]
+    pub fn attitude(&self) -> Quat {
+        self.attitude
+    }
+
+    /// Takes the specific force (body FRD, any unit), the rate (body FRD, rad/s) and the time since the last step, s.
+    ///
+    /// A force of zero, or one that is not finite, corrects nothing. A rate that is not finite, or a time that is not
+    /// above zero, changes nothing. More than half a second is taken for half a second.
+    pub fn step(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) {
+        // Rates beyond any sensor would overflow the quaternion.
+        if dt.is_nan() || dt <= 0.0 || !within(gyro, 1e6) {
+            return;
+        }
+        let dt = dt.min(0.5);
+        let [x, y, z, w] = *self.attitude.coords.as_ref();
+        let mut rate = *gyro;
+        let norm = accel.norm();
+        if norm.is_finite() && norm > 0.0 {
+            let down = Vec3::new(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z);
+            rate += (-accel / norm).cross(&down) * self.gain;
+        }
+        let change = [
+            -x * rate.x - y * rate.y - z * rate.z,
+            w * rate.x - z * rate.y + y * rate.z,
+            z * rate.x + w * rate.y - x * rate.z,
+            -y * rate.x + x * rate.y + w * rate.z,
+        ]
+        .map(|part| 0.5 * dt * part);
+        let [w, x, y, z] = [w + change[0], x + change[1], y + change[2], z + change[3]];
+        let norm = math::sqrt(w * w + x * x + y * y + z * z);
+        if norm.is_finite() && norm > 0.0 {
+            self.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z) / norm);
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! Attitude alone: filters for bodies without a position sensor.
+//!
+//! | filter | use it for | not for |
+//! |---|---|---|
+//! | [`AttitudeFilter`] | anything with gyro and accelerometer, magnetometer or not; unknown gyro bias; bent fields | – |
+//! | [`Mahony`] | the smallest thing that levels a quadcopter | unknown gyro bias, long accelerations |
+//!
+//! Both are plain structs that know no clock: time enters as the length of a step.
+
+mod bias;
+mod config;
+mod estimator;
+mod filter;
+mod hard_iron;
+mod heading;
+mod low_pass;
+mod magnetic;
+mod mahony;
+mod rest;
+mod rotation;
+
+pub use config::AttitudeConfig;
+pub use filter::AttitudeFilter;
+pub use mahony::Mahony;

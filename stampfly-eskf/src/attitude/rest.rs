@@ -1,0 +1,77 @@
+//! Is the body at rest? Then the gyro shows its bias.
+//!
+//! Gyro and accelerometer stay close to their own low-passed selves for a while, and the gyro's mean is small enough to be
+//! a bias. A turn that is slower than the largest bias, and perfectly smooth, is taken for rest: no inertial sensor can
+//! tell them apart. A vehicle whose motors run is never at rest for this detector.
+//!
+//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.4.
+
+use super::config::AttitudeConfig;
+use super::low_pass::LowPass;
+use stampfly_types::Vec3;
+
+/// Watches for rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RestDetector {
+    gyro: LowPass<3>,
+    accel: LowPass<3>,
+    quiet_for: f32,
+}
+
+impl RestDetector {
+    pub fn new(config: &AttitudeConfig) -> Self {
+        let low_pass = LowPass::new(config.rest_filter_time);
+        Self { gyro: low_pass, accel: low_pass, quiet_for: 0.0 }
+    }
+
+    /// Takes an inertial sample; `calibrated` is the gyro bias of the start.
+    pub fn step(&mut self, config: &AttitudeConfig, accel: &Vec3, gyro: &Vec3, calibrated: &Vec3, dt: f32) {
+        self.gyro.step(gyro, dt);
+        self.accel.step(accel, dt);
+        let quiet = (gyro - self.gyro.value()).norm() < config.rest_rate
+            && (accel - self.accel.value()).norm() < config.rest_force
+            && (self.gyro.value() - calibrated).amax() < config.bias_limit;
+        self.quiet_for = if quiet { (self.quiet_for + dt).min(config.rest_time) } else { 0.0 };
+    }
+
+    /// Has it been quiet for long enough?
+    pub fn is_at_rest(&self, config: &AttitudeConfig) -> bool {
+        self.quiet_for >= config.rest_time
+    }
+
+    /// Mean rate of the last moment, rad/s.
+    pub fn rate(&self) -> &Vec3 {
+        self.gyro.value()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::GRAVITY;
+
+    /// Time until rest is seen, s, if it is within five seconds.
+    fn seen_after(rate: impl Fn(u16) -> f32, force: impl Fn(u16) -> f32) -> Option<f32> {
+        let config = AttitudeConfig::default();
+        let mut detector = RestDetector::new(&config);
+        (0..2_000u16).find_map(|step| {
+            let accel = Vec3::new(force(step), 0.0, -GRAVITY);
+            detector.step(&config, &accel, &Vec3::new(0.0, rate(step), 0.0), &Vec3::zeros(), 0.0025);
+            detector.is_at_rest(&config).then(|| f32::from(step) * 0.0025)
+        })
+    }
+
+    fn noise(step: u16) -> f32 {
+        f32::from(step * 7 % 13) / 6.0 - 1.0
+    }
+
+    #[test]
+    fn rest_is_seen_in_time_and_motion_is_not_rest() {
+        let time = AttitudeConfig::default().rest_time;
+        let seen = seen_after(|step| 0.01 + 0.005 * noise(step), |step| 0.1 * noise(step)).unwrap();
+        assert!(seen >= time - 0.01 && seen < time + 0.6, "{seen} s");
+        assert!(seen_after(|step| 0.2 * noise(step / 40), |_| 0.0).is_none(), "a trembling hand");
+        assert!(seen_after(|_| 0.0, |step| 1.5 * noise(step)).is_none(), "a running motor");
+        assert!(seen_after(|_| 0.2, |_| 0.0).is_none(), "a steady turn");
+    }
+}
