@@ -18,7 +18,8 @@ use stampfly_board::vehicle::assemble;
 use stampfly_board::{FlightLoop, Pending, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::{
-    Barometer, Button, Imu, Indicator, Magnetometer, MotionCapture, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
+    Barometer, Button, Imu, Indicator, Magnetometer, MotionCapture, MotorOutputs, OpticalFlow, PowerMonitor,
+    RangeFinder, Sample,
 };
 use stampfly_sim::sensors::{MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
