@@ -5,6 +5,9 @@
 //! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture | 1.5 kB | – |
 //! | [`Complementary`] | the same where memory and time are short | 0.4 kB | aggressive flight |
 //!
+//! [`calibration`] finds what the sensors do wrong before they are used: bias, scale, hard and soft iron, trim, drift
+//! with temperature.
+//!
 //! Both implement [`Estimator`], need no allocation and no other crate of the family than `stampfly-types`, and
 //! give the same bits on every machine.
 #![no_std]
@@ -14,6 +17,7 @@
 extern crate std;
 
 pub mod aid;
+pub mod calibration;
 mod complementary;
 mod config;
 mod eskf;

@@ -1,0 +1,354 @@
+//! Magnetometer hard and soft iron: the ellipsoid through samples of all directions.
+//!
+//! Turned every way in a constant field, an ideal magnetometer draws a sphere about zero. Magnets on board shift it (hard
+//! iron), steel and unequal gains stretch it (soft iron). Fitting the ellipsoid gives both back.
+//!
+//! Use it outdoors or far from steel, once a vehicle and place. Not while motors run: their field follows their
+//! current. Not for the orientation of the sensor, which lengths alone do not show; the correction found is the symmetric one.
+//!
+//! Method: the quadric with trace(A) = 3, linear in nine unknowns, by a triangular (QR) factorisation that takes one
+//! sample after the other by Givens rotations (Golub, Van Loan, "Matrix Computations", sections 5.1.8 and 6.5). The normal
+//! equations would square the condition number, for which `f32` has no room; the factor also shows the residual without a
+//! difference of large numbers. Coordinates are counted from the first sample, so hard iron of any size costs no digits.
+
+use nalgebra::{Matrix3, SymmetricEigen};
+use stampfly_types::{Vec3, math};
+
+/// What is accepted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EllipsoidConfig {
+    /// A sample nearer than this to the last one taken is left out, µT: waiting must not outweigh turning.
+    pub spacing: f32,
+    /// Samples needed.
+    pub samples_min: u32,
+    /// Directions needed, as a share of the 26 looked at.
+    pub coverage_min: f32,
+    /// Field strengths believed, µT. That of the earth is 22 to 67 µT, and gains differ.
+    pub strength_range: [f32; 2],
+    /// Longest axis over shortest: more is a broken sensor. Samples as flat as that are refused as well.
+    pub stretch_max: f32,
+    /// Largest root mean square of the corrected strength's error, as a share of the strength.
+    pub residual_max: f32,
+}
+
+impl Default for EllipsoidConfig {
+    fn default() -> Self {
+        Self {
+            spacing: 2.0,
+            samples_min: 100,
+            coverage_min: 0.75,
+            strength_range: [15.0, 90.0],
+            stretch_max: 1.5,
+            residual_max: 0.1,
+        }
+    }
+}
+
+/// Why a sample was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MagRefusal {
+    /// A number in it is not finite.
+    NotFinite,
+    /// Too near to the last one taken to say anything new.
+    TooNear,
+    /// So far from the first one that they cannot lie on one ellipsoid.
+    TooFar,
+}
+
+/// Why there is no result.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum EllipsoidFailure {
+    /// Fewer samples than needed.
+    TooFew {
+        /// Samples taken.
+        samples: u32,
+    },
+    /// The samples are much wider one way than another: in a plane, on a line, on a cap.
+    Flat {
+        /// Least width over largest.
+        flatness: f32,
+    },
+    /// What fits best is no ellipsoid, or nothing fits best.
+    NotPositive,
+    /// The field is too weak or too strong.
+    Strength {
+        /// Mean radius, µT.
+        strength: f32,
+    },
+    /// The axes are too different.
+    Stretched {
+        /// Longest over shortest.
+        stretch: f32,
+    },
+    /// Too few directions have been seen.
+    Coverage {
+        /// Share of the 26 directions.
+        coverage: f32,
+    },
+    /// The samples do not lie on the ellipsoid: the field changed meanwhile.
+    Residual {
+        /// Root mean square, as a share of the strength.
+        residual: f32,
+    },
+}
+
+/// How good a result is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EllipsoidQuality {
+    /// Root mean square of the corrected strength's error, µT.
+    pub residual: f32,
+    /// Share of 26 directions, evenly around, that a sample came within 30° of.
+    pub coverage: f32,
+    /// Longest axis over shortest: soft iron. One is a sphere.
+    pub stretch: f32,
+    /// Samples taken.
+    pub samples: u32,
+}
+
+/// Corrects a magnetometer: matrix · (measured − offset).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MagCorrection {
+    /// Hard iron, body FRD, µT.
+    pub offset: Vec3,
+    /// Inverse of the soft iron, symmetric; its determinant is one.
+    pub matrix: Matrix3<f32>,
+    /// Strength of the corrected field, µT.
+    pub strength: f32,
+}
+
+impl MagCorrection {
+    /// The field behind a measurement, body FRD, µT.
+    #[inline]
+    #[must_use]
+    pub fn correct(&self, measured: Vec3) -> Vec3 {
+        self.matrix * (measured - self.offset)
+    }
+}
+
+/// Unknowns, and the right-hand side behind them.
+const UNKNOWNS: usize = 9;
+const WIDTH: usize = UNKNOWNS + 1;
+/// Coordinates are counted in this, µT, so that their squares are near one.
+const UNIT: f32 = 50.0;
+/// A pivot below this share of its column means that the column depends on the ones before it.
+const DEPENDENT: f32 = 1e-4;
+/// Cosine of 30°: samples that near to both poles are as wide as this share of the diameter.
+const NEAR: f32 = 0.866;
+/// Three faces, six edges and four corners of a cube: with their opposites, 26 directions.
+const DIRECTIONS: [[f32; 3]; 13] = [
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 0.0, -1.0],
+    [0.0, 1.0, 1.0],
+    [0.0, 1.0, -1.0],
+    [1.0, 1.0, 1.0],
+    [1.0, 1.0, -1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, -1.0, -1.0],
+];
+
+/// Fits the ellipsoid, sample by sample.
+///
+/// ```
+/// use stampfly_eskf::calibration::EllipsoidFit;
+/// use stampfly_types::{Vec3, math};
+/// let mut fit = EllipsoidFit::default();
+/// for k in 0..400 {
+///     // A spiral over the sphere, 48 µT, shifted and stretched.
+///     let z = 1.0 - k as f32 / 200.0;
+///     let (sin, cos) = math::sin_cos(k as f32 * 0.5);
+///     let across = math::sqrt(1.0 - z * z);
+///     let field = Vec3::new(across * cos, across * sin, z) * 48.0;
+///     let _ = fit.add(&(field.component_mul(&Vec3::new(1.1, 1.0, 1.0 / 1.1)) + Vec3::new(120.0, -30.0, 15.0)));
+/// }
+/// let (correction, quality) = fit.solve().unwrap();
+/// assert!((correction.offset - Vec3::new(120.0, -30.0, 15.0)).amax() < 0.01);
+/// assert!((correction.strength - 48.0).abs() < 0.01 && quality.coverage == 1.0 && quality.residual < 0.01);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EllipsoidFit {
+    config: EllipsoidConfig,
+    /// The first sample, and the last one taken, µT.
+    origin: Vec3,
+    last: Vec3,
+    /// The triangular factor; the right-hand side in the last column, the norm of the residual in the last place.
+    triangle: [[f32; WIDTH]; WIDTH],
+    /// Least and most along each direction, from the first sample.
+    extent: [[f32; 2]; 13],
+    samples: u32,
+}
+
+impl Default for EllipsoidFit {
+    fn default() -> Self {
+        Self::new(EllipsoidConfig::default())
+    }
+}
+
+impl EllipsoidFit {
+    /// No sample yet.
+    #[must_use]
+    pub fn new(config: EllipsoidConfig) -> Self {
+        Self {
+            config,
+            origin: Vec3::zeros(),
+            last: Vec3::zeros(),
+            triangle: [[0.0; WIDTH]; WIDTH],
+            extent: [[0.0; 2]; 13],
+            samples: 0,
+        }
+    }
+
+    /// Samples taken so far.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Takes a field, body FRD, µT.
+    ///
+    /// # Errors
+    /// Why it was left out.
+    pub fn add(&mut self, field: &Vec3) -> Result<(), MagRefusal> {
+        if !field.iter().all(|v| v.is_finite()) {
+            return Err(MagRefusal::NotFinite);
+        }
+        if self.samples == 0 {
+            self.origin = *field;
+        } else if (field - self.last).norm() < self.config.spacing {
+            return Err(MagRefusal::TooNear);
+        }
+        let from_origin = field - self.origin;
+        let [_, strongest] = self.config.strength_range;
+        if from_origin.amax() > 2.0 * strongest * self.config.stretch_max {
+            // A first sample that no other agrees with was the wrong one.
+            if self.samples < 5 {
+                *self = Self::new(self.config);
+            }
+            return Err(MagRefusal::TooFar);
+        }
+        self.last = *field;
+        self.samples = self.samples.saturating_add(1);
+        let at = from_origin / UNIT;
+        for ([low, high], direction) in self.extent.iter_mut().zip(DIRECTIONS) {
+            let along = at.dot(&Vec3::from(direction));
+            (*low, *high) = (low.min(along), high.max(along));
+        }
+        let (x, y, z) = (at.x, at.y, at.z);
+        let (xx, yy, zz) = (x * x, y * y, z * z);
+        let (p, q) = (xx + yy - 2.0 * zz, xx + zz - 2.0 * yy);
+        let (xy, xz, yz) = (2.0 * x * y, 2.0 * x * z, 2.0 * y * z);
+        self.rotate_in([p, q, xy, xz, yz, 2.0 * x, 2.0 * y, 2.0 * z, 1.0, xx + yy + zz]);
+        Ok(())
+    }
+
+    /// Adds an equation to the triangular factor.
+    fn rotate_in(&mut self, mut equation: [f32; WIDTH]) {
+        for (i, row) in self.triangle.iter_mut().enumerate() {
+            let (pivot, value) = (row[i], equation[i]);
+            let length = math::sqrt(pivot * pivot + value * value);
+            if length > 0.0 {
+                let (cos, sin) = (pivot / length, value / length);
+                for (kept, new) in row.iter_mut().zip(&mut equation).skip(i) {
+                    (*kept, *new) = (cos * *kept + sin * *new, cos * *new - sin * *kept);
+                }
+            }
+        }
+    }
+
+    /// The nine unknowns, by back substitution.
+    fn unknowns(&self) -> Option<[f32; UNKNOWNS]> {
+        let mut unknowns = [0.0; UNKNOWNS];
+        for (i, row) in self.triangle.iter().enumerate().take(UNKNOWNS).rev() {
+            let column: f32 = self.triangle.iter().map(|row| row[i] * row[i]).sum();
+            if row[i].abs() <= DEPENDENT * math::sqrt(column) {
+                return None;
+            }
+            let known: f32 = row.iter().zip(&unknowns).skip(i + 1).map(|(factor, unknown)| factor * unknown).sum();
+            unknowns[i] = (row[UNKNOWNS] - known) / row[i];
+        }
+        Some(unknowns)
+    }
+
+    /// Offset, matrix and strength, and how well they fit.
+    ///
+    /// # Errors
+    /// Why there are none.
+    pub fn solve(&self) -> Result<(MagCorrection, EllipsoidQuality), EllipsoidFailure> {
+        let config = &self.config;
+        let samples = self.samples;
+        if samples < config.samples_min.max(UNKNOWNS as u32 + 1) {
+            return Err(EllipsoidFailure::TooFew { samples });
+        }
+        // A cap with noise is fitted well by an ellipsoid as flat as the cap, so the fit cannot be the judge of this.
+        let flatness = self.flatness();
+        if flatness.is_nan() || flatness * config.stretch_max < NEAR {
+            return Err(EllipsoidFailure::Flat { flatness });
+        }
+        let [p, q, xy, xz, yz, bx, by, bz, constant] = self.unknowns().ok_or(EllipsoidFailure::NotPositive)?;
+        // xᵀ·A·x − 2·bᵀ·x = constant, which is (x − c)ᵀ·A·(x − c) = square with A·c = b.
+        let shape = Matrix3::new(1.0 - p - q, -xy, -xz, -xy, 1.0 - p + 2.0 * q, -yz, -xz, -yz, 1.0 + 2.0 * p - q);
+        let b = Vec3::new(bx, by, bz);
+        let factor = shape.cholesky().ok_or(EllipsoidFailure::NotPositive)?;
+        let (center, inverse) = (factor.solve(&b), factor.inverse());
+        let square = constant + b.dot(&center);
+        let eigen = SymmetricEigen::try_new(shape, 1e-6, 50).ok_or(EllipsoidFailure::NotPositive)?;
+        let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
+        if !(least > 0.0 && square > 0.0 && most.is_finite() && square.is_finite()) {
+            return Err(EllipsoidFailure::NotPositive);
+        }
+        // Radius of the sphere of the same volume.
+        let gain = math::cbrt(math::sqrt(eigen.eigenvalues.product()));
+        let strength = math::sqrt(square) / gain * UNIT;
+        let stretch = math::sqrt(most / least);
+        let coverage = self.coverage(&center, &inverse, square);
+        // (x − c)ᵀ·A·(x − c) is the square of the corrected strength, so half its relative error is that of the strength.
+        let [.., [.., norm]] = self.triangle;
+        let residual = 0.5 * norm.abs() / square / math::sqrt(samples as f32 - UNKNOWNS as f32);
+        let [weakest, strongest] = config.strength_range;
+        if stretch > config.stretch_max {
+            return Err(EllipsoidFailure::Stretched { stretch });
+        }
+        if !(weakest..=strongest).contains(&strength) {
+            return Err(EllipsoidFailure::Strength { strength });
+        }
+        if coverage < config.coverage_min {
+            return Err(EllipsoidFailure::Coverage { coverage });
+        }
+        if residual.is_nan() || residual > config.residual_max {
+            return Err(EllipsoidFailure::Residual { residual });
+        }
+        let roots = Matrix3::from_diagonal(&eigen.eigenvalues.map(|value| math::sqrt(value) / gain));
+        let matrix = eigen.eigenvectors * roots * eigen.eigenvectors.transpose();
+        let correction = MagCorrection { offset: self.origin + center * UNIT, matrix, strength };
+        Ok((correction, EllipsoidQuality { residual: residual * strength, coverage, stretch, samples }))
+    }
+
+    /// Least width of the samples over the largest.
+    fn flatness(&self) -> f32 {
+        let widths = self.extent.iter().zip(DIRECTIONS).map(|([low, high], d)| (high - low) / Vec3::from(d).norm());
+        let (least, most) = widths.fold((f32::INFINITY, 0.0f32), |(least, most), w| (least.min(w), most.max(w)));
+        least / most
+    }
+
+    /// Share of directions in which the samples reach the ellipsoid, or nearly so.
+    fn coverage(&self, center: &Vec3, inverse: &Matrix3<f32>, square: f32) -> f32 {
+        let reached: usize = self
+            .extent
+            .iter()
+            .zip(DIRECTIONS)
+            .map(|([low, high], direction)| {
+                let direction = Vec3::from(direction);
+                let middle = center.dot(&direction);
+                let near = NEAR * math::sqrt(square * direction.dot(&(inverse * direction)));
+                usize::from(high - middle >= near) + usize::from(middle - low >= near)
+            })
+            .sum();
+        reached as f32 / (2 * DIRECTIONS.len()) as f32
+    }
+}
