@@ -6,11 +6,11 @@
 //! Use it outdoors or far from steel, once a vehicle and place. Not while motors run: their field follows their
 //! current. Not for the orientation of the sensor, which lengths alone do not show; the correction found is the symmetric one.
 //!
-//! Method: the quadric with trace(A) = 3, linear in nine unknowns, by a triangular (QR) factorisation that takes one
-//! sample after the other by Givens rotations (Golub, Van Loan, "Matrix Computations", sections 5.1.8 and 6.5). The normal
-//! equations would square the condition number, for which `f32` has no room; the factor also shows the residual without a
-//! difference of large numbers. Coordinates are counted from the first sample, so hard iron of any size costs no digits.
+//! Method: the quadric with trace(A) = 3, linear in nine unknowns (Q. Li, J. G. Griffiths, "Least squares ellipsoid specific
+//! fitting", GMP 2004, for quadrics in general), solved by a triangular factor that takes one sample after the other.
+//! Coordinates are counted from the first sample, so hard iron of any size costs no digits.
 
+use super::triangle::{Triangle, UNKNOWNS};
 use nalgebra::{Matrix3, SymmetricEigen};
 use stampfly_types::{Vec3, math};
 
@@ -127,13 +127,8 @@ impl MagCorrection {
     }
 }
 
-/// Unknowns, and the right-hand side behind them.
-const UNKNOWNS: usize = 9;
-const WIDTH: usize = UNKNOWNS + 1;
 /// Coordinates are counted in this, µT, so that their squares are near one.
 const UNIT: f32 = 50.0;
-/// A pivot below this share of its column means that the column depends on the ones before it.
-const DEPENDENT: f32 = 1e-4;
 /// Cosine of 30°: samples that near to both poles are as wide as this share of the diameter.
 const NEAR: f32 = 0.866;
 /// Three faces, six edges and four corners of a cube: with their opposites, 26 directions.
@@ -177,8 +172,7 @@ pub struct EllipsoidFit {
     /// The first sample, and the last one taken, µT.
     origin: Vec3,
     last: Vec3,
-    /// The triangular factor; the right-hand side in the last column, the norm of the residual in the last place.
-    triangle: [[f32; WIDTH]; WIDTH],
+    quadric: Triangle,
     /// Least and most along each direction, from the first sample.
     extent: [[f32; 2]; 13],
     samples: u32,
@@ -198,7 +192,7 @@ impl EllipsoidFit {
             config,
             origin: Vec3::zeros(),
             last: Vec3::zeros(),
-            triangle: [[0.0; WIDTH]; WIDTH],
+            quadric: Triangle::default(),
             extent: [[0.0; 2]; 13],
             samples: 0,
         }
@@ -243,36 +237,8 @@ impl EllipsoidFit {
         let (xx, yy, zz) = (x * x, y * y, z * z);
         let (p, q) = (xx + yy - 2.0 * zz, xx + zz - 2.0 * yy);
         let (xy, xz, yz) = (2.0 * x * y, 2.0 * x * z, 2.0 * y * z);
-        self.rotate_in([p, q, xy, xz, yz, 2.0 * x, 2.0 * y, 2.0 * z, 1.0, xx + yy + zz]);
+        self.quadric.add([p, q, xy, xz, yz, 2.0 * x, 2.0 * y, 2.0 * z, 1.0, xx + yy + zz]);
         Ok(())
-    }
-
-    /// Adds an equation to the triangular factor.
-    fn rotate_in(&mut self, mut equation: [f32; WIDTH]) {
-        for (i, row) in self.triangle.iter_mut().enumerate() {
-            let (pivot, value) = (row[i], equation[i]);
-            let length = math::sqrt(pivot * pivot + value * value);
-            if length > 0.0 {
-                let (cos, sin) = (pivot / length, value / length);
-                for (kept, new) in row.iter_mut().zip(&mut equation).skip(i) {
-                    (*kept, *new) = (cos * *kept + sin * *new, cos * *new - sin * *kept);
-                }
-            }
-        }
-    }
-
-    /// The nine unknowns, by back substitution.
-    fn unknowns(&self) -> Option<[f32; UNKNOWNS]> {
-        let mut unknowns = [0.0; UNKNOWNS];
-        for (i, row) in self.triangle.iter().enumerate().take(UNKNOWNS).rev() {
-            let column: f32 = self.triangle.iter().map(|row| row[i] * row[i]).sum();
-            if row[i].abs() <= DEPENDENT * math::sqrt(column) {
-                return None;
-            }
-            let known: f32 = row.iter().zip(&unknowns).skip(i + 1).map(|(factor, unknown)| factor * unknown).sum();
-            unknowns[i] = (row[UNKNOWNS] - known) / row[i];
-        }
-        Some(unknowns)
     }
 
     /// Offset, matrix and strength, and how well they fit.
@@ -290,7 +256,7 @@ impl EllipsoidFit {
         if flatness.is_nan() || flatness * config.stretch_max < NEAR {
             return Err(EllipsoidFailure::Flat { flatness });
         }
-        let [p, q, xy, xz, yz, bx, by, bz, constant] = self.unknowns().ok_or(EllipsoidFailure::NotPositive)?;
+        let [p, q, xy, xz, yz, bx, by, bz, constant] = self.quadric.solve().ok_or(EllipsoidFailure::NotPositive)?;
         // xᵀ·A·x − 2·bᵀ·x = constant, which is (x − c)ᵀ·A·(x − c) = square with A·c = b.
         let shape = Matrix3::new(1.0 - p - q, -xy, -xz, -xy, 1.0 - p + 2.0 * q, -yz, -xz, -yz, 1.0 + 2.0 * p - q);
         let b = Vec3::new(bx, by, bz);
@@ -308,8 +274,7 @@ impl EllipsoidFit {
         let stretch = math::sqrt(most / least);
         let coverage = self.coverage(&center, &inverse, square);
         // (x − c)ᵀ·A·(x − c) is the square of the corrected strength, so half its relative error is that of the strength.
-        let [.., [.., norm]] = self.triangle;
-        let residual = 0.5 * norm.abs() / square / math::sqrt(samples as f32 - UNKNOWNS as f32);
+        let residual = 0.5 * self.quadric.residual() / square / math::sqrt(samples as f32 - UNKNOWNS as f32);
         let [weakest, strongest] = config.strength_range;
         if stretch > config.stretch_max {
             return Err(EllipsoidFailure::Stretched { stretch });

@@ -21,6 +21,7 @@ mod six_position;
 mod still;
 mod stillness;
 mod temperature;
+mod triangle;
 
 pub use ellipsoid::{EllipsoidConfig, EllipsoidFailure, EllipsoidFit, EllipsoidQuality, MagCorrection, MagRefusal};
 pub use level_trim::{LevelTrim, LevelTrimQuality, LevelTrimRefusal, Trim};

@@ -8,7 +8,7 @@
 //! 0.5 % and less), and not with a temperature far from that of flight.
 //!
 //! Method: Gauss-Newton on the lengths; D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU
-//! calibration without external equipments", ICRA 2014, section IV, with three scales and three biases for unknowns.
+//! calibration without external equipments", ICRA 2014, with three scales and three biases for unknowns.
 
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use nalgebra::{SMatrix, SVector};
