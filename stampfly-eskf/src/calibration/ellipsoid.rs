@@ -10,8 +10,9 @@
 //! fitting", GMP 2004, for quadrics in general), solved by a triangular factor that takes one sample after the other.
 //! Coordinates are counted from the first sample, so hard iron of any size costs no digits.
 
-use super::triangle::{Triangle, UNKNOWNS};
-use nalgebra::{Matrix3, SymmetricEigen};
+use super::principal_axes::principal_axes;
+use super::triangle::Triangle;
+use nalgebra::Matrix3;
 use stampfly_types::{Vec3, math};
 
 /// What is accepted.
@@ -127,6 +128,8 @@ impl MagCorrection {
     }
 }
 
+/// Of the quadric.
+const UNKNOWNS: usize = 9;
 /// Coordinates are counted in this, µT, so that their squares are near one.
 const UNIT: f32 = 50.0;
 /// Cosine of 30°: samples that near to both poles are as wide as this share of the diameter.
@@ -172,7 +175,7 @@ pub struct EllipsoidFit {
     /// The first sample, and the last one taken, µT.
     origin: Vec3,
     last: Vec3,
-    quadric: Triangle,
+    quadric: Triangle<{ UNKNOWNS + 1 }>,
     /// Least and most along each direction, from the first sample.
     extent: [[f32; 2]; 13],
     samples: u32,
@@ -256,20 +259,20 @@ impl EllipsoidFit {
         if flatness.is_nan() || flatness * config.stretch_max < NEAR {
             return Err(EllipsoidFailure::Flat { flatness });
         }
-        let [p, q, xy, xz, yz, bx, by, bz, constant] = self.quadric.solve().ok_or(EllipsoidFailure::NotPositive)?;
+        let [p, q, xy, xz, yz, bx, by, bz, constant, _] = self.quadric.solve().ok_or(EllipsoidFailure::NotPositive)?;
         // xᵀ·A·x − 2·bᵀ·x = constant, which is (x − c)ᵀ·A·(x − c) = square with A·c = b.
         let shape = Matrix3::new(1.0 - p - q, -xy, -xz, -xy, 1.0 - p + 2.0 * q, -yz, -xz, -yz, 1.0 + 2.0 * p - q);
         let b = Vec3::new(bx, by, bz);
-        let factor = shape.cholesky().ok_or(EllipsoidFailure::NotPositive)?;
-        let (center, inverse) = (factor.solve(&b), factor.inverse());
+        let (axes, squares) = principal_axes(shape);
+        let (least, most) = (squares.min(), squares.max());
+        let inverse = axes * Matrix3::from_diagonal(&squares.map(|value| 1.0 / value)) * axes.transpose();
+        let center = inverse * b;
         let square = constant + b.dot(&center);
-        let eigen = SymmetricEigen::try_new(shape, 1e-6, 50).ok_or(EllipsoidFailure::NotPositive)?;
-        let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
-        if !(least > 0.0 && square > 0.0 && most.is_finite() && square.is_finite()) {
+        if !(least > 0.0 && square > 0.0 && squares.sum().is_finite() && square.is_finite()) {
             return Err(EllipsoidFailure::NotPositive);
         }
         // Radius of the sphere of the same volume.
-        let gain = math::cbrt(math::sqrt(eigen.eigenvalues.product()));
+        let gain = math::cbrt(math::sqrt(squares.product()));
         let strength = math::sqrt(square) / gain * UNIT;
         let stretch = math::sqrt(most / least);
         let coverage = self.coverage(&center, &inverse, square);
@@ -288,8 +291,8 @@ impl EllipsoidFit {
         if residual.is_nan() || residual > config.residual_max {
             return Err(EllipsoidFailure::Residual { residual });
         }
-        let roots = Matrix3::from_diagonal(&eigen.eigenvalues.map(|value| math::sqrt(value) / gain));
-        let matrix = eigen.eigenvectors * roots * eigen.eigenvectors.transpose();
+        let roots = Matrix3::from_diagonal(&squares.map(|value| math::sqrt(value) / gain));
+        let matrix = axes * roots * axes.transpose();
         let correction = MagCorrection { offset: self.origin + center * UNIT, matrix, strength };
         Ok((correction, EllipsoidQuality { residual: residual * strength, coverage, stretch, samples }))
     }

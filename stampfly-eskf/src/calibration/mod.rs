@@ -17,6 +17,7 @@
 
 mod ellipsoid;
 mod level_trim;
+mod principal_axes;
 mod six_position;
 mod still;
 mod stillness;

@@ -10,8 +10,8 @@
 //! Method: Gauss-Newton on the lengths; D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU
 //! calibration without external equipments", ICRA 2014, with three scales and three biases for unknowns.
 
+use super::triangle::Triangle;
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
-use nalgebra::{SMatrix, SVector};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{GRAVITY, Micros, Vec3, math};
 
@@ -232,20 +232,17 @@ impl SixPosition {
         let mut correction = none;
         // Converges to the last bit in four.
         for _ in 0..8 {
-            let mut normal = SMatrix::<f32, 6, 6>::zeros();
-            let mut gradient = SVector::<f32, 6>::zeros();
+            let mut equations = Triangle::<7>::default();
             for measured in self.forces() {
                 let force = correction.correct(*measured);
                 let up = force / force.norm();
                 // |a| by scale, in g so that both kinds of unknowns have the same size, and by bias.
                 let by_scale = up.component_mul(&(measured - correction.bias)) / GRAVITY;
                 let by_bias = -up.component_mul(&correction.scale);
-                let row = SVector::from([by_scale.x, by_scale.y, by_scale.z, by_bias.x, by_bias.y, by_bias.z]);
-                normal += row * row.transpose();
-                gradient += row * (GRAVITY - force.norm());
+                let short = GRAVITY - force.norm();
+                equations.add([by_scale.x, by_scale.y, by_scale.z, by_bias.x, by_bias.y, by_bias.z, short]);
             }
-            let step = normal.cholesky().ok_or(SixPositionFailure::NotSolvable)?.solve(&gradient);
-            let [sx, sy, sz, bx, by, bz] = step.into();
+            let [sx, sy, sz, bx, by, bz, _] = equations.solve().ok_or(SixPositionFailure::NotSolvable)?;
             correction.scale += Vec3::new(sx, sy, sz) / GRAVITY;
             correction.bias += Vec3::new(bx, by, bz);
         }
