@@ -1,7 +1,7 @@
 //! Recorded sensors: a StampFly carried by hand, and BROAD's hand-held trials.
 
 use crate::{draw, range};
-use stampfly_host::chart::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Panel, RED, Scale, Shape};
+use stampfly_host::chart::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Panel, RED, Scale, Shape};
 use stampfly_host::dataset::{self, Recording};
 use stampfly_host::estimate::{self, Estimated};
 use stampfly_types::Micros;
@@ -141,7 +141,7 @@ pub fn paths() -> Result<(), Box<dyn Error>> {
     draw("estimation_paths.svg", &chart)
 }
 
-/// BROAD: the attitude filter, the Kalman filter and VQF's published errors.
+/// BROAD: the attitude filter and the Kalman filter beside the errors of others in the data's own table.
 pub fn attitude() -> Result<(), Box<dyn Error>> {
     println!("BROAD trials, degrees RMS: tilt, total");
     let Ok(table) = std::fs::read_to_string(PathBuf::from(FOLDER).join("broad/rmse_table.csv")) else {
@@ -151,9 +151,10 @@ pub fn attitude() -> Result<(), Box<dyn Error>> {
     let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let header = lines.next().ok_or("an empty table")?;
     let column = |name: &str| header.iter().position(|cell| *cell == name).ok_or(format!("no column {name}"));
-    let columns = [column("vqf9d_incl")?, column("vqf9d_total")?];
+    let vqf = [column("vqf9d_incl")?, column("vqf9d_total")?];
+    let mahony = [column("mahony_incl")?, column("mahony_total")?];
     // Filter by filter: tilt and total, trial by trial.
-    let mut errors: [Vec<[f64; 2]>; 3] = Default::default();
+    let mut errors: [Vec<[f64; 2]>; 4] = Default::default();
     let mut trials = Vec::new();
     for cells in lines {
         let path = PathBuf::from(FOLDER).join(format!("broad/{}.npz", cells[0]));
@@ -168,24 +169,32 @@ pub fn attitude() -> Result<(), Box<dyn Error>> {
             let figures = estimate::run(&recording, &config).figures;
             [figures.tilt_rmse_deg, figures.total_rmse_deg].map(Option::unwrap_or_default)
         });
-        let vqf = columns.map(|column| cells[column].parse().unwrap_or(f64::NAN));
-        println!("  {:<42} attitude filter {ours:.2?}, Kalman filter {kalman:.2?}, VQF {vqf:.2?}", cells[0]);
+        let known = |columns: [usize; 2]| columns.map(|column| cells[column].parse().unwrap_or(f64::NAN));
+        let (vqf, mahony) = (known(vqf), known(mahony));
+        println!(
+            "  {:<36} attitude filter {ours:.2?}, Kalman filter {kalman:.2?}, VQF {vqf:.2?}, Mahony {mahony:.2?}",
+            cells[0]
+        );
         trials.push(cells[0].split('_').next().unwrap_or_default().to_owned());
-        for (list, values) in errors.iter_mut().zip([ours, kalman, vqf]) {
+        for (list, values) in errors.iter_mut().zip([ours, kalman, vqf, mahony]) {
             list.push(values);
         }
     }
-    let filters =
-        [("attitude filter", BLUE), ("Kalman filter on the same samples", GREY), ("VQF 2.1.2, published", ORANGE)];
+    let filters = [
+        ("AttitudeFilter", BLUE),
+        ("Eskf on the same samples", GREY),
+        ("VQF, its defaults", ORANGE),
+        ("Mahony, published by BROAD", GREEN),
+    ];
     let panels = ["tilt", "whole attitude"].iter().enumerate().map(|(part, title)| {
         let bars = |filter: usize| -> Vec<[f64; 2]> {
-            let beside = 0.27 * (filter as f64 - 1.0);
+            let beside = 0.2 * (filter as f64 - 1.5);
             errors[filter].iter().enumerate().map(|(trial, values)| [trial as f64 + beside, values[part]]).collect()
         };
         let marks = filters.iter().enumerate().map(|(filter, (name, colour))| Mark {
             name,
             colour,
-            shape: Shape::Bars(0.24, bars(filter)),
+            shape: Shape::Bars(0.18, bars(filter)),
         });
         let names = trials.iter().enumerate().map(|(place, trial)| (place as f64, trial.clone())).collect();
         let most = range(errors.iter().flatten().map(|values| values[part]))[1];
@@ -199,7 +208,7 @@ pub fn attitude() -> Result<(), Box<dyn Error>> {
     let chart = Chart {
         title: "Attitude of a hand-held sensor against motion capture (BROAD)".to_owned(),
         columns: 2,
-        size: [300.0, 200.0],
+        size: [320.0, 200.0],
         panels: panels.collect(),
     };
     draw("estimation_attitude.svg", &chart)
