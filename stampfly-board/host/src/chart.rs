@@ -142,7 +142,7 @@ impl Axis {
                     .skip_while(|(step, ..)| *step < low * 0.999)
                     .take_while(|(step, ..)| *step <= high * 1.001)
                     .filter(|(_, first, _)| *first || !few)
-                    .map(|(step, _, decimals)| (step, number(step, decimals)))
+                    .map(|(step, _, decimals)| (step, magnitude(step, decimals)))
                     .collect()
             }
             Scale::Linear => {
@@ -169,6 +169,19 @@ fn steps(from: f64) -> impl Iterator<Item = (f64, bool, usize)> {
 fn number(value: f64, decimals: usize) -> String {
     // Minus zero is zero.
     format!("{:.decimals$}", value + 0.0).replace('-', "−")
+}
+
+/// A number above zero with one digit that is not zero, short.
+fn magnitude(value: f64, decimals: usize) -> String {
+    if decimals < 4 {
+        return number(value, decimals);
+    }
+    let power: String =
+        decimals.to_string().chars().filter_map(|c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c.to_digit(10)? as usize)).collect();
+    match libm::round(value * libm::pow(10.0, decimals as f64)) as u8 {
+        1 => format!("10⁻{power}"),
+        digit => format!("{digit}·10⁻{power}"),
+    }
 }
 
 fn escape(text: &str) -> String {
@@ -349,6 +362,7 @@ mod tests {
         assert_eq!(labels(&Axis::linear("", [0.0, 31.0])), ["0", "10", "20", "30"]);
         let frequency = Axis { scale: Scale::Logarithmic, ..Axis::linear("Hz", [4.0, 200.0]) };
         assert_eq!(labels(&frequency), ["5", "10", "20", "50", "100", "200"]);
+        assert_eq!(labels(&Axis { range: [1e-5, 1e-4], ..frequency.clone() }), ["10⁻⁵", "2·10⁻⁵", "5·10⁻⁵", "10⁻⁴"]);
         let wide = Axis { range: [0.001, 1.0], ..frequency };
         assert_eq!(labels(&wide), ["0.001", "0.01", "0.1", "1"]);
         assert!((wide.place(0.1, 300.0) - 200.0).abs() < 1e-9);

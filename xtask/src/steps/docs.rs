@@ -18,6 +18,7 @@ const DOCUMENTS: &[&str] = &[
     "docs/decisions.md",
     "docs/estimation.md",
     "docs/msrv.md",
+    "stampfly-board/host/README.md",
     "stampfly-eskf/README.md",
     "stampfly-sim/README.md",
 ];
