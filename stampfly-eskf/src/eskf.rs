@@ -41,7 +41,7 @@ const MAX_STEP: f32 = 0.5;
 /// The state moves with every inertial sample, its doubt with the first sample after this much time, s: at 400 Hz with
 /// every second one. A hundredth of the time in which doubt changes, and half the work. (PX4's EKF2 takes 10 ms.)
 const DOUBT_STEP: f32 = 4e-3;
-/// While standing, the ground is absorbed at every n-th inertial sample.
+/// What is assumed where nothing measures is looked at on every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
 /// A vector of more axes is more often far away by chance: its gate, relative to that of one axis, for the same chance
 /// (6·10⁻⁵ at four standard deviations).

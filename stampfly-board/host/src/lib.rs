@@ -11,11 +11,13 @@
 //! | [`flight_log`] | a flight from a ULog file of any origin |
 //! | [`dataset`] | recorded sensor data with or without a reference, from five public formats, in our conventions |
 //! | [`estimate`] | an estimator over recorded data, and how good it is |
+//! | [`chart`] | charts for documents, as SVG |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
 //! This crate uses files, floats in `f64` and an allocator; nothing in it belongs on a vehicle.
 
 pub mod campaign;
+pub mod chart;
 pub mod dataset;
 pub mod estimate;
 pub mod flight;

@@ -3,9 +3,9 @@
 //! Turned into angular rate and freed of the body's own rotation, flow times distance is the velocity along body x
 //! and y. The reading compared here is therefore z = distance · (flow rate ∓ body rate), the prediction
 //! v_body = Rᵀ·v. For a small body rotation θ, (R(I + \[θ\]×))ᵀ·v = v_b + \[v_b\]×·θ, which gives the attitude columns;
-//! the velocity columns are the columns of R. The gyro bias enters through the rotation that was removed: with
-//! b the bias, z contains −distance·(ω_m − b), so the prediction gets −distance·b in y's rate for x (and + in x's
-//! rate for y).
+//! the velocity columns are the columns of R. The gyro bias enters through the rotation that was removed: the rates
+//! are raw, ω_m = ω + b, so with the bias b the reading along x is v_x − distance·b_y and the one along y is
+//! v_y + distance·b_x. The prediction has the same terms.
 //!
 //! The distance is taken as known; its error is part of the measurement noise (see the filter's configuration).
 

@@ -2,8 +2,9 @@
 //!
 //! A flow sensor reports what it saw a picture or two ago, a camera system what it saw fifty milliseconds ago. This
 //! ring keeps how the body turned and what its specific force added, not states: a correction of the present state
-//! is a correction of the past ones, too, without touching them. Samples that come faster than every 2.5 ms are
-//! merged, so the memory reaches back [`REACH`] at any rate of the inertial sensor.
+//! is a correction of the past ones, too, without touching them. (Impulses keep the attitude they were added with: a
+//! correction by θ leaves an error of θ times the impulse until they are forgotten.) Samples that come faster than every
+//! 2.5 ms are merged, so the memory reaches back [`REACH`] at any rate of the inertial sensor.
 
 use super::Passage;
 use super::state::{Motion, multiply, small_rotation};

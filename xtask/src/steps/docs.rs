@@ -2,7 +2,9 @@
 //!
 //! A link to a line, such as `[`Ring::write`](../stampfly-bus/src/ring.rs#L90)`, is checked: the line must contain the
 //! last word of the link's text. Lines move, so `cargo xtask docs --fix` puts the numbers right and rewrites the
-//! generated topic table; without `--fix` a difference is a failure. Every other relative link must lead to a file.
+//! generated topic table; without `--fix` a difference is a failure. Every other link into the repository, relative or by
+//! its address, must lead to a file, and one into the same document to a heading. Every picture must be shown somewhere,
+//! and the guide to tuning must name every field there is to tune.
 
 use crate::Failure;
 use crate::repository::{Repository, capture};
@@ -10,7 +12,23 @@ use std::fs;
 use std::path::Path;
 
 /// Documents that are checked, relative to the top folder.
-const DOCUMENTS: &[&str] = &["README.md", "docs/architecture.md", "docs/decisions.md", "docs/msrv.md"];
+const DOCUMENTS: &[&str] = &[
+    "README.md",
+    "docs/architecture.md",
+    "docs/decisions.md",
+    "docs/estimation.md",
+    "docs/msrv.md",
+    "stampfly-board/host/README.md",
+    "stampfly-eskf/README.md",
+    "stampfly-sim/README.md",
+];
+/// Addresses of the repository's files, for documents that are read elsewhere.
+const ADDRESSES: &[&str] =
+    &["https://github.com/stampfly/stampfly/blob/main/", "https://raw.githubusercontent.com/stampfly/stampfly/main/"];
+/// Where the pictures are.
+const PICTURES: &str = "docs/images";
+/// The guide to tuning, and the structure whose fields it must name.
+const TUNING: (&str, &str, &str) = ("docs/estimation.md", "stampfly-eskf/src/config.rs", "pub struct EskfConfig {");
 /// The document that is generated.
 const TOPICS: &str = "docs/topics.md";
 
@@ -21,13 +39,17 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
         _ => return Err("the only argument is --fix".to_owned()),
     };
     let mut stale = Vec::new();
+    let mut all = String::new();
     for name in DOCUMENTS {
         let path = repository.root.join(name);
         let text = fs::read_to_string(&path).map_err(|e| format!("{name}: {e}"))?;
         let folder = path.parent().unwrap_or(&repository.root);
-        let checked = check_links(&text, folder).map_err(|e| format!("{name}: {e}"))?;
+        let checked = check_links(&text, folder, &repository.root).map_err(|e| format!("{name}: {e}"))?;
         keep(&path, name, &text, &checked, fix, &mut stale)?;
+        all += &text;
     }
+    check_pictures(&repository.root, &all)?;
+    check_tuning(&repository.root)?;
     let mut list = repository.cargo();
     let (table, _) =
         capture(list.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "topics", "--markdown"]))?;
@@ -53,8 +75,53 @@ fn keep(path: &Path, name: &str, before: &str, now: &str, fix: bool, stale: &mut
     Ok(())
 }
 
+/// Is every picture shown by one of the documents?
+fn check_pictures(root: &Path, documents: &str) -> Result<(), Failure> {
+    let pictures = fs::read_dir(root.join(PICTURES)).map_err(|e| format!("{PICTURES}: {e}"))?;
+    for picture in pictures {
+        let name = picture.map_err(|e| format!("{PICTURES}: {e}"))?.file_name();
+        let name = name.to_string_lossy();
+        if !documents.contains(&format!("images/{name})")) {
+            return Err(format!("{PICTURES}/{name} is in no document"));
+        }
+    }
+    Ok(())
+}
+
+/// Does the guide to tuning name every field?
+fn check_tuning(root: &Path) -> Result<(), Failure> {
+    let (guide, source, structure) = TUNING;
+    let read = |name: &str| fs::read_to_string(root.join(name)).map_err(|e| format!("{name}: {e}"));
+    let (text, source) = (read(guide)?, read(source)?);
+    let missing = missing_fields(&text, &source, structure);
+    if missing.is_empty() { Ok(()) } else { Err(format!("{guide}: the guide to tuning leaves out {missing:?}")) }
+}
+
+/// Public fields of a structure that the text does not name as code.
+fn missing_fields<'s>(text: &str, source: &'s str, structure: &str) -> Vec<&'s str> {
+    let lines = source.lines().skip_while(|line| *line != structure).skip(1).take_while(|line| *line != "}");
+    let fields = lines.filter_map(|line| line.trim().strip_prefix("pub ")?.split_once(':'));
+    fields.map(|(field, _)| field).filter(|field| !text.contains(&format!("`{field}`"))).collect()
+}
+
+/// Is there a heading that a link to this anchor leads to? GitHub's rule: small letters, blanks become dashes, other
+/// signs go.
+fn has_heading(text: &str, anchor: &str) -> bool {
+    let kept = |c: char| match c {
+        ' ' => Some('-'),
+        c if c.is_alphanumeric() || c == '-' || c == '_' => Some(c),
+        _ => None,
+    };
+    let headings = text
+        .lines()
+        .filter_map(|line| line.trim_start_matches('#').strip_prefix(' ').filter(|_| line.starts_with('#')));
+    headings
+        .map(|heading| heading.to_lowercase().chars().filter_map(kept).collect::<String>())
+        .any(|slug| slug == anchor)
+}
+
 /// The text with every line number put right.
-fn check_links(text: &str, folder: &Path) -> Result<String, Failure> {
+fn check_links(text: &str, folder: &Path, root: &Path) -> Result<String, Failure> {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(start) = rest.find("](") {
@@ -63,6 +130,16 @@ fn check_links(text: &str, folder: &Path) -> Result<String, Failure> {
         let target = &after[2..end];
         out.push_str(before);
         out.push_str("](");
+        if let Some(anchor) = target.strip_prefix('#')
+            && !has_heading(text, anchor)
+        {
+            return Err(format!("link to #{anchor}: no such heading"));
+        }
+        if let Some(file) = ADDRESSES.iter().find_map(|address| target.strip_prefix(address))
+            && !root.join(file).exists()
+        {
+            return Err(format!("link to {target}: {file} does not exist"));
+        }
         out.push_str(&check_link(before, target, folder)?);
         rest = &after[end..];
     }
@@ -110,18 +187,40 @@ fn has_word(line: &str, words: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::check_links;
+    use super::{check_links, missing_fields};
+    use crate::Failure;
     use std::path::Path;
+
+    /// Checks a text as if it were in this package, at the top.
+    fn checked(text: &str) -> Result<String, Failure> {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        check_links(text, here, here)
+    }
+
+    #[test]
+    fn links_into_the_repository_lead_somewhere() {
+        let page = "# 2. What it's for\n\n[there](#2-what-its-for)";
+        assert_eq!(checked(page).as_deref(), Ok(page));
+        assert!(checked("# Here\n[x](#there)").is_err());
+        assert!(checked("[x](https://github.com/stampfly/stampfly/blob/main/Cargo.toml)").is_ok());
+        assert!(checked("[x](https://github.com/stampfly/stampfly/blob/main/nowhere.md)").is_err());
+        assert!(checked("[x](https://example.org/nowhere.md)").is_ok());
+    }
+
+    #[test]
+    fn fields_that_are_not_named_are_found() {
+        let source = "pub struct Config {\n    /// One.\n    pub one: f32,\n    pub two: f32,\n}\npub struct B {\n    pub three: f32,\n}\n";
+        assert_eq!(missing_fields("`one` and two", source, "pub struct Config {"), ["two"]);
+    }
 
     #[test]
     fn line_numbers_follow_the_word() {
-        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let fixed = check_links("see [`docs::check_links`](src/steps/docs.rs#L1).", here).expect("exists");
+        let fixed = checked("see [`docs::check_links`](src/steps/docs.rs#L1).").expect("exists");
         let number: usize = fixed.trim_end_matches(").").rsplit('L').next().expect("a number").parse().expect("one");
         let line = include_str!("docs.rs").lines().nth(number - 1).expect("that line");
         assert!(line.starts_with("fn check_links"), "{line}");
-        assert_eq!(check_links(&fixed, here).expect("exists"), fixed);
-        assert!(check_links("[x](nowhere.md)", here).is_err());
-        assert!(check_links("[`no_such_thing_here`](Cargo.toml#L1)", here).is_err());
+        assert_eq!(checked(&fixed).expect("exists"), fixed);
+        assert!(checked("[x](nowhere.md)").is_err());
+        assert!(checked("[`no_such_thing_here`](Cargo.toml#L1)").is_err());
     }
 }

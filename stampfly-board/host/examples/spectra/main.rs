@@ -1,6 +1,6 @@
 //! Does the simulated inertial sensor shake like the real one?
 //!
-//! `cargo run --release -p stampfly-sim --example spectra` reads recordings of a real StampFly, simulates the same
+//! `cargo run --release -p stampfly-host --example spectra` reads recordings of a real StampFly, simulates the same
 //! situations, prints the power in bands side by side, draws `docs/images/spectra.svg`, and fails when a band is off
 //! by more than the stated factor. `STAMPFLY_DATA` names the folder of the recordings (default `../shared/data`).
 //!
@@ -10,7 +10,7 @@
 //! record, where white noise goes in and the chain's own shape comes out. The flight holds manoeuvres, so it is
 //! compared above 10 Hz for the accelerometer and above 30 Hz for the gyroscope.
 
-#[path = "../../tests/hover/pilot.rs"]
+#[path = "../../../../stampfly-sim/tests/hover/pilot.rs"]
 mod pilot;
 mod plot;
 mod recording;
@@ -24,7 +24,7 @@ use stampfly_sim::sensors::imu::counts_to_si;
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig};
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Axes in the order of the recordings' columns.
@@ -59,9 +59,9 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<bool, String> {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let folder = std::env::var_os("STAMPFLY_DATA").map_or_else(|| workspace.join("../shared/data"), PathBuf::from);
-    let flights = folder.join("stampfly_flights");
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // Set by the build script.
+    let flights = Path::new(env!("STAMPFLY_DATA_FOLDER")).join("stampfly_flights");
     let standing = Recording::read(&flights.join("stampfly_fft_20260114T115628.csv"))?;
     let flying = Recording::read(&flights.join("stampfly_fft_20260113T231806.csv"))?;
     let cases = [
