@@ -91,6 +91,25 @@ pub struct EskfConfig {
     pub lockout: f32,
 }
 
+impl EskfConfig {
+    /// Squared Mahalanobis distance at which the gate of a measurement of so many axes lies. A vector of more axes is more
+    /// often far away by chance: its gate is wider, for the same chance (6·10⁻⁵ at four standard deviations).
+    ///
+    /// ```
+    /// let config = stampfly_eskf::EskfConfig { gate: 4.0, ..Default::default() };
+    /// assert_eq!(config.gate_distance(1), 16.0);
+    /// assert!((config.gate_distance(2) - 19.36).abs() < 1e-3);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn gate_distance(&self, axes: usize) -> f32 {
+        self.gate * self.gate * GATE_OF_AXES.get(axes).copied().unwrap_or(1.0)
+    }
+}
+
+/// Squared gate, relative to that of one axis.
+const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
+
 /// What of the magnetic field is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MagModel {

@@ -43,9 +43,6 @@ const MAX_STEP: f32 = 0.5;
 const DOUBT_STEP: f32 = 4e-3;
 /// While standing, the ground is absorbed at every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
-/// A vector of more axes is more often far away by chance: its gate, relative to that of one axis, for the same chance
-/// (6·10⁻⁵ at four standard deviations).
-const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
 
 /// Running mean of inertial samples between two looks at gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -238,8 +235,7 @@ impl Eskf {
             *innovation -= row.predicted;
         }
         let projection = self.covariance.project(&jacobians, innovations, variances);
-        let gate = self.config.gate * self.config.gate * GATE_OF_AXES.get(M).copied().unwrap_or(1.0);
-        let ratio = projection.distance() / gate;
+        let ratio = projection.distance() / self.config.gate_distance(M);
         (projection, ratio)
     }
 
