@@ -4,12 +4,13 @@
 /// PMW3901, BMP280).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EskfConfig {
-    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for propeller vibration.
+    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and axes;
+    /// vibration is `accel_roughness`.
     pub accel_noise: f32,
     /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
     pub gyro_noise: f32,
-    /// What a change of the accelerometer from sample to sample adds to its noise: share of its square, 1. See
-    /// [`Roughness`](crate::filter::Roughness).
+    /// What a change of the accelerometer from sample to sample adds to its noise: share of its square, 1. A third for
+    /// white noise of 800 Hz bandwidth sampled at 400 Hz. See [`Roughness`](crate::filter::Roughness).
     pub accel_roughness: f32,
     /// The same for the gyro.
     pub gyro_roughness: f32,
@@ -134,19 +135,19 @@ pub enum GravityUse {
 impl Default for EskfConfig {
     fn default() -> Self {
         Self {
-            accel_noise: 0.3,
-            gyro_noise: 0.003,
-            accel_roughness: 0.0,
-            gyro_roughness: 0.0,
-            gyro_bias_walk: 3e-5,
+            accel_noise: 0.1,
+            gyro_noise: 5e-4,
+            accel_roughness: 0.35,
+            gyro_roughness: 0.25,
+            gyro_bias_walk: 2e-5,
             accel_bias_walk: 1e-3,
             initial_position: 0.01,
             initial_velocity: 0.05,
             initial_attitude: 0.05,
-            initial_gyro_bias: 0.003,
+            initial_gyro_bias: 8e-4,
             initial_accel_bias: 0.1,
-            vibration_bias: 2.0,
-            tof_sigma: 0.01,
+            vibration_bias: 3.0,
+            tof_sigma: 0.005,
             tof_min: 0.02,
             tof_max: 4.0,
             min_cos_tilt: 0.8,
@@ -156,7 +157,7 @@ impl Default for EskfConfig {
             flow_delay: 0.004,
             flow_min_quality: 25,
             flow_min_distance: 0.02,
-            baro_sigma: 0.3,
+            baro_sigma: 0.15,
             baro_enable: true,
             baro_walk: 0.02,
             mag_sigma: 0.1,

@@ -54,6 +54,20 @@ struct Snapshot {
     covariance: SMatrix<f64, N, N>,
 }
 
+/// A running mean.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mean {
+    sum: SVector<f64, 3>,
+    count: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: Vec3) {
+        self.sum += value.map(f64::from);
+        self.count += 1.0;
+    }
+}
+
 /// What is going on with one sensor.
 #[derive(Debug, Default)]
 struct Followed {
@@ -72,9 +86,8 @@ pub struct Observation {
     snapshots: Vec<Snapshot>,
     due: Micros,
     sensors: [Followed; SENSORS.len()],
-    /// Sums of what the inertial sensor showed beyond the truth, and how many.
-    excess: [SVector<f64, 3>; 2],
-    count: f64,
+    /// What gyroscope and accelerometer showed beyond the truth.
+    offsets: [Mean; 2],
     lost_since: Option<Micros>,
     result: FlightConsistency,
 }
@@ -91,8 +104,7 @@ impl Observation {
             snapshots: Vec::new(),
             due: Micros::ZERO,
             sensors: Default::default(),
-            excess: [SVector::zeros(); 2],
-            count: 0.0,
+            offsets: [Mean::default(); 2],
             lost_since: None,
             result: FlightConsistency::default(),
         }
@@ -145,10 +157,8 @@ impl Observation {
         if self.mode.state != FlightState::Flying {
             return;
         }
-        let wide = |v: Vec3| v.map(f64::from);
-        self.excess[0] += wide(imu.gyro) - wide(truth.angular_rate);
-        self.excess[1] += wide(imu.accel) - wide(truth.specific_force);
-        self.count += 1.0;
+        self.offsets[0].add(imu.gyro - truth.angular_rate);
+        self.offsets[1].add(imu.accel - truth.specific_force);
         let snapshot = self.snapshot(truth);
         self.watch(at, &snapshot.error);
         if at >= self.due {
@@ -199,15 +209,15 @@ impl Observation {
     /// What the flight showed.
     ///
     /// The truth of a bias is what the inertial sensor showed beyond the truth on the mean of the flight: its offset,
-    /// what its scale and its axes make of gravity, and what vibration moved it by.
+    /// what its scale and its axes make of gravity and of turning, and what vibration moved it by.
     #[must_use]
     pub fn finish(mut self) -> FlightConsistency {
         let mut result = self.result;
         result.identical = self.shadow.is_identical();
         for snapshot in &mut self.snapshots {
-            for (block, excess) in [GYRO_BIAS, ACCEL_BIAS].into_iter().zip(&self.excess) {
+            for (block, offset) in [GYRO_BIAS, ACCEL_BIAS].into_iter().zip(&self.offsets) {
                 let mut error = snapshot.error.fixed_rows_mut::<3>(block);
-                error += excess / self.count;
+                error += offset.sum / offset.count;
             }
         }
         let mut squares = |values: Vec<f64>| {

@@ -12,7 +12,7 @@
 //! | dead-reckoned | horizontal position and heading: nobody measures them, their errors only grow, so they are measured against their own growing covariance and are in no bar |
 //! | band | 95 % of single samples of a χ² variable of so many degrees of freedom, 2.5 % on either side |
 //! | mean | over the samples of a flight, then over flights |
-//! | inside | share of flights whose sample at one random instant lies in the band |
+//! | inside, above | share of flights whose sample at one random instant lies in the band, or above it |
 //!
 //! Not for recordings: they have no truth of biases.
 
@@ -43,8 +43,11 @@ const JUDGED: usize = 6;
 /// Sensors whose innovations are looked at, and their axes.
 pub const SENSORS: [(&str, usize); 3] = [("range", 1), ("flow", 2), ("barometer", 1)];
 
-/// Share of the flights whose sample at a random instant must lie in the band.
-pub const INSIDE: f64 = 0.9;
+/// Share of the flights whose sample at a random instant must lie in the band. Of a perfect filter 95 % do. This one takes
+/// vibration as alike along all axes and a gyro's error of scale for a bias, so quiet flights lie below the band.
+pub const INSIDE: f64 = 0.8;
+/// Share of the flights whose error at a random instant may lie above the band. Of a perfect filter 2.5 % do.
+pub const ABOVE: f64 = 0.05;
 
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -59,6 +62,10 @@ pub struct Line {
     pub band: [f64; 2],
     /// Share of the flights whose sample at a random instant lies in the band.
     pub inside: f64,
+    /// Share of the flights whose sample at a random instant lies above it: overconfidence.
+    pub above: f64,
+    /// Share that may lie there.
+    pub allowed: f64,
     /// Does it have to be inside?
     pub judged: bool,
 }
@@ -67,7 +74,8 @@ impl Line {
     /// Is the mean in the band, and are enough of the single samples?
     #[must_use]
     pub fn is_good(&self) -> bool {
-        !self.judged || (self.band[0]..=self.band[1]).contains(&self.mean) && self.inside >= INSIDE
+        let [low, high] = self.band;
+        !self.judged || low <= self.mean && self.mean <= high && self.inside >= INSIDE && self.above <= self.allowed
     }
 }
 
@@ -92,19 +100,30 @@ impl Summary {
     /// Summarises flights.
     #[must_use]
     pub fn of(flights: &[FlightConsistency]) -> Self {
-        let line = |name, freedom, judged, squares: Vec<Squares>| {
+        let line = |name, freedom, judged, allowed, squares: Vec<Squares>| {
             let (count, band) = (squares.len().max(1) as f64, chi_square::band(freedom));
             let inside = squares.iter().filter(|s| (band[0]..=band[1]).contains(&s.once)).count();
             let mean = squares.iter().map(|s| s.mean).sum::<f64>() / count;
-            Line { name, freedom, mean, band, inside: inside as f64 / count, judged }
+            let above = squares.iter().filter(|s| s.once > band[1]).count();
+            Line {
+                name,
+                freedom,
+                mean,
+                band,
+                inside: inside as f64 / count,
+                above: above as f64 / count,
+                allowed,
+                judged,
+            }
         };
         let errors = BLOCKS.iter().enumerate().map(|(block, (name, states))| {
             let squares = flights.iter().filter_map(|flight| flight.errors[block]).collect();
-            line(*name, states.len(), block < JUDGED, squares)
+            line(*name, states.len(), block < JUDGED, ABOVE, squares)
         });
         let innovations = SENSORS.iter().enumerate().map(|(sensor, (name, axes))| {
             let squares = flights.iter().filter_map(|flight| flight.innovations[sensor]).collect();
-            line(*name, *axes, true, squares)
+            // A picture more or less in a flow reading makes tails: beyond the band, within the gate.
+            line(*name, *axes, true, 1.0 - INSIDE, squares)
         });
         Self {
             errors: errors.collect(),

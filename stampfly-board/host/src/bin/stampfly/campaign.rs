@@ -6,7 +6,7 @@ use crate::arguments::CampaignOptions;
 use crate::terminal;
 use serde_json::{Map, json};
 use stampfly_host::campaign::{run_recorded, spreads};
-use stampfly_host::consistency::{INSIDE, Line, Summary};
+use stampfly_host::consistency::{ABOVE, INSIDE, Line, Summary};
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::FlightConfig;
 use std::process::ExitCode;
@@ -82,14 +82,20 @@ fn print_consistency(summary: &Summary) {
     let print = |line: &Line| {
         let [low, high] = line.band;
         let mark = if line.is_good() { "" } else { "  OUTSIDE" };
-        let (name, freedom, mean, inside) = (line.name, line.freedom, line.mean, line.inside * 100.0);
-        outln!("{name:<26} {freedom:>3} {mean:>8.2}   {low:>6.3} to {high:>6.2} {inside:>8.1} %{mark}");
+        let (name, freedom, mean) = (line.name, line.freedom, line.mean);
+        let [inside, above] = [line.inside, line.above].map(|share| 100.0 * share);
+        outln!("{name:<26} {freedom:>3} {mean:>8.2}   {low:>6.3} to {high:>6.2} {inside:>8.1} % {above:>6.1} %{mark}");
     };
-    outln!("\n{:<26} {:>3} {:>8}   {:^16} {:>10}", "error squared (NEES)", "dof", "mean", "95 % band", "inside");
+    let head = ("error squared (NEES)", "dof", "mean", "95 % band", "inside", "above");
+    outln!("\n{:<26} {:>3} {:>8}   {:^16} {:>10} {:>8}", head.0, head.1, head.2, head.3, head.4, head.5);
     summary.errors.iter().for_each(print);
     outln!("{:<26}", "innovation squared (NIS)");
     summary.innovations.iter().for_each(print);
-    outln!("\nmean: over flights; inside: share of flights at one random instant, at least {:.0} %", INSIDE * 100.0);
+    outln!(
+        "\nmean: over flights; inside, above: share of flights at one random instant, at least {:.0} %, at most {:.0} %",
+        INSIDE * 100.0,
+        ABOVE * 100.0
+    );
     outln!(
         "{} resets after a lock-out, {} neither recovered nor reported, {} flights reported lost",
         summary.resets,
