@@ -168,7 +168,7 @@ impl Default for EskfConfig {
             still_gravity_sigma: 0.1,
             still_velocity_sigma: 0.01,
             still_position_sigma: 0.005,
-            blind_velocity: 0.2,
+            blind_velocity: 0.07,
             gate: 4.0,
             lockout: 0.2,
         }
