@@ -28,8 +28,9 @@ use nalgebra_025 as na25;
 use nalgebra_034 as na34;
 use stampfly_benches::acceptance::{MIX, fused_per_step};
 use stampfly_benches::stream::{self, Step, Truth};
+use stampfly_eskf::attitude::{AttitudeConfig, AttitudeFilter, Mahony};
 use stampfly_eskf::{Eskf, Estimator};
-use stampfly_types::Vec3;
+use stampfly_types::{Quat, Vec3};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -122,6 +123,24 @@ fn attitudes(steps: &[Step], measure: &mut impl Measure<[f32; 4]>) {
     let inputs: Vec<Upwards> = steps.iter().map(Upwards::new).collect();
 
     // The first is what the others are compared with.
+    let upwards = |q: Quat| [q.w, q.i, -q.j, -q.k];
+    let mut filter = AttitudeFilter::from_calibration(AttitudeConfig::default(), &stream::calibration());
+    measure.contender("AttitudeFilter", |k| {
+        let step = at(steps, k);
+        filter.step(&step.imu.accel, &step.imu.gyro, PERIOD);
+        if let Some(mag) = &step.mag {
+            let _ = black_box(filter.field(&mag.field, 0.0, 16.0 * PERIOD));
+        }
+        upwards(filter.attitude())
+    });
+
+    let mut filter = Mahony::new(0.5);
+    measure.contender("Mahony", |k| {
+        let step = at(steps, k);
+        filter.step(&step.imu.accel, &step.imu.gyro, PERIOD);
+        upwards(filter.attitude())
+    });
+
     let vector = |v: [f32; 3]| na34::Vector3::from(v);
     let mut filter = ahrs::Madgwick::new(PERIOD, 0.1f32);
     measure.contender("ahrs 0.8, Madgwick", |k| {

@@ -24,6 +24,8 @@ topics! {
     sensor_mag: MagData = ring(8) @ 25 Hz from mag => [estimation, calibration];
     /// Air pressure.
     sensor_baro: BaroData = ring(8) @ 50 Hz from baro => [estimation, calibration];
+    /// Where cameras see the vehicle.
+    external_pose: ExternalPose = ring(8) @ 100 Hz from cameras => [estimation];
     /// Battery.
     sensor_power: PowerData = ring(8) @ 10 Hz from power => [failsafe, actuation, telemetry];
 

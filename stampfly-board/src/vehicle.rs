@@ -19,6 +19,8 @@ pub struct Outside<'b> {
     pub mag: wiring::sensor_mag::Tx<'b>,
     /// From the barometer.
     pub baro: wiring::sensor_baro::Tx<'b>,
+    /// From a motion capture system.
+    pub cameras: wiring::external_pose::Tx<'b>,
     /// From the battery monitor.
     pub power: wiring::sensor_power::Tx<'b>,
     /// From the pilot's radio.
@@ -46,6 +48,7 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
         sensor_flow,
         sensor_mag,
         sensor_baro,
+        external_pose,
         sensor_power,
         command_pilot,
         command_guided,
@@ -73,6 +76,7 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
                 flow: sensor_flow.estimation,
                 mag: sensor_mag.estimation,
                 baro: sensor_baro.estimation,
+                pose: external_pose.estimation,
                 calibration: calibration.estimation,
                 command: estimator_command.estimation,
                 state: estimate_state.tx,
@@ -172,6 +176,7 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
         flow: sensor_flow.tx,
         mag: sensor_mag.tx,
         baro: sensor_baro.tx,
+        cameras: external_pose.tx,
         power: sensor_power.tx,
         pilot: command_pilot.tx,
         guided: command_guided.tx,

@@ -35,5 +35,5 @@ pub mod time;
 pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};
 pub use error::{SensorError, SensorErrorKind};
 pub use link::{Button, Command, CommandLink, PinButton};
-pub use sensor::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Sample};
+pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};
 pub use time::Timebase;

@@ -2,7 +2,7 @@
 
 use crate::SensorError;
 use stampfly_types::Micros;
-use stampfly_types::messages::{BaroData, FlowData, ImuData, MagData, PowerData, TofData};
+use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
 
 /// A measurement and the instant it is valid for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,6 +60,10 @@ sensor_trait! {
 sensor_trait! {
     /// An optical flow sensor. The angles are the sum since the previous sample; none is lost between two calls.
     OpticalFlow, FlowData
+}
+sensor_trait! {
+    /// A system of cameras in the room. Its samples are stamped when they were seen and arrive tens of milliseconds later.
+    MotionCapture, ExternalPose
 }
 sensor_trait! {
     /// A battery monitor.

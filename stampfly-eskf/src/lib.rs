@@ -2,7 +2,7 @@
 //!
 //! | estimator | use it for | size | not for |
 //! |---|---|---|---|
-//! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture | 1.5 kB | – |
+//! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture | 4.1 kB | – |
 //! | [`Complementary`] | the same where memory and time are short | 0.4 kB | aggressive flight |
 //! | [`AttitudeFilter`](attitude::AttitudeFilter) | attitude without position sensors, field bent or not | 1.2 kB | position, velocity |
 //! | [`Mahony`](attitude::Mahony) | the least that levels a multirotor | 20 bytes | unknown gyro bias, heading |

@@ -23,6 +23,7 @@ pub(crate) enum Stream {
     Mag = 8,
     Baro = 9,
     Power = 10,
+    Cameras = 11,
 }
 
 /// A seeded stream of random numbers.

@@ -325,6 +325,7 @@ fn publish_outside(
         sensor_flow => flow,
         sensor_mag => mag,
         sensor_baro => baro,
+        external_pose => cameras,
         sensor_power => power,
         command_pilot => pilot,
         command_guided => guided,

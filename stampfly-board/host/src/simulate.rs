@@ -18,7 +18,8 @@ use stampfly_board::vehicle::assemble;
 use stampfly_board::{FlightLoop, Pending, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::{
-    Barometer, Button, Imu, Indicator, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
+    Barometer, Button, Imu, Indicator, Magnetometer, MotionCapture, MotorOutputs, OpticalFlow, PowerMonitor,
+    RangeFinder, Sample,
 };
 use stampfly_sim::sensors::{MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
@@ -37,6 +38,8 @@ pub struct FlightConfig {
     pub vehicle: VehicleConfig,
     /// What to fly.
     pub mission: Mission,
+    /// Is the vehicle watched by a motion capture system?
+    pub cameras: bool,
     /// Seed of the executor's delays; `None` for an executor that is never late.
     pub jitter: Option<u64>,
     /// The flight is broken off after this long.
@@ -51,6 +54,7 @@ impl FlightConfig {
             simulation: SimulationConfig { seed, ..SimulationConfig::default() },
             vehicle: VehicleConfig::default(),
             mission: Mission::parse(crate::mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
+            cameras: false,
             jitter: None,
             limit: Micros::from_secs(180),
         }
@@ -234,7 +238,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let started = WallInstant::now();
     let start = config.simulation.start;
     let Simulation { clock, world, sensors } = Simulation::new(&config.simulation);
-    let Sensors { imu, tof, flow, mag, baro, power, mut motors, mut indicator, button } = sensors;
+    let Sensors { imu, tof, flow, mag, baro, cameras, power, mut motors, mut indicator, button } = sensors;
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
     let (vehicle, outside) = assemble(ports, &config.vehicle);
@@ -249,6 +253,9 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     tasks.spawn(pump!(flow, outside.flow));
     tasks.spawn(pump!(mag, outside.mag));
     tasks.spawn(pump!(baro, outside.baro));
+    if config.cameras {
+        tasks.spawn(pump!(cameras, outside.cameras));
+    }
     tasks.spawn(pump!(power, outside.power));
     tasks.spawn(watch_button(clock.clone(), button, outside.button));
     tasks.spawn(ground_station::fly(clock.clone(), &config.mission, outside.guided, outside.telemetry, &progress));

@@ -15,16 +15,29 @@ fn figures(file: &str) -> Figures {
     estimate::run(&recording, &estimate::suite(recording.kind)).figures
 }
 
-/// Horizontal end error of a log that lies still, metres.
-const STILL: f64 = 0.005;
+/// Logs that lie still, and how far from the start each may end, metres.
+const STILL: [(&str, f64); 4] =
+    [("static_test7", 0.001), ("static_low_ba", 0.001), ("static_comparison", 0.001), ("test_400hz_static", 0.0015)];
+/// Carried logs, and how far from the start the best of four other filters ends, metres: the StampFly's firmware in two
+/// versions, the Crazyflie's and PX4's EKF2, each in a replay of the same log.
+const CARRIED: [(&str, f64); 8] = [
+    ("static_test_30s", 0.2388),
+    ("flow_test_square_01", 0.0402),
+    ("square01", 0.0911),
+    ("square_30cm", 0.0751),
+    ("analysis_rot", 0.1549),
+    ("angle_test2", 0.4060),
+    ("flow_sa", 0.1252),
+    ("flow_scale", 0.4218),
+];
 
 #[test]
 #[cfg_attr(not(recorded_data), ignore = "set STAMPFLY_DATA to the recorded data")]
 fn a_vehicle_that_lies_still_stays() {
-    for name in ["static_test7", "static_low_ba", "static_comparison", "test_400hz_static"] {
+    for (name, end) in STILL {
         let figures = figures(&format!("stampfly_logs/{name}.csv"));
         assert!(!figures.diverged && figures.started_still, "{name}: {figures:?}");
-        assert!(figures.end_xy_m.unwrap() <= STILL, "{name}: {figures:?}");
+        assert!(figures.end_xy_m.unwrap() <= end, "{name}: {figures:?}");
         assert!(figures.rejected.values().all(|share| *share < 0.01), "{name}: {:?}", figures.rejected);
     }
 }
@@ -32,23 +45,18 @@ fn a_vehicle_that_lies_still_stays() {
 #[test]
 #[cfg_attr(not(recorded_data), ignore = "set STAMPFLY_DATA to the recorded data")]
 fn a_carried_vehicle_goes_as_far_as_its_flow_says() {
-    let carried = [
-        "static_test_30s",
-        "flow_test_square_01",
-        "square01",
-        "square_30cm",
-        "analysis_rot",
-        "angle_test2",
-        "flow_sa",
-        "flow_scale",
-    ];
-    for name in carried {
+    let mut as_good = 0;
+    for (name, best) in CARRIED {
         let figures = figures(&format!("stampfly_logs/{name}.csv"));
         let ratio = figures.max_xy_m.unwrap() / figures.flow_dead_reckoning_max_xy_m.unwrap();
-        assert!((0.7..=1.3).contains(&ratio), "{name}: {ratio}, {figures:?}");
+        assert!((0.8..=1.2).contains(&ratio), "{name}: {ratio}, {figures:?}");
         assert!(!figures.diverged && figures.max_xy_m.unwrap() < 2.0, "{name}: {figures:?}");
         assert!(figures.rejected["flow"] < 0.1 && figures.rejected["tof"] < 0.05, "{name}: {:?}", figures.rejected);
+        let end = figures.end_xy_m.unwrap();
+        assert!(end <= 2.0 * best, "{name} ends at {end} m, the best peer at {best}");
+        as_good += usize::from(end <= best);
     }
+    assert!(3 * as_good >= 2 * CARRIED.len(), "no worse than the best peer on {as_good} of {}", CARRIED.len());
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -64,14 +72,16 @@ fn tilt_of_a_crazyflie_agrees_with_motion_capture() {
         "B3_figure8_fast_rep2",
         "B3_figure8_slow_rep1",
         "B5_helix_fast_mell_rep1",
-        "B9_trefoil_fast_rep5",
         "B9_trefoil_slow_rep5",
     ];
+    // One crashed: its own estimate is no measure.
+    assert!(!figures("nanobench/B9_trefoil_fast_rep5.npz").diverged);
     let all: Vec<_> = flights.iter().map(|name| figures(&format!("nanobench/{name}.npz"))).collect();
     assert!(all.iter().all(|figures| !figures.diverged && figures.truth_samples > 500), "{all:?}");
     let tilt = median(all.iter().map(|figures| figures.tilt_rmse_deg.unwrap()).collect());
     let aligned = median(all.iter().map(|figures| figures.tilt_rmse_aligned_deg.unwrap()).collect());
-    assert!(tilt <= 2.5 && aligned <= 1.6, "{tilt}° and {aligned}°");
+    let device = median(all.iter().map(|figures| figures.device_tilt_rmse_deg.unwrap()).collect());
+    assert!(tilt <= 1.05 * device && aligned <= 1.5, "{tilt}°, aligned {aligned}°, the vehicle's own {device}°");
 }
 
 #[test]

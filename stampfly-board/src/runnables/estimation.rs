@@ -35,6 +35,7 @@ pub struct Estimation<'b> {
     flow_samples: Vec<Stamped<FlowData>, 16>,
     mag_samples: Vec<Stamped<MagData>, 8>,
     baro_samples: Vec<Stamped<BaroData>, 8>,
+    poses: Vec<Stamped<ExternalPose>, 8>,
     newest_calibration: Option<Stamped<CalibrationResult>>,
     newest_command: Option<Stamped<EstimatorCommand>>,
 }
@@ -51,6 +52,8 @@ pub struct EstimationPorts<'b> {
     pub mag: wiring::sensor_mag::Rx<'b>,
     /// Air pressure.
     pub baro: wiring::sensor_baro::Rx<'b>,
+    /// Pose seen from outside.
+    pub pose: wiring::external_pose::Rx<'b>,
     /// Still-calibration.
     pub calibration: wiring::calibration::Rx<'b>,
     /// From the mode machine.
@@ -79,6 +82,7 @@ impl<'b> Estimation<'b> {
             flow_samples: Vec::new(),
             mag_samples: Vec::new(),
             baro_samples: Vec::new(),
+            poses: Vec::new(),
             newest_calibration: None,
             newest_command: None,
         }
@@ -92,6 +96,7 @@ impl Runnable for Estimation<'_> {
         activation.drain(&mut self.ports.flow, &mut self.flow_samples);
         activation.drain(&mut self.ports.mag, &mut self.mag_samples);
         activation.drain(&mut self.ports.baro, &mut self.baro_samples);
+        activation.drain(&mut self.ports.pose, &mut self.poses);
         self.newest_calibration = activation.latest(&mut self.ports.calibration);
         self.newest_command = activation.latest(&mut self.ports.command);
     }
@@ -123,6 +128,14 @@ impl Runnable for Estimation<'_> {
         }
         for sample in &self.baro_samples {
             estimator.fuse_baro(sample.at, &sample.data);
+        }
+        for Stamped { at, data, .. } in &self.poses {
+            if data.position_sigma > 0.0 {
+                estimator.fuse_position(*at, &data.position, data.position_sigma);
+            }
+            if data.attitude_sigma > 0.0 {
+                estimator.fuse_attitude(*at, &data.attitude, data.attitude_sigma);
+            }
         }
         self.ports.state.publish(now, &estimator.estimate());
         self.ports.status.publish(now, &estimator.status());

@@ -12,9 +12,11 @@
 //! | [`MagModel`] | BMM150 | 25 Hz | `Magnetometer` |
 //! | [`BaroModel`] | BMP280 | 13.5 Hz | `Barometer` |
 //! | [`PowerModel`] | INA3221 | 10 Hz | `PowerMonitor` |
+//! | [`CameraModel`] | a room full of cameras | 100 Hz | `MotionCapture` |
 
 mod actuators;
 mod baro;
+mod cameras;
 mod decimator;
 mod flow;
 pub mod imu;
@@ -25,6 +27,7 @@ pub mod tof;
 
 pub use actuators::{ButtonModel, IndicatorRecorder, MotorModel};
 pub use baro::BaroModel;
+pub use cameras::CameraModel;
 pub use flow::FlowModel;
 pub use imu::ImuModel;
 pub use mag::MagModel;
@@ -34,7 +37,7 @@ pub use tof::{Mount, RangeModel};
 use crate::time::Clock;
 use crate::world::World;
 
-/// Everything that is soldered to the board.
+/// Everything that is soldered to the board, and the cameras around it.
 #[derive(Debug)]
 pub struct Sensors {
     /// Inertial measurement unit.
@@ -47,6 +50,8 @@ pub struct Sensors {
     pub mag: MagModel,
     /// Barometer.
     pub baro: BaroModel,
+    /// Motion capture.
+    pub cameras: CameraModel,
     /// Battery monitor.
     pub power: PowerModel,
     /// Motors.
@@ -65,6 +70,7 @@ impl Sensors {
             flow: FlowModel::new(world, clock, seed),
             mag: MagModel::new(world, clock, seed),
             baro: BaroModel::new(world, clock, seed),
+            cameras: CameraModel::new(world, clock, seed),
             power: PowerModel::new(world, clock, seed),
             motors: MotorModel::new(world, clock),
             indicator: IndicatorRecorder::new(clock),

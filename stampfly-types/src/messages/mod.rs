@@ -2,7 +2,7 @@
 //!
 //! | group | messages |
 //! |---|---|
-//! | [`sensor`] | [`ImuData`] [`TofData`] [`FlowData`] [`MagData`] [`BaroData`] [`PowerData`] |
+//! | [`sensor`] | [`ImuData`] [`TofData`] [`FlowData`] [`MagData`] [`BaroData`] [`ExternalPose`] [`PowerData`] |
 //! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] |
 //! | [`command`] | [`PilotInput`] [`GuidedCommand`] [`ButtonEvent`] [`CommandSetpoint`] [`Setpoint`] |
 //! | [`control`] | [`ControlOutput`] [`MotorOutput`] |
@@ -22,7 +22,7 @@ pub use command::{
 };
 pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
 pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};
-pub use sensor::{BaroData, FlowData, ImuData, MagData, PowerData, TofData};
+pub use sensor::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
 pub use system::{
     Alerts, ArmBlocks, FlightMode, FlightState, GroundContact, Signal, SystemAlert, SystemMode, Tone, VehicleStatus,
 };

@@ -3,7 +3,7 @@
 //! Chip axes, scales and register quirks end in the driver; from here inward a sample means the same for every
 //! vehicle.
 
-use crate::{Vec3, message};
+use crate::{Quat, Vec3, message};
 
 message! {
     /// One inertial sample.
@@ -79,5 +79,22 @@ message! {
         current: f32 ["A"],
         /// Power out of the battery.
         power: f32 ["W"],
+    }
+}
+
+message! {
+    /// Where somebody outside sees the vehicle: motion capture, or another vehicle's estimate of it.
+    ///
+    /// In the vehicle's world: north is where its nose pointed and the origin is where it stood when it was switched on,
+    /// so the cameras' frame has to be set there. A vehicle whose own idea differs is moved to this one.
+    pub struct ExternalPose {
+        /// Position, world NED.
+        position: Vec3 ["m"],
+        /// Attitude, body FRD → world NED.
+        attitude: Quat ["1"],
+        /// Standard deviation of the position, per axis; zero when there is none.
+        position_sigma: f32 ["m"],
+        /// Standard deviation of the attitude, per axis; zero when there is none.
+        attitude_sigma: f32 ["rad"],
     }
 }

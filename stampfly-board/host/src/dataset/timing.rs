@@ -108,19 +108,23 @@ pub(super) fn straight_end(rows: &[Sample<ImuData>]) -> usize {
 /// Tells new samples of a slow sensor from repetitions of the last one in a fast log.
 pub(super) struct Held<T> {
     period: Micros,
+    row: Option<Micros>,
     last: Option<(Micros, T)>,
 }
 
 impl<T: PartialEq + Copy> Held<T> {
     /// A sensor that has a new sample about every `period`.
     pub(super) fn new(period: Micros) -> Self {
-        Self { period, last: None }
+        Self { period, row: None, last: None }
     }
 
-    /// Is this a new sample? A changed value is; an unchanged one once half a period more than one has passed.
+    /// Is this a new sample? A changed value is. So is an unchanged one where the log itself is no faster than the sensor,
+    /// and otherwise once half a period more than one has passed.
     pub(super) fn is_new(&mut self, at: Micros, value: T) -> bool {
+        let slow_log = self.row.replace(at).is_some_and(|row| at.since(row).0 * 10 >= self.period.0 * 9);
         let new = self.last.is_none_or(|(since, last)| {
-            at > since && (last != value || at.since(since).0 >= self.period.0 + self.period.0 / 2)
+            let overdue = at.since(since).0 >= self.period.0 + self.period.0 / 2;
+            at > since && (last != value || slow_log || overdue)
         });
         if new {
             self.last = Some((at, value));
@@ -177,6 +181,12 @@ mod tests {
         let mut tof = Held::new(Micros::from_millis(33));
         let new: Vec<_> = (0..12).filter(|i| tof.is_new(Micros::from_millis(i * 10), i32::from(*i >= 3))).collect();
         assert_eq!(new, [0, 3, 8]);
+    }
+
+    #[test]
+    fn in_a_log_slower_than_the_sensor_every_row_is_a_sample() {
+        let mut flow = Held::new(Micros::from_millis(10));
+        assert!((0..20).all(|row| flow.is_new(Micros::from_millis(row * 11), 0)));
     }
 
     proptest! {

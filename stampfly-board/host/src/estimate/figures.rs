@@ -39,6 +39,8 @@ pub struct Figures {
     pub tilt_rmse_deg: Option<f64>,
     /// The same with one constant rotation of the body removed.
     pub tilt_rmse_aligned_deg: Option<f64>,
+    /// Error of the vertical that the recording's own device believed at the time, over the same instants.
+    pub device_tilt_rmse_deg: Option<f64>,
     /// Error about the vertical.
     pub heading_rmse_deg: Option<f64>,
     /// Error of the attitude.
@@ -101,6 +103,7 @@ impl Figures {
             flow_dead_reckoning_end_xy_m: by_flow.map(|reach| reach.end_xy_m),
             tilt_rmse_deg: accuracy.tilt(),
             tilt_rmse_aligned_deg: accuracy.tilt_aligned(),
+            device_tilt_rmse_deg: device(recording).tilt(),
             heading_rmse_deg: accuracy.heading(),
             total_rmse_deg: accuracy.total(),
             position_rmse_m: accuracy.position_rms(),
@@ -141,6 +144,21 @@ fn accuracy(recording: &Recording, start: &Start, drive: &Drive) -> Accuracy {
         if let (Some(position), Some(velocity), true) = (point.position, point.velocity, drive.holds_position) {
             accuracy.position(&(state.position + origin), &position);
             accuracy.velocity(&state.velocity, &velocity);
+        }
+    }
+    accuracy
+}
+
+/// How good the device's own attitude was, where the data set's metric counts.
+fn device(recording: &Recording) -> Accuracy {
+    let first = recording.imu.first().map_or(Micros::ZERO, |sample| sample.at);
+    let own = recording.device.as_deref().unwrap_or_default();
+    let mut accuracy = Accuracy::default();
+    for point in recording.truth.iter().filter(|point| counts(recording.kind, first, point)) {
+        let index = own.partition_point(|device| device.at <= point.at).checked_sub(1);
+        let newest = index.and_then(|index| own.get(index)).filter(|device| point.at.since(device.at) < STALE);
+        if let (Some(newest), Some(attitude)) = (newest, point.attitude) {
+            accuracy.attitude(&newest.attitude, &attitude);
         }
     }
     accuracy

@@ -61,6 +61,9 @@ pub struct SceneOptions {
     /// Mean wind towards north and east, m/s.
     #[arg(long, value_name = "N,E", value_parser = north_and_east, allow_hyphen_values = true)]
     pub wind: Option<[f32; 2]>,
+    /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
+    #[arg(long)]
+    pub cameras: bool,
     /// Delay and interrupt the executor, by this seed.
     #[arg(long, value_name = "SEED")]
     pub jitter: Option<u64>,
@@ -81,6 +84,7 @@ impl Default for SceneOptions {
             vibration: 1.0,
             gust: None,
             wind: None,
+            cameras: false,
             jitter: None,
             list: false,
             json: false,
@@ -251,6 +255,7 @@ impl SceneOptions {
             config.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
         set_parameters(&mut config.vehicle, &self.param)?;
+        config.cameras = self.cameras;
         config.jitter = self.jitter;
         Ok(config)
     }
