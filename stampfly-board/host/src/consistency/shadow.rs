@@ -7,7 +7,9 @@
 use stampfly_board::{plan, wiring};
 use stampfly_bus::{Activation, InputRecord};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
-use stampfly_types::messages::{BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData};
+use stampfly_types::messages::{
+    BaroData, CalibrationResult, EstimatorCommand, ExternalPose, FlowData, ImuData, MagData, TofData,
+};
 use stampfly_types::{Message, Micros};
 use std::collections::VecDeque;
 
@@ -69,6 +71,7 @@ pub struct Shadow {
     flow: Recent<FlowData>,
     mag: Recent<MagData>,
     baro: Recent<BaroData>,
+    pose: Recent<ExternalPose>,
     calibration: Recent<CalibrationResult>,
     command: Recent<EstimatorCommand>,
     last_imu: Option<(Micros, ImuData)>,
@@ -87,6 +90,7 @@ impl Shadow {
             flow: Recent::default(),
             mag: Recent::default(),
             baro: Recent::default(),
+            pose: Recent::default(),
             calibration: Recent::default(),
             command: Recent::default(),
             last_imu: None,
@@ -119,6 +123,7 @@ impl Shadow {
             wiring::Id::sensor_flow => self.flow.add(at, generation, words),
             wiring::Id::sensor_mag => self.mag.add(at, generation, words),
             wiring::Id::sensor_baro => self.baro.add(at, generation, words),
+            wiring::Id::external_pose => self.pose.add(at, generation, words),
             wiring::Id::calibration => self.calibration.add(at, generation, words),
             wiring::Id::estimator_command => self.command.add(at, generation, words),
             wiring::Id::estimate_state => {
@@ -136,7 +141,7 @@ impl Shadow {
         if plan::ACTIVATIONS.get(index).is_none_or(|info| info.name != "estimation") {
             return;
         }
-        let &[imu, tof, flow, mag, baro, calibration, command] = activation.inputs() else { return };
+        let &[imu, tof, flow, mag, baro, pose, calibration, command] = activation.inputs() else { return };
         let (now, estimator) = (activation.now(), &mut self.estimator);
         if let Some((_, calibration)) = self.calibration.taken(calibration).last()
             && calibration.complete
@@ -163,6 +168,14 @@ impl Shadow {
         }
         for (at, baro) in self.baro.taken(baro) {
             seen(Sensor::Baro, now, estimator.fuse_baro(at, &baro));
+        }
+        for (at, pose) in self.pose.taken(pose) {
+            if pose.position_sigma > 0.0 {
+                estimator.fuse_position(at, &pose.position, pose.position_sigma);
+            }
+            if pose.attitude_sigma > 0.0 {
+                estimator.fuse_attitude(at, &pose.attitude, pose.attitude_sigma);
+            }
         }
     }
 }
