@@ -48,7 +48,8 @@ fn late_measurements_do_as_well_as_those_on_time() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let delays = Uniform::new_inclusive(0, most).expect("a range");
         // Due step, then in the order of stamps: a sensor's samples arrive in order.
-        let (mut tofs, mut flows): (Vec<(u64, Micros, TofData)>, Vec<(u64, Micros, FlowData)>) = (vec![], vec![]);
+        let mut tofs: Vec<(u64, Micros, TofData)> = Vec::new();
+        let mut flows: Vec<(u64, Micros, FlowData)> = Vec::new();
         let (mut refused, mut squares) = (0, [0.0; 3]);
         for step in 1..=8_000u64 {
             let at = flight.at(step);
