@@ -39,7 +39,7 @@ pub struct FlightConsistency {
     /// Times a sensor was refused until the estimate was moved to it.
     pub resets: u32,
     /// Of them or others, those that neither ended within a second nor raised `diverged`; and stretches of more than
-    /// [`PATIENCE`] in which the error was beyond any use while the estimate called itself valid.
+    /// a second in which the error was beyond any use while the estimate called itself valid.
     pub unresolved: u32,
     /// Did the estimate say that it is lost?
     pub diverged: bool,

@@ -60,7 +60,7 @@ pub enum Sensor {
     Baro,
 }
 
-/// The second estimator. See the [module](self) documentation.
+/// The second estimator: fed by the bus and the activations, it repeats the flight's own.
 #[derive(Debug)]
 pub struct Shadow {
     estimator: Eskf,
