@@ -7,6 +7,9 @@
 //! | [`AttitudeFilter`](attitude::AttitudeFilter) | attitude without position sensors, field bent or not | 1.2 kB | position, velocity |
 //! | [`Mahony`](attitude::Mahony) | the least that levels a multirotor | 20 bytes | unknown gyro bias, heading |
 //!
+//! [`calibration`] finds what the sensors do wrong before they are used: bias, scale, hard and soft iron, trim, drift
+//! with temperature.
+//!
 //! All but the last implement [`Estimator`]. They need no allocation and no other crate of the family than
 //! `stampfly-types`, and give the same bits on every machine.
 #![no_std]
@@ -17,6 +20,7 @@ extern crate std;
 
 pub mod aid;
 pub mod attitude;
+pub mod calibration;
 mod complementary;
 mod config;
 mod eskf;

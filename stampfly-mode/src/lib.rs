@@ -7,7 +7,6 @@
 //! | [`failsafe`] | what is wrong: detects, never acts | 400 Hz |
 //! | [`landing`] | contact with the ground, take-off and landing | 400 Hz |
 //! | [`authority`] | whose sticks count | 50 Hz |
-//! | [`calibration`] | when it was still for long enough | 400 Hz |
 //! | [`button`] | what a press meant | 50 Hz |
 //! | [`signal`] | what people see and hear | 30 Hz |
 //!
@@ -21,7 +20,6 @@ extern crate std;
 pub mod arming;
 pub mod authority;
 pub mod button;
-pub mod calibration;
 pub mod failsafe;
 pub mod landing;
 pub mod machine;
@@ -29,7 +27,6 @@ pub mod signal;
 
 pub use authority::{Authority, AuthorityConfig};
 pub use button::ButtonDecoder;
-pub use calibration::{StillCalibration, StillnessConfig};
 pub use failsafe::{Failsafe, FailsafeConfig, FailsafeInput};
 pub use landing::{LandingConfig, LandingInput, TakeoffLanding};
 pub use machine::{Command, ModeInput, ModeMachine, ModeOutput};

@@ -3,7 +3,7 @@
 use crate::wiring;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
-use stampfly_mode::StillCalibration;
+use stampfly_eskf::calibration::StillCalibration;
 use stampfly_types::messages::*;
 
 /// Calibration: still samples in, biases and the first attitude out.
@@ -58,7 +58,8 @@ impl Runnable for Calibration<'_> {
             self.calibration.add_baro(&sample.data);
         }
         for sample in &self.imu_samples {
-            self.calibration.step(sample.at, &sample.data);
+            // Motion shows in the result as progress that began again; what kind of motion it was is not published.
+            let _ = self.calibration.step(sample.at, &sample.data);
         }
         // A result that does not change any more is not news.
         let result = self.calibration.result();

@@ -109,6 +109,11 @@ impl<T: FloatCore> Biquad<T> {
         }
     }
 
+    /// Changes the design and keeps the state: for a corner that moves a little at a time.
+    pub fn retune(&mut self, coefficients: BiquadCoefficients<T>) {
+        self.coefficients = coefficients;
+    }
+
     /// The present output.
     #[must_use]
     pub fn value(&self) -> T {

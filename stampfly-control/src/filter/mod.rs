@@ -1,4 +1,5 @@
-//! Digital filters: [`LowPass`] of first order, [`Biquad`] low-pass and notch, [`BiquadChain`] of equal stages.
+//! Digital filters: [`LowPass`] of first order, [`Biquad`] low-pass and notch, [`BiquadChain`] of equal stages,
+//! [`DynamicNotch`] that follows a tone.
 //!
 //! Use a [`LowPass`] where little lag matters more than a steep edge (battery voltage, derivative terms), a
 //! [`BiquadChain`] against vibration above a known frequency, a notch [`Biquad`] against one structural mode. All
@@ -8,9 +9,11 @@
 //! state for ever.
 
 mod biquad;
+mod dynamic_notch;
 mod low_pass;
 
 pub use biquad::{Biquad, BiquadChain, BiquadCoefficients};
+pub use dynamic_notch::DynamicNotch;
 pub use low_pass::LowPass;
 
 /// Why a filter could not be designed.

@@ -1,0 +1,34 @@
+//! Calibration: what a sensor does wrong that can be found out on the ground.
+//!
+//! | component | finds | the vehicle has to | result |
+//! |---|---|---|---|
+//! | [`StillCalibration`] | gyro bias, first attitude, ground altitude | lie still, after every power-on | [`CalibrationResult`] |
+//! | [`SixPosition`] | accelerometer scale and bias | lie on each of its six faces, once | [`AccelCorrection`] |
+//! | [`EllipsoidFit`] | magnetometer hard and soft iron | be turned all ways, once per place | [`MagCorrection`] |
+//! | [`LevelTrim`] | tilt of the sensor in the airframe | stand on a level floor, once | [`Trim`] |
+//! | [`TemperatureTable`] | bias against temperature | lie still while it warms up | [`TemperatureBias`] |
+//!
+//! All are plain data stepped with the time as an argument. A sample that is of no use is refused with the reason; a
+//! result comes with its quality, or not at all. Four of them listen to [`StillAverage`], so all mean the same by still.
+//!
+//! Corrections apply in this order: temperature bias, accelerometer or magnetometer correction, trim.
+//!
+//! [`CalibrationResult`]: stampfly_types::messages::CalibrationResult
+
+mod ellipsoid;
+mod level_trim;
+mod principal_axes;
+mod six_position;
+mod still;
+mod stillness;
+mod temperature;
+mod triangle;
+
+pub use ellipsoid::{EllipsoidConfig, EllipsoidFailure, EllipsoidFit, EllipsoidQuality, MagCorrection, MagRefusal};
+pub use level_trim::{LevelTrim, LevelTrimQuality, LevelTrimRefusal, Trim};
+pub use six_position::{
+    AccelCorrection, Face, SixPosition, SixPositionFailure, SixPositionQuality, SixPositionRefusal,
+};
+pub use still::{StillCalibration, StillQuality};
+pub use stillness::{NotStill, StillAverage, StillMean, StillnessConfig};
+pub use temperature::{Reach, TemperatureBias, TemperatureQuality, TemperatureRefusal, TemperatureTable};

@@ -1,0 +1,265 @@
+//! Accelerometer scale and bias from the six faces.
+//!
+//! The vehicle is put on each of its faces, in any order, and left alone for about two seconds each. Held still, an
+//! accelerometer measures one g whatever its attitude, so the scale and bias sought are those that give every hold the
+//! same length. That needs no exact placing: a face that leans by ten degrees is as good as an upright one.
+//!
+//! Use it once a vehicle, and after a crash. Not for cross-axis errors, which six faces do not show (data sheets give
+//! 0.5 % and less), and not with a temperature far from that of flight.
+//!
+//! Method: Gauss-Newton on the lengths; D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU
+//! calibration without external equipments", ICRA 2014, with three scales and three biases for unknowns.
+
+use super::triangle::Triangle;
+use super::{NotStill, StillAverage, StillMean, StillnessConfig};
+use stampfly_types::messages::ImuData;
+use stampfly_types::{GRAVITY, Micros, Vec3, math};
+
+/// The side of the vehicle that is down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Face {
+    /// Nose down.
+    Front,
+    /// Tail down.
+    Rear,
+    /// On its right side.
+    Right,
+    /// On its left side.
+    Left,
+    /// On its feet.
+    Bottom,
+    /// On its back.
+    Top,
+}
+
+impl Face {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Front, Self::Rear, Self::Right, Self::Left, Self::Bottom, Self::Top];
+
+    /// Cosine of 25°: more than that off, and it is no face.
+    const UPRIGHT: f32 = 0.906;
+
+    /// The face that is down when this specific force is felt, body FRD; `None` when it leans by more than 25°.
+    #[must_use]
+    pub fn of(force: &Vec3) -> Option<Self> {
+        let limit = Self::UPRIGHT * force.norm();
+        let pairs = [(force.x, Self::Front, Self::Rear), (force.y, Self::Right, Self::Left)];
+        let pairs = pairs.into_iter().chain([(force.z, Self::Bottom, Self::Top)]);
+        // The table pushes upwards, so it pushes against the axis that points down.
+        let mut found = pairs.filter(|(along, ..)| along.abs() >= limit && limit > 0.0);
+        found.next().map(|(along, down, up)| if along < 0.0 { down } else { up })
+    }
+}
+
+/// Why a sample or a hold was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SixPositionRefusal {
+    /// It moves.
+    Moving(NotStill),
+    /// It turned slowly during the hold.
+    Creeping,
+    /// It leans by more than 25° from the nearest face.
+    NotAFace,
+    /// This face was held before and had another length: one of the two holds was not at rest.
+    Contradiction(Face),
+    /// This face has been held twice already.
+    FaceFull(Face),
+}
+
+/// Why there is no result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SixPositionFailure {
+    /// This face has not been held yet.
+    Missing(Face),
+    /// The holds do not determine scale and bias.
+    NotSolvable,
+    /// A scale is off by more than a fifth or a bias above 3 m/s²: that is a fault, not a tolerance.
+    Implausible,
+}
+
+/// How good a result is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SixPositionQuality {
+    /// Root mean square of |a| − g over the holds as measured, m/s².
+    pub residual_before: f32,
+    /// The same after correction. Zero without meaning when `redundancy` is zero.
+    pub residual: f32,
+    /// Holds beyond the six that determine the result: hold faces a second time to have the result checked.
+    pub redundancy: u32,
+    /// Expected standard error of a bias from the noise of the holds, m/s².
+    pub noise: f32,
+}
+
+/// Corrects an accelerometer: (measured − bias) · scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AccelCorrection {
+    /// What it shows without any force, body FRD, m/s².
+    pub bias: Vec3,
+    /// What the rest has to be multiplied with, by axis.
+    pub scale: Vec3,
+}
+
+impl AccelCorrection {
+    /// The specific force behind a measurement, body FRD, m/s².
+    #[inline]
+    #[must_use]
+    pub fn correct(&self, measured: Vec3) -> Vec3 {
+        (measured - self.bias).component_mul(&self.scale)
+    }
+}
+
+/// Holds kept of each face: one is needed, the second checks.
+const HOLDS: usize = 2;
+/// Two holds of a face may differ in length by this, m/s², and by this share of their distance, which is what a bias of
+/// 1 m/s² does to two holds that lean differently.
+const AGREEMENT: (f32, f32) = (0.1, 0.1);
+/// Largest standard deviation of the specific force in a hold, m/s². Above it, it turned too slowly to be called motion.
+const CREEP: f32 = 0.25;
+
+/// The six-position calibration of an accelerometer.
+///
+/// ```
+/// use stampfly_eskf::calibration::SixPosition;
+/// use stampfly_types::{GRAVITY, Micros, Vec3, messages::ImuData};
+/// let mut calibration = SixPosition::default();
+/// let mut now = Micros::ZERO;
+/// for axis in [Vec3::x(), Vec3::y(), Vec3::z()] {
+///     for force in [axis * GRAVITY, axis * -GRAVITY] {
+///         let measured = force * 1.01 + Vec3::new(0.1, -0.2, 0.3);
+///         for k in 0..1200 {
+///             now += Micros(2_500);
+///             // It is picked up and turned, then left alone.
+///             let gyro = if k < 100 { Vec3::new(3.0, 0.0, 0.0) } else { Vec3::zeros() };
+///             let _ = calibration.step(now, &ImuData { accel: measured, gyro, temperature: 25.0 });
+///         }
+///     }
+/// }
+/// let (correction, quality) = calibration.solve().unwrap();
+/// assert!((correction.bias - Vec3::new(0.1, -0.2, 0.3)).amax() < 1e-3);
+/// assert!(quality.residual < 1e-3 && quality.residual_before > 0.1);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SixPosition {
+    average: StillAverage,
+    /// A hold has been taken, and nobody has touched the vehicle since.
+    taken: bool,
+    holds: [[Option<Vec3>; HOLDS]; 6],
+    noise: f32,
+}
+
+impl Default for SixPosition {
+    /// Two thirds of a second to settle, a second and a quarter at 400 Hz to average, any accelerometer within a fifth of g.
+    fn default() -> Self {
+        let limits = StillnessConfig { force_range: [7.8, 11.8], settle: 0.7, samples: 500, ..Default::default() };
+        Self::new(limits)
+    }
+}
+
+impl SixPosition {
+    /// Nothing held yet. `force_range` must leave room for the errors that are looked for.
+    #[must_use]
+    pub fn new(still: StillnessConfig) -> Self {
+        Self { average: StillAverage::new(still), taken: false, holds: [[None; HOLDS]; 6], noise: 0.0 }
+    }
+
+    /// Takes an inertial sample. Gives the face when its hold has just been taken: now turn the vehicle.
+    ///
+    /// # Errors
+    /// Why the sample, or with its last sample the hold, does not count. The holds taken before stay.
+    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<Option<Face>, SixPositionRefusal> {
+        match self.average.step(now, imu) {
+            Err(reason) => {
+                self.taken &= reason == NotStill::NotFinite;
+                Err(SixPositionRefusal::Moving(reason))
+            }
+            Ok(Some(mean)) if !self.taken => {
+                let face = self.hold(&mean)?;
+                self.taken = true;
+                Ok(Some(face))
+            }
+            Ok(_) => Ok(None),
+        }
+    }
+
+    fn hold(&mut self, mean: &StillMean) -> Result<Face, SixPositionRefusal> {
+        if mean.accel_noise.amax() > CREEP {
+            return Err(SixPositionRefusal::Creeping);
+        }
+        let face = Face::of(&mean.accel).ok_or(SixPositionRefusal::NotAFace)?;
+        let full = SixPositionRefusal::FaceFull(face);
+        let places = self.holds.get_mut(face as usize).ok_or(full)?;
+        for before in places.iter().flatten() {
+            let (constant, share) = AGREEMENT;
+            if (before.norm() - mean.accel.norm()).abs() > constant + share * (before - mean.accel).norm() {
+                return Err(SixPositionRefusal::Contradiction(face));
+            }
+        }
+        *places.iter_mut().find(|place| place.is_none()).ok_or(full)? = Some(mean.accel);
+        self.noise = self.noise.max(mean.accel_noise.amax() / math::sqrt(mean.samples as f32));
+        Ok(face)
+    }
+
+    /// Has this face been held?
+    #[must_use]
+    pub fn has(&self, face: Face) -> bool {
+        self.holds.get(face as usize).is_some_and(|holds| holds.iter().any(Option::is_some))
+    }
+
+    fn forces(&self) -> impl Iterator<Item = &Vec3> {
+        self.holds.iter().flatten().flatten()
+    }
+
+    /// Root mean square of |a| − g.
+    fn residual(&self, correction: &AccelCorrection) -> f32 {
+        let squares = self.forces().map(|force| {
+            let off = correction.correct(*force).norm() - GRAVITY;
+            off * off
+        });
+        math::sqrt(squares.sum::<f32>() / (self.forces().count() as f32).max(1.0))
+    }
+
+    /// Scale and bias of the accelerometer, and how well they fit.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn solve(&self) -> Result<(AccelCorrection, SixPositionQuality), SixPositionFailure> {
+        if let Some(missing) = Face::ALL.into_iter().find(|face| !self.has(*face)) {
+            return Err(SixPositionFailure::Missing(missing));
+        }
+        let none = AccelCorrection { bias: Vec3::zeros(), scale: Vec3::repeat(1.0) };
+        let mut correction = none;
+        // Converges to the last bit in four.
+        for _ in 0..8 {
+            let mut equations = Triangle::<7>::default();
+            for measured in self.forces() {
+                let force = correction.correct(*measured);
+                let up = force / force.norm();
+                // |a| by scale, in g so that both kinds of unknowns have the same size, and by bias.
+                let by_scale = up.component_mul(&(measured - correction.bias)) / GRAVITY;
+                let by_bias = -up.component_mul(&correction.scale);
+                let short = GRAVITY - force.norm();
+                equations.add([by_scale.x, by_scale.y, by_scale.z, by_bias.x, by_bias.y, by_bias.z, short]);
+            }
+            let [sx, sy, sz, bx, by, bz, _] = equations.solve().ok_or(SixPositionFailure::NotSolvable)?;
+            correction.scale += Vec3::new(sx, sy, sz) / GRAVITY;
+            correction.bias += Vec3::new(bx, by, bz);
+        }
+        let residual = self.residual(&correction);
+        if !residual.is_finite() {
+            return Err(SixPositionFailure::NotSolvable);
+        }
+        if correction.scale.iter().any(|s| (s - 1.0).abs() > 0.2) || correction.bias.amax() > 3.0 {
+            return Err(SixPositionFailure::Implausible);
+        }
+        let quality = SixPositionQuality {
+            residual_before: self.residual(&none),
+            residual,
+            redundancy: (self.forces().count() as u32).saturating_sub(6),
+            // Two opposite faces share each bias.
+            noise: self.noise * core::f32::consts::FRAC_1_SQRT_2,
+        };
+        Ok((correction, quality))
+    }
+}

@@ -1,0 +1,164 @@
+//! Still-calibration: wait until nobody touches the vehicle, then average. After every power-on.
+//!
+//! Gives the gyro's bias, the specific force that shows the first attitude, and the field and altitude to start from.
+//! What counts as still is [`StillAverage`]'s business.
+//!
+//! Not for soft or hard iron, nor for accelerometer scale: those need the vehicle to be turned.
+
+use super::{NotStill, StillAverage, StillMean, StillnessConfig};
+use stampfly_types::messages::{BaroData, CalibrationResult, ImuData, MagData};
+use stampfly_types::{GRAVITY, Micros, Vec3};
+
+/// How good a finished still-calibration is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillQuality {
+    /// Standard deviation of one sample of the gyro, rad/s.
+    pub gyro_noise: Vec3,
+    /// Standard deviation of one sample of the accelerometer, m/s².
+    pub accel_noise: Vec3,
+    /// Mean specific force above gravity, m/s²: scale and bias of the accelerometer.
+    pub force_error: f32,
+    /// Samples averaged.
+    pub samples: u32,
+}
+
+/// The still-calibration.
+///
+/// ```
+/// use stampfly_eskf::calibration::StillCalibration;
+/// use stampfly_types::{Micros, Vec3, messages::ImuData};
+/// let mut calibration = StillCalibration::default();
+/// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0 };
+/// for k in 0..1500 {
+///     calibration.step(Micros(2_500 * k), &still).unwrap();
+/// }
+/// let result = calibration.result();
+/// assert!(result.complete && (result.gyro_bias.x - 0.01).abs() < 1e-5);
+/// assert!(calibration.quality().unwrap().force_error.abs() < 0.01);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StillCalibration {
+    average: StillAverage,
+    mean: Option<StillMean>,
+    field: Vec3,
+    altitude: Option<f32>,
+    result: CalibrationResult,
+}
+
+impl StillCalibration {
+    /// Nothing collected yet.
+    #[must_use]
+    pub fn new(config: StillnessConfig) -> Self {
+        Self { average: StillAverage::new(config), ..Self::default() }
+    }
+
+    /// Takes an inertial sample. After completion nothing changes any more.
+    ///
+    /// # Errors
+    /// Why the sample does not count: the collection begins again, unless the sample was not finite.
+    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<(), NotStill> {
+        if self.result.complete {
+            return Ok(());
+        }
+        let begun = self.average.progress() > 0.0;
+        let step = self.average.step(now, imu);
+        self.result.progress = self.average.progress();
+        if step.is_err() && begun && self.result.progress == 0.0 {
+            self.result.restarts = self.result.restarts.wrapping_add(1);
+        }
+        if let Some(mean) = step? {
+            self.mean = Some(mean);
+            self.result.gyro_bias = mean.gyro;
+            self.result.specific_force = mean.accel;
+            self.result.field = self.field;
+            self.result.baro_altitude = self.altitude.unwrap_or(0.0);
+            self.result.progress = 1.0;
+            self.result.complete = true;
+        }
+        Ok(())
+    }
+
+    /// Takes a magnetometer sample.
+    pub fn add_mag(&mut self, mag: &MagData) {
+        if mag.field.iter().all(|v| v.is_finite()) {
+            let first = self.field == Vec3::zeros();
+            self.field += (mag.field - self.field) * if first { 1.0 } else { 0.1 };
+        }
+    }
+
+    /// Takes a barometer sample.
+    pub fn add_baro(&mut self, baro: &BaroData) {
+        if baro.altitude.is_finite() {
+            self.altitude = Some(self.altitude.map_or(baro.altitude, |a| a + 0.1 * (baro.altitude - a)));
+        }
+    }
+
+    /// What has been found so far.
+    #[must_use]
+    pub fn result(&self) -> CalibrationResult {
+        self.result
+    }
+
+    /// How good it is; `None` before completion.
+    #[must_use]
+    pub fn quality(&self) -> Option<StillQuality> {
+        self.mean.map(|mean| StillQuality {
+            gyro_noise: mean.gyro_noise,
+            accel_noise: mean.accel_noise,
+            force_error: mean.accel.norm() - GRAVITY,
+            samples: mean.samples,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn still() -> ImuData {
+        ImuData { accel: Vec3::new(0.1, 0.0, -9.8), gyro: Vec3::new(0.01, -0.02, 0.005), temperature: 30.0 }
+    }
+
+    #[test]
+    fn motion_starts_the_average_again() {
+        let mut calibration = StillCalibration::default();
+        for k in 0..1000u64 {
+            calibration.step(Micros(2_500 * k), &still()).unwrap();
+        }
+        assert!(calibration.result().progress > 0.5);
+        for k in 1000..1020u64 {
+            let turning = ImuData { gyro: Vec3::new(1.0, 0.0, 0.0), ..still() };
+            assert!(calibration.step(Micros(2_500 * k), &turning).is_err());
+        }
+        assert_eq!((calibration.result().progress, calibration.result().restarts), (0.0, 1));
+        for k in 1020..4000u64 {
+            // The running means forget within a few tenths of a second.
+            let _ = calibration.step(Micros(2_500 * k), &still());
+        }
+        let result = calibration.result();
+        assert!(result.complete && (result.gyro_bias - still().gyro).norm() < 1e-5, "the motion left no trace");
+    }
+
+    #[test]
+    fn a_hand_is_never_still() {
+        let mut calibration = StillCalibration::default();
+        for k in 0..8000u64 {
+            let swing = stampfly_types::math::sin(k as f32 * 0.03) * 0.2;
+            let _ = calibration.step(Micros(2_500 * k), &ImuData { gyro: Vec3::new(swing, 0.0, 0.0), ..still() });
+        }
+        assert!(!calibration.result().complete && calibration.quality().is_none());
+    }
+
+    #[test]
+    fn a_sample_that_is_not_finite_is_left_out_and_ends_nothing() {
+        let mut calibration = StillCalibration::default();
+        for k in 0..1600u64 {
+            calibration.step(Micros(2_500 * k), &still()).unwrap();
+            let broken = ImuData { accel: Vec3::new([f32::NAN, 1e30][k as usize % 2], 0.0, 0.0), ..still() };
+            assert!(k > 1300 || calibration.step(Micros(2_500 * k), &broken) == Err(NotStill::NotFinite));
+        }
+        let quality = calibration.quality().unwrap();
+        assert!(calibration.result().complete && calibration.result().restarts == 0);
+        assert!(quality.accel_noise.amax() < 1e-3 && quality.gyro_noise.amax() < 1e-5, "{quality:?}");
+    }
+}

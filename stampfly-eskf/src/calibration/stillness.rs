@@ -1,0 +1,236 @@
+//! Means over stretches in which nobody touched the vehicle.
+//!
+//! A vehicle that calibrates in somebody's hand flips after take-off. So a mean only counts samples of a period in which
+//! the gyro and the accelerometer were quiet from beginning to end; any motion starts it again. Limits are the StampFly's
+//! (BMI270); the method is the exponentially weighted mean and variance.
+//!
+//! Use it to build a calibration that needs stillness. Not for deciding in flight whether the vehicle stands: a hover
+//! in calm air is as quiet as a table.
+
+use stampfly_types::messages::ImuData;
+use stampfly_types::{Micros, Vec3, math};
+
+/// What counts as still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillnessConfig {
+    /// Largest mean angular rate, rad/s. Above the gyro's own offset, which may be 1 °/s an axis.
+    pub rate_max: f32,
+    /// Largest variance of the angular rate, (rad/s)².
+    pub rate_variance_max: f32,
+    /// Mean specific force must lie between these, m/s².
+    pub force_range: [f32; 2],
+    /// Largest variance of the specific force, (m/s²)².
+    pub force_variance_max: f32,
+    /// Time to settle before the average begins, s.
+    pub settle: f32,
+    /// Samples averaged.
+    pub samples: u32,
+}
+
+impl Default for StillnessConfig {
+    fn default() -> Self {
+        Self {
+            rate_max: 0.06,
+            rate_variance_max: 1e-3,
+            force_range: [9.3, 10.3],
+            force_variance_max: 0.05,
+            settle: 1.0,
+            samples: 1000,
+        }
+    }
+}
+
+/// Why a sample does not belong to a still stretch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NotStill {
+    /// A number in it is not finite, or beyond what any sensor measures. It is left out and ends nothing.
+    NotFinite,
+    /// It turns: the mean angular rate is above the limit.
+    Turning,
+    /// It trembles: the variance of the angular rate is above the limit.
+    Trembling,
+    /// The mean specific force is not that of gravity.
+    NotGravity,
+    /// It is shaken: the variance of the specific force is above the limit.
+    Shaken,
+}
+
+/// The mean of a still stretch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillMean {
+    /// Mean angular rate, which is the gyro's bias, body FRD, rad/s.
+    pub gyro: Vec3,
+    /// Mean specific force, body FRD, m/s².
+    pub accel: Vec3,
+    /// Mean temperature of the sensor, °C, if every sample had one.
+    pub temperature: Option<f32>,
+    /// Standard deviation of one sample of the gyro, rad/s.
+    pub gyro_noise: Vec3,
+    /// Standard deviation of one sample of the accelerometer, m/s².
+    pub accel_noise: Vec3,
+    /// Samples in the mean.
+    pub samples: u32,
+}
+
+/// Weight of a new sample in the running mean and variance: about 50 ms at 400 Hz.
+const WEIGHT: f32 = 0.05;
+/// No sensor measures more, in any unit used here; its square is still far from infinity.
+const LARGEST: f32 = 1e6;
+
+/// Mean and variance with an exponential window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Spread {
+    mean: Vec3,
+    variance: f32,
+}
+
+impl Spread {
+    fn add(&mut self, value: &Vec3) {
+        let off = value - self.mean;
+        self.mean += off * WEIGHT;
+        self.variance += WEIGHT * (off.norm_squared() - self.variance);
+    }
+}
+
+/// Sums over one stretch. Squares are of the distance from the first value, because the difference of large squares is
+/// noise in `f32`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    first: Vec3,
+    sum: Vec3,
+    squares: Vec3,
+}
+
+impl Sums {
+    fn add(&mut self, value: &Vec3, count: u32) {
+        if count == 1 {
+            self.first = *value;
+        }
+        self.sum += value;
+        let off = value - self.first;
+        self.squares += off.component_mul(&off);
+    }
+
+    /// Mean and standard deviation.
+    fn finish(&self, share: f32) -> (Vec3, Vec3) {
+        let mean = self.sum * share;
+        let off = mean - self.first;
+        (mean, (self.squares * share - off.component_mul(&off)).map(math::sqrt))
+    }
+}
+
+/// Averages still stretches of a fixed number of samples, one after the other.
+///
+/// ```
+/// use stampfly_eskf::calibration::{NotStill, StillAverage, StillnessConfig};
+/// use stampfly_types::{Micros, Vec3, messages::ImuData};
+/// let mut average = StillAverage::new(StillnessConfig { samples: 100, settle: 0.5, ..Default::default() });
+/// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0 };
+/// let first = (0..).find_map(|k| average.step(Micros(2_500 * k), &still).unwrap()).unwrap();
+/// assert!((first.gyro.x - 0.01).abs() < 1e-6 && first.samples == 100);
+/// let turning = ImuData { gyro: Vec3::new(5.0, 0.0, 0.0), ..still };
+/// assert_eq!(average.step(Micros::from_secs(1), &turning), Err(NotStill::Turning));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillAverage {
+    config: StillnessConfig,
+    rate: Spread,
+    force: Spread,
+    since: Option<Micros>,
+    count: u32,
+    gyro: Sums,
+    accel: Sums,
+    temperature: f32,
+}
+
+impl Default for StillAverage {
+    fn default() -> Self {
+        Self::new(StillnessConfig::default())
+    }
+}
+
+impl StillAverage {
+    /// Nothing collected yet.
+    #[must_use]
+    pub fn new(config: StillnessConfig) -> Self {
+        Self {
+            config,
+            rate: Spread::default(),
+            force: Spread::default(),
+            since: None,
+            count: 0,
+            gyro: Sums::default(),
+            accel: Sums::default(),
+            temperature: 0.0,
+        }
+    }
+
+    /// What it was made with.
+    #[must_use]
+    pub fn config(&self) -> StillnessConfig {
+        self.config
+    }
+
+    /// Share of the present stretch that has been collected, 0 to 1.
+    #[must_use]
+    pub fn progress(&self) -> f32 {
+        self.count as f32 / self.config.samples.max(1) as f32
+    }
+
+    fn check(&self) -> Result<(), NotStill> {
+        let [low, high] = self.config.force_range;
+        // A comparison with NaN must count as motion.
+        let checks = [
+            (self.rate.mean.norm() <= self.config.rate_max, NotStill::Turning),
+            (self.rate.variance <= self.config.rate_variance_max, NotStill::Trembling),
+            ((low..=high).contains(&self.force.mean.norm()), NotStill::NotGravity),
+            (self.force.variance <= self.config.force_variance_max, NotStill::Shaken),
+        ];
+        checks.iter().find(|(passed, _)| !passed).map_or(Ok(()), |(_, reason)| Err(*reason))
+    }
+
+    fn start_again(&mut self) {
+        *self = Self { rate: self.rate, force: self.force, since: self.since, ..Self::new(self.config) };
+    }
+
+    /// Takes an inertial sample, in order. Gives the mean with the last sample of a stretch; the next one begins with the
+    /// next sample, without settling again.
+    ///
+    /// # Errors
+    /// What kind of motion it is. Unless the sample was not finite, the stretch begins again.
+    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<Option<StillMean>, NotStill> {
+        if !imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.abs() <= LARGEST) {
+            return Err(NotStill::NotFinite);
+        }
+        if self.since.is_none() {
+            // The first sample is the first mean; a variance counted from zero would be motion.
+            (self.rate.mean, self.force.mean) = (imu.gyro, imu.accel);
+        }
+        self.rate.add(&imu.gyro);
+        self.force.add(&imu.accel);
+        let since = *self.since.get_or_insert(now);
+        if let Err(reason) = self.check() {
+            self.since = Some(now);
+            self.start_again();
+            return Err(reason);
+        }
+        if now.since(since).seconds() < self.config.settle {
+            return Ok(None);
+        }
+        self.count += 1;
+        self.gyro.add(&imu.gyro, self.count);
+        self.accel.add(&imu.accel, self.count);
+        self.temperature += imu.temperature;
+        if self.count < self.config.samples {
+            return Ok(None);
+        }
+        let share = 1.0 / self.count as f32;
+        let (gyro, gyro_noise) = self.gyro.finish(share);
+        let (accel, accel_noise) = self.accel.finish(share);
+        let temperature = Some(self.temperature * share).filter(|mean| mean.is_finite());
+        let mean = StillMean { gyro, accel, temperature, gyro_noise, accel_noise, samples: self.count };
+        self.start_again();
+        Ok(Some(mean))
+    }
+}

@@ -1,0 +1,97 @@
+//! Least squares that takes one equation after the other: a triangular (QR) factor and Givens rotations.
+//!
+//! The normal equations would square the condition number, for which `f32` has no room; this factor has the condition of
+//! the equations themselves, and shows the residual without a difference of large numbers. Golub, Van Loan, "Matrix
+//! Computations", 4th edition, sections 5.1.8 and 6.5.
+
+use stampfly_types::math;
+
+/// A pivot below this share of its column means that the column depends on the ones before it.
+const DEPENDENT: f32 = 1e-4;
+
+/// Equations in `WIDTH` − 1 unknowns, as the triangle they come down to. The right-hand side is the last column; in its
+/// last place stands the norm of the residual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Triangle<const WIDTH: usize> {
+    rows: [[f32; WIDTH]; WIDTH],
+}
+
+impl<const WIDTH: usize> Default for Triangle<WIDTH> {
+    fn default() -> Self {
+        Self { rows: [[0.0; WIDTH]; WIDTH] }
+    }
+}
+
+impl<const WIDTH: usize> Triangle<WIDTH> {
+    /// Rotates an equation in: the factors of the unknowns, the right-hand side behind them.
+    pub(super) fn add(&mut self, mut equation: [f32; WIDTH]) {
+        for (i, row) in self.rows.iter_mut().enumerate() {
+            let (Some(&pivot), Some(&value)) = (row.get(i), equation.get(i)) else { return };
+            let length = math::sqrt(pivot * pivot + value * value);
+            if length > 0.0 {
+                let (cos, sin) = (pivot / length, value / length);
+                for (kept, new) in row.iter_mut().zip(&mut equation).skip(i) {
+                    (*kept, *new) = (cos * *kept + sin * *new, cos * *new - sin * *kept);
+                }
+            }
+        }
+    }
+
+    /// The unknowns, by back substitution; the place of the right-hand side stays zero. `None` when the equations leave
+    /// an unknown open.
+    pub(super) fn solve(&self) -> Option<[f32; WIDTH]> {
+        let mut unknowns = [0.0; WIDTH];
+        for (i, row) in self.rows.iter().enumerate().rev().skip(1) {
+            let column: f32 = self.rows.iter().map(|row| row.get(i).map_or(0.0, |cell| cell * cell)).sum();
+            let pivot = *row.get(i)?;
+            if pivot.is_nan() || pivot.abs() <= DEPENDENT * math::sqrt(column) {
+                return None;
+            }
+            let known: f32 = row.iter().zip(&unknowns).skip(i + 1).map(|(factor, unknown)| factor * unknown).sum();
+            *unknowns.get_mut(i)? = (row.last()? - known) / pivot;
+        }
+        Some(unknowns)
+    }
+
+    /// Norm of what the best solution leaves of the right-hand sides.
+    pub(super) fn residual(&self) -> f32 {
+        self.rows.last().and_then(|row| row.last()).map_or(0.0, |norm| norm.abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNKNOWNS: usize = 9;
+    const WIDTH: usize = UNKNOWNS + 1;
+
+    /// An equation with known factors, the solution 1, 2, … 9, and this error.
+    fn equation(n: u16, error: f32) -> [f32; WIDTH] {
+        let mut equation = [0.0; WIDTH];
+        let mut sum = error;
+        for (k, factor) in equation.iter_mut().take(UNKNOWNS).enumerate() {
+            *factor = math::sin(f32::from(n) * (k as f32 + 1.0) * 0.7 + k as f32);
+            sum += *factor * (k as f32 + 1.0);
+        }
+        equation[UNKNOWNS] = sum;
+        equation
+    }
+
+    #[test]
+    fn the_solution_and_what_it_leaves_are_found() {
+        let mut triangle = Triangle::<WIDTH>::default();
+        for n in 0..8 {
+            triangle.add(equation(n, 0.0));
+        }
+        assert_eq!(triangle.solve(), None, "eight equations in nine unknowns");
+        for n in 8..400 {
+            triangle.add(equation(n, if n % 2 == 0 { 0.1 } else { -0.1 }));
+        }
+        for (found, true_value) in triangle.solve().unwrap().iter().take(UNKNOWNS).zip(1u8..) {
+            assert!((found - f32::from(true_value)).abs() < 0.02, "{found} for {true_value}");
+        }
+        let rms = triangle.residual() / math::sqrt(400.0);
+        assert!((rms - 0.1).abs() < 0.005, "{rms}");
+    }
+}
