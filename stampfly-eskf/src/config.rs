@@ -4,12 +4,13 @@
 /// PMW3901, BMP280).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EskfConfig {
-    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for propeller vibration.
+    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and axes;
+    /// vibration is `accel_roughness`.
     pub accel_noise: f32,
     /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
     pub gyro_noise: f32,
-    /// What a change of the accelerometer from sample to sample adds to its noise: share of its square, 1. See
-    /// [`Roughness`](crate::filter::Roughness).
+    /// What a change of the accelerometer from sample to sample adds to its noise: share of its square, 1. A third for
+    /// white noise of 800 Hz bandwidth sampled at 400 Hz. See [`Roughness`](crate::filter::Roughness).
     pub accel_roughness: f32,
     /// The same for the gyro.
     pub gyro_roughness: f32,
@@ -91,6 +92,25 @@ pub struct EskfConfig {
     pub lockout: f32,
 }
 
+impl EskfConfig {
+    /// Squared Mahalanobis distance at which the gate of a measurement of so many axes lies. A vector of more axes is more
+    /// often far away by chance: its gate is wider, for the same chance (6·10⁻⁵ at four standard deviations).
+    ///
+    /// ```
+    /// let config = stampfly_eskf::EskfConfig { gate: 4.0, ..Default::default() };
+    /// assert_eq!(config.gate_distance(1), 16.0);
+    /// assert!((config.gate_distance(2) - 19.36).abs() < 1e-3);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn gate_distance(&self, axes: usize) -> f32 {
+        self.gate * self.gate * GATE_OF_AXES.get(axes).copied().unwrap_or(1.0)
+    }
+}
+
+/// Squared gate, relative to that of one axis.
+const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
+
 /// What of the magnetic field is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MagModel {
@@ -115,19 +135,19 @@ pub enum GravityUse {
 impl Default for EskfConfig {
     fn default() -> Self {
         Self {
-            accel_noise: 0.3,
-            gyro_noise: 0.003,
-            accel_roughness: 0.0,
-            gyro_roughness: 0.0,
+            accel_noise: 0.1,
+            gyro_noise: 5e-4,
+            accel_roughness: 0.35,
+            gyro_roughness: 0.25,
             gyro_bias_walk: 3e-5,
             accel_bias_walk: 1e-3,
             initial_position: 0.01,
             initial_velocity: 0.05,
             initial_attitude: 0.05,
-            initial_gyro_bias: 0.003,
-            initial_accel_bias: 0.1,
-            vibration_bias: 2.0,
-            tof_sigma: 0.01,
+            initial_gyro_bias: 8e-4,
+            initial_accel_bias: 0.12,
+            vibration_bias: 3.0,
+            tof_sigma: 0.005,
             tof_min: 0.02,
             tof_max: 4.0,
             min_cos_tilt: 0.8,
@@ -148,7 +168,7 @@ impl Default for EskfConfig {
             still_gravity_sigma: 0.1,
             still_velocity_sigma: 0.01,
             still_position_sigma: 0.005,
-            blind_velocity: 0.2,
+            blind_velocity: 0.07,
             gate: 4.0,
             lockout: 0.2,
         }

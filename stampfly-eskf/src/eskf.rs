@@ -10,10 +10,12 @@
 //! | `eskf/measurements.rs` | one function a sensor |
 //! | `eskf/assumptions.rs` | what is assumed where nothing measures |
 //! | `eskf/gate.rs` | gates, lock-outs, resets |
+//! | `eskf/persistence.rs` | innovations that keep to one side |
 
 mod assumptions;
 mod gate;
 mod measurements;
+mod persistence;
 
 use crate::aid::baro::Offset;
 use crate::aid::gravity::Acceleration;
@@ -26,6 +28,7 @@ use crate::filter::state::{Rotation, multiply, rotate};
 use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, Passage, Roughness, VELOCITY};
 use crate::level::attitude_from_specific_force;
 use gate::{Gates, Sensor};
+use persistence::Persistence;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
@@ -41,11 +44,11 @@ const MAX_STEP: f32 = 0.5;
 /// The state moves with every inertial sample, its doubt with the first sample after this much time, s: at 400 Hz with
 /// every second one. A hundredth of the time in which doubt changes, and half the work. (PX4's EKF2 takes 10 ms.)
 const DOUBT_STEP: f32 = 4e-3;
+/// What is added to the doubt of a filter whose innovations keep to one side, rad and rad/s.
+const DOUBTED_TILT: f32 = 0.1;
+const DOUBTED_GYRO_BIAS: f32 = 0.03;
 /// What is assumed where nothing measures is looked at on every n-th inertial sample.
 const STILL_DIVIDER: u32 = 4;
-/// A vector of more axes is more often far away by chance: its gate, relative to that of one axis, for the same chance
-/// (6·10⁻⁵ at four standard deviations).
-const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
 
 /// Running mean of inertial samples between two looks at gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -117,6 +120,7 @@ pub struct Eskf {
     force: Vec3,
     accels: Mean,
     gates: Gates,
+    persistence: Persistence,
     /// Last specific force used as the vertical, and what it should have been.
     gravity: [Vec3; 2],
     status: EstimatorStatus,
@@ -170,6 +174,7 @@ impl Eskf {
             force: Vec3::zeros(),
             accels: Mean::default(),
             gates: Gates::default(),
+            persistence: Persistence::default(),
             gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
@@ -238,8 +243,7 @@ impl Eskf {
             *innovation -= row.predicted;
         }
         let projection = self.covariance.project(&jacobians, innovations, variances);
-        let gate = self.config.gate * self.config.gate * GATE_OF_AXES.get(M).copied().unwrap_or(1.0);
-        let ratio = projection.distance() / gate;
+        let ratio = projection.distance() / self.config.gate_distance(M);
         (projection, ratio)
     }
 
@@ -262,6 +266,23 @@ impl Eskf {
         self.status.resets = self.status.resets.wrapping_add(1);
         self.status.diverged |= self.gates.reset(sensor, self.now);
         Fusion::Reset
+    }
+
+    /// Doubts what flow shows only by and by, because its innovations keep to one side. Doubting it again and again means
+    /// that the estimate is lost.
+    fn doubt(&mut self) {
+        self.doubt_tilt();
+        self.status.diverged |= self.gates.doubt(self.now);
+    }
+
+    /// Doubts the tilt and what may have tilted it.
+    fn doubt_tilt(&mut self) {
+        for axis in 0..2 {
+            self.covariance.inflate(ATTITUDE + axis, DOUBTED_TILT * DOUBTED_TILT);
+            self.covariance.inflate(GYRO_BIAS + axis, DOUBTED_GYRO_BIAS * DOUBTED_GYRO_BIAS);
+            // Tilt and accelerometer bias look alike to flow: what went into the bias is asked for again.
+            self.forget_accel_bias(axis);
+        }
     }
 
     fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {

@@ -1,5 +1,6 @@
 //! A campaign: many missions in parallel, each with its own seed, and what they say together.
 
+use crate::consistency::FlightConsistency;
 use crate::metrics::{FIGURES, Metrics};
 use crate::recorder::Recorder;
 use crate::simulate::{FlightConfig, Outcome, fly};
@@ -45,6 +46,8 @@ pub struct Flight {
     pub seed: u64,
     /// How it went.
     pub outcome: Outcome,
+    /// How the estimate's errors compared with its covariance, if that was asked for.
+    pub consistency: Option<FlightConsistency>,
 }
 
 impl Flight {
@@ -59,6 +62,15 @@ impl Flight {
 /// Flies `configs` on as many threads as there are cores. Flights come back in the order of the configurations.
 /// `done` is called after each.
 pub fn run(configs: &[FlightConfig], done: &(dyn Fn(&Flight) + Sync)) -> Vec<Flight> {
+    run_recorded(configs, &|_| Recorder::hash_only(), done)
+}
+
+/// The same with a recorder of one's own for each flight.
+pub fn run_recorded(
+    configs: &[FlightConfig],
+    recorder: &(dyn Fn(&FlightConfig) -> Recorder + Sync),
+    done: &(dyn Fn(&Flight) + Sync),
+) -> Vec<Flight> {
     let next = AtomicUsize::new(0);
     let flights = Mutex::new(BTreeMap::new());
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(configs.len().max(1));
@@ -69,8 +81,10 @@ pub fn run(configs: &[FlightConfig], done: &(dyn Fn(&Flight) + Sync)) -> Vec<Fli
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     configs.get(index).map(|config| (index, config))
                 } {
-                    let outcome = fly(config, &mut Recorder::hash_only(), &mut |_, _| {});
-                    let flight = Flight { seed: config.simulation.seed, outcome };
+                    let mut recorder = recorder(config);
+                    let outcome = fly(config, &mut recorder, &mut |_, _| {});
+                    let (seed, consistency) = (config.simulation.seed, recorder.into_consistency());
+                    let flight = Flight { seed, outcome, consistency };
                     done(&flight);
                     if let Ok(mut flights) = flights.lock() {
                         flights.insert(index, flight);

@@ -6,6 +6,7 @@
 //! | [`mission`], [`ground_station`] | what to fly, and who asks the vehicle for it |
 //! | [`metrics`] | how good a flight was |
 //! | [`campaign`] | many flights in parallel |
+//! | [`consistency`] | is the estimator as good as it says? |
 //! | [`recorder`], [`replay`] | the log of a flight, and the flight again from its log |
 //! | [`flight`] | a flight as columns over time, with units and names |
 //! | [`flight_log`] | a flight from a ULog file of any origin |
@@ -18,6 +19,7 @@
 
 pub mod campaign;
 pub mod chart;
+pub mod consistency;
 pub mod dataset;
 pub mod estimate;
 pub mod flight;

@@ -13,6 +13,7 @@
 //! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `land` when it stands
 //! and is disarmed.
 
+use stampfly_sim::Noise;
 use std::fmt;
 
 /// One step.
@@ -77,7 +78,36 @@ pub const REFERENCE: &str = include_str!("../missions/square.mission");
 /// Take-off, a minute of hovering, landing.
 pub const HOVER: &str = include_str!("../missions/hover.mission");
 
+/// Random number stream of random missions; the vehicle's own are below a thousand.
+const STREAM: u64 = 1_000;
+
 impl Mission {
+    /// A mission drawn from a seed: take-off to 0.4 to 1 m, four to eight places within 1.5 m of it and 0.3 to 1.5 m
+    /// high, in any heading, at 0.3 to 1.2 m/s, with up to two seconds at each, and landing.
+    ///
+    /// ```
+    /// use stampfly_host::mission::{Mission, Step};
+    /// let mission = Mission::random(1);
+    /// assert!(mission.steps.len() >= 7 && mission.steps.last() == Some(&Step::Land));
+    /// assert_ne!(mission, Mission::random(2));
+    /// ```
+    #[must_use]
+    pub fn random(seed: u64) -> Self {
+        let mut noise = Noise::new(seed, STREAM);
+        let mut between = |low: f64, high: f64| (low + (high - low) * noise.unit()) as f32;
+        let mut steps = vec![Step::Arm, Step::TakeOff { height: between(0.4, 1.0) }];
+        for _ in 0..between(4.0, 9.0) as u32 {
+            steps.push(Step::GoTo {
+                place: [between(-1.5, 1.5), between(-1.5, 1.5), between(0.3, 1.5)],
+                yaw: Some(between(-180.0, 180.0)),
+                speed: between(0.3, 1.2),
+                dwell: between(0.0, 2.0),
+            });
+        }
+        steps.push(Step::Land);
+        Self { steps }
+    }
+
     /// Reads a mission.
     ///
     /// ```

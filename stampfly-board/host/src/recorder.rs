@@ -4,6 +4,7 @@
 //! file is the order in which things became visible: what a runnable reads is in the file before the activation that
 //! reads it. Replay relies on that.
 
+use crate::consistency::{FlightConsistency, Observation};
 use stampfly_board::vehicle::assemble;
 use stampfly_board::{FlightLoop, Observer, VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
@@ -54,6 +55,17 @@ pub struct Recorder {
     bytes: Vec<u8>,
     timing: Option<Vec<Timing>>,
     started: Option<std::time::Instant>,
+    consistency: Consistency,
+}
+
+/// Is somebody to look at the estimator's covariance?
+enum Consistency {
+    /// No.
+    No,
+    /// Yes, when the flight begins, with this seed.
+    Wanted(u64),
+    /// It is being done.
+    Yes(Box<Observation>),
 }
 
 /// Wall time one runnable took, over a flight.
@@ -79,6 +91,7 @@ impl Recorder {
             bytes: Vec::new(),
             timing: None,
             started: None,
+            consistency: Consistency::No,
         }
     }
 
@@ -94,7 +107,16 @@ impl Recorder {
         Self { timing: Some(vec![Timing::default(); plan::COUNT]), ..self }
     }
 
+    /// Compares the estimate's errors with its covariance, too. `seed` chooses the instant that is looked at alone.
+    #[must_use]
+    pub fn with_consistency(self, seed: u64) -> Self {
+        Self { consistency: Consistency::Wanted(seed), ..self }
+    }
+
     pub(crate) fn begin(&mut self, start: Micros, config: &VehicleConfig) {
+        if let Consistency::Wanted(seed) = self.consistency {
+            self.consistency = Consistency::Yes(Box::new(Observation::new(config.eskf, seed)));
+        }
         if !self.wanted {
             return;
         }
@@ -115,6 +137,9 @@ impl Recorder {
 
     pub(crate) fn sample(&mut self, id: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
         self.hash.publish(id as u16, generation, at, words);
+        if let Consistency::Yes(observation) = &mut self.consistency {
+            observation.sample(id, at, generation, words);
+        }
         if let Some(log) = &mut self.log {
             // The sink is memory and the schema is the bus's own: this cannot fail.
             let _ = log.sample(id as usize, &Sample { at, generation, words });
@@ -122,6 +147,9 @@ impl Recorder {
     }
 
     pub(crate) fn truth(&mut self, at: Micros, generation: u32, truth: &Truth) {
+        if let Consistency::Yes(observation) = &mut self.consistency {
+            observation.truth(at, truth);
+        }
         if let Some(log) = &mut self.log {
             let _ = log.sample(TRUTH, &Sample { at, generation, words: truth.to_words().as_ref() });
         }
@@ -145,6 +173,12 @@ impl Recorder {
         &self.bytes
     }
 
+    /// How the estimate's errors compared with its covariance, once the flight is over; `None` when nobody wanted to know.
+    #[must_use]
+    pub fn into_consistency(self) -> Option<FlightConsistency> {
+        if let Consistency::Yes(observation) = self.consistency { Some(observation.finish()) } else { None }
+    }
+
     /// Wall time per runnable, in table order; empty when it was not measured.
     #[must_use]
     pub fn timing(&self) -> &[Timing] {
@@ -154,6 +188,9 @@ impl Recorder {
 
 impl Observer for Recorder {
     fn has_read(&mut self, index: usize, activation: &Activation) {
+        if let Consistency::Yes(observation) = &mut self.consistency {
+            observation.activation(index, activation);
+        }
         let Some(log) = &mut self.log else { return };
         let mut record = stampfly_log::Activation::new(index as u8, activation.now());
         for input in activation.inputs() {

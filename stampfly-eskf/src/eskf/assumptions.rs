@@ -35,12 +35,22 @@ impl Eskf {
                 // It never rights itself otherwise: doubt the attitude, once per lock-out, until gravity fits in again.
                 self.gates.wait(Sensor::Gravity, self.now);
                 for axis in 0..3 {
-                    self.covariance.inflate(ATTITUDE + axis, 0.01);
+                    self.covariance.inflate(ATTITUDE + axis, 0.1);
+                    // Gravity turned into motion by a wrong tilt, and what was learned from that.
+                    self.state.velocity[axis] = 0.0;
+                    self.covariance.reset(VELOCITY + axis, UNKNOWN_VELOCITY * UNKNOWN_VELOCITY);
+                    self.forget_accel_bias(axis);
                 }
                 Fusion::Gated { ratio }
             }
         };
         self.count(Counter::Gravity, fusion);
+    }
+
+    /// Takes the accelerometer for as good as when it was started.
+    pub(super) fn forget_accel_bias(&mut self, axis: usize) {
+        self.state.accel_bias[axis] = 0.0;
+        self.covariance.reset(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
     }
 
     /// Heading counts from where the vehicle was initialised, so it is known there. Doubting it would let every error of

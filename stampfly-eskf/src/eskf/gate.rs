@@ -111,6 +111,11 @@ impl Gates {
     /// Notes that the state was moved to a sensor. True when that has happened too often: the estimate is lost.
     pub(super) fn reset(&mut self, sensor: Sensor, now: Micros) -> bool {
         self.accept(sensor, now);
+        self.doubt(now)
+    }
+
+    /// Notes that the estimate could not be right as it was. True when that has happened too often: it is lost.
+    pub(super) fn doubt(&mut self, now: Micros) -> bool {
         self.resets = if now.since(self.last_reset) > CALM { 1 } else { self.resets.saturating_add(1) };
         self.last_reset = now;
         self.resets >= TOO_MANY_RESETS

@@ -90,17 +90,23 @@ impl Eskf {
         let world = rotate(&then.rotation, &Vec3::new(measured[0], measured[1], 0.0));
         self.acceleration.see(seen, Vec3::new(world.x, world.y, then.state.velocity.z));
         match self.gates.judge(Sensor::Flow, self.now, ratio, self.config.lockout) {
-            Verdict::Fuse => Ok(self.absorb(&projection, ratio)),
+            Verdict::Fuse => {
+                let fusion = self.absorb(&projection, ratio);
+                // On the ground nothing moves, so nothing is learned from what does not fit.
+                if self.anchor.is_none() && self.persistence.see(projection.innovations(), flow.interval) {
+                    self.doubt();
+                }
+                Ok(fusion)
+            }
             Verdict::Leave => Ok(Fusion::Gated { ratio }),
             Verdict::Believe => {
                 self.state.velocity.x = world.x;
                 self.state.velocity.y = world.y;
                 for (axis, variance) in variances.into_iter().enumerate() {
                     self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
-                    self.covariance.inflate(ATTITUDE + axis, 0.01);
-                    self.covariance.inflate(ACCEL_BIAS + axis, 0.01);
-                    self.covariance.inflate(GYRO_BIAS + axis, 1e-5);
                 }
+                // Whatever carried the velocity away was a tilt or a bias.
+                self.doubt_tilt();
                 Ok(self.moved_to(Sensor::Flow))
             }
         }

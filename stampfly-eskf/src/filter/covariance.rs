@@ -53,6 +53,13 @@ pub struct Projection<const M: usize> {
 }
 
 impl<const M: usize> Projection<M> {
+    /// The innovations, independent of each other and each of variance one when the filter is consistent.
+    #[inline]
+    #[must_use]
+    pub fn innovations(&self) -> &[f32; M] {
+        &self.innovations
+    }
+
     /// Squared Mahalanobis distance yᵀ·S⁻¹·y of the measurement (NIS): χ²-distributed with `M` degrees of freedom when
     /// the filter is consistent.
     #[inline]

@@ -43,7 +43,7 @@ impl Default for Command {
 /// What decides a simulated flight.
 #[derive(Clone, Debug, Args)]
 pub struct SceneOptions {
-    /// Mission to fly: a file, or one of the built-in `square` and `hover`.
+    /// Mission to fly: a file, one of the built-in `square` and `hover`, or `random`, drawn from the seed.
     #[arg(long, value_name = "FILE", default_value = "square")]
     pub mission: String,
     /// Change a number of the simulated vehicle or its surroundings (see `--list`).
@@ -116,6 +116,10 @@ impl Default for FlyOptions {
 pub struct CampaignOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
+    /// Compare the estimator's errors and innovations with its covariance (NEES, NIS), and judge by that. Meant for
+    /// `--mission random --flights 500`.
+    #[arg(long)]
+    pub consistency: bool,
     /// How many flights.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub flights: u64,
@@ -231,6 +235,7 @@ impl SceneOptions {
         config.mission = match self.mission.as_str() {
             "square" => Mission::parse(stampfly_host::mission::REFERENCE)?,
             "hover" => Mission::parse(stampfly_host::mission::HOVER)?,
+            "random" => Mission::random(seed),
             path => {
                 let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
                 Mission::parse(&text).map_err(|error| format!("mission {path}: {error}"))?

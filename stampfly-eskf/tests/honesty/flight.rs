@@ -1,0 +1,204 @@
+//! A made-up flight with honest sensors: smooth, for ever, everything known.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use stampfly_eskf::filter::N;
+use stampfly_eskf::{Eskf, Estimator};
+use stampfly_types::messages::{BaroData, CalibrationResult, FlowData, ImuData, MagData, TofData};
+use stampfly_types::{GRAVITY, Micros, Vec3};
+
+/// Between inertial samples, µs.
+pub const STEP: u64 = 2_500;
+/// How much older than its stamp the end of a flow reading is, and how long it is, s.
+const FLOW_DELAY: f64 = 0.004;
+const FLOW_INTERVAL: f64 = 0.01;
+/// The earth's field, µT, north and down.
+pub const FIELD: Vec3 = Vec3::new(20.0, 0.0, 40.0);
+
+/// Where the vehicle is and how it moves, after `time` seconds.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    pub attitude: UnitQuaternion<f64>,
+    pub position: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+    pub acceleration: Vector3<f64>,
+}
+
+/// A path, and what its sensors do wrong.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// What the clock shows at its beginning.
+    pub start: Micros,
+    /// Velocity on top of the path's, world; it dies out within a second.
+    pub extra: Vector3<f64>,
+    pub gyro_bias: Vec3,
+    pub accel_bias: Vec3,
+    noise: ChaCha8Rng,
+}
+
+impl Flight {
+    pub fn new(start: Micros, seed: u64) -> Self {
+        Self {
+            start,
+            extra: Vector3::zeros(),
+            gyro_bias: Vec3::zeros(),
+            accel_bias: Vec3::zeros(),
+            noise: ChaCha8Rng::seed_from_u64(seed),
+        }
+    }
+
+    /// The instant `steps` inertial samples after the beginning.
+    pub fn at(&self, steps: u64) -> Micros {
+        self.start + Micros(steps * STEP)
+    }
+
+    fn seconds(&self, at: Micros) -> f64 {
+        at.0.wrapping_sub(self.start.0).cast_signed() as f64 * 1e-6
+    }
+
+    /// Two metres above the floor, to and fro by half a metre, leaning by a few degrees, looking about.
+    pub fn pose(&self, at: Micros) -> Pose {
+        const SWINGS: [(f64, f64, f64); 3] = [(0.5, 0.9, 0.0), (0.4, 1.1, 1.0), (0.1, 0.6, 2.0)];
+        const DYING: f64 = 0.3;
+        let t = self.seconds(at);
+        let swing = |derivative: u8| {
+            Vector3::from_fn(|axis, _| {
+                let (size, rate, phase) = SWINGS[axis];
+                let angle = rate * t + phase;
+                match derivative {
+                    0 => size * angle.sin(),
+                    1 => size * rate * angle.cos(),
+                    _ => -size * rate * rate * angle.sin(),
+                }
+            })
+        };
+        let left = (-t / DYING).exp();
+        let extra = self.extra * (DYING * (1.0 - left));
+        let speed = self.extra * left;
+        let braking = -speed / DYING;
+        let roll = 0.08 * (1.3 * t).sin();
+        let pitch = 0.06 * (1.7 * t + 0.5).sin();
+        let yaw = 0.8 * (0.25 * t).sin();
+        Pose {
+            attitude: UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+            position: swing(0) + extra - Vector3::new(0.0, 0.0, 2.0),
+            velocity: swing(1) + speed,
+            acceleration: swing(2) + braking,
+        }
+    }
+
+    fn rate(&self, from: Micros, to: Micros) -> Vector3<f64> {
+        let turn = self.pose(from).attitude.inverse() * self.pose(to).attitude;
+        turn.scaled_axis() / ((to.0 - from.0) as f64 * 1e-6)
+    }
+
+    fn noise(&mut self, sigma: f32) -> f32 {
+        let normal: f32 = StandardNormal.sample(&mut self.noise);
+        sigma * normal
+    }
+
+    fn noise3(&mut self, sigma: f32) -> Vec3 {
+        Vec3::from_fn(|_, _| self.noise(sigma))
+    }
+
+    /// The inertial sample that ends at this instant.
+    pub fn imu(&mut self, at: Micros) -> ImuData {
+        let before = Micros(at.0 - STEP.min(at.0));
+        let middle = self.pose(Micros(at.0 - STEP / 2));
+        let gravity = Vector3::new(0.0, 0.0, f64::from(GRAVITY));
+        let force = middle.attitude.inverse() * (middle.acceleration - gravity);
+        ImuData {
+            accel: force.map(|v| v as f32) + self.accel_bias + self.noise3(0.5),
+            gyro: self.rate(before, at).map(|v| v as f32) + self.gyro_bias + self.noise3(0.01),
+            temperature: 25.0,
+        }
+    }
+
+    pub fn tof(&mut self, at: Micros) -> TofData {
+        let pose = self.pose(at);
+        let distance = -pose.position.z / (pose.attitude * Vector3::z()).z;
+        TofData { distance: distance as f32 + self.noise(0.004), valid: true, ..TofData::default() }
+    }
+
+    pub fn flow(&mut self, at: Micros) -> FlowData {
+        let ago = |seconds: f64| Micros(at.0.saturating_sub((seconds * 1e6) as u64));
+        let (begin, end) = (ago(FLOW_DELAY + FLOW_INTERVAL), ago(FLOW_DELAY));
+        let middle = self.pose(ago(FLOW_DELAY + 0.5 * FLOW_INTERVAL));
+        let velocity = middle.attitude.inverse() * middle.velocity;
+        let distance = -middle.position.z / (middle.attitude * Vector3::z()).z;
+        let rate = self.rate(begin, end);
+        let seen = |v: f64| (v * FLOW_INTERVAL) as f32;
+        FlowData {
+            delta_x: seen(velocity.x / distance + rate.y) + self.noise(0.001),
+            delta_y: seen(velocity.y / distance - rate.x) + self.noise(0.001),
+            interval: FLOW_INTERVAL as f32,
+            quality: 100,
+            valid: true,
+        }
+    }
+
+    pub fn baro(&mut self, at: Micros) -> BaroData {
+        let altitude = 100.0 - self.pose(at).position.z as f32 + self.noise(0.06);
+        BaroData { altitude, ..BaroData::default() }
+    }
+
+    pub fn mag(&mut self, at: Micros) -> MagData {
+        let field = self.pose(at).attitude.inverse() * FIELD.map(f64::from);
+        MagData { field: field.map(|v| v as f32) + self.noise3(0.5) }
+    }
+
+    /// What a still vehicle would have measured in the attitude of the beginning.
+    pub fn calibration(&self) -> CalibrationResult {
+        let attitude = self.pose(self.start).attitude;
+        let level = attitude.inverse() * Vector3::new(0.0, 0.0, -f64::from(GRAVITY));
+        let field = attitude.inverse() * FIELD.map(f64::from);
+        CalibrationResult {
+            specific_force: level.map(|v| v as f32),
+            field: field.map(|v| v as f32),
+            gyro_bias: self.gyro_bias,
+            complete: true,
+            ..CalibrationResult::default()
+        }
+    }
+
+    /// Offers what is due after so many inertial samples: all sensors at their rates, on time.
+    pub fn feed(&mut self, eskf: &mut Eskf, steps: u64) {
+        let at = self.at(steps);
+        eskf.predict(at, &self.imu(at));
+        if steps.is_multiple_of(13) {
+            eskf.fuse_tof(at, &self.tof(at));
+        }
+        if steps.is_multiple_of(4) {
+            eskf.fuse_flow(at, &self.flow(at));
+        }
+        if steps.is_multiple_of(8) {
+            eskf.fuse_baro(at, &self.baro(at));
+        }
+        if steps.is_multiple_of(16) {
+            eskf.fuse_mag(at, &self.mag(at));
+        }
+    }
+
+    /// How far off the estimate is: tilt (rad), velocity (m/s), height (m).
+    pub fn errors(&self, eskf: &Eskf, at: Micros) -> [f64; 3] {
+        let (pose, estimate) = (self.pose(at), eskf.estimate());
+        let down = (estimate.attitude.inverse() * Vec3::z()).map(f64::from);
+        let tilt = down.angle(&(pose.attitude.inverse() * Vector3::z()));
+        let body = |velocity: Vector3<f64>, attitude: UnitQuaternion<f64>| attitude.inverse() * velocity;
+        let [x, y, z, w] = estimate.attitude.coords.map(f64::from).into();
+        let attitude = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
+        // In the body, because nothing but a magnetometer shows the heading.
+        let velocity = body(estimate.velocity.map(f64::from), attitude) - body(pose.velocity, pose.attitude);
+        [tilt, velocity.norm(), (f64::from(estimate.height) + pose.position.z).abs()]
+    }
+}
+
+/// Is the covariance finite, exactly symmetric and positive definite, by a Cholesky factorisation in double precision?
+pub fn is_sound(eskf: &Eskf) -> bool {
+    let p = eskf.covariance();
+    let symmetric = (0..N).all(|i| (0..i).all(|j| p.get(i, j).to_bits() == p.get(j, i).to_bits()));
+    let dense = nalgebra::SMatrix::<f64, N, N>::from_fn(|i, j| f64::from(p.get(i, j)));
+    symmetric && dense.iter().all(|v| v.is_finite()) && dense.cholesky().is_some() && eskf.nominal().is_finite()
+}
