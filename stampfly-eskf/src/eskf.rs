@@ -24,7 +24,7 @@ use crate::config::{EskfConfig, GravityUse};
 use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
 use crate::filter::history::REACH;
-use crate::filter::state::{Rotation, multiply, rotate};
+use crate::filter::state::{Rotation, multiply, rotate, rotate_back};
 use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, Passage, Roughness, VELOCITY};
 use crate::level::attitude_from_specific_force;
 use gate::{Gates, Sensor};
@@ -261,6 +261,14 @@ impl Eskf {
         self.absorb(&projection, ratio);
     }
 
+    /// Starts the memory anew: after a turn of the state the kept impulses point elsewhere, after a gap their time is
+    /// wrong. Late measurements wait until there is a past again.
+    fn forget_past(&mut self) {
+        self.history = History::default();
+        self.pending = Passage::default();
+        self.start = self.state.rotation();
+    }
+
     /// Notes that the state was moved to a sensor that had been locked out.
     fn moved_to(&mut self, sensor: Sensor) -> Fusion {
         self.status.resets = self.status.resets.wrapping_add(1);
@@ -413,6 +421,9 @@ impl Estimator for Eskf {
             return;
         }
         self.now = at;
+        if dt > MAX_STEP {
+            self.forget_past();
+        }
         let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
         self.history.add(&motion);
         let [force, rate] = &mut self.roughness;

@@ -79,8 +79,11 @@ impl Estimator for AttitudeFilter {
         if !book.initialized {
             return Fusion::Refused(Refusal::NotInitialized);
         }
-        if book.mag_at.is_some_and(|last| at <= last) || at > book.now + FUTURE {
-            return Fusion::Refused(Refusal::Stale);
+        if book.mag_at.is_some_and(|last| at <= last) {
+            return Fusion::Refused(Refusal::Repeated);
+        }
+        if at > book.now + FUTURE {
+            return Fusion::Refused(Refusal::Future);
         }
         // A field that is newer than the last inertial sample is taken for as new.
         let age = if at < book.now { book.now.since(at).seconds() } else { 0.0 };

@@ -87,8 +87,10 @@ impl Eskf {
         let (projection, ratio) = self.compare(&then, rows, measured, variances);
         self.status.flow_innovation = [measured[0] - rows[0].predicted, measured[1] - rows[1].predicted];
         self.status.flow_ratio = ratio;
-        let world = rotate(&then.rotation, &Vec3::new(measured[0], measured[1], 0.0));
-        self.acceleration.see(seen, Vec3::new(world.x, world.y, then.state.velocity.z));
+        // Flow sees two axes of the body's; along the beam the velocity is what it was thought to be.
+        let along = rotate_back(&then.rotation, &then.state.velocity).z;
+        let world = rotate(&then.rotation, &Vec3::new(measured[0], measured[1], along));
+        self.acceleration.see(seen, world);
         match self.gates.judge(Sensor::Flow, self.now, ratio, self.config.lockout) {
             Verdict::Fuse => {
                 let fusion = self.absorb(&projection, ratio);
@@ -100,8 +102,8 @@ impl Eskf {
             }
             Verdict::Leave => Ok(Fusion::Gated { ratio }),
             Verdict::Believe => {
-                self.state.velocity.x = world.x;
-                self.state.velocity.y = world.y;
+                self.state.velocity.x += world.x - then.state.velocity.x;
+                self.state.velocity.y += world.y - then.state.velocity.y;
                 for (axis, variance) in variances.into_iter().enumerate() {
                     self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
                 }
@@ -137,9 +139,11 @@ impl Eskf {
             }
             Verdict::Leave => Ok(Fusion::Gated { ratio }),
             Verdict::Believe => {
-                // Air that jumps does not move the vehicle: what is believed is a new offset.
+                // Air that jumps does not move the vehicle: what is believed is a new offset, and nothing is lost.
                 self.baro_offset = Some(Offset::new(here, noise));
-                Ok(self.moved_to(Sensor::Baro))
+                self.gates.accept(Sensor::Baro, self.now);
+                self.status.resets = self.status.resets.wrapping_add(1);
+                Ok(Fusion::Reset)
             }
         }
     }
@@ -243,9 +247,8 @@ impl Eskf {
             Verdict::Fuse => Ok(self.absorb(&projection, ratio)),
             Verdict::Leave => Ok(Fusion::Gated { ratio }),
             Verdict::Believe => {
-                // Turned as a whole: what the body did since stays as it was seen.
                 self.state.attitude = multiply([w, x, y, z], then.passage.turn);
-                self.start = self.state.rotation();
+                self.forget_past();
                 for axis in 0..3 {
                     self.covariance.reset(ATTITUDE + axis, 4.0 * variance);
                     self.covariance.inflate(VELOCITY + axis, 0.1);
