@@ -6,7 +6,8 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `eskf.rs` | the filter itself, its time, the [`Estimator`] it is |
+//! | `eskf.rs` | the filter itself and its time |
+//! | `eskf/interface.rs` | the [`Estimator`] it is |
 //! | `eskf/measurements.rs` | one function a sensor |
 //! | `eskf/assumptions.rs` | what is assumed where nothing measures |
 //! | `eskf/gate.rs` | gates, lock-outs, resets |
@@ -14,6 +15,7 @@
 
 mod assumptions;
 mod gate;
+mod interface;
 mod measurements;
 mod persistence;
 
@@ -363,172 +365,4 @@ fn initial_covariance(config: &EskfConfig) -> Covariance {
         config.initial_gyro_bias,
         config.initial_accel_bias,
     ])
-}
-
-impl Estimator for Eskf {
-    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
-        let finite = |v: &Vec3| v.iter().all(|x| x.is_finite());
-        if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
-            return;
-        }
-        let fresh = Self::new(self.config);
-        *self = Self { now: at, initialized: true, calibration: *calibration, command: self.command, ..fresh };
-        self.state.gyro_bias = calibration.gyro_bias;
-        self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
-        self.start = self.state.rotation();
-        self.baro_seen = at;
-        self.field = (calibration.field.norm() > 1.0).then(|| rotate(&self.start, &calibration.field.normalize()));
-        self.anchor = self.command.on_ground.then(Vec3::zeros);
-        self.know_heading();
-    }
-
-    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
-        let previous = core::mem::replace(&mut self.command, *command);
-        if command.full_resets != previous.full_resets && self.initialized {
-            let calibration = self.calibration;
-            self.initialize(at, &calibration);
-        }
-        if command.origin_resets != previous.origin_resets {
-            self.surface = self.surface.map(|surface| surface - self.state.position.z);
-            if let Some(offset) = &mut self.baro_offset {
-                offset.shift(self.state.position.z);
-            }
-            self.state.position = Vec3::zeros();
-            self.state.velocity = Vec3::zeros();
-            for axis in 0..3 {
-                self.covariance.reset(POSITION + axis, self.config.initial_position * self.config.initial_position);
-                self.covariance.reset(VELOCITY + axis, self.config.initial_velocity * self.config.initial_velocity);
-            }
-            self.anchor = None;
-        }
-        match (command.on_ground, self.anchor) {
-            (true, None) => self.anchor = Some(self.state.position),
-            (false, Some(anchor)) => {
-                // Blind on the ground: the surface is one clearance below.
-                self.surface.get_or_insert(anchor.z + self.config.ground_clearance);
-                self.anchor = None;
-                let vibration = self.config.vibration_bias;
-                self.covariance.inflate(ACCEL_BIAS + 2, vibration * vibration);
-            }
-            _ => {}
-        }
-    }
-
-    fn predict(&mut self, at: Micros, imu: &ImuData) {
-        let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
-        let dt = at.since(self.now).seconds();
-        if !self.initialized || !usable || dt <= 0.0 {
-            return;
-        }
-        self.now = at;
-        if dt > MAX_STEP {
-            self.forget_past();
-        }
-        let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
-        self.history.add(&motion);
-        let [force, rate] = &mut self.roughness;
-        force.add(&imu.accel, motion.dt);
-        rate.add(&imu.gyro, motion.dt);
-        self.pending.extend(&motion);
-        if self.pending.duration > DOUBT_STEP {
-            let [force, rate] = self.roughness.map(|roughness| roughness.mean_square() * motion.dt);
-            let noise = ProcessNoise {
-                velocity: self.noise.velocity + self.config.accel_roughness * force,
-                attitude: self.noise.attitude + self.config.gyro_roughness * rate,
-                ..self.noise
-            };
-            self.covariance.propagate(&self.start, &self.pending, &noise);
-            self.pending = Passage::default();
-            self.start = self.state.rotation();
-        }
-        self.rate = motion.rate;
-        self.force = motion.force;
-        self.accels.add(&imu.accel);
-        self.steps = self.steps.wrapping_add(1);
-        if self.steps.is_multiple_of(STILL_DIVIDER)
-            && let Some(accel) = self.accels.take()
-        {
-            self.assume(accel, dt * STILL_DIVIDER as f32);
-        }
-        if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() {
-            self.absorb_gravity(imu.accel, &self.acceleration.at(at), self.config.gravity_sigma);
-        }
-        self.watch();
-    }
-
-    fn fuse_tof(&mut self, at: Micros, tof: &TofData) -> Fusion {
-        let fusion = self.try_tof(at, tof).unwrap_or_else(Fusion::Refused);
-        self.count(Counter::Tof, fusion)
-    }
-
-    fn fuse_flow(&mut self, at: Micros, flow: &FlowData) -> Fusion {
-        let fusion = self.try_flow(at, flow).unwrap_or_else(Fusion::Refused);
-        self.count(Counter::Flow, fusion)
-    }
-
-    fn fuse_baro(&mut self, at: Micros, baro: &BaroData) -> Fusion {
-        let fusion = self.try_baro(at, baro).unwrap_or_else(Fusion::Refused);
-        self.count(Counter::Baro, fusion)
-    }
-
-    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion {
-        let fusion = self.try_mag(at, mag).unwrap_or_else(Fusion::Refused);
-        self.count(Counter::Mag, fusion)
-    }
-
-    fn fuse_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Fusion {
-        self.try_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
-    }
-
-    fn fuse_position(&mut self, at: Micros, position: &Vec3, sigma: f32) -> Fusion {
-        self.try_position(at, position, sigma).unwrap_or_else(Fusion::Refused)
-    }
-
-    fn fuse_attitude(&mut self, at: Micros, attitude: &Quat, sigma: f32) -> Fusion {
-        self.try_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused)
-    }
-
-    fn estimate(&self) -> StateEstimate {
-        let recent = |sensor| self.gates.is_recent(sensor, self.now);
-        let standing = self.anchor.is_some();
-        let sound = self.initialized && !self.status.diverged;
-        let outside = recent(Sensor::Velocity) || recent(Sensor::Position);
-        let horizontal = sound && self.holds_velocity();
-        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || outside || standing);
-        let valid = Validity::NONE
-            .set(Validity::TILT, self.initialized)
-            .set(Validity::HEADING, self.initialized)
-            .set(Validity::VELOCITY_XY | Validity::POSITION_XY, horizontal)
-            .set(Validity::VELOCITY_Z | Validity::POSITION_Z, vertical)
-            .set(Validity::HEIGHT, sound && self.surface.is_some() && vertical);
-        let sensors = SensorMask::NONE
-            .set(SensorMask::IMU, self.initialized)
-            .set(SensorMask::TOF, recent(Sensor::Tof))
-            .set(SensorMask::FLOW, recent(Sensor::Flow))
-            .set(SensorMask::BARO, recent(Sensor::Baro))
-            .set(SensorMask::MAG, recent(Sensor::Mag))
-            .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
-            .set(SensorMask::STATIONARY, standing)
-            .set(SensorMask::EXTERNAL, outside || recent(Sensor::Attitude));
-        let p = &self.covariance;
-        StateEstimate {
-            attitude: self.state.quat(),
-            position: self.state.position,
-            velocity: self.state.velocity,
-            angular_rate: self.rate,
-            specific_force: self.force,
-            gyro_bias: self.state.gyro_bias,
-            accel_bias: self.state.accel_bias,
-            height: self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z,
-            position_std_xy: math::sqrt(p.get(POSITION, POSITION) + p.get(POSITION + 1, POSITION + 1)),
-            valid,
-            sensors,
-        }
-    }
-
-    fn status(&self) -> EstimatorStatus {
-        let [measured, predicted] = &self.gravity;
-        let apart = measured.cross(predicted).norm();
-        EstimatorStatus { accel_innovation: math::atan2(apart, measured.dot(predicted)), ..self.status }
-    }
 }

@@ -3,6 +3,7 @@
 //! Not for general use: `nalgebra` has everything. These avoid its transcendentals in the path of every sample and say
 //! what happens in the degenerate cases.
 
+use crate::filter::state::small_rotation;
 use nalgebra::Quaternion;
 use stampfly_types::{Quat, Vec3, math};
 
@@ -18,14 +19,13 @@ pub(super) fn within(vector: &Vec3, limit: f32) -> bool {
 pub(super) fn from_vector(vector: &Vec3) -> Quat {
     let half = vector * 0.5;
     let square = half.norm_squared();
-    let (real, scale) = if square < 0.0156 {
-        (1.0 - square * 0.5 * (1.0 - square * (1.0 / 12.0)), 1.0 - square * (1.0 / 6.0) * (1.0 - square * (1.0 / 20.0)))
-    } else {
-        let angle = math::sqrt(square);
-        let (sin, cos) = math::sin_cos(angle);
-        (cos, sin / angle)
-    };
-    Quat::new_unchecked(Quaternion::from_parts(real, half * scale))
+    if square < 0.0156 {
+        let [w, x, y, z] = small_rotation(*vector);
+        return Quat::new_unchecked(Quaternion::new(w, x, y, z));
+    }
+    let angle = math::sqrt(square);
+    let (sin, cos) = math::sin_cos(angle);
+    Quat::new_unchecked(Quaternion::from_parts(cos, half * (sin / angle)))
 }
 
 /// The product, brought back to unit length; the first factor if rounding made nothing of it.
