@@ -68,6 +68,9 @@ impl spi::Error for Fault {
     }
 }
 
+/// A chip as a closure.
+pub type AnyChip = Box<dyn FnMut(Access<'_>) -> Result<(), Fault>>;
+
 /// How long a transfer takes.
 pub const TRANSFER: u64 = 20;
 
