@@ -5,6 +5,7 @@
 //! | [`bmi270`] | Bosch BMI270 | acceleration and angular rate | SPI, I2C | [`Imu`](crate::Imu) |
 //! | [`pmw3901`] | PixArt PMW3901 | optical flow | SPI | [`OpticalFlow`](crate::OpticalFlow) |
 //! | [`bmp280`] | Bosch BMP280 | air pressure | I2C | [`Barometer`](crate::Barometer) |
+//! | [`ina3221`] | Texas Instruments INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
 //!
 //! # How every one of them is built
 //! * A **codec** of registers, scales and formulas: pure functions and plain structs, each with its data sheet section.
@@ -28,6 +29,7 @@ mod axis;
 pub mod bmi270;
 pub mod bmp280;
 mod error;
+pub mod ina3221;
 pub mod pmw3901;
 mod port;
 
