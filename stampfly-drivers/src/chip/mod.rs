@@ -6,6 +6,7 @@
 //! | [`pmw3901`] | PixArt PMW3901 | optical flow | SPI | [`OpticalFlow`](crate::OpticalFlow) |
 //! | [`bmp280`] | Bosch BMP280 | air pressure | I2C | [`Barometer`](crate::Barometer) |
 //! | [`ina3221`] | Texas Instruments INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
+//! | [`bmm150`] | Bosch BMM150 | magnetic field | I2C | [`Magnetometer`](crate::Magnetometer) |
 //!
 //! # How every one of them is built
 //! * A **codec** of registers, scales and formulas: pure functions and plain structs, each with its data sheet section.
@@ -27,6 +28,7 @@
 
 mod axis;
 pub mod bmi270;
+pub mod bmm150;
 pub mod bmp280;
 mod error;
 pub mod ina3221;
