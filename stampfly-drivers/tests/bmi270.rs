@@ -12,9 +12,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 const BLOB: [u8; 600] = [0xC8; 600];
-/// Chip period and tick in nanoseconds.
+/// Nominal chip period in nanoseconds, of 16 ticks.
 const PERIOD: u64 = 625_000;
-const TICK: u64 = 39_063;
 
 struct Chip {
     clock: Clock,
@@ -28,6 +27,8 @@ struct Chip {
     faults: Vec<(u8, Fault)>,
     starts: bool,
     frozen: bool,
+    /// Chip period in nanoseconds.
+    period: u64,
     /// Counts of one sample: accelerometer, gyroscope.
     sample: fn(u64) -> [i16; 6],
 }
@@ -45,6 +46,7 @@ impl Chip {
             faults: Vec::new(),
             starts: true,
             frozen: false,
+            period: PERIOD,
             sample: |_| [100, 200, -4096, 164, -328, 16],
         }
     }
@@ -55,7 +57,7 @@ impl Chip {
 
     /// Chip samples taken until now.
     fn produced(&self) -> u64 {
-        if self.frozen { self.consumed } else { self.nanos() / PERIOD }
+        if self.frozen { self.consumed } else { self.nanos() / self.period }
     }
 
     fn access(&mut self, access: Access<'_>) -> Result<(), Fault> {
@@ -82,7 +84,8 @@ impl Chip {
                     return Err(self.faults.remove(position).1);
                 }
                 let nanos = self.nanos();
-                self.registers[0x18..0x1B].copy_from_slice(&(nanos % PERIOD / TICK).to_le_bytes()[..3]);
+                self.registers[0x18..0x1B]
+                    .copy_from_slice(&(nanos % self.period * 16 / self.period).to_le_bytes()[..3]);
                 let bytes = ((self.produced() - self.consumed).min(157) * 13) as u16;
                 self.registers[0x24..0x26].copy_from_slice(&bytes.to_le_bytes());
                 if register == 0x26 {
@@ -176,6 +179,26 @@ fn the_stamp_is_the_middle_of_the_filter() {
         let counts = sample.data.accel.x / stampfly_types::GRAVITY * 4096.0;
         let instant = Micros((counts.round() as u64) * PERIOD / 1_000);
         assert!(sample.at.0.abs_diff(instant.0) <= 60, "{} {}", sample.at, instant);
+    }
+}
+
+#[test]
+fn a_chip_clock_that_is_off_costs_no_sample() {
+    for period in [PERIOD * 97 / 100, PERIOD * 103 / 100] {
+        let (clock, chip) = bench();
+        chip.borrow_mut().period = period;
+        chip.borrow_mut().sample = |n| [(n % 8_192) as i16; 6];
+        let mut imu = driver(&clock, &chip, Config::default());
+        let mut before = block_on(imu.next()).expect("a sample");
+        for _ in 0..500 {
+            let sample = block_on(imu.next()).expect("a sample");
+            let step = (sample.data.accel.x - before.data.accel.x) / stampfly_types::GRAVITY * 4096.0;
+            assert!((step - 4.0).abs() < 1e-2, "{step}");
+            // One tick, and three nominal periods that the chip makes in another time.
+            assert!((sample.at.since(before.at).0 * 1_000).abs_diff(4 * period) <= 60_000);
+            assert!(clock.now().since(sample.at) < Micros(2_300));
+            before = sample;
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! | [`bmi270`] | Bosch BMI270 | acceleration and angular rate | SPI, I2C | [`Imu`](crate::Imu) |
 //! | [`pmw3901`] | PixArt PMW3901 | optical flow | SPI | [`OpticalFlow`](crate::OpticalFlow) |
 //! | [`bmp280`] | Bosch BMP280 | air pressure | I2C | [`Barometer`](crate::Barometer) |
-//! | [`ina3221`] | Texas Instruments INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
+//! | [`ina3221`] | TI INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
 //! | [`bmm150`] | Bosch BMM150 | magnetic field | I2C | [`Magnetometer`](crate::Magnetometer) |
 //!
 //! # How every one of them is built

@@ -164,7 +164,8 @@ impl Rate {
     }
 }
 
-/// ACC_CONF, ACC_RANGE, GYR_CONF and GYR_RANGE: performance filters of normal bandwidth, register 0x40 to register 0x43.
+/// ACC_CONF, ACC_RANGE, GYR_CONF and GYR_RANGE: performance filters of normal bandwidth,
+/// registers 0x40 to 0x43.
 #[must_use]
 pub const fn sensor_registers(config: &Config) -> [u8; 4] {
     let rate = config.rate.code();
@@ -187,11 +188,13 @@ pub const fn cross_axis_factor(register: u8) -> i8 {
 /// What the chip says about itself: registers 0x18 to 0x25 in one burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// Free-running time in ticks of 39.0625 µs, 24 bits, register 0x18. Samples are taken where it divides by their period.
+    /// Free-running time in ticks of 39.0625 µs, 24 bits, register 0x18. Samples are taken
+    /// where it divides by their period.
     pub sensor_time: u32,
     /// The accelerometer's or gyroscope's configuration is impossible, register 0x1B.
     pub configuration_error: bool,
-    /// The low four bits of INTERNAL_STATUS: 1 is running, 0 is not initialised, 2 is a refused configuration, register 0x21.
+    /// The low four bits of INTERNAL_STATUS: 1 is running, 0 is not initialised, 2 is a refused
+    /// configuration, register 0x21.
     pub start_up: u8,
     /// Die temperature in 1/512 K from 23 °C; `None` while there is none, register 0x22.
     pub temperature: Option<i16>,
@@ -258,8 +261,9 @@ pub fn decode_acceleration(bytes: &[u8; 6]) -> [i16; 3] {
     [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes)
 }
 
-/// Does the difference between the two deflections, at ±16 g, pass the self test? More than 16 g on x, less than −15 g
-/// on y, more than 10 g on z, §4 "Sensor self-test".
+/// Does the difference between the two deflections, at ±16 g, pass the self test?
+///
+/// More than 16 g on x, less than −15 g on y, more than 10 g on z, §4 "Sensor self-test".
 #[must_use]
 pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
     let [x, y, z] = core::array::from_fn(|axis| {

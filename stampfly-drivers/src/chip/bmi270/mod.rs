@@ -190,7 +190,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
         if self.blob.is_empty() || !self.blob.len().is_multiple_of(2) || self.blob.len() > codec::BLOB_LIMIT {
             return Err(ChipError::InvalidConfiguration);
         }
-        // On SPI the chip listens as on I2C until its first rising edge of the chip select; what that read gives is noise.
+        // Until the first rising edge of its chip select the chip listens as on I2C: what this read gives is noise.
         let _: [u8; 1] = self.port.read(register::CHIP_ID).await?;
         self.port.wait(POWER_UP).await;
         self.port.write(register::CMD, &[codec::SOFT_RESET]).await?;

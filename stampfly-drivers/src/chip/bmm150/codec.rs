@@ -56,7 +56,7 @@ impl Preset {
         }
     }
 
-    /// How long a measurement takes (chapter "Measurement time"): 145 µs per repetition of x and y, 500 µs of z, 980 µs.
+    /// How long a measurement takes: 145 µs per repetition of x and y, 500 µs per repetition of z, and 980 µs.
     #[must_use]
     pub const fn duration(self) -> Micros {
         let [xy, z] = self.codes();

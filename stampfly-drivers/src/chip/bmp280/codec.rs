@@ -207,8 +207,8 @@ mod tests {
     fn the_data_sheets_example_comes_out() {
         let Compensated { temperature, pressure } = EXAMPLE.compensate(519_888, 415_148).expect("a result");
         assert_eq!(temperature, 2_508, "25.08 °C");
-        // The figure prints 25 767 236, 100 653.27 Pa, which is of floating point; the integer formula beside it gives three
-        // units, a hundredth of a pascal, less.
+        // The figure prints 25 767 236 (100 653.27 Pa), which is of floating point; the integer formula beside it gives
+        // three units less, a hundredth of a pascal.
         assert_eq!(pressure, 25_767_233);
     }
 

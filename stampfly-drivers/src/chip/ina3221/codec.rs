@@ -1,5 +1,5 @@
-//! Registers and scales of the INA3221, from Texas Instruments SBOS576B. Registers are words, high byte first, described
-//! in its §8.6 "Register Maps".
+//! Registers and scales of the INA3221, from Texas Instruments SBOS576B. Registers are words, high byte first,
+//! described in its §8.6 "Register Maps".
 
 use super::Config;
 use stampfly_types::Micros;

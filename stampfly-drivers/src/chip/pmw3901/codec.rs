@@ -1,4 +1,5 @@
-//! Registers, tables and the motion burst of the PMW3901, from PixArt PMW3901MB-TXQT product data sheet, version 1.x.
+//! Registers, tables and the motion burst of the PMW3901, from PixArt's PMW3901MB-TXQT product
+//! data sheet.
 
 /// Register addresses ("Registers", table of the data sheet's last chapter).
 pub mod register {
