@@ -220,6 +220,19 @@ fn a_late_reader_gets_every_sample() {
 }
 
 #[test]
+fn an_overrun_starts_anew_instead_of_mixing_old_samples_with_new() {
+    let (clock, chip) = bench();
+    let mut imu = driver(&clock, &chip, Config::default());
+    block_on(imu.next()).expect("a sample");
+    clock.advance(300_000);
+    chip.borrow_mut().sample = |n| [(n % 8_192) as i16; 6];
+    let sample = block_on(imu.next()).expect("a sample");
+    let counts = sample.data.accel.x / stampfly_types::GRAVITY * 4096.0;
+    assert!(sample.at.0.abs_diff(counts.round() as u64 * PERIOD / 1_000) <= 60);
+    assert!(clock.now().since(sample.at) < Micros(2_150));
+}
+
+#[test]
 fn lost_samples_restart_the_filter_and_cost_two_periods() {
     let (clock, chip) = bench();
     let mut imu = driver(&clock, &chip, Config::default());

@@ -20,6 +20,10 @@
 //! * Every read brings back whether the chip still holds its configuration. One that lost it (brown-out, ESD) is
 //!   [`ChipError::Restarted`] once, and the next call sets it up again.
 //!
+//! # What they expect of the board
+//! On a shared SPI every chip select has to be high before the first transfer to any chip: one that floats low answers
+//! into its neighbour's data.
+//!
 //! # Recovery of the bus
 //! Drivers share a bus with others, so they do not clock a stuck slave free or reset the peripheral: that is the
 //! bus owner's work (nine clocks on SCL with SDA released, then STOP; I2C specification UM10204 §3.1.16). A driver

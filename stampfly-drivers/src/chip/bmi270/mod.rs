@@ -34,6 +34,8 @@ const SELF_TEST_SETTLE: Micros = Micros::from_millis(51);
 /// FIFO may or may not hold the sample.
 const AIM: u64 = 3;
 const EARLIEST: u64 = 2;
+/// The FIFO of 2 kB holds 157 frames; from here on it may have lost some before the driver could look.
+const OVERRUN: u64 = 150;
 /// Samples may be missing for this many output periods.
 const PATIENCE: u64 = 4;
 
@@ -61,7 +63,7 @@ impl Default for Config {
 /// by the chip's clock, good to one of its ticks (39 µs) and the time the status takes on the bus (13 µs at 10 MHz).
 /// The chip's own low-pass delays a little more; that is not taken off.
 ///
-/// A reader that comes late gets every sample, up to the FIFO's 98 ms. Beyond that, or when a read is cancelled or
+/// A reader that comes late gets every sample, up to 90 ms (at 400 Hz). Beyond that, or when a read is cancelled or
 /// garbled, the FIFO is emptied and the filter starts anew, which takes two output periods. Gives up on the chip
 /// ([`ChipError::NoSample`]) after four output periods without a sample.
 ///
@@ -265,6 +267,9 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
                 let missing = 4u64.saturating_sub(frames).max(u64::from(age >= EARLIEST));
                 self.due = newest + ticks_to_micros(missing * period + AIM);
                 continue;
+            }
+            if frames >= OVERRUN {
+                return Ok(None);
             }
             self.reading = true;
             let bytes = self.port.read(register::FIFO_DATA).await?;
