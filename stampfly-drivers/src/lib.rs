@@ -9,6 +9,12 @@
 //! | [`Indicator`] | lights and buzzer | boards |
 //! | [`Timebase`] | a clock that can also wait | boards, the simulator |
 //!
+//! | module or type | what it is |
+//! |---|---|
+//! | [`chip`] | drivers for particular chips, on any `embedded-hal-async` bus |
+//! | [`blocking`] | the same drivers on a blocking bus |
+//! | [`Decimator`] | from 1600 to 400 samples per second without folding |
+//!
 //! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
 //! conversion. Writing to motors is immediate and therefore not. Everything between the two is synchronous and
 //! lives in other crates.
@@ -27,12 +33,16 @@
 extern crate std;
 
 pub mod actuator;
+pub mod blocking;
+pub mod chip;
+mod decimator;
 pub mod error;
 pub mod link;
 pub mod sensor;
 pub mod time;
 
 pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};
+pub use decimator::Decimator;
 pub use error::{SensorError, SensorErrorKind};
 pub use link::{Button, Command, CommandLink, PinButton};
 pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};

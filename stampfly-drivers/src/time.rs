@@ -1,5 +1,8 @@
 //! A clock that can also wait.
 
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
 use stampfly_types::Micros;
 
@@ -10,4 +13,28 @@ use stampfly_types::Micros;
 pub trait Timebase: DelayNs + Clone {
     /// Time since power-on.
     fn now(&self) -> Micros;
+}
+
+/// Waits until an instant; returns at once when it has passed.
+pub(crate) async fn sleep_until<T: Timebase>(clock: &mut T, instant: Micros) {
+    let left = instant.since(clock.now());
+    if left > Micros::ZERO {
+        clock.delay_us(u32::try_from(left.0).unwrap_or(u32::MAX)).await;
+    }
+}
+
+/// The outcome of a future, or `None` when it takes longer than `limit`; it is dropped then.
+///
+/// The future is polled first, so one that never waits costs no timer.
+pub(crate) async fn within<T: Timebase, F: Future>(clock: &T, limit: Micros, future: F) -> Option<F::Output> {
+    let mut alarm = clock.clone();
+    let mut alarm = pin!(alarm.delay_us(u32::try_from(limit.0).unwrap_or(u32::MAX)));
+    let mut future = pin!(future);
+    poll_fn(|context| {
+        if let Poll::Ready(value) = future.as_mut().poll(context) {
+            return Poll::Ready(Some(value));
+        }
+        alarm.as_mut().poll(context).map(|()| None)
+    })
+    .await
 }

@@ -1,7 +1,6 @@
 //! The inertial sensor, a BMI270 as the StampFly uses it: ±8 g, ±2000 °/s, 1600 Hz into a FIFO that is read in
 //! fours and decimated to 400 Hz.
 
-use super::decimator::Decimator;
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
 use crate::time::Clock;
@@ -9,7 +8,7 @@ use crate::vibration::Vibration;
 use crate::world::World;
 use core::convert::Infallible;
 use nalgebra::{Matrix3, Vector3};
-use stampfly_drivers::Sample;
+use stampfly_drivers::{Decimator, Sample};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{GRAVITY, Micros, Vec3};
 
@@ -153,7 +152,7 @@ impl stampfly_drivers::Imu for ImuModel {
         loop {
             let (at, group) = self.next_group().await;
             let Some(sum) = self.decimator.push(&group) else { continue };
-            let (accel, gyro) = counts_to_si(sum);
+            let (accel, gyro) = counts_to_si(sum.map(|sum| f64::from(sum) / f64::from(Decimator::GAIN)));
             // The die warms by ten degrees within a few minutes.
             let minutes = at.since(self.start).seconds() / 60.0;
             let temperature = 25.0 + 10.0 * minutes / (minutes + 2.0);

@@ -17,7 +17,6 @@
 mod actuators;
 mod baro;
 mod cameras;
-mod decimator;
 mod flow;
 pub mod imu;
 mod mag;

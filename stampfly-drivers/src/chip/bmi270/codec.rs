@@ -1,0 +1,344 @@
+//! Registers, scales and frames of the BMI270, from Bosch BST-BMI270-DS000 revision 1.3. Registers are described in its
+//! §5.2 in the order of their addresses, which are given here; other sections are named by their titles.
+
+use super::Config;
+
+/// Register addresses, §5.2.
+pub mod register {
+    /// Identification: [`CHIP_ID_VALUE`](super::CHIP_ID_VALUE).
+    pub const CHIP_ID: u8 = 0x00;
+    /// Accelerometer, 6 bytes, then gyroscope, 6 bytes.
+    pub const DATA_8: u8 = 0x0C;
+    /// Sensor time, 3 bytes; the [`Status`](super::Status) burst begins here.
+    pub const SENSORTIME_0: u8 = 0x18;
+    /// Start-up status.
+    pub const INTERNAL_STATUS: u8 = 0x21;
+    /// FIFO output.
+    pub const FIFO_DATA: u8 = 0x26;
+    /// Gyroscope cross-axis factor.
+    pub const GYR_CAS: u8 = 0x3C;
+    /// Accelerometer configuration; its range, the gyroscope's configuration and range follow.
+    pub const ACC_CONF: u8 = 0x40;
+    /// FIFO down-sampling.
+    pub const FIFO_DOWNS: u8 = 0x45;
+    /// FIFO configuration, 2 bytes.
+    pub const FIFO_CONFIG_0: u8 = 0x48;
+    /// Start of initialisation.
+    pub const INIT_CTRL: u8 = 0x59;
+    /// Address of the configuration data in words, 2 bytes.
+    pub const INIT_ADDR_0: u8 = 0x5B;
+    /// Configuration data.
+    pub const INIT_DATA: u8 = 0x5E;
+    /// Accelerometer self test.
+    pub const ACC_SELF_TEST: u8 = 0x6D;
+    /// Power saving.
+    pub const PWR_CONF: u8 = 0x7C;
+    /// Sensor enables.
+    pub const PWR_CTRL: u8 = 0x7D;
+    /// Commands.
+    pub const CMD: u8 = 0x7E;
+}
+
+/// What [`register::CHIP_ID`] reads, register 0x00.
+pub const CHIP_ID_VALUE: u8 = 0x24;
+/// Command: reset, register 0x7E.
+pub const SOFT_RESET: u8 = 0xB6;
+/// Command: empty the FIFO, register 0x7E.
+pub const FIFO_FLUSH: u8 = 0xB0;
+/// Temperature, accelerometer and gyroscope on, register 0x7D.
+pub const ALL_SENSORS: u8 = 0x0E;
+/// Accelerometer only, register 0x7D.
+pub const ACCELEROMETER_ONLY: u8 = 0x04;
+/// Advanced power saving off, FIFO self wake-up on, register 0x7C.
+pub const NORMAL_POWER: u8 = 0x02;
+/// Filtered data into the FIFO, not down-sampled, register 0x45.
+pub const FIFO_FILTERED: u8 = 0x88;
+/// Overwrite the oldest, no sensor time frame; headers, accelerometer and gyroscope, register 0x48 and register 0x49.
+pub const FIFO_WITH_HEADERS: [u8; 2] = [0x00, 0xD0];
+/// Bytes of a frame with both sensors: header, gyroscope, accelerometer, §4 "FIFO".
+pub const FRAME_BYTES: usize = 13;
+/// The longest configuration the chip holds, bytes, §4 "Device initialization".
+pub const BLOB_LIMIT: usize = 8192;
+/// A sensor time tick is 39.0625 µs, register 0x18: this many of them are 5 ms.
+pub const TICKS_IN_5_MILLIS: u64 = 128;
+
+/// Full scale of the accelerometer, register 0x41.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum AccelRange {
+    G2,
+    G4,
+    G8,
+    G16,
+}
+
+impl AccelRange {
+    /// The register's value.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::G2 => 0,
+            Self::G4 => 1,
+            Self::G8 => 2,
+            Self::G16 => 3,
+        }
+    }
+
+    /// Counts per standard gravity, §1.2.
+    #[must_use]
+    pub const fn counts_per_g(self) -> f32 {
+        match self {
+            Self::G2 => 16_384.0,
+            Self::G4 => 8_192.0,
+            Self::G8 => 4_096.0,
+            Self::G16 => 2_048.0,
+        }
+    }
+}
+
+/// Full scale of the gyroscope, °/s, register 0x43.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum GyroRange {
+    Dps125,
+    Dps250,
+    Dps500,
+    Dps1000,
+    Dps2000,
+}
+
+impl GyroRange {
+    /// The register's value.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Dps2000 => 0,
+            Self::Dps1000 => 1,
+            Self::Dps500 => 2,
+            Self::Dps250 => 3,
+            Self::Dps125 => 4,
+        }
+    }
+
+    /// Counts per degree per second, §1.2.
+    #[must_use]
+    pub const fn counts_per_dps(self) -> f32 {
+        match self {
+            Self::Dps2000 => 16.4,
+            Self::Dps1000 => 32.8,
+            Self::Dps500 => 65.6,
+            Self::Dps250 => 131.2,
+            Self::Dps125 => 262.4,
+        }
+    }
+}
+
+/// Samples per second as delivered. The chip samples four times as often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Rate {
+    Hz400,
+    Hz200,
+    Hz100,
+}
+
+impl Rate {
+    /// The chip's output data rate of four times this, for either sensor, register 0x40 and register 0x42.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Hz400 => 0x0C,
+            Self::Hz200 => 0x0B,
+            Self::Hz100 => 0x0A,
+        }
+    }
+
+    /// Sensor time ticks between two samples of the chip.
+    #[must_use]
+    pub const fn ticks(self) -> u64 {
+        match self {
+            Self::Hz400 => 16,
+            Self::Hz200 => 32,
+            Self::Hz100 => 64,
+        }
+    }
+}
+
+/// ACC_CONF, ACC_RANGE, GYR_CONF and GYR_RANGE: performance filters of normal bandwidth,
+/// registers 0x40 to 0x43.
+#[must_use]
+pub const fn sensor_registers(config: &Config) -> [u8; 4] {
+    let rate = config.rate.code();
+    [0xA0 | rate, config.accel_range.code(), 0xE0 | rate, config.gyro_range.code()]
+}
+
+/// Where configuration byte `offset` goes: the word address, low four bits first, register 0x5B and register 0x5C.
+#[must_use]
+pub const fn init_address(offset: usize) -> [u8; 2] {
+    let word = offset / 2;
+    [(word & 0x0F) as u8, (word >> 4) as u8]
+}
+
+/// The gyroscope's cross-axis factor: seven bits, signed, register 0x3C.
+#[must_use]
+pub const fn cross_axis_factor(register: u8) -> i8 {
+    ((register << 1) as i8) >> 1
+}
+
+/// What the chip says about itself: registers 0x18 to 0x25 in one burst.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Status {
+    /// Free-running time in ticks of 39.0625 µs, 24 bits, register 0x18. Samples are taken
+    /// where it divides by their period.
+    pub sensor_time: u32,
+    /// The accelerometer's or gyroscope's configuration is impossible, register 0x1B.
+    pub configuration_error: bool,
+    /// The low four bits of INTERNAL_STATUS: 1 is running, 0 is not initialised, 2 is a refused
+    /// configuration, register 0x21.
+    pub start_up: u8,
+    /// Die temperature in 1/512 K from 23 °C; `None` while there is none, register 0x22.
+    pub temperature: Option<i16>,
+    /// Bytes in the FIFO, register 0x24.
+    pub fifo_bytes: u16,
+}
+
+impl Status {
+    /// The value of [`start_up`](Self::start_up) of a chip that runs.
+    pub const RUNNING: u8 = 1;
+
+    /// Takes the burst apart.
+    #[must_use]
+    pub const fn decode(burst: &[u8; 14]) -> Self {
+        let [time0, time1, time2, event, _, _, _, _, _, internal, temp0, temp1, fifo0, fifo1] = *burst;
+        let temperature = i16::from_le_bytes([temp0, temp1]);
+        Self {
+            sensor_time: u32::from_le_bytes([time0, time1, time2, 0]),
+            configuration_error: event & 0x1C != 0,
+            start_up: internal & 0x0F,
+            temperature: if temperature == i16::MIN { None } else { Some(temperature) },
+            fifo_bytes: u16::from_le_bytes([fifo0, fifo1 & 0x3F]),
+        }
+    }
+
+    /// Die temperature, °C, register 0x22.
+    #[must_use]
+    pub fn celsius(&self) -> Option<f32> {
+        self.temperature.map(|raw| 23.0 + f32::from(raw) / 512.0)
+    }
+}
+
+/// Four frames of both sensors as accelerometer x, y, z, gyroscope x, y, z in counts.
+///
+/// `None` when there is anything else among them: a skip frame (samples were lost), a frame of one sensor (the other is
+/// starting up), a configuration change, the end of data. §4 "FIFO".
+#[must_use]
+pub fn decode_frames(bytes: &[u8; 4 * FRAME_BYTES]) -> Option<[[i16; 6]; 4]> {
+    let mut group = [[0; 6]; 4];
+    let (frames, _) = bytes.as_chunks::<FRAME_BYTES>();
+    for (sample, frame) in group.iter_mut().zip(frames) {
+        *sample = decode_frame(frame)?;
+    }
+    Some(group)
+}
+
+fn decode_frame(frame: &[u8; FRAME_BYTES]) -> Option<[i16; 6]> {
+    let [header, gx0, gx1, gy0, gy1, gz0, gz1, ax0, ax1, ay0, ay1, az0, az1] = *frame;
+    // Bits 1:0 are the tags of the interrupt pins, which are not used.
+    if header & 0xFC != 0x8C {
+        return None;
+    }
+    let gyro = [[gx0, gx1], [gy0, gy1], [gz0, gz1]].map(i16::from_le_bytes);
+    let [ax, ay, az] = [[ax0, ax1], [ay0, ay1], [az0, az1]].map(i16::from_le_bytes);
+    let [gx, gy, gz] = gyro;
+    // The code of a gyroscope without data, register 0x12; not a reading, which saturates on one axis before all three.
+    (gyro != [i16::MIN; 3]).then_some([ax, ay, az, gx, gy, gz])
+}
+
+/// Accelerometer x, y, z in counts, of the data registers.
+#[must_use]
+pub fn decode_acceleration(bytes: &[u8; 6]) -> [i16; 3] {
+    let [x0, x1, y0, y1, z0, z1] = *bytes;
+    [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes)
+}
+
+/// Does the difference between the two deflections, at ±16 g, pass the self test?
+///
+/// More than 16 g on x, less than −15 g on y, more than 10 g on z, §4 "Sensor self-test".
+#[must_use]
+pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
+    let [x, y, z] = core::array::from_fn(|axis| {
+        let pick = |side: &[i16; 3]| side.get(axis).map_or(0.0, |counts| f32::from(*counts));
+        (pick(&positive) - pick(&negative)) / AccelRange::G16.counts_per_g()
+    });
+    x > 16.0 && y < -15.0 && z > 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_configuration_is_what_the_registers_say() {
+        // ODR 1600 Hz, normal bandwidth, performance filter; ±8 g; the same and low noise; ±2000 °/s.
+        assert_eq!(sensor_registers(&Config::default()), [0xAC, 0x02, 0xEC, 0x00]);
+    }
+
+    #[test]
+    fn words_are_addressed_in_four_and_eight_bits() {
+        assert_eq!(init_address(0), [0x00, 0x00]);
+        assert_eq!(init_address(256), [0x00, 0x08]);
+        assert_eq!(init_address(8190), [0x0F, 0xFF]);
+    }
+
+    #[test]
+    fn the_cross_axis_factor_has_seven_bits_and_a_sign() {
+        assert_eq!([0x00, 0x3F, 0x40, 0x7F, 0x80].map(cross_axis_factor), [0, 63, -64, -1, 0]);
+    }
+
+    #[test]
+    fn the_status_burst_is_taken_apart() {
+        let mut burst = [0; 14];
+        burst[..3].copy_from_slice(&[0x10, 0x32, 0x54]);
+        burst[9] = 0x61;
+        burst[10..12].copy_from_slice(&[0x00, 0x02]);
+        burst[12..].copy_from_slice(&[0x34, 0xC1]);
+        let status = Status::decode(&burst);
+        assert_eq!(status.sensor_time, 0x54_32_10);
+        assert_eq!(status.start_up, Status::RUNNING);
+        assert_eq!(status.celsius(), Some(24.0));
+        assert_eq!(status.fifo_bytes, 0x134, "two reserved bits are ignored");
+        burst[3] = 0x04;
+        burst[10..12].copy_from_slice(&[0x00, 0x80]);
+        assert_eq!(Status::decode(&burst).celsius(), None, "0x8000 is no temperature");
+        assert!(Status::decode(&burst).configuration_error);
+    }
+
+    #[test]
+    fn only_four_whole_frames_are_a_group() {
+        let mut bytes = [0u8; 52];
+        for (number, frame) in bytes.chunks_mut(13).enumerate() {
+            frame[0] = 0x8C;
+            frame[1..7].copy_from_slice(&[number as u8, 0, 0xFF, 0xFF, 0x00, 0x80]);
+            frame[7..13].copy_from_slice(&[1, 0, 2, 0, 0, 0x10]);
+        }
+        let group = decode_frames(&bytes).expect("four frames");
+        assert_eq!(group[3], [1, 2, 4096, 3, -1, i16::MIN]);
+        for header in [0x40, 0x44, 0x48, 0x80, 0x84, 0x88, 0x00, 0xFF] {
+            let mut other = bytes;
+            other[26] = header;
+            assert_eq!(decode_frames(&other), None, "{header:#04x}");
+        }
+        bytes[1..7].copy_from_slice(&[0x00, 0x80, 0x00, 0x80, 0x00, 0x80]);
+        assert_eq!(decode_frames(&bytes), None, "a gyroscope that is starting up");
+    }
+
+    #[test]
+    fn the_self_test_has_a_limit_on_every_axis() {
+        let g = |x: f32, y: f32, z: f32| [x, y, z].map(|g| (g * 2048.0) as i16);
+        assert!(passes_self_test(g(9.0, -8.0, 6.0), g(-8.0, 8.0, -5.0)));
+        assert!(!passes_self_test(g(7.0, -8.0, 6.0), g(-8.0, 8.0, -5.0)));
+        assert!(!passes_self_test(g(9.0, -6.0, 6.0), g(-8.0, 8.0, -5.0)));
+        assert!(!passes_self_test(g(9.0, -8.0, 4.0), g(-8.0, 8.0, -5.0)));
+        assert!(!passes_self_test([0; 3], [0; 3]));
+    }
+}

@@ -1,0 +1,318 @@
+//! The BMI270, an accelerometer and gyroscope by Bosch, at 400 samples per second without folding.
+//!
+//! The chip samples at 1600 Hz into its FIFO; the driver takes four at a time and [decimates](crate::Decimator) them.
+//! It needs no interrupt pin: every read tells the phase of the chip's own clock, and the driver sleeps until the
+//! next four are there. At 10 MHz a sample costs 70 bytes, 56 µs of bus.
+//!
+//! Use it where vibration matters. Not for the chip's step counters and gestures, and not with its auxiliary
+//! interface.
+
+pub mod codec;
+
+use super::port::Port;
+use super::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters};
+use crate::{Decimator, Imu, Sample, Timebase};
+pub use codec::{AccelRange, GyroRange, Rate};
+use codec::{FRAME_BYTES, Status, register};
+use embedded_hal_async::i2c::I2c;
+use embedded_hal_async::spi::SpiDevice;
+use stampfly_types::messages::ImuData;
+use stampfly_types::{GRAVITY, Micros, Vec3};
+
+/// Configuration data in one transfer. Even, and small enough for the DMA buffers of small parts.
+const CHUNK: usize = 256;
+/// The chip may be accessed this long after power-on and after leaving power saving (§4 "Start-up").
+const POWER_UP: Micros = Micros(450);
+const SOFT_RESET: Micros = Micros(2_000);
+/// How long the chip may take to start with its configuration: typically 20 ms.
+const START_UP_LIMIT: Micros = Micros::from_millis(150);
+/// The gyroscope's first sample after it is switched on, 45 ms (§1.2), with a margin.
+const GYRO_START: Micros = Micros::from_millis(50);
+/// Each deflection of the self test settles for 50 ms (§4 "Sensor self-test").
+const SELF_TEST_SETTLE: Micros = Micros::from_millis(51);
+/// Ticks of sensor time from a sample to the read the driver aims at, and to the earliest one it trusts: before, the
+/// FIFO may or may not hold the sample.
+const AIM: u64 = 3;
+const EARLIEST: u64 = 2;
+/// The FIFO of 2 kB holds 157 frames; from here on it may have lost some before the driver could look.
+const OVERRUN: u64 = 150;
+/// Samples may be missing for this many output periods.
+const PATIENCE: u64 = 4;
+
+/// What the chip is told to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// Full scale of the accelerometer.
+    pub accel_range: AccelRange,
+    /// Full scale of the gyroscope.
+    pub gyro_range: GyroRange,
+    /// Samples per second as delivered.
+    pub rate: Rate,
+}
+
+impl Default for Config {
+    /// ±8 g, ±2000 °/s, 400 Hz.
+    fn default() -> Self {
+        Self { accel_range: AccelRange::G8, gyro_range: GyroRange::Dps2000, rate: Rate::Hz400 }
+    }
+}
+
+/// The driver. Implements [`Imu`].
+///
+/// `Sample::at` is the middle of the decimation filter: at 400 Hz three chip samples (1.9 ms) before the newest one,
+/// by the chip's clock, good to one of its ticks (39 µs) and the time the status takes on the bus (13 µs at 10 MHz).
+/// The chip's own low-pass delays a little more; that is not taken off.
+///
+/// A reader that comes late gets every sample, up to 90 ms (at 400 Hz). Beyond that, or when a read is cancelled or
+/// garbled, the FIFO is emptied and the filter starts anew, which takes two output periods. Gives up on the chip
+/// ([`ChipError::NoSample`]) after four output periods without a sample.
+///
+/// The chip does not run without a configuration of 8 kB that Bosch publishes with its sensor API
+/// (`bmi270_config_file`); it is not part of this crate.
+///
+/// ```no_run
+/// use stampfly_drivers::chip::AxisMap;
+/// use stampfly_drivers::chip::bmi270::{Bmi270, Config};
+/// use stampfly_drivers::{Imu, Timebase};
+///
+/// async fn watch<S, T>(device: S, clock: T, configuration_file: &[u8])
+/// where
+///     S: embedded_hal_async::spi::SpiDevice,
+///     T: Timebase,
+/// {
+///     let mut imu = Bmi270::spi(device, clock, configuration_file, AxisMap::STAMPFLY_IMU, Config::default());
+///     while let Ok(sample) = imu.next().await {
+///         let _specific_force = sample.data.accel;
+///     }
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Bmi270<'b, R, T> {
+    port: Port<R, T>,
+    blob: &'b [u8],
+    axes: AxisMap,
+    config: Config,
+    running: bool,
+    /// Between the first bit of a FIFO read and its last: set when a call was cancelled there.
+    reading: bool,
+    decimator: Decimator,
+    /// When to look again.
+    due: Micros,
+    cross_axis: f32,
+    temperature: f32,
+}
+
+impl<'b, S: SpiDevice, T: Timebase> Bmi270<'b, SpiRegisters<S>, T> {
+    /// The chip on SPI, mode 0 or 3, up to 10 MHz.
+    pub fn spi(device: S, clock: T, blob: &'b [u8], axes: AxisMap, config: Config) -> Self {
+        Self::new(SpiRegisters(device), clock, blob, axes, config)
+    }
+}
+
+impl<'b, I: I2c, T: Timebase> Bmi270<'b, I2cRegisters<I>, T> {
+    /// The chip on I2C, at 0x68 (SDO low) or 0x69. The read of a sample fills a 400 kHz bus for 1.7 ms.
+    pub fn i2c(bus: I, address: u8, clock: T, blob: &'b [u8], axes: AxisMap, config: Config) -> Self {
+        Self::new(I2cRegisters::new(bus, address), clock, blob, axes, config)
+    }
+}
+
+impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
+    fn new(registers: R, clock: T, blob: &'b [u8], axes: AxisMap, config: Config) -> Self {
+        Self {
+            port: Port::new(registers, clock),
+            blob,
+            axes,
+            config,
+            running: false,
+            reading: false,
+            decimator: Decimator::default(),
+            due: Micros::ZERO,
+            cross_axis: 0.0,
+            // The zero of the chip's scale, until it has measured.
+            temperature: 23.0,
+        }
+    }
+
+    /// Sets the chip up: reset, identification, configuration file, sensors, FIFO. 60 to 220 ms.
+    ///
+    /// # Errors
+    /// Another chip, an impossible or refused configuration, the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<R::Error>> {
+        self.running = false;
+        self.upload().await?;
+        let wanted = codec::sensor_registers(&self.config);
+        self.port.write(register::ACC_CONF, &wanted).await?;
+        self.port.write(register::FIFO_DOWNS, &[codec::FIFO_FILTERED]).await?;
+        self.port.write(register::FIFO_CONFIG_0, &codec::FIFO_WITH_HEADERS).await?;
+        self.port.write(register::PWR_CTRL, &[codec::ALL_SENSORS]).await?;
+        self.port.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
+        self.port.wait(GYRO_START).await;
+        let kept: [u8; 4] = self.port.read(register::ACC_CONF).await?;
+        let status = self.status().await?;
+        if kept != wanted || status.configuration_error {
+            return Err(ChipError::Configuration { status: kept[0] });
+        }
+        self.temperature = status.celsius().unwrap_or(self.temperature);
+        let [factor]: [u8; 1] = self.port.read(register::GYR_CAS).await?;
+        self.cross_axis = f32::from(codec::cross_axis_factor(factor)) / 512.0;
+        self.restart_fifo().await?;
+        self.running = true;
+        Ok(())
+    }
+
+    /// Deflects the accelerometer's masses both ways and compares. 170 ms; the vehicle has to stand still.
+    ///
+    /// The gyroscope's own test is not run: it is part of the configuration file's features, not of the chip.
+    /// Leaves the chip to be set up by the next call.
+    ///
+    /// # Errors
+    /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
+    pub async fn self_test(&mut self) -> Result<(), ChipError<R::Error>> {
+        self.running = false;
+        self.upload().await?;
+        self.port.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
+        self.port.write(register::PWR_CTRL, &[codec::ACCELEROMETER_ONLY]).await?;
+        // 1600 Hz, normal bandwidth, performance filter, ±16 g.
+        self.port.write(register::ACC_CONF, &[0xAC, AccelRange::G16.code()]).await?;
+        self.port.wait(SOFT_RESET).await;
+        // High amplitude and enable; bit 2 is the direction.
+        let mut deflections = [[0; 3]; 2];
+        for (command, deflection) in [0x0D, 0x09].into_iter().zip(&mut deflections) {
+            self.port.write(register::ACC_SELF_TEST, &[command]).await?;
+            self.port.wait(SELF_TEST_SETTLE).await;
+            *deflection = codec::decode_acceleration(&self.port.read(register::DATA_8).await?);
+        }
+        self.port.write(register::ACC_SELF_TEST, &[0]).await?;
+        let [positive, negative] = deflections;
+        if codec::passes_self_test(positive, negative) { Ok(()) } else { Err(ChipError::SelfTest) }
+    }
+
+    /// Reset, identification, configuration file, until the chip says it runs.
+    async fn upload(&mut self) -> Result<(), ChipError<R::Error>> {
+        if self.blob.is_empty() || !self.blob.len().is_multiple_of(2) || self.blob.len() > codec::BLOB_LIMIT {
+            return Err(ChipError::InvalidConfiguration);
+        }
+        // Until the first rising edge of its chip select the chip listens as on I2C: what this read gives is noise.
+        let _: [u8; 1] = self.port.read(register::CHIP_ID).await?;
+        self.port.wait(POWER_UP).await;
+        self.port.write(register::CMD, &[codec::SOFT_RESET]).await?;
+        self.port.wait(SOFT_RESET).await;
+        let _: [u8; 1] = self.port.read(register::CHIP_ID).await?;
+        self.port.wait(POWER_UP).await;
+        let [found]: [u8; 1] = self.port.read(register::CHIP_ID).await?;
+        if found != codec::CHIP_ID_VALUE {
+            return Err(ChipError::Identification { found: u16::from(found) });
+        }
+        self.port.write(register::PWR_CONF, &[0]).await?;
+        self.port.wait(POWER_UP).await;
+        self.port.write(register::INIT_CTRL, &[0]).await?;
+        for (number, chunk) in self.blob.chunks(CHUNK).enumerate() {
+            self.port.write(register::INIT_ADDR_0, &codec::init_address(number * CHUNK)).await?;
+            self.port.write(register::INIT_DATA, chunk).await?;
+        }
+        self.port.write(register::INIT_CTRL, &[1]).await?;
+        let deadline = self.port.now() + START_UP_LIMIT;
+        loop {
+            let [status]: [u8; 1] = self.port.read(register::INTERNAL_STATUS).await?;
+            match status & 0x0F {
+                Status::RUNNING => return Ok(()),
+                // Not initialised yet.
+                0 if self.port.now() < deadline => self.port.wait(Micros::from_millis(1)).await,
+                _ => return Err(ChipError::Configuration { status }),
+            }
+        }
+    }
+
+    async fn status(&mut self) -> Result<Status, ChipError<R::Error>> {
+        Ok(Status::decode(&self.port.read(register::SENSORTIME_0).await?))
+    }
+
+    /// Empties the FIFO and forgets what the filter remembers.
+    async fn restart_fifo(&mut self) -> Result<(), ChipError<R::Error>> {
+        self.decimator = Decimator::default();
+        self.port.write(register::CMD, &[codec::FIFO_FLUSH]).await?;
+        self.reading = false;
+        self.due = self.port.now() + self.chip_period(4);
+        Ok(())
+    }
+
+    /// The time of so many samples of the chip.
+    fn chip_period(&self, samples: u64) -> Micros {
+        ticks_to_micros(samples * self.config.rate.ticks())
+    }
+
+    /// The next group of four with the instant of its first sample; `None` when there is a gap before it.
+    async fn group(&mut self, deadline: Micros) -> Result<Option<(Micros, [[i16; 6]; 4])>, ChipError<R::Error>> {
+        loop {
+            self.port.wait_until(self.due).await;
+            let asked = self.port.now();
+            if asked > deadline {
+                self.running = false;
+                return Err(ChipError::NoSample);
+            }
+            let status = self.status().await?;
+            let answered = self.port.now();
+            if status.start_up != Status::RUNNING {
+                self.running = false;
+                return Err(ChipError::Restarted);
+            }
+            self.temperature = status.celsius().unwrap_or(self.temperature);
+            let period = self.config.rate.ticks();
+            let age = u64::from(status.sensor_time) % period;
+            let frames = u64::from(status.fifo_bytes) / FRAME_BYTES as u64;
+            let newest = answered.since(ticks_to_micros(age));
+            // Would the next sample have come while the status was on the bus?
+            let ambiguous = age < EARLIEST || ticks_to_micros(age) + answered.since(asked) >= ticks_to_micros(period);
+            if frames < 4 || ambiguous {
+                let missing = 4u64.saturating_sub(frames).max(u64::from(age >= EARLIEST));
+                self.due = newest + ticks_to_micros(missing * period + AIM);
+                continue;
+            }
+            if frames >= OVERRUN {
+                return Ok(None);
+            }
+            self.reading = true;
+            let bytes = self.port.read(register::FIFO_DATA).await?;
+            self.reading = false;
+            self.due = newest + ticks_to_micros(8u64.saturating_sub(frames) * period + AIM);
+            let Some(group) = codec::decode_frames(&bytes) else { return Ok(None) };
+            return Ok(Some((newest.since(self.chip_period(frames - 1)), group)));
+        }
+    }
+}
+
+const fn ticks_to_micros(ticks: u64) -> Micros {
+    Micros(ticks.saturating_mul(5_000) / codec::TICKS_IN_5_MILLIS)
+}
+
+impl<R: Registers, T: Timebase> Imu for Bmi270<'_, R, T> {
+    type Error = ChipError<R::Error>;
+
+    async fn next(&mut self) -> Result<Sample<ImuData>, Self::Error> {
+        if !self.running {
+            self.start().await?;
+        }
+        let deadline = self.port.now() + self.chip_period(4 * PATIENCE);
+        if self.reading {
+            self.restart_fifo().await?;
+        }
+        loop {
+            let Some((at, group)) = self.group(deadline).await? else {
+                self.restart_fifo().await?;
+                continue;
+            };
+            let Some(sum) = self.decimator.push(&group) else { continue };
+            let [ax, ay, az, gx, gy, gz] = sum.map(|sixteenths| sixteenths as f32 / Decimator::GAIN as f32);
+            let accel = Vec3::new(ax, ay, az) * (GRAVITY / self.config.accel_range.counts_per_g());
+            // The factory's correction of the gyroscope's x axis (register 0x12).
+            let gyro = Vec3::new(gx - self.cross_axis * gz, gy, gz)
+                * (core::f32::consts::PI / 180.0 / self.config.gyro_range.counts_per_dps());
+            let data = ImuData {
+                accel: self.axes.to_body(accel),
+                gyro: self.axes.to_body(gyro),
+                temperature: self.temperature,
+            };
+            return Ok(Sample { at, data });
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The BMM150, a magnetometer by Bosch.
+//!
+//! Use it for heading, after calibration and away from the motors' current. Not with its interrupt pins, which the
+//! StampFly does not connect, and not with its SPI.
+
+pub mod codec;
+
+use super::port::Port;
+use super::{AxisMap, ChipError, I2cRegisters};
+use crate::{Magnetometer, Sample, Timebase};
+pub use codec::{Preset, Rate};
+use codec::{Reading, Trim, register};
+use embedded_hal_async::i2c::I2c;
+use stampfly_types::Micros;
+use stampfly_types::messages::MagData;
+
+/// From power-on of the chip's logic to the first access: 3 ms.
+const START_UP: Micros = Micros::from_millis(3);
+/// How long the self test may take.
+const SELF_TEST_LIMIT: Micros = Micros::from_millis(20);
+/// How often the data is looked at once it may be new.
+const POLL: Micros = Micros::from_millis(2);
+
+/// What the chip is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// Repetitions in a sample.
+    pub preset: Preset,
+    /// Samples per second. What the preset cannot do is [`ChipError::InvalidConfiguration`].
+    pub rate: Rate,
+}
+
+impl Default for Config {
+    /// Nine repetitions of x and y, fifteen of z, 25 Hz.
+    fn default() -> Self {
+        Self { preset: Preset::Regular, rate: Rate::Hz25 }
+    }
+}
+
+/// The driver. Implements [`Magnetometer`].
+///
+/// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip. A field beyond the
+/// range is [`ChipError::Data`]. The chip keeps only its newest sample and does not say since when: a reader that comes
+/// late gets the one after it, and so does one whose call was dropped on the bus.
+///
+/// ```no_run
+/// use stampfly_drivers::chip::AxisMap;
+/// use stampfly_drivers::chip::bmm150::{Bmm150, Config};
+/// use stampfly_drivers::{Magnetometer, Timebase};
+///
+/// async fn watch(bus: impl embedded_hal_async::i2c::I2c, clock: impl Timebase) {
+///     let axes = AxisMap::STAMPFLY_MAGNETOMETER;
+///     let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, axes, Config::default());
+///     while let Ok(sample) = compass.next().await {
+///         let _microtesla = sample.data.field;
+///     }
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Bmm150<R, T> {
+    port: Port<R, T>,
+    axes: AxisMap,
+    config: Config,
+    /// `None` while the chip is not set up.
+    trim: Option<Trim>,
+    /// When the next sample may be there.
+    due: Micros,
+}
+
+impl Bmm150<(), ()> {
+    /// Address with CSB and SDO at ground, as on the StampFly.
+    pub const ALL_LOW: u8 = 0x10;
+}
+
+impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
+    /// A driver of the chip with this address.
+    pub const fn new(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
+        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        Self { port, axes, config, trim: None, due: Micros::ZERO }
+    }
+
+    /// Sets the chip up: power, reset, identification, trim, repetitions, rate. 7 ms.
+    ///
+    /// # Errors
+    /// Another chip, one without trim, an impossible configuration, the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.set_up().await.map(|_| ())
+    }
+
+    /// Lets the chip deflect its own sensors. 10 to 30 ms; leaves the chip to be set up by the next call.
+    ///
+    /// # Errors
+    /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
+    pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.wake().await?;
+        self.port.write(register::MODE, &[codec::SELF_TEST]).await?;
+        let deadline = self.port.now() + SELF_TEST_LIMIT;
+        loop {
+            self.port.wait(POLL).await;
+            let [mode]: [u8; 1] = self.port.read(register::MODE).await?;
+            if mode & 1 == 0 {
+                break;
+            }
+            if self.port.now() > deadline {
+                return Err(ChipError::SelfTest);
+            }
+        }
+        let data = self.port.read(register::DATA_X_LSB).await?;
+        if codec::passes_self_test(&data) { Ok(()) } else { Err(ChipError::SelfTest) }
+    }
+
+    /// From whatever state to sleep, with the identification checked.
+    async fn wake(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.trim = None;
+        // Without power nothing but this register answers.
+        self.port.write(register::POWER, &[codec::POWER_ON]).await?;
+        self.port.wait(START_UP).await;
+        self.port.write(register::POWER, &[codec::SOFT_RESET]).await?;
+        self.port.wait(START_UP).await;
+        let [found]: [u8; 1] = self.port.read(register::CHIP_ID).await?;
+        if found == codec::CHIP_ID_VALUE { Ok(()) } else { Err(ChipError::Identification { found: u16::from(found) }) }
+    }
+
+    async fn set_up(&mut self) -> Result<Trim, ChipError<I::Error>> {
+        if self.config.preset.duration() > self.config.rate.period() {
+            return Err(ChipError::InvalidConfiguration);
+        }
+        self.wake().await?;
+        let trim = Trim::decode(&self.port.read(register::TRIM).await?).ok_or(ChipError::Data)?;
+        let [xy, z] = self.config.preset.codes();
+        self.port.write(register::REPETITIONS_XY, &[xy]).await?;
+        self.port.write(register::REPETITIONS_Z, &[z]).await?;
+        self.port.write(register::MODE, &[codec::mode_bits(&self.config)]).await?;
+        self.due = self.port.now() + self.config.preset.duration();
+        self.trim = Some(trim);
+        Ok(trim)
+    }
+
+    /// Waits for new data, and gives it with the instant it was seen.
+    async fn reading(&mut self) -> Result<(Micros, Reading), ChipError<I::Error>> {
+        let period = self.config.rate.period();
+        let asked = self.port.now();
+        let deadline = asked + period + period;
+        let mut stale = asked > self.due + Micros(period.0 / 8);
+        self.port.wait_until(self.due).await;
+        loop {
+            let reading = Reading::decode(&self.port.read(register::DATA_X_LSB).await?);
+            let now = self.port.now();
+            if reading.power & codec::POWER_ON == 0 || reading.mode != codec::mode_bits(&self.config) {
+                self.trim = None;
+                return Err(ChipError::Restarted);
+            }
+            if reading.ready && !stale {
+                // A little early: the chip's clock may be fast by a few per cent.
+                self.due = now + Micros(period.0 - period.0 / 16);
+                return Ok((now, reading));
+            }
+            stale = false;
+            if now > deadline {
+                self.trim = None;
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+    }
+}
+
+impl<I: I2c, T: Timebase> Magnetometer for Bmm150<I2cRegisters<I>, T> {
+    type Error = ChipError<I::Error>;
+
+    async fn next(&mut self) -> Result<Sample<MagData>, Self::Error> {
+        let trim = match self.trim {
+            Some(trim) => trim,
+            None => self.set_up().await?,
+        };
+        let (seen, reading) = self.reading().await?;
+        let field = trim.compensate(&reading).ok_or(ChipError::Data)?;
+        let at = seen.since(Micros(self.config.preset.duration().0 / 2));
+        Ok(Sample { at, data: MagData { field: self.axes.to_body(field) } })
+    }
+}

@@ -1,0 +1,178 @@
+//! The BMP280, a barometer by Bosch.
+//!
+//! In the chip's own rhythm nothing tells a new conversion from an old one; the driver therefore starts every
+//! conversion itself, which also tells when it was. Use it for height over minutes, beside something that knows height
+//! over seconds. Not with the SPI of this part.
+
+pub mod codec;
+
+use super::port::Port;
+use super::{ChipError, I2cRegisters};
+use crate::{Barometer, Sample, Timebase};
+use codec::{Calibration, Reading, register};
+pub use codec::{Filter, Oversampling};
+use embedded_hal_async::i2c::I2c;
+use stampfly_types::Micros;
+use stampfly_types::messages::BaroData;
+
+/// From reset to the first access, §1 table 2.
+const START_UP: Micros = Micros::from_millis(2);
+/// How long the chip may copy its calibration.
+const COPY_LIMIT: Micros = Micros::from_millis(20);
+const POLL: Micros = Micros::from_millis(1);
+/// What the chip can measure, Pa with eight bits after the point, §1 table 2.
+const RANGE: core::ops::RangeInclusive<u32> = 30_000 << 8..=110_000 << 8;
+
+/// What the driver and the chip are told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// Pressure conversions in a sample.
+    pub pressure: Oversampling,
+    /// Temperature conversions in a sample.
+    pub temperature: Oversampling,
+    /// Low-pass over samples.
+    pub filter: Filter,
+    /// Time between two samples; never less than a conversion takes.
+    pub interval: Micros,
+}
+
+impl Default for Config {
+    /// Four pressure conversions, two of temperature, a light filter, 25 Hz.
+    fn default() -> Self {
+        Self {
+            pressure: Oversampling::X4,
+            temperature: Oversampling::X2,
+            filter: Filter::C4,
+            interval: Micros::from_millis(40),
+        }
+    }
+}
+
+/// The driver. Implements [`Barometer`].
+///
+/// `Sample::at` is the middle of the pressure conversion; the filter's delay of a few samples is not taken off. A call
+/// that is dropped loses its conversion, and the next one starts another when that one is over. The chip has no self
+/// test; pressures outside of what it can measure are [`ChipError::Data`].
+///
+/// ```no_run
+/// use stampfly_drivers::chip::bmp280::{Bmp280, Config};
+/// use stampfly_drivers::{Barometer, Timebase};
+///
+/// async fn watch(bus: impl embedded_hal_async::i2c::I2c, clock: impl Timebase) {
+///     let mut baro = Bmp280::new(bus, Bmp280::SDO_LOW, clock, Config::default());
+///     while let Ok(sample) = baro.next().await {
+///         let _metres = sample.data.altitude;
+///     }
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Bmp280<R, T> {
+    port: Port<R, T>,
+    config: Config,
+    /// `None` while the chip is not set up.
+    calibration: Option<Calibration>,
+    /// When the next conversion may begin.
+    due: Micros,
+}
+
+impl Bmp280<(), ()> {
+    /// Address with SDO at ground, as on the StampFly.
+    pub const SDO_LOW: u8 = 0x76;
+    /// Address with SDO at the supply.
+    pub const SDO_HIGH: u8 = 0x77;
+}
+
+impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
+    /// A driver of the chip with this address.
+    pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
+        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        Self { port, config, calibration: None, due: Micros::ZERO }
+    }
+
+    /// Sets the chip up: reset, identification, calibration, filter. A few milliseconds.
+    ///
+    /// # Errors
+    /// Another chip, one without calibration, the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.set_up().await.map(|_| ())
+    }
+
+    async fn set_up(&mut self) -> Result<Calibration, ChipError<I::Error>> {
+        self.calibration = None;
+        let [found]: [u8; 1] = self.port.read(register::ID).await?;
+        if !codec::IDENTIFICATIONS.contains(&found) {
+            return Err(ChipError::Identification { found: u16::from(found) });
+        }
+        self.port.write(register::RESET, &[codec::SOFT_RESET]).await?;
+        self.port.wait(START_UP).await;
+        let deadline = self.port.now() + COPY_LIMIT;
+        loop {
+            let [status]: [u8; 1] = self.port.read(register::STATUS).await?;
+            if status & codec::COPYING == 0 {
+                break;
+            }
+            if self.port.now() > deadline {
+                return Err(ChipError::Configuration { status });
+            }
+            self.port.wait(POLL).await;
+        }
+        let bytes = self.port.read(register::CALIBRATION).await?;
+        let calibration = Calibration::decode(&bytes).ok_or(ChipError::Data)?;
+        self.port.write(register::CONFIG, &[codec::filter_bits(&self.config)]).await?;
+        self.calibration = Some(calibration);
+        self.due = self.port.now();
+        Ok(calibration)
+    }
+
+    /// One conversion, from its start to its raw result.
+    async fn convert(&mut self, begun: Micros) -> Result<Reading, ChipError<I::Error>> {
+        let control = codec::oversampling_bits(&self.config);
+        let limit = codec::conversion_limit(&self.config);
+        self.due = begun + self.config.interval.max(limit);
+        self.port.write(register::CTRL_MEAS, &[control | codec::FORCED]).await?;
+        self.port.wait_until(begun + limit).await;
+        loop {
+            let reading = Reading::decode(&self.port.read(register::STATUS).await?);
+            if (reading.oversampling_bits, reading.filter_bits) != (control, codec::filter_bits(&self.config)) {
+                self.calibration = None;
+                return Err(ChipError::Restarted);
+            }
+            if !reading.measuring {
+                return Ok(reading);
+            }
+            if self.port.now() > begun + limit + limit {
+                self.calibration = None;
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+    }
+}
+
+impl<I: I2c, T: Timebase> Barometer for Bmp280<I2cRegisters<I>, T> {
+    type Error = ChipError<I::Error>;
+
+    async fn next(&mut self) -> Result<Sample<BaroData>, Self::Error> {
+        let calibration = match self.calibration {
+            Some(calibration) => calibration,
+            None => self.set_up().await?,
+        };
+        self.port.wait_until(self.due).await;
+        let begun = self.port.now();
+        let reading = self.convert(begun).await?;
+        if reading.pressure == Reading::SKIPPED || reading.temperature == Reading::SKIPPED {
+            return Err(ChipError::Data);
+        }
+        let compensated = calibration
+            .compensate(reading.temperature, reading.pressure)
+            .filter(|compensated| RANGE.contains(&compensated.pressure))
+            .ok_or(ChipError::Data)?;
+        let pressure = compensated.pressure as f32 / 256.0;
+        let data = BaroData {
+            pressure,
+            temperature: compensated.temperature as f32 / 100.0,
+            altitude: codec::pressure_altitude(pressure),
+        };
+        Ok(Sample { at: begun + codec::pressure_instant(&self.config), data })
+    }
+}

@@ -1,0 +1,169 @@
+//! Registers and scales of the INA3221, from Texas Instruments SBOS576B. Registers are words, high byte first,
+//! described in its §8.6 "Register Maps".
+
+use super::Config;
+use stampfly_types::Micros;
+
+/// Register addresses, §8.6.1.
+pub mod register {
+    /// Channels, averages, times, mode.
+    pub const CONFIGURATION: u8 = 0x00;
+    /// Shunt voltage of channel 1; its bus voltage and those of the other channels follow.
+    pub const SHUNT_1: u8 = 0x01;
+    /// Flags.
+    pub const MASK_ENABLE: u8 = 0x0F;
+    /// Who made it: [`MANUFACTURER_VALUE`](super::MANUFACTURER_VALUE).
+    pub const MANUFACTURER: u8 = 0xFE;
+    /// What it is: [`DIE_VALUE`](super::DIE_VALUE).
+    pub const DIE: u8 = 0xFF;
+}
+
+/// "TI", §8.6.2.
+pub const MANUFACTURER_VALUE: u16 = 0x5449;
+/// §8.6.2.
+pub const DIE_VALUE: u16 = 0x3220;
+/// Reset, in [`register::CONFIGURATION`].
+pub const RESET: u16 = 0x8000;
+/// All conversions of the enabled channels are done; reading it clears it. In [`register::MASK_ENABLE`].
+pub const CONVERSION_READY: u16 = 0x0001;
+/// Shunt and bus, continuously.
+const CONTINUOUS: u16 = 0b111;
+
+/// Which pair of pins the shunt is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Channel {
+    One,
+    Two,
+    Three,
+}
+
+impl Channel {
+    /// Address of its shunt voltage.
+    #[must_use]
+    pub const fn shunt_register(self) -> u8 {
+        register::SHUNT_1 + 2 * self as u8
+    }
+
+    /// Address of its bus voltage.
+    #[must_use]
+    pub const fn bus_register(self) -> u8 {
+        self.shunt_register() + 1
+    }
+}
+
+/// Conversions averaged into one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Average {
+    A1,
+    A4,
+    A16,
+    A64,
+    A128,
+    A256,
+    A512,
+    A1024,
+}
+
+impl Average {
+    const fn conversions(self) -> u64 {
+        match self {
+            Self::A1 => 1,
+            Self::A4 => 4,
+            Self::A16 => 16,
+            Self::A64 => 64,
+            Self::A128 => 128,
+            Self::A256 => 256,
+            Self::A512 => 512,
+            Self::A1024 => 1_024,
+        }
+    }
+}
+
+/// Time of one conversion, µs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum ConversionTime {
+    Us140,
+    Us204,
+    Us332,
+    Us588,
+    Us1100,
+    Us2116,
+    Us4156,
+    Us8244,
+}
+
+impl ConversionTime {
+    const fn micros(self) -> u64 {
+        match self {
+            Self::Us140 => 140,
+            Self::Us204 => 204,
+            Self::Us332 => 332,
+            Self::Us588 => 588,
+            Self::Us1100 => 1_100,
+            Self::Us2116 => 2_116,
+            Self::Us4156 => 4_156,
+            Self::Us8244 => 8_244,
+        }
+    }
+}
+
+/// CONFIGURATION: one channel only, the same time for shunt and bus.
+#[must_use]
+pub const fn configuration(config: &Config) -> u16 {
+    let time = config.time as u16;
+    (0x4000 >> config.channel as u16) | (config.average as u16) << 9 | time << 6 | time << 3 | CONTINUOUS
+}
+
+/// From one result to the next.
+#[must_use]
+pub const fn cycle(config: &Config) -> Micros {
+    Micros(2 * config.average.conversions() * config.time.micros())
+}
+
+/// Voltage over the shunt, V: 13 bits, left-justified, 40 µV each, §8.6.2.
+#[must_use]
+pub fn shunt_volts(register: u16) -> f32 {
+    f32::from((register as i16) >> 3) * 40e-6
+}
+
+/// Voltage of the bus, V: 13 bits, left-justified, 8 mV each, §8.6.2.
+#[must_use]
+pub fn bus_volts(register: u16) -> f32 {
+    f32::from((register as i16) >> 3) * 8e-3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_are_those_of_the_data_sheet() {
+        // −80 mV is 2000 counts of 40 µV in two's complement: 0xC180.
+        assert!((shunt_volts(0xC180) + 0.08).abs() < 1e-7);
+        assert!((shunt_volts(0x7FF8) - 0.163_8).abs() < 1e-6, "full scale");
+        assert!((bus_volts(0x7FF8) - 32.76).abs() < 1e-4, "full scale");
+        assert_eq!(shunt_volts(0xFFF8), -40e-6);
+        assert_eq!(shunt_volts(0x0007), 0.0, "the low three bits are not data");
+    }
+
+    #[test]
+    fn the_configuration_word_is_the_reset_value_with_other_choices() {
+        // Reset value 0x7127: three channels, no average, 1.1 ms, continuous.
+        let config = Config { average: Average::A1, time: ConversionTime::Us1100, ..Config::default() };
+        assert_eq!(configuration(&config), 0x2127, "channel 2 only");
+        assert_eq!(configuration(&Config { channel: Channel::One, ..config }), 0x4127);
+        assert_eq!(configuration(&Config { channel: Channel::Three, ..config }), 0x1127);
+        assert_eq!(configuration(&Config { average: Average::A1024, ..config }), 0x2F27);
+        assert_eq!((Channel::Two.shunt_register(), Channel::Two.bus_register()), (3, 4));
+    }
+
+    #[test]
+    fn the_default_gives_more_than_ten_results_a_second() {
+        let cycle = cycle(&Config::default());
+        assert_eq!(cycle, Micros(2 * 64 * 588));
+        assert!(cycle < Micros::from_millis(100));
+    }
+}

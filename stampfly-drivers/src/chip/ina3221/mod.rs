@@ -1,0 +1,158 @@
+//! The INA3221, a monitor of up to three supplies by Texas Instruments, here of one: the battery.
+//!
+//! The chip averages by itself without a gap, so the samples' mean is the mean current. Use it for state of charge and
+//! for the voltage the motors see. Not as an over-current cut-off: a sample is tens of milliseconds old.
+
+pub mod codec;
+
+use super::port::Port;
+use super::{ChipError, I2cRegisters};
+use crate::{PowerMonitor, Sample, Timebase};
+use codec::register;
+pub use codec::{Average, Channel, ConversionTime};
+use embedded_hal_async::i2c::I2c;
+use stampfly_types::Micros;
+use stampfly_types::messages::PowerData;
+
+/// From a reset to the first access. The data sheet gives no figure.
+const AFTER_RESET: Micros = Micros::from_millis(1);
+/// How often the flag is looked at once it may be up.
+const POLL: Micros = Micros::from_millis(2);
+
+/// What the chip and the driver are told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Where the shunt is.
+    pub channel: Channel,
+    /// Resistance of the shunt, Ω.
+    pub shunt_ohms: f32,
+    /// Conversions in a sample.
+    pub average: Average,
+    /// Time of one conversion, of shunt and bus alike.
+    pub time: ConversionTime,
+}
+
+impl Default for Config {
+    /// The StampFly's: 0.01 Ω on channel 2 (R12 of its schematic); 64 times 588 µs, a sample every 75 ms.
+    fn default() -> Self {
+        Self { channel: Channel::Two, shunt_ohms: 0.01, average: Average::A64, time: ConversionTime::Us588 }
+    }
+}
+
+/// The driver. Implements [`PowerMonitor`].
+///
+/// `Sample::at` is the middle of the average. The resolution of 40 µV is 4 mA at 0.01 Ω, the range ±16 A. The chip
+/// keeps
+/// only its newest result and does not say since when: a reader that comes late gets the one after it. The chip has
+/// no self test.
+///
+/// ```no_run
+/// use stampfly_drivers::chip::ina3221::{Config, Ina3221};
+/// use stampfly_drivers::{PowerMonitor, Timebase};
+///
+/// async fn watch(bus: impl embedded_hal_async::i2c::I2c, clock: impl Timebase) {
+///     let mut battery = Ina3221::new(bus, Ina3221::A0_GROUND, clock, Config::default());
+///     while let Ok(sample) = battery.next().await {
+///         let _watts = sample.data.power;
+///     }
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Ina3221<R, T> {
+    port: Port<R, T>,
+    config: Config,
+    running: bool,
+    /// When the next result may be there.
+    due: Micros,
+}
+
+impl Ina3221<(), ()> {
+    /// Address with A0 at ground, as on the StampFly.
+    pub const A0_GROUND: u8 = 0x40;
+}
+
+impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
+    /// A driver of the chip with this address.
+    pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
+        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        Self { port, config, running: false, due: Micros::ZERO }
+    }
+
+    /// Sets the chip up: identification, reset, configuration. A millisecond.
+    ///
+    /// # Errors
+    /// Another chip, a shunt that cannot be, the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.running = false;
+        if !(self.config.shunt_ohms.is_finite() && self.config.shunt_ohms > 0.0) {
+            return Err(ChipError::InvalidConfiguration);
+        }
+        for (register, value) in
+            [(register::MANUFACTURER, codec::MANUFACTURER_VALUE), (register::DIE, codec::DIE_VALUE)]
+        {
+            let found = self.read(register).await?;
+            if found != value {
+                return Err(ChipError::Identification { found });
+            }
+        }
+        self.write(codec::RESET).await?;
+        self.port.wait(AFTER_RESET).await;
+        self.write(codec::configuration(&self.config)).await?;
+        self.due = self.port.now() + codec::cycle(&self.config);
+        self.running = true;
+        Ok(())
+    }
+
+    async fn read(&mut self, register: u8) -> Result<u16, ChipError<I::Error>> {
+        Ok(u16::from_be_bytes(self.port.read(register).await?))
+    }
+
+    async fn write(&mut self, configuration: u16) -> Result<(), ChipError<I::Error>> {
+        self.port.write(register::CONFIGURATION, &configuration.to_be_bytes()).await
+    }
+
+    /// Waits for the flag that a result is there, and gives the instant it was seen.
+    async fn ready(&mut self) -> Result<Micros, ChipError<I::Error>> {
+        let cycle = codec::cycle(&self.config);
+        let asked = self.port.now();
+        let deadline = asked + cycle + cycle;
+        // A flag that may have been up for long tells nothing about when: take it down and wait for the next.
+        let mut stale = asked > self.due + Micros(cycle.0 / 8);
+        self.port.wait_until(self.due).await;
+        loop {
+            if self.read(register::CONFIGURATION).await? != codec::configuration(&self.config) {
+                self.running = false;
+                return Err(ChipError::Restarted);
+            }
+            let flags = self.read(register::MASK_ENABLE).await?;
+            let now = self.port.now();
+            if flags & codec::CONVERSION_READY != 0 && !stale {
+                // A little early: the chip's clock may be fast by a few per cent.
+                self.due = now + Micros(cycle.0 - cycle.0 / 16);
+                return Ok(now);
+            }
+            stale = false;
+            if now > deadline {
+                self.running = false;
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+    }
+}
+
+impl<I: I2c, T: Timebase> PowerMonitor for Ina3221<I2cRegisters<I>, T> {
+    type Error = ChipError<I::Error>;
+
+    async fn next(&mut self) -> Result<Sample<PowerData>, Self::Error> {
+        if !self.running {
+            self.start().await?;
+        }
+        let seen = self.ready().await?;
+        let current =
+            codec::shunt_volts(self.read(self.config.channel.shunt_register()).await?) / self.config.shunt_ohms;
+        let voltage = codec::bus_volts(self.read(self.config.channel.bus_register()).await?);
+        let at = seen.since(Micros(codec::cycle(&self.config).0 / 2));
+        Ok(Sample { at, data: PowerData { voltage, current, power: voltage * current } })
+    }
+}

@@ -1,0 +1,219 @@
+//! The PMW3901, an optical flow sensor by PixArt, a hundred times a second.
+//!
+//! It compares pictures of the floor and adds up how many counts they moved; a read takes what has been counted. Use it
+//! from 8 cm above the floor on (below it is out of focus), with light of 60 lux or more. Not as a sensor of distance
+//! moved: the counts are angles, and rotation is in them.
+
+pub mod codec;
+
+use super::port::bounded;
+use super::{AxisMap, ChipError};
+use crate::time::sleep_until;
+use crate::{OpticalFlow, Sample, Timebase};
+use codec::{Motion, Step, register};
+use embedded_hal_async::spi::{Operation, SpiDevice};
+use stampfly_types::messages::FlowData;
+use stampfly_types::{Micros, Vec3};
+
+/// From power-on to the first access ("Power-up sequence").
+const POWER_UP: Micros = Micros::from_millis(45);
+const AFTER_RESET: Micros = Micros::from_millis(5);
+/// From an address to the data it asks for (tSRAD), ns.
+const ADDRESS_TO_DATA: u32 = 35_000;
+/// From the end of a write to the next access (tSWW, tSWR).
+const AFTER_WRITE: Micros = Micros(45);
+/// From the end of a read to the next access (tSRW, tSRR).
+const AFTER_READ: Micros = Micros(20);
+/// From the last clock of a write to the end of the chip select (tSCLK-NCS), ns.
+const WRITE_HOLD: u32 = 20_000;
+/// How often the chip's calibration is asked for before it counts as broken.
+const ATTEMPTS: usize = 10;
+
+/// What the driver is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Time between two samples. Pictures come at 121 Hz: faster than that gives empty samples.
+    pub interval: Micros,
+    /// Angle of one count, rad; a lens of another distance has another.
+    pub radians_per_count: f32,
+}
+
+impl Default for Config {
+    /// 100 Hz, the module's own lens.
+    fn default() -> Self {
+        Self { interval: Micros::from_millis(10), radians_per_count: codec::RADIANS_PER_COUNT }
+    }
+}
+
+/// The driver, on SPI in mode 3 at no more than 2 MHz. Implements [`OpticalFlow`].
+///
+/// `Sample::at` is the instant of the read; the newest picture in it is up to 8 ms older, which the chip does not tell.
+/// `FlowData::interval` is the time since the counts were last emptied, whatever the caller's rhythm. After a read that
+/// failed or was cancelled nobody knows what was lost: the driver empties the counts and begins a new interval, so no
+/// sample ever covers less time than it says.
+///
+/// A sample costs 110 µs of bus, most of it the pause between address and data.
+///
+/// ```no_run
+/// use stampfly_drivers::chip::AxisMap;
+/// use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
+/// use stampfly_drivers::{OpticalFlow, Timebase};
+///
+/// async fn watch(device: impl embedded_hal_async::spi::SpiDevice, clock: impl Timebase) {
+///     let mut flow = Pmw3901::new(device, clock, AxisMap::STAMPFLY_FLOW, Config::default());
+///     while let Ok(sample) = flow.next().await {
+///         let _forward = if sample.data.valid { sample.data.delta_x / sample.data.interval } else { 0.0 };
+///     }
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Pmw3901<S, T> {
+    device: S,
+    clock: T,
+    axes: AxisMap,
+    config: Config,
+    running: bool,
+    /// When the counts were last emptied; `None` when that is unknown.
+    emptied: Option<Micros>,
+}
+
+impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
+    /// A driver of the chip on this device.
+    pub const fn new(device: S, clock: T, axes: AxisMap, config: Config) -> Self {
+        Self { device, clock, axes, config, running: false, emptied: None }
+    }
+
+    /// Sets the chip up: reset, both identifications, calibration, performance registers. About 85 ms.
+    ///
+    /// # Errors
+    /// Another chip, one that does not give its calibration, the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<S::Error>> {
+        self.running = false;
+        self.emptied = None;
+        let ready = self.clock.now() + POWER_UP;
+        sleep_until(&mut self.clock, ready).await;
+        self.write(register::POWER_UP_RESET, codec::RESET).await?;
+        self.wait(AFTER_RESET).await;
+        let (found, inverse) = (self.read(register::PRODUCT_ID).await?, self.read(register::INVERSE_PRODUCT_ID).await?);
+        if found != codec::PRODUCT || inverse != !codec::PRODUCT {
+            return Err(ChipError::Identification { found: u16::from_be_bytes([found, inverse]) });
+        }
+        for offset in 0..5 {
+            self.read(register::MOTION + offset).await?;
+        }
+        self.calibrate().await?;
+        for step in codec::PERFORMANCE {
+            match *step {
+                Step::Write(register, value) => self.write(register, value).await?,
+                Step::Wait(millis) => self.wait(Micros::from_millis(u64::from(millis))).await,
+            }
+        }
+        self.running = true;
+        Ok(())
+    }
+
+    /// The part of the list that depends on the chip.
+    async fn calibrate(&mut self) -> Result<(), ChipError<S::Error>> {
+        for (register, value) in codec::PREPARE {
+            self.write(register, value).await?;
+        }
+        let mut status = self.read(0x47).await?;
+        for _ in 1..ATTEMPTS {
+            if status == 0x08 {
+                break;
+            }
+            self.write(0x43, 0x10).await?;
+            status = self.read(0x47).await?;
+        }
+        if status != 0x08 {
+            return Err(ChipError::Configuration { status });
+        }
+        let high = self.read(0x67).await? & 0x80 != 0;
+        self.write(0x48, if high { 0x04 } else { 0x02 }).await?;
+        for (register, value) in codec::PREPARE_CALIBRATION {
+            self.write(register, value).await?;
+        }
+        if self.read(0x73).await? == 0 {
+            let [first, second] = codec::calibration(self.read(0x70).await?, self.read(0x71).await?);
+            for (register, value) in
+                [(0x7F, 0x00), (0x61, 0xAD), (0x51, first), (0x7F, 0x0E), (0x70, first), (0x71, second)]
+            {
+                self.write(register, value).await?;
+            }
+        }
+        Ok(())
+    }
+
+    async fn burst(&mut self) -> Result<Motion, ChipError<S::Error>> {
+        let mut bytes = [0; 12];
+        let mut operations = [
+            Operation::Write(&[register::MOTION_BURST]),
+            Operation::DelayNs(ADDRESS_TO_DATA),
+            Operation::Read(&mut bytes),
+        ];
+        bounded(&self.clock, self.device.transaction(&mut operations)).await?;
+        if let Some(motion) = Motion::decode(&bytes) {
+            return Ok(motion);
+        }
+        // Nobody there. Whoever comes back has lost its registers.
+        self.running = false;
+        Err(ChipError::Data)
+    }
+
+    async fn read(&mut self, register: u8) -> Result<u8, ChipError<S::Error>> {
+        let mut bytes = [0];
+        let mut operations =
+            [Operation::Write(&[register]), Operation::DelayNs(ADDRESS_TO_DATA), Operation::Read(&mut bytes)];
+        bounded(&self.clock, self.device.transaction(&mut operations)).await?;
+        self.wait(AFTER_READ).await;
+        let [value] = bytes;
+        Ok(value)
+    }
+
+    async fn write(&mut self, register: u8, value: u8) -> Result<(), ChipError<S::Error>> {
+        let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(WRITE_HOLD)];
+        bounded(&self.clock, self.device.transaction(&mut operations)).await?;
+        self.wait(AFTER_WRITE).await;
+        Ok(())
+    }
+
+    async fn wait(&mut self, span: Micros) {
+        let instant = self.clock.now() + span;
+        sleep_until(&mut self.clock, instant).await;
+    }
+}
+
+impl<S: SpiDevice, T: Timebase> OpticalFlow for Pmw3901<S, T> {
+    type Error = ChipError<S::Error>;
+
+    async fn next(&mut self) -> Result<Sample<FlowData>, Self::Error> {
+        if !self.running {
+            self.start().await?;
+        }
+        let emptied = match self.emptied {
+            Some(emptied) => emptied,
+            None => {
+                self.burst().await?;
+                let now = self.clock.now();
+                self.emptied = Some(now);
+                now
+            }
+        };
+        sleep_until(&mut self.clock, emptied + self.config.interval).await;
+        // Until the burst is over, nobody knows what it takes away.
+        self.emptied = None;
+        let motion = self.burst().await?;
+        let at = self.clock.now();
+        self.emptied = Some(at);
+        let counts = Vec3::new(f32::from(motion.delta_x), f32::from(motion.delta_y), 0.0);
+        let angle = self.axes.to_body(counts) * self.config.radians_per_count;
+        let data = FlowData {
+            delta_x: angle.x,
+            delta_y: angle.y,
+            interval: at.since(emptied).seconds(),
+            quality: motion.quality,
+            valid: motion.is_valid(),
+        };
+        Ok(Sample { at, data })
+    }
+}

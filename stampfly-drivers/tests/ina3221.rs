@@ -1,0 +1,158 @@
+//! The INA3221 driver against a chip of closures that averages in its own time.
+
+mod common;
+
+use common::{Access, AnyChip, Clock, Fault, I2cBus, cancel};
+use stampfly_drivers::blocking::block_on;
+use stampfly_drivers::chip::ina3221::{Config, Ina3221};
+use stampfly_drivers::chip::{ChipError, I2cRegisters};
+use stampfly_drivers::{PowerMonitor, Timebase};
+use stampfly_types::Micros;
+use std::cell::RefCell;
+use std::rc::Rc;
+
+struct Chip {
+    clock: Clock,
+    registers: [u16; 256],
+    begun: Micros,
+    /// Results that have been reported.
+    reported: u64,
+    cycle: u64,
+    fault: Option<Fault>,
+}
+
+impl Chip {
+    fn new(clock: &Clock) -> Self {
+        let mut registers = [0; 256];
+        registers[0xFE] = 0x5449;
+        registers[0xFF] = 0x3220;
+        // 2.00 A over 10 mΩ: 500 counts of 40 µV; 3.8 V: 475 counts of 8 mV.
+        registers[3] = 500 << 3;
+        registers[4] = 475 << 3;
+        Self { clock: clock.clone(), registers, begun: Micros::ZERO, reported: 0, cycle: 2 * 64 * 588, fault: None }
+    }
+
+    fn access(&mut self, access: Access<'_>) -> Result<(), Fault> {
+        match access {
+            Access::Write(0, &[high, low]) => {
+                let word = u16::from_be_bytes([high, low]);
+                self.registers[0] = if word & 0x8000 != 0 { 0x7127 } else { word };
+                self.begun = self.clock.now();
+                self.reported = 0;
+            }
+            Access::Write(register, _) => panic!("nothing to write at {register:#04x}"),
+            Access::Read(register, into) => {
+                if let Some(fault) = self.fault.take() {
+                    return Err(fault);
+                }
+                if register == 0x0F {
+                    let done = self.clock.now().since(self.begun).0 / self.cycle;
+                    self.registers[0x0F] = u16::from(done > self.reported);
+                    self.reported = done;
+                }
+                into.copy_from_slice(&self.registers[usize::from(register)].to_be_bytes());
+            }
+        }
+        Ok(())
+    }
+}
+
+type Shared = Rc<RefCell<Chip>>;
+
+fn bench(config: Config) -> (Clock, Shared, Ina3221<I2cRegisters<I2cBus<AnyChip>>, Clock>) {
+    let clock = Clock::new();
+    let chip = Rc::new(RefCell::new(Chip::new(&clock)));
+    let shared = chip.clone();
+    let access: AnyChip = Box::new(move |access| shared.borrow_mut().access(access));
+    let bus = I2cBus { address: 0x40, clock: clock.clone(), chip: access };
+    let driver = Ina3221::new(bus, Ina3221::A0_GROUND, clock.clone(), config);
+    (clock, chip, driver)
+}
+
+#[test]
+fn samples_are_amperes_and_volts_and_every_result_is_read_once() {
+    for percent in [97, 100, 103] {
+        let (clock, chip, mut battery) = bench(Config::default());
+        chip.borrow_mut().cycle = 2 * 64 * 588 * percent / 100;
+        let first = block_on(battery.next()).expect("a sample");
+        assert!((first.data.current - 2.0).abs() < 1e-5, "0.01 Ω, not 0.1 Ω");
+        assert!((first.data.voltage - 3.8).abs() < 1e-5);
+        assert!((first.data.power - 7.6).abs() < 1e-4);
+        assert_eq!(chip.borrow().registers[0], 0x26DF);
+        let mut before = first.at;
+        for _ in 0..50 {
+            let sample = block_on(battery.next()).expect("a sample");
+            let step = sample.at.since(before).0.abs_diff(chip.borrow().cycle);
+            assert!(step <= 2_200, "off by no more than a look at the flag: {step}");
+            before = sample.at;
+        }
+        let mean = before.since(first.at).0 / 50;
+        assert!(mean.abs_diff(chip.borrow().cycle) < 50, "none twice, none lost: {mean}");
+        assert!(clock.now().since(before) < Micros::from_millis(41));
+    }
+}
+
+#[test]
+fn current_into_the_battery_is_negative() {
+    let (_, chip, mut battery) = bench(Config::default());
+    chip.borrow_mut().registers[3] = (-250i16 << 3) as u16;
+    let sample = block_on(battery.next()).expect("a sample");
+    assert!((sample.data.current + 1.0).abs() < 1e-5);
+    assert!((sample.data.power + 3.8).abs() < 1e-4);
+}
+
+#[test]
+fn both_identifications_are_checked_and_an_impossible_shunt_is_refused() {
+    for (register, found) in [(0xFE, 0x1234), (0xFF, 0xFFFF)] {
+        let (_, chip, mut battery) = bench(Config::default());
+        chip.borrow_mut().registers[register] = found;
+        assert_eq!(block_on(battery.next()), Err(ChipError::Identification { found }));
+    }
+    for shunt_ohms in [0.0, -0.01, f32::NAN, f32::INFINITY] {
+        let (_, _, mut battery) = bench(Config { shunt_ohms, ..Config::default() });
+        assert_eq!(block_on(battery.next()), Err(ChipError::InvalidConfiguration));
+    }
+}
+
+#[test]
+fn faults_are_bounded_and_healed() {
+    let (clock, chip, mut battery) = bench(Config::default());
+    block_on(battery.next()).expect("a sample");
+    chip.borrow_mut().registers[0] = 0x7127;
+    assert_eq!(block_on(battery.next()), Err(ChipError::Restarted));
+    block_on(battery.next()).expect("a sample");
+    for (fault, expected) in [(Fault::Nack, ChipError::Bus(Fault::Nack)), (Fault::Hang, ChipError::BusTimeout)] {
+        chip.borrow_mut().fault = Some(fault);
+        assert_eq!(block_on(battery.next()), Err(expected));
+        block_on(battery.next()).expect("a sample");
+    }
+    let usual = chip.borrow().cycle;
+    chip.borrow_mut().cycle = 100_000_000;
+    let before = clock.now();
+    assert_eq!(block_on(battery.next()), Err(ChipError::NoSample));
+    assert!(clock.now().since(before) < Micros(2 * usual + 5_000));
+}
+
+#[test]
+fn a_cancelled_wait_loses_nothing() {
+    let (clock, chip, mut battery) = bench(Config::default());
+    let first = block_on(battery.next()).expect("a sample").at;
+    clock.stop(true);
+    cancel(battery.next());
+    clock.stop(false);
+    let second = block_on(battery.next()).expect("a sample").at;
+    assert!(second.since(first).0.abs_diff(chip.borrow().cycle) <= 2_200);
+}
+
+#[test]
+fn a_late_reader_gets_a_result_whose_instant_is_known() {
+    let (clock, chip, mut battery) = bench(Config::default());
+    block_on(battery.next()).expect("a sample");
+    for late in [130_000, 200_123, 1_000_000] {
+        clock.advance(late);
+        let at = block_on(battery.next()).expect("a sample").at;
+        let (begun, cycle) = (chip.borrow().begun, chip.borrow().cycle);
+        let into = (at.since(begun).0 + cycle / 2) % cycle;
+        assert!(into <= 2_200, "the middle of a cycle: {into}");
+    }
+}

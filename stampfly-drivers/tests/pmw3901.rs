@@ -1,0 +1,246 @@
+//! The PMW3901 driver against a chip of banks of registers that insists on its pauses.
+
+mod common;
+
+use common::{Clock, Fault, cancel, finish};
+use embedded_hal_async::spi::{self, Operation};
+use stampfly_drivers::blocking::block_on;
+use stampfly_drivers::chip::pmw3901::{Config, Pmw3901, codec};
+use stampfly_drivers::chip::{AxisMap, ChipError};
+use stampfly_drivers::{OpticalFlow, Timebase};
+use stampfly_types::Micros;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+struct Chip {
+    registers: BTreeMap<(u8, u8), u8>,
+    bank: u8,
+    writes: Vec<(u8, u8)>,
+    /// Counts not yet read.
+    counts: [i16; 2],
+    quality: u8,
+    shutter: u8,
+    absent: bool,
+    fault: Option<Fault>,
+    /// Earliest next access.
+    ready: Micros,
+    /// How many more times register 0x47 says no.
+    refusals: u32,
+}
+
+impl Chip {
+    fn new() -> Self {
+        let registers =
+            [((0, 0x00), 0x49), ((0, 0x5F), 0xB6), ((0x0E, 0x73), 0x00), ((0x0E, 0x70), 20), ((0x0E, 0x71), 80)];
+        Self {
+            registers: registers.into(),
+            bank: 0,
+            writes: Vec::new(),
+            counts: [0; 2],
+            quality: 100,
+            shutter: 2,
+            absent: false,
+            fault: None,
+            ready: Micros::ZERO,
+            refusals: 0,
+        }
+    }
+
+    fn write(&mut self, register: u8, value: u8) {
+        self.writes.push((register, value));
+        match register {
+            0x7F => self.bank = value,
+            _ => drop(self.registers.insert((self.bank, register), value)),
+        }
+    }
+
+    fn read(&mut self, register: u8, into: &mut [u8]) {
+        if self.absent {
+            return into.fill(0xFF);
+        }
+        match (self.bank, register) {
+            (0, 0x16) => {
+                let [x, y] = self.counts.map(i16::to_le_bytes);
+                let moved = if self.counts == [0; 2] { 0 } else { 0x80 };
+                into.copy_from_slice(&[moved, 0xBF, x[0], x[1], y[0], y[1], self.quality, 9, 90, 9, self.shutter, 7]);
+                self.counts = [0; 2];
+            }
+            (0x0E, 0x47) => {
+                into[0] = if self.refusals == 0 { 8 } else { 0 };
+                self.refusals = self.refusals.saturating_sub(1);
+            }
+            key => into[0] = self.registers.get(&key).copied().unwrap_or(0),
+        }
+    }
+}
+
+struct Device(Clock, Rc<RefCell<Chip>>);
+
+impl spi::ErrorType for Device {
+    type Error = Fault;
+}
+
+impl spi::SpiDevice for Device {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Fault> {
+        let outcome = {
+            let mut chip = self.1.borrow_mut();
+            assert!(self.0.now() >= chip.ready, "the pause between two accesses is too short");
+            let fault = chip.fault.take();
+            let pause = match operations {
+                [Operation::Write([register, value]), Operation::DelayNs(20_000..)] if register & 0x80 != 0 => {
+                    chip.write(register & 0x7F, *value);
+                    45
+                }
+                [Operation::Write([register]), Operation::DelayNs(35_000..), Operation::Read(into)] => {
+                    chip.read(*register, into);
+                    if *register == 0x16 { 0 } else { 20 }
+                }
+                other => panic!("not an access that keeps the data sheet's times: {other:?}"),
+            };
+            chip.ready = self.0.now() + Micros(common::TRANSFER + pause);
+            fault.map_or(Ok(()), Err)
+        };
+        finish(&self.0, outcome).await
+    }
+}
+
+type Shared = Rc<RefCell<Chip>>;
+
+fn bench() -> (Clock, Shared, Pmw3901<Device, Clock>) {
+    let (clock, chip) = (Clock::new(), Rc::new(RefCell::new(Chip::new())));
+    let device = Device(clock.clone(), chip.clone());
+    let driver = Pmw3901::new(device, clock.clone(), AxisMap::STAMPFLY_FLOW, Config::default());
+    (clock, chip, driver)
+}
+
+#[test]
+fn the_whole_list_is_written_with_the_chips_own_calibration() {
+    let (_, chip, mut flow) = bench();
+    block_on(flow.start()).expect("starts");
+    let chip = chip.borrow();
+    assert_eq!(chip.writes[0], (0x3A, 0x5A));
+    assert_eq!(chip.writes[1..6], codec::PREPARE);
+    assert_eq!(chip.writes[6], (0x48, 0x02));
+    assert_eq!(chip.writes[7..12], codec::PREPARE_CALIBRATION);
+    assert_eq!(chip.writes[12..18], [(0x7F, 0), (0x61, 0xAD), (0x51, 34), (0x7F, 0x0E), (0x70, 34), (0x71, 36)]);
+    let rest: Vec<_> = codec::PERFORMANCE
+        .iter()
+        .filter_map(|step| match step {
+            codec::Step::Write(register, value) => Some((*register, *value)),
+            codec::Step::Wait(_) => None,
+        })
+        .collect();
+    assert_eq!(chip.writes[18..], rest);
+}
+
+#[test]
+fn a_chip_with_a_calibration_of_its_own_keeps_it() {
+    let (_, chip, mut flow) = bench();
+    chip.borrow_mut().registers.insert((0x0E, 0x73), 1);
+    chip.borrow_mut().registers.insert((0x0E, 0x67), 0x80);
+    block_on(flow.start()).expect("starts");
+    let chip = chip.borrow();
+    assert_eq!(chip.writes[6], (0x48, 0x04));
+    assert!(!chip.writes.iter().any(|write| write.0 == 0x51 && write.1 != 0x7B));
+}
+
+#[test]
+fn it_asks_again_for_the_calibration_but_not_for_ever() {
+    let (_, chip, mut flow) = bench();
+    chip.borrow_mut().refusals = 3;
+    block_on(flow.start()).expect("starts at the fourth attempt");
+    let (_, chip, mut flow) = bench();
+    chip.borrow_mut().refusals = 1_000;
+    assert_eq!(block_on(flow.start()), Err(ChipError::Configuration { status: 0 }));
+}
+
+#[test]
+fn both_identifications_have_to_match() {
+    let (_, chip, mut flow) = bench();
+    chip.borrow_mut().registers.insert((0, 0x5F), 0x00);
+    assert_eq!(block_on(flow.next()), Err(ChipError::Identification { found: 0x4900 }));
+    let (_, chip, mut flow) = bench();
+    chip.borrow_mut().absent = true;
+    assert_eq!(block_on(flow.next()), Err(ChipError::Identification { found: 0xFFFF }));
+}
+
+#[test]
+fn every_count_is_delivered_once_in_body_axes_and_radians() {
+    let (clock, chip, mut flow) = bench();
+    block_on(flow.start()).expect("starts");
+    chip.borrow_mut().counts = [1_000, 1_000];
+    let mut total = [0.0; 2];
+    let mut before = None;
+    for round in 0..100 {
+        if round == 50 {
+            clock.advance(35_000);
+        }
+        let sample = block_on(flow.next()).expect("a sample");
+        if let Some(before) = before {
+            assert_eq!(sample.data.interval, sample.at.since(before).seconds());
+        }
+        assert!((sample.data.interval - if round == 50 { 0.035 } else { 0.01 }).abs() < 1e-4);
+        before = Some(sample.at);
+        total[0] += sample.data.delta_x;
+        total[1] += sample.data.delta_y;
+        chip.borrow_mut().counts = [2, -3];
+    }
+    // What was counted before the first interval belongs to nobody; 99 reads carry (2, −3): body = (−y, x).
+    assert!((total[0] - 99.0 * 3.0 * 0.00222).abs() < 1e-4, "{total:?}");
+    assert!((total[1] - 99.0 * 2.0 * 0.00222).abs() < 1e-4, "{total:?}");
+}
+
+#[test]
+fn blind_samples_are_delivered_but_not_vouched_for() {
+    let (_, chip, mut flow) = bench();
+    assert!(block_on(flow.next()).expect("a sample").data.valid);
+    chip.borrow_mut().quality = 10;
+    let sample = block_on(flow.next()).expect("a sample");
+    assert!(!sample.data.valid && sample.data.quality == 10);
+    chip.borrow_mut().counts = [4, 4];
+    assert!(block_on(flow.next()).expect("a sample").data.valid);
+    chip.borrow_mut().counts = [4, 4];
+    chip.borrow_mut().shutter = 0x1F;
+    assert!(!block_on(flow.next()).expect("a sample").data.valid);
+}
+
+#[test]
+fn after_a_failed_or_cancelled_read_a_new_interval_begins() {
+    let (clock, chip, mut flow) = bench();
+    block_on(flow.next()).expect("a sample");
+    for fault in [Fault::Nack, Fault::Hang] {
+        chip.borrow_mut().fault = Some(fault);
+        let before = clock.now();
+        let error = block_on(flow.next()).expect_err("the bus failed");
+        assert_eq!(error, if fault == Fault::Nack { ChipError::Bus(fault) } else { ChipError::BusTimeout });
+        assert!(clock.now().since(before) <= Micros::from_millis(21));
+        clock.advance(100_000);
+        chip.borrow_mut().counts = [500, 500];
+        let sample = block_on(flow.next()).expect("a sample");
+        assert_eq!((sample.data.delta_x, sample.data.delta_y), (0.0, 0.0), "counted while nobody knew since when");
+        assert!(sample.data.interval < 0.011);
+    }
+    clock.advance(10_000);
+    chip.borrow_mut().fault = Some(Fault::Hang);
+    clock.stop(true);
+    cancel(flow.next());
+    clock.stop(false);
+    clock.advance(100);
+    chip.borrow_mut().counts = [500, 500];
+    let sample = block_on(flow.next()).expect("a sample");
+    assert_eq!((sample.data.delta_x, sample.data.delta_y), (0.0, 0.0));
+}
+
+#[test]
+fn a_chip_that_falls_off_the_bus_is_set_up_again_when_it_is_back() {
+    let (_, chip, mut flow) = bench();
+    block_on(flow.next()).expect("a sample");
+    chip.borrow_mut().absent = true;
+    assert_eq!(block_on(flow.next()), Err(ChipError::Data));
+    assert_eq!(block_on(flow.next()), Err(ChipError::Identification { found: 0xFFFF }));
+    chip.borrow_mut().absent = false;
+    chip.borrow_mut().writes.clear();
+    block_on(flow.next()).expect("a sample");
+    assert!(chip.borrow().writes.len() > 70);
+}
