@@ -18,9 +18,11 @@ const bounds = (() => {
   for (let axis = 0; axis < 3; axis++) if (low[axis] > high[axis]) [low[axis], high[axis]] = [-0.5, 0.5];
   return { low, high, ground: Math.max(high[2], 0) };
 })();
-const size = Math.max(bounds.high[0] - bounds.low[0], bounds.high[1] - bounds.low[1], (bounds.ground - bounds.low[2]) * 1.2, 0.6);
+// A square flown round is seen from a corner: what has to fit is its diagonal.
+const wide = Math.hypot(bounds.high[0] - bounds.low[0], bounds.high[1] - bounds.low[1]);
+const size = Math.max(wide, (bounds.ground - bounds.low[2]) * 1.2, 0.6);
 const middle = [0, 1].map((axis) => (bounds.low[axis] + bounds.high[axis]) / 2).concat((bounds.low[2] + bounds.ground) / 2);
-const HOME = { turn: -2.25, tilt: 0.42, distance: size * 1.42 };
+const HOME = { turn: -2.25, tilt: 0.42, distance: size * 1.35 };
 const camera = { ...HOME, target: [...middle] };
 
 /** Camera coordinates of a point: right, up, depth. */
