@@ -12,6 +12,7 @@
 //! | emulator | bus | address or clock | data sheet |
 //! |---|---|---|---|
 //! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
+//! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
 //!
 //! | fault | where |
 //! |---|---|
@@ -22,11 +23,13 @@
 mod bmp280;
 mod fault;
 mod i2c;
+mod ina3221;
 mod spi;
 
 pub use bmp280::Bmp280;
 pub use fault::{Attached, Faults};
 pub use i2c::I2cBus;
+pub use ina3221::Ina3221;
 pub use spi::{SpiBus, SpiPort};
 
 use core::fmt;

@@ -9,7 +9,7 @@ use stampfly_drivers::{PowerMonitor, Sample};
 use stampfly_types::Micros;
 use stampfly_types::messages::PowerData;
 
-const RATE: f64 = 10.0;
+pub(crate) const RATE: f64 = 10.0;
 const READ_OUT: Micros = Micros(300);
 /// Resolution of the voltage, V.
 const VOLTAGE_STEP: f64 = 0.008;
@@ -45,6 +45,18 @@ impl PowerPhysics {
         self.before = (drawn, now);
         let voltage = voltage + 0.003 * self.noise.normal();
         [voltage, mean * self.gain + 0.003 * self.noise.normal()]
+    }
+
+    /// Voltage, V, and current, A, averaged over a conversion, as far as the world remembers it.
+    pub(crate) fn mean(&mut self, begin: Micros, end: Micros) -> [f64; 2] {
+        const POINTS: u64 = 8;
+        let length = end.since(begin).0;
+        let current = (0..POINTS)
+            .map(|point| self.world.motion_at(begin + Micros(length * (2 * point + 1) / (2 * POINTS))).current)
+            .sum::<f64>()
+            / POINTS as f64;
+        let voltage = self.world.inspect(|plant| plant.battery().voltage()) + 0.003 * self.noise.normal();
+        [voltage, current * self.gain + 0.003 * self.noise.normal()]
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod bmp280;
 mod bus;
+mod ina3221;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};
