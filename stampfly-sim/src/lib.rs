@@ -3,6 +3,7 @@
 //! * [`time`]: virtual time and a deterministic executor;
 //! * [`plant`]: the vehicle as a body with motors, a battery, a floor and the air;
 //! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
+//! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
 //! * [`Simulation`]: all of it from one [`SimulationConfig`].
 //!
 //! Everything is a value: no global, no wall clock, no thread. A process can hold as many vehicles as memory allows,
@@ -11,6 +12,7 @@
 //! Not for other vehicles yet: the plant is a quadcopter with the StampFly's layout, though every number of it can be
 //! set by name.
 
+pub mod chips;
 mod noise;
 pub mod plant;
 pub mod sensors;

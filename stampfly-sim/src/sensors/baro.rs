@@ -10,12 +10,12 @@ use stampfly_types::Micros;
 use stampfly_types::messages::BaroData;
 
 /// Conversion time plus 62.5 ms of standby.
-const RATE: f64 = 13.5;
+pub(crate) const RATE: f64 = 13.5;
 const READ_OUT: Micros = Micros(400);
 /// Pressure at the floor, Pa.
 const FLOOR_PRESSURE: f64 = 101_000.0;
 /// Standard deviation of one conversion after the chip's filter, Pa: 6 cm, what the static records show.
-const DEVIATION: f64 = 0.7;
+pub(crate) const DEVIATION: f64 = 0.7;
 /// Resolution, Pa.
 const RESOLUTION: f64 = 0.16;
 /// Drift by weather and warming, Pa/√s.
@@ -31,15 +31,47 @@ fn altitude(pressure: f64) -> f64 {
     44_330.77 * (1.0 - libm::pow(pressure / 101_325.0, 0.190_263))
 }
 
+/// The air at the chip, shared by the model and the register-level emulator.
+#[derive(Debug)]
+pub(crate) struct BaroPhysics {
+    world: World,
+    noise: Noise,
+    drift: f64,
+    start: Micros,
+}
+
+impl BaroPhysics {
+    pub(crate) fn new(world: &World, start: Micros, mut noise: Noise) -> Self {
+        // Specimens differ by a metre or ten.
+        Self { drift: 60.0 * noise.normal(), noise, start, world: world.clone() }
+    }
+
+    /// One conversion at `at`, Pa, `period` seconds after the one before, with noise of this standard deviation.
+    pub(crate) fn pressure(&mut self, at: Micros, period: f64, deviation: f64) -> f64 {
+        let motion = self.world.motion_at(at);
+        let hover = self.world.inspect(|plant| plant.rotors().hover_speed());
+        let height = -motion.position.z;
+        // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa per metre.
+        let still = FLOOR_PRESSURE - 11.77 * height;
+        let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
+        let wash = WASH * thrust * (1.0 + WASH_FLOOR * libm::exp(-height.max(0.0) / WASH_HEIGHT));
+        self.drift += DRIFT * period.sqrt() * self.noise.normal();
+        still + wash + self.drift + deviation * self.noise.normal()
+    }
+
+    /// Temperature of the die, °C.
+    pub(crate) fn temperature(&self, at: Micros) -> f32 {
+        let minutes = at.since(self.start).seconds() / 60.0;
+        25.0 + 8.0 * minutes / (minutes + 2.0)
+    }
+}
+
 /// The model of the barometer. Implements [`Barometer`].
 #[derive(Debug)]
 pub struct BaroModel {
-    world: World,
     clock: Clock,
-    noise: Noise,
     schedule: Schedule,
-    drift: f64,
-    start: Micros,
+    physics: BaroPhysics,
 }
 
 impl BaroModel {
@@ -47,11 +79,7 @@ impl BaroModel {
         let mut noise = Noise::stream(seed, Stream::Baro);
         Self {
             schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
-            // Specimens differ by a metre or ten.
-            drift: 60.0 * noise.normal(),
-            noise,
-            start: clock.now(),
-            world: world.clone(),
+            physics: BaroPhysics::new(world, clock.now(), noise),
             clock: clock.clone(),
         }
     }
@@ -65,20 +93,11 @@ impl Barometer for BaroModel {
         let at = self.schedule.instant(number);
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);
-        let motion = self.world.motion_at(at);
-        let hover = self.world.inspect(|plant| plant.rotors().hover_speed());
-        let height = -motion.position.z;
-        // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa per metre.
-        let still = FLOOR_PRESSURE - 11.77 * height;
-        let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
-        let wash = WASH * thrust * (1.0 + WASH_FLOOR * libm::exp(-height.max(0.0) / WASH_HEIGHT));
-        self.drift += DRIFT * (self.schedule.period() * 1e-6).sqrt() * self.noise.normal();
-        let pressure = still + wash + self.drift + DEVIATION * self.noise.normal();
+        let pressure = self.physics.pressure(at, self.schedule.period() * 1e-6, DEVIATION);
         let pressure = (pressure / RESOLUTION).round() * RESOLUTION;
-        let minutes = at.since(self.start).seconds() / 60.0;
         let data = BaroData {
             pressure: pressure as f32,
-            temperature: 25.0 + 8.0 * minutes / (minutes + 2.0),
+            temperature: self.physics.temperature(at),
             altitude: altitude(pressure) as f32,
         };
         Ok(Sample { at, data })

@@ -27,20 +27,14 @@ const FAR: f64 = 4.5;
 /// The driver vouches for a sample from this quality on.
 const MINIMUM_QUALITY: u8 = 25;
 
-/// The model of the flow sensor. Implements [`OpticalFlow`].
-///
-/// `Sample::at` is the instant of the read, all the driver can know; the newest picture is on average half a picture
-/// older.
+/// The pictures and what is counted in them, shared by the model and the register-level emulator.
 #[derive(Debug)]
-pub struct FlowModel {
+pub(crate) struct FlowPhysics {
     world: World,
-    clock: Clock,
     noise: Noise,
     frames: Schedule,
-    reads: Schedule,
     /// Number of the next picture.
     frame: u64,
-    last_read: Micros,
     /// Counts not yet read, with the fraction that is carried on.
     counts: [f64; 2],
     /// Scale and mounting error of this specimen: rows x and y.
@@ -48,24 +42,50 @@ pub struct FlowModel {
     texture: f64,
 }
 
-impl FlowModel {
-    pub(crate) fn new(world: &World, clock: &Clock, seed: u64) -> Self {
+/// The model of the flow sensor. Implements [`OpticalFlow`].
+///
+/// `Sample::at` is the instant of the read, all the driver can know; the newest picture is on average half a picture
+/// older.
+#[derive(Debug)]
+pub struct FlowModel {
+    clock: Clock,
+    physics: FlowPhysics,
+    reads: Schedule,
+    last_read: Micros,
+}
+
+impl FlowPhysics {
+    /// The physics and the instants at which the processor reads.
+    pub(crate) fn new(world: &World, start: Micros, seed: u64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Flow);
-        let start = clock.now();
         let (scale_x, scale_y) = (1.0 + noise.within(0.03), 1.0 + noise.within(0.03));
         let (sin, cos) = libm::sincos(noise.within(1f64.to_radians()));
-        Self {
-            frames: Schedule::new(start, FRAME_RATE, 0.02, &mut noise),
-            reads: Schedule::new(start, READ_RATE, 0.0, &mut noise),
+        let frames = Schedule::new(start, FRAME_RATE, 0.02, &mut noise);
+        let reads = Schedule::new(start, READ_RATE, 0.0, &mut noise);
+        let physics = Self {
+            frames,
             frame: 0,
-            last_read: start,
             counts: [0.0; 2],
             mounting: [[scale_x * cos, scale_x * sin], [-scale_y * sin, scale_y * cos]],
             texture: 140.0 + noise.within(40.0),
             noise,
             world: world.clone(),
-            clock: clock.clone(),
+        };
+        (physics, reads)
+    }
+
+    /// Takes the pictures up to `at` and gives the whole counts since the last call, in the convention of
+    /// [`FlowData`].
+    pub(crate) fn read(&mut self, at: Micros) -> [f64; 2] {
+        while self.frames.instant(self.frame) <= at {
+            self.expose(self.frame);
+            self.frame += 1;
         }
+        let whole = self.counts.map(|counts| counts.round().clamp(-32768.0, 32767.0));
+        for (counts, whole) in self.counts.iter_mut().zip(whole) {
+            *counts -= whole;
+        }
+        whole
     }
 
     /// Adds the motion from the previous picture to picture `number`.
@@ -89,11 +109,19 @@ impl FlowModel {
         }
     }
 
-    fn quality(&mut self, instant: Micros) -> u8 {
+    /// Features found in the picture, the chip's SQUAL.
+    pub(crate) fn quality(&mut self, instant: Micros) -> u8 {
         let height = slant_height(&self.world.motion_at(instant));
         let near = 0.5 + 0.5 * ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
         let far = 1.0 - ((height - DIM) / (FAR - DIM)).clamp(0.0, 1.0);
         (self.texture * near * far * (1.0 + 0.04 * self.noise.normal())) as u8
+    }
+}
+
+impl FlowModel {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64) -> Self {
+        let (physics, reads) = FlowPhysics::new(world, clock.now(), seed);
+        Self { physics, reads, last_read: clock.now(), clock: clock.clone() }
     }
 }
 
@@ -118,17 +146,10 @@ impl OpticalFlow for FlowModel {
         let at = self.reads.instant(number);
         self.clock.sleep_until(at).await;
         self.reads.reported(number);
-        while self.frames.instant(self.frame) <= at {
-            self.expose(self.frame);
-            self.frame += 1;
-        }
-        let whole = self.counts.map(|counts| counts.round().clamp(-32768.0, 32767.0));
-        for (counts, whole) in self.counts.iter_mut().zip(whole) {
-            *counts -= whole;
-        }
+        let whole = self.physics.read(at);
         let interval = at.since(self.last_read).seconds();
         self.last_read = at;
-        let quality = self.quality(at);
+        let quality = self.physics.quality(at);
         let [delta_x, delta_y] = whole.map(|counts| (counts * COUNT) as f32);
         Ok(Sample { at, data: FlowData { delta_x, delta_y, interval, quality, valid: quality >= MINIMUM_QUALITY } })
     }

@@ -36,20 +36,14 @@ const GYRO_BIAS: f64 = 0.017_453;
 const ACCEL_WALK: f64 = 3e-4;
 const GYRO_WALK: f64 = 2e-5;
 
-/// The model of the inertial sensor. Implements [`Imu`](stampfly_drivers::Imu) at 400 Hz.
-///
-/// `Sample::at` is the instant in the middle of the decimation filter, three chip samples (1.9 ms) before the newest
-/// one; with the read-out it is 2 ms old when it is delivered.
+/// What reaches the chip and what the chip makes of it, shared by the model and the register-level emulator.
 #[derive(Debug)]
-pub struct ImuModel {
+pub(crate) struct ImuPhysics {
     world: World,
-    clock: Clock,
     noise: Noise,
     vibration: Vibration,
-    schedule: Schedule,
-    decimator: Decimator,
-    /// Number of the first chip sample of the next group.
-    cursor: u64,
+    /// Samples made so far.
+    samples: u64,
     start: Micros,
     accel_bias: Vector3<f64>,
     gyro_bias: Vector3<f64>,
@@ -58,25 +52,23 @@ pub struct ImuModel {
     gyro_matrix: Matrix3<f64>,
 }
 
-impl ImuModel {
-    pub(crate) fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
+impl ImuPhysics {
+    /// The physics and the times of its samples, which are always 1600 a second.
+    pub(crate) fn new(world: &World, start: Micros, seed: u64, vibration: f64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Imu);
-        let start = clock.now();
         let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
         // Half a degree between the axes, half a per cent of scale.
         let mut matrix = || Matrix3::identity() + Matrix3::from_fn(|_, _| noise.within(0.005));
         let (accel_matrix, gyro_matrix) = (matrix(), matrix());
         let hover_speed = world.inspect(|plant| plant.rotors().hover_speed());
-        Self {
+        let physics = Self {
             vibration: Vibration::new(
                 vibration,
                 schedule.period() * 1e-6,
                 hover_speed,
                 Noise::stream(seed, Stream::Vibration),
             ),
-            schedule,
-            decimator: Decimator::default(),
-            cursor: 0,
+            samples: 0,
             start,
             accel_bias: noise.normal3() * ACCEL_BIAS,
             gyro_bias: Vector3::from_fn(|_, _| noise.within(GYRO_BIAS)),
@@ -84,34 +76,78 @@ impl ImuModel {
             gyro_matrix,
             noise,
             world: world.clone(),
-            clock: clock.clone(),
+        };
+        (physics, schedule)
+    }
+
+    /// The next sample, taken at `at`: accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s, body.
+    pub(crate) fn sample(&mut self, at: Micros) -> [f64; 6] {
+        let motion = self.world.motion_at(at);
+        let shake = self.vibration.step(&motion.rotor_speed);
+        let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
+        let gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
+        let per_sample = (RATE / 2.0).sqrt();
+        let sample = core::array::from_fn(|channel| {
+            let (value, density) = if channel < 3 {
+                (accel[channel], ACCEL_DENSITY[channel])
+            } else {
+                (gyro[channel - 3], GYRO_DENSITY[channel - 3])
+            };
+            value + shake[channel] + density * per_sample * self.noise.normal()
+        });
+        self.samples += 1;
+        if self.samples.is_multiple_of(GROUP as u64) {
+            let wander = (GROUP as f64 / RATE).sqrt();
+            self.accel_bias += self.noise.normal3() * (ACCEL_WALK * wander);
+            self.gyro_bias += self.noise.normal3() * (GYRO_WALK * wander);
         }
+        sample
+    }
+
+    /// Temperature of the die, °C: it warms by ten degrees within a few minutes.
+    pub(crate) fn temperature(&self, at: Micros) -> f32 {
+        let minutes = at.since(self.start).seconds() / 60.0;
+        25.0 + 10.0 * minutes / (minutes + 2.0)
+    }
+}
+
+/// A value as counts of the converter, which saturates as the chip does.
+pub(crate) fn to_counts(value: f64, counts_per_unit: f64) -> i16 {
+    let counts = value * counts_per_unit;
+    (counts + 0.5f64.copysign(counts)) as i16
+}
+
+/// The model of the inertial sensor. Implements [`Imu`](stampfly_drivers::Imu) at 400 Hz.
+///
+/// `Sample::at` is the instant in the middle of the decimation filter, three chip samples (1.9 ms) before the newest
+/// one; with the read-out it is 2 ms old when it is delivered.
+#[derive(Debug)]
+pub struct ImuModel {
+    clock: Clock,
+    physics: ImuPhysics,
+    schedule: Schedule,
+    decimator: Decimator,
+    /// Number of the first chip sample of the next group.
+    cursor: u64,
+}
+
+impl ImuModel {
+    pub(crate) fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
+        let (physics, schedule) = ImuPhysics::new(world, clock.now(), seed, vibration);
+        Self { physics, schedule, decimator: Decimator::default(), cursor: 0, clock: clock.clone() }
     }
 
     /// The present offsets, which an estimator has to find: accelerometer (m/s²) and gyroscope (rad/s), without the
     /// rectification of vibration.
     #[must_use]
     pub fn bias(&self) -> (Vec3, Vec3) {
-        (self.accel_bias.cast(), self.gyro_bias.cast())
+        (self.physics.accel_bias.cast(), self.physics.gyro_bias.cast())
     }
 
     /// Chip sample `number` in counts: accelerometer x, y, z, gyroscope x, y, z.
     fn convert(&mut self, number: u64) -> [i16; 6] {
-        let motion = self.world.motion_at(self.schedule.instant(number));
-        let shake = self.vibration.step(&motion.rotor_speed);
-        let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
-        let gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
-        let per_sample = (RATE / 2.0).sqrt();
-        core::array::from_fn(|channel| {
-            let (value, density, scale) = if channel < 3 {
-                (accel[channel], ACCEL_DENSITY[channel], ACCEL_SCALE)
-            } else {
-                (gyro[channel - 3], GYRO_DENSITY[channel - 3], GYRO_SCALE)
-            };
-            let counts = (value + shake[channel] + density * per_sample * self.noise.normal()) * scale;
-            // The conversion saturates, as the chip does.
-            (counts + 0.5f64.copysign(counts)) as i16
-        })
+        let sample = self.physics.sample(self.schedule.instant(number));
+        core::array::from_fn(|channel| to_counts(sample[channel], if channel < 3 { ACCEL_SCALE } else { GYRO_SCALE }))
     }
 
     /// The next group of four as it comes out of the FIFO, with the instant of its first sample.
@@ -131,9 +167,6 @@ impl ImuModel {
         let first = self.cursor;
         self.cursor += GROUP as u64;
         let group = core::array::from_fn(|i| self.convert(first + i as u64));
-        let wander = (GROUP as f64 / RATE).sqrt();
-        self.accel_bias += self.noise.normal3() * (ACCEL_WALK * wander);
-        self.gyro_bias += self.noise.normal3() * (GYRO_WALK * wander);
         (self.schedule.instant(first), group)
     }
 }
@@ -153,9 +186,7 @@ impl stampfly_drivers::Imu for ImuModel {
             let (at, group) = self.next_group().await;
             let Some(sum) = self.decimator.push(&group) else { continue };
             let (accel, gyro) = counts_to_si(sum.map(|sum| f64::from(sum) / f64::from(Decimator::GAIN)));
-            // The die warms by ten degrees within a few minutes.
-            let minutes = at.since(self.start).seconds() / 60.0;
-            let temperature = 25.0 + 10.0 * minutes / (minutes + 2.0);
+            let temperature = self.physics.temperature(at);
             return Ok(Sample { at, data: ImuData { accel, gyro, temperature } });
         }
     }

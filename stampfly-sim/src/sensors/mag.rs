@@ -25,15 +25,42 @@ const PER_AMPERE: [f64; 3] = [-13.0, 20.0, -7.0];
 /// Share of the motors' field that flickers with the commutation.
 const FLICKER: f64 = 0.2;
 
+/// The field at the chip, shared by the model and the register-level emulator.
+#[derive(Debug)]
+pub(crate) struct MagPhysics {
+    world: World,
+    noise: Noise,
+    hard_iron: Vector3<f64>,
+    idle_current: f64,
+}
+
+impl MagPhysics {
+    pub(crate) fn new(world: &World, mut noise: Noise) -> Self {
+        Self {
+            hard_iron: noise.normal3() * HARD_IRON,
+            idle_current: world.inspect(|plant| plant.parameters().board_current),
+            noise,
+            world: world.clone(),
+        }
+    }
+
+    /// One conversion at `at`, µT, body.
+    pub(crate) fn field(&mut self, at: Micros) -> Vector3<f64> {
+        let motion = self.world.motion_at(at);
+        let motors = (motion.current - self.idle_current).max(0.0) * (1.0 + FLICKER * self.noise.normal());
+        motion.attitude.inverse_transform_vector(&Vector3::from(FIELD))
+            + self.hard_iron
+            + Vector3::from(PER_AMPERE) * motors
+            + self.noise.normal3() * DEVIATION
+    }
+}
+
 /// The model of the magnetometer. Implements [`Magnetometer`].
 #[derive(Debug)]
 pub struct MagModel {
-    world: World,
     clock: Clock,
-    noise: Noise,
     schedule: Schedule,
-    hard_iron: Vector3<f64>,
-    idle_current: f64,
+    physics: MagPhysics,
 }
 
 impl MagModel {
@@ -41,10 +68,7 @@ impl MagModel {
         let mut noise = Noise::stream(seed, Stream::Mag);
         Self {
             schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
-            hard_iron: noise.normal3() * HARD_IRON,
-            idle_current: world.inspect(|plant| plant.parameters().board_current),
-            noise,
-            world: world.clone(),
+            physics: MagPhysics::new(world, noise),
             clock: clock.clone(),
         }
     }
@@ -52,7 +76,7 @@ impl MagModel {
     /// The offset that a calibration has to find, µT, body.
     #[must_use]
     pub fn hard_iron(&self) -> stampfly_types::Vec3 {
-        self.hard_iron.cast()
+        self.physics.hard_iron.cast()
     }
 }
 
@@ -64,13 +88,7 @@ impl Magnetometer for MagModel {
         let at = self.schedule.instant(number);
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);
-        let motion = self.world.motion_at(at);
-        let motors = (motion.current - self.idle_current).max(0.0) * (1.0 + FLICKER * self.noise.normal());
-        let field = motion.attitude.inverse_transform_vector(&Vector3::from(FIELD))
-            + self.hard_iron
-            + Vector3::from(PER_AMPERE) * motors
-            + self.noise.normal3() * DEVIATION;
-        let field = field.map(|value| (value / RESOLUTION).round() * RESOLUTION);
+        let field = self.physics.field(at).map(|value| (value / RESOLUTION).round() * RESOLUTION);
         Ok(Sample { at, data: MagData { field: field.cast() } })
     }
 }

@@ -15,13 +15,13 @@
 //! | [`CameraModel`] | a room full of cameras | 100 Hz | `MotionCapture` |
 
 mod actuators;
-mod baro;
+pub(crate) mod baro;
 mod cameras;
-mod flow;
+pub(crate) mod flow;
 pub mod imu;
-mod mag;
-mod power;
-mod schedule;
+pub(crate) mod mag;
+pub(crate) mod power;
+pub(crate) mod schedule;
 pub mod tof;
 
 pub use actuators::{ButtonModel, IndicatorRecorder, MotorModel};

@@ -9,24 +9,63 @@ use stampfly_drivers::{PowerMonitor, Sample};
 use stampfly_types::Micros;
 use stampfly_types::messages::PowerData;
 
-const RATE: f64 = 10.0;
+pub(crate) const RATE: f64 = 10.0;
 const READ_OUT: Micros = Micros(300);
 /// Resolution of the voltage, V.
 const VOLTAGE_STEP: f64 = 0.008;
 /// Resolution of the current, A: 40 µV over 10 mΩ.
 const CURRENT_STEP: f64 = 0.004;
 
-/// The model of the battery monitor. Implements [`PowerMonitor`].
+/// Voltage and current at the chip, shared by the model and the register-level emulator.
 #[derive(Debug)]
-pub struct PowerModel {
+pub(crate) struct PowerPhysics {
     world: World,
-    clock: Clock,
     noise: Noise,
-    schedule: Schedule,
     /// Gain error of the shunt and the amplifier.
     gain: f64,
     /// Charge drawn at the previous sample, and when that was.
     before: (f64, Micros),
+}
+
+impl PowerPhysics {
+    pub(crate) fn new(world: &World, start: Micros, mut noise: Noise) -> Self {
+        Self {
+            gain: 1.0 + noise.within(0.02),
+            noise,
+            before: (world.inspect(|plant| plant.battery().drawn()), start),
+            world: world.clone(),
+        }
+    }
+
+    /// Voltage now, V, and mean current since the call before, A.
+    pub(crate) fn measure(&mut self, now: Micros) -> [f64; 2] {
+        self.world.advance_to(now);
+        let (voltage, drawn) = self.world.inspect(|plant| (plant.battery().voltage(), plant.battery().drawn()));
+        let mean = (drawn - self.before.0) / f64::from(now.since(self.before.1).seconds()).max(1e-3);
+        self.before = (drawn, now);
+        let voltage = voltage + 0.003 * self.noise.normal();
+        [voltage, mean * self.gain + 0.003 * self.noise.normal()]
+    }
+
+    /// Voltage, V, and current, A, averaged over a conversion, as far as the world remembers it.
+    pub(crate) fn mean(&mut self, begin: Micros, end: Micros) -> [f64; 2] {
+        const POINTS: u64 = 8;
+        let length = end.since(begin).0;
+        let current = (0..POINTS)
+            .map(|point| self.world.motion_at(begin + Micros(length * (2 * point + 1) / (2 * POINTS))).current)
+            .sum::<f64>()
+            / POINTS as f64;
+        let voltage = self.world.inspect(|plant| plant.battery().voltage()) + 0.003 * self.noise.normal();
+        [voltage, current * self.gain + 0.003 * self.noise.normal()]
+    }
+}
+
+/// The model of the battery monitor. Implements [`PowerMonitor`].
+#[derive(Debug)]
+pub struct PowerModel {
+    clock: Clock,
+    schedule: Schedule,
+    physics: PowerPhysics,
 }
 
 impl PowerModel {
@@ -34,10 +73,7 @@ impl PowerModel {
         let mut noise = Noise::stream(seed, Stream::Power);
         Self {
             schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
-            gain: 1.0 + noise.within(0.02),
-            noise,
-            before: (world.inspect(|plant| plant.battery().drawn()), clock.now()),
-            world: world.clone(),
+            physics: PowerPhysics::new(world, clock.now(), noise),
             clock: clock.clone(),
         }
     }
@@ -51,13 +87,9 @@ impl PowerMonitor for PowerModel {
         let at = self.schedule.instant(number);
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);
-        let now = self.clock.now();
-        self.world.advance_to(now);
-        let (voltage, drawn) = self.world.inspect(|plant| (plant.battery().voltage(), plant.battery().drawn()));
-        let mean = (drawn - self.before.0) / f64::from(now.since(self.before.1).seconds()).max(1e-3);
-        self.before = (drawn, now);
-        let voltage = ((voltage + 0.003 * self.noise.normal()) / VOLTAGE_STEP).round() * VOLTAGE_STEP;
-        let current = ((mean * self.gain + 0.003 * self.noise.normal()) / CURRENT_STEP).round() * CURRENT_STEP;
+        let [voltage, current] = self.physics.measure(self.clock.now());
+        let voltage = (voltage / VOLTAGE_STEP).round() * VOLTAGE_STEP;
+        let current = (current / CURRENT_STEP).round() * CURRENT_STEP;
         let power = voltage * current;
         Ok(Sample { at, data: PowerData { voltage: voltage as f32, current: current as f32, power: power as f32 } })
     }

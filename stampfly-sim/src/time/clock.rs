@@ -77,6 +77,13 @@ impl DelayNs for Clock {
     }
 }
 
+impl embedded_hal::delay::DelayNs for Clock {
+    /// Moves the clock on at once. Where other tasks share the clock they run late, as beside any blocking driver.
+    fn delay_ns(&mut self, ns: u32) {
+        self.advance_to(self.now() + Micros(u64::from(ns).div_ceil(1_000)));
+    }
+}
+
 /// The future of [`Clock::sleep_until`].
 #[derive(Debug)]
 #[must_use = "a future does nothing until it is awaited"]

@@ -1,0 +1,81 @@
+//! What may go wrong between a chip and the processor, switched on and off while the simulation runs.
+
+use crate::chips::Chip;
+use crate::noise::Noise;
+use crate::time::Clock;
+use core::cell::{Cell, RefCell};
+use stampfly_types::Micros;
+use std::rc::Rc;
+
+/// The faults of one chip. The default is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Faults {
+    /// The chip answers nothing: no acknowledge on I²C, all ones on SPI.
+    pub dead: bool,
+    /// Share of transfers that fail, 0 to 1: no acknowledge on I²C, an overrun of the controller on SPI.
+    pub refusals: f64,
+    /// Probability that a data bit is read or written wrongly, 0 to 1.
+    pub bit_errors: f64,
+    /// How long the chip holds the clock line low in every transfer. I²C only.
+    pub stretch: Micros,
+}
+
+/// A handle to a chip on a bus: its faults, and what somebody else may do to it. Clones mean the same chip.
+///
+/// ```
+/// use embedded_hal_async::i2c::I2c;
+/// use stampfly_sim::chips::{Bmp280, Faults, I2cBus};
+/// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
+///
+/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let clock = simulation.clock.clone();
+/// let mut bus = I2cBus::new(&clock, 1);
+/// let barometer = bus.attach(0x76, Bmp280::new(&simulation.world, &clock, 1));
+/// let mut id = [0];
+/// block_on(&clock, bus.write_read(0x76, &[0xD0], &mut id))?;
+/// assert_eq!(id, [0x58]);
+/// barometer.set_faults(Faults { dead: true, ..Default::default() });
+/// assert!(block_on(&clock, bus.write_read(0x76, &[0xD0], &mut id)).is_err());
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Attached {
+    clock: Clock,
+    chip: Rc<RefCell<dyn Chip>>,
+    faults: Rc<Cell<Faults>>,
+}
+
+impl Attached {
+    pub(super) fn new(clock: &Clock, chip: Rc<RefCell<dyn Chip>>) -> Self {
+        Self { clock: clock.clone(), chip, faults: Rc::default() }
+    }
+
+    /// The faults at present.
+    #[must_use]
+    pub fn faults(&self) -> Faults {
+        self.faults.get()
+    }
+
+    /// Replaces the faults, from the next transfer on.
+    pub fn set_faults(&self, faults: Faults) {
+        self.faults.set(faults);
+    }
+
+    /// The supply dips: the chip loses its settings and starts again.
+    pub fn reset(&self) {
+        self.chip.borrow_mut().reset(self.clock.now());
+    }
+
+    /// Another part has been soldered: this is what its identity register says from now on.
+    pub fn set_id(&self, id: u16) {
+        self.chip.borrow_mut().set_id(id);
+    }
+}
+
+/// A byte as it arrives at the other end of the line.
+pub(super) fn carry(byte: u8, bit_errors: f64, noise: &mut Noise) -> u8 {
+    if bit_errors <= 0.0 {
+        return byte;
+    }
+    (0..8).fold(byte, |byte, bit| byte ^ (u8::from(noise.chance(bit_errors)) << bit))
+}

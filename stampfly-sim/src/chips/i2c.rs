@@ -1,0 +1,201 @@
+//! An I²C bus on virtual time, with the `async` and the blocking traits of embedded-hal.
+//!
+//! The whole transfer costs its bits at 400 kHz and no other task gets the bus meanwhile. The chips see each byte at
+//! the instant of its last bit, but only when the transfer is over: nothing is asked of the world's future. A future
+//! that is dropped before its end has done nothing but to occupy the line.
+
+use super::fault::{Attached, Faults, carry};
+use super::{BusError, I2cChip, after};
+use crate::noise::Noise;
+use crate::time::Clock;
+use core::cell::{Cell, RefCell};
+use embedded_hal::i2c::{ErrorType, NoAcknowledgeSource, Operation};
+use stampfly_types::Micros;
+use std::rc::Rc;
+
+/// Nanoseconds per bit at 400 kHz, the fast mode of the I²C specification (UM10204, table 10).
+const BIT: u64 = 2_500;
+/// Bits of a byte with its acknowledge.
+const BYTE: u64 = 9;
+/// Clock pulses after which a chip in the middle of a byte has let go of the data line (UM10204, section 3.1.16).
+const RECOVERY: u8 = 9;
+/// Stream of the bit errors; no sensor has this number.
+const STREAM: u64 = 101;
+
+struct Device {
+    address: u8,
+    chip: Rc<RefCell<dyn I2cChip>>,
+    attached: Attached,
+}
+
+struct State {
+    clock: Clock,
+    devices: RefCell<Vec<Device>>,
+    busy_until: Cell<Micros>,
+    /// Clock pulses until the data line is free.
+    held: Cell<u8>,
+    noise: RefCell<Noise>,
+}
+
+/// A handle to the bus. Clones are the same bus; each may belong to another driver.
+///
+/// ```
+/// use stampfly_sim::chips::{Bmp280, I2cBus};
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Micros;
+///
+/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let clock = simulation.clock.clone();
+/// let mut bus = I2cBus::new(&clock, 1);
+/// bus.attach(0x76, Bmp280::new(&simulation.world, &clock, 1));
+/// let mut id = [0];
+/// embedded_hal::i2c::I2c::write_read(&mut bus, 0x76, &[0xD0], &mut id)?;
+/// assert_eq!(clock.now(), Micros(98), "39 bits: start, address, register, start, address, data, stop");
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
+#[derive(Clone)]
+pub struct I2cBus(Rc<State>);
+
+impl core::fmt::Debug for I2cBus {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let addresses: Vec<u8> = self.0.devices.borrow().iter().map(|device| device.address).collect();
+        f.debug_struct("I2cBus").field("addresses", &addresses).field("held", &self.0.held).finish_non_exhaustive()
+    }
+}
+
+impl I2cBus {
+    /// A bus without chips. The seed decides on bit errors and refusals.
+    #[must_use]
+    pub fn new(clock: &Clock, seed: u64) -> Self {
+        Self(Rc::new(State {
+            clock: clock.clone(),
+            devices: RefCell::default(),
+            busy_until: Cell::new(clock.now()),
+            held: Cell::new(0),
+            noise: RefCell::new(Noise::new(seed, STREAM)),
+        }))
+    }
+
+    /// Solders a chip to the bus at a 7-bit address. Where two have the same address the first one answers.
+    pub fn attach(&self, address: u8, chip: impl I2cChip + 'static) -> Attached {
+        let chip = Rc::new(RefCell::new(chip));
+        let attached = Attached::new(&self.0.clock, chip.clone());
+        self.0.devices.borrow_mut().push(Device { address, chip, attached: attached.clone() });
+        attached
+    }
+
+    /// A chip that lost count in the middle of a byte holds the data line low, until nine clock pulses.
+    pub fn hold_sda(&self) {
+        self.0.held.set(RECOVERY);
+    }
+
+    /// Is the data line free?
+    #[must_use]
+    pub fn sda_is_high(&self) -> bool {
+        self.0.held.get() == 0
+    }
+
+    /// One pulse of the clock line, made by hand. Takes no time of its own; the caller waits between edges.
+    pub fn pulse_scl(&self) {
+        self.0.held.set(self.0.held.get().saturating_sub(1));
+    }
+
+    fn faults(&self, address: u8) -> Option<Faults> {
+        let devices = self.0.devices.borrow();
+        devices.iter().find(|device| device.address == address).map(|device| device.attached.faults())
+    }
+
+    /// Takes the bus. Returns the start, the end, and what is already known to fail.
+    fn begin(&self, address: u8, operations: &[Operation<'_>]) -> (Micros, Micros, Result<(), BusError>) {
+        let start = self.0.clock.now();
+        let answers = self.faults(address).filter(|faults| {
+            let refused = faults.refusals > 0.0 && self.0.noise.borrow_mut().chance(faults.refusals);
+            !faults.dead && !refused
+        });
+        let (bits, stretch, outcome) = match answers {
+            _ if !self.sda_is_high() => (1, Micros::ZERO, Err(BusError::ArbitrationLost)),
+            None => (2 + BYTE, Micros::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
+            Some(faults) => (length(operations), faults.stretch, Ok(())),
+        };
+        let end = start + Micros((bits * BIT).div_ceil(1_000)) + stretch;
+        self.0.busy_until.set(end);
+        (start, end, outcome)
+    }
+
+    /// Exchanges the bytes of a transfer that began at `start`.
+    fn exchange(&self, address: u8, operations: &mut [Operation<'_>], start: Micros) -> Result<(), BusError> {
+        let devices = self.0.devices.borrow();
+        let Some(device) = devices.iter().find(|device| device.address == address) else {
+            return Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address));
+        };
+        let errors = device.attached.faults().bit_errors;
+        let mut chip = device.chip.borrow_mut();
+        let mut noise = self.0.noise.borrow_mut();
+        let (mut bits, mut index, mut before) = (0, 0, None);
+        for operation in operations {
+            let direction = Some(matches!(operation, Operation::Read(_)));
+            if core::mem::replace(&mut before, direction) != direction {
+                bits += 1 + BYTE;
+                index = 0;
+            }
+            match operation {
+                Operation::Write(bytes) => {
+                    for byte in *bytes {
+                        bits += BYTE;
+                        if !chip.receive(index, carry(*byte, errors, &mut noise), after(start, bits * BIT)) {
+                            return Err(BusError::NoAcknowledge(NoAcknowledgeSource::Data));
+                        }
+                        index += 1;
+                    }
+                }
+                Operation::Read(bytes) => {
+                    for byte in bytes.iter_mut() {
+                        bits += BYTE;
+                        *byte = carry(chip.send(index, after(start, bits * BIT)), errors, &mut noise);
+                        index += 1;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Bits of a whole transfer: a start and the address at every change of direction, the bytes, and the stop.
+fn length(operations: &[Operation<'_>]) -> u64 {
+    let mut before = None;
+    operations.iter().fold(1, |bits, operation| {
+        let (direction, bytes) = match operation {
+            Operation::Read(bytes) => (Some(true), bytes.len()),
+            Operation::Write(bytes) => (Some(false), bytes.len()),
+        };
+        let turn = core::mem::replace(&mut before, direction) != direction;
+        bits + BYTE * bytes as u64 + if turn { 1 + BYTE } else { 0 }
+    })
+}
+
+impl ErrorType for I2cBus {
+    type Error = BusError;
+}
+
+impl embedded_hal_async::i2c::I2c for I2cBus {
+    async fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result<(), BusError> {
+        while self.0.busy_until.get() > self.0.clock.now() {
+            self.0.clock.sleep_until(self.0.busy_until.get()).await;
+        }
+        let (start, end, outcome) = self.begin(address, operations);
+        self.0.clock.sleep_until(end).await;
+        outcome?;
+        self.exchange(address, operations, start)
+    }
+}
+
+impl embedded_hal::i2c::I2c for I2cBus {
+    fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result<(), BusError> {
+        self.0.clock.advance_to(self.0.busy_until.get());
+        let (start, end, outcome) = self.begin(address, operations);
+        self.0.clock.advance_to(end);
+        outcome?;
+        self.exchange(address, operations, start)
+    }
+}

@@ -1,0 +1,116 @@
+//! The StampFly's chips at register level, behind simulated buses.
+//!
+//! A driver that talks to these buses exchanges the bytes it would exchange with the board: the chips count
+//! conversions, want their start-up sequences and waiting times, and answer a wrong order as the hardware would.
+//! What they measure comes from the same physics as the models in [`sensors`](crate::sensors): the same seed is the
+//! same specimen in both. Use this to test drivers; to test everything behind the drivers use the models, which cost
+//! a hundredth of the time.
+//!
+//! The emulators are written from the makers' data sheets, not from a driver, so that a misreading is not made twice.
+//! Every register table names its section. What no public source confirms is marked *unverified*.
+//!
+//! | emulator | bus | address or clock | data sheet |
+//! |---|---|---|---|
+//! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
+//! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
+//!
+//! | fault | where |
+//! |---|---|
+//! | dead chip, refused transfers, bit errors, clock stretching | [`Faults`] |
+//! | reset in flight, another part | [`Attached`] |
+//! | data line held low | [`I2cBus::hold_sda`] |
+
+mod bmp280;
+mod fault;
+mod i2c;
+mod ina3221;
+mod spi;
+
+pub use bmp280::Bmp280;
+pub use fault::{Attached, Faults};
+pub use i2c::I2cBus;
+pub use ina3221::Ina3221;
+pub use spi::{SpiBus, SpiPort};
+
+use core::fmt;
+use embedded_hal::i2c::NoAcknowledgeSource;
+use embedded_hal::{i2c as hal_i2c, spi as hal_spi};
+use stampfly_types::Micros;
+
+/// A chip as its registers. Time is an argument and does not go back.
+///
+/// Both numbers are wide enough for every chip; one with 8-bit registers uses the lower half.
+pub trait Chip: fmt::Debug {
+    /// Reads a register, with whatever this does to the chip. Registers that do not exist read as zero.
+    fn read(&mut self, register: u16, now: Micros) -> u16;
+    /// Writes a register. Registers that do not exist or cannot be written swallow the value.
+    fn write(&mut self, register: u16, value: u16, now: Micros);
+    /// Power-on reset.
+    fn reset(&mut self, now: Micros);
+    /// Changes what the identity register says.
+    fn set_id(&mut self, id: u16);
+}
+
+/// A chip that can sit on an [`I2cBus`]: how it maps bytes to registers.
+pub trait I2cChip: Chip {
+    /// Takes byte number `index` after a (repeated) start in write direction. `false` is no acknowledge.
+    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool;
+    /// Gives byte number `index` after a (repeated) start in read direction.
+    fn send(&mut self, index: usize, now: Micros) -> u8;
+}
+
+/// A chip that can sit on an [`SpiBus`].
+pub trait SpiChip: Chip {
+    /// Takes and gives byte number `index` since the chip was selected.
+    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8;
+    /// Chip select goes high.
+    fn release(&mut self, now: Micros);
+}
+
+/// Why a transfer failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BusError {
+    /// Nobody acknowledged the address or a data byte. I²C only.
+    NoAcknowledge(NoAcknowledgeSource),
+    /// The data line is held low by a chip, so no start condition can be made. I²C only.
+    ArbitrationLost,
+    /// The processor's controller lost bytes. SPI only.
+    Overrun,
+}
+
+impl fmt::Display for BusError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoAcknowledge(_) => "no acknowledge",
+            Self::ArbitrationLost => "data line held low",
+            Self::Overrun => "controller overrun",
+        })
+    }
+}
+
+impl core::error::Error for BusError {}
+
+impl hal_i2c::Error for BusError {
+    fn kind(&self) -> hal_i2c::ErrorKind {
+        match self {
+            Self::NoAcknowledge(source) => hal_i2c::ErrorKind::NoAcknowledge(*source),
+            Self::ArbitrationLost => hal_i2c::ErrorKind::ArbitrationLoss,
+            Self::Overrun => hal_i2c::ErrorKind::Overrun,
+        }
+    }
+}
+
+impl hal_spi::Error for BusError {
+    fn kind(&self) -> hal_spi::ErrorKind {
+        match self {
+            Self::Overrun => hal_spi::ErrorKind::Overrun,
+            Self::NoAcknowledge(_) | Self::ArbitrationLost => hal_spi::ErrorKind::Other,
+        }
+    }
+}
+
+/// An instant `nanoseconds` after `start`, counted in whole microseconds like everything on the virtual clock.
+fn after(start: Micros, nanoseconds: u64) -> Micros {
+    start + Micros(nanoseconds / 1_000)
+}

@@ -1,0 +1,196 @@
+//! The buses: what a transfer costs, who may use them, and every fault.
+
+use crate::standing;
+use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource, Operation};
+use stampfly_sim::chips::{Bmp280, BusError, Chip, Faults, I2cBus, SpiBus, SpiChip};
+use stampfly_sim::time::{Clock, Tasks, block_on};
+use stampfly_types::Micros;
+use std::cell::RefCell;
+
+const ADDRESS: u8 = 0x76;
+const NACK: BusError = BusError::NoAcknowledge(NoAcknowledgeSource::Address);
+
+fn bus(seed: u64) -> (Clock, I2cBus, stampfly_sim::chips::Attached) {
+    let simulation = standing();
+    let bus = I2cBus::new(&simulation.clock, seed);
+    let chip = bus.attach(ADDRESS, Bmp280::new(&simulation.world, &simulation.clock, 1));
+    (simulation.clock, bus, chip)
+}
+
+/// Reads the identity with the blocking trait.
+fn id(bus: &mut I2cBus) -> Result<u8, BusError> {
+    let mut id = [0];
+    embedded_hal::i2c::I2c::write_read(bus, ADDRESS, &[0xD0], &mut id)?;
+    Ok(id[0])
+}
+
+#[test]
+fn both_traits_cost_the_bits_of_the_transfer() {
+    let (clock, mut bus, _) = bus(1);
+    let mut data = [0; 24];
+    // Start, address, register, start, address, 24 bytes, stop: 246 bits of 2.5 µs.
+    block_on(&clock, embedded_hal_async::i2c::I2c::write_read(&mut bus, ADDRESS, &[0x88], &mut data)).unwrap();
+    assert_eq!(clock.now(), Micros(615));
+    embedded_hal::i2c::I2c::write_read(&mut bus, ADDRESS, &[0x88], &mut data).unwrap();
+    assert_eq!(clock.now(), Micros(1_230));
+    // Two writes in a row are one: no second start.
+    let mut operations = [Operation::Write(&[0xF5]), Operation::Write(&[0])];
+    embedded_hal::i2c::I2c::transaction(&mut bus, ADDRESS, &mut operations).unwrap();
+    assert_eq!(clock.now(), Micros(1_230 + 73));
+}
+
+#[test]
+fn tasks_share_the_bus_one_after_the_other() {
+    let (clock, bus, _) = bus(1);
+    let ends = RefCell::new(Vec::new());
+    let mut tasks = Tasks::new(clock.clone());
+    for _ in 0..3 {
+        let (mut bus, clock, ends) = (bus.clone(), clock.clone(), &ends);
+        tasks.spawn(async move {
+            let mut id = [0];
+            embedded_hal_async::i2c::I2c::write_read(&mut bus, ADDRESS, &[0xD0], &mut id).await.unwrap();
+            assert_eq!(id, [0x58]);
+            ends.borrow_mut().push(clock.now().0);
+        });
+    }
+    tasks.run_until(Micros::from_millis(1));
+    drop(tasks);
+    assert_eq!(ends.into_inner(), [98, 196, 294]);
+}
+
+#[test]
+fn an_absent_or_dead_chip_does_not_acknowledge_and_costs_one_byte() {
+    let (clock, mut bus, chip) = bus(1);
+    assert_eq!(embedded_hal::i2c::I2c::write(&mut bus, 0x77, &[0; 100]), Err(NACK));
+    assert_eq!(clock.now(), Micros(28), "eleven bits");
+    chip.set_faults(Faults { dead: true, ..Default::default() });
+    assert_eq!(id(&mut bus), Err(NACK));
+    chip.set_faults(Faults::default());
+    assert_eq!(id(&mut bus), Ok(0x58));
+    assert_eq!(embedded_hal::i2c::Error::kind(&NACK), ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
+}
+
+#[test]
+fn a_held_data_line_blocks_everybody_until_nine_pulses() {
+    let (clock, mut bus, _) = bus(1);
+    bus.hold_sda();
+    for _ in 0..3 {
+        let before = clock.now();
+        assert_eq!(id(&mut bus), Err(BusError::ArbitrationLost));
+        assert!(clock.now().since(before) < Micros(10), "no endless wait");
+    }
+    (0..8).for_each(|_| bus.pulse_scl());
+    assert!(!bus.sda_is_high());
+    bus.pulse_scl();
+    assert!(bus.sda_is_high());
+    assert_eq!(id(&mut bus), Ok(0x58));
+}
+
+#[test]
+fn refusals_and_bit_errors_come_at_their_rate_and_repeat_with_the_seed() {
+    let run = |seed| {
+        let (_, mut bus, chip) = bus(seed);
+        chip.set_faults(Faults { refusals: 0.25, bit_errors: 0.01, ..Default::default() });
+        (0..2_000).map(|_| id(&mut bus)).collect::<Vec<_>>()
+    };
+    let answers = run(5);
+    let refused = answers.iter().filter(|answer| answer.is_err()).count();
+    assert!((420..580).contains(&refused), "{refused}");
+    // Sixteen bits that matter: an error in about 15 of 100.
+    let wrong = answers.iter().flatten().filter(|id| **id != 0x58).count();
+    assert!((160..290).contains(&wrong), "{wrong}");
+    assert_eq!(answers, run(5));
+    assert_ne!(answers, run(6));
+}
+
+#[test]
+fn a_chip_may_stretch_the_clock() {
+    let (clock, mut bus, chip) = bus(1);
+    chip.set_faults(Faults { stretch: Micros(700), ..Default::default() });
+    assert_eq!(id(&mut bus), Ok(0x58));
+    assert_eq!(clock.now(), Micros(798));
+}
+
+#[test]
+fn another_part_shows_in_the_identity_and_a_reset_in_the_settings() {
+    let (clock, mut bus, chip) = bus(1);
+    clock.advance_to(Micros::from_millis(3));
+    chip.set_id(0x60);
+    assert_eq!(id(&mut bus), Ok(0x60));
+    embedded_hal::i2c::I2c::write(&mut bus, ADDRESS, &[0xF5, 0x48]).unwrap();
+    let mut config = [0];
+    embedded_hal::i2c::I2c::write_read(&mut bus, ADDRESS, &[0xF5], &mut config).unwrap();
+    assert_eq!(config, [0x48]);
+    chip.reset();
+    embedded_hal::i2c::I2c::write_read(&mut bus, ADDRESS, &[0xF5], &mut config).unwrap();
+    assert_eq!(config, [0]);
+}
+
+#[test]
+fn a_dropped_transfer_occupies_the_line_and_changes_nothing() {
+    let (clock, bus, _) = bus(1);
+    clock.advance_to(Micros::from_millis(3));
+    let start = clock.now();
+    let mut dropped = bus.clone();
+    {
+        let mut future = std::pin::pin!(embedded_hal_async::i2c::I2c::write(&mut dropped, ADDRESS, &[0xF5, 0x48]));
+        let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+        assert!(future.as_mut().poll(&mut context).is_pending());
+    }
+    let mut bus = bus;
+    let mut config = [9];
+    block_on(&clock, embedded_hal_async::i2c::I2c::write_read(&mut bus, ADDRESS, &[0xF5], &mut config)).unwrap();
+    assert_eq!((config, clock.now().since(start)), ([0], Micros(73 + 98)));
+}
+
+/// A chip that answers the byte before and notes when.
+#[derive(Debug, Default)]
+struct Echo {
+    last: u8,
+    times: Vec<(usize, u64)>,
+    releases: u8,
+}
+
+impl Chip for Echo {
+    fn read(&mut self, _: u16, _: Micros) -> u16 {
+        u16::from(self.releases)
+    }
+    fn write(&mut self, _: u16, _: u16, _: Micros) {}
+    fn reset(&mut self, _: Micros) {
+        *self = Self::default();
+    }
+    fn set_id(&mut self, _: u16) {}
+}
+
+impl SpiChip for Echo {
+    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
+        self.times.push((index, now.0));
+        core::mem::replace(&mut self.last, byte)
+    }
+    fn release(&mut self, _: Micros) {
+        self.releases += 1;
+        self.times.clear();
+    }
+}
+
+#[test]
+fn spi_transfers_cost_their_bits_and_delays() {
+    use embedded_hal::spi::Operation;
+    let clock = Clock::new(Micros::ZERO);
+    let bus = SpiBus::new(&clock, 1);
+    let (mut fast, attached) = bus.attach(8_000_000, Echo::default());
+    let (mut slow, _) = bus.attach(2_000_000, Echo::default());
+    let mut read = [0; 3];
+    embedded_hal::spi::SpiDevice::transfer(&mut fast, &mut read, &[1, 2, 3]).unwrap();
+    assert_eq!((read, clock.now()), ([0, 1, 2], Micros(3)));
+    let mut answer = [0; 2];
+    let mut operations = [Operation::Write(&[7]), Operation::DelayNs(35_000), Operation::Read(&mut answer)];
+    block_on(&clock, embedded_hal_async::spi::SpiDevice::transaction(&mut slow, &mut operations)).unwrap();
+    assert_eq!((answer, clock.now()), ([7, 0], Micros(3 + 4 + 35 + 8)));
+
+    attached.set_faults(Faults { dead: true, ..Default::default() });
+    embedded_hal::spi::SpiDevice::transfer_in_place(&mut fast, &mut read).unwrap();
+    assert_eq!(read, [0xFF; 3], "nobody drives the line");
+    attached.set_faults(Faults { refusals: 1.0, ..Default::default() });
+    assert_eq!(embedded_hal::spi::SpiDevice::read(&mut fast, &mut read), Err(BusError::Overrun));
+}

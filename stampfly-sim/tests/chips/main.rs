@@ -1,0 +1,20 @@
+//! The emulated chips, asked byte by byte as their data sheets prescribe.
+#![allow(clippy::unusual_byte_groupings, reason = "digits are grouped as the fields of the register")]
+
+mod bmp280;
+mod bus;
+mod ina3221;
+
+use stampfly_sim::plant::WindConfig;
+use stampfly_sim::{Simulation, SimulationConfig};
+use stampfly_types::Micros;
+
+/// A vehicle on the floor in still air.
+fn standing() -> Simulation {
+    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..Default::default() })
+}
+
+/// Lets time pass.
+fn wait(simulation: &Simulation, microseconds: u64) {
+    simulation.clock.advance_to(simulation.clock.now() + Micros(microseconds));
+}
