@@ -14,11 +14,16 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     let clone = repository.target("package-clone");
     let _ = fs::remove_dir_all(&clone);
     run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
+    // A place of its own for every commit: cargo keeps what it has unpacked of a version, and ours does not change with
+    // every commit.
+    let (commit, _) = capture(repository.command("git").args(["rev-parse", "--short", "HEAD"]))?;
+    let packages = repository.target("packages");
+    let _ = fs::remove_dir_all(&packages);
     let mut package = repository.cargo();
     package
         .current_dir(&clone)
         .args(["package", "--locked", "--quiet", "--target-dir"])
-        .arg(repository.target("packages"));
+        .arg(packages.join(commit.trim()));
     // Together, because they depend on each other and none is published yet.
     for library in repository.libraries()? {
         package.args(["-p", &library.name]);
