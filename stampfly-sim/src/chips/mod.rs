@@ -13,6 +13,7 @@
 //! |---|---|---|---|
 //! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
 //! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
+//! | [`Bmi270`] | [`SpiBus`] | up to 10 MHz | BST-BMI270-DS000 |
 //!
 //! | fault | where |
 //! |---|---|
@@ -20,12 +21,14 @@
 //! | reset in flight, another part | [`Attached`] |
 //! | data line held low | [`I2cBus::hold_sda`] |
 
+mod bmi270;
 mod bmp280;
 mod fault;
 mod i2c;
 mod ina3221;
 mod spi;
 
+pub use bmi270::Bmi270;
 pub use bmp280::Bmp280;
 pub use fault::{Attached, Faults};
 pub use i2c::I2cBus;

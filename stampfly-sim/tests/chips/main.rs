@@ -1,6 +1,7 @@
 //! The emulated chips, asked byte by byte as their data sheets prescribe.
 #![allow(clippy::unusual_byte_groupings, reason = "digits are grouped as the fields of the register")]
 
+mod bmi270;
 mod bmp280;
 mod bus;
 mod ina3221;
