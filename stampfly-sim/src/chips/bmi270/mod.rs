@@ -312,8 +312,12 @@ impl Chip for Bmi270 {
             ID => self.id,
             STATUS => value | COMMAND_READY,
             ACCEL..TIME => {
-                let flag = if register < GYRO { READY_ACCEL } else { READY_GYRO };
-                self.set(STATUS, self.register(STATUS) & !flag);
+                let (first, flag) = if register < GYRO { (ACCEL, READY_ACCEL) } else { (GYRO, READY_GYRO) };
+                let place = usize::from(first - ACCEL);
+                // What arrived during this transfer has not been read.
+                if self.shadow[place..place + 6] == self.registers[usize::from(first)..usize::from(first) + 6] {
+                    self.set(STATUS, self.register(STATUS) & !flag);
+                }
                 self.shadow[usize::from(register - ACCEL)]
             }
             TIME..EVENT => self.time(now)[usize::from(register - TIME)],
