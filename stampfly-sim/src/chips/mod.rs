@@ -13,6 +13,9 @@
 //! |---|---|---|---|
 //! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
 //! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
+//! | [`Bmi270`] | [`SpiBus`] | up to 10 MHz | BST-BMI270-DS000 |
+//! | [`Bmm150`] | [`I2cBus`] | 0x10 | BST-BMM150-DS001 |
+//! | [`Pmw3901`] | [`SpiBus`] | up to 2 MHz | PixArt PMW3901MB |
 //!
 //! | fault | where |
 //! |---|---|
@@ -20,16 +23,22 @@
 //! | reset in flight, another part | [`Attached`] |
 //! | data line held low | [`I2cBus::hold_sda`] |
 
+mod bmi270;
+mod bmm150;
 mod bmp280;
 mod fault;
 mod i2c;
 mod ina3221;
+mod pmw3901;
 mod spi;
 
+pub use bmi270::Bmi270;
+pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
 pub use fault::{Attached, Faults};
 pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
+pub use pmw3901::Pmw3901;
 pub use spi::{SpiBus, SpiPort};
 
 use core::fmt;

@@ -10,7 +10,7 @@ use stampfly_drivers::{Magnetometer, Sample};
 use stampfly_types::Micros;
 use stampfly_types::messages::MagData;
 
-const RATE: f64 = 25.0;
+pub(crate) const RATE: f64 = 25.0;
 const READ_OUT: Micros = Micros(300);
 /// The Earth's field in Kanazawa, world NED, µT (World Magnetic Model, rounded): 49° of dip, 8° west.
 const FIELD: [f64; 3] = [30.8, -4.3, 36.4];

@@ -1,9 +1,12 @@
 //! The emulated chips, asked byte by byte as their data sheets prescribe.
 #![allow(clippy::unusual_byte_groupings, reason = "digits are grouped as the fields of the register")]
 
+mod bmi270;
+mod bmm150;
 mod bmp280;
 mod bus;
 mod ina3221;
+mod pmw3901;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};

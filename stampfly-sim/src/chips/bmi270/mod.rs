@@ -1,0 +1,459 @@
+//! The inertial sensor BMI270: Bosch BST-BMI270-DS000 ("DS" below), on SPI.
+//!
+//! | register | content | after reset | DS |
+//! |---|---|---|---|
+//! | 0x00 | identity 0x24 | | 5.2.1 |
+//! | 0x02 | errors: bit 0 fatal | 0 | 5.2.2 |
+//! | 0x03 | status: accelerometer (7), gyroscope (6) data ready, command ready (4) | 0x10 | 5.2.3 |
+//! | 0x0C–0x11, 0x12–0x17 | accelerometer, gyroscope, low byte first | 0 | 5.2.8, 5.2.14 |
+//! | 0x18–0x1A | time, 39.0625 µs | | 5.2.20 |
+//! | 0x1B | event: bit 0 power-on, cleared by reading; (4:2) settings refused | 1 | 5.2.23 |
+//! | 0x1D | interrupt status: accelerometer (7), gyroscope (6) ready, cleared by reading | 0 | 5.2.25 |
+//! | 0x21 | (3:0) 0 not initialised, 1 ready, 2 failed | 0 | 5.2.30 |
+//! | 0x22–0x23 | temperature, 1/512 K above 23 °C, 0x8000 invalid | 0x8000 | 5.2.31 |
+//! | 0x24–0x25, 0x26 | FIFO fill level, FIFO data | 0 | 5.2.33 to 5.2.35 |
+//! | 0x40, 0x41 | accelerometer filter and rate, range | 0xA8, 0x02 | 5.2.45, 5.2.46 |
+//! | 0x42, 0x43 | gyroscope filter and rate, range | 0xA9, 0x00 | 5.2.47, 5.2.48 |
+//! | 0x48, 0x49 | FIFO: stop when full (0), time (1); header (4), accelerometer (6), gyroscope (7) | 0x02, 0x10 | 5.2.53, 5.2.54 |
+//! | 0x59 | 0 prepares, 1 ends the upload | 0 | 5.2.69 |
+//! | 0x5B, 0x5C, 0x5E | word address (3:0, 11:4), data of the upload | 0 | 5.2.70 to 5.2.72 |
+//! | 0x7C | bit 0: advanced power save | 0x03 | 5.2.98 |
+//! | 0x7D | gyroscope (1), accelerometer (2), temperature (3) on | 0 | 5.2.99 |
+//! | 0x7E | 0xB6 resets, 0xB0 empties the FIFO | 0 | 5.2.100 |
+//!
+//! The section numbers of single registers follow the order of the register map and are *unverified*; the contents
+//! are those of the map in DS 5.1.
+//!
+//! A read has one byte without meaning before the data (DS 6.3). The chip starts on I²C and takes the first rising
+//! edge of chip select as the choice of SPI, so the first transfer after power-on and after a reset is lost (DS 6.1).
+//! A read goes on to the next register, except at 0x26 and 0x5E. In advanced power save neither the FIFO nor the
+//! upload can be reached, and writes need 450 µs between them, otherwise 2 µs (DS 4.4, 6.5).
+//!
+//! *Unverified*: that accesses in the 2 ms of a start are ignored and read as zero; that writes too close together are
+//! lost; that data of an upload that was not announced by a zero in 0x59 is ignored; that sensors do not start before the upload has succeeded; 10 ms from the end of an upload to its result;
+//! first data 2 ms (accelerometer) and 45 ms (gyroscope) after being switched on; the plain mean as filter at rates
+//! below 1600 Hz; the four bytes after header 0x48. Not modelled: rates above 1600 Hz, interrupt pins, FIFO
+//! downsampling and watermark, features, the auxiliary bus, filter delay.
+
+mod fifo;
+
+use super::{Chip, SpiChip};
+use crate::sensors::imu::{ImuPhysics, to_counts};
+use crate::sensors::schedule::Schedule;
+use crate::time::Clock;
+use crate::world::World;
+use fifo::Fifo;
+use stampfly_types::{GRAVITY, Micros};
+
+const ID: u16 = 0x00;
+const STATUS: u16 = 0x03;
+const ACCEL: u16 = 0x0C;
+const GYRO: u16 = 0x12;
+const TIME: u16 = 0x18;
+const EVENT: u16 = 0x1B;
+const INTERRUPTS: u16 = 0x1D;
+const INTERNAL_STATUS: u16 = 0x21;
+const TEMPERATURE: u16 = 0x22;
+const FIFO_LENGTH: u16 = 0x24;
+const FIFO_DATA: u16 = 0x26;
+const ACCEL_SETTINGS: u16 = 0x40;
+const ACCEL_RANGE: u16 = 0x41;
+const GYRO_SETTINGS: u16 = 0x42;
+const GYRO_RANGE: u16 = 0x43;
+const FIFO_MODE: u16 = 0x48;
+const FIFO_CONTENT: u16 = 0x49;
+const UPLOAD_CONTROL: u16 = 0x59;
+const UPLOAD_ADDRESS_LOW: u16 = 0x5B;
+const UPLOAD_ADDRESS_HIGH: u16 = 0x5C;
+const UPLOAD_DATA: u16 = 0x5E;
+const POWER_SAVE: u16 = 0x7C;
+const POWER: u16 = 0x7D;
+const COMMAND: u16 = 0x7E;
+
+/// Values after reset that are not zero.
+const AFTER_RESET: [(u16, u8); 11] = [
+    (ACCEL_SETTINGS, 0xA8),
+    (ACCEL_RANGE, 0x02),
+    (GYRO_SETTINGS, 0xA9),
+    (0x44, 0x46),
+    (0x45, 0x88),
+    (0x47, 0x02),
+    (FIFO_MODE, 0x02),
+    (FIFO_CONTENT, 0x10),
+    (EVENT, 0x01),
+    (TEMPERATURE + 1, 0x80),
+    (POWER_SAVE, 0x03),
+];
+const READY_ACCEL: u8 = 0x80;
+const READY_GYRO: u8 = 0x40;
+const COMMAND_READY: u8 = 0x10;
+const START_UP: Micros = Micros(2_000);
+const UPLOAD_CHECK: Micros = Micros(10_000);
+const ACCEL_START: Micros = Micros(2_000);
+const GYRO_START: Micros = Micros(45_000);
+/// Rate code of 1600 Hz.
+const FASTEST: u8 = 0x0C;
+/// Bytes of the memory for the upload.
+const UPLOAD_SIZE: usize = 8_192;
+
+/// The emulator. The same seed is the same specimen as [`ImuModel`](crate::sensors::ImuModel).
+///
+/// ```
+/// use embedded_hal::spi::SpiDevice;
+/// use stampfly_sim::chips::{Bmi270, SpiBus};
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Micros;
+///
+/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let clock = simulation.clock.clone();
+/// let image = [0x5A; 8192];
+/// let chip = Bmi270::new(&simulation.world, &clock, 1, 1.0, &image);
+/// let (mut port, _) = SpiBus::new(&clock, 1).attach(8_000_000, chip);
+/// clock.advance_to(Micros::from_millis(2));
+/// let mut answer = [0; 3];
+/// port.transfer(&mut answer, &[0x80])?; // chooses SPI
+/// port.transfer(&mut answer, &[0x80])?;
+/// assert_eq!(answer[2], 0x24, "after one byte without meaning");
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
+#[derive(Debug)]
+pub struct Bmi270 {
+    physics: ImuPhysics,
+    schedule: Schedule,
+    /// Number of the next sample at 1600 Hz.
+    tick: u64,
+    id: u8,
+    image: Vec<u8>,
+    memory: Vec<u8>,
+    registers: [u8; 128],
+    /// End of the start-up.
+    ready: Micros,
+    /// Beginning of the chip's time.
+    epoch: Micros,
+    spi: bool,
+    /// Before this instant the chip takes no further write.
+    idle_until: Micros,
+    /// Whether the running transfer came late enough to be taken.
+    accepts: bool,
+    /// Whether the upload has been announced.
+    prepared: bool,
+    /// End of the check of an upload.
+    check: Option<Micros>,
+    /// Byte address of the upload.
+    address: usize,
+    /// When accelerometer and gyroscope were switched on, if they are.
+    on: [Option<Micros>; 2],
+    /// Sums of the samples since the last output, accelerometer and gyroscope, and how many.
+    sums: [([f64; 3], u64); 2],
+    fifo: Fifo,
+    /// The address byte of this transfer.
+    command: u8,
+    pointer: u16,
+    /// The data registers as the running transfer sees them.
+    shadow: [u8; 12],
+}
+
+impl Bmi270 {
+    /// A chip that has just been powered. `image` is the configuration that its check will accept, at most 8192 bytes:
+    /// the maker's file, or any stand-in. `vibration` is that of [`SimulationConfig`](crate::SimulationConfig).
+    #[must_use]
+    pub fn new(world: &World, clock: &Clock, seed: u64, vibration: f64, image: &[u8]) -> Self {
+        let now = clock.now();
+        let (physics, schedule) = ImuPhysics::new(world, now, seed, vibration);
+        let mut chip = Self {
+            physics,
+            schedule,
+            tick: 0,
+            id: 0x24,
+            image: image.iter().copied().take(UPLOAD_SIZE).collect(),
+            memory: Vec::new(),
+            registers: [0; 128],
+            ready: now,
+            epoch: now,
+            spi: false,
+            idle_until: now,
+            accepts: false,
+            prepared: false,
+            check: None,
+            address: 0,
+            on: [None; 2],
+            sums: Default::default(),
+            fifo: Fifo::default(),
+            command: 0,
+            pointer: 0,
+            shadow: [0; 12],
+        };
+        chip.reset(now);
+        chip
+    }
+
+    fn register(&self, register: u16) -> u8 {
+        self.registers[usize::from(register & 0x7F)]
+    }
+
+    fn set(&mut self, register: u16, value: u8) {
+        self.registers[usize::from(register & 0x7F)] = value;
+    }
+
+    fn saves_power(&self) -> bool {
+        self.register(POWER_SAVE) & 1 != 0
+    }
+
+    /// Samples at 1600 Hz per output of sensor 0 or 1; none where the rate is not allowed (DS 5.2.45, 5.2.47).
+    fn divider(&self, sensor: usize) -> Option<u64> {
+        let (register, slowest) = [(ACCEL_SETTINGS, 1), (GYRO_SETTINGS, 6)][sensor];
+        let code = self.register(register) & 0x0F;
+        (slowest..=FASTEST).contains(&code).then(|| 1 << (FASTEST - code))
+    }
+
+    /// Counts per m/s² or rad/s (DS 5.2.46, 5.2.48).
+    fn scale(&self, sensor: usize) -> f64 {
+        if sensor == 0 {
+            f64::from(16_384u32 >> (self.register(ACCEL_RANGE) & 3)) / f64::from(GRAVITY)
+        } else {
+            let doublings = (self.register(GYRO_RANGE) & 7).min(4);
+            16.4 * f64::from(1u8 << doublings) * 180.0 / core::f64::consts::PI
+        }
+    }
+
+    /// The chip's 24-bit time at `at`.
+    fn time(&self, at: Micros) -> [u8; 3] {
+        let pace = self.schedule.period() / 625.0;
+        let ticks = (at.since(self.epoch).0 as f64 / pace / 39.0625) as u32;
+        let [low, middle, high, _] = ticks.to_le_bytes();
+        [low, middle, high]
+    }
+
+    fn update(&mut self, now: Micros) {
+        if let Some(instant) = self.check.filter(|instant| *instant <= now) {
+            self.check = None;
+            let complete = !self.memory.is_empty() && self.memory.starts_with(&self.image);
+            self.set(INTERNAL_STATUS, if complete { 1 } else { 2 });
+            self.switch(instant);
+        }
+        while self.schedule.instant(self.tick) <= now {
+            let at = self.schedule.instant(self.tick);
+            self.tick += 1;
+            if self.on != [None; 2] {
+                self.sample(at);
+            }
+        }
+    }
+
+    /// One tick of the sensors.
+    fn sample(&mut self, at: Micros) {
+        let [ax, ay, az, gx, gy, gz] = self.physics.sample(at);
+        // Body is (y, x, −z) of the chip as it is soldered.
+        let body = [[ay, ax, -az], [gy, gx, -gz]];
+        let mut outputs = [None; 2];
+        for (sensor, values) in body.into_iter().enumerate() {
+            let started = [ACCEL_START, GYRO_START][sensor];
+            let running = self.on[sensor].is_some_and(|since| at.since(since) >= started && at >= since);
+            let Some(divider) = self.divider(sensor).filter(|_| running) else { continue };
+            let (sum, count) = &mut self.sums[sensor];
+            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            *count += 1;
+            if !self.tick.is_multiple_of(divider) {
+                continue;
+            }
+            let (sum, count) = core::mem::take(&mut self.sums[sensor]);
+            let scale = self.scale(sensor);
+            let mut bytes = [0; 6];
+            for (pair, sum) in bytes.chunks_exact_mut(2).zip(sum) {
+                pair.copy_from_slice(&to_counts(sum / count as f64, scale).to_le_bytes());
+            }
+            let place = usize::from([ACCEL, GYRO][sensor]);
+            self.registers[place..place + 6].copy_from_slice(&bytes);
+            let flag = [READY_ACCEL, READY_GYRO][sensor];
+            self.set(STATUS, self.register(STATUS) | flag);
+            self.set(INTERRUPTS, self.register(INTERRUPTS) | flag);
+            outputs[sensor] = Some(bytes);
+        }
+        if self.register(POWER) & 8 != 0 {
+            let counts = ((self.physics.temperature(at) - 23.0) * 512.0) as i16;
+            let [low, high] = counts.to_le_bytes();
+            self.set(TEMPERATURE, low);
+            self.set(TEMPERATURE + 1, high);
+        }
+        let content = self.register(FIFO_CONTENT);
+        let [accel, gyro] = [outputs[0].filter(|_| content & 0x40 != 0), outputs[1].filter(|_| content & 0x80 != 0)];
+        if accel.is_some() || gyro.is_some() {
+            self.fifo.push(gyro, accel, content & 0x10 != 0, self.register(FIFO_MODE) & 1 != 0);
+        }
+    }
+
+    /// Switches the sensors as the power register says.
+    fn switch(&mut self, now: Micros) {
+        let power = self.register(POWER);
+        for (sensor, bit) in [(0, 4), (1, 2)] {
+            let on = power & bit != 0 && self.register(INTERNAL_STATUS) & 0x0F == 1;
+            self.on[sensor] = on.then(|| self.on[sensor].unwrap_or(now));
+            if !on {
+                self.sums[sensor] = Default::default();
+            }
+        }
+    }
+
+    /// Looks whether the rates are allowed and tells by the event register.
+    fn check_settings(&mut self) {
+        let refused = u8::from(self.divider(0).is_none()) | u8::from(self.divider(1).is_none()) << 1;
+        self.set(EVENT, self.register(EVENT) & !0x1C | refused << 2);
+    }
+}
+
+impl Chip for Bmi270 {
+    fn read(&mut self, register: u16, now: Micros) -> u16 {
+        self.update(now);
+        if now < self.ready {
+            return 0;
+        }
+        let value = self.register(register);
+        u16::from(match register {
+            ID => self.id,
+            STATUS => value | COMMAND_READY,
+            ACCEL..TIME => {
+                let (first, flag) = if register < GYRO { (ACCEL, READY_ACCEL) } else { (GYRO, READY_GYRO) };
+                let place = usize::from(first - ACCEL);
+                // What arrived during this transfer has not been read.
+                if self.shadow[place..place + 6] == self.registers[usize::from(first)..usize::from(first) + 6] {
+                    self.set(STATUS, self.register(STATUS) & !flag);
+                }
+                self.shadow[usize::from(register - ACCEL)]
+            }
+            TIME..EVENT => self.time(now)[usize::from(register - TIME)],
+            EVENT => {
+                self.set(EVENT, value & !1);
+                value
+            }
+            INTERRUPTS => core::mem::take(&mut self.registers[usize::from(INTERRUPTS)]),
+            FIFO_LENGTH => self.fifo.len() as u8,
+            0x25 => (self.fifo.len() >> 8) as u8 & 0x3F,
+            FIFO_DATA if self.saves_power() => 0,
+            FIFO_DATA => {
+                let timed = self.register(FIFO_MODE) & 2 != 0 && self.register(FIFO_CONTENT) & 0x10 != 0;
+                self.fifo.pop(timed.then(|| self.time(now)))
+            }
+            UPLOAD_DATA | COMMAND => 0,
+            _ => value,
+        })
+    }
+
+    fn write(&mut self, register: u16, value: u16, now: Micros) {
+        self.update(now);
+        let value = value as u8;
+        if now < self.ready || register >= 0x80 {
+            return;
+        }
+        match register {
+            // Read-only.
+            0x00..=0x2E => {}
+            UPLOAD_CONTROL if self.saves_power() => {}
+            UPLOAD_CONTROL => {
+                self.set(UPLOAD_CONTROL, value);
+                self.prepared = value & 1 == 0;
+                if self.prepared {
+                    self.memory.clear();
+                    self.set(INTERNAL_STATUS, 0);
+                    self.switch(now);
+                } else {
+                    self.check = Some(now + UPLOAD_CHECK);
+                }
+            }
+            UPLOAD_ADDRESS_LOW | UPLOAD_ADDRESS_HIGH => {
+                self.set(register, value);
+                let words = usize::from(self.register(UPLOAD_ADDRESS_HIGH)) << 4
+                    | usize::from(self.register(UPLOAD_ADDRESS_LOW) & 0x0F);
+                self.address = 2 * words;
+            }
+            UPLOAD_DATA if self.saves_power() || !self.prepared => {}
+            UPLOAD_DATA => {
+                if self.address < UPLOAD_SIZE {
+                    self.memory.resize(self.memory.len().max(self.address + 1), 0);
+                    self.memory[self.address] = value;
+                    self.address += 1;
+                }
+            }
+            COMMAND if value == 0xB6 => self.reset(now),
+            COMMAND if value == 0xB0 => self.fifo.clear(),
+            COMMAND => {}
+            POWER => {
+                self.set(POWER, value & 0x0F);
+                self.switch(now);
+            }
+            ACCEL_SETTINGS..=GYRO_RANGE => {
+                let sensor = usize::from(register >= GYRO_SETTINGS);
+                if self.register(register) != value && self.register(FIFO_CONTENT) & (0x40 << sensor) != 0 {
+                    self.fifo.push_configuration(1 << sensor);
+                }
+                self.set(register, value);
+                self.sums[sensor] = Default::default();
+                self.check_settings();
+            }
+            _ => self.set(register, value),
+        }
+    }
+
+    fn reset(&mut self, now: Micros) {
+        self.registers = [0; 128];
+        for (register, value) in AFTER_RESET {
+            self.set(register, value);
+        }
+        self.ready = now + START_UP;
+        self.epoch = now;
+        self.spi = false;
+        self.idle_until = now;
+        self.prepared = false;
+        self.check = None;
+        self.address = 0;
+        self.memory.clear();
+        self.on = [None; 2];
+        self.sums = Default::default();
+        self.fifo.clear();
+        self.shadow = [0; 12];
+    }
+
+    fn set_id(&mut self, id: u16) {
+        self.id = id as u8;
+    }
+}
+
+impl SpiChip for Bmi270 {
+    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
+        if index == 0 {
+            self.update(now);
+            self.command = byte;
+            self.accepts = now >= self.idle_until;
+            self.pointer = u16::from(byte & 0x7F);
+            self.shadow.copy_from_slice(&self.registers[usize::from(ACCEL)..usize::from(TIME)]);
+            return 0xFF;
+        }
+        let reads = self.command & 0x80 != 0;
+        if !self.spi {
+            return 0xFF;
+        }
+        if reads && index == 1 {
+            return 0;
+        }
+        let register = self.pointer;
+        if register != FIFO_DATA && register != UPLOAD_DATA {
+            self.pointer = (self.pointer + 1) & 0x7F;
+        }
+        if reads {
+            return self.read(register, now) as u8;
+        }
+        if self.accepts {
+            self.write(register, u16::from(byte), now);
+        }
+        0xFF
+    }
+
+    fn release(&mut self, now: Micros) {
+        if self.spi && self.command & 0x80 == 0 && self.accepts {
+            let idle = if self.saves_power() { 450 } else { 2 };
+            self.idle_until = now + Micros(idle);
+        }
+        // The rising edge chooses SPI, but not in the start-up, so not at the end of the transfer that resets.
+        self.spi = now >= self.ready;
+        self.fifo.release();
+    }
+}

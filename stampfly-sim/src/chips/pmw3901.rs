@@ -1,0 +1,260 @@
+//! The optical flow sensor PMW3901MB: PixArt's data sheet ("DS" below), on SPI at up to 2 MHz.
+//!
+//! | register | content | DS |
+//! |---|---|---|
+//! | 0x00, 0x5F | identity 0x49 and its inverse 0xB6 | register list |
+//! | 0x02 | motion (7); reading it latches the counts | register list |
+//! | 0x03–0x06 | counts x, y since the last latch, low byte first | register list |
+//! | 0x07 | features (SQUAL) | register list |
+//! | 0x08–0x0C | sum, maximum, minimum of the picture, shutter low and high | register list |
+//! | 0x16 | burst of 12: motion, observation, x, y, SQUAL, sum, maximum, minimum, shutter high, low | burst mode |
+//! | 0x3A | 0x5A resets | power-up |
+//! | 0x7F | bank of the registers for the performance settings | performance list |
+//!
+//! Bit 7 of the address is set for a write. Between address and data of a read 35 µs have to pass, after a write 45 µs,
+//! after a read 20 µs (DS, timing). After power-on it needs 45 ms. The data sheet's list of performance settings has
+//! to be written.
+//!
+//! *Unverified*: that data clocked out too early is zero and commands that come too early are lost (the burst without
+//! its pause is reported to work in practice); zero motion and quality without the performance settings; 0x08 at 0x47
+//! of bank 0x0E, and what 0x67, 0x70, 0x71 and 0x73 say; which of the list's entries matter (those in which its
+//! public copies agree are wanted, in any order); 5 ms for a reset; observation 0xBF; the picture's sum, maximum and
+//! minimum, which only follow the quality. Section numbers differ between the public revisions and are not given.
+//! Not modelled: shutdown, frame capture, the motion pin.
+
+use super::{Chip, SpiChip};
+use crate::sensors::flow::FlowPhysics;
+use crate::time::Clock;
+use crate::world::World;
+use stampfly_types::Micros;
+
+const START_UP: Micros = Micros(45_000);
+const RESET_TIME: Micros = Micros(5_000);
+const READ_PAUSE: Micros = Micros(35);
+const AFTER_WRITE: Micros = Micros(45);
+const AFTER_READ: Micros = Micros(20);
+const MOTION: u16 = 0x02;
+const BURST: u8 = 0x16;
+const RESET: u16 = 0x3A;
+const BANK: u16 = 0x7F;
+/// Below this quality the shutter is fully open.
+const DARK: u8 = 25;
+
+/// Bank, register and value that the performance list leaves behind, where its public copies agree.
+#[rustfmt::skip]
+const PERFORMANCE: [(u8, u8, u8); 50] = [
+    (0x00, 0x61, 0xAD), (0x03, 0x40, 0x00), (0x05, 0x41, 0xB3), (0x05, 0x43, 0xF1), (0x05, 0x45, 0x14),
+    (0x05, 0x5B, 0x32), (0x05, 0x5F, 0x34), (0x05, 0x7B, 0x08), (0x06, 0x44, 0x1B), (0x06, 0x40, 0xBF),
+    (0x06, 0x4E, 0x3F), (0x08, 0x65, 0x20), (0x08, 0x6A, 0x18), (0x09, 0x4F, 0xAF), (0x09, 0x5F, 0x40),
+    (0x09, 0x48, 0x80), (0x09, 0x49, 0x80), (0x09, 0x57, 0x77), (0x09, 0x60, 0x78), (0x09, 0x61, 0x78),
+    (0x09, 0x62, 0x08), (0x0A, 0x45, 0x60), (0x00, 0x4D, 0x11), (0x00, 0x55, 0x80), (0x00, 0x74, 0x1F),
+    (0x00, 0x75, 0x1F), (0x00, 0x4A, 0x78), (0x00, 0x4B, 0x78), (0x00, 0x44, 0x08), (0x00, 0x45, 0x50),
+    (0x00, 0x64, 0xFF), (0x00, 0x65, 0x1F), (0x14, 0x66, 0x08), (0x07, 0x41, 0x0D), (0x07, 0x43, 0x14),
+    (0x07, 0x4B, 0x0E), (0x07, 0x45, 0x0F), (0x07, 0x44, 0x42), (0x07, 0x4C, 0x80), (0x10, 0x5B, 0x02),
+    (0x07, 0x70, 0x00), (0x07, 0x40, 0x40), (0x06, 0x62, 0xF0), (0x06, 0x63, 0x00), (0x0D, 0x48, 0xC0),
+    (0x0D, 0x6F, 0xD5), (0x00, 0x5B, 0xA0), (0x00, 0x4E, 0xA8), (0x00, 0x5A, 0x50), (0x00, 0x40, 0x80),
+];
+/// The specimen's own values at 0x70 and 0x71 of bank 0, from which the list makes settings where 0x73 reads zero.
+const FACTORY: [u8; 2] = [0x1A, 0x60];
+
+/// The emulator. The same seed is the same specimen as [`FlowModel`](crate::sensors::FlowModel).
+///
+/// ```
+/// use embedded_hal::spi::{Operation, SpiDevice};
+/// use stampfly_sim::chips::{Pmw3901, SpiBus};
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Micros;
+///
+/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let clock = simulation.clock.clone();
+/// let chip = Pmw3901::new(&simulation.world, &clock, 1);
+/// let (mut port, _) = SpiBus::new(&clock, 1).attach(2_000_000, chip);
+/// clock.advance_to(Micros::from_millis(45));
+/// let mut id = [0];
+/// port.transaction(&mut [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)])?;
+/// assert_eq!(id, [0x49]);
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
+#[derive(Debug)]
+pub struct Pmw3901 {
+    physics: FlowPhysics,
+    id: u8,
+    ready: Micros,
+    banks: Vec<[u8; 128]>,
+    bank: u8,
+    /// Counts as the last latch left them.
+    latched: [i16; 2],
+    moved: bool,
+    /// The next command may begin from here on.
+    idle_until: Micros,
+    /// The address byte of this transfer, when it came, and whether it came late enough.
+    command: u8,
+    commanded: Micros,
+    accepts: bool,
+    /// What a running burst sends.
+    burst: [u8; 12],
+}
+
+impl Pmw3901 {
+    /// A chip that has just been powered.
+    #[must_use]
+    pub fn new(world: &World, clock: &Clock, seed: u64) -> Self {
+        let now = clock.now();
+        let mut chip = Self {
+            physics: FlowPhysics::new(world, now, seed).0,
+            id: 0x49,
+            ready: now,
+            banks: Vec::new(),
+            bank: 0,
+            latched: [0; 2],
+            moved: false,
+            idle_until: now,
+            command: 0,
+            commanded: now,
+            accepts: false,
+            burst: [0; 12],
+        };
+        chip.reset(now);
+        chip
+    }
+
+    /// Has the performance list been written?
+    fn is_tuned(&self) -> bool {
+        PERFORMANCE
+            .iter()
+            .all(|(bank, register, value)| self.banks[usize::from(*bank)][usize::from(*register)] == *value)
+    }
+
+    fn quality(&mut self, now: Micros) -> u8 {
+        let quality = self.physics.quality(now);
+        if self.is_tuned() { quality } else { 0 }
+    }
+
+    fn latch(&mut self, now: Micros) {
+        let counts = self.physics.read(now);
+        // Flow along body x is −y of the chip as it is soldered, along body y it is x.
+        self.latched = if self.is_tuned() { [counts[1] as i16, -counts[0] as i16] } else { [0; 2] };
+        self.moved = self.latched != [0; 2];
+    }
+
+    /// The registers that are not memory, in bank 0.
+    fn measure(&mut self, register: u16, now: Micros) -> Option<u8> {
+        let [x, y] = self.latched.map(i16::to_le_bytes);
+        Some(match register {
+            0x00 => self.id,
+            0x5F => !self.id,
+            MOTION => {
+                self.latch(now);
+                u8::from(self.moved) << 7
+            }
+            0x03 => x[0],
+            0x04 => x[1],
+            0x05 => y[0],
+            0x06 => y[1],
+            0x07 => self.quality(now),
+            0x08..=0x0A => self.quality(now) / 2 + 20 * (register as u8 - 0x08),
+            0x0B => 0x80,
+            0x0C => {
+                if self.quality(now) < DARK {
+                    0x1F
+                } else {
+                    0x03
+                }
+            }
+            0x15 => 0xBF,
+            0x67 => 0x80,
+            0x70 | 0x71 => FACTORY[usize::from(register - 0x70)],
+            0x73 => 0,
+            _ => return None,
+        })
+    }
+
+    fn fill_burst(&mut self, now: Micros) {
+        self.latch(now);
+        let quality = self.quality(now);
+        let [[x_low, x_high], [y_low, y_high]] = self.latched.map(i16::to_le_bytes);
+        let shutter = if quality < DARK { 0x1F } else { 0x03 };
+        let moved = u8::from(self.moved) << 7;
+        let light = quality / 2;
+        self.burst = [moved, 0xBF, x_low, x_high, y_low, y_high, quality, light, light + 20, light + 40, shutter, 0x80];
+    }
+}
+
+impl Chip for Pmw3901 {
+    fn read(&mut self, register: u16, now: Micros) -> u16 {
+        if now < self.ready {
+            return 0;
+        }
+        let register = register & 0x7F;
+        // The check of the list works on bank 0x0E, the values of the specimen on bank 0 and 0x0E alike.
+        let measured = if matches!(self.bank, 0x00 | 0x0E) { self.measure(register, now) } else { None };
+        let stored = self.banks[usize::from(self.bank)][usize::from(register)];
+        let checked = self.bank == 0x0E && register == 0x47 && self.banks[0x0E][0x43] == 0x10;
+        u16::from(if checked { 0x08 } else { measured.unwrap_or(stored) })
+    }
+
+    fn write(&mut self, register: u16, value: u16, now: Micros) {
+        if now < self.ready {
+            return;
+        }
+        let (register, value) = (register & 0x7F, value as u8);
+        match register {
+            BANK => self.bank = value & 0x1F,
+            RESET if value == 0x5A && self.bank == 0 => {
+                self.reset(now);
+                self.ready = now + RESET_TIME;
+            }
+            _ => self.banks[usize::from(self.bank)][usize::from(register)] = value,
+        }
+    }
+
+    fn reset(&mut self, now: Micros) {
+        self.ready = now + START_UP;
+        // Memory that was never written must not look like a setting: no value of the list is 0xEE.
+        self.banks = vec![[0xEE; 128]; 32];
+        self.bank = 0;
+        self.latched = [0; 2];
+        self.moved = false;
+        self.physics.read(now);
+    }
+
+    fn set_id(&mut self, id: u16) {
+        self.id = id as u8;
+    }
+}
+
+impl SpiChip for Pmw3901 {
+    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
+        if index == 0 {
+            self.command = byte;
+            self.commanded = now;
+            self.accepts = now >= self.idle_until;
+            return 0;
+        }
+        if !self.accepts {
+            return 0;
+        }
+        if self.command & 0x80 != 0 {
+            if index == 1 {
+                self.write(u16::from(self.command), u16::from(byte), now);
+            }
+            return 0;
+        }
+        if now < self.commanded + READ_PAUSE || now < self.ready {
+            return 0;
+        }
+        if self.command != BURST {
+            return if index == 1 { self.read(u16::from(self.command), now) as u8 } else { 0 };
+        }
+        if index == 1 {
+            self.fill_burst(now);
+        }
+        self.burst.get(index - 1).copied().unwrap_or(0)
+    }
+
+    fn release(&mut self, now: Micros) {
+        if self.accepts {
+            self.idle_until = now + if self.command & 0x80 != 0 { AFTER_WRITE } else { AFTER_READ };
+        }
+    }
+}

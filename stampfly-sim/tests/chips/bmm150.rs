@@ -1,0 +1,136 @@
+//! BMM150 after Bosch BST-BMM150-DS001, with the compensation of Bosch's Sensor API.
+
+use crate::{standing, wait};
+use embedded_hal::i2c::I2c;
+use stampfly_sim::Simulation;
+use stampfly_sim::chips::{Bmm150, I2cBus};
+
+const ADDRESS: u8 = 0x10;
+
+/// A chip that has been powered but not woken.
+fn chip() -> (Simulation, I2cBus) {
+    let simulation = standing();
+    let bus = I2cBus::new(&simulation.clock, 1);
+    bus.attach(ADDRESS, Bmm150::new(&simulation.world, &simulation.clock, 1));
+    (simulation, bus)
+}
+
+fn awake() -> (Simulation, I2cBus) {
+    let (simulation, mut bus) = chip();
+    write(&mut bus, 0x4B, 1);
+    wait(&simulation, 3_000);
+    (simulation, bus)
+}
+
+fn read<const N: usize>(bus: &mut I2cBus, register: u8) -> [u8; N] {
+    let mut bytes = [0; N];
+    bus.write_read(ADDRESS, &[register], &mut bytes).unwrap();
+    bytes
+}
+
+fn write(bus: &mut I2cBus, register: u8, value: u8) {
+    bus.write(ADDRESS, &[register, value]).unwrap();
+}
+
+/// Field in µT, chip axes.
+fn compensate(trim: &[u8; 21], data: &[u8; 8]) -> [f64; 3] {
+    let short = |register: usize| f64::from(trim[register - 0x5D] as i8);
+    let signed = |register: usize| f64::from(i16::from_le_bytes([trim[register - 0x5D], trim[register - 0x5C]]));
+    let unsigned = |register: usize| f64::from(u16::from_le_bytes([trim[register - 0x5D], trim[register - 0x5C]]));
+    let word = |place: usize| i16::from_le_bytes([data[place], data[place + 1]]);
+    let hall = f64::from(word(6) as u16 >> 2);
+    let xyz1 = unsigned(0x6C);
+    let turn = xyz1 * 16_384.0 / hall - 16_384.0;
+    let gain = short(0x70) * turn * turn / 268_435_456.0 + turn * f64::from(trim[0x71 - 0x5D]) / 16_384.0;
+    let flat = |raw: i16, one: f64, two: f64| {
+        (f64::from(raw >> 3) * ((gain + 256.0) * (two + 160.0)) / 8_192.0 + one * 8.0) / 16.0
+    };
+    let upright = (f64::from(word(4) >> 1) - signed(0x62)) * 131_072.0 - signed(0x6E) * (hall - xyz1);
+    [
+        flat(word(0), short(0x5D), short(0x64)),
+        flat(word(2), short(0x5E), short(0x65)),
+        upright / ((signed(0x68) + unsigned(0x6A) * hall / 32_768.0) * 4.0) / 16.0,
+    ]
+}
+
+#[test]
+fn in_suspend_only_the_power_register_answers() {
+    let (simulation, mut bus) = chip();
+    wait(&simulation, 10_000);
+    assert_eq!((read(&mut bus, 0x40), read(&mut bus, 0x4B)), ([0], [0]));
+    write(&mut bus, 0x4B, 1);
+    assert_eq!((read(&mut bus, 0x40), read(&mut bus, 0x4B)), ([0], [1]), "waking");
+    wait(&simulation, 3_000);
+    assert_eq!((read(&mut bus, 0x40), read(&mut bus, 0x4C)), ([0x32], [0x06]), "asleep");
+    write(&mut bus, 0x4B, 0);
+    assert_eq!(read(&mut bus, 0x40), [0]);
+}
+
+#[test]
+fn a_forced_conversion_takes_its_time_and_ends_in_sleep() {
+    let (simulation, mut bus) = awake();
+    write(&mut bus, 0x51, 4);
+    write(&mut bus, 0x52, 14);
+    write(&mut bus, 0x4C, 0x02);
+    // 145 µs · 9 + 500 µs · 15 + 980 µs = 9.8 ms, within two per cent.
+    wait(&simulation, 9_000);
+    assert_eq!(read(&mut bus, 0x48).map(|byte| byte & 1), [0]);
+    wait(&simulation, 1_000);
+    let data: [u8; 8] = read(&mut bus, 0x42);
+    assert_eq!((data[6] & 1, read(&mut bus, 0x4C)), (1, [0x06]));
+    assert_eq!(read(&mut bus, 0x48).map(|byte| byte & 1), [0], "taken");
+    wait(&simulation, 100_000);
+    let again: [u8; 8] = read(&mut bus, 0x42);
+    assert_eq!(again[..6], data[..6]);
+}
+
+#[test]
+fn normal_mode_measures_the_field_at_its_rate() {
+    let (simulation, mut bus) = awake();
+    let trim = read(&mut bus, 0x5D);
+    write(&mut bus, 0x51, 4);
+    write(&mut bus, 0x52, 14);
+    write(&mut bus, 0x4C, 6 << 3);
+    let (mut fresh, mut sum) = (0, [0.0; 3]);
+    for _ in 0..4_000 {
+        wait(&simulation, 1_722);
+        let data: [u8; 8] = read(&mut bus, 0x42);
+        if data[6] & 1 != 0 {
+            fresh += 1;
+            sum.iter_mut().zip(compensate(&trim, &data)).for_each(|(sum, value)| *sum += value);
+        }
+    }
+    // 8 s at 25 Hz by the chip's clock.
+    assert!((195..=205).contains(&fresh), "{fresh}");
+    let mean = sum.map(|sum| sum / f64::from(fresh));
+    // What the model of the same specimen says, which is a body of (−y, x, z).
+    let hard_iron = simulation.sensors.mag.hard_iron();
+    let expected = [-4.3 + hard_iron.y, -30.8 - hard_iron.x, 36.4 + hard_iron.z].map(f64::from);
+    for (axis, (mean, expected)) in mean.iter().zip(expected).enumerate() {
+        assert!((mean - expected).abs() < 1.0, "axis {axis}: {mean} {expected}");
+    }
+}
+
+#[test]
+fn too_many_repetitions_slow_the_rate_down() {
+    let (simulation, mut bus) = awake();
+    write(&mut bus, 0x52, 255);
+    write(&mut bus, 0x4C, 6 << 3);
+    let mut fresh = 0;
+    for _ in 0..1_000 {
+        wait(&simulation, 1_000);
+        fresh += u32::from(read::<8>(&mut bus, 0x42)[6] & 1);
+    }
+    assert!((8..=10).contains(&fresh), "129 ms each: {fresh}");
+}
+
+#[test]
+fn a_soft_reset_wants_both_bits_and_ends_in_sleep() {
+    let (simulation, mut bus) = awake();
+    write(&mut bus, 0x51, 4);
+    write(&mut bus, 0x4B, 0x81);
+    assert_eq!(read(&mut bus, 0x51), [4], "one bit is not enough");
+    write(&mut bus, 0x4B, 0x83);
+    wait(&simulation, 3_000);
+    assert_eq!((read(&mut bus, 0x51), read(&mut bus, 0x4B), read(&mut bus, 0x40)), ([0], [1], [0x32]));
+}
