@@ -3,11 +3,13 @@
 //! A driver that talks to these buses exchanges the bytes it would exchange with the board: the chips count
 //! conversions, want their start-up sequences and waiting times, and answer a wrong order as the hardware would.
 //! What they measure comes from the same physics as the models in [`sensors`](crate::sensors): the same seed is the
-//! same specimen in both. Use this to test drivers; to test everything behind the drivers use the models, which cost
-//! a hundredth of the time.
+//! same specimen in both. Use this to test drivers; to test everything behind the drivers use the models, which skip
+//! the bytes and the bus.
 //!
-//! The emulators are written from the makers' data sheets, not from a driver, so that a misreading is not made twice.
-//! Every register table names its section. What no public source confirms is marked *unverified*.
+//! The emulators follow the makers' data sheets, as far as those are publicly quoted, and none of this project's
+//! drivers, so that a misreading is not made twice. Every register table names its section. What no public source
+//! confirms is marked *unverified*; so are all section and table numbers except BMP280 3.11 and 8, and INA3221 8.4
+//! and 8.6, which have been compared with the sheets.
 //!
 //! | emulator | bus | address or clock | data sheet |
 //! |---|---|---|---|

@@ -194,3 +194,58 @@ fn spi_transfers_cost_their_bits_and_delays() {
     attached.set_faults(Faults { refusals: 1.0, ..Default::default() });
     assert_eq!(embedded_hal::spi::SpiDevice::read(&mut fast, &mut read), Err(BusError::Overrun));
 }
+
+#[test]
+fn a_fault_of_one_chip_leaves_its_neighbours_alone() {
+    use stampfly_sim::chips::{Bmm150, Ina3221};
+    let simulation = standing();
+    let clock = simulation.clock.clone();
+    let mut bus = I2cBus::new(&clock, 1);
+    let barometer = bus.attach(ADDRESS, Bmp280::new(&simulation.world, &clock, 1));
+    let compass = bus.attach(0x10, Bmm150::new(&simulation.world, &clock, 1));
+    bus.attach(0x40, Ina3221::new(&simulation.world, &clock, 1));
+    barometer.set_faults(Faults { dead: true, ..Default::default() });
+    compass.set_faults(Faults { refusals: 1.0, ..Default::default() });
+    let mut word = [0; 2];
+    for _ in 0..100 {
+        assert_eq!(id(&mut bus), Err(NACK));
+        assert_eq!(embedded_hal::i2c::I2c::write(&mut bus, 0x10, &[0x4B, 1]), Err(NACK));
+        embedded_hal::i2c::I2c::write_read(&mut bus, 0x40, &[0xFF], &mut word).unwrap();
+        assert_eq!(word, [0x32, 0x20]);
+    }
+    compass.set_faults(Faults::default());
+    assert_eq!(embedded_hal::i2c::I2c::write(&mut bus, 0x10, &[0x4B, 1]), Ok(()));
+}
+
+#[test]
+fn two_chips_share_the_spi_wires_one_after_the_other() {
+    use stampfly_sim::chips::{Bmi270, Pmw3901};
+    let simulation = standing();
+    let clock = simulation.clock.clone();
+    let bus = SpiBus::new(&clock, 1);
+    let (imu, _) = bus.attach(8_000_000, Bmi270::new(&simulation.world, &clock, 1, 1.0, &[1]));
+    let (flow, _) = bus.attach(2_000_000, Pmw3901::new(&simulation.world, &clock, 1));
+    clock.advance_to(Micros::from_millis(50));
+    let ends = RefCell::new(Vec::new());
+    let mut tasks = Tasks::new(clock.clone());
+    let (watch, log) = (&clock, &ends);
+    tasks.spawn(async move {
+        use embedded_hal::spi::Operation;
+        let (mut flow, mut id) = (flow, [0]);
+        let mut operations = [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)];
+        embedded_hal_async::spi::SpiDevice::transaction(&mut flow, &mut operations).await.unwrap();
+        log.borrow_mut().push((watch.now().0 - 50_000, id[0]));
+    });
+    tasks.spawn(async move {
+        let mut imu = imu;
+        for _ in 0..2 {
+            let mut bytes = [0x80, 0, 0];
+            embedded_hal_async::spi::SpiDevice::transfer_in_place(&mut imu, &mut bytes).await.unwrap();
+            log.borrow_mut().push((watch.now().0 - 50_000, bytes[2]));
+        }
+    });
+    tasks.run_until(Micros::from_millis(51));
+    drop(tasks);
+    // The slow chip holds the wires for 43 µs; the first answer of the other one is the choice of SPI.
+    assert_eq!(ends.into_inner(), [(43, 0x49), (46, 0xFF), (49, 0x24)]);
+}
