@@ -2,14 +2,18 @@
 //!
 //! Emulators and drivers were written apart, each from the data sheet. What agrees here was understood the same twice.
 
+use stampfly_drivers::chip::AxisMap;
+use stampfly_drivers::chip::bmi270::{self, Bmi270};
+use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
-use stampfly_drivers::{Barometer, PowerMonitor, SensorError, SensorErrorKind};
-use stampfly_sim::chips::{self, Attached, Faults, I2cBus};
+use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
+use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, SensorError, SensorErrorKind};
+use stampfly_sim::chips::{self, Attached, Faults, I2cBus, SpiBus};
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::time::{Clock, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::{Micros, Vec3};
 
 /// A vehicle on the floor in still air, its barometer and its battery monitor on one bus.
 struct Bench {
@@ -97,4 +101,55 @@ fn another_part_is_refused() {
     let mut bench = bench();
     bench.barometer.set_id(0x55);
     assert!(bench.pressure().is_err() && bench.voltage().is_ok());
+}
+
+/// A stand-in for the maker's configuration file, in which no two bursts are equal.
+fn image() -> Vec<u8> {
+    (0..8_192u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()
+}
+
+#[test]
+fn inertial_sensor_and_flow_share_a_bus() {
+    let config = SimulationConfig { wind: WindConfig::CALM, ..Default::default() };
+    let simulation = Simulation::new(&config);
+    let (clock, world) = (simulation.clock.clone(), &simulation.world);
+    let bus = SpiBus::new(&clock, 1);
+    let image = image();
+    let (imu, _) = bus.attach(8_000_000, chips::Bmi270::new(world, &clock, config.seed, 1.0, &image));
+    let (flow, _) = bus.attach(2_000_000, chips::Pmw3901::new(world, &clock, config.seed));
+    clock.advance_to(clock.now() + Micros::from_millis(50));
+    let mut imu = Bmi270::spi(imu, clock.clone(), &image, AxisMap::STAMPFLY_IMU, bmi270::Config::default());
+    let mut flow = Pmw3901::new(flow, clock.clone(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default());
+
+    block_on(&clock, imu.start()).expect("the inertial sensor starts");
+    let mut stamps = Vec::new();
+    for _ in 0..400 {
+        let sample = block_on(&clock, imu.next()).expect("a sample");
+        stamps.push(sample.at);
+        assert!((sample.data.accel.z + 9.81).abs() < 0.6 && sample.data.gyro.norm() < 0.05, "{sample:?}");
+    }
+    let mean = stamps[399].since(stamps[0]).seconds() / 399.0;
+    assert!((mean / 0.0025 - 1.0).abs() < 0.025, "{mean} s between samples");
+    block_on(&clock, flow.start()).expect("the flow sensor starts");
+    for _ in 0..20 {
+        let sample = block_on(&clock, flow.next()).expect("a sample");
+        assert!(sample.data.delta_x.abs() < 0.05, "standing: {sample:?}");
+        block_on(&clock, imu.next()).expect("the neighbour goes on");
+    }
+}
+
+#[test]
+fn the_field_is_the_models() {
+    let config = SimulationConfig { wind: WindConfig::CALM, ..Default::default() };
+    let mut simulation = Simulation::new(&config);
+    let clock = simulation.clock.clone();
+    let bus = I2cBus::new(&clock, 1);
+    bus.attach(Bmm150::ALL_LOW, chips::Bmm150::new(&simulation.world, &clock, config.seed));
+    clock.advance_to(clock.now() + Micros::from_millis(5));
+    let axes = AxisMap::STAMPFLY_MAGNETOMETER;
+    let mut driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock.clone(), axes, bmm150::Config::default());
+    let mean = |fields: Vec<Vec3>| fields.iter().sum::<Vec3>() / fields.len() as f32;
+    let read = mean((0..40).map(|_| block_on(&clock, driver.next()).expect("a field").data.field).collect());
+    let model = mean((0..40).map(|_| block_on(&clock, simulation.sensors.mag.next()).unwrap().data.field).collect());
+    assert!((read - model).norm() < 1.0, "{read:?} µT by the driver, {model:?} by the model");
 }

@@ -23,6 +23,8 @@ use stampfly_types::{GRAVITY, Micros, Vec3};
 const CHUNK: usize = 256;
 /// The chip may be accessed this long after power-on and after leaving power saving (§4 "Start-up").
 const POWER_UP: Micros = Micros(450);
+/// Idle time after a write in normal mode, "Interface" and timing tables of the data sheet.
+const AFTER_WRITE: Micros = Micros(2);
 const SOFT_RESET: Micros = Micros(2_000);
 /// How long the chip may take to start with its configuration: typically 20 ms.
 const START_UP_LIMIT: Micros = Micros::from_millis(150);
@@ -141,11 +143,11 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
         self.running = false;
         self.upload().await?;
         let wanted = codec::sensor_registers(&self.config);
-        self.port.write(register::ACC_CONF, &wanted).await?;
-        self.port.write(register::FIFO_DOWNS, &[codec::FIFO_FILTERED]).await?;
-        self.port.write(register::FIFO_CONFIG_0, &codec::FIFO_WITH_HEADERS).await?;
-        self.port.write(register::PWR_CTRL, &[codec::ALL_SENSORS]).await?;
-        self.port.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
+        self.write(register::ACC_CONF, &wanted).await?;
+        self.write(register::FIFO_DOWNS, &[codec::FIFO_FILTERED]).await?;
+        self.write(register::FIFO_CONFIG_0, &codec::FIFO_WITH_HEADERS).await?;
+        self.write(register::PWR_CTRL, &[codec::ALL_SENSORS]).await?;
+        self.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
         self.port.wait(GYRO_START).await;
         let kept: [u8; 4] = self.port.read(register::ACC_CONF).await?;
         let status = self.status().await?;
@@ -170,19 +172,19 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
     pub async fn self_test(&mut self) -> Result<(), ChipError<R::Error>> {
         self.running = false;
         self.upload().await?;
-        self.port.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
-        self.port.write(register::PWR_CTRL, &[codec::ACCELEROMETER_ONLY]).await?;
+        self.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
+        self.write(register::PWR_CTRL, &[codec::ACCELEROMETER_ONLY]).await?;
         // 1600 Hz, normal bandwidth, performance filter, ±16 g.
-        self.port.write(register::ACC_CONF, &[0xAC, AccelRange::G16.code()]).await?;
+        self.write(register::ACC_CONF, &[0xAC, AccelRange::G16.code()]).await?;
         self.port.wait(SOFT_RESET).await;
         // High amplitude and enable; bit 2 is the direction.
         let mut deflections = [[0; 3]; 2];
         for (command, deflection) in [0x0D, 0x09].into_iter().zip(&mut deflections) {
-            self.port.write(register::ACC_SELF_TEST, &[command]).await?;
+            self.write(register::ACC_SELF_TEST, &[command]).await?;
             self.port.wait(SELF_TEST_SETTLE).await;
             *deflection = codec::decode_acceleration(&self.port.read(register::DATA_8).await?);
         }
-        self.port.write(register::ACC_SELF_TEST, &[0]).await?;
+        self.write(register::ACC_SELF_TEST, &[0]).await?;
         let [positive, negative] = deflections;
         if codec::passes_self_test(positive, negative) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
@@ -195,7 +197,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
         // Until the first rising edge of its chip select the chip listens as on I2C: what this read gives is noise.
         let _: [u8; 1] = self.port.read(register::CHIP_ID).await?;
         self.port.wait(POWER_UP).await;
-        self.port.write(register::CMD, &[codec::SOFT_RESET]).await?;
+        self.write(register::CMD, &[codec::SOFT_RESET]).await?;
         self.port.wait(SOFT_RESET).await;
         let _: [u8; 1] = self.port.read(register::CHIP_ID).await?;
         self.port.wait(POWER_UP).await;
@@ -203,14 +205,14 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
         if found != codec::CHIP_ID_VALUE {
             return Err(ChipError::Identification { found: u16::from(found) });
         }
-        self.port.write(register::PWR_CONF, &[0]).await?;
+        self.write(register::PWR_CONF, &[0]).await?;
         self.port.wait(POWER_UP).await;
-        self.port.write(register::INIT_CTRL, &[0]).await?;
+        self.write(register::INIT_CTRL, &[0]).await?;
         for (number, chunk) in self.blob.chunks(CHUNK).enumerate() {
-            self.port.write(register::INIT_ADDR_0, &codec::init_address(number * CHUNK)).await?;
-            self.port.write(register::INIT_DATA, chunk).await?;
+            self.write(register::INIT_ADDR_0, &codec::init_address(number * CHUNK)).await?;
+            self.write(register::INIT_DATA, chunk).await?;
         }
-        self.port.write(register::INIT_CTRL, &[1]).await?;
+        self.write(register::INIT_CTRL, &[1]).await?;
         let deadline = self.port.now() + START_UP_LIMIT;
         loop {
             let [status]: [u8; 1] = self.port.read(register::INTERNAL_STATUS).await?;
@@ -223,6 +225,13 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
         }
     }
 
+    /// Writes, and leaves the chip the time it needs until the next access.
+    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), ChipError<R::Error>> {
+        self.port.write(register, bytes).await?;
+        self.port.wait(AFTER_WRITE).await;
+        Ok(())
+    }
+
     async fn status(&mut self) -> Result<Status, ChipError<R::Error>> {
         Ok(Status::decode(&self.port.read(register::SENSORTIME_0).await?))
     }
@@ -230,7 +239,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
     /// Empties the FIFO and forgets what the filter remembers.
     async fn restart_fifo(&mut self) -> Result<(), ChipError<R::Error>> {
         self.decimator = Decimator::default();
-        self.port.write(register::CMD, &[codec::FIFO_FLUSH]).await?;
+        self.write(register::CMD, &[codec::FIFO_FLUSH]).await?;
         self.reading = false;
         self.due = self.port.now() + self.chip_period(4);
         Ok(())
