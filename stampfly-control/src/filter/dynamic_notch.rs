@@ -15,8 +15,9 @@ use stampfly_types::math;
 
 /// Samples between two looks at the spectrum.
 const LOOK: u8 = 8;
-/// A tone must have this many times the mean power of the band's resonators to be one.
-const PROMINENCE: f32 = 3.0;
+/// A tone must have this many times the mean power of the band's resonators to be one: a tone between two of sixteen has
+/// five times, the strongest of sixteen in noise seldom more than four.
+const PROMINENCE: f32 = 4.5;
 /// Time constants of the frequency and of the fading, in looks.
 const FOLLOW: f32 = 0.25;
 const FADE: f32 = 0.1;
@@ -42,7 +43,7 @@ impl Resonator {
     }
 }
 
-/// A notch that follows the strongest tone of a band, seen by `BINS` resonators, and is not there without one.
+/// A notch that follows the strongest tone of a band, seen by `BINS` resonators, and seldom there in noise alone.
 ///
 /// For vibration that moves with the throttle. It costs four multiplications a resonator and sample; a fixed
 /// [`Biquad`] is cheaper where the frequency is known.
@@ -207,18 +208,18 @@ mod tests {
         }
 
         #[test]
-        fn without_a_tone_nothing_is_touched(seed in any::<u64>()) {
+        fn in_noise_the_notch_is_seldom_there(seed in any::<u64>()) {
             let (mut notch, mut bits, mut touched) = (ours(), seed | 1, 0.0f32);
             for _ in 0..4000 {
                 bits ^= bits << 13;
                 bits ^= bits >> 7;
                 bits ^= bits << 17;
                 let noise = (bits >> 40) as f32 / 8_388_608.0 - 1.0;
-                touched = touched.max(notch.share);
+                touched += notch.share / 4000.0;
                 let out = notch.step(noise);
                 prop_assert!(out.is_finite());
             }
-            prop_assert!(touched < 0.95, "{touched}");
+            prop_assert!(touched < 0.3, "{touched}");
         }
 
         #[test]
