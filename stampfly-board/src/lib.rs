@@ -15,6 +15,7 @@ extern crate std;
 mod activation_table;
 mod config;
 mod flight_loop;
+pub mod golden;
 pub mod messages;
 pub mod parameters;
 pub mod runnables;

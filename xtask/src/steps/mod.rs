@@ -10,6 +10,7 @@ pub mod docs;
 pub mod examples;
 pub mod figures;
 pub mod fmt;
+pub mod golden;
 pub mod loom;
 pub mod no_std;
 pub mod package;

@@ -9,6 +9,7 @@ mod arguments;
 mod campaign;
 mod estimate;
 mod fly;
+mod golden;
 mod replay;
 mod terminal;
 mod topics;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         Command::Topics(options) => topics::run(&options),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
+        Command::Golden(options) => golden::run(&options),
     };
     match result {
         Ok(code) => code,
