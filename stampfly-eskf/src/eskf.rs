@@ -328,10 +328,9 @@ impl Eskf {
         self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
     }
 
-    /// What gravity and the ground say, where they are asked.
+    /// What gravity says where it is asked, and what is assumed where nobody can be.
     fn assume(&mut self, accel: Vec3, dt: f32) {
-        if let Some(anchor) = self.anchor {
-            self.absorb_standing(anchor);
+        if self.anchor.is_some() {
             self.absorb_gravity(accel, &Vec3::zeros(), self.config.still_gravity_sigma);
         } else if !self.holds_velocity() {
             if self.config.gravity_use == GravityUse::WhenUnaided {

@@ -1,10 +1,10 @@
 //! Records the golden flight: a hop in simulation, as what came from outside and what the motors were told.
 //!
 //! Two things are done to the flight before it is written. It ends when the motors have stood still for a moment. And
-//! twice a second the newest sample of every other sensor is held back until an inertial sample comes, so
-//! that all of them are new in one activation: by chance that would hardly happen, and it is what a step costs most.
-//! The sensors' own stamps stay, so the estimator sees late samples, as it would of a busy bus. What the motors are to
-//! be told is what they are told when this record is played here.
+//! twice a second, where all other sensors' samples come closest together, they are held back by those few milliseconds
+//! until they are new in one activation: by chance that happens once in minutes, and it is what a step costs most. Their
+//! stamps stay, so the estimator sees late samples, as it does of a busy bus. What the motors are to be told is what they
+//! are told when this record is played here.
 
 use crate::mission::Mission;
 use crate::recorder::Recorder;
@@ -14,6 +14,7 @@ use stampfly_board::golden::{GoldenError, MOTORS, Report, Witness, Writer, play}
 use stampfly_board::{Observer, wiring};
 use stampfly_bus::{Activation, Band};
 use stampfly_types::{Message, Micros, messages::MotorOutput};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// The shortest flight that has everything: calibration, standing, arming, take-off, hovering, landing.
@@ -134,32 +135,39 @@ fn shorten(inputs: &mut Vec<Event>, end: Micros) {
     }
 }
 
-/// Now and then, holds back the newest sample of every other sensor until an inertial sample comes.
+/// Now and then, when the samples of all other sensors are youngest, holds them back until the next inertial sample comes.
 fn gather(inputs: &mut Vec<Event>, start: Micros) {
-    let mut due = start + GATHERING;
     let mut newest = [None; GATHERED.len()];
-    let mut place = 0;
-    while let Some(input) = inputs.get(place) {
+    // Of each stretch of time, the inertial sample that the others are closest to: age of the oldest, and places.
+    let mut closest: BTreeMap<u64, (Micros, usize, [usize; GATHERED.len()])> = BTreeMap::new();
+    for (place, input) in inputs.iter().enumerate() {
         match input {
-            Event::Sample { topic: wiring::Id::sensor_imu, at, .. } if *at >= due => {
-                due += GATHERING;
-                let mut held: Vec<usize> = newest.iter_mut().filter_map(Option::take).collect();
-                held.sort_unstable();
-                // From the back, so that the places of the others stay.
-                let samples: Vec<Event> = held.iter().rev().map(|place| inputs.remove(*place)).collect();
-                place -= held.len();
-                inputs.splice(place..place, samples);
-                place += held.len();
+            Event::Sample { topic: wiring::Id::sensor_imu, at, .. } => {
+                let [Some(tof), Some(flow), Some(mag), Some(baro), Some(power)] = newest else { continue };
+                // The battery's slow monitor would decide alone; nobody asks it for its age.
+                let age = [tof, flow, mag, baro].map(|(seen, _): (Micros, _)| at.since(seen));
+                let oldest = age.into_iter().max().unwrap_or_default();
+                let stretch = at.since(start).0 / GATHERING.0;
+                let best = closest.get(&stretch).is_some_and(|(best, ..)| *best <= oldest);
+                if !best {
+                    closest.insert(stretch, (oldest, place, [tof, flow, mag, baro, power].map(|(_, place)| place)));
+                }
             }
-            Event::Sample { topic, .. } => {
+            Event::Sample { topic, at, .. } => {
                 let sensor = GATHERED.iter().position(|id| id == topic);
                 if let Some(newest) = sensor.and_then(|sensor| newest.get_mut(sensor)) {
-                    *newest = Some(place);
+                    *newest = Some((*at, place));
                 }
             }
             Event::Turn(_) => {}
         }
-        place += 1;
+    }
+    // From the back, so that the places in front stay.
+    for (_, place, mut held) in closest.into_values().rev() {
+        held.sort_unstable();
+        let samples: Vec<Event> = held.iter().rev().map(|place| inputs.remove(*place)).collect();
+        let place = place - held.len();
+        inputs.splice(place..place, samples);
     }
 }
 
