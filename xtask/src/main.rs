@@ -86,6 +86,12 @@ const STEPS: &[Step] = &[
         run: steps::golden::run,
     },
     Step {
+        name: "qemu",
+        about: "the golden flight on emulated cores: the same bits, within the budgets? (--fix: write the table)",
+        in_ci: true,
+        run: steps::qemu::run,
+    },
+    Step {
         name: "docs",
         about: "do the documents' links and tables agree with the sources? (--fix: make them)",
         in_ci: true,

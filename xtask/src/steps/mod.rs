@@ -15,5 +15,6 @@ pub mod loom;
 pub mod no_std;
 pub mod package;
 pub mod peers;
+pub mod qemu;
 pub mod test;
 pub mod ulog;
