@@ -18,6 +18,7 @@ mod flight_loop;
 pub mod messages;
 pub mod parameters;
 pub mod runnables;
+pub mod tasks;
 mod topic_table;
 pub mod vehicle;
 

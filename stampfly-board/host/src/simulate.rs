@@ -188,15 +188,16 @@ impl Watch {
     }
 }
 
-/// Publishes a sensor's samples for as long as it delivers them.
+/// Publishes a sensor's samples for as long as the vehicle is on.
 macro_rules! pump {
-    ($sensor:expr, $publisher:expr) => {{
+    ($sensor:expr, $publisher:expr, $clock:expr, $health:expr) => {{
         let (mut sensor, mut publisher) = ($sensor, $publisher);
+        let (clock, health): (_, &Health) = ($clock.clone(), $health);
         async move {
-            loop {
-                let Ok::<Sample<_>, Infallible>(sample) = sensor.next().await;
-                publisher.publish(sample.at, &sample.data);
-            }
+            let publish = |at, data: &_| {
+                publisher.publish(at, data);
+            };
+            match pump(async || sensor.next().await, publish, clock, RETRY, health).await {}
         }
     }};
 }
