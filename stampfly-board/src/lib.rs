@@ -14,6 +14,7 @@ extern crate std;
 
 mod activation_table;
 mod config;
+pub mod devices;
 mod flight_loop;
 pub mod messages;
 pub mod parameters;

@@ -29,6 +29,7 @@
 mod bmi270;
 mod bmm150;
 mod bmp280;
+mod board;
 mod fault;
 mod i2c;
 mod ina3221;
@@ -39,6 +40,7 @@ mod vl53l3cx;
 pub use bmi270::Bmi270;
 pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
+pub use board::{AttachedChips, Board, stand_in_image};
 pub use fault::{Attached, Faults};
 pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
