@@ -13,6 +13,7 @@
 //! |---|---|
 //! | [`chip`] | drivers for particular chips, on any `embedded-hal-async` bus |
 //! | [`blocking`] | the same drivers on a blocking bus |
+//! | [`recover_i2c`] | frees a bus whose data line is held |
 //! | [`Decimator`] | from 1600 to 400 samples per second without folding |
 //!
 //! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
@@ -38,6 +39,7 @@ pub mod chip;
 mod decimator;
 pub mod error;
 pub mod link;
+mod recovery;
 pub mod sensor;
 pub mod time;
 
@@ -45,5 +47,6 @@ pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};
 pub use decimator::Decimator;
 pub use error::{SensorError, SensorErrorKind};
 pub use link::{Button, Command, CommandLink, PinButton};
+pub use recovery::{Recovery, RecoveryError, recover_i2c};
 pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};
 pub use time::Timebase;

@@ -27,9 +27,9 @@
 //!
 //! # Recovery of the bus
 //! Drivers share a bus with others, so they do not clock a stuck slave free or reset the peripheral: that is the
-//! bus owner's work (nine clocks on SCL with SDA released, then STOP; I2C specification UM10204 §3.1.16). A driver
-//! reports [`ChipError::Bus`] or [`ChipError::BusTimeout`] for one call and tries again at the next; a board that
-//! sees those from every device of a bus recovers the bus.
+//! bus owner's work, with [`recover_i2c`](crate::recover_i2c). A driver reports [`ChipError::Bus`] or
+//! [`ChipError::BusTimeout`] for one call and tries again at the next; a board that sees those from every device of a
+//! bus recovers the bus.
 
 mod axis;
 pub mod bmi270;
