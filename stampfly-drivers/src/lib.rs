@@ -13,6 +13,7 @@
 //! |---|---|
 //! | [`chip`] | drivers for particular chips, on any `embedded-hal-async` bus |
 //! | [`blocking`] | the same drivers on a blocking bus |
+//! | [`slot`] | two devices on one SPI bus without a lock |
 //! | [`recover_i2c`] | frees a bus whose data line is held |
 //! | [`Decimator`] | from 1600 to 400 samples per second without folding |
 //!
@@ -41,6 +42,7 @@ pub mod error;
 pub mod link;
 mod recovery;
 pub mod sensor;
+pub mod slot;
 pub mod time;
 
 pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};

@@ -25,7 +25,7 @@ pub struct TransferLimit {
 
 impl TransferLimit {
     /// SPI at 4 MHz or more, whose owner waits for no more than one short transfer of a neighbour
-    /// (`slot`): at most 1 ms for everything the drivers here transfer at once.
+    /// ([`slot`](crate::slot)): at most 1 ms for everything the drivers here transfer at once.
     pub const SPI: Self = Self { byte: Micros(2), margin: Micros(300) };
     /// SPI of a guest on a bus with slots: 1 MHz or more, and it waits for its slot, 5 ms when the lead is silent.
     pub const SPI_GUEST: Self = Self { byte: Micros(8), margin: Micros(9_000) };
