@@ -6,7 +6,7 @@
 //! | [`CommandLink`] | a stream of authenticated commands | radios, mission scripts |
 //! | [`Button`] | a contact | any `embedded_hal::digital::InputPin`, through [`PinButton`] |
 //! | [`MotorOutputs`] | motors | any set of `embedded_hal::pwm::SetDutyCycle`, through [`PwmMotors`] |
-//! | [`Indicator`] | lights and buzzer | boards |
+//! | [`Indicator`] | lights and buzzer | [`Lights`] on any `SmartLedsWrite`, [`Buzzer`] on any [`SetFrequency`] |
 //! | [`Timebase`] | a clock that can also wait | boards, the simulator |
 //!
 //! | module or type | what it is |
@@ -39,15 +39,17 @@ pub mod blocking;
 pub mod chip;
 mod decimator;
 pub mod error;
+pub mod indicator;
 pub mod link;
 mod recovery;
 pub mod sensor;
 pub mod slot;
 pub mod time;
 
-pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};
+pub use actuator::{MotorError, MotorOutputs, PwmMotors};
 pub use decimator::Decimator;
 pub use error::{SensorError, SensorErrorKind};
+pub use indicator::{Buzzer, Indicator, Lights, SetFrequency};
 pub use link::{Button, Command, CommandLink, PinButton};
 pub use recovery::{Recovery, RecoveryError, recover_i2c};
 pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};
