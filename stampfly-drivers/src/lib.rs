@@ -15,6 +15,7 @@
 //! | [`blocking`] | the same drivers on a blocking bus |
 //! | [`slot`] | two devices on one SPI bus without a lock |
 //! | [`recover_i2c`] | frees a bus whose data line is held |
+//! | [`shared`] | one I2C bus for several drivers, freed when a device hangs |
 //! | [`Decimator`] | from 1600 to 400 samples per second without folding |
 //!
 //! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
@@ -43,6 +44,7 @@ pub mod indicator;
 pub mod link;
 mod recovery;
 pub mod sensor;
+pub mod shared;
 pub mod slot;
 pub mod time;
 

@@ -118,6 +118,18 @@ impl<R, T: Timebase> Port<R, T> {
         Ok(bytes)
     }
 
+    /// Reads what will be believed until the next start, such as calibration: twice, and refuses it unless both agree.
+    pub(crate) async fn read_twice<A: Copy, const N: usize>(
+        &mut self,
+        register: A,
+    ) -> Result<[u8; N], ChipError<R::Error>>
+    where
+        R: Registers<A>,
+    {
+        let first = self.read(register).await?;
+        if self.read(register).await? == first { Ok(first) } else { Err(ChipError::Data) }
+    }
+
     pub(crate) async fn write<A>(&mut self, register: A, data: &[u8]) -> Result<(), ChipError<R::Error>>
     where
         R: Registers<A>,

@@ -155,7 +155,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
             return Err(ChipError::Configuration { status: kept[0] });
         }
         self.temperature = status.celsius().unwrap_or(self.temperature);
-        let [factor]: [u8; 1] = self.port.read(register::GYR_CAS).await?;
+        let [factor]: [u8; 1] = self.port.read_twice(register::GYR_CAS).await?;
         self.cross_axis = f32::from(codec::cross_axis_factor(factor)) / 512.0;
         self.restart_fifo().await?;
         self.running = true;

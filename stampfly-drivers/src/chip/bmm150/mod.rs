@@ -126,7 +126,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
             return Err(ChipError::InvalidConfiguration);
         }
         self.wake().await?;
-        let trim = Trim::decode(&self.port.read(register::TRIM).await?).ok_or(ChipError::Data)?;
+        let trim = Trim::decode(&self.port.read_twice(register::TRIM).await?).ok_or(ChipError::Data)?;
         let [xy, z] = self.config.preset.codes();
         self.port.write(register::REPETITIONS_XY, &[xy]).await?;
         self.port.write(register::REPETITIONS_Z, &[z]).await?;

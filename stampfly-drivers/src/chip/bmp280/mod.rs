@@ -116,7 +116,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
             }
             self.port.wait(POLL).await;
         }
-        let bytes = self.port.read(register::CALIBRATION).await?;
+        let bytes = self.port.read_twice(register::CALIBRATION).await?;
         let calibration = Calibration::decode(&bytes).ok_or(ChipError::Data)?;
         self.port.write(register::CONFIG, &[codec::filter_bits(&self.config)]).await?;
         self.calibration = Some(calibration);
