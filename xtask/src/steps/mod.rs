@@ -13,6 +13,7 @@ pub mod fmt;
 pub mod loom;
 pub mod no_std;
 pub mod package;
+pub mod panic_proof;
 pub mod peers;
 pub mod test;
 pub mod ulog;
