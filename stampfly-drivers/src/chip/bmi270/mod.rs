@@ -81,21 +81,24 @@ impl Default for Config {
 /// The chip does not run without a configuration of 8 kB that Bosch publishes with its sensor API
 /// (`bmi270_config_file`); it is not part of this crate.
 ///
-/// ```no_run
+/// ```
+/// # #![allow(dead_code)]
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
+/// # fn main() {
+/// # let frames = [0x8C, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x10].repeat(4);
+/// # let (device, clock) = (Chip::new(&[
+/// #     (0x00, &[0x24]), (0x21, &[0x01]), (0x26, &frames), (0x18, &[3, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 52, 0]),
+/// # ]), Clock::default());
+/// # let configuration_file = [0xC8; 8_192];
+/// use stampfly_drivers::Imu;
+/// use stampfly_drivers::blocking::block_on;
 /// use stampfly_drivers::chip::AxisMap;
 /// use stampfly_drivers::chip::bmi270::{Bmi270, Config};
-/// use stampfly_drivers::{Imu, Timebase};
 ///
-/// async fn watch<S, T>(device: S, clock: T, configuration_file: &[u8])
-/// where
-///     S: embedded_hal_async::spi::SpiDevice,
-///     T: Timebase,
-/// {
-///     let mut imu = Bmi270::spi(device, clock, configuration_file, AxisMap::STAMPFLY_IMU, Config::default());
-///     while let Ok(sample) = imu.next().await {
-///         let _specific_force = sample.data.accel;
-///     }
-/// }
+/// let mut imu = Bmi270::spi(device, clock, &configuration_file, AxisMap::STAMPFLY_IMU, Config::default());
+/// let sample = block_on(imu.next()).expect("a sample");
+/// assert!((sample.data.accel.z + 9.81).abs() < 0.01, "level and still");
+/// # }
 /// ```
 #[derive(Debug)]
 pub struct Bmi270<'b, R, T, P = NoPin> {

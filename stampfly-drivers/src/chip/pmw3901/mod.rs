@@ -64,17 +64,22 @@ impl Default for Config {
 /// A sample costs 110 µs of bus, most of it the pause between address and data. `next` ends within the interval and
 /// 40 ms; when it has to start the chip and every access is slow, within 1.2 s.
 ///
-/// ```no_run
+/// ```
+/// # #![allow(dead_code)]
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
+/// # fn main() {
+/// # let (device, clock) = (Chip::new(&[
+/// #     (0x00, &[0x49]), (0x5F, &[0xB6]), (0x47, &[0x08]), (0x16, &[0x80, 0, 3, 0, 0, 0, 90, 1, 90, 9, 2, 7]),
+/// # ]), Clock::default());
+/// use stampfly_drivers::OpticalFlow;
+/// use stampfly_drivers::blocking::block_on;
 /// use stampfly_drivers::chip::AxisMap;
 /// use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
-/// use stampfly_drivers::{OpticalFlow, Timebase};
 ///
-/// async fn watch(device: impl embedded_hal_async::spi::SpiDevice, clock: impl Timebase) {
-///     let mut flow = Pmw3901::new(device, clock, AxisMap::STAMPFLY_FLOW, Config::default());
-///     while let Ok(sample) = flow.next().await {
-///         let _forward = if sample.data.valid { sample.data.delta_x / sample.data.interval } else { 0.0 };
-///     }
-/// }
+/// let mut flow = Pmw3901::new(device, clock, AxisMap::STAMPFLY_FLOW, Config::default());
+/// let sample = block_on(flow.next()).expect("a picture");
+/// assert!(sample.data.valid && sample.data.delta_y / sample.data.interval > 0.6, "to the right, rad/s");
+/// # }
 /// ```
 #[derive(Debug)]
 pub struct Pmw3901<S, T> {
