@@ -41,7 +41,8 @@ impl Default for Config {
 ///
 /// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip. A field beyond the
 /// range is [`ChipError::Data`]. The chip keeps only its newest sample and does not say since when: a reader that comes
-/// late gets the one after it, and so does one whose call was dropped on the bus.
+/// late gets the one after it, and so does one whose call was dropped on the bus. `next` ends within two periods and
+/// 20 ms, 10 ms later when it sets the chip up.
 ///
 /// ```
 /// # #![allow(dead_code)]

@@ -52,7 +52,8 @@ impl Default for Config {
 ///
 /// `Sample::at` is the middle of the pressure conversion; the filter's delay of a few samples is not taken off. A call
 /// that is dropped loses its conversion, and the next one starts another when that one is over. The chip has no self
-/// test; pressures outside of what it can measure are [`ChipError::Data`].
+/// test; pressures outside of what it can measure are [`ChipError::Data`]. `next` ends within an interval and two
+/// conversions, 30 ms later when it sets the chip up.
 ///
 /// ```
 /// # #![allow(dead_code)]
