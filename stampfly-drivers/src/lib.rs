@@ -13,6 +13,7 @@
 //! |---|---|
 //! | [`chip`] | drivers for particular chips, on any `embedded-hal-async` bus |
 //! | [`blocking`] | the same drivers on a blocking bus |
+//! | [`Interlock`] | no motor turns without a decision to arm |
 //! | [`slot`] | two devices on one SPI bus without a lock |
 //! | [`recover_i2c`] | frees a bus whose data line is held |
 //! | [`shared`] | one I2C bus for several drivers, freed when a device hangs |
@@ -41,6 +42,7 @@ pub mod chip;
 mod decimator;
 pub mod error;
 pub mod indicator;
+mod interlock;
 pub mod link;
 mod recovery;
 pub mod sensor;
@@ -52,6 +54,7 @@ pub use actuator::{MotorError, MotorOutputs, PwmMotors};
 pub use decimator::Decimator;
 pub use error::{SensorError, SensorErrorKind};
 pub use indicator::{Buzzer, Indicator, Lights, SetFrequency};
+pub use interlock::{ArmToken, Interlock};
 pub use link::{Button, Command, CommandLink, PinButton};
 pub use recovery::{Recovery, RecoveryError, recover_i2c};
 pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};

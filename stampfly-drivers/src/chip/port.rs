@@ -146,6 +146,11 @@ impl<R, T: Timebase> Port<R, T> {
         self.wait_until(instant).await;
     }
 
+    /// The outcome of a future, or `None` when it is not there at `instant`.
+    pub(crate) async fn until<F: Future>(&self, instant: Micros, future: F) -> Option<F::Output> {
+        within(&self.clock, instant.since(self.now()), future).await
+    }
+
     pub(crate) async fn wait_until(&mut self, instant: Micros) {
         sleep_until(&mut self.clock, instant).await;
     }
