@@ -1,0 +1,144 @@
+//! The tasks that feed the bus: models of the sensors, or the real drivers over emulated chips.
+
+use stampfly_board::tasks::{Health, pump};
+use stampfly_board::{devices, wiring};
+use stampfly_drivers::{
+    Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, SensorErrorKind,
+};
+use stampfly_sim::chips::{self, stand_in_image};
+use stampfly_sim::sensors::{BaroModel, CameraModel, FlowModel, ImuModel, MagModel, PowerModel, RangeModel};
+use stampfly_sim::time::{Clock, Tasks};
+use stampfly_types::Micros;
+use std::sync::LazyLock;
+
+/// How far the simulation goes down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sensing {
+    /// To samples: models of the sensors stand in for the drivers. Fast.
+    #[default]
+    Models,
+    /// To bytes: the real drivers over emulated chips, on buses that take their time.
+    Chips,
+}
+
+/// What stands in for the inertial sensor's configuration file, at both ends of the bus.
+pub(crate) static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
+
+/// A driver that has failed is asked again after this long.
+const RETRY: Micros = Micros::from_millis(5);
+
+/// How each sensor's driver fares.
+#[derive(Debug, Default)]
+pub struct Healths {
+    /// Inertial sensor.
+    pub imu: Health,
+    /// Range finder, down.
+    pub tof: Health,
+    /// Flow.
+    pub flow: Health,
+    /// Magnetometer.
+    pub mag: Health,
+    /// Barometer.
+    pub baro: Health,
+    /// Battery monitor.
+    pub power: Health,
+    /// Motion capture.
+    pub cameras: Health,
+}
+
+impl Healths {
+    /// Errors so far and the newest of each sensor, by name.
+    pub fn errors(&self) -> impl Iterator<Item = (&'static str, u32, Option<SensorErrorKind>)> {
+        [
+            ("imu", &self.imu),
+            ("tof", &self.tof),
+            ("flow", &self.flow),
+            ("mag", &self.mag),
+            ("baro", &self.baro),
+            ("power", &self.power),
+            ("cameras", &self.cameras),
+        ]
+        .into_iter()
+        .map(|(name, health)| (name, health.errors(), health.last_error()))
+    }
+}
+
+/// The ends that sensors publish to.
+pub(crate) struct Topics<'b> {
+    pub imu: wiring::sensor_imu::Tx<'b>,
+    pub tof: wiring::sensor_tof::Tx<'b>,
+    pub flow: wiring::sensor_flow::Tx<'b>,
+    pub mag: wiring::sensor_mag::Tx<'b>,
+    pub baro: wiring::sensor_baro::Tx<'b>,
+    pub power: wiring::sensor_power::Tx<'b>,
+}
+
+/// The models of the sensors.
+pub(crate) struct Models {
+    pub imu: ImuModel,
+    pub tof: RangeModel,
+    pub flow: FlowModel,
+    pub mag: MagModel,
+    pub baro: BaroModel,
+    pub power: PowerModel,
+}
+
+/// A task that publishes a sensor's samples for as long as the vehicle is on.
+macro_rules! spawn {
+    ($tasks:ident, $clock:ident, $sensor:expr => $publisher:expr, $health:expr) => {{
+        let (mut sensor, mut publisher) = ($sensor, $publisher);
+        let (clock, health): (_, &Health) = ($clock.clone(), &$health);
+        $tasks.spawn(async move {
+            let publish = |at, data: &_| {
+                publisher.publish(at, data);
+            };
+            match pump(async || sensor.next().await, publish, clock, RETRY, health).await {}
+        });
+    }};
+}
+
+/// Starts a task for each model. The order is part of the flight: tasks due at the same instant run in it.
+pub(crate) fn start_models<'a>(
+    tasks: &mut Tasks<'a>,
+    clock: &Clock,
+    models: Models,
+    topics: Topics<'a>,
+    health: &'a Healths,
+) {
+    spawn!(tasks, clock, models.imu => topics.imu, health.imu);
+    spawn!(tasks, clock, models.tof => topics.tof, health.tof);
+    spawn!(tasks, clock, models.flow => topics.flow, health.flow);
+    spawn!(tasks, clock, models.mag => topics.mag, health.mag);
+    spawn!(tasks, clock, models.baro => topics.baro, health.baro);
+    spawn!(tasks, clock, models.power => topics.power, health.power);
+}
+
+/// Starts a task for each driver, over these chips.
+pub(crate) fn start_drivers<'a>(
+    tasks: &mut Tasks<'a>,
+    clock: &Clock,
+    board: chips::Board,
+    tof: RangeModel,
+    topics: Topics<'a>,
+    health: &'a Healths,
+) {
+    let chips::Board { i2c, imu, flow, .. } = board;
+    let time = || clock.clone();
+    spawn!(tasks, clock, devices::imu(imu, time(), &IMAGE) => topics.imu, health.imu);
+    spawn!(tasks, clock, tof => topics.tof, health.tof);
+    spawn!(tasks, clock, devices::flow(flow, time()) => topics.flow, health.flow);
+    spawn!(tasks, clock, devices::magnetometer(i2c.clone(), time()) => topics.mag, health.mag);
+    spawn!(tasks, clock, devices::barometer(i2c.clone(), time()) => topics.baro, health.baro);
+    spawn!(tasks, clock, devices::power(i2c, time()) => topics.power, health.power);
+}
+
+/// Starts the task of the cameras.
+pub(crate) fn start_cameras<'a>(
+    tasks: &mut Tasks<'a>,
+    clock: &Clock,
+    cameras: CameraModel,
+    topic: wiring::external_pose::Tx<'a>,
+    health: &'a Healths,
+) {
+    spawn!(tasks, clock, cameras => topic, health.cameras);
+}
