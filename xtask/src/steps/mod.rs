@@ -14,6 +14,7 @@ pub mod fmt;
 pub mod loom;
 pub mod no_std;
 pub mod package;
+pub mod panic_proof;
 pub mod peers;
 pub mod test;
 pub mod ulog;
