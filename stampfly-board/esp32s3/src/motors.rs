@@ -38,6 +38,11 @@ pub fn cut() {
     }
 }
 
+/// Starts the PWM unit, which the buzzer uses, too.
+pub fn start_unit(unit: LEDC<'static>) {
+    Ledc::new(unit).set_global_slow_clock(LSGlobalClkSource::APBClk);
+}
+
 type PwmChannel = Channel<'static, LowSpeed>;
 
 /// The motors, in motor order: front right, rear right, rear left, front left.
@@ -47,12 +52,10 @@ pub struct Motors {
 }
 
 impl Motors {
-    /// Starts the PWM unit at duty zero and gives it the pins.
-    pub fn new(unit: LEDC<'static>, pins: MotorPins<'static>) -> Self {
+    /// Takes the pins, at duty zero. The unit must have been started.
+    pub fn new(pins: MotorPins<'static>) -> Self {
         static TIMER: StaticCell<Timer<'static, LowSpeed>> = StaticCell::new();
-        let mut unit = Ledc::new(unit);
-        unit.set_global_slow_clock(LSGlobalClkSource::APBClk);
-        let mut timer = unit.timer(timer::Number::Timer0);
+        let mut timer = Timer::new(LEDC::regs(), timer::Number::Timer0);
         let config =
             timer::config::Config { duty: RESOLUTION, clock_source: LSClockSource::APBClk, frequency: FREQUENCY };
         timer.configure(config).expect("the assertion above has computed the divisor");

@@ -10,16 +10,15 @@ use embassy_sync::mutex::Mutex;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 use esp_hal::Async;
-use esp_hal::dma::{DmaRxBuf, DmaTxBuf};
-use esp_hal::dma_buffers;
 use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
 use esp_hal::peripherals::{DMA_CH0, SPI2};
 use esp_hal::spi::master::{Config, Spi, SpiDma};
 use esp_hal::spi::{Error, Mode};
 use esp_hal::time::Rate;
+use esp_hal::{dma_rx_buffer, dma_tx_buffer};
 
 /// The longest transfer is a chunk of the inertial sensor's configuration with its address.
-const BUFFER: usize = 512;
+const LONGEST: usize = 512;
 /// Transfers up to this are done by the processor: setting the DMA up would take longer.
 const SHORT_TRANSFER: usize = 8;
 
@@ -51,7 +50,6 @@ pub fn start(parts: Parts) -> (Bus, Selects) {
     let deselected = |pin: AnyPin<'static>| Output::new(pin, Level::High, OutputConfig::default());
     let pins = parts.pins;
     let selects = Selects { imu: deselected(pins.imu_select.into()), flow: deselected(pins.flow_select.into()) };
-    let (rx, rx_descriptors, tx, tx_descriptors) = dma_buffers!(BUFFER);
     let bus = Spi::new(parts.unit, imu_config())
         .expect("10 MHz is possible")
         .with_sck(pins.clock)
@@ -59,8 +57,8 @@ pub fn start(parts: Parts) -> (Bus, Selects) {
         .with_miso(pins.from_chips)
         .with_dma(parts.dma)
         .with_buffers(
-            DmaRxBuf::new(rx_descriptors, rx).expect("descriptors for the whole buffer"),
-            DmaTxBuf::new(tx_descriptors, tx).expect("descriptors for the whole buffer"),
+            dma_rx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
+            dma_tx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
         )
         .into_async();
     (Mutex::new(bus), selects)
