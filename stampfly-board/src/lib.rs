@@ -14,10 +14,12 @@ extern crate std;
 
 mod activation_table;
 mod config;
+pub mod console;
 pub mod devices;
 mod flight_loop;
 pub mod messages;
 pub mod parameters;
+pub mod profile;
 pub mod runnables;
 pub mod tasks;
 mod topic_table;
