@@ -9,7 +9,12 @@
 //! | [`magnetometer`] | BMM150 | I2C, 0x10 | 25 |
 //! | [`barometer`] | BMP280 | I2C, 0x76 | 25 |
 //! | [`power`] | INA3221, channel 2, 10 mΩ | I2C, 0x40 | 10 |
+//! | [`range_down`], [`range_ahead`] | VL53L3CX | I2C, 0x29, moved to 0x30 and 0x31 | 30 |
+//!
+//! The two on SPI share it in [slots](stampfly_drivers::slot): the inertial sensor leads at [`RHYTHM`], the flow sensor
+//! transfers for up to [`LONGEST_FLOW`] in between.
 
+use embedded_hal::digital::OutputPin;
 use embedded_hal_async::i2c::I2c;
 use embedded_hal_async::spi::SpiDevice;
 use stampfly_drivers::Timebase;
@@ -18,7 +23,15 @@ use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
+use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::chip::{AxisMap, I2cRegisters, SpiRegisters};
+use stampfly_drivers::slot::Rhythm;
+use stampfly_types::Micros;
+
+/// The rhythm of the inertial sensor on the bus it shares.
+pub const RHYTHM: Rhythm = Rhythm::HZ_400;
+/// The flow sensor's longest transfer: twelve bytes at 2 MHz after 35 µs for the address, with a margin.
+pub const LONGEST_FLOW: Micros = Micros(200);
 
 /// The inertial sensor. `configuration_file` is Bosch's, 8 kB.
 pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, configuration_file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
@@ -43,4 +56,24 @@ pub fn barometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmp280<I2cRegisters<I
 /// The battery monitor.
 pub fn power<I: I2c, T: Timebase>(i2c: I, clock: T) -> Ina3221<I2cRegisters<I>, T> {
     Ina3221::new(i2c, Ina3221::A0_GROUND, clock, ina3221::Config::default())
+}
+
+/// The range finder that looks down. Create both range finders before either is used: creating one resets it.
+pub fn range_down<I: I2c, X: OutputPin, T: Timebase>(
+    i2c: I,
+    shutdown: X,
+    boot: &BootAddress,
+    clock: T,
+) -> Vl53l3cx<'_, I, X, T> {
+    Vl53l3cx::new(i2c, shutdown, boot, 0x30, clock, vl53l3cx::Config::default())
+}
+
+/// The range finder that looks ahead. On the battery hat: it answers on USB power, but cannot measure.
+pub fn range_ahead<I: I2c, X: OutputPin, T: Timebase>(
+    i2c: I,
+    shutdown: X,
+    boot: &BootAddress,
+    clock: T,
+) -> Vl53l3cx<'_, I, X, T> {
+    Vl53l3cx::new(i2c, shutdown, boot, 0x31, clock, vl53l3cx::Config::default())
 }

@@ -1,7 +1,7 @@
-//! Motors, lights and sound.
+//! Motors.
 
 use embedded_hal::pwm::SetDutyCycle;
-use stampfly_types::messages::{MotorOutput, Signal};
+use stampfly_types::messages::MotorOutput;
 
 /// Motors that take a duty cycle.
 ///
@@ -97,12 +97,6 @@ impl<P: SetDutyCycle, const N: usize> Drop for PwmMotors<P, N> {
     fn drop(&mut self) {
         self.stop();
     }
-}
-
-/// Lights and buzzer.
-pub trait Indicator {
-    /// Shows the signal. Must not block: a tune plays on by itself.
-    fn show(&mut self, signal: &Signal);
 }
 
 #[cfg(test)]

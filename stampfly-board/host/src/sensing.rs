@@ -2,6 +2,8 @@
 
 use stampfly_board::tasks::{Health, pump};
 use stampfly_board::{devices, wiring};
+use stampfly_drivers::chip::vl53l3cx::BootAddress;
+use stampfly_drivers::slot::Slots;
 use stampfly_drivers::{
     Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, SensorErrorKind,
 };
@@ -34,6 +36,8 @@ pub struct Healths {
     pub imu: Health,
     /// Range finder, down.
     pub tof: Health,
+    /// Range finder, ahead.
+    pub tof_front: Health,
     /// Flow.
     pub flow: Health,
     /// Magnetometer.
@@ -52,6 +56,7 @@ impl Healths {
         [
             ("imu", &self.imu),
             ("tof", &self.tof),
+            ("tof_front", &self.tof_front),
             ("flow", &self.flow),
             ("mag", &self.mag),
             ("baro", &self.baro),
@@ -67,6 +72,7 @@ impl Healths {
 pub(crate) struct Topics<'b> {
     pub imu: wiring::sensor_imu::Tx<'b>,
     pub tof: wiring::sensor_tof::Tx<'b>,
+    pub tof_front: wiring::sensor_tof_front::Tx<'b>,
     pub flow: wiring::sensor_flow::Tx<'b>,
     pub mag: wiring::sensor_mag::Tx<'b>,
     pub baro: wiring::sensor_baro::Tx<'b>,
@@ -113,19 +119,35 @@ pub(crate) fn start_models<'a>(
     spawn!(tasks, clock, models.power => topics.power, health.power);
 }
 
+/// What the drivers of one vehicle share; to be made before the tasks.
+pub(crate) struct Shared {
+    boot: BootAddress,
+    slots: Slots<Clock>,
+}
+
+impl Shared {
+    pub fn new(clock: &Clock) -> Self {
+        Self { boot: BootAddress::new(), slots: Slots::new(clock.clone(), devices::RHYTHM) }
+    }
+}
+
 /// Starts a task for each driver, over these chips.
 pub(crate) fn start_drivers<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
     board: chips::Board,
-    tof: RangeModel,
+    shared: &'a mut Shared,
     topics: Topics<'a>,
     health: &'a Healths,
 ) {
-    let chips::Board { i2c, imu, flow, .. } = board;
+    let chips::Board { i2c, imu, flow, shutdown_bottom, shutdown_front, .. } = board;
     let time = || clock.clone();
+    let (imu, flow, _) = shared.slots.split(imu, flow, devices::LONGEST_FLOW);
+    let down = devices::range_down(i2c.clone(), shutdown_bottom, &shared.boot, time());
+    let ahead = devices::range_ahead(i2c.clone(), shutdown_front, &shared.boot, time());
     spawn!(tasks, clock, devices::imu(imu, time(), &IMAGE) => topics.imu, health.imu);
-    spawn!(tasks, clock, tof => topics.tof, health.tof);
+    spawn!(tasks, clock, down => topics.tof, health.tof);
+    spawn!(tasks, clock, ahead => topics.tof_front, health.tof_front);
     spawn!(tasks, clock, devices::flow(flow, time()) => topics.flow, health.flow);
     spawn!(tasks, clock, devices::magnetometer(i2c.clone(), time()) => topics.mag, health.mag);
     spawn!(tasks, clock, devices::barometer(i2c.clone(), time()) => topics.baro, health.baro);

@@ -11,7 +11,7 @@ use crate::ground_station::{self, Progress};
 use crate::metrics::{Collector, Instant, Metrics};
 use crate::mission::Mission;
 use crate::recorder::Recorder;
-use crate::sensing::{self, Healths, Models, Sensing, Topics};
+use crate::sensing::{self, Healths, Models, Sensing, Shared, Topics};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stampfly_board::messages::ButtonContact;
@@ -234,10 +234,13 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let mut flight_loop = FlightLoop::new(vehicle, heads, start);
     recorder.begin(start, &config.vehicle);
 
-    let (progress, health) = (Progress::default(), Healths::default());
+    let (progress, health, mut shared) = (Progress::default(), Healths::default(), Shared::new(&clock));
     let mut tasks = Tasks::new(clock.clone());
-    let Outside { imu: to_imu, tof: to_tof, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power, .. } = outside;
-    let topics = Topics { imu: to_imu, tof: to_tof, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power };
+    let Outside {
+        imu: to_imu, tof: to_tof, tof_front, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power, ..
+    } = outside;
+    let topics =
+        Topics { imu: to_imu, tof: to_tof, tof_front, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power };
     match config.sensing {
         Sensing::Models => {
             let models = Models { imu, tof, flow, mag, baro, power };
@@ -245,7 +248,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
         }
         Sensing::Chips => {
             let board = chips::Board::new(&world, &clock, &config.simulation, &sensing::IMAGE);
-            sensing::start_drivers(&mut tasks, &clock, board, tof, topics, &health);
+            sensing::start_drivers(&mut tasks, &clock, board, &mut shared, topics, &health);
         }
     }
     if config.cameras {

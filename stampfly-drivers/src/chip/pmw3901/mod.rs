@@ -7,7 +7,7 @@
 pub mod codec;
 
 use super::port::bounded;
-use super::{AxisMap, ChipError};
+use super::{AxisMap, ChipError, TransferLimit};
 use crate::time::sleep_until;
 use crate::{OpticalFlow, Sample, Timebase};
 use codec::{Motion, Step, register};
@@ -15,6 +15,8 @@ use embedded_hal_async::spi::{Operation, SpiDevice};
 use stampfly_types::messages::FlowData;
 use stampfly_types::{Micros, Vec3};
 
+/// The longest transfer, a burst.
+const LIMIT: Micros = TransferLimit::SPI_GUEST.of(12);
 /// From power-on to the first access ("Power-up sequence").
 const POWER_UP: Micros = Micros::from_millis(45);
 const AFTER_RESET: Micros = Micros::from_millis(5);
@@ -151,7 +153,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             Operation::DelayNs(ADDRESS_TO_DATA),
             Operation::Read(&mut bytes),
         ];
-        bounded(&self.clock, self.device.transaction(&mut operations)).await?;
+        bounded(&self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
         if let Some(motion) = Motion::decode(&bytes) {
             return Ok(motion);
         }
@@ -164,7 +166,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         let mut bytes = [0];
         let mut operations =
             [Operation::Write(&[register]), Operation::DelayNs(ADDRESS_TO_DATA), Operation::Read(&mut bytes)];
-        bounded(&self.clock, self.device.transaction(&mut operations)).await?;
+        bounded(&self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
         self.wait(AFTER_READ).await;
         let [value] = bytes;
         Ok(value)
@@ -172,7 +174,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
 
     async fn write(&mut self, register: u8, value: u8) -> Result<(), ChipError<S::Error>> {
         let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(WRITE_HOLD)];
-        bounded(&self.clock, self.device.transaction(&mut operations)).await?;
+        bounded(&self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
         self.wait(AFTER_WRITE).await;
         Ok(())
     }
