@@ -1,99 +1,65 @@
-//! The buzzer: tunes, note by note, on a timer of the PWM unit that the motors do not use.
+//! The buzzer's channel of the PWM unit, on a timer that the motors do not use.
 
+use core::convert::Infallible;
+use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use esp_hal::gpio::{AnyPin, DriveMode};
 use esp_hal::ledc::LowSpeed;
-use esp_hal::ledc::channel::{self, Channel, ChannelIFace};
+use esp_hal::ledc::channel::{self, ChannelHW, ChannelIFace};
 use esp_hal::ledc::timer::{self, LSClockSource, Timer, TimerIFace};
 use esp_hal::peripherals::LEDC;
 use esp_hal::time::Rate;
-use stampfly_types::Micros;
-use stampfly_types::messages::{Signal, Tone};
+use stampfly_drivers::SetFrequency;
 use static_cell::StaticCell;
 
-/// A note: its frequency in hertz, zero for a rest, and how long it sounds.
-type Note = (u32, Micros);
+const RESOLUTION: timer::config::Duty = timer::config::Duty::Duty10Bit;
+/// What the timer can divide its clock by without leaving a tune: all notes are far inside.
+const PITCHES: core::ops::RangeInclusive<u32> = 100..=20_000;
 
-const A4: u32 = 440;
-const C4: u32 = 262;
-const C5: u32 = 523;
-const E5: u32 = 659;
-const G5: u32 = 784;
+/// A channel with a frequency of its own.
+pub struct Channel(channel::Channel<'static, LowSpeed>);
 
-const fn ms(note: u32, millis: u64) -> Note {
-    (note, Micros::from_millis(millis))
-}
-
-/// The notes of each tune.
-const fn notes(tone: Tone) -> &'static [Note] {
-    match tone {
-        Tone::None => const { &[] },
-        Tone::Start => const { &[ms(C5, 100), ms(E5, 100), ms(G5, 200)] },
-        Tone::Ready => const { &[ms(C5, 100), ms(0, 50), ms(C5, 100), ms(0, 50), ms(C5, 100)] },
-        Tone::Arm => const { &[ms(E5, 100), ms(G5, 100)] },
-        Tone::Disarm => const { &[ms(G5, 100), ms(E5, 100)] },
-        Tone::Pair => const { &[ms(C5, 100), ms(G5, 100)] },
-        Tone::LowBattery => const { &[ms(A4, 200), ms(0, 100), ms(A4, 200)] },
-        Tone::Error => const { &[ms(C4, 500)] },
-    }
-}
-
-/// Half on, half off is loudest.
-const LOUD: u8 = 50;
-
-/// The buzzer. The motors' unit must have been started.
-pub struct Buzzer {
-    channel: Channel<'static, LowSpeed>,
-    playing: &'static [Note],
-    /// When the present note ends.
-    until: Micros,
-    /// The tune that was started last.
-    heard: u32,
-}
-
-impl Buzzer {
-    /// Silence.
+impl Channel {
+    /// Silence. The PWM unit must have been started.
     pub fn new(pin: AnyPin<'static>) -> Self {
         static TIMER: StaticCell<Timer<'static, LowSpeed>> = StaticCell::new();
-        let timer = TIMER.init(tuned(C5));
-        let mut channel = Channel::new(channel::Number::Channel4, pin);
+        let timer = TIMER.init(tuned(*PITCHES.start()));
+        let mut channel = channel::Channel::new(channel::Number::Channel4, pin);
         let config = channel::config::Config { timer, duty_pct: 0, drive_mode: DriveMode::PushPull };
         channel.configure(config).expect("the timer is configured and zero is a duty");
-        Self { channel, playing: &[], until: Micros::ZERO, heard: 0 }
-    }
-
-    /// Plays on; call it as often as the shortest note is long, or more.
-    pub fn step(&mut self, now: Micros, signal: &Signal) {
-        if signal.tone_count != self.heard {
-            (self.heard, self.playing, self.until) = (signal.tone_count, notes(signal.tone), now);
-        } else if now < self.until {
-            return;
-        }
-        match self.playing {
-            [(note, length), rest @ ..] => {
-                self.sound(*note);
-                (self.playing, self.until) = (rest, now + *length);
-            }
-            [] => self.sound(0),
-        }
-    }
-
-    fn sound(&mut self, note: u32) {
-        if note > 0 {
-            tuned(note);
-        }
-        // A buzzer that cannot be set is silent or not; nothing depends on it.
-        let _ = self.channel.set_duty(if note > 0 { LOUD } else { 0 });
+        Self(channel)
     }
 }
 
-/// The buzzer's timer at this frequency, in hertz.
+impl ErrorType for Channel {
+    type Error = Infallible;
+}
+
+impl SetDutyCycle for Channel {
+    fn max_duty_cycle(&self) -> u16 {
+        1 << RESOLUTION as u16
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+        self.0.set_duty_hw(duty.into());
+        Ok(())
+    }
+}
+
+impl SetFrequency for Channel {
+    fn set_frequency(&mut self, hertz: u32) -> Result<(), Infallible> {
+        tuned(hertz.clamp(*PITCHES.start(), *PITCHES.end()));
+        Ok(())
+    }
+}
+
+/// The timer at this frequency, in hertz. It is one set of registers; every value of this type writes the same.
 fn tuned(frequency: u32) -> Timer<'static, LowSpeed> {
     let mut timer = Timer::new(LEDC::regs(), timer::Number::Timer1);
     let config = timer::config::Config {
-        duty: timer::config::Duty::Duty10Bit,
+        duty: RESOLUTION,
         clock_source: LSClockSource::APBClk,
         frequency: Rate::from_hz(frequency),
     };
-    timer.configure(config).expect("every note is within the timer's range");
+    timer.configure(config).expect("every pitch is within the timer's range");
     timer
 }

@@ -6,10 +6,15 @@ use crate::pins::MotorPins;
 use crate::sensors::{HEALTH, RETRY};
 use crate::{imu_config, spi};
 use embassy_futures::join::join;
+use stampfly_board::profile::{Profile, Stopwatch};
 use stampfly_board::tasks::{fly, pump};
 use stampfly_board::{FlightLoop, devices, plan, wiring};
 use stampfly_bus::AnyTopic;
+use stampfly_drivers::slot::Slots;
 use stampfly_drivers::{Imu, OpticalFlow, Timebase};
+
+/// How long every runnable takes, for whoever reports.
+pub static PROFILE: Profile = Profile::new();
 
 /// What flies.
 pub struct Parts {
@@ -27,8 +32,10 @@ pub struct Parts {
 pub async fn run(parts: Parts) {
     let Parts { vehicle, heads, mut imu, mut flow, duties, motors, spi } = parts;
     let motors = Motors::new(motors);
-    let (bus, selects) = spi::start(spi);
-    let (imu_chip, flow_chip) = spi::devices(&bus, selects);
+    let mut bus = spi::Bus::start(spi);
+    let mut slots = Slots::new(Clock, devices::RHYTHM);
+    let (imu_chip, flow_chip) = bus.devices();
+    let (imu_chip, flow_chip, _) = slots.split(imu_chip, flow_chip, devices::LONGEST_FLOW);
     let mut imu_chip = devices::imu(imu_chip, Clock, imu_config::FILE);
     let mut flow_chip = devices::flow(flow_chip, Clock);
     let sensing =
@@ -36,5 +43,8 @@ pub async fn run(parts: Parts) {
     let looking_down =
         pump(async || flow_chip.next().await, |at, sample| _ = flow.publish(at, sample), Clock, RETRY, &HEALTH.flow);
     let flight_loop = FlightLoop::new(vehicle, heads, Clock.now());
-    join(fly(sensing, flight_loop, duties, motors, Clock, &mut (), |_| {}), looking_down).await;
+    let mut stopwatch = Stopwatch::new(&PROFILE, Clock);
+    // A motor channel that refuses has nobody to tell in flight; the cut-off remains.
+    let flying = fly(sensing, flight_loop, duties, motors, Clock, &mut stopwatch, |_| {});
+    join(flying, looking_down).await;
 }

@@ -59,8 +59,16 @@ fn main() -> ! {
         motors: pins.motors,
         spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi },
     };
-    let sensors =
-        sensors::Parts { unit: chip.I2C0, pins: pins.i2c, mag: outside.mag, baro: outside.baro, power: outside.power };
+    let sensors = sensors::Parts {
+        unit: chip.I2C0,
+        pins: pins.i2c,
+        range: pins.range,
+        tof: outside.tof,
+        tof_front: outside.tof_front,
+        mag: outside.mag,
+        baro: outside.baro,
+        power: outside.power,
+    };
     let people =
         people::Parts { pulses: chip.RMT, pins: pins.people, signal: outside.indicator, button: outside.button };
     let radio = radio::Parts { unit: chip.WIFI, peer: None, pilot: outside.pilot, telemetry: outside.telemetry };
