@@ -13,6 +13,7 @@
 extern crate std;
 
 mod activation_table;
+pub mod black_box;
 mod config;
 pub mod console;
 pub mod devices;

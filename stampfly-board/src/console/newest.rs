@@ -1,20 +1,9 @@
 //! The newest sample of every topic, as words, and how to read them without their types.
 
+use crate::black_box::LONGEST;
 use crate::wiring;
 use core::fmt;
 use stampfly_types::{FieldInfo, FieldKind, Message, Micros};
-
-/// Words of the longest message.
-const LONGEST: usize = {
-    let (mut longest, mut index) = (0, 0);
-    while index < wiring::COUNT {
-        if wiring::TOPICS[index].words > longest {
-            longest = wiring::TOPICS[index].words;
-        }
-        index += 1;
-    }
-    longest
-};
 
 /// The newest sample of every topic.
 ///
