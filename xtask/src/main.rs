@@ -74,6 +74,12 @@ const STEPS: &[Step] = &[
         run: steps::panic_proof::run,
     },
     Step {
+        name: "esp32",
+        about: "does the firmware check for the ESP32-S3, and build and link for its sibling?",
+        in_ci: true,
+        run: steps::esp32::run,
+    },
+    Step {
         name: "package",
         about: "would each crate, as committed, build from its package?",
         in_ci: true,

@@ -7,6 +7,7 @@ pub mod cortex_m4f;
 pub mod determinism;
 pub mod doc;
 pub mod docs;
+pub mod esp32;
 pub mod examples;
 pub mod figures;
 pub mod fmt;

@@ -35,7 +35,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
 }
 
 /// Full paths, because rustup's come first in `PATH`.
-fn debian_cargo(repository: &Repository) -> Command {
+pub fn debian_cargo(repository: &Repository) -> Command {
     let mut cargo = repository.command("/usr/bin/cargo");
     cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", "/usr/bin/rustc").env_remove("RUSTUP_TOOLCHAIN");
     cargo
