@@ -76,7 +76,7 @@ fn main() {
         for band in [Band::Flight, Band::Background] {
             while let Some((index, now)) = scheduler.due(band, 0, clock, &heads) {
                 let mut activation = Activation::live(now);
-                scheduler.started(index, now, &heads);
+                scheduler.started(index, now, clock, &heads);
                 vehicle.read(index, &mut activation);
                 vehicle.run(index, &mut activation);
                 scheduler.finished(index);

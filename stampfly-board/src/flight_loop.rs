@@ -57,7 +57,7 @@ impl<'b> FlightLoop<'b> {
         let mut next = 0;
         while let Some((index, now)) = self.scheduler.due(band, next, clock, &self.heads) {
             let mut activation = Activation::live(now);
-            self.start(index, &mut activation, observer);
+            self.start(index, &mut activation, clock, observer);
             self.complete(index, &mut activation, observer);
             next = index + 1;
         }
@@ -65,8 +65,8 @@ impl<'b> FlightLoop<'b> {
     }
 
     #[inline]
-    fn start(&mut self, index: usize, activation: &mut Activation, observer: &mut impl Observer) {
-        self.scheduler.started(index, activation.now(), &self.heads);
+    fn start(&mut self, index: usize, activation: &mut Activation, clock: Micros, observer: &mut impl Observer) {
+        self.scheduler.started(index, activation.now(), clock, &self.heads);
         self.vehicle.read(index, activation);
         observer.has_read(index, activation);
     }
@@ -84,7 +84,7 @@ impl<'b> FlightLoop<'b> {
     pub fn start_next(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> Option<Pending> {
         let (index, now) = self.scheduler.due(band, 0, clock, &self.heads)?;
         let mut activation = Activation::live(now);
-        self.start(index, &mut activation, observer);
+        self.start(index, &mut activation, clock, observer);
         Some(Pending { index, activation })
     }
 

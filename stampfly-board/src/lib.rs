@@ -13,12 +13,17 @@
 extern crate std;
 
 mod activation_table;
+pub mod black_box;
 mod config;
+pub mod console;
+pub mod devices;
 mod flight_loop;
 pub mod golden;
 pub mod messages;
 pub mod parameters;
+pub mod profile;
 pub mod runnables;
+pub mod tasks;
 mod topic_table;
 pub mod vehicle;
 

@@ -46,7 +46,10 @@ pub struct ActivationInfo {
 /// in a replay share it, so they agree on `now`.
 ///
 /// `now` of an activation is the newest stamp of its topics for `on`, the predecessor's `now` for `after`, and the
-/// scheduled tick for `every` and `or at latest`.
+/// scheduled tick for `every` and `or at latest`; it never goes back.
+///
+/// `or at latest` counts from when the activation last ran, by the clock, not from its `now`: a stamp is as old as the
+/// sensor's delay, and a deadline that counted from it would pass while everything is in order.
 #[derive(Clone, Debug)]
 pub struct Scheduler<const A: usize, const T: usize> {
     table: &'static [ActivationInfo; A],
@@ -54,6 +57,8 @@ pub struct Scheduler<const A: usize, const T: usize> {
     seen: [[u32; MAX_TRIGGERS]; A],
     /// The `now` of each activation's last run.
     last: [Micros; A],
+    /// What the clock showed at each activation's last run.
+    ran: [Micros; A],
     /// How often each activation has finished.
     runs: [u32; A],
     /// How often each activation's predecessor had finished when it last started.
@@ -67,7 +72,7 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
     /// A scheduler at power-on, `start` on the clock. Periods count from there.
     #[must_use]
     pub fn new(table: &'static [ActivationInfo; A], start: Micros) -> Self {
-        Self { table, seen: [[0; MAX_TRIGGERS]; A], last: [start; A], runs: [0; A], followed: [0; A] }
+        Self { table, seen: [[0; MAX_TRIGGERS]; A], last: [start; A], ran: [start; A], runs: [0; A], followed: [0; A] }
     }
 
     /// The first activation of this band from line `first` on that is due at `clock`: its index and its `now`.
@@ -105,20 +110,26 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
                 let runs = *self.runs.get(before)?;
                 (runs != *self.followed.get(index)?).then(|| self.last.get(before).copied()).flatten()
             }
-            Trigger::Every(period) => self.tick(index, period, clock),
+            Trigger::Every(_) => None,
         };
-        by_trigger.or_else(|| self.tick(index, info.at_latest?, clock))
+        // A deadline that has passed may have been later than the stamp that comes after it.
+        let last = *self.last.get(index)?;
+        by_trigger
+            .map(|now| now.max(last))
+            .or_else(|| self.tick(index, info).filter(|tick| clock >= *tick).map(|tick| tick.max(last)))
     }
 
-    /// The scheduled tick `period` after the last activation, once the clock has reached it.
-    fn tick(&self, index: usize, period: Micros, clock: Micros) -> Option<Micros> {
-        let tick = *self.last.get(index)? + period;
-        (clock >= tick).then_some(tick)
+    /// When this activation is due even if nothing triggers it.
+    fn tick(&self, index: usize, info: &ActivationInfo) -> Option<Micros> {
+        match info.trigger {
+            Trigger::Every(period) => Some(*self.last.get(index)? + period),
+            _ => Some(*self.ran.get(index)? + info.at_latest?),
+        }
     }
 
-    /// Notes that an activation is about to read its inputs.
+    /// Notes that an activation is about to read its inputs, at `clock`.
     #[inline]
-    pub fn started(&mut self, index: usize, now: Micros, heads: &[&dyn AnyTopic; T]) {
+    pub fn started(&mut self, index: usize, now: Micros, clock: Micros, heads: &[&dyn AnyTopic; T]) {
         match self.table.get(index).map(|info| info.trigger) {
             Some(Trigger::On(topics)) => {
                 let seen = self.seen.get_mut(index).into_iter().flatten();
@@ -132,6 +143,11 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
                 }
             }
             _ => {}
+        }
+        // A tick is on time by definition, so that ticks do not drift with an executor that is late.
+        let is_tick = self.table.get(index).and_then(|info| self.tick(index, info)) == Some(now);
+        if let Some(ran) = self.ran.get_mut(index) {
+            *ran = if is_tick { now } else { clock };
         }
         if let Some(last) = self.last.get_mut(index) {
             *last = now;
@@ -149,17 +165,7 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
     /// The next instant at which a period or a deadline makes something due.
     #[must_use]
     pub fn next_tick(&self) -> Option<Micros> {
-        self.table
-            .iter()
-            .zip(self.last)
-            .filter_map(|(info, last)| {
-                let period = match info.trigger {
-                    Trigger::Every(period) => Some(period),
-                    _ => info.at_latest,
-                };
-                Some(last + period?)
-            })
-            .min()
+        self.table.iter().enumerate().filter_map(|(index, info)| self.tick(index, info)).min()
     }
 }
 

@@ -139,7 +139,7 @@ impl<'b> Rig<'b> {
         for band in [Band::Flight, Band::Background] {
             while let Some((index, now)) = self.scheduler.due(band, 0, clock, &self.heads) {
                 let mut activation = Activation::live(now);
-                self.scheduler.started(index, now, &self.heads);
+                self.scheduler.started(index, now, clock, &self.heads);
                 self.vehicle.read(index, &mut activation);
                 self.vehicle.run(index, &mut activation);
                 self.scheduler.finished(index);
@@ -159,9 +159,27 @@ fn a_silent_imu_still_activates_control() {
     for clock in (3_000..40_000).step_by(500) {
         rig.run_due(Micros(clock));
     }
-    // After the sample, then every 10 ms of silence, at the scheduled ticks and not at the clock's.
-    assert_eq!(rig.vehicle.control.nows, [2_500, 12_500, 22_500, 32_500].map(Micros));
+    // After the sample, then every 10 ms from when that ran, at the scheduled ticks and not at the clock's.
+    assert_eq!(rig.vehicle.control.nows, [2_500, 12_600, 22_600, 32_600].map(Micros));
     assert_eq!(rig.vehicle.telemetry.generations, [1], "20 ms period");
+}
+
+#[test]
+fn a_deadline_counts_from_the_run_and_time_does_not_go_back() {
+    let mut bus = wiring::Bus::new();
+    let mut rig = Rig::new(&mut bus);
+    // Samples are 6 ms old when they arrive; from stamp to arrival of the next one it is 12 ms.
+    for k in 0..10u64 {
+        rig.imu.publish(Micros(k * 6_000), &ImuData::default());
+        rig.run_due(Micros(k * 6_000 + 6_000));
+        rig.run_due(Micros(k * 6_000 + 11_900));
+    }
+    assert_eq!(rig.vehicle.control.nows, (0..10).map(|k| Micros(k * 6_000)).collect::<Vec<_>>(), "no deadline passed");
+    // Silence, a deadline, and then a sample whose stamp lies before the deadline.
+    rig.run_due(Micros(72_000));
+    rig.imu.publish(Micros(66_000), &ImuData::default());
+    rig.run_due(Micros(72_100));
+    assert_eq!(rig.vehicle.control.nows[10..], [Micros(70_000), Micros(70_000)]);
 }
 
 #[test]

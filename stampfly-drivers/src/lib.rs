@@ -6,13 +6,17 @@
 //! | [`CommandLink`] | a stream of authenticated commands | radios, mission scripts |
 //! | [`Button`] | a contact | any `embedded_hal::digital::InputPin`, through [`PinButton`] |
 //! | [`MotorOutputs`] | motors | any set of `embedded_hal::pwm::SetDutyCycle`, through [`PwmMotors`] |
-//! | [`Indicator`] | lights and buzzer | boards |
+//! | [`Indicator`] | lights and buzzer | [`Lights`] on any `SmartLedsWrite`, [`Buzzer`] on any [`SetFrequency`] |
 //! | [`Timebase`] | a clock that can also wait | boards, the simulator |
 //!
 //! | module or type | what it is |
 //! |---|---|
 //! | [`chip`] | drivers for particular chips, on any `embedded-hal-async` bus |
 //! | [`blocking`] | the same drivers on a blocking bus |
+//! | [`Interlock`] | no motor turns without a decision to arm |
+//! | [`slot`] | two devices on one SPI bus without a lock |
+//! | [`recover_i2c`] | frees a bus whose data line is held |
+//! | [`shared`] | one I2C bus for several drivers, freed when a device hangs |
 //! | [`Decimator`] | from 1600 to 400 samples per second without folding |
 //!
 //! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
@@ -37,13 +41,21 @@ pub mod blocking;
 pub mod chip;
 mod decimator;
 pub mod error;
+pub mod indicator;
+mod interlock;
 pub mod link;
+mod recovery;
 pub mod sensor;
+pub mod shared;
+pub mod slot;
 pub mod time;
 
-pub use actuator::{Indicator, MotorError, MotorOutputs, PwmMotors};
+pub use actuator::{MotorError, MotorOutputs, PwmMotors};
 pub use decimator::Decimator;
 pub use error::{SensorError, SensorErrorKind};
+pub use indicator::{Buzzer, Indicator, Lights, SetFrequency};
+pub use interlock::{ArmToken, Interlock};
 pub use link::{Button, Command, CommandLink, PinButton};
+pub use recovery::{Recovery, RecoveryError, recover_i2c};
 pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};
 pub use time::Timebase;

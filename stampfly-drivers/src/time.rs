@@ -16,7 +16,7 @@ pub trait Timebase: DelayNs + Clone {
 }
 
 /// Waits until an instant; returns at once when it has passed.
-pub(crate) async fn sleep_until<T: Timebase>(clock: &mut T, instant: Micros) {
+pub async fn sleep_until<T: Timebase>(clock: &mut T, instant: Micros) {
     let left = instant.since(clock.now());
     if left > Micros::ZERO {
         clock.delay_us(u32::try_from(left.0).unwrap_or(u32::MAX)).await;

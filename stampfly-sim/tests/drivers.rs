@@ -103,18 +103,13 @@ fn another_part_is_refused() {
     assert!(bench.pressure().is_err() && bench.voltage().is_ok());
 }
 
-/// A stand-in for the maker's configuration file, in which no two bursts are equal.
-fn image() -> Vec<u8> {
-    (0..8_192u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()
-}
-
 #[test]
 fn inertial_sensor_and_flow_share_a_bus() {
     let config = SimulationConfig { wind: WindConfig::CALM, ..Default::default() };
     let simulation = Simulation::new(&config);
     let (clock, world) = (simulation.clock.clone(), &simulation.world);
     let bus = SpiBus::new(&clock, 1);
-    let image = image();
+    let image = chips::stand_in_image();
     let (imu, _) = bus.attach(8_000_000, chips::Bmi270::new(world, &clock, config.seed, 1.0, &image));
     let (flow, _) = bus.attach(2_000_000, chips::Pmw3901::new(world, &clock, config.seed));
     clock.advance_to(clock.now() + Micros::from_millis(50));

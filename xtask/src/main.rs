@@ -68,6 +68,18 @@ const STEPS: &[Step] = &[
         run: steps::cortex_m4f::run,
     },
     Step {
+        name: "panic-proof",
+        about: "does the flight code link without a panic handler?",
+        in_ci: true,
+        run: steps::panic_proof::run,
+    },
+    Step {
+        name: "esp32",
+        about: "does the firmware check for the ESP32-S3, and build and link for its sibling?",
+        in_ci: true,
+        run: steps::esp32::run,
+    },
+    Step {
         name: "package",
         about: "would each crate, as committed, build from its package?",
         in_ci: true,

@@ -106,6 +106,17 @@ pub fn install(repository: &Repository, packages: &[&str]) -> Result<(), Failure
         .map_err(missing)
 }
 
+/// A program of a Python package, which is installed into a place of its own when it is missing.
+pub fn python_tool(repository: &Repository, package: &str, tool: &str) -> Result<Command, Failure> {
+    let place = repository.target("python").join(package);
+    let program = |name: &str| place.join("bin").join(name).to_string_lossy().into_owned();
+    if !Path::new(&program(tool)).exists() {
+        run(repository.command("python3").args(["-m", "venv"]).arg(&place))?;
+        run(repository.command(&program("pip")).args(["install", "--quiet", package]))?;
+    }
+    Ok(repository.command(&program(tool)))
+}
+
 /// Makes rustup install targets that are missing.
 pub fn add_targets(repository: &Repository, targets: &[&str]) -> Result<(), Failure> {
     if !exists("rustup") {

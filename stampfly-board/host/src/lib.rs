@@ -3,6 +3,7 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`simulate`] | one simulated vehicle with its whole flight stack, on virtual time |
+//! | [`sensing`] | what feeds its bus: models of the sensors, or the drivers over emulated chips |
 //! | [`mission`], [`ground_station`] | what to fly, and who asks the vehicle for it |
 //! | [`metrics`] | how good a flight was |
 //! | [`campaign`] | many flights in parallel |
@@ -32,6 +33,7 @@ pub mod mission;
 pub mod recorder;
 pub mod replay;
 pub mod report;
+pub mod sensing;
 pub mod simulate;
 
 pub use dataset::Recording;

@@ -11,22 +11,20 @@ use crate::ground_station::{self, Progress};
 use crate::metrics::{Collector, Instant, Metrics};
 use crate::mission::Mission;
 use crate::recorder::Recorder;
+use crate::sensing::{self, Healths, Models, Sensing, Shared, Topics};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stampfly_board::messages::ButtonContact;
-use stampfly_board::vehicle::assemble;
+use stampfly_board::vehicle::{Outside, assemble};
 use stampfly_board::{FlightLoop, Pending, VehicleConfig, wiring};
 use stampfly_bus::Band;
-use stampfly_drivers::{
-    Barometer, Button, Imu, Indicator, Magnetometer, MotionCapture, MotorOutputs, OpticalFlow, PowerMonitor,
-    RangeFinder, Sample,
-};
+use stampfly_drivers::{Button, Indicator, MotorOutputs};
+use stampfly_sim::chips;
 use stampfly_sim::sensors::{MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig, Truth};
 use stampfly_types::messages::{FlightState, MotorOutput, Setpoint, StateEstimate, SystemMode};
 use stampfly_types::{Message, Micros, Quat, Vec3, frame};
-use std::convert::Infallible;
 use std::time::Instant as WallInstant;
 
 /// All that decides a flight.
@@ -38,6 +36,8 @@ pub struct FlightConfig {
     pub vehicle: VehicleConfig,
     /// What to fly.
     pub mission: Mission,
+    /// What the sensor tasks read.
+    pub sensing: Sensing,
     /// Is the vehicle watched by a motion capture system?
     pub cameras: bool,
     /// Seed of the executor's delays; `None` for an executor that is never late.
@@ -54,6 +54,7 @@ impl FlightConfig {
             simulation: SimulationConfig { seed, ..SimulationConfig::default() },
             vehicle: VehicleConfig::default(),
             mission: Mission::parse(crate::mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
+            sensing: Sensing::Models,
             cameras: false,
             jitter: None,
             limit: Micros::from_secs(180),
@@ -188,19 +189,6 @@ impl Watch {
     }
 }
 
-/// Publishes a sensor's samples for as long as it delivers them.
-macro_rules! pump {
-    ($sensor:expr, $publisher:expr) => {{
-        let (mut sensor, mut publisher) = ($sensor, $publisher);
-        async move {
-            loop {
-                let Ok::<Sample<_>, Infallible>(sample) = sensor.next().await;
-                publisher.publish(sample.at, &sample.data);
-            }
-        }
-    }};
-}
-
 /// How late the executor is, drawn from a seed.
 struct Jitter {
     random: Option<ChaCha8Rng>,
@@ -246,17 +234,27 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let mut flight_loop = FlightLoop::new(vehicle, heads, start);
     recorder.begin(start, &config.vehicle);
 
-    let progress = Progress::default();
+    let (progress, health) = (Progress::default(), Healths::default());
+    let board = chips::Board::new(&world, &clock, &config.simulation, &sensing::IMAGE);
+    let mut shared = Shared::new(&clock, &board.i2c);
     let mut tasks = Tasks::new(clock.clone());
-    tasks.spawn(pump!(imu, outside.imu));
-    tasks.spawn(pump!(tof, outside.tof));
-    tasks.spawn(pump!(flow, outside.flow));
-    tasks.spawn(pump!(mag, outside.mag));
-    tasks.spawn(pump!(baro, outside.baro));
-    if config.cameras {
-        tasks.spawn(pump!(cameras, outside.cameras));
+    let Outside {
+        imu: to_imu, tof: to_tof, tof_front, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power, ..
+    } = outside;
+    let topics =
+        Topics { imu: to_imu, tof: to_tof, tof_front, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power };
+    match config.sensing {
+        Sensing::Models => {
+            let models = Models { imu, tof, flow, mag, baro, power };
+            sensing::start_models(&mut tasks, &clock, models, topics, &health);
+        }
+        Sensing::Chips => {
+            sensing::start_drivers(&mut tasks, &clock, board, &mut shared, topics, &health);
+        }
     }
-    tasks.spawn(pump!(power, outside.power));
+    if config.cameras {
+        sensing::start_cameras(&mut tasks, &clock, cameras, outside.cameras, &health);
+    }
     tasks.spawn(watch_button(clock.clone(), button, outside.button));
     tasks.spawn(ground_station::fly(clock.clone(), &config.mission, outside.guided, outside.telemetry, &progress));
 

@@ -79,7 +79,11 @@ impl Runnable for ModeManager<'_> {
     }
 
     fn run(&mut self, activation: &mut Activation) {
-        let commands: Vec<GuidedKind, 16> = self.commands.iter().map(|s| s.data.kind).collect();
+        let mut commands = Vec::<GuidedKind, 16>::new();
+        for command in &self.commands {
+            // As many as the queue holds.
+            let _ = commands.push(command.data.kind);
+        }
         let input = ModeInput {
             alerts: self.alerts,
             estimate: &self.estimate,

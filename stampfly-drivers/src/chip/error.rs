@@ -9,7 +9,7 @@ use core::fmt::Debug;
 pub enum ChipError<E> {
     /// The bus refused or garbled the transfer.
     Bus(E),
-    /// The transfer took longer than 10 ms and was given up.
+    /// The transfer took longer than its length allows ([`TransferLimit`](super::TransferLimit)) and was given up.
     BusTimeout,
     /// The chip answers but made no new sample in time.
     NoSample,
@@ -18,6 +18,10 @@ pub enum ChipError<E> {
         /// The identification that was read.
         found: u16,
     },
+    /// A pin of the chip could not be set.
+    Pin,
+    /// Another chip answers at the address this one starts up with, so it is kept in reset.
+    AddressTaken,
     /// The configuration handed to the driver cannot be, so nothing was sent.
     InvalidConfiguration,
     /// The chip did not start or did not keep what was written; this is its status register, or what it kept.
@@ -39,8 +43,10 @@ impl<E: Debug> SensorError for ChipError<E> {
             Self::Bus(_) => SensorErrorKind::Bus,
             Self::BusTimeout | Self::NoSample => SensorErrorKind::Timeout,
             Self::Identification { .. } => SensorErrorKind::Identification,
-            Self::InvalidConfiguration | Self::Configuration { .. } => SensorErrorKind::Configuration,
-            Self::Restarted => SensorErrorKind::Other,
+            Self::InvalidConfiguration | Self::Configuration { .. } | Self::AddressTaken => {
+                SensorErrorKind::Configuration
+            }
+            Self::Restarted | Self::Pin => SensorErrorKind::Other,
             Self::SelfTest => SensorErrorKind::SelfTest,
             Self::Data => SensorErrorKind::Data,
         }

@@ -7,6 +7,7 @@
 //! | [`bmp280`] | Bosch BMP280 | air pressure | I2C | [`Barometer`](crate::Barometer) |
 //! | [`ina3221`] | TI INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
 //! | [`bmm150`] | Bosch BMM150 | magnetic field | I2C | [`Magnetometer`](crate::Magnetometer) |
+//! | [`vl53l3cx`] | ST VL53L3CX | distance | I2C | [`RangeFinder`](crate::RangeFinder) |
 //!
 //! # How every one of them is built
 //! * A **codec** of registers, scales and formulas: pure functions and plain structs, each with its data sheet section.
@@ -15,8 +16,8 @@
 //!
 //! # What every one of them promises
 //! * Creating it does no I/O. The first `next` sets the chip up; so does `start`, for who wants to know early.
-//! * A transfer that takes longer than 10 ms is given up ([`ChipError::BusTimeout`]), and so is a chip that makes no
-//!   new sample in time ([`ChipError::NoSample`]).
+//! * A transfer that takes longer than its length allows ([`TransferLimit`]) is given up ([`ChipError::BusTimeout`]),
+//!   and so is a chip that makes no new sample in time ([`ChipError::NoSample`]).
 //! * Every read brings back whether the chip still holds its configuration. One that lost it (brown-out, ESD) is
 //!   [`ChipError::Restarted`] once, and the next call sets it up again.
 //!
@@ -26,9 +27,9 @@
 //!
 //! # Recovery of the bus
 //! Drivers share a bus with others, so they do not clock a stuck slave free or reset the peripheral: that is the
-//! bus owner's work (nine clocks on SCL with SDA released, then STOP; I2C specification UM10204 §3.1.16). A driver
-//! reports [`ChipError::Bus`] or [`ChipError::BusTimeout`] for one call and tries again at the next; a board that
-//! sees those from every device of a bus recovers the bus.
+//! bus owner's work, with [`recover_i2c`](crate::recover_i2c). A driver reports [`ChipError::Bus`] or
+//! [`ChipError::BusTimeout`] for one call and tries again at the next; a board that sees those from every device of a
+//! bus recovers the bus.
 
 mod axis;
 pub mod bmi270;
@@ -36,9 +37,12 @@ pub mod bmm150;
 pub mod bmp280;
 mod error;
 pub mod ina3221;
+mod limit;
 pub mod pmw3901;
 mod port;
+pub mod vl53l3cx;
 
 pub use axis::{Axis, AxisMap};
 pub use error::ChipError;
+pub use limit::TransferLimit;
 pub use port::{I2cRegisters, Registers, SpiRegisters};

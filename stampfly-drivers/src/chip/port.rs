@@ -1,6 +1,6 @@
 //! A chip as registers of bytes, whichever wires it hangs on.
 
-use super::ChipError;
+use super::{ChipError, TransferLimit};
 use crate::Timebase;
 use crate::time::{sleep_until, within};
 use core::fmt::Debug;
@@ -8,29 +8,27 @@ use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
 use stampfly_types::Micros;
 
-/// The longest a transfer may take, waiting for other devices of the bus included: three times the longest of the
-/// StampFly (a range read-out, 134 bytes at 400 kHz).
-const BUS_LIMIT: Micros = Micros::from_millis(10);
-
-/// Registers with addresses of one byte that count up by themselves.
-pub trait Registers {
+/// Registers that count up by themselves; `A` is their address, of one byte or of two.
+pub trait Registers<A = u8> {
     /// The bus's error.
     type Error: Debug;
+    /// How long a transfer on these wires may take.
+    const LIMIT: TransferLimit;
 
     /// Reads registers from `register` on.
     ///
     /// # Errors
     /// When the bus refuses.
-    async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), Self::Error>;
+    async fn read(&mut self, register: A, into: &mut [u8]) -> Result<(), Self::Error>;
 
     /// Writes registers from `register` on.
     ///
     /// # Errors
     /// When the bus refuses.
-    async fn write(&mut self, register: u8, data: &[u8]) -> Result<(), Self::Error>;
+    async fn write(&mut self, register: A, data: &[u8]) -> Result<(), Self::Error>;
 }
 
-/// Registers behind an I2C address.
+/// Registers behind an I2C address; addresses of two bytes go out high byte first.
 #[derive(Debug)]
 pub struct I2cRegisters<I> {
     bus: I,
@@ -42,19 +40,41 @@ impl<I: I2c> I2cRegisters<I> {
     pub const fn new(bus: I, address: u8) -> Self {
         Self { bus, address }
     }
+
+    async fn read_after(&mut self, register: &[u8], into: &mut [u8]) -> Result<(), I::Error> {
+        self.bus.write_read(self.address, register, into).await
+    }
+
+    async fn write_after(&mut self, register: &[u8], data: &[u8]) -> Result<(), I::Error> {
+        // Two writes in one transaction go out without a second start: no buffer needed to join them.
+        let mut operations = [i2c::Operation::Write(register), i2c::Operation::Write(data)];
+        self.bus.transaction(self.address, &mut operations).await
+    }
 }
 
 impl<I: I2c> Registers for I2cRegisters<I> {
     type Error = I::Error;
+    const LIMIT: TransferLimit = TransferLimit::I2C;
 
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), I::Error> {
-        self.bus.write_read(self.address, &[register], into).await
+        self.read_after(&[register], into).await
     }
 
     async fn write(&mut self, register: u8, data: &[u8]) -> Result<(), I::Error> {
-        // Two writes in one transaction go out without a second start: no buffer needed to join them.
-        let mut operations = [i2c::Operation::Write(&[register]), i2c::Operation::Write(data)];
-        self.bus.transaction(self.address, &mut operations).await
+        self.write_after(&[register], data).await
+    }
+}
+
+impl<I: I2c> Registers<u16> for I2cRegisters<I> {
+    type Error = I::Error;
+    const LIMIT: TransferLimit = TransferLimit::I2C;
+
+    async fn read(&mut self, register: u16, into: &mut [u8]) -> Result<(), I::Error> {
+        self.read_after(&register.to_be_bytes(), into).await
+    }
+
+    async fn write(&mut self, register: u16, data: &[u8]) -> Result<(), I::Error> {
+        self.write_after(&register.to_be_bytes(), data).await
     }
 }
 
@@ -65,6 +85,7 @@ pub struct SpiRegisters<S>(pub S);
 
 impl<S: SpiDevice> Registers for SpiRegisters<S> {
     type Error = S::Error;
+    const LIMIT: TransferLimit = TransferLimit::SPI;
 
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), S::Error> {
         // The dummy byte is clocked in while a second byte is clocked out.
@@ -83,19 +104,37 @@ pub(crate) struct Port<R, T> {
     clock: T,
 }
 
-impl<R: Registers, T: Timebase> Port<R, T> {
+impl<R, T: Timebase> Port<R, T> {
     pub(crate) const fn new(registers: R, clock: T) -> Self {
         Self { registers, clock }
     }
 
-    pub(crate) async fn read<const N: usize>(&mut self, register: u8) -> Result<[u8; N], ChipError<R::Error>> {
+    pub(crate) async fn read<A, const N: usize>(&mut self, register: A) -> Result<[u8; N], ChipError<R::Error>>
+    where
+        R: Registers<A>,
+    {
         let mut bytes = [0; N];
-        bounded(&self.clock, self.registers.read(register, &mut bytes)).await?;
+        bounded(&self.clock, R::LIMIT.of(N), self.registers.read(register, &mut bytes)).await?;
         Ok(bytes)
     }
 
-    pub(crate) async fn write(&mut self, register: u8, data: &[u8]) -> Result<(), ChipError<R::Error>> {
-        bounded(&self.clock, self.registers.write(register, data)).await
+    /// Reads what will be believed until the next start, such as calibration: twice, and refuses it unless both agree.
+    pub(crate) async fn read_twice<A: Copy, const N: usize>(
+        &mut self,
+        register: A,
+    ) -> Result<[u8; N], ChipError<R::Error>>
+    where
+        R: Registers<A>,
+    {
+        let first = self.read(register).await?;
+        if self.read(register).await? == first { Ok(first) } else { Err(ChipError::Data) }
+    }
+
+    pub(crate) async fn write<A>(&mut self, register: A, data: &[u8]) -> Result<(), ChipError<R::Error>>
+    where
+        R: Registers<A>,
+    {
+        bounded(&self.clock, R::LIMIT.of(data.len()), self.registers.write(register, data)).await
     }
 
     pub(crate) fn now(&self) -> Micros {
@@ -107,15 +146,28 @@ impl<R: Registers, T: Timebase> Port<R, T> {
         self.wait_until(instant).await;
     }
 
+    /// The outcome of a future, or `None` when it is not there at `instant`.
+    pub(crate) async fn until<F: Future>(&self, instant: Micros, future: F) -> Option<F::Output> {
+        within(&self.clock, instant.since(self.now()), future).await
+    }
+
     pub(crate) async fn wait_until(&mut self, instant: Micros) {
         sleep_until(&mut self.clock, instant).await;
     }
 }
 
-/// A transfer, given up after [`BUS_LIMIT`].
+impl<I, T> Port<I2cRegisters<I>, T> {
+    /// Talks to another address from now on, for chips that move.
+    pub(crate) const fn move_to(&mut self, address: u8) {
+        self.registers.address = address;
+    }
+}
+
+/// A transfer, given up after `limit`.
 pub(crate) async fn bounded<T: Timebase, V, E>(
     clock: &T,
+    limit: Micros,
     transfer: impl Future<Output = Result<V, E>>,
 ) -> Result<V, ChipError<E>> {
-    within(clock, BUS_LIMIT, transfer).await.ok_or(ChipError::BusTimeout)?.map_err(ChipError::Bus)
+    within(clock, limit, transfer).await.ok_or(ChipError::BusTimeout)?.map_err(ChipError::Bus)
 }

@@ -86,7 +86,8 @@ impl History {
     /// Newest first.
     #[inline]
     fn backwards(&self) -> impl Iterator<Item = &Stretch> {
-        let (older, newer) = self.stretches.split_at(self.newest + 1);
+        let all = (&self.stretches[..], &[][..]);
+        let (older, newer) = self.stretches.split_at_checked(self.newest + 1).unwrap_or(all);
         older.iter().rev().chain(newer.iter().rev()).take_while(|stretch| stretch.length > 0.0)
     }
 

@@ -23,9 +23,16 @@ const RECOVERY: u8 = 9;
 const STREAM: u64 = 101;
 
 struct Device {
-    address: u8,
+    /// The address it was soldered to.
+    soldered: u8,
     chip: Rc<RefCell<dyn I2cChip>>,
     attached: Attached,
+}
+
+impl Device {
+    fn answers(&self, address: u8) -> bool {
+        self.chip.borrow().address(self.soldered) == Some(address)
+    }
 }
 
 struct State {
@@ -58,7 +65,8 @@ pub struct I2cBus(Rc<State>);
 
 impl core::fmt::Debug for I2cBus {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let addresses: Vec<u8> = self.0.devices.borrow().iter().map(|device| device.address).collect();
+        let addresses: Vec<u8> =
+            self.0.devices.borrow().iter().filter_map(|device| device.chip.borrow().address(device.soldered)).collect();
         f.debug_struct("I2cBus").field("addresses", &addresses).field("held", &self.0.held).finish_non_exhaustive()
     }
 }
@@ -80,7 +88,7 @@ impl I2cBus {
     pub fn attach(&self, address: u8, chip: impl I2cChip + 'static) -> Attached {
         let chip = Rc::new(RefCell::new(chip));
         let attached = Attached::new(&self.0.clock, chip.clone());
-        self.0.devices.borrow_mut().push(Device { address, chip, attached: attached.clone() });
+        self.0.devices.borrow_mut().push(Device { soldered: address, chip, attached: attached.clone() });
         attached
     }
 
@@ -100,9 +108,14 @@ impl I2cBus {
         self.0.held.set(self.0.held.get().saturating_sub(1));
     }
 
+    /// The clock it runs on.
+    pub(super) fn clock(&self) -> Clock {
+        self.0.clock.clone()
+    }
+
     fn faults(&self, address: u8) -> Option<Faults> {
         let devices = self.0.devices.borrow();
-        devices.iter().find(|device| device.address == address).map(|device| device.attached.faults())
+        devices.iter().find(|device| device.answers(address)).map(|device| device.attached.faults())
     }
 
     /// Takes the bus. Returns the start, the end, and what is already known to fail.
@@ -125,7 +138,7 @@ impl I2cBus {
     /// Exchanges the bytes of a transfer that began at `start`.
     fn exchange(&self, address: u8, operations: &mut [Operation<'_>], start: Micros) -> Result<(), BusError> {
         let devices = self.0.devices.borrow();
-        let Some(device) = devices.iter().find(|device| device.address == address) else {
+        let Some(device) = devices.iter().find(|device| device.answers(address)) else {
             return Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address));
         };
         let errors = device.attached.faults().bit_errors;

@@ -18,6 +18,7 @@
 //! | [`Bmi270`] | [`SpiBus`] | up to 10 MHz | BST-BMI270-DS000 |
 //! | [`Bmm150`] | [`I2cBus`] | 0x10 | BST-BMM150-DS001 |
 //! | [`Pmw3901`] | [`SpiBus`] | up to 2 MHz | PixArt PMW3901MB |
+//! | [`Vl53l3cx`] | [`I2cBus`] | 0x29, can be moved | ST DS13204 |
 //!
 //! | fault | where |
 //! |---|---|
@@ -28,20 +29,26 @@
 mod bmi270;
 mod bmm150;
 mod bmp280;
+mod board;
 mod fault;
 mod i2c;
 mod ina3221;
+mod lines;
 mod pmw3901;
 mod spi;
+mod vl53l3cx;
 
 pub use bmi270::Bmi270;
 pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
+pub use board::{AttachedChips, Board, stand_in_image};
 pub use fault::{Attached, Faults};
 pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
+pub use lines::{ClockLine, DataLine};
 pub use pmw3901::Pmw3901;
 pub use spi::{SpiBus, SpiPort};
+pub use vl53l3cx::{ShutdownPin, Vl53l3cx};
 
 use core::fmt;
 use embedded_hal::i2c::NoAcknowledgeSource;
@@ -64,6 +71,11 @@ pub trait Chip: fmt::Debug {
 
 /// A chip that can sit on an [`I2cBus`]: how it maps bytes to registers.
 pub trait I2cChip: Chip {
+    /// The address the chip answers to now; `None` when it is held in reset. Most chips keep the one they were
+    /// soldered to.
+    fn address(&self, soldered: u8) -> Option<u8> {
+        Some(soldered)
+    }
     /// Takes byte number `index` after a (repeated) start in write direction. `false` is no acknowledge.
     fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool;
     /// Gives byte number `index` after a (repeated) start in read direction.

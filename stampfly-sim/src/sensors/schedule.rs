@@ -28,6 +28,11 @@ impl Schedule {
         Micros((self.first + number as f64 * self.period) as u64)
     }
 
+    /// Periods between conversion zero and the end of this microsecond; at the instant of a conversion at least its number.
+    pub(crate) fn phase(&self, at: Micros) -> f64 {
+        (at.0 as f64 + 1.0 - self.first) / self.period
+    }
+
     /// The conversion to report next: the one after the last reported, unless newer ones have already replaced it
     /// in the chip's registers by `now`. A conversion can be read `latency` microseconds after its instant.
     pub(crate) fn upcoming(&self, now: Micros, latency: f64) -> u64 {

@@ -10,7 +10,7 @@ use stampfly_drivers::{RangeFinder, Sample};
 use stampfly_types::Micros;
 use stampfly_types::messages::TofData;
 
-const RATE: f64 = 30.0;
+pub(crate) const RATE: f64 = 30.0;
 /// Reading 134 bytes over a 400 kHz bus.
 const READ_OUT: Micros = Micros(3_200);
 /// Shortest range that can be told from the cover glass, m.
@@ -38,63 +38,36 @@ pub enum Mount {
     Front,
 }
 
-/// The model of a range finder. Implements [`RangeFinder`].
-///
-/// `Sample::at` is the middle of the measurement; the sample is delivered one read-out after its end.
-///
-/// ```
-/// use stampfly_drivers::RangeFinder;
-/// use stampfly_sim::sensors::{Mount, RangeModel};
-/// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
-///
-/// let mut simulation = Simulation::new(&SimulationConfig::default());
-/// let Ok(sample) = block_on(&simulation.clock, simulation.sensors.tof.next());
-/// assert!(sample.data.valid && (sample.data.distance - 0.03).abs() < 0.01, "standing");
-///
-/// // A second one, looking forward, for vehicles that have it.
-/// let mut front = RangeModel::new(&simulation.world, &simulation.clock, 1, Mount::Front);
-/// let Ok(sample) = block_on(&simulation.clock, front.next());
-/// assert!(!sample.data.valid, "no wall in sight");
-/// ```
+/// What the beam meets and what the chip makes of it, shared by the model and the register-level emulator.
 #[derive(Debug)]
-pub struct RangeModel {
+pub(crate) struct RangePhysics {
     world: World,
-    clock: Clock,
     noise: Noise,
-    schedule: Schedule,
     beam: Vector3<f64>,
     /// Offset of this specimen, m.
     offset: f64,
 }
 
-impl RangeModel {
-    /// A range finder looking down or forward.
-    #[must_use]
-    pub fn new(world: &World, clock: &Clock, seed: u64, mount: Mount) -> Self {
+impl RangePhysics {
+    /// The physics and the times of its measurements.
+    pub(crate) fn new(world: &World, start: Micros, seed: u64, mount: Mount) -> (Self, Schedule) {
         let (stream, beam) = match mount {
             Mount::Bottom => (Stream::BottomTof, Vector3::z()),
             Mount::Front => (Stream::FrontTof, Vector3::x()),
         };
         let mut noise = Noise::stream(seed, stream);
-        Self {
-            schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
-            offset: noise.within(0.003),
-            noise,
-            beam,
-            world: world.clone(),
-            clock: clock.clone(),
-        }
+        let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
+        (Self { offset: noise.within(0.003), noise, beam, world: world.clone() }, schedule)
     }
 
-    /// The true distance along the beam to the floor at `instant`; `None` when the beam misses it.
-    #[must_use]
-    pub fn true_distance(&self, instant: Micros) -> Option<f64> {
+    fn true_distance(&self, instant: Micros) -> Option<f64> {
         let motion = self.world.motion_at(instant);
         let slope = (motion.attitude * self.beam).z;
         (slope > 1e-3).then(|| -motion.position.z / slope)
     }
 
-    fn measure(&mut self, instant: Micros) -> TofData {
+    /// A measurement around `instant`.
+    pub(crate) fn measure(&mut self, instant: Micros) -> TofData {
         let distance = self.true_distance(instant);
         // The same number of draws whatever happens, so that one flight's noise does not depend on its course.
         let (lost, normal) = (self.noise.chance(DROPOUTS), self.noise.normal());
@@ -116,6 +89,46 @@ impl RangeModel {
     }
 }
 
+/// The model of a range finder. Implements [`RangeFinder`].
+///
+/// `Sample::at` is the middle of the measurement; the sample is delivered one read-out after its end.
+///
+/// ```
+/// use stampfly_drivers::RangeFinder;
+/// use stampfly_sim::sensors::{Mount, RangeModel};
+/// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
+///
+/// let mut simulation = Simulation::new(&SimulationConfig::default());
+/// let Ok(sample) = block_on(&simulation.clock, simulation.sensors.tof.next());
+/// assert!(sample.data.valid && (sample.data.distance - 0.03).abs() < 0.01, "standing");
+///
+/// // A second one, looking forward, for vehicles that have it.
+/// let mut front = RangeModel::new(&simulation.world, &simulation.clock, 1, Mount::Front);
+/// let Ok(sample) = block_on(&simulation.clock, front.next());
+/// assert!(!sample.data.valid, "no wall in sight");
+/// ```
+#[derive(Debug)]
+pub struct RangeModel {
+    clock: Clock,
+    schedule: Schedule,
+    physics: RangePhysics,
+}
+
+impl RangeModel {
+    /// A range finder looking down or forward.
+    #[must_use]
+    pub fn new(world: &World, clock: &Clock, seed: u64, mount: Mount) -> Self {
+        let (physics, schedule) = RangePhysics::new(world, clock.now(), seed, mount);
+        Self { physics, schedule, clock: clock.clone() }
+    }
+
+    /// The true distance along the beam to the floor at `instant`; `None` when the beam misses it.
+    #[must_use]
+    pub fn true_distance(&self, instant: Micros) -> Option<f64> {
+        self.physics.true_distance(instant)
+    }
+}
+
 impl RangeFinder for RangeModel {
     type Error = Infallible;
 
@@ -127,6 +140,6 @@ impl RangeFinder for RangeModel {
         self.clock.sleep_until(begin + Micros(latency as u64)).await;
         self.schedule.reported(number);
         let at = begin + Micros((0.5 * period) as u64);
-        Ok(Sample { at, data: self.measure(at) })
+        Ok(Sample { at, data: self.physics.measure(at) })
     }
 }

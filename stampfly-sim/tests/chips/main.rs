@@ -7,6 +7,7 @@ mod bmp280;
 mod bus;
 mod ina3221;
 mod pmw3901;
+mod vl53l3cx;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};

@@ -1,7 +1,7 @@
 //! `ulog`: the tools of the format's own authors open the log of a flight and find samples in it.
 
 use crate::Failure;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::repository::{Repository, capture, python_tool, run as run_program};
 use std::fs;
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
@@ -19,19 +19,12 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
         _ => return Err("one log at a time".to_owned()),
     };
 
-    let tools = folder.join("python/bin");
-    if !tools.join("ulog_info").exists() {
-        run_program(repository.command("python3").args(["-m", "venv"]).arg(folder.join("python")))?;
-        run_program(repository.command(&tools.join("pip").to_string_lossy()).args(["install", "--quiet", "pyulog"]))?;
-    }
-    let tool = |name: &str| repository.command(&tools.join(name).to_string_lossy());
-
-    let (info, _) = capture(tool("ulog_info").arg(&log))?;
+    let (info, _) = capture(python_tool(repository, "pyulog", "ulog_info")?.arg(&log))?;
     println!("{info}");
     let tables = folder.join("csv");
     let _ = fs::remove_dir_all(&tables);
     fs::create_dir_all(&tables).map_err(io)?;
-    run_program(tool("ulog2csv").arg("-o").arg(&tables).arg(&log))?;
+    run_program(python_tool(repository, "pyulog", "ulog2csv")?.arg("-o").arg(&tables).arg(&log))?;
 
     let mut rows = 0;
     let mut topics = 0;

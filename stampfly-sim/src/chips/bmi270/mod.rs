@@ -29,6 +29,9 @@
 //! A read goes on to the next register, except at 0x26 and 0x5E. In advanced power save neither the FIFO nor the
 //! upload can be reached, and writes need 450 µs between them, otherwise 2 µs (DS 4.4, 6.5).
 //!
+//! The time counts sixteen ticks a sample and a sample falls on a multiple of them: Bosch says so of this part's
+//! siblings (BMI160, 2.3.1 table 11; BMA400, "Sensor Time") and their drivers rely on it.
+//!
 //! *Unverified*: that accesses in the 2 ms of a start are ignored and read as zero; that writes too close together are
 //! lost; that data of an upload that was not announced by a zero in 0x59 is ignored; that sensors do not start before the upload has succeeded; 10 ms from the end of an upload to its result;
 //! first data 2 ms (accelerometer) and 45 ms (gyroscope) after being switched on; the plain mean as filter at rates
@@ -218,8 +221,7 @@ impl Bmi270 {
 
     /// The chip's 24-bit time at `at`.
     fn time(&self, at: Micros) -> [u8; 3] {
-        let pace = self.schedule.period() / 625.0;
-        let ticks = (at.since(self.epoch).0 as f64 / pace / 39.0625) as u32;
+        let ticks = (16.0 * (self.schedule.phase(at) - self.schedule.phase(self.epoch).floor())) as u32;
         let [low, middle, high, _] = ticks.to_le_bytes();
         [low, middle, high]
     }

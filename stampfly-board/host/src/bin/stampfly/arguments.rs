@@ -6,6 +6,7 @@ use stampfly_board::{VehicleConfig, parameters};
 use stampfly_host::dataset::Kind;
 use stampfly_host::estimate::{ATTITUDE, suite};
 use stampfly_host::mission::Mission;
+use stampfly_host::sensing::Sensing;
 use stampfly_host::simulate::FlightConfig;
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -63,6 +64,9 @@ pub struct SceneOptions {
     /// Mean wind towards north and east, m/s.
     #[arg(long, value_name = "N,E", value_parser = north_and_east, allow_hyphen_values = true)]
     pub wind: Option<[f32; 2]>,
+    /// Run the real drivers over emulated chips instead of sensor models.
+    #[arg(long)]
+    pub chips: bool,
     /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
     #[arg(long)]
     pub cameras: bool,
@@ -86,6 +90,7 @@ impl Default for SceneOptions {
             vibration: 1.0,
             gust: None,
             wind: None,
+            chips: false,
             cameras: false,
             jitter: None,
             list: false,
@@ -268,6 +273,7 @@ impl SceneOptions {
             config.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
         set_parameters(&mut config.vehicle, &self.param)?;
+        config.sensing = if self.chips { Sensing::Chips } else { Sensing::Models };
         config.cameras = self.cameras;
         config.jitter = self.jitter;
         Ok(config)

@@ -1,0 +1,34 @@
+//! The time of the vehicle: microseconds since power-on, from the chip's 64-bit counter.
+
+use embassy_time::Timer;
+use embedded_hal_async::delay::DelayNs;
+use esp_hal::time::Instant;
+use stampfly_drivers::Timebase;
+use stampfly_types::Micros;
+
+/// Waits shorter than this are spent waiting: putting a task to sleep and waking it costs about as much.
+const SHORT: Micros = Micros(10);
+
+/// The vehicle's clock. There is one counter; every copy reads it.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock;
+
+impl Timebase for Clock {
+    fn now(&self) -> Micros {
+        Micros(Instant::now().duration_since_epoch().as_micros())
+    }
+}
+
+impl DelayNs for Clock {
+    async fn delay_ns(&mut self, ns: u32) {
+        let span = Micros(u64::from(ns.div_ceil(1_000)));
+        if span >= SHORT {
+            return Timer::after_micros(span.0).await;
+        }
+        // One more, because the present microsecond has already begun.
+        let end = self.now() + span + Micros(1);
+        while self.now() < end {
+            core::hint::spin_loop();
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The cut-off: a hardware timer that stops the motors when nobody controls them any more.
+//!
+//! It has a timer and an interrupt of its own, on the core that does not fly, and takes no lock. So it works when the
+//! flight task waits for a bus that has died, when its executor is stuck, and when its core has stopped with interrupts
+//! off. Once it has acted, motors stay off until the flight task says that it is disarmed.
+
+use crate::motors;
+use core::ptr::null_mut;
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering};
+use esp_hal::Blocking;
+use esp_hal::handler;
+use esp_hal::interrupt::Priority;
+use esp_hal::time::{Duration, Instant};
+use esp_hal::timer::PeriodicTimer;
+use esp_hal::timer::timg::Timer;
+use static_cell::StaticCell;
+
+/// Motors that nobody has confirmed for this long are stopped.
+const PATIENCE: Duration = Duration::from_millis(25);
+/// How often the timer looks. Motors turn for at most `PATIENCE` and this after the last confirmation.
+const PERIOD: Duration = Duration::from_millis(1);
+
+/// When the flight task last confirmed that it controls the motors: the low bits of the time in microseconds, which is
+/// plenty for differences of milliseconds.
+static CONFIRMED: AtomicU32 = AtomicU32::new(0);
+/// May the motors turn? While they may not, there is nothing to cut.
+static ARMED: AtomicBool = AtomicBool::new(false);
+static TRIPPED: AtomicBool = AtomicBool::new(false);
+/// Set by a panic: the motors stay off until the vehicle is switched off.
+static FOR_GOOD: AtomicBool = AtomicBool::new(false);
+/// The timer, for the interrupt only.
+static TIMER: AtomicPtr<PeriodicTimer<'static, Blocking>> = AtomicPtr::new(null_mut());
+
+fn now() -> u32 {
+    Instant::now().duration_since_epoch().as_micros() as u32
+}
+
+/// Starts to watch. Called on the core that does not fly.
+pub fn start(timer: Timer<'static>) {
+    static CELL: StaticCell<PeriodicTimer<'static, Blocking>> = StaticCell::new();
+    let timer = CELL.init(PeriodicTimer::new(timer));
+    timer.set_interrupt_handler(look);
+    timer.start(PERIOD).expect("a millisecond is within the timer's range");
+    timer.listen();
+    TIMER.store(timer, Ordering::Release);
+}
+
+/// The flight task controls the motors: to be said with every output. `armed` says whether they may turn.
+pub fn confirm(armed: bool) {
+    CONFIRMED.store(now(), Ordering::Relaxed);
+    ARMED.store(armed, Ordering::Release);
+}
+
+/// Has the cut-off acted, and nobody reset it since?
+pub fn has_tripped() -> bool {
+    TRIPPED.load(Ordering::Acquire) || FOR_GOOD.load(Ordering::Acquire)
+}
+
+/// Lets the motors turn again. Returns whether they may.
+pub fn reset() -> bool {
+    let allowed = !FOR_GOOD.load(Ordering::Acquire);
+    if allowed {
+        TRIPPED.store(false, Ordering::Release);
+    }
+    allowed
+}
+
+/// Stops the motors until the vehicle is switched off.
+pub fn trip_for_good() {
+    FOR_GOOD.store(true, Ordering::Release);
+    TRIPPED.store(true, Ordering::Release);
+    motors::cut();
+}
+
+#[handler(priority = Priority::Priority3)]
+fn look() {
+    // SAFETY: the pointer is null or leads to the static timer, which `start` has handed over to this function and does
+    // not touch again; an interrupt does not interrupt itself.
+    if let Some(timer) = unsafe { TIMER.load(Ordering::Acquire).as_mut() } {
+        timer.clear_interrupt();
+    }
+    let age = now().wrapping_sub(CONFIRMED.load(Ordering::Relaxed));
+    if ARMED.load(Ordering::Acquire) && age > PATIENCE.as_micros() as u32 {
+        TRIPPED.store(true, Ordering::Release);
+    }
+    // Again and again: whatever gave the pins back, tripped means off.
+    if has_tripped() {
+        motors::cut();
+    }
+}

@@ -1,0 +1,125 @@
+//! The StampFly's firmware: the assembly of `stampfly-board` on an ESP32-S3.
+//!
+//! | core | what runs there |
+//! |---|---|
+//! | 1 | flight: inertial and flow sensor, every runnable, the motors |
+//! | 0 | radio, slow sensors, lights and button, console, and the cut-off that watches core 1 |
+//!
+//! Both cores have an executor in thread mode, because interrupts may not use the floating-point unit here. The code is
+//! the same on an ESP32-C6, which has one core and no StampFly around it: that build is for looking at, not for flying.
+#![no_std]
+#![no_main]
+
+extern crate alloc;
+
+mod buzzer;
+mod clock;
+mod cutoff;
+mod flight;
+mod imu_config;
+mod motors;
+mod panic;
+mod people;
+mod pins;
+mod radio;
+mod sensors;
+mod spi;
+
+use embassy_executor::Spawner;
+use esp_hal::clock::CpuClock;
+use esp_hal::ram;
+use esp_hal::timer::timg::TimerGroup;
+use pins::*;
+use stampfly_board::{VehicleConfig, vehicle, wiring};
+use static_cell::StaticCell;
+
+esp_bootloader_esp_idf::esp_app_desc!();
+
+#[esp_hal::main]
+fn main() -> ! {
+    motors::cut();
+    let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
+    // The first part is memory the boot loader has done with; the radio wants both.
+    esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
+    esp_alloc::heap_allocator!(size: 36 * 1024);
+    motors::start_unit(chip.LEDC);
+    esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
+    cutoff::start(TimerGroup::new(chip.TIMG1).timer0);
+
+    static BUS: StaticCell<wiring::Bus> = StaticCell::new();
+    let wiring::Split { ports, taps: _, heads } = BUS.init_with(wiring::Bus::new).split(None);
+    let (vehicle, outside) = vehicle::assemble(ports, &VehicleConfig::default());
+    let pins: Pins<'static> = split_resources!(chip);
+    let flight = flight::Parts {
+        vehicle,
+        heads,
+        imu: outside.imu,
+        flow: outside.flow,
+        duties: outside.motors,
+        motors: pins.motors,
+        spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi },
+    };
+    let sensors = sensors::Parts {
+        unit: chip.I2C0,
+        pins: pins.i2c,
+        range: pins.range,
+        tof: outside.tof,
+        tof_front: outside.tof_front,
+        mag: outside.mag,
+        baro: outside.baro,
+        power: outside.power,
+    };
+    let people =
+        people::Parts { pulses: chip.RMT, pins: pins.people, signal: outside.indicator, button: outside.button };
+    let radio = radio::Parts { unit: chip.WIFI, peer: None, pilot: outside.pilot, telemetry: outside.telemetry };
+    let ground = move |spawner: Spawner| {
+        spawner.spawn(sensors::run(sensors).expect("spawned once"));
+        spawner.spawn(people::run(people).expect("spawned once"));
+        spawner.spawn(radio::run(radio).expect("spawned once"));
+    };
+    let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
+
+    #[cfg(feature = "esp32s3")]
+    {
+        cores::start_second(chip.CPU_CTRL, chip.FROM_CPU_INTR1, fly);
+        cores::run(ground)
+    }
+    #[cfg(feature = "esp32c6")]
+    cores::run(move |spawner| {
+        fly(spawner);
+        ground(spawner);
+    })
+}
+
+/// Executors, one a core.
+mod cores {
+    use embassy_executor::Spawner;
+    use esp_rtos::embassy::Executor;
+    use static_cell::StaticCell;
+
+    /// Runs tasks on the core it is called on, for ever.
+    pub fn run(start: impl FnOnce(Spawner)) -> ! {
+        static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+        EXECUTOR.init(Executor::new()).run(start)
+    }
+
+    /// Runs tasks on the second core, for ever, ahead of everything the radio might do there.
+    #[cfg(feature = "esp32s3")]
+    pub fn start_second(
+        control: esp_hal::peripherals::CPU_CTRL<'static>,
+        interrupt: esp_hal::peripherals::FROM_CPU_INTR1<'static>,
+        start: impl FnOnce(Spawner) + Send + 'static,
+    ) {
+        use esp_hal::system::Stack;
+        static STACK: StaticCell<Stack<16384>> = StaticCell::new();
+        static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+        esp_rtos::start_second_core(control, interrupt, STACK.init_with(Stack::new), || {
+            esp_rtos::CurrentThreadHandle::get().set_priority(HIGHEST);
+            EXECUTOR.init(Executor::new()).run(start)
+        });
+    }
+
+    /// Of the threads of esp-rtos.
+    #[cfg(feature = "esp32s3")]
+    const HIGHEST: usize = 31;
+}

@@ -1,0 +1,57 @@
+//! Lights, buzzer and button.
+
+use crate::buzzer::Channel;
+use crate::clock::Clock;
+use crate::pins::PeoplePins;
+use embassy_time::{Duration, Ticker};
+use esp_hal::Blocking;
+use esp_hal::gpio::{Input, InputConfig, Pull};
+use esp_hal::peripherals::RMT;
+use esp_hal::rmt::Rmt;
+use esp_hal::time::Rate;
+use esp_hal_smartled::{RmtSmartLeds, WS2812B_TIMING, buffer_size, color_order};
+use smart_leds_trait::RGB8;
+use stampfly_board::messages::ButtonContact;
+use stampfly_board::wiring;
+use stampfly_drivers::{Button, Buzzer, Indicator, Lights, PinButton, Timebase};
+
+/// The clock of the unit that makes the lights' pulses.
+const PULSE_CLOCK: Rate = Rate::from_mhz(80);
+
+/// The writer of a chain of lights, with room for `N` pulses.
+type Chain<const N: usize> = RmtSmartLeds<'static, N, Blocking, RGB8, color_order::Grb>;
+
+/// What they need.
+pub struct Parts {
+    pub pulses: RMT<'static>,
+    pub pins: PeoplePins<'static>,
+    pub signal: wiring::signal::Rx<'static>,
+    pub button: wiring::button_contact::Tx<'static>,
+}
+
+/// Shows, sounds and listens for ever.
+#[embassy_executor::task]
+pub async fn run(parts: Parts) {
+    let Parts { pulses, pins, mut signal, mut button } = parts;
+    let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
+    let status: Chain<{ buffer_size::<RGB8>(1) }> =
+        Chain::new(WS2812B_TIMING, pulses.channel0, pins.status_light, PULSE_CLOCK).expect("possible pulses");
+    let body: Chain<{ buffer_size::<RGB8>(2) }> =
+        Chain::new(WS2812B_TIMING, pulses.channel1, pins.body_lights, PULSE_CLOCK).expect("possible pulses");
+    let (mut status, mut body) = (Lights::<_, 1>::status(status), Lights::<_, 2>::body(body));
+    let mut buzzer = Buzzer::new(Channel::new(pins.buzzer.into()));
+    let mut contact = PinButton(Input::new(pins.button, InputConfig::default().with_pull(Pull::Up)));
+    let mut ticker = Ticker::every(Duration::from_millis(10));
+    loop {
+        ticker.next().await;
+        let now = Clock.now();
+        button.publish(now, &ButtonContact { pressed: contact.is_pressed() });
+        if let Some(sample) = signal.latest() {
+            status.show(&sample.data);
+            body.show(&sample.data);
+            buzzer.show(&sample.data);
+        }
+        // A buzzer that refuses is tried again the next time.
+        let _ = buzzer.step(now);
+    }
+}

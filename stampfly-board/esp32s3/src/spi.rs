@@ -1,0 +1,127 @@
+//! The SPI bus: the inertial sensor and the flow sensor, each with its own speed, mode and chip select.
+//!
+//! Transfers go by DMA. A transfer that is dropped half-way releases its chip, so that the next one finds the bus in
+//! order. Both chips are deselected before the first transfer, or the one nobody talks to would talk, too. Who transfers
+//! when is decided by [slots](stampfly_drivers::slot); the lock here is never waited for.
+
+use crate::clock::Clock;
+use crate::pins::SpiPins;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::Mutex;
+use embedded_hal_async::delay::DelayNs;
+use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
+use esp_hal::Async;
+use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
+use esp_hal::peripherals::{DMA_CH0, SPI2};
+use esp_hal::spi::master::{Config, Spi, SpiDma};
+use esp_hal::spi::{Error, Mode};
+use esp_hal::time::Rate;
+use esp_hal::{dma_rx_buffer, dma_tx_buffer};
+
+/// The longest transfer is a chunk of the inertial sensor's configuration with its address.
+const LONGEST: usize = 512;
+/// Transfers up to this are done by the processor: setting the DMA up would take longer.
+const SHORT: usize = 8;
+
+/// What the bus is made of. It is started where it is used, so that its interrupts come there.
+pub struct Parts {
+    pub unit: SPI2<'static>,
+    pub dma: DMA_CH0<'static>,
+    pub pins: SpiPins<'static>,
+}
+
+type Shared = Mutex<NoopRawMutex, SpiDma<'static, Async>>;
+
+/// The bus with both chips deselected.
+pub struct Bus {
+    shared: Shared,
+    imu: Output<'static>,
+    flow: Output<'static>,
+}
+
+/// A chip on the bus.
+pub struct Device<'b> {
+    shared: &'b Shared,
+    select: &'b mut Output<'static>,
+    config: Config,
+}
+
+impl Bus {
+    /// Deselects both chips and starts the bus.
+    pub fn start(parts: Parts) -> Self {
+        let deselected = |pin: AnyPin<'static>| Output::new(pin, Level::High, OutputConfig::default());
+        let pins = parts.pins;
+        let (imu, flow) = (deselected(pins.imu_select.into()), deselected(pins.flow_select.into()));
+        let unit = Spi::new(parts.unit, imu_config())
+            .expect("10 MHz is possible")
+            .with_sck(pins.clock)
+            .with_mosi(pins.to_chips)
+            .with_miso(pins.from_chips)
+            .with_dma(parts.dma)
+            .with_buffers(
+                dma_rx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
+                dma_tx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
+            )
+            .into_async();
+        Self { shared: Mutex::new(unit), imu, flow }
+    }
+
+    /// The inertial sensor and the flow sensor.
+    pub fn devices(&mut self) -> (Device<'_>, Device<'_>) {
+        let Self { shared, imu, flow } = self;
+        (Device { shared, select: imu, config: imu_config() }, Device { shared, select: flow, config: flow_config() })
+    }
+}
+
+/// BMI270: 10 MHz, mode 0.
+fn imu_config() -> Config {
+    config(Rate::from_mhz(10), Mode::_0)
+}
+
+/// PMW3901: 2 MHz, mode 3.
+fn flow_config() -> Config {
+    config(Rate::from_mhz(2), Mode::_3)
+}
+
+fn config(frequency: Rate, mode: Mode) -> Config {
+    Config::default().with_frequency(frequency).with_mode(mode).with_min_async_transfer_size(SHORT)
+}
+
+/// A chip that listens until this is dropped.
+struct Selected<'s>(&'s mut Output<'static>);
+
+impl<'s> Selected<'s> {
+    fn new(select: &'s mut Output<'static>) -> Self {
+        select.set_low();
+        Self(select)
+    }
+}
+
+impl Drop for Selected<'_> {
+    fn drop(&mut self) {
+        self.0.set_high();
+    }
+}
+
+impl ErrorType for Device<'_> {
+    type Error = Error;
+}
+
+impl SpiDevice for Device<'_> {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Error> {
+        let mut unit = self.shared.lock().await;
+        unit.apply_config(&self.config).map_err(|_| Error::Unsupported)?;
+        // Dropped, and with it the chip deselected, before the bus is free again.
+        let _selected = Selected::new(self.select);
+        for operation in operations {
+            match operation {
+                Operation::Read(into) => SpiBus::read(&mut *unit, into).await?,
+                Operation::Write(from) => SpiBus::write(&mut *unit, from).await?,
+                Operation::Transfer(into, from) => SpiBus::transfer(&mut *unit, into, from).await?,
+                Operation::TransferInPlace(both) => SpiBus::transfer_in_place(&mut *unit, both).await?,
+                Operation::DelayNs(ns) => Clock.delay_ns(*ns).await,
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,79 @@
+//! The StampFly's chips as they are wired: address, axes and settings of each driver.
+//!
+//! The same drivers run over the hardware's buses and over emulated chips; only the buses and the clock differ.
+//!
+//! | function | part | bus | samples per second |
+//! |---|---|---|---|
+//! | [`imu`] | BMI270 | SPI, mode 0, 10 MHz | 400, from 1600 |
+//! | [`flow`] | PMW3901 | SPI, mode 3, 2 MHz | 100 |
+//! | [`magnetometer`] | BMM150 | I2C, 0x10 | 25 |
+//! | [`barometer`] | BMP280 | I2C, 0x76 | 25 |
+//! | [`power`] | INA3221, channel 2, 10 mΩ | I2C, 0x40 | 10 |
+//! | [`range_down`], [`range_ahead`] | VL53L3CX | I2C, 0x29, moved to 0x30 and 0x31 | 30 |
+//!
+//! The two on SPI share it in [slots](stampfly_drivers::slot): the inertial sensor leads at [`RHYTHM`], the flow sensor
+//! transfers for up to [`LONGEST_FLOW`] in between.
+
+use embedded_hal::digital::OutputPin;
+use embedded_hal_async::i2c::I2c;
+use embedded_hal_async::spi::SpiDevice;
+use stampfly_drivers::Timebase;
+use stampfly_drivers::chip::bmi270::{self, Bmi270};
+use stampfly_drivers::chip::bmm150::{self, Bmm150};
+use stampfly_drivers::chip::bmp280::{self, Bmp280};
+use stampfly_drivers::chip::ina3221::{self, Ina3221};
+use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
+use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
+use stampfly_drivers::chip::{AxisMap, I2cRegisters, SpiRegisters};
+use stampfly_drivers::slot::Rhythm;
+use stampfly_types::Micros;
+
+/// The rhythm of the inertial sensor on the bus it shares.
+pub const RHYTHM: Rhythm = Rhythm::HZ_400;
+/// The flow sensor's longest transfer: twelve bytes at 2 MHz after 35 µs for the address, with a margin.
+pub const LONGEST_FLOW: Micros = Micros(200);
+
+/// The inertial sensor. `configuration_file` is Bosch's, 8 kB.
+pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, configuration_file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
+    Bmi270::spi(spi, clock, configuration_file, AxisMap::STAMPFLY_IMU, bmi270::Config::default())
+}
+
+/// The flow sensor.
+pub fn flow<S: SpiDevice, T: Timebase>(spi: S, clock: T) -> Pmw3901<S, T> {
+    Pmw3901::new(spi, clock, AxisMap::STAMPFLY_FLOW, pmw3901::Config::default())
+}
+
+/// The magnetometer.
+pub fn magnetometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmm150<I2cRegisters<I>, T> {
+    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, AxisMap::STAMPFLY_MAGNETOMETER, bmm150::Config::default())
+}
+
+/// The barometer.
+pub fn barometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmp280<I2cRegisters<I>, T> {
+    Bmp280::new(i2c, Bmp280::SDO_LOW, clock, bmp280::Config::default())
+}
+
+/// The battery monitor.
+pub fn power<I: I2c, T: Timebase>(i2c: I, clock: T) -> Ina3221<I2cRegisters<I>, T> {
+    Ina3221::new(i2c, Ina3221::A0_GROUND, clock, ina3221::Config::default())
+}
+
+/// The range finder that looks down. Create both range finders before either is used: creating one resets it.
+pub fn range_down<I: I2c, X: OutputPin, T: Timebase>(
+    i2c: I,
+    shutdown: X,
+    boot: &BootAddress,
+    clock: T,
+) -> Vl53l3cx<'_, I, X, T> {
+    Vl53l3cx::new(i2c, shutdown, boot, 0x30, clock, vl53l3cx::Config::default())
+}
+
+/// The range finder that looks ahead. On the battery hat: it answers on USB power, but cannot measure.
+pub fn range_ahead<I: I2c, X: OutputPin, T: Timebase>(
+    i2c: I,
+    shutdown: X,
+    boot: &BootAddress,
+    clock: T,
+) -> Vl53l3cx<'_, I, X, T> {
+    Vl53l3cx::new(i2c, shutdown, boot, 0x31, clock, vl53l3cx::Config::default())
+}

@@ -1,0 +1,126 @@
+//! From a driver to a topic, for as long as the vehicle is on.
+
+use core::convert::Infallible;
+use core::sync::atomic::{AtomicU32, Ordering};
+use stampfly_drivers::time::sleep_until;
+use stampfly_drivers::{Sample, SensorError, SensorErrorKind, Timebase};
+use stampfly_types::Micros;
+
+/// How a driver fares. Written by its [`pump`], read by whoever reports: a console, a log.
+#[derive(Debug, Default)]
+pub struct Health {
+    samples: AtomicU32,
+    errors: AtomicU32,
+    /// Index in [`KINDS`] plus one, or zero.
+    last: AtomicU32,
+}
+
+/// Every kind of error there is, so that one fits into a word.
+const KINDS: [SensorErrorKind; 7] = [
+    SensorErrorKind::Bus,
+    SensorErrorKind::Timeout,
+    SensorErrorKind::Identification,
+    SensorErrorKind::Configuration,
+    SensorErrorKind::SelfTest,
+    SensorErrorKind::Data,
+    SensorErrorKind::Other,
+];
+
+impl Health {
+    /// A driver that has not been asked yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { samples: AtomicU32::new(0), errors: AtomicU32::new(0), last: AtomicU32::new(0) }
+    }
+
+    /// Samples published since power-on, modulo 2³².
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.samples.load(Ordering::Relaxed)
+    }
+
+    /// Errors since power-on, modulo 2³².
+    #[must_use]
+    pub fn errors(&self) -> u32 {
+        self.errors.load(Ordering::Relaxed)
+    }
+
+    /// The newest error, whether or not the driver has recovered.
+    #[must_use]
+    pub fn last_error(&self) -> Option<SensorErrorKind> {
+        let index = self.last.load(Ordering::Relaxed).checked_sub(1)?;
+        KINDS.get(index as usize).copied()
+    }
+
+    fn count(counter: &AtomicU32) {
+        // One pump writes; a load and a store are enough where there is no atomic addition.
+        counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    fn note(&self, kind: SensorErrorKind) {
+        Self::count(&self.errors);
+        let index = KINDS.iter().position(|known| *known == kind).unwrap_or(KINDS.len() - 1);
+        self.last.store(index as u32 + 1, Ordering::Relaxed);
+    }
+}
+
+/// After so many doublings the pause before the next attempt grows no more.
+const LONGEST_RETRY: u32 = 4;
+
+/// Publishes a driver's samples for ever. After an error the driver is left alone for `retry`, after another one twice
+/// as long and so on up to sixteen times, so that a dead chip costs its neighbours on the bus next to nothing.
+///
+/// Silence is not this task's business: whoever reads the topic sees the age of the newest sample.
+///
+/// ```
+/// use stampfly_board::tasks::{Health, pump};
+/// use stampfly_drivers::blocking::{BlockingClock, block_on};
+/// use stampfly_drivers::{Sample, SensorErrorKind};
+/// use stampfly_types::Micros;
+/// # #[derive(Clone)] struct Delay;
+/// # impl embedded_hal::delay::DelayNs for Delay { fn delay_ns(&mut self, _: u32) {} }
+/// # let clock = BlockingClock::new(Delay, || Micros(0));
+/// let (health, mut calls, mut published) = (Health::new(), 0, Vec::new());
+/// let endless = pump(
+///     async || {
+///         calls += 1;
+///         match calls {
+///             1 | 3 => Ok(Sample { at: Micros(calls), data: calls }),
+///             2 => Err(SensorErrorKind::Bus),
+///             _ => std::future::pending().await,
+///         }
+///     },
+///     |at, data: &u64| published.push((at, *data)),
+///     clock,
+///     Micros::from_millis(5),
+///     &health,
+/// );
+/// # use core::{future::Future, pin::pin, task::{Context, Waker}};
+/// # assert!(pin!(endless).poll(&mut Context::from_waker(Waker::noop())).is_pending());
+/// assert_eq!(published, [(Micros(1), 1), (Micros(3), 3)]);
+/// assert_eq!((health.samples(), health.errors(), health.last_error()), (2, 1, Some(SensorErrorKind::Bus)));
+/// ```
+pub async fn pump<M, E: SensorError>(
+    mut next: impl AsyncFnMut() -> Result<Sample<M>, E>,
+    mut publish: impl FnMut(Micros, &M),
+    mut clock: impl Timebase,
+    retry: Micros,
+    health: &Health,
+) -> Infallible {
+    let mut failures = 0;
+    loop {
+        match next().await {
+            Ok(sample) => {
+                failures = 0;
+                publish(sample.at, &sample.data);
+                Health::count(&health.samples);
+            }
+            Err(error) => {
+                health.note(error.kind());
+                let again = clock.now() + Micros(retry.0 << failures);
+                failures = LONGEST_RETRY.min(failures + 1);
+                sleep_until(&mut clock, again).await;
+            }
+        }
+    }
+}

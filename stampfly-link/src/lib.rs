@@ -1,0 +1,57 @@
+//! The radio link of the StampFly, without a radio.
+//!
+//! | type | what it is | when to use it |
+//! |---|---|---|
+//! | [`Session`] | the vehicle's end of the link: whom it listens to, pairing, counters | in a vehicle |
+//! | [`ControlPacket`] | sticks and switches, 14 bytes | in a transmitter, a simulator, a test |
+//! | [`PairingPacket`] | the vehicle's call for a transmitter, 11 bytes | in a transmitter |
+//! | [`TelemetryPacket`] | what the vehicle tells its pilot, 22 bytes | at either end |
+//!
+//! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
+//! fixed order, from the cheapest check to the dearest, a packet is taken whole or not at all, and nothing that was
+//! refused leaves a trace other than a [count](Counters).
+//!
+//! The formats are those of the public StampFly ecosystem (`protocol/spec/messages.yaml` there, corrected by what its
+//! transmitter really sends). They authenticate nobody; see the README.
+//!
+//! # Example
+//! ```
+//! use stampfly_link::{Address, ControlPacket, Session};
+//! use stampfly_types::{Micros, messages::PilotInput};
+//!
+//! let (vehicle, transmitter) = (Address([1; 6]), Address([2; 6]));
+//! let mut session = Session::new(vehicle, 1, None);
+//! session.start_pairing(Micros(0), false)?;
+//! assert!(session.beacon(Micros(0)).is_some(), "calls for a transmitter");
+//!
+//! let bytes = ControlPacket::from_pilot(vehicle, &PilotInput::default()).to_bytes();
+//! assert!(session.receive(Micros(10_000), transmitter, &bytes).is_ok());
+//! assert_eq!(session.peer(), Some(transmitter), "the first that answers is the one");
+//! # Ok::<(), stampfly_link::PairingRefused>(())
+//! ```
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod address;
+mod control;
+mod pairing;
+mod session;
+mod telemetry;
+
+pub use address::Address;
+pub use control::{ControlError, ControlPacket};
+pub use pairing::{PairingError, PairingPacket};
+pub use session::{Counters, PairingRefused, Rejected, Session};
+pub use telemetry::{LinkState, TelemetryError, TelemetryPacket};
+
+/// The checksum of every packet that has one: the sum of the bytes before it, modulo 256.
+fn checksum(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |sum, byte| sum.wrapping_add(*byte))
+}
+
+/// The README's example, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

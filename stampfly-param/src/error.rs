@@ -1,0 +1,104 @@
+//! What can go wrong, by operation.
+
+use core::fmt;
+use sequential_storage::Error;
+
+/// The flash range is not at least two whole pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoRoom;
+
+/// Why a value could not be loaded. The default applies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum LoadError<E> {
+    /// What is stored is outside its range, or not a number: the range has changed, or the flash lies.
+    OutOfRange {
+        /// What is stored.
+        stored: f32,
+    },
+    /// The pages make no sense. [`ParameterStore::erase`](crate::ParameterStore::erase) helps.
+    Corrupted,
+    /// The flash.
+    Flash(E),
+}
+
+/// Why a value was not saved. What was stored before still is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SaveError<E> {
+    /// The value is outside its range, or not a number.
+    OutOfRange,
+    /// More names than the pages have room for.
+    Full,
+    /// The pages make no sense. [`ParameterStore::erase`](crate::ParameterStore::erase) helps.
+    Corrupted,
+    /// The flash.
+    Flash(E),
+}
+
+/// Why the pages were not erased, or not all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum EraseError<E> {
+    /// The flash.
+    Flash(E),
+}
+
+impl<E> From<Error<E>> for LoadError<E> {
+    fn from(error: Error<E>) -> Self {
+        match error {
+            Error::Storage { value, .. } => Self::Flash(value),
+            _ => Self::Corrupted,
+        }
+    }
+}
+
+impl<E> From<Error<E>> for SaveError<E> {
+    fn from(error: Error<E>) -> Self {
+        match error {
+            Error::Storage { value, .. } => Self::Flash(value),
+            Error::FullStorage | Error::ItemTooBig => Self::Full,
+            _ => Self::Corrupted,
+        }
+    }
+}
+
+impl fmt::Display for NoRoom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("parameters need at least two whole pages of flash")
+    }
+}
+
+impl<E: fmt::Debug> fmt::Display for LoadError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutOfRange { stored } => write!(f, "the stored {stored} is out of range"),
+            Self::Corrupted => f.write_str("the stored parameters are damaged"),
+            Self::Flash(error) => write!(f, "flash: {error:?}"),
+        }
+    }
+}
+
+impl<E: fmt::Debug> fmt::Display for SaveError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutOfRange => f.write_str("the value is out of range"),
+            Self::Full => f.write_str("no room for another parameter"),
+            Self::Corrupted => f.write_str("the stored parameters are damaged"),
+            Self::Flash(error) => write!(f, "flash: {error:?}"),
+        }
+    }
+}
+
+impl<E: fmt::Debug> fmt::Display for EraseError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Flash(error) => write!(f, "flash: {error:?}"),
+        }
+    }
+}
+
+impl core::error::Error for NoRoom {}
+impl<E: fmt::Debug> core::error::Error for LoadError<E> {}
+impl<E: fmt::Debug> core::error::Error for SaveError<E> {}
+impl<E: fmt::Debug> core::error::Error for EraseError<E> {}

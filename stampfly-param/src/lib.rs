@@ -1,0 +1,33 @@
+//! Parameters that survive a power cut: numbers with names, in flash.
+//!
+//! | type | what it is |
+//! |---|---|
+//! | [`ParameterStore`] | loads and saves values by name, on any NOR flash |
+//! | [`Disarmed`] | the proof without which nothing is written |
+//! | [`key`] | the number a name has in flash |
+//!
+//! Use it at power-on, to overlay a vehicle's defaults with what its owner has saved, and from a console. Not in flight:
+//! while flash is written, an ESP32 runs nothing that is not in RAM, for up to 200 ms.
+//!
+//! A name is stored as its 32-bit FNV-1a hash. A table of parameters should be tested for two names with one hash.
+//!
+//! # What a power cut can do
+//! A value is appended and becomes valid with its last word, so after a cut each name has the value before it or the one
+//! that was being written. The tests cut every write and every erasure at every word.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod disarmed;
+mod error;
+mod store;
+
+pub use disarmed::Disarmed;
+pub use error::{EraseError, LoadError, NoRoom, SaveError};
+pub use store::{ParameterStore, key};
+
+/// The README's example, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

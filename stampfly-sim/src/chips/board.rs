@@ -1,0 +1,97 @@
+//! All chips of the StampFly, wired: two buses and the pins beside them.
+
+use super::{Attached, Bmi270, Bmm150, Bmp280, I2cBus, Ina3221, Pmw3901, ShutdownPin, SpiBus, SpiPort, Vl53l3cx};
+use crate::SimulationConfig;
+use crate::sensors::Mount;
+use crate::time::Clock;
+use crate::world::World;
+
+/// Clock of the inertial sensor's SPI, Hz.
+const IMU_CLOCK: u32 = 10_000_000;
+/// Clock of the flow sensor's SPI, Hz: the chip's limit.
+const FLOW_CLOCK: u32 = 2_000_000;
+
+/// The chips of one vehicle, just powered. The same configuration is the same specimens as
+/// [`Sensors`](crate::sensors::Sensors).
+///
+/// ```
+/// use stampfly_drivers::chip::ina3221::{Config, Ina3221};
+/// use stampfly_drivers::PowerMonitor;
+/// use stampfly_sim::chips::{Board, stand_in_image};
+/// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
+///
+/// let config = SimulationConfig::default();
+/// let simulation = Simulation::new(&config);
+/// let board = Board::new(&simulation.world, &simulation.clock, &config, &stand_in_image());
+/// let mut monitor = Ina3221::new(board.i2c, Ina3221::A0_GROUND, simulation.clock.clone(), Config::default());
+/// let sample = block_on(&simulation.clock, monitor.next())?;
+/// assert!((3.7..4.4).contains(&sample.data.voltage));
+/// # Ok::<(), stampfly_drivers::chip::ChipError<stampfly_sim::chips::BusError>>(())
+/// ```
+#[derive(Debug)]
+pub struct Board {
+    /// Magnetometer, barometer, battery monitor and both range finders.
+    pub i2c: I2cBus,
+    /// The inertial sensor on the SPI it shares with the flow sensor.
+    pub imu: SpiPort<Bmi270>,
+    /// The flow sensor.
+    pub flow: SpiPort<Pmw3901>,
+    /// XSHUT of the range finder that looks down.
+    pub shutdown_bottom: ShutdownPin,
+    /// XSHUT of the range finder that looks ahead.
+    pub shutdown_front: ShutdownPin,
+    /// What may happen to each chip.
+    pub attached: AttachedChips,
+}
+
+/// The chips by name, for faults.
+#[derive(Clone, Debug)]
+pub struct AttachedChips {
+    /// BMI270.
+    pub imu: Attached,
+    /// PMW3901.
+    pub flow: Attached,
+    /// BMM150.
+    pub mag: Attached,
+    /// BMP280.
+    pub baro: Attached,
+    /// INA3221.
+    pub power: Attached,
+    /// VL53L3CX that looks down.
+    pub tof: Attached,
+    /// VL53L3CX that looks ahead.
+    pub tof_front: Attached,
+}
+
+impl Board {
+    /// Both range finders' address after power-on.
+    const RANGE: u8 = 0x29;
+
+    /// Chips around this world. `image` is what the inertial sensor takes for its configuration file.
+    #[must_use]
+    pub fn new(world: &World, clock: &Clock, config: &SimulationConfig, image: &[u8]) -> Self {
+        let seed = config.seed;
+        let (i2c, spi) = (I2cBus::new(clock, seed), SpiBus::new(clock, seed));
+        let (imu, imu_attached) = spi.attach(IMU_CLOCK, Bmi270::new(world, clock, seed, config.vibration, image));
+        let (flow, flow_attached) = spi.attach(FLOW_CLOCK, Pmw3901::new(world, clock, seed));
+        let (bottom, shutdown_bottom) = Vl53l3cx::new(world, clock, seed, Mount::Bottom);
+        let (front, shutdown_front) = Vl53l3cx::new(world, clock, seed, Mount::Front);
+        let attached = AttachedChips {
+            imu: imu_attached,
+            flow: flow_attached,
+            mag: i2c.attach(0x10, Bmm150::new(world, clock, seed)),
+            baro: i2c.attach(0x76, Bmp280::new(world, clock, seed)),
+            power: i2c.attach(0x40, Ina3221::new(world, clock, seed)),
+            tof: i2c.attach(Self::RANGE, bottom),
+            tof_front: i2c.attach(Self::RANGE, front),
+        };
+        Self { i2c, imu, flow, shutdown_bottom, shutdown_front, attached }
+    }
+}
+
+/// A stand-in for the inertial sensor's configuration file, which is its maker's: 8 kB in which no two bursts are equal.
+/// The emulator only compares.
+#[must_use]
+pub fn stand_in_image() -> Vec<u8> {
+    (0..8_192u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()
+}

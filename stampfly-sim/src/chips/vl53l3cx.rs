@@ -1,0 +1,340 @@
+//! The range finder VL53L3CX: ST DS13204 ("DS" below), ranging on one target.
+//!
+//! ST publishes no register map of this part, only its drivers; the map here is the one of the VL53L1 family as public
+//! drivers and application notes name it (ST UM2510, UM2356), and *all of it is unverified* on this part, but for what
+//! a running StampFly showed: model 0xEA, module type 0xAA and a one in bit 0 of 0x0010 after its start.
+//!
+//! | register | content | after reset |
+//! |---|---|---|
+//! | 0x0001 | address, 7 bits; acts from the end of the transfer | 0x29 |
+//! | 0x0010, 0x00E5 | bit 0: the firmware runs | 1, 3 |
+//! | 0x0030 | bit 4: interrupt line active low | 0x11 |
+//! | 0x0031 | bit 0: level of the interrupt line | |
+//! | 0x0046 | interrupt at: 0x20 a new measurement | 0 |
+//! | 0x005E, 0x0061 | time-outs A and B, macro periods, coded | 0 |
+//! | 0x0060, 0x0063 | periods of the laser A and B, half pixel clocks less one | 0x0B, 0x09 |
+//! | 0x006C–0x006F | period of measurements, ticks of the slow oscillator | 0 |
+//! | 0x0086 | bit 0 clears the interrupt and lets the next measurement begin | |
+//! | 0x0087 | 0x40 measures again and again, 0x10 once, 0x80 and 0 stop | 0 |
+//! | 0x0088 | interrupt status, (2:0) | 0 |
+//! | 0x0089 | (4:0) 9 valid, 6 sigma, 4 signal, 5 phase | 0 |
+//! | 0x008B | number of the measurement, 0 to 255 and then from 128 | 0 |
+//! | 0x008C | spads that saw something, 8.8 | 0 |
+//! | 0x008E, 0x0090 | signal and ambient rate, 9.7 Mcps | 0 |
+//! | 0x0092 | sigma, 14.2 mm | 0 |
+//! | 0x0096 | distance, mm | 0 |
+//! | 0x0098 | signal rate less crosstalk, 9.7 Mcps | 0 |
+//! | 0x00DE | slow oscillator: ticks per 1.075⁻¹ ms | |
+//! | 0x010F, 0x0110, 0x0111 | model 0xEA, module type 0xAA, revision 0x10 | |
+//!
+//! Addresses have two bytes, numbers of more than one byte begin with the highest (DS 3.2). Both directions go on to
+//! the next register. 1.2 ms from the release of XSHUT or from power to the first answer (DS 2.8); until then nobody
+//! acknowledges. A measurement takes the two time-outs and 14 ms more, *unverified*; the next one does not begin before
+//! the interrupt of the one before has been cleared, and not before the period is over. What is set during a
+//! measurement acts on the next one. The chip has no other memory than these registers: an edge of XSHUT or a dip of
+//! the supply brings it back to 0x29.
+//!
+//! Not modelled: the histogram and several targets, thresholds, calibration data, the region of interest.
+
+use super::{Chip, I2cChip};
+use crate::sensors::schedule::Schedule;
+use crate::sensors::tof::{Mount, RATE, RangePhysics, STATUS_OUT_OF_BOUNDS, STATUS_SIGMA, STATUS_SIGNAL, STATUS_VALID};
+use crate::time::Clock;
+use crate::world::World;
+use core::cell::RefCell;
+use core::convert::Infallible;
+use embedded_hal::digital::{ErrorType, OutputPin};
+use stampfly_types::Micros;
+use std::rc::Rc;
+
+const ADDRESS: u16 = 0x0001;
+const FIRMWARE: [(u16, u8); 2] = [(0x0010, 1), (0x00E5, 3)];
+const POLARITY: u16 = 0x0030;
+const LINE: u16 = 0x0031;
+const INTERRUPT_AT: u16 = 0x0046;
+const TIMEOUT_A: u16 = 0x005E;
+const PERIOD_A: u16 = 0x0060;
+const TIMEOUT_B: u16 = 0x0061;
+const PERIOD_B: u16 = 0x0063;
+const PERIOD: u16 = 0x006C;
+const CLEAR: u16 = 0x0086;
+const MODE: u16 = 0x0087;
+const RESULT: u16 = 0x0088;
+const OSCILLATOR: u16 = 0x00DE;
+const MODEL: u16 = 0x010F;
+/// Everything a driver may write lies below.
+const SIZE: usize = 0x0140;
+
+const FIRST_ADDRESS: u8 = 0x29;
+const BOOT: Micros = Micros(1_200);
+/// Slow oscillator of this specimen.
+const SLOW_OSCILLATOR: u16 = 0x03C0;
+/// Duration of a macro period per pixel clock of the laser's period: 2304 clocks of the fast oscillator, 11.8 MHz, in
+/// 64 phases, µs.
+const MACRO_PERIOD: f64 = 2304.0 / 11.8 / 64.0;
+/// What a measurement takes beside its two time-outs.
+const OVERHEAD: f64 = 14_000.0;
+
+/// A coded number of macro periods: the low byte shifted left by the high one, plus one.
+fn macro_periods(code: u16) -> f64 {
+    let [shift, mantissa] = code.to_be_bytes();
+    f64::from(mantissa) * libm::exp2(f64::from(shift)) + 1.0
+}
+
+/// The emulator. The same seed is the same specimen as [`RangeModel`](crate::sensors::RangeModel).
+///
+/// ```
+/// use embedded_hal::i2c::I2c;
+/// use stampfly_sim::chips::{I2cBus, Vl53l3cx};
+/// use stampfly_sim::sensors::Mount;
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Micros;
+///
+/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let clock = simulation.clock.clone();
+/// let mut bus = I2cBus::new(&clock, 1);
+/// let (chip, _shutdown) = Vl53l3cx::new(&simulation.world, &clock, 1, Mount::Bottom);
+/// bus.attach(0x29, chip);
+/// clock.advance_to(Micros::from_millis(2));
+/// bus.write(0x29, &[0x00, 0x01, 0x30])?; // move to another address
+/// let mut id = [0; 2];
+/// bus.write_read(0x30, &[0x01, 0x0F], &mut id)?;
+/// assert_eq!(id, [0xEA, 0xAA]);
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
+#[derive(Debug)]
+pub struct Vl53l3cx(Rc<RefCell<State>>);
+
+/// The chip's XSHUT pin as the processor drives it: low holds the chip in reset.
+#[derive(Clone, Debug)]
+pub struct ShutdownPin {
+    clock: Clock,
+    state: Rc<RefCell<State>>,
+}
+
+#[derive(Debug)]
+struct State {
+    clock: Clock,
+    physics: RangePhysics,
+    /// True time per time of the chip's clock.
+    pace: f64,
+    id: u8,
+    /// When the chip answers; never while XSHUT is low.
+    ready: Option<Micros>,
+    registers: Box<[u8; SIZE]>,
+    /// Beginning of the running or coming measurement.
+    begin: Option<Micros>,
+    /// A measurement waits to be taken note of.
+    pending: bool,
+    pointer: u16,
+}
+
+impl State {
+    fn word(&self, register: u16) -> u16 {
+        u16::from_be_bytes([self.byte(register), self.byte(register + 1)])
+    }
+
+    fn byte(&self, register: u16) -> u8 {
+        self.registers.get(usize::from(register)).copied().unwrap_or(0)
+    }
+
+    fn set(&mut self, register: u16, bytes: &[u8]) {
+        for (slot, byte) in self.registers[usize::from(register)..].iter_mut().zip(bytes) {
+            *slot = *byte;
+        }
+    }
+
+    /// Whether the chip answers at all at this instant.
+    fn answers(&self, now: Micros) -> bool {
+        self.ready.is_some_and(|ready| ready <= now)
+    }
+
+    fn restart(&mut self, ready: Option<Micros>) {
+        self.ready = ready;
+        self.registers.fill(0);
+        self.begin = None;
+        self.pending = false;
+        self.set(ADDRESS, &[FIRST_ADDRESS]);
+        for (register, value) in FIRMWARE {
+            self.set(register, &[value]);
+        }
+        self.set(POLARITY, &[0x11]);
+        self.set(PERIOD_A, &[0x0B]);
+        self.set(PERIOD_B, &[0x09]);
+        self.set(OSCILLATOR, &SLOW_OSCILLATOR.to_be_bytes());
+        self.set(MODEL, &[self.id, 0xAA, 0x10]);
+    }
+
+    fn true_time(&self, microseconds: f64) -> Micros {
+        Micros((microseconds * self.pace) as u64)
+    }
+
+    /// How long a measurement takes.
+    fn duration(&self) -> Micros {
+        let range = |timeout, period| {
+            let clocks = 2.0 * (f64::from(self.byte(period)) + 1.0);
+            macro_periods(self.word(timeout)) * clocks * MACRO_PERIOD
+        };
+        self.true_time(OVERHEAD + range(TIMEOUT_A, PERIOD_A) + range(TIMEOUT_B, PERIOD_B))
+    }
+
+    /// Time from one measurement to the next.
+    fn period(&self) -> Micros {
+        let ticks = f64::from(u32::from_be_bytes(core::array::from_fn(|n| self.byte(PERIOD + n as u16))));
+        self.true_time(ticks / (f64::from(SLOW_OSCILLATOR) * 1.075) * 1e3).max(self.duration())
+    }
+
+    fn update(&mut self, now: Micros) {
+        while let Some(begin) = self.begin.filter(|begin| !self.pending && *begin + self.duration() <= now) {
+            self.measure(begin);
+            self.pending = true;
+            // Once, or again when the period is over and this one has been taken note of.
+            self.begin = (self.byte(MODE) == 0x40).then(|| begin + self.period());
+        }
+    }
+
+    fn measure(&mut self, begin: Micros) {
+        let reading = self.physics.measure(begin + Micros(self.duration().0 / 2));
+        let millimetres = (reading.distance * 1e3 + 0.5) as u16;
+        let code = match reading.status {
+            STATUS_VALID => 9,
+            STATUS_SIGMA => 6,
+            STATUS_SIGNAL => 4,
+            STATUS_OUT_OF_BOUNDS => 5,
+            _ => 0,
+        };
+        // Light comes back with the square of the distance; 40 Mcps at ten centimetres on a bright floor.
+        let metres = f64::from(reading.distance).max(0.1);
+        let signal = if reading.status == STATUS_SIGNAL { 0.1 } else { 0.4 / (metres * metres) };
+        let number = match self.byte(RESULT + 3) {
+            255 => 128,
+            number => number + 1,
+        };
+        let rate = |mega_counts: f64| ((mega_counts * 128.0) as u16).to_be_bytes();
+        self.set(RESULT, &[3, code, 0, number]);
+        self.set(0x008C, &(200u16 << 8).to_be_bytes());
+        self.set(0x008E, &rate(signal));
+        self.set(0x0090, &rate(0.5));
+        self.set(0x0092, &((f64::from(reading.sigma) * 4e3 + 0.5) as u16).to_be_bytes());
+        self.set(0x0096, &millimetres.to_be_bytes());
+        self.set(0x0098, &rate(signal));
+    }
+}
+
+impl Vl53l3cx {
+    /// A chip that has just been powered with XSHUT high, and that pin.
+    #[must_use]
+    pub fn new(world: &World, clock: &Clock, seed: u64, mount: Mount) -> (Self, ShutdownPin) {
+        let (physics, schedule): (_, Schedule) = RangePhysics::new(world, clock.now(), seed, mount);
+        let mut state = State {
+            clock: clock.clone(),
+            physics,
+            pace: schedule.period() * RATE * 1e-6,
+            id: 0xEA,
+            ready: None,
+            registers: Box::new([0; SIZE]),
+            begin: None,
+            pending: false,
+            pointer: 0,
+        };
+        state.restart(Some(clock.now() + BOOT));
+        let state = Rc::new(RefCell::new(state));
+        (Self(state.clone()), ShutdownPin { clock: clock.clone(), state })
+    }
+}
+
+impl ErrorType for ShutdownPin {
+    type Error = Infallible;
+}
+
+impl OutputPin for ShutdownPin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.state.borrow_mut().restart(None);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        let mut state = self.state.borrow_mut();
+        if state.ready.is_none() {
+            state.ready = Some(self.clock.now() + BOOT);
+        }
+        Ok(())
+    }
+}
+
+impl Chip for Vl53l3cx {
+    fn read(&mut self, register: u16, now: Micros) -> u16 {
+        let mut state = self.0.borrow_mut();
+        state.update(now);
+        if register == LINE {
+            let asserted = state.pending && state.byte(INTERRUPT_AT) & 0x20 != 0;
+            return u16::from(asserted != (state.byte(POLARITY) & 0x10 != 0));
+        }
+        u16::from(state.byte(register))
+    }
+
+    fn write(&mut self, register: u16, value: u16, now: Micros) {
+        let mut state = self.0.borrow_mut();
+        state.update(now);
+        let byte = value as u8;
+        match register {
+            CLEAR if byte & 1 != 0 => {
+                state.pending = false;
+                state.set(RESULT, &[0]);
+                // One that should have begun while the interrupt stood begins now.
+                state.begin = state.begin.map(|begin| begin.max(now));
+            }
+            MODE => {
+                state.set(MODE, &[byte]);
+                state.begin = match byte {
+                    0x40 | 0x10 => Some(now),
+                    _ => None,
+                };
+            }
+            // What the chip found and what it is cannot be written, nor what does not exist.
+            LINE | RESULT..MODEL => {}
+            ADDRESS => state.set(ADDRESS, &[byte & 0x7F]),
+            _ if usize::from(register) < SIZE && register < RESULT => state.set(register, &[byte]),
+            _ => {}
+        }
+    }
+
+    fn reset(&mut self, now: Micros) {
+        let mut state = self.0.borrow_mut();
+        if state.ready.is_some() {
+            state.restart(Some(now + BOOT));
+        }
+    }
+
+    fn set_id(&mut self, id: u16) {
+        let mut state = self.0.borrow_mut();
+        state.id = id as u8;
+        state.set(MODEL, &[id as u8]);
+    }
+}
+
+impl I2cChip for Vl53l3cx {
+    fn address(&self, _: u8) -> Option<u8> {
+        let state = self.0.borrow();
+        state.answers(state.clock.now()).then(|| state.byte(ADDRESS))
+    }
+
+    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+        if index < 2 {
+            let mut state = self.0.borrow_mut();
+            state.pointer = state.pointer << 8 | u16::from(byte);
+        } else {
+            let register = self.0.borrow().pointer;
+            self.write(register, u16::from(byte), now);
+            self.0.borrow_mut().pointer = register.wrapping_add(1);
+        }
+        true
+    }
+
+    fn send(&mut self, _: usize, now: Micros) -> u8 {
+        let register = self.0.borrow().pointer;
+        let byte = self.read(register, now) as u8;
+        self.0.borrow_mut().pointer = register.wrapping_add(1);
+        byte
+    }
+}

@@ -1,0 +1,139 @@
+//! VL53L3CX after ST DS13204 and the register names of the VL53L1 family.
+
+use crate::{standing, wait};
+use embedded_hal::digital::OutputPin;
+use embedded_hal::i2c::I2c;
+use stampfly_sim::Simulation;
+use stampfly_sim::chips::{Attached, BusError, I2cBus, ShutdownPin, Vl53l3cx};
+use stampfly_sim::sensors::Mount;
+
+const FIRST: u8 = 0x29;
+
+struct Bench {
+    simulation: Simulation,
+    bus: I2cBus,
+    chip: Attached,
+    shutdown: ShutdownPin,
+}
+
+impl Bench {
+    /// A chip that has had its supply for two milliseconds.
+    fn new() -> Self {
+        let simulation = standing();
+        let bus = I2cBus::new(&simulation.clock, 1);
+        let (chip, shutdown) = Vl53l3cx::new(&simulation.world, &simulation.clock, 1, Mount::Bottom);
+        let chip = bus.attach(FIRST, chip);
+        wait(&simulation, 2_000);
+        Self { simulation, bus, chip, shutdown }
+    }
+
+    fn try_read<const N: usize>(&mut self, address: u8, register: u16) -> Result<[u8; N], BusError> {
+        let mut bytes = [0; N];
+        self.bus.write_read(address, &register.to_be_bytes(), &mut bytes)?;
+        Ok(bytes)
+    }
+
+    fn read<const N: usize>(&mut self, register: u16) -> [u8; N] {
+        self.try_read(FIRST, register).unwrap()
+    }
+
+    fn write(&mut self, register: u16, bytes: &[u8]) {
+        let message = [&register.to_be_bytes(), bytes].concat();
+        self.bus.write(FIRST, &message).unwrap();
+    }
+
+    /// Long distance, 33 ms, a measurement every 40 ms by the chip's own oscillator.
+    fn start(&mut self) {
+        self.write(0x0046, &[0x20]);
+        self.write(0x005E, &[0x00, 0x60, 0x0F, 0x00, 0x6E, 0x0D]);
+        let [high, low] = self.read(0x00DE);
+        let ticks = f64::from(u16::from_be_bytes([high, low])) * 40.0 * 1.075;
+        self.write(0x006C, &(ticks as u32).to_be_bytes());
+        self.write(0x0087, &[0x40]);
+    }
+
+    /// Is the interrupt line asserted? Active low after a reset.
+    fn is_ready(&mut self) -> bool {
+        let ([polarity], [line]): ([u8; 1], [u8; 1]) = (self.read(0x0030), self.read(0x0031));
+        (line & 1 == 0) == (polarity & 0x10 != 0)
+    }
+}
+
+#[test]
+fn it_answers_when_it_has_started_and_says_what_it_is() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(0x010F), [0xEA, 0xAA]);
+    assert_eq!((bench.read(0x0010), bench.read(0x00E5)), ([1], [3]));
+    bench.chip.reset();
+    wait(&bench.simulation, 1_000);
+    assert!(bench.try_read::<1>(FIRST, 0x010F).is_err(), "1.2 ms have not passed");
+    wait(&bench.simulation, 500);
+    assert_eq!(bench.read(0x010F), [0xEA]);
+}
+
+#[test]
+fn a_new_address_lasts_until_the_next_reset() {
+    let mut bench = Bench::new();
+    bench.write(0x0001, &[0x30]);
+    assert!(bench.try_read::<1>(FIRST, 0x010F).is_err());
+    assert_eq!(bench.try_read(0x30, 0x010F), Ok([0xEA]));
+    bench.shutdown.set_low().unwrap();
+    wait(&bench.simulation, 5_000);
+    assert!(bench.try_read::<1>(FIRST, 0x010F).is_err() && bench.try_read::<1>(0x30, 0x010F).is_err(), "held");
+    bench.shutdown.set_high().unwrap();
+    wait(&bench.simulation, 1_300);
+    assert_eq!(bench.read(0x010F), [0xEA]);
+}
+
+#[test]
+fn it_measures_the_floor_again_when_the_interrupt_has_been_cleared() {
+    let mut bench = Bench::new();
+    assert!(!bench.is_ready());
+    bench.start();
+    wait(&bench.simulation, 25_000);
+    assert!(!bench.is_ready(), "33 ms have not passed");
+    wait(&bench.simulation, 11_000);
+    assert!(bench.is_ready());
+    let [_, status, _, number]: [u8; 4] = bench.read(0x0088);
+    let distance = u16::from_be_bytes(bench.read(0x0096));
+    assert_eq!((status & 0x1F, number), (9, 1));
+    assert!((24..=36).contains(&distance), "{distance} mm to the floor, standing");
+
+    wait(&bench.simulation, 200_000);
+    assert_eq!(bench.read(0x008B), [1], "nobody took note of the first one");
+    bench.write(0x0086, &[1]);
+    assert!(!bench.is_ready());
+    wait(&bench.simulation, 36_000);
+    assert!(bench.is_ready());
+    assert_eq!(bench.read(0x008B), [2]);
+
+    bench.write(0x0086, &[1]);
+    bench.write(0x0087, &[0x80]);
+    wait(&bench.simulation, 100_000);
+    assert!(!bench.is_ready(), "stopped");
+}
+
+#[test]
+fn measurements_keep_their_period() {
+    let mut bench = Bench::new();
+    bench.start();
+    let mut instants = Vec::new();
+    for _ in 0..20 {
+        while !bench.is_ready() {
+            wait(&bench.simulation, 200);
+        }
+        instants.push(bench.simulation.clock.now());
+        bench.write(0x0086, &[1]);
+    }
+    let mean = instants[19].since(instants[0]).seconds() / 19.0;
+    assert!((mean / 0.040 - 1.0).abs() < 0.025, "{mean} s");
+}
+
+#[test]
+fn results_cannot_be_written() {
+    let mut bench = Bench::new();
+    bench.write(0x0096, &[0x12, 0x34]);
+    bench.write(0x010F, &[0x00]);
+    assert_eq!(bench.read(0x0096), [0, 0]);
+    assert_eq!(bench.read(0x010F), [0xEA]);
+}
