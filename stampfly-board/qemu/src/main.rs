@@ -32,8 +32,9 @@ use stampfly_board::plan;
 /// What each machine runs once it is awake. Says whether every bit was as recorded.
 fn run() -> bool {
     let activations = record::activations();
-    let Some(record) = Record::begin(&activations) else {
-        outln!("no flight record can be begun");
+    let mut memory = [0; memory::SIZE];
+    let Some(record) = Record::begin(&mut memory, &activations) else {
+        outln!("no room for a flight record");
         return false;
     };
     let mut profile = Profile::new(record);
@@ -50,8 +51,8 @@ fn run() -> bool {
         Verdict::Beyond { worst, since } => outln!("duties deviate by {worst}, beyond tolerance since {since}"),
     }
     outln!("published: {} messages, hash {:016x}", report.messages, report.hash);
-    let (bytes, hash) = profile.record.finish();
-    outln!("recorded: {bytes} bytes, hash {hash:016x}");
+    let (bytes, lost) = (profile.record.bytes(), profile.record.lost());
+    outln!("recorded: {} bytes, {lost} messages lost, hash {:016x}", bytes.len(), memory::hash(bytes));
     outln!("stack: {} bytes of a vehicle and its bus", golden::STACK);
     for (info, tally) in plan::ACTIVATIONS.iter().zip(&profile.runnables) {
         tally.print(format_args!("{}, budget {} us", info.name, info.budget.0));

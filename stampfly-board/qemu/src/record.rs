@@ -1,10 +1,9 @@
 //! The flight record, as the vehicle keeps it: a ULog with every sample of every topic and every activation.
 
-use crate::memory::Memory;
 use stampfly_board::vehicle::assemble;
 use stampfly_board::{FlightLoop, VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
-use stampfly_log::ulog::{Definitions, Sample, Topic, Writer};
+use stampfly_log::ulog::{Definitions, Ram, Sample, Topic, Writer};
 use stampfly_log::{ActivationTopic, Input};
 use stampfly_types::Micros;
 
@@ -32,14 +31,13 @@ pub fn activations() -> [ActivationTopic; plan::COUNT] {
     })
 }
 
-/// A flight record that is being written. Page memory takes everything, so nothing here can be refused; a message that
-/// could not be made would be missing from the hash.
-pub struct Record<'t>(Writer<'t, Memory>);
+/// A flight record that is being written into memory.
+pub struct Record<'t>(Writer<'t, Ram<'t>>);
 
 impl<'t> Record<'t> {
-    /// Facts, parameters and formats.
-    pub fn begin(activations: &'t [ActivationTopic]) -> Option<Self> {
-        let mut head = Definitions::start(Memory::new(), Micros::ZERO).ok()?;
+    /// Facts, parameters and formats. `None` when there is no room for them.
+    pub fn begin(memory: &'t mut [u8], activations: &'t [ActivationTopic]) -> Option<Self> {
+        let mut head = Definitions::start(Ram::new(memory), Micros::ZERO).ok()?;
         head.info("sys_name", "StampFly").ok()?;
         for parameter in parameters::PARAMETERS {
             head.parameter(parameter.name, parameter.get(&VehicleConfig::default()).into()).ok()?;
@@ -47,7 +45,7 @@ impl<'t> Record<'t> {
         head.data(&TOPICS, activations).ok().map(Self)
     }
 
-    /// One sample of a topic.
+    /// One sample of a topic. What does not fit any more is counted.
     pub fn sample(&mut self, topic: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
         let _ = self.0.sample(topic as usize, &Sample { at, generation, words });
     }
@@ -61,8 +59,13 @@ impl<'t> Record<'t> {
         let _ = self.0.activation(&record);
     }
 
-    /// Bytes written, and the hash over them.
-    pub fn finish(&self) -> (usize, u64) {
-        self.0.sink().finish()
+    /// What was written.
+    pub fn bytes(&self) -> &[u8] {
+        self.0.sink().written()
+    }
+
+    /// Messages that found no room.
+    pub fn lost(&self) -> u32 {
+        self.0.lost()
     }
 }

@@ -29,6 +29,8 @@ pub enum Command {
     Replay(ReplayOptions),
     /// List the topics: type, policy, rate, publisher, readers.
     Topics(TopicsOptions),
+    /// List the runnables: what activates them, budget, response time.
+    Schedule(TopicsOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
     /// Run the estimator over recorded sensor data and say how good it is.

@@ -11,6 +11,7 @@ mod estimate;
 mod fly;
 mod golden;
 mod replay;
+mod schedule;
 mod terminal;
 mod topics;
 
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Fly(options) => fly::run(&options),
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
+        Command::Schedule(options) => schedule::run(&options),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
         Command::Golden(options) => golden::run(&options),
