@@ -1,12 +1,15 @@
 //! Motors.
 
+use crate::{ArmToken, Interlock};
 use embedded_hal::pwm::SetDutyCycle;
+use stampfly_types::Micros;
 use stampfly_types::messages::MotorOutput;
 
 /// Motors that take a duty cycle.
 ///
 /// # Contract
 /// * `armed: false` stops every motor, whatever the duties say.
+/// * On real motors `armed: true` counts after an `armed: false` only: see [`Interlock`].
 /// * A duty that is not finite counts as zero; others are clamped to 0..=1.
 /// * Returns within microseconds; called once per control period.
 pub trait MotorOutputs {
@@ -29,7 +32,11 @@ pub struct MotorError {
 
 /// Brushed motors behind transistors, one PWM channel each.
 ///
-/// The motors stop when this is dropped.
+/// They turn only after an output that was not armed ([`Interlock`]): a driver that is created in the middle of a
+/// flight leaves them still. They stop when this is dropped.
+///
+/// An output that does not come any more changes nothing: cutting off stale commands is the board's work, with
+/// [`stop`](Self::stop).
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -41,33 +48,61 @@ pub struct MotorError {
 /// #     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> { self.0 = duty; Ok(()) }
 /// # }
 /// use stampfly_drivers::{MotorOutputs, PwmMotors};
-/// use stampfly_types::messages::MotorOutput;
+/// use stampfly_types::{Micros, messages::MotorOutput};
 ///
-/// let mut motors = PwmMotors::new([Channel(9), Channel(9), Channel(9), Channel(9)]);
-/// let mut output = MotorOutput { count: 4, armed: true, ..Default::default() };
+/// // At 400 outputs per second a motor takes an eighth of a second to full power.
+/// let mut motors = PwmMotors::new([Channel(9), Channel(9)]).with_slew_limit(8.0, Micros(2_500));
+/// let mut output = MotorOutput { count: 2, ..Default::default() };
+/// motors.write(&output)?;
+/// output.armed = true;
 /// output.duty[1] = 0.5;
 /// motors.write(&output)?;
-/// assert_eq!(motors.channels().map(|c| c.0).collect::<Vec<_>>(), [0, 128, 0, 0]);
+/// assert_eq!(motors.channels().map(|c| c.0).collect::<Vec<_>>(), [0, 5]);
+/// for _ in 0..100 {
+///     motors.write(&output)?;
+/// }
+/// assert_eq!(motors.channels().map(|c| c.0).collect::<Vec<_>>(), [0, 128]);
 /// # Ok::<(), stampfly_drivers::MotorError>(())
 /// ```
 pub struct PwmMotors<P: SetDutyCycle, const N: usize> {
     channels: [P; N],
+    interlock: Interlock,
+    /// What the channels were last told.
+    duties: [f32; N],
+    /// The most a duty rises from one output to the next.
+    rise: f32,
 }
 
 impl<P: SetDutyCycle, const N: usize> PwmMotors<P, N> {
     /// Takes the channels, in motor order, and stops them.
     pub fn new(channels: [P; N]) -> Self {
-        let mut motors = Self { channels };
+        let mut motors = Self { channels, interlock: Interlock::default(), duties: [0.0; N], rise: f32::INFINITY };
         motors.stop();
         motors
     }
 
-    /// Stops every motor.
+    /// Limits how fast a duty rises: by so much a second when outputs come with this period, and slower when they come
+    /// less often. A falling duty is never limited. A limit that is not positive keeps the motors still.
+    #[must_use]
+    pub fn with_slew_limit(mut self, duty_per_second: f32, period: Micros) -> Self {
+        // NaN gives zero.
+        self.rise = (duty_per_second * period.seconds()).max(0.0);
+        self
+    }
+
+    /// Stops every motor. The next armed output turns them again, from zero on.
     pub fn stop(&mut self) {
+        self.duties = [0.0; N];
         for channel in &mut self.channels {
             // A channel that cannot be stopped has nobody left to tell; the board's own cut-off remains.
             let _ = channel.set_duty_cycle_fully_off();
         }
+    }
+
+    /// Stops every motor, and none turns until the vehicle has been disarmed.
+    pub fn lock(&mut self) {
+        self.interlock.lock();
+        self.stop();
     }
 
     /// The channels, in motor order.
@@ -76,15 +111,23 @@ impl<P: SetDutyCycle, const N: usize> PwmMotors<P, N> {
     }
 }
 
+/// What a channel is to be told, now that motors may turn. The only way to a duty above zero.
+fn turn(_: &ArmToken<'_>, wanted: f32, before: f32, rise: f32) -> f32 {
+    let wanted = if wanted.is_finite() { wanted.clamp(0.0, 1.0) } else { 0.0 };
+    wanted.min(before + rise)
+}
+
 impl<P: SetDutyCycle, const N: usize> MotorOutputs for PwmMotors<P, N> {
     type Error = MotorError;
 
     fn write(&mut self, output: &MotorOutput) -> Result<(), MotorError> {
         let mut result = Ok(());
-        for (index, (channel, duty)) in self.channels.iter_mut().zip(output.duty).enumerate() {
-            let duty = if output.armed && duty.is_finite() { duty.clamp(0.0, 1.0) } else { 0.0 };
+        let token = self.interlock.token(output);
+        let channels = self.channels.iter_mut().zip(&mut self.duties).enumerate();
+        for ((index, (channel, duty)), wanted) in channels.zip(output.duty) {
+            *duty = token.as_ref().map_or(0.0, |token| turn(token, wanted, *duty, self.rise));
             let max = channel.max_duty_cycle();
-            let counts = (duty * f32::from(max) + 0.5) as u16;
+            let counts = (*duty * f32::from(max) + 0.5) as u16;
             if channel.set_duty_cycle(counts.min(max)).is_err() && result.is_ok() {
                 result = Err(MotorError { channel: index });
             }
@@ -137,6 +180,9 @@ mod tests {
         let mut output = MotorOutput { count: 4, armed: true, ..Default::default() };
         output.duty[..4].copy_from_slice(&[f32::NAN, 2.0, -1.0, 0.5]);
         motors.write(&output).expect("all channels work");
+        assert_eq!(seen.each_ref().map(Cell::get), [0; 4], "nobody decided to arm");
+        motors.write(&MotorOutput::default()).expect("all channels work");
+        motors.write(&output).expect("all channels work");
         assert_eq!(seen.each_ref().map(Cell::get), [0, 255, 0, 128]);
         output.armed = false;
         motors.write(&output).expect("all channels work");
@@ -152,7 +198,36 @@ mod tests {
         let seen: [Cell<u16>; 2] = core::array::from_fn(|_| Cell::new(0));
         let mut motors = PwmMotors::new([Channel(&seen[0], true), Channel(&seen[1], false)]);
         let output = MotorOutput { duty: [1.0; 8], count: 2, armed: true, unmet: [0.0; 4] };
+        assert_eq!(motors.write(&MotorOutput::default()), Err(MotorError { channel: 0 }));
         assert_eq!(motors.write(&output), Err(MotorError { channel: 0 }));
         assert_eq!(seen[1].get(), 255);
+    }
+
+    #[test]
+    fn a_rise_is_limited_a_fall_is_not_and_a_stop_begins_at_zero() {
+        let seen = Cell::new(7);
+        let mut motors = PwmMotors::new([Channel(&seen, false)]).with_slew_limit(4.0, Micros(25_000));
+        let output = |duty: f32| MotorOutput { duty: [duty; 8], count: 1, armed: true, unmet: [0.0; 4] };
+        motors.write(&MotorOutput::default()).expect("works");
+        let written = |motors: &mut PwmMotors<_, 1>, duty| {
+            motors.write(&output(duty)).expect("works");
+            seen.get()
+        };
+        assert_eq!([1.0; 4].map(|duty| written(&mut motors, duty)), [26, 51, 77, 102], "a tenth per output");
+        assert_eq!([0.35, f32::NAN, 0.05, 1.0].map(|duty| written(&mut motors, duty)), [89, 0, 13, 38]);
+        motors.stop();
+        assert_eq!(seen.get(), 0);
+        assert_eq!(written(&mut motors, 1.0), 26);
+        motors.write(&MotorOutput::default()).expect("works");
+        assert_eq!(written(&mut motors, 1.0), 26, "disarming begins at zero, too");
+        motors.lock();
+        assert_eq!([1.0; 3].map(|duty| written(&mut motors, duty)), [0; 3], "until it has been disarmed");
+        motors.write(&MotorOutput::default()).expect("works");
+        assert_eq!(written(&mut motors, 1.0), 26);
+        for limit in [f32::NAN, -1.0, 0.0] {
+            let mut motors = PwmMotors::new([Channel(&seen, false)]).with_slew_limit(limit, Micros(2_500));
+            motors.write(&MotorOutput::default()).expect("works");
+            assert_eq!(written(&mut motors, 1.0), 0, "{limit}");
+        }
     }
 }

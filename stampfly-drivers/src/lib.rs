@@ -13,8 +13,10 @@
 //! |---|---|
 //! | [`chip`] | drivers for particular chips, on any `embedded-hal-async` bus |
 //! | [`blocking`] | the same drivers on a blocking bus |
+//! | [`Interlock`] | no motor turns without a decision to arm |
 //! | [`slot`] | two devices on one SPI bus without a lock |
 //! | [`recover_i2c`] | frees a bus whose data line is held |
+//! | [`shared`] | one I2C bus for several drivers, freed when a device hangs |
 //! | [`Decimator`] | from 1600 to 400 samples per second without folding |
 //!
 //! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
@@ -40,9 +42,11 @@ pub mod chip;
 mod decimator;
 pub mod error;
 pub mod indicator;
+mod interlock;
 pub mod link;
 mod recovery;
 pub mod sensor;
+pub mod shared;
 pub mod slot;
 pub mod time;
 
@@ -50,6 +54,7 @@ pub use actuator::{MotorError, MotorOutputs, PwmMotors};
 pub use decimator::Decimator;
 pub use error::{SensorError, SensorErrorKind};
 pub use indicator::{Buzzer, Indicator, Lights, SetFrequency};
+pub use interlock::{ArmToken, Interlock};
 pub use link::{Button, Command, CommandLink, PinButton};
 pub use recovery::{Recovery, RecoveryError, recover_i2c};
 pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};

@@ -3,11 +3,13 @@
 mod common;
 
 use common::{Access, Clock, Fault, I2cBus, SpiBus};
-use stampfly_drivers::Timebase;
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
+use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
+use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
+use stampfly_drivers::{Barometer, Imu, Magnetometer, PowerMonitor, Timebase};
 use stampfly_types::Micros;
 
 fn silent(_: Access<'_>) -> Result<(), Fault> {
@@ -41,4 +43,39 @@ fn what_the_flight_band_reads_ends_well_within_its_period() {
     // At 100 kHz a byte takes nine clocks; nothing that is merely slow is given up.
     assert!((1..=256).all(|bytes| i2c.of(bytes).0 >= bytes as u64 * 90 && i2c.of(bytes).0 <= 30_000));
     assert_eq!(spi.of(usize::MAX), Micros(u64::MAX), "no overflow");
+}
+
+/// Calls a driver a hundred times on a bus that fails for ever: how long the longest call took, and that all failed.
+macro_rules! worst {
+    ($clock:ident, $driver:expr) => {{
+        let mut driver = $driver;
+        let mut worst = Micros::ZERO;
+        for _ in 0..100 {
+            let begun = $clock.now();
+            assert!(block_on(driver.next()).is_err());
+            worst = worst.max($clock.now().since(begun));
+        }
+        worst
+    }};
+}
+
+#[test]
+fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() {
+    for fault in [Fault::Nack, Fault::Hang] {
+        let clock = Clock::new();
+        let i2c = |address| I2cBus { address, clock: clock.clone(), chip: move |_: Access<'_>| Err(fault) };
+        let spi = || SpiBus { clock: clock.clone(), chip: move |_: Access<'_>| Err(fault) };
+        let imu = bmi270::Config::default();
+        let worst = [
+            worst!(clock, Bmi270::spi(spi(), clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
+            worst!(clock, Bmi270::i2c(i2c(0x68), 0x68, clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
+            worst!(clock, Bmp280::new(i2c(0x76), 0x76, clock.clone(), bmp280::Config::default())),
+            worst!(clock, Ina3221::new(i2c(0x40), 0x40, clock.clone(), ina3221::Config::default())),
+            worst!(clock, Bmm150::new(i2c(0x10), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())),
+        ];
+        let limits = [Micros(400), Micros(6_000), Micros(6_000), Micros(6_000), Micros(10_000)];
+        for (worst, limit) in worst.into_iter().zip(limits) {
+            assert!(worst > Micros::ZERO && worst < limit, "{worst} with {fault:?}");
+        }
+    }
 }

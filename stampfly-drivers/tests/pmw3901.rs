@@ -27,6 +27,8 @@ struct Chip {
     ready: Micros,
     /// How many more times register 0x47 says no.
     refusals: u32,
+    /// A register that can be written only.
+    forgets_witness: bool,
 }
 
 impl Chip {
@@ -44,6 +46,7 @@ impl Chip {
             fault: None,
             ready: Micros::ZERO,
             refusals: 0,
+            forgets_witness: false,
         }
     }
 
@@ -70,6 +73,7 @@ impl Chip {
                 into[0] = if self.refusals == 0 { 8 } else { 0 };
                 self.refusals = self.refusals.saturating_sub(1);
             }
+            (0, 0x4E) if self.forgets_witness => into[0] = 0,
             key => into[0] = self.registers.get(&key).copied().unwrap_or(0),
         }
     }
@@ -94,7 +98,7 @@ impl spi::SpiDevice for Device {
                 }
                 [Operation::Write([register]), Operation::DelayNs(35_000..), Operation::Read(into)] => {
                     chip.read(*register, into);
-                    if *register == 0x16 { 0 } else { 20 }
+                    20
                 }
                 other => panic!("not an access that keeps the data sheet's times: {other:?}"),
             };
@@ -243,4 +247,34 @@ fn a_chip_that_falls_off_the_bus_is_set_up_again_when_it_is_back() {
     chip.borrow_mut().writes.clear();
     block_on(flow.next()).expect("a sample");
     assert!(chip.borrow().writes.len() > 70);
+}
+
+#[test]
+fn a_chip_that_restarts_in_flight_is_noticed_within_a_second_and_set_up_again() {
+    let (clock, chip, mut flow) = bench();
+    for _ in 0..150 {
+        block_on(flow.next()).expect("a sample");
+    }
+    // Back with its own values, and counting.
+    chip.borrow_mut().registers = Chip::new().registers;
+    let begun = clock.now();
+    let error = loop {
+        if let Err(error) = block_on(flow.next()) {
+            break error;
+        }
+    };
+    assert_eq!(error, ChipError::Restarted);
+    assert!(clock.now().since(begun) <= Micros(1_011_000));
+    chip.borrow_mut().writes.clear();
+    block_on(flow.next()).expect("a sample");
+    assert!(chip.borrow().writes.len() > 70);
+}
+
+#[test]
+fn a_chip_that_does_not_give_the_witness_back_is_left_alone() {
+    let (_, chip, mut flow) = bench();
+    chip.borrow_mut().forgets_witness = true;
+    for _ in 0..300 {
+        block_on(flow.next()).expect("a sample");
+    }
 }

@@ -3,11 +3,12 @@
 use stampfly_board::tasks::{Health, pump};
 use stampfly_board::{devices, wiring};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
+use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
 use stampfly_drivers::{
     Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, SensorErrorKind,
 };
-use stampfly_sim::chips::{self, stand_in_image};
+use stampfly_sim::chips::{self, I2cBus, stand_in_image};
 use stampfly_sim::sensors::{BaroModel, CameraModel, FlowModel, ImuModel, MagModel, PowerModel, RangeModel};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_types::Micros;
@@ -123,11 +124,17 @@ pub(crate) fn start_models<'a>(
 pub(crate) struct Shared {
     boot: BootAddress,
     slots: Slots<Clock>,
+    i2c: SharedI2c<I2cBus, 5>,
 }
 
 impl Shared {
-    pub fn new(clock: &Clock) -> Self {
-        Self { boot: BootAddress::new(), slots: Slots::new(clock.clone(), devices::RHYTHM) }
+    /// For the chips of this bus.
+    pub fn new(clock: &Clock, i2c: &I2cBus) -> Self {
+        Self {
+            boot: BootAddress::new(),
+            slots: Slots::new(clock.clone(), devices::RHYTHM),
+            i2c: SharedI2c::new(i2c.clone()),
+        }
     }
 }
 
@@ -140,18 +147,19 @@ pub(crate) fn start_drivers<'a>(
     topics: Topics<'a>,
     health: &'a Healths,
 ) {
-    let chips::Board { i2c, imu, flow, shutdown_bottom, shutdown_front, .. } = board;
+    let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = shared.i2c.split();
+    let chips::Board { imu, flow, shutdown_bottom, shutdown_front, .. } = board;
     let time = || clock.clone();
     let (imu, flow, _) = shared.slots.split(imu, flow, devices::LONGEST_FLOW);
-    let down = devices::range_down(i2c.clone(), shutdown_bottom, &shared.boot, time());
-    let ahead = devices::range_ahead(i2c.clone(), shutdown_front, &shared.boot, time());
+    let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
+    let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
     spawn!(tasks, clock, devices::imu(imu, time(), &IMAGE) => topics.imu, health.imu);
     spawn!(tasks, clock, down => topics.tof, health.tof);
     spawn!(tasks, clock, ahead => topics.tof_front, health.tof_front);
     spawn!(tasks, clock, devices::flow(flow, time()) => topics.flow, health.flow);
-    spawn!(tasks, clock, devices::magnetometer(i2c.clone(), time()) => topics.mag, health.mag);
-    spawn!(tasks, clock, devices::barometer(i2c.clone(), time()) => topics.baro, health.baro);
-    spawn!(tasks, clock, devices::power(i2c, time()) => topics.power, health.power);
+    spawn!(tasks, clock, devices::magnetometer(to_mag, time()) => topics.mag, health.mag);
+    spawn!(tasks, clock, devices::barometer(to_baro, time()) => topics.baro, health.baro);
+    spawn!(tasks, clock, devices::power(to_power, time()) => topics.power, health.power);
 }
 
 /// Starts the task of the cameras.

@@ -234,7 +234,9 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let mut flight_loop = FlightLoop::new(vehicle, heads, start);
     recorder.begin(start, &config.vehicle);
 
-    let (progress, health, mut shared) = (Progress::default(), Healths::default(), Shared::new(&clock));
+    let (progress, health) = (Progress::default(), Healths::default());
+    let board = chips::Board::new(&world, &clock, &config.simulation, &sensing::IMAGE);
+    let mut shared = Shared::new(&clock, &board.i2c);
     let mut tasks = Tasks::new(clock.clone());
     let Outside {
         imu: to_imu, tof: to_tof, tof_front, flow: to_flow, mag: to_mag, baro: to_baro, power: to_power, ..
@@ -247,7 +249,6 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
             sensing::start_models(&mut tasks, &clock, models, topics, &health);
         }
         Sensing::Chips => {
-            let board = chips::Board::new(&world, &clock, &config.simulation, &sensing::IMAGE);
             sensing::start_drivers(&mut tasks, &clock, board, &mut shared, topics, &health);
         }
     }

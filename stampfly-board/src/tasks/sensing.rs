@@ -64,8 +64,11 @@ impl Health {
     }
 }
 
-/// Publishes a driver's samples for ever. After an error the driver is left alone for `retry`, so that a dead chip
-/// costs its neighbours on the bus next to nothing.
+/// After so many doublings the pause before the next attempt grows no more.
+const LONGEST_RETRY: u32 = 4;
+
+/// Publishes a driver's samples for ever. After an error the driver is left alone for `retry`, after another one twice
+/// as long and so on up to sixteen times, so that a dead chip costs its neighbours on the bus next to nothing.
 ///
 /// Silence is not this task's business: whoever reads the topic sees the age of the newest sample.
 ///
@@ -104,15 +107,18 @@ pub async fn pump<M, E: SensorError>(
     retry: Micros,
     health: &Health,
 ) -> Infallible {
+    let mut failures = 0;
     loop {
         match next().await {
             Ok(sample) => {
+                failures = 0;
                 publish(sample.at, &sample.data);
                 Health::count(&health.samples);
             }
             Err(error) => {
                 health.note(error.kind());
-                let again = clock.now() + retry;
+                let again = clock.now() + Micros(retry.0 << failures);
+                failures = LONGEST_RETRY.min(failures + 1);
                 sleep_until(&mut clock, again).await;
             }
         }

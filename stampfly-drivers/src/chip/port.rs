@@ -118,6 +118,18 @@ impl<R, T: Timebase> Port<R, T> {
         Ok(bytes)
     }
 
+    /// Reads what will be believed until the next start, such as calibration: twice, and refuses it unless both agree.
+    pub(crate) async fn read_twice<A: Copy, const N: usize>(
+        &mut self,
+        register: A,
+    ) -> Result<[u8; N], ChipError<R::Error>>
+    where
+        R: Registers<A>,
+    {
+        let first = self.read(register).await?;
+        if self.read(register).await? == first { Ok(first) } else { Err(ChipError::Data) }
+    }
+
     pub(crate) async fn write<A>(&mut self, register: A, data: &[u8]) -> Result<(), ChipError<R::Error>>
     where
         R: Registers<A>,
@@ -132,6 +144,11 @@ impl<R, T: Timebase> Port<R, T> {
     pub(crate) async fn wait(&mut self, span: Micros) {
         let instant = self.clock.now() + span;
         self.wait_until(instant).await;
+    }
+
+    /// The outcome of a future, or `None` when it is not there at `instant`.
+    pub(crate) async fn until<F: Future>(&self, instant: Micros, future: F) -> Option<F::Output> {
+        within(&self.clock, instant.since(self.now()), future).await
     }
 
     pub(crate) async fn wait_until(&mut self, instant: Micros) {

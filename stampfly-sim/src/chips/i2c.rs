@@ -108,6 +108,11 @@ impl I2cBus {
         self.0.held.set(self.0.held.get().saturating_sub(1));
     }
 
+    /// The clock it runs on.
+    pub(super) fn clock(&self) -> Clock {
+        self.0.clock.clone()
+    }
+
     fn faults(&self, address: u8) -> Option<Faults> {
         let devices = self.0.devices.borrow();
         devices.iter().find(|device| device.answers(address)).map(|device| device.attached.faults())

@@ -13,6 +13,10 @@ pub mod register {
     pub const SENSORTIME_0: u8 = 0x18;
     /// Start-up status.
     pub const INTERNAL_STATUS: u8 = 0x21;
+    /// Which page of features the registers from 0x30 on show.
+    pub const FEAT_PAGE: u8 = 0x2F;
+    /// On page 1: what [`GYRO_TRIGGER`](super::GYRO_TRIGGER) starts, 2 bytes.
+    pub const G_TRIG_1: u8 = 0x32;
     /// FIFO output.
     pub const FIFO_DATA: u8 = 0x26;
     /// Gyroscope cross-axis factor.
@@ -21,8 +25,16 @@ pub mod register {
     pub const ACC_CONF: u8 = 0x40;
     /// FIFO down-sampling.
     pub const FIFO_DOWNS: u8 = 0x45;
+    /// Fill level of the FIFO that raises the interrupt, bytes, 2 bytes.
+    pub const FIFO_WTM_0: u8 = 0x46;
     /// FIFO configuration, 2 bytes.
     pub const FIFO_CONFIG_0: u8 = 0x48;
+    /// Electrical behaviour of the pin INT1.
+    pub const INT1_IO_CTRL: u8 = 0x53;
+    /// Whether interrupts stay until they are read.
+    pub const INT_LATCH: u8 = 0x55;
+    /// Which data interrupts go to which pin.
+    pub const INT_MAP_DATA: u8 = 0x58;
     /// Start of initialisation.
     pub const INIT_CTRL: u8 = 0x59;
     /// Address of the configuration data in words, 2 bytes.
@@ -31,6 +43,8 @@ pub mod register {
     pub const INIT_DATA: u8 = 0x5E;
     /// Accelerometer self test.
     pub const ACC_SELF_TEST: u8 = 0x6D;
+    /// Outcome of the gyroscope's self test.
+    pub const GYR_SELF_TEST_AXES: u8 = 0x6E;
     /// Power saving.
     pub const PWR_CONF: u8 = 0x7C;
     /// Sensor enables.
@@ -47,6 +61,18 @@ pub const SOFT_RESET: u8 = 0xB6;
 pub const FIFO_FLUSH: u8 = 0xB0;
 /// Temperature, accelerometer and gyroscope on, register 0x7D.
 pub const ALL_SENSORS: u8 = 0x0E;
+/// Four frames, register 0x46.
+pub const WATERMARK: [u8; 2] = [4 * FRAME_BYTES as u8, 0];
+/// Push-pull, active high, output enabled, register 0x53.
+pub const INT1_PUSH_PULL_HIGH: u8 = 0x0A;
+/// The pin follows the fill level, register 0x55.
+pub const NOT_LATCHED: u8 = 0x00;
+/// The FIFO's watermark on INT1, register 0x58.
+pub const WATERMARK_ON_INT1: u8 = 0x02;
+/// Command: what [`register::G_TRIG_1`] selects, register 0x7E.
+pub const GYRO_TRIGGER: u8 = 0x02;
+/// The self test, not the calibration of the sensitivity; data in blocks as after a reset, register 0x32 of page 1.
+pub const SELECT_GYRO_SELF_TEST: [u8; 2] = [0x00, 0x00];
 /// Accelerometer only, register 0x7D.
 pub const ACCELEROMETER_ONLY: u8 = 0x04;
 /// Advanced power saving off, FIFO self wake-up on, register 0x7C.
@@ -273,9 +299,24 @@ pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
     x > 16.0 && y < -15.0 && z > 10.0
 }
 
+/// The outcome of the gyroscope's self test, register 0x6E: bit 0 is "done", bits 1 to 3 are the axes that passed.
+///
+/// `None` while it runs.
+#[must_use]
+pub const fn gyro_self_test(axes: u8) -> Option<bool> {
+    if axes & 1 == 0 { None } else { Some(axes & 0x0E == 0x0E) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gyroscope_passes_with_three_axes_and_when_it_is_done() {
+        assert_eq!([0x00, 0x0E, 0x01, 0x0D, 0x0F, 0xFF].map(gyro_self_test), {
+            [None, None, Some(false), Some(false), Some(true), Some(true)]
+        });
+    }
 
     #[test]
     fn the_default_configuration_is_what_the_registers_say() {

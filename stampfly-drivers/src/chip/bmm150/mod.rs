@@ -41,20 +41,27 @@ impl Default for Config {
 ///
 /// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip. A field beyond the
 /// range is [`ChipError::Data`]. The chip keeps only its newest sample and does not say since when: a reader that comes
-/// late gets the one after it, and so does one whose call was dropped on the bus.
+/// late gets the one after it, and so does one whose call was dropped on the bus. `next` ends within two periods and
+/// 20 ms, 10 ms later when it sets the chip up.
 ///
-/// ```no_run
+/// ```
+/// # #![allow(dead_code)]
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
+/// # fn main() {
+/// # let trim = [0, 0, 9, 9, 9, 0, 0, 26, 26, 9, 9, 0xFB, 0x02, 0xAB, 0x60, 0x8D, 0x1B, 0, 0, 0xFD, 29];
+/// # let (bus, clock) = (Chip::new(&[
+/// #     (0x40, &[0x32]), (0x42, &[0x20, 0x03, 0x40, 0x06, 0xE8, 0x03, 0x35, 0x6E]), (0x5D, &trim),
+/// # ]), Clock::default());
+/// use stampfly_drivers::Magnetometer;
+/// use stampfly_drivers::blocking::block_on;
 /// use stampfly_drivers::chip::AxisMap;
 /// use stampfly_drivers::chip::bmm150::{Bmm150, Config};
-/// use stampfly_drivers::{Magnetometer, Timebase};
 ///
-/// async fn watch(bus: impl embedded_hal_async::i2c::I2c, clock: impl Timebase) {
-///     let axes = AxisMap::STAMPFLY_MAGNETOMETER;
-///     let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, axes, Config::default());
-///     while let Ok(sample) = compass.next().await {
-///         let _microtesla = sample.data.field;
-///     }
-/// }
+/// let axes = AxisMap::STAMPFLY_MAGNETOMETER;
+/// let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, axes, Config::default());
+/// let sample = block_on(compass.next()).expect("a measurement");
+/// assert!(sample.data.field.norm() > 20.0, "microtesla");
+/// # }
 /// ```
 #[derive(Debug)]
 pub struct Bmm150<R, T> {
@@ -126,7 +133,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
             return Err(ChipError::InvalidConfiguration);
         }
         self.wake().await?;
-        let trim = Trim::decode(&self.port.read(register::TRIM).await?).ok_or(ChipError::Data)?;
+        let trim = Trim::decode(&self.port.read_twice(register::TRIM).await?).ok_or(ChipError::Data)?;
         let [xy, z] = self.config.preset.codes();
         self.port.write(register::REPETITIONS_XY, &[xy]).await?;
         self.port.write(register::REPETITIONS_Z, &[z]).await?;

@@ -52,18 +52,26 @@ impl Default for Config {
 ///
 /// `Sample::at` is the middle of the pressure conversion; the filter's delay of a few samples is not taken off. A call
 /// that is dropped loses its conversion, and the next one starts another when that one is over. The chip has no self
-/// test; pressures outside of what it can measure are [`ChipError::Data`].
+/// test; pressures outside of what it can measure are [`ChipError::Data`]. `next` ends within an interval and two
+/// conversions, 30 ms later when it sets the chip up.
 ///
-/// ```no_run
+/// ```
+/// # #![allow(dead_code)]
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
+/// # fn main() {
+/// # let calibration: Vec<u8> = [27504, 26435, -1000, 36477, -10685, 3024, 2855, 140, -7, 15500, -14600, 6000]
+/// #     .into_iter().flat_map(|word: i32| (word as u16).to_le_bytes()).collect();
+/// # let (bus, clock) = (Chip::new(&[
+/// #     (0x88, &calibration), (0xD0, &[0x58]), (0xF7, &[0x65, 0x5A, 0xC0, 0x7E, 0xED, 0x00]),
+/// # ]), Clock::default());
+/// use stampfly_drivers::Barometer;
+/// use stampfly_drivers::blocking::block_on;
 /// use stampfly_drivers::chip::bmp280::{Bmp280, Config};
-/// use stampfly_drivers::{Barometer, Timebase};
 ///
-/// async fn watch(bus: impl embedded_hal_async::i2c::I2c, clock: impl Timebase) {
-///     let mut baro = Bmp280::new(bus, Bmp280::SDO_LOW, clock, Config::default());
-///     while let Ok(sample) = baro.next().await {
-///         let _metres = sample.data.altitude;
-///     }
-/// }
+/// let mut baro = Bmp280::new(bus, Bmp280::SDO_LOW, clock, Config::default());
+/// let sample = block_on(baro.next()).expect("a conversion");
+/// assert_eq!(sample.data.pressure.round(), 100_653.0);
+/// # }
 /// ```
 #[derive(Debug)]
 pub struct Bmp280<R, T> {
@@ -116,7 +124,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
             }
             self.port.wait(POLL).await;
         }
-        let bytes = self.port.read(register::CALIBRATION).await?;
+        let bytes = self.port.read_twice(register::CALIBRATION).await?;
         let calibration = Calibration::decode(&bytes).ok_or(ChipError::Data)?;
         self.port.write(register::CONFIG, &[codec::filter_bits(&self.config)]).await?;
         self.calibration = Some(calibration);

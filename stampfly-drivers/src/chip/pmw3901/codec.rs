@@ -81,6 +81,10 @@ pub const PERFORMANCE: &[Step] = {
     ]
 };
 
+/// A register of the list, in the bank where the list ends, and what it is told. A chip that restarted has another
+/// value there.
+pub const WITNESS: (u8, u8) = (0x4E, 0xA8);
+
 /// One motion burst ("Burst mode").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
@@ -166,6 +170,15 @@ mod tests {
         assert_eq!(calibration(29, 255), [40, 114]);
         assert_eq!(calibration(60, 0), [0x3F, 0]);
         assert_eq!(calibration(255, 1), [0x3F, 0]);
+    }
+
+    #[test]
+    fn the_witness_is_written_in_the_last_bank_and_not_again() {
+        let last = PERFORMANCE.iter().rposition(|step| matches!(step, Step::Write(register::BANK, 0)));
+        let tail = PERFORMANCE.get(last.expect("a bank")..).expect("steps");
+        let (register, value) = WITNESS;
+        assert!(tail.contains(&Step::Write(register, value)));
+        assert_eq!(tail.iter().filter(|step| matches!(step, Step::Write(at, _) if *at == register)).count(), 1);
     }
 
     #[test]

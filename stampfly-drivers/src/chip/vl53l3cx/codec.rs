@@ -60,11 +60,12 @@ pub const SHORT_BIAS_SEARCH: u8 = 0x09;
 pub const FROM_LAST_BIAS: u8 = 0x00;
 /// The result: status to distance and signal rate, from [`register::RESULT_RANGE_STATUS`].
 pub const RESULT_BYTES: usize = 17;
-/// How long the two calibrations and the detector selection before a measurement take, with the share of the ranging
-/// parts that is overhead: fitted to the published values.
+/// How long the two calibrations and the detector selection before a measurement take, µs: fitted to the published
+/// values.
 const PREPARATION: u64 = 12_000;
 /// A macro period of a light pulse period of one clock: 2304 periods of the nominal oscillator.
 const NANOS_PER_MACRO_CLOCK: u64 = 3_051;
+/// A millisecond.
 const PHASE_CALIBRATION: u64 = 1_000_000;
 /// Budgets that the formula of the ranging parts meets.
 const BUDGETS: core::ops::RangeInclusive<u64> = 33_000..=500_000;
@@ -151,7 +152,10 @@ const fn nanos_per_macro_period(code: u8) -> u64 {
 }
 
 const fn rounded(dividend: u64, divisor: u64) -> u64 {
-    (dividend + divisor / 2) / divisor
+    match dividend.saturating_add(divisor / 2).checked_div(divisor) {
+        Some(quotient) => quotient,
+        None => 0,
+    }
 }
 
 /// A number of macro periods as the chip takes it: eight bits and how often they are doubled.
@@ -170,7 +174,10 @@ pub const fn encode_timeout(macro_periods: u64) -> u16 {
 #[must_use]
 pub const fn phase_calibration(mode: DistanceMode) -> u8 {
     let [first, _] = mode.periods();
-    (PHASE_CALIBRATION / nanos_per_macro_period(first)) as u8
+    match PHASE_CALIBRATION.checked_div(nanos_per_macro_period(first)) {
+        Some(periods) => periods as u8,
+        None => 0,
+    }
 }
 
 /// [`register::RANGE_CONFIG_TIMEOUT_MACROP_A`] and what follows: times, limits of 90 mm for the standard deviation and
@@ -178,7 +185,7 @@ pub const fn phase_calibration(mode: DistanceMode) -> u8 {
 #[must_use]
 pub const fn ranging(config: &Config) -> [u8; 12] {
     // What is left of the budget, less a tenth, in two equal parts.
-    let part = config.budget.0.saturating_sub(PREPARATION) * 450;
+    let part = config.budget.0.saturating_sub(PREPARATION).saturating_mul(450);
     let [first, second] = config.mode.periods();
     let [a1, a0] = encode_timeout(rounded(part, nanos_per_macro_period(first))).to_be_bytes();
     let [b1, b0] = encode_timeout(rounded(part, nanos_per_macro_period(second))).to_be_bytes();
@@ -189,7 +196,7 @@ pub const fn ranging(config: &Config) -> [u8; 12] {
 /// published drivers'.
 #[must_use]
 pub const fn inter_measurement(period: Micros, oscillator: u16) -> [u8; 4] {
-    let ticks = (oscillator as u64 & 0x3FF) * period.0 * 43 / 40_000;
+    let ticks = (oscillator as u64 & 0x3FF).saturating_mul(period.0).saturating_mul(43) / 40_000;
     (if ticks > u32::MAX as u64 { u32::MAX } else { ticks as u32 }).to_be_bytes()
 }
 
@@ -337,7 +344,7 @@ mod tests {
     fn the_period_is_in_ticks_of_the_chips_own_clock() {
         assert_eq!(u32::from_be_bytes(inter_measurement(Micros::from_millis(100), 1_000)), 107_500);
         assert_eq!(inter_measurement(Micros::from_millis(100), 0xFC00 | 1_000), 107_500u32.to_be_bytes(), "10 bits");
-        assert_eq!(inter_measurement(Micros(u64::MAX / 1_000_000), 1_023), u32::MAX.to_be_bytes());
+        assert_eq!(inter_measurement(Micros(u64::MAX), 1_023), u32::MAX.to_be_bytes());
     }
 
     #[test]

@@ -76,20 +76,30 @@ impl Default for Config {
 /// The first sample takes 10 ms and two measurements, 80 ms in all. `next` ends within two periods and 20 ms
 /// ([`ChipError::NoSample`]); when it has to start the chip, within four more periods and 350 ms.
 ///
-/// ```no_run
-/// use embedded_hal::digital::OutputPin;
-/// use embedded_hal_async::i2c::I2c;
+/// ```
+/// # #![allow(dead_code)]
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
+/// # fn main() {
+/// # let result = [9, 0, 1, 16, 0, 0, 0, 0, 9, 0, 8, 0, 0, 0x04, 0xD2, 0, 90];
+/// # let content: [(u16, &[u8]); 5] =
+/// #     [(0x89, &result), (0xE5, &[1]), (0xDE, &[3, 232]), (0x10F, &[0xEA, 0xAA]), (0x30, &[1, 1])];
+/// # let [below_bus, ahead_bus] = [Chip::new(&content), Chip::new(&content)];
+/// # let [below_pin, ahead_pin] = [&below_bus, &ahead_bus].map(|chip| Pin(chip.awake.clone()));
+/// # let clock = Clock::default();
+/// use stampfly_drivers::RangeFinder;
+/// use stampfly_drivers::blocking::block_on;
 /// use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, Vl53l3cx};
-/// use stampfly_drivers::{RangeFinder, Timebase};
 ///
-/// async fn watch<I: I2c + Clone>(bus: I, below: impl OutputPin, ahead: impl OutputPin, clock: impl Timebase) {
-///     let boot = BootAddress::new();
-///     let mut below = Vl53l3cx::new(bus.clone(), below, &boot, 0x30, clock.clone(), Config::default());
-///     let mut ahead = Vl53l3cx::new(bus, ahead, &boot, 0x31, clock, Config::default());
-///     while let (Ok(below), Ok(ahead)) = (below.next().await, ahead.next().await) {
-///         let _metres = [below.data, ahead.data].map(|range| range.valid.then_some(range.distance));
-///     }
-/// }
+/// // Two handles of one bus; on every chip's XSHUT a pin.
+/// let boot = BootAddress::new();
+/// let mut below = Vl53l3cx::new(below_bus, below_pin, &boot, 0x30, clock.clone(), Config::default());
+/// let mut ahead = Vl53l3cx::new(ahead_bus, ahead_pin, &boot, 0x31, clock, Config::default());
+///
+/// assert!(!block_on(below.next()).expect("a measurement").data.valid, "the first one is not vouched for");
+/// let sample = block_on(below.next()).expect("a measurement");
+/// assert!(sample.data.valid && sample.data.distance == 1.234, "metres");
+/// assert!(block_on(ahead.next()).is_ok());
+/// # }
 /// ```
 #[derive(Debug)]
 pub struct Vl53l3cx<'b, I, X, T> {

@@ -1,0 +1,235 @@
+//! Every chip, every fault: a typed error within its time, neighbours that notice nothing, recovery without a restart.
+//!
+//! All seven drivers run as in flight on the two buses. A fault begins after one second and ends 0.4 s later.
+
+mod rig;
+
+use rig::{Access, NAMES, Said, run};
+use stampfly_drivers::SensorErrorKind;
+use stampfly_sim::chips::Faults;
+use stampfly_types::Micros;
+
+const BEGIN: Micros = Micros::from_millis(1_000);
+const FAULT_ENDS: Micros = Micros::from_millis(1_400);
+const END: Micros = Micros::from_millis(3_500);
+
+/// What each driver promises, ms: time between samples, from a fault to an error, from its end to a sample.
+///
+/// The promises are the drivers' documentation: four output periods of the inertial sensor; `interval` and a transfer of
+/// the flow sensor; a conversion and its limit; two periods and 20 ms of a range finder, and four and 350 ms more with a
+/// start. To the recovery belong the start sequence, a driver's last attempt, and the 80 ms before the next.
+const PROMISES: [(u64, u64, u64); 7] = [
+    (3, 20, 330),    // imu
+    (11, 40, 380),   // flow
+    (42, 100, 230),  // mag
+    (42, 100, 230),  // baro
+    (105, 250, 430), // power
+    (36, 90, 900),   // tof
+    (36, 90, 900),   // tof_front
+];
+
+fn promise(index: usize) -> [Micros; 3] {
+    let (period, error, recovery) = PROMISES[index];
+    [period, error, recovery].map(Micros::from_millis)
+}
+
+fn samples(said: &[Said]) -> impl Iterator<Item = (Micros, f32)> {
+    said.iter().filter_map(|(at, said)| said.ok().map(|figure| (*at, figure)))
+}
+
+fn errors(said: &[Said]) -> Vec<(Micros, SensorErrorKind)> {
+    said.iter().filter_map(|(at, said)| said.err().map(|kind| (*at, kind))).collect()
+}
+
+/// The longest time without a sample between two instants.
+fn longest_gap(said: &[Said], begin: Micros, end: Micros) -> Micros {
+    let instants = samples(said).map(|(at, _)| at).filter(|at| (begin..=end).contains(at));
+    let (last, gap) = instants.fold((begin, Micros::ZERO), |(last, gap), at| (at, gap.max(at.since(last))));
+    gap.max(end.since(last))
+}
+
+/// The same from one second after the start on, when everything runs.
+fn assert_unharmed(index: usize, said: &[Said], what: &str) {
+    let late: Vec<_> = errors(said).into_iter().filter(|(at, _)| *at >= BEGIN).collect();
+    assert!(late.is_empty(), "{what}: {} said {late:?}", NAMES[index]);
+    let [period, ..] = promise(index);
+    let gap = longest_gap(said, BEGIN, END);
+    // A sample may come late by what the bus is busy, and one range finder by its look every 2 ms.
+    assert!(gap <= period + period, "{what}: {} was silent for {gap}", NAMES[index]);
+}
+
+/// Samples come again within the promised time, and say what they said before.
+fn assert_recovered(index: usize, said: &[Said], from: Micros, what: &str) {
+    let [.., recovery] = promise(index);
+    let again = samples(said).map(|(at, _)| at).find(|at| *at > from);
+    let took = again.map(|at| at.since(from));
+    assert!(took.is_some_and(|took| took <= recovery), "{what}: {} took {took:?}", NAMES[index]);
+    let mean = |begin: Micros, end: Micros| {
+        let figures: Vec<f32> = samples(said).filter(|(at, _)| (begin..end).contains(at)).map(|(_, f)| f).collect();
+        figures.iter().sum::<f32>() / figures.len() as f32
+    };
+    let (before, after) = (mean(Micros::from_millis(700), BEGIN), mean(END.since(Micros::from_millis(700)), END));
+    // Noise of the mean of some samples: m/s², rad, µT, Pa, V, m, share.
+    let tolerance = [0.05, 0.002, 1.0, 2.0, 0.02, 0.002, 0.1][index];
+    assert!((before - after).abs() < tolerance, "{what}: {} says {after} after {before}", NAMES[index]);
+}
+
+/// Runs every chip through a fault that lasts from [`BEGIN`] to [`FAULT_ENDS`].
+fn each(
+    chips: &[usize],
+    what: &str,
+    on: impl Fn(&Access, usize),
+    off: impl Fn(&Access, usize),
+    look: impl Fn(usize, &[Said]),
+) {
+    for &index in chips {
+        let said = run(END, &[(BEGIN, &|access| on(access, index)), (FAULT_ENDS, &|access| off(access, index))]);
+        look(index, &said[index]);
+        assert_recovered(index, &said[index], FAULT_ENDS, what);
+        for other in (0..NAMES.len()).filter(|other| *other != index) {
+            assert_unharmed(other, &said[other], &format!("{what} of {}", NAMES[index]));
+        }
+    }
+}
+
+const ALL: [usize; 7] = [0, 1, 2, 3, 4, 5, 6];
+const ON_I2C: [usize; 5] = [2, 3, 4, 5, 6];
+
+fn set(faults: Faults) -> impl Fn(&Access, usize) {
+    move |access, index| access.chip(index).set_faults(faults)
+}
+
+fn heal(access: &Access, index: usize) {
+    access.chip(index).set_faults(Faults::default());
+}
+
+/// An error of one of these kinds came in time, and no sample during the fault but those already on their way.
+fn assert_failed(index: usize, said: &[Said], kinds: &[SensorErrorKind], what: &str) {
+    let [_, limit, _] = promise(index);
+    let during: Vec<_> = errors(said).into_iter().filter(|(at, _)| (BEGIN..=FAULT_ENDS).contains(at)).collect();
+    let first = during.first().map(|(at, _)| at.since(BEGIN));
+    assert!(first.is_some_and(|first| first <= limit), "{what}: {} said {first:?}", NAMES[index]);
+    assert!(during.iter().all(|(_, kind)| kinds.contains(kind)), "{what}: {} said {during:?}", NAMES[index]);
+    let samples = samples(said).filter(|(at, _)| (BEGIN + limit..FAULT_ENDS).contains(at)).count();
+    assert_eq!(samples, 0, "{what}: {} measures on", NAMES[index]);
+}
+
+#[test]
+fn without_a_fault_nobody_says_an_error() {
+    let said = run(END, &[]);
+    for (index, said) in said.iter().enumerate() {
+        assert_unharmed(index, said, "no fault");
+        let first = samples(said).next().map(|(at, _)| at);
+        assert!(first.is_some_and(|at| at < Micros::from_millis(700)), "{} began {first:?}", NAMES[index]);
+    }
+}
+
+#[test]
+fn a_dead_chip() {
+    // All ones on SPI is data, of a wrong identity or of sensors that do not run.
+    use SensorErrorKind::*;
+    let dead = Faults { dead: true, ..Faults::default() };
+    each(&ALL, "death", set(dead), heal, |index, said| {
+        assert_failed(index, said, &[Bus, Timeout, Identification, Configuration, Data, Other], "death");
+    });
+}
+
+#[test]
+fn refused_transfers() {
+    let refusing = Faults { refusals: 1.0, ..Faults::default() };
+    each(&ALL, "refusal", set(refusing), heal, |index, said| {
+        // A range finder that does not acknowledge may have restarted at its first address.
+        assert_failed(index, said, &[SensorErrorKind::Bus, SensorErrorKind::Other], "refusal");
+    });
+}
+
+#[test]
+fn bit_errors() {
+    // Every other transfer of a few bytes is hit. What is garbled cannot always be known, but nobody hangs.
+    let noisy = Faults { bit_errors: 0.01, ..Faults::default() };
+    each(&ALL, "noise", set(noisy), heal, |index, said| {
+        let [period, _, recovery] = promise(index);
+        let mut last = BEGIN;
+        for (at, _) in said.iter().filter(|(at, _)| (BEGIN..FAULT_ENDS).contains(at)) {
+            assert!(at.since(last) <= period + recovery, "{} said nothing for {}", NAMES[index], at.since(last));
+            last = *at;
+        }
+    });
+}
+
+#[test]
+fn a_stretched_clock() {
+    // Half a millisecond in every transfer: slow, but within what every driver allows.
+    let slow = Faults { stretch: Micros(500), ..Faults::default() };
+    each(&ON_I2C, "stretching", set(slow), heal, |index, said| assert_unharmed(index, said, "stretching"));
+}
+
+#[test]
+fn a_clock_that_is_held() {
+    // 15 ms in every transfer is given up. Nobody can use the bus meanwhile, so the neighbours miss samples; but in
+    // between they have their turns, and nobody is worse off afterwards.
+    let held = Faults { stretch: Micros::from_millis(15), ..Faults::default() };
+    for index in ON_I2C {
+        let said =
+            run(END, &[(BEGIN, &|access| set(held)(access, index)), (FAULT_ENDS, &|access| heal(access, index))]);
+        assert_failed(index, &said[index], &[SensorErrorKind::Timeout, SensorErrorKind::Bus], "held clock");
+        for other in ON_I2C {
+            assert_recovered(other, &said[other], FAULT_ENDS, "held clock");
+            let served = samples(&said[other]).filter(|(at, _)| (BEGIN..FAULT_ENDS).contains(at)).count();
+            assert!(other == index || served > 0, "held clock of {}: {} starves", NAMES[index], NAMES[other]);
+        }
+        assert_unharmed(0, &said[0], "held clock");
+        assert_unharmed(1, &said[1], "held clock");
+    }
+}
+
+#[test]
+fn a_reset_in_flight() {
+    each(
+        &ALL,
+        "reset",
+        |access, index| access.chip(index).reset(),
+        |_, _| {},
+        |index, said| {
+            assert_recovered(index, said, BEGIN + promise(index)[1], "reset");
+        },
+    );
+}
+
+#[test]
+fn another_part() {
+    let ids = |id: u16| {
+        move |access: &Access, index: usize| {
+            access.chip(index).set_id(id);
+            access.chip(index).reset();
+        }
+    };
+    let right = [0x24, 0x49, 0x32, 0x58, 0x3220, 0xEA, 0xEA];
+    each(
+        &ALL,
+        "another part",
+        ids(0x77),
+        |access, index| ids(right[index])(access, index),
+        |index, said| {
+            let kinds = errors(said);
+            assert!(
+                kinds.iter().any(|(_, kind)| *kind == SensorErrorKind::Identification),
+                "{}: {kinds:?}",
+                NAMES[index]
+            );
+        },
+    );
+}
+
+#[test]
+fn a_data_line_that_is_held() {
+    let said = run(END, &[(BEGIN, &|access| access.i2c.hold_sda())]);
+    let failed: usize = ON_I2C.iter().map(|index| errors(&said[*index]).len()).sum();
+    assert_eq!(failed, 1, "the one whose turn it was frees the bus for all");
+    for index in ON_I2C {
+        assert_recovered(index, &said[index], BEGIN, "held data line");
+    }
+    for index in [0, 1] {
+        assert_unharmed(index, &said[index], "held data line");
+    }
+}

@@ -1,0 +1,109 @@
+// Chips as memories, for the examples in the documentation: what is written can be read back, and what the example
+// gives is there to be read. No chip has a rhythm, no time passes but what the driver waits for.
+
+use core::cell::Cell;
+use core::convert::Infallible;
+use embedded_hal::digital::OutputPin;
+use embedded_hal_async::delay::DelayNs;
+use embedded_hal_async::i2c::{self, I2c};
+use embedded_hal_async::spi::{self, SpiDevice};
+use std::rc::Rc;
+
+/// Virtual time in nanoseconds: whoever waits moves it on.
+#[derive(Clone, Default)]
+struct Clock(Rc<Cell<u64>>);
+
+impl DelayNs for Clock {
+    async fn delay_ns(&mut self, ns: u32) {
+        self.0.set(self.0.get() + u64::from(ns));
+    }
+}
+
+impl stampfly_drivers::Timebase for Clock {
+    fn now(&self) -> stampfly_types::Micros {
+        stampfly_types::Micros(1_000_000 + self.0.get() / 1_000)
+    }
+}
+
+/// A bus with one chip, and the pin that keeps it in reset.
+struct Chip {
+    memory: [u8; 1024],
+    /// Registers that are read in one piece, longest memory first.
+    pieces: Vec<(u16, Vec<u8>)>,
+    awake: Rc<Cell<bool>>,
+}
+
+impl Chip {
+    fn new(content: &[(u16, &[u8])]) -> Self {
+        let mut chip = Self { memory: [0; 1024], pieces: Vec::new(), awake: Rc::new(Cell::new(true)) };
+        for (register, data) in content {
+            chip.store(*register, data);
+        }
+        chip
+    }
+
+    fn store(&mut self, register: u16, data: &[u8]) {
+        self.pieces.retain(|piece| piece.0 != register || piece.1.len() != data.len());
+        self.pieces.push((register, data.to_vec()));
+        self.memory[usize::from(register)..][..data.len()].copy_from_slice(data);
+    }
+
+    fn load(&self, register: u16, into: &mut [u8]) {
+        let piece = self.pieces.iter().find(|piece| piece.0 == register && piece.1.len() == into.len());
+        into.copy_from_slice(piece.map_or(&self.memory[usize::from(register)..][..into.len()], |piece| &piece.1));
+    }
+}
+
+impl i2c::ErrorType for Chip {
+    type Error = i2c::ErrorKind;
+}
+
+impl I2c for Chip {
+    async fn transaction(&mut self, _: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), i2c::ErrorKind> {
+        if !self.awake.get() {
+            return Err(i2c::ErrorKind::NoAcknowledge(i2c::NoAcknowledgeSource::Address));
+        }
+        let [i2c::Operation::Write(address), data] = operations else { panic!("not a register access") };
+        let register = address.iter().fold(0, |number, byte| number << 8 | u16::from(*byte));
+        match data {
+            i2c::Operation::Read(into) => self.load(register, into),
+            i2c::Operation::Write(data) => self.store(register, data),
+        }
+        Ok(())
+    }
+}
+
+impl spi::ErrorType for Chip {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Chip {
+    async fn transaction(&mut self, operations: &mut [spi::Operation<'_, u8>]) -> Result<(), Infallible> {
+        use spi::Operation::{DelayNs, Read, Write};
+        match operations {
+            [Write([register, _]), Read(into)] => self.load(u16::from(register & 0x7F), into),
+            [Write([register]), Write(data)] => self.store(u16::from(*register), data),
+            [Write([register]), DelayNs(_), Read(into)] => self.load(u16::from(*register), into),
+            [Write([register, value]), DelayNs(_)] => self.store(u16::from(register & 0x7F), &[*value]),
+            _ => panic!("not a register access"),
+        }
+        Ok(())
+    }
+}
+
+struct Pin(Rc<Cell<bool>>);
+
+impl embedded_hal::digital::ErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.set(false);
+        Ok(())
+    }
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.set(true);
+        Ok(())
+    }
+}
