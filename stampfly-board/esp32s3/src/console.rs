@@ -24,7 +24,7 @@ use stampfly_log::ulog::{Full, Sample, Sink};
 const VERSION: &str = concat!("stampfly-esp32s3 ", env!("CARGO_PKG_VERSION"));
 const PROMPT: &str = "> ";
 /// The longest reply is the list of parameters.
-const REPLY: usize = 6 * 1024;
+const REPLY: usize = 4 * 1024;
 /// A terminal that takes nothing for this long is none.
 const PATIENCE: Duration = Duration::from_millis(200);
 /// Bytes of the log in a line of its dump.
@@ -209,7 +209,7 @@ impl Screen {
 }
 
 /// The longest piece of a log that is made at once: what explains its topics.
-const LOG_PIECE: usize = 16 * 1024;
+const LOG_PIECE: usize = 10 * 1024;
 
 /// Collects what a log is made of.
 struct Bytes<'b>(&'b RefCell<Vec<u8, LOG_PIECE>>);

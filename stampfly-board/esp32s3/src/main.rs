@@ -28,6 +28,7 @@ mod sensors;
 mod spi;
 mod storage;
 
+use clock::Clock;
 use core::cell::RefCell;
 use embassy_executor::Spawner;
 use embassy_futures::block_on;
@@ -36,7 +37,8 @@ use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
 use memory::Memory;
 use pins::*;
-use stampfly_board::{VehicleConfig, vehicle, wiring};
+use stampfly_board::{FlightLoop, VehicleConfig, vehicle, wiring};
+use stampfly_drivers::Timebase;
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -66,9 +68,9 @@ fn main() -> ! {
     static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
     let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
     let pins: Pins<'static> = split_resources!(chip);
+    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
     let flight = flight::Parts {
-        vehicle,
-        heads,
+        flight_loop: FLIGHT_LOOP.init_with(|| FlightLoop::new(vehicle, heads, Clock.now())),
         imu: outside.imu,
         flow: outside.flow,
         duties: outside.motors,

@@ -10,8 +10,8 @@ use stampfly_drivers::Timebase;
 use stampfly_types::Micros;
 use stampfly_types::messages::SystemMode;
 
-/// 64 kB: about five seconds.
-const WORDS: usize = 16 * 1024;
+/// 32 kB: between two and three seconds.
+const WORDS: usize = 8 * 1024;
 /// One sample of each topic per interval.
 const INTERVAL: Micros = Micros::from_millis(40);
 /// Remembering goes on for this long after the motors have stopped.
