@@ -12,6 +12,7 @@ pub mod examples;
 pub mod figures;
 pub mod fmt;
 pub mod loom;
+pub mod memory;
 pub mod no_std;
 pub mod package;
 pub mod panic_proof;
