@@ -36,6 +36,8 @@ struct Chip {
     target: (u8, i16),
     blind: bool,
     boots: bool,
+    /// A bit that changes on the way to the ranging parts' registers.
+    flip: u8,
     /// Faults of the next accesses to a register.
     faults: Vec<(u16, Fault)>,
 }
@@ -55,6 +57,7 @@ impl Chip {
             target: (9, 1_234),
             blind: false,
             boots: true,
+            flip: 0,
             faults: Vec::new(),
         }
     }
@@ -82,6 +85,9 @@ impl Chip {
     fn write(&mut self, register: u16, data: &[u8]) {
         for (offset, value) in data.iter().enumerate() {
             self.registers[usize::from(register) + offset] = *value;
+        }
+        if register == 0x5E {
+            self.registers[0x60] ^= core::mem::take(&mut self.flip);
         }
         match (register, data) {
             (0x0001, [address]) => self.address = *address,
@@ -458,4 +464,13 @@ fn a_driver_that_exists_holds_its_chip_in_reset() {
     assert_eq!(block_on(below.next()), Err(ChipError::AddressTaken));
     let [mut below, mut ahead] = bench.drivers();
     assert!(block_on(below.next()).is_ok() && block_on(ahead.next()).is_ok());
+}
+
+#[test]
+fn a_configuration_that_arrives_garbled_is_told_and_sent_again() {
+    let bench = Bench::new();
+    let [mut below, _] = bench.drivers();
+    bench.chips[0].borrow_mut().flip = 0x08;
+    assert_eq!(block_on(below.next()), Err(ChipError::Configuration { status: 0x07 }));
+    assert!(block_on(below.next()).is_ok());
 }

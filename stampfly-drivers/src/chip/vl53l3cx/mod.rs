@@ -225,9 +225,15 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         }
         let mode = self.config.mode;
         self.port.write(register::PHASECAL_CONFIG_TIMEOUT_MACROP, &[codec::phase_calibration(mode)]).await?;
-        self.port.write(register::RANGE_CONFIG_TIMEOUT_MACROP_A, &codec::ranging(&self.config)).await?;
+        let ranging = codec::ranging(&self.config);
+        self.port.write(register::RANGE_CONFIG_TIMEOUT_MACROP_A, &ranging).await?;
+        // A wrong bit in here would not be noticed as anything but wrong distances.
+        let kept: [u8; 12] = self.port.read(register::RANGE_CONFIG_TIMEOUT_MACROP_A).await?;
+        if kept != ranging {
+            return Err(ChipError::Configuration { status: kept[2] });
+        }
         self.port.write(register::SD_CONFIG_WOI_SD0, &mode.windows()).await?;
-        let oscillator = u16::from_be_bytes(self.port.read(register::RESULT_OSC_CALIBRATE_VAL).await?);
+        let oscillator = u16::from_be_bytes(self.port.read_twice(register::RESULT_OSC_CALIBRATE_VAL).await?);
         let period = codec::inter_measurement(self.config.period, oscillator);
         self.port.write(register::SYSTEM_INTERMEASUREMENT_PERIOD, &period).await
     }
