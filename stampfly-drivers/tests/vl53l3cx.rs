@@ -286,6 +286,19 @@ fn a_reader_that_comes_late_gets_a_fresh_measurement() {
 }
 
 #[test]
+fn a_reader_that_comes_a_little_late_knows_when_the_measurement_was() {
+    let bench = Bench::new();
+    let [mut below, _] = bench.drivers();
+    for round in 0..75 {
+        block_on(below.next()).expect("a sample");
+        bench.clock.advance(30_000 + round * 97);
+        let sample = block_on(below.next()).expect("a sample");
+        let (_, finished) = bench.chips[0].borrow().measured();
+        assert!(sample.at.0.abs_diff(finished - 16_500) <= 1_500, "{} and {finished} in round {round}", sample.at);
+    }
+}
+
+#[test]
 fn the_same_measurement_is_never_delivered_twice_whatever_happens_to_its_end() {
     let bench = Bench::new();
     let [mut below, _] = bench.drivers();

@@ -272,9 +272,13 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             }
             let up = status & 1 != 0;
             if up && !self.stale {
-                self.due = now + early(period);
-                let since = now.since(before.unwrap_or(now));
-                return Ok(now.since(Micros(since.0 / 2)));
+                // Between two looks; or, up at the first look, when the rhythm says, for all that is known.
+                let seen = match before {
+                    Some(before) => before + Micros(now.since(before).0 / 2),
+                    None => now.min(self.due + period.since(early(period))),
+                };
+                self.due = seen + early(period);
+                return Ok(seen);
             }
             if up {
                 self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;
