@@ -53,7 +53,7 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(size: 36 * 1024);
     motors::start_unit(chip.LEDC);
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
-    cutoff::start(TimerGroup::new(chip.TIMG1).timer0);
+    cutoff::start(chip.TIMG1);
 
     static BUS: StaticCell<wiring::Bus> = StaticCell::new();
     let wiring::Split { ports, taps, heads } = BUS.init_with(wiring::Bus::new).split(None);
