@@ -8,5 +8,7 @@
 //! | `control` | `stampfly-control` | a rate loop that learns a disturbance, on a hexacopter's mixer |
 //! | `mode` | `stampfly-mode` | a flight through the state table, and what refuses to arm |
 //! | `log` | `stampfly-log` | writing a log and reading it back |
+//! | `link` | `stampfly-link` | a vehicle that looks for a transmitter in a room full of them |
+//! | `param` | `stampfly-param` | a value that survives the power cut in the middle of its change |
 //! | `drivers` | `stampfly-drivers` | motors on any PWM channel |
 //! | `sim` | `stampfly-sim` | a hop on virtual time that nobody stabilises |

@@ -157,6 +157,15 @@ mod tests {
     }
 
     #[test]
+    fn no_two_names_share_a_place_in_flash() {
+        for (index, parameter) in PARAMETERS.iter().enumerate() {
+            let key = stampfly_param::key(parameter.name);
+            let twin = PARAMETERS[..index].iter().find(|other| stampfly_param::key(other.name) == key);
+            assert!(twin.is_none(), "{}", parameter.name);
+        }
+    }
+
+    #[test]
     fn each_parameter_reaches_a_field_of_its_own() {
         for parameter in PARAMETERS {
             let mut config = VehicleConfig::default();

@@ -1,7 +1,7 @@
 //! The vehicle's end of the link: whom it listens to, and what it throws away.
 //!
 //! Before it is paired, and while it looks for a new transmitter, the vehicle calls twice a second and takes the first
-//! station that answers with a whole control packet for this very vehicle. From then on it listens to that station and
+//! station that answers with a whole control packet for this very vehicle and its arm switch off. From then on it listens to that station and
 //! to nobody else. Looking starts only on the pilot's demand and never with motors armed, so nobody can talk a flying
 //! vehicle out of its pilot's hands by shouting.
 //!
@@ -14,6 +14,8 @@ use stampfly_types::messages::PilotInput;
 
 /// Time between two calls for a transmitter.
 const CALL_PERIOD: Micros = Micros::from_millis(500);
+/// A transmitter that has been silent for this long is looking for vehicles, too.
+const SILENCE: Micros = Micros::from_secs(1);
 
 /// What came in since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,7 +24,7 @@ pub struct Counters {
     pub accepted: u32,
     /// Older than the newest that was taken.
     pub old: u32,
-    /// From a station the vehicle does not listen to.
+    /// From a station the vehicle does not listen to, or does not take as its own.
     pub strangers: u32,
     /// Not of a control packet's length.
     pub length: u32,
@@ -44,6 +46,8 @@ pub enum Rejected {
     Malformed(ControlError),
     /// Older than the newest that was taken.
     Old,
+    /// From a transmitter that wants to be the vehicle's and has its arm switch on.
+    ArmSwitch,
 }
 
 impl core::fmt::Display for Rejected {
@@ -52,6 +56,7 @@ impl core::fmt::Display for Rejected {
             Self::Stranger => f.write_str("from a station the vehicle does not listen to"),
             Self::Malformed(error) => error.fmt(f),
             Self::Old => f.write_str("older than the newest"),
+            Self::ArmSwitch => f.write_str("its arm switch is on"),
         }
     }
 }
@@ -94,6 +99,8 @@ pub struct Session {
     /// While looking for a transmitter: when to call next.
     next_call: Option<Micros>,
     newest: Option<Micros>,
+    /// While looking: when the present transmitter was last heard, or looking began.
+    present_heard: Micros,
     counters: Counters,
 }
 
@@ -102,10 +109,18 @@ impl Session {
     #[must_use]
     pub fn new(vehicle: Address, channel: u8, peer: Option<Address>) -> Self {
         let next_call = if peer.is_none() { Some(Micros::ZERO) } else { None };
-        Self { vehicle, channel, peer, next_call, newest: None, counters: Counters::default() }
+        Self {
+            vehicle,
+            channel,
+            peer,
+            next_call,
+            newest: None,
+            present_heard: Micros::ZERO,
+            counters: Counters::default(),
+        }
     }
 
-    /// Looks for a transmitter. The present one is heard no more, until it answers the call like any other.
+    /// Looks for a transmitter. The present one is heard no more, until it has been silent for a second.
     ///
     /// # Errors
     /// With motors armed; nothing has changed then.
@@ -113,7 +128,7 @@ impl Session {
         if armed {
             return Err(PairingRefused);
         }
-        self.next_call = Some(now);
+        (self.next_call, self.present_heard) = (Some(now), now);
         Ok(())
     }
 
@@ -149,7 +164,7 @@ impl Session {
         let counter = match &outcome {
             Ok(_) => accepted,
             Err(Rejected::Old) => old,
-            Err(Rejected::Stranger) => strangers,
+            Err(Rejected::Stranger | Rejected::ArmSwitch) => strangers,
             Err(Rejected::Malformed(ControlError::Length)) => length,
             Err(Rejected::Malformed(ControlError::OtherVehicle)) => other_vehicles,
             Err(Rejected::Malformed(ControlError::Checksum)) => checksum,
@@ -172,6 +187,15 @@ impl Session {
             return Err(Rejected::Old);
         }
         if self.is_pairing() {
+            if self.peer == Some(source) {
+                let heard = core::mem::replace(&mut self.present_heard, at);
+                if at.since(heard) < SILENCE {
+                    return Err(Rejected::Stranger);
+                }
+            }
+            if packet.arm {
+                return Err(Rejected::ArmSwitch);
+            }
             (self.peer, self.next_call) = (Some(source), None);
         }
         self.newest = Some(at);

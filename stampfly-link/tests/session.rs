@@ -10,7 +10,7 @@ const PILOT: Address = Address([0x30, 1, 2, 3, 4, 5]);
 const STRANGER: Address = Address([0x30, 9, 9, 9, 9, 9]);
 
 fn packet() -> [u8; 14] {
-    ControlPacket::from_pilot(VEHICLE, &PilotInput { arm: true, ..Default::default() }).to_bytes()
+    ControlPacket::from_pilot(VEHICLE, &PilotInput { throttle: 0.25, ..Default::default() }).to_bytes()
 }
 
 #[test]
@@ -43,6 +43,20 @@ fn a_paired_vehicle_looks_only_when_told_and_never_armed() {
 }
 
 #[test]
+fn the_present_transmitter_wins_only_after_a_silence() {
+    let mut session = Session::new(VEHICLE, 1, Some(PILOT));
+    assert_eq!(session.start_pairing(Micros::from_millis(10), false), Ok(()));
+    for ms in (20..5_000).step_by(20) {
+        assert_eq!(session.receive(Micros::from_millis(ms), PILOT, &packet()), Err(Rejected::Stranger), "still on");
+    }
+    let mut other = session.clone();
+    assert!(other.receive(Micros::from_millis(5_001), STRANGER, &packet()).is_ok());
+    assert_eq!(other.peer(), Some(STRANGER));
+    assert!(session.receive(Micros::from_millis(6_100), PILOT, &packet()).is_ok(), "switched off and on again");
+    assert!(!session.is_pairing() && session.peer() == Some(PILOT));
+}
+
+#[test]
 fn nobody_pairs_with_half_a_packet_or_from_a_group() {
     let mut session = Session::new(VEHICLE, 1, None);
     session.stop_pairing();
@@ -51,7 +65,11 @@ fn nobody_pairs_with_half_a_packet_or_from_a_group() {
     assert!(session.receive(Micros(0), PILOT, &[0; 14]).is_err());
     assert_eq!(session.receive(Micros(0), Address::BROADCAST, &packet()), Err(Rejected::Stranger));
     assert_eq!(session.receive(Micros(0), Address([0; 6]), &packet()), Err(Rejected::Stranger));
-    assert_eq!(session.peer(), None);
+    let armed = ControlPacket { arm: true, ..ControlPacket::centred(VEHICLE) }.to_bytes();
+    assert_eq!(session.receive(Micros(0), PILOT, &armed), Err(Rejected::ArmSwitch));
+    assert_eq!((session.peer(), session.age(Micros(0))), (None, None));
+    assert!(session.receive(Micros(0), PILOT, &packet()).is_ok());
+    assert!(session.receive(Micros(1), PILOT, &armed).is_ok_and(|input| input.arm), "its own may arm");
 }
 
 #[test]

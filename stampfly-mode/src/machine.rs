@@ -173,6 +173,8 @@ pub struct ModeMachine {
     crashed: bool,
     silent_since: Option<Micros>,
     was_diverged: bool,
+    /// While pairing: has the transmitter of before fallen silent?
+    unheard: bool,
 }
 
 impl ModeMachine {
@@ -183,10 +185,20 @@ impl ModeMachine {
         let mode = &mut self.output.mode;
         if let Some(gesture) = input.button {
             match gesture {
-                ButtonGesture::HoldPair if !is_armed(mode.state) => mode.pairing = !mode.pairing,
+                ButtonGesture::HoldPair if !is_armed(mode.state) => {
+                    mode.pairing = !mode.pairing;
+                    self.unheard = false;
+                    // Another transmitter has to show its arm switch off, too.
+                    self.switch = None;
+                }
                 _ => {}
             }
         }
+        // The first frame after silence is the new transmitter's: the link listens to no other.
+        if mode.pairing && input.pilot.is_some() && self.unheard {
+            mode.pairing = false;
+        }
+        self.unheard = mode.pairing && (self.unheard || input.pilot.is_none());
         mode.blocks = arming::blocks(mode.state, mode.pairing, self.crashed, switch.is_stale, input);
         let happened = self.happened(now, input, &switch);
         if self.acknowledges(input, &switch) {
@@ -366,6 +378,40 @@ mod tests {
             };
             machine.step(Micros(self.now), &input)
         }
+    }
+
+    #[test]
+    fn pairing_ends_with_the_first_frame_after_a_silence_and_its_arm_switch_must_be_seen_off() {
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let hold = |world: &mut World, machine: &mut ModeMachine| {
+            world.now += 2_500;
+            let input = ModeInput {
+                alerts: world.alerts,
+                estimate: &world.estimate,
+                calibration: &world.calibration,
+                status: &world.status,
+                pilot: world.pilot.as_ref(),
+                commands: &[],
+                button: Some(ButtonGesture::HoldPair),
+            };
+            machine.step(Micros(world.now), &input).mode.pairing
+        };
+        world.pilot = Some(PilotInput::default());
+        world.step(&mut machine, &[]);
+        assert!(hold(&mut world, &mut machine));
+        assert!(world.step(&mut machine, &[]).mode.pairing, "a frame from before is still fresh");
+        assert!(!hold(&mut world, &mut machine), "the pilot has changed his mind");
+        assert!(hold(&mut world, &mut machine));
+        world.pilot = None;
+        assert!(world.step(&mut machine, &[]).mode.pairing);
+        world.pilot = Some(PilotInput { arm: true, ..Default::default() });
+        let paired = world.step(&mut machine, &[]).mode;
+        assert!(!paired.pairing && !paired.armed);
+        assert!(!world.step(&mut machine, &[]).mode.armed, "switched on before it was seen off");
+        world.pilot = Some(PilotInput::default());
+        world.step(&mut machine, &[]);
+        world.pilot = Some(PilotInput { arm: true, ..Default::default() });
+        assert!(world.step(&mut machine, &[]).mode.armed);
     }
 
     /// What happens to the world before a command.

@@ -9,6 +9,7 @@
 //! for a failed step, 2 for a wrong command line.
 
 mod ci;
+mod elf;
 mod ratchet;
 mod repository;
 mod steps;
@@ -78,6 +79,12 @@ const STEPS: &[Step] = &[
         about: "does the firmware check for the ESP32-S3, and build and link for its sibling?",
         in_ci: true,
         run: steps::esp32::run,
+    },
+    Step {
+        name: "memory",
+        about: "does the firmware stay within its flash, memory and stack? (optional: a program)",
+        in_ci: true,
+        run: steps::memory::run,
     },
     Step {
         name: "package",

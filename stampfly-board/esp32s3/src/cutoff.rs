@@ -3,6 +3,8 @@
 //! It has a timer and an interrupt of its own, on the core that does not fly, and takes no lock. So it works when the
 //! flight task waits for a bus that has died, when its executor is stuck, and when its core has stopped with interrupts
 //! off. Once it has acted, motors stay off until the flight task says that it is disarmed.
+//!
+//! Should this core stop, too, the chip's watchdog restarts it all; a chip that starts has its motors off.
 
 use crate::motors;
 use core::ptr::null_mut;
@@ -10,15 +12,19 @@ use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering};
 use esp_hal::Blocking;
 use esp_hal::handler;
 use esp_hal::interrupt::Priority;
+use esp_hal::peripherals::TIMG1;
 use esp_hal::time::{Duration, Instant};
 use esp_hal::timer::PeriodicTimer;
-use esp_hal::timer::timg::Timer;
+use esp_hal::timer::timg::{MwdtStage, MwdtStageAction, TimerGroup, Wdt};
 use static_cell::StaticCell;
 
 /// Motors that nobody has confirmed for this long are stopped.
 const PATIENCE: Duration = Duration::from_millis(25);
 /// How often the timer looks. Motors turn for at most `PATIENCE` and this after the last confirmation.
 const PERIOD: Duration = Duration::from_millis(1);
+
+/// Longer than any write to flash, which stops both cores.
+const WATCHDOG: Duration = Duration::from_secs(4);
 
 /// When the flight task last confirmed that it controls the motors: the low bits of the time in microseconds, which is
 /// plenty for differences of milliseconds.
@@ -28,21 +34,30 @@ static ARMED: AtomicBool = AtomicBool::new(false);
 static TRIPPED: AtomicBool = AtomicBool::new(false);
 /// Set by a panic: the motors stay off until the vehicle is switched off.
 static FOR_GOOD: AtomicBool = AtomicBool::new(false);
-/// The timer, for the interrupt only.
-static TIMER: AtomicPtr<PeriodicTimer<'static, Blocking>> = AtomicPtr::new(null_mut());
+/// For the interrupt only.
+static WATCH: AtomicPtr<Watch> = AtomicPtr::new(null_mut());
+
+struct Watch {
+    timer: PeriodicTimer<'static, Blocking>,
+    watchdog: Wdt<TIMG1<'static>>,
+}
 
 fn now() -> u32 {
     Instant::now().duration_since_epoch().as_micros() as u32
 }
 
 /// Starts to watch. Called on the core that does not fly.
-pub fn start(timer: Timer<'static>) {
-    static CELL: StaticCell<PeriodicTimer<'static, Blocking>> = StaticCell::new();
-    let timer = CELL.init(PeriodicTimer::new(timer));
-    timer.set_interrupt_handler(look);
-    timer.start(PERIOD).expect("a millisecond is within the timer's range");
-    timer.listen();
-    TIMER.store(timer, Ordering::Release);
+pub fn start(group: TIMG1<'static>) {
+    static CELL: StaticCell<Watch> = StaticCell::new();
+    let group = TimerGroup::new(group);
+    let watch = CELL.init(Watch { timer: PeriodicTimer::new(group.timer0), watchdog: group.wdt });
+    watch.timer.set_interrupt_handler(look);
+    watch.timer.start(PERIOD).expect("a millisecond is within the timer's range");
+    watch.watchdog.set_timeout(MwdtStage::Stage0, WATCHDOG);
+    watch.watchdog.set_stage_action(MwdtStage::Stage0, MwdtStageAction::ResetSystem);
+    watch.watchdog.enable();
+    watch.timer.listen();
+    WATCH.store(watch, Ordering::Release);
 }
 
 /// The flight task controls the motors: to be said with every output. `armed` says whether they may turn.
@@ -68,16 +83,21 @@ pub fn reset() -> bool {
 /// Stops the motors until the vehicle is switched off.
 pub fn trip_for_good() {
     FOR_GOOD.store(true, Ordering::Release);
-    TRIPPED.store(true, Ordering::Release);
     motors::cut();
+}
+
+/// Keeps the watchdog from restarting a vehicle that has stopped on purpose.
+pub fn stand_down() {
+    Wdt::<TIMG1<'static>>::new().disable();
 }
 
 #[handler(priority = Priority::Priority3)]
 fn look() {
-    // SAFETY: the pointer is null or leads to the static timer, which `start` has handed over to this function and does
-    // not touch again; an interrupt does not interrupt itself.
-    if let Some(timer) = unsafe { TIMER.load(Ordering::Acquire).as_mut() } {
-        timer.clear_interrupt();
+    // SAFETY: the pointer is null or leads to the static, which `start` has handed over to this function and does not
+    // touch again; an interrupt does not interrupt itself.
+    if let Some(watch) = unsafe { WATCH.load(Ordering::Acquire).as_mut() } {
+        watch.timer.clear_interrupt();
+        watch.watchdog.feed();
     }
     let age = now().wrapping_sub(CONFIRMED.load(Ordering::Relaxed));
     if ARMED.load(Ordering::Acquire) && age > PATIENCE.as_micros() as u32 {

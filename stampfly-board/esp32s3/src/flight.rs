@@ -8,18 +8,16 @@ use crate::{imu_config, spi};
 use embassy_futures::join::join;
 use stampfly_board::profile::{Profile, Stopwatch};
 use stampfly_board::tasks::{fly, pump};
-use stampfly_board::{FlightLoop, devices, plan, wiring};
-use stampfly_bus::AnyTopic;
+use stampfly_board::{FlightLoop, devices, wiring};
 use stampfly_drivers::slot::Slots;
-use stampfly_drivers::{Imu, OpticalFlow, Timebase};
+use stampfly_drivers::{Imu, OpticalFlow};
 
 /// How long every runnable takes, for whoever reports.
 pub static PROFILE: Profile = Profile::new();
 
 /// What flies.
 pub struct Parts {
-    pub vehicle: plan::Vehicle<'static>,
-    pub heads: [&'static dyn AnyTopic; wiring::COUNT],
+    pub flight_loop: &'static mut FlightLoop<'static>,
     pub imu: wiring::sensor_imu::Tx<'static>,
     pub flow: wiring::sensor_flow::Tx<'static>,
     pub duties: wiring::actuator_motor::Rx<'static>,
@@ -30,7 +28,7 @@ pub struct Parts {
 /// Flies for ever.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { vehicle, heads, mut imu, mut flow, duties, motors, spi } = parts;
+    let Parts { flight_loop, mut imu, mut flow, duties, motors, spi } = parts;
     let motors = Motors::new(motors);
     let mut bus = spi::Bus::start(spi);
     let mut slots = Slots::new(Clock, devices::RHYTHM);
@@ -42,7 +40,6 @@ pub async fn run(parts: Parts) {
         pump(async || imu_chip.next().await, |at, sample| _ = imu.publish(at, sample), Clock, RETRY, &HEALTH.imu);
     let looking_down =
         pump(async || flow_chip.next().await, |at, sample| _ = flow.publish(at, sample), Clock, RETRY, &HEALTH.flow);
-    let flight_loop = FlightLoop::new(vehicle, heads, Clock.now());
     let mut stopwatch = Stopwatch::new(&PROFILE, Clock);
     // A motor channel that refuses has nobody to tell in flight; the cut-off remains.
     let flying = fly(sensing, flight_loop, duties, motors, Clock, &mut stopwatch, |_| {});

@@ -14,9 +14,11 @@ extern crate alloc;
 
 mod buzzer;
 mod clock;
+mod console;
 mod cutoff;
 mod flight;
 mod imu_config;
+mod memory;
 mod motors;
 mod panic;
 mod people;
@@ -24,14 +26,21 @@ mod pins;
 mod radio;
 mod sensors;
 mod spi;
+mod storage;
 
+use clock::Clock;
+use core::cell::RefCell;
 use embassy_executor::Spawner;
+use embassy_futures::block_on;
 use esp_hal::clock::CpuClock;
 use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
+use memory::Memory;
 use pins::*;
-use stampfly_board::{VehicleConfig, vehicle, wiring};
+use stampfly_board::{FlightLoop, VehicleConfig, vehicle, wiring};
+use stampfly_drivers::Timebase;
 use static_cell::StaticCell;
+use storage::Storage;
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
@@ -44,15 +53,24 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(size: 36 * 1024);
     motors::start_unit(chip.LEDC);
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
-    cutoff::start(TimerGroup::new(chip.TIMG1).timer0);
+    cutoff::start(chip.TIMG1);
 
     static BUS: StaticCell<wiring::Bus> = StaticCell::new();
-    let wiring::Split { ports, taps: _, heads } = BUS.init_with(wiring::Bus::new).split(None);
-    let (vehicle, outside) = vehicle::assemble(ports, &VehicleConfig::default());
+    let wiring::Split { ports, taps, heads } = BUS.init_with(wiring::Bus::new).split(None);
+    let mut storage = Storage::open(chip.FLASH);
+    let mut config = VehicleConfig::default();
+    let unusable = block_on(storage.load(&mut config));
+    if unusable > 0 {
+        esp_println::println!("{unusable} kept parameters cannot be used; their defaults apply");
+    }
+    let peer = block_on(storage.load_peer());
+    let (vehicle, outside) = vehicle::assemble(ports, &config);
+    static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
+    let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
     let pins: Pins<'static> = split_resources!(chip);
+    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
     let flight = flight::Parts {
-        vehicle,
-        heads,
+        flight_loop: FLIGHT_LOOP.init_with(|| FlightLoop::new(vehicle, heads, Clock.now())),
         imu: outside.imu,
         flow: outside.flow,
         duties: outside.motors,
@@ -71,10 +89,13 @@ fn main() -> ! {
     };
     let people =
         people::Parts { pulses: chip.RMT, pins: pins.people, signal: outside.indicator, button: outside.button };
-    let radio = radio::Parts { unit: chip.WIFI, peer: None, pilot: outside.pilot, telemetry: outside.telemetry };
+    let radio = radio::Parts { unit: chip.WIFI, peer, pilot: outside.pilot, telemetry: outside.telemetry };
+    let console = console::Parts { usb: chip.USB_DEVICE, memory, storage, config };
     let ground = move |spawner: Spawner| {
         spawner.spawn(sensors::run(sensors).expect("spawned once"));
         spawner.spawn(people::run(people).expect("spawned once"));
+        spawner.spawn(memory::run(memory).expect("spawned once"));
+        spawner.spawn(console::run(console).expect("spawned once"));
         spawner.spawn(radio::run(radio).expect("spawned once"));
     };
     let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
@@ -111,7 +132,7 @@ mod cores {
         start: impl FnOnce(Spawner) + Send + 'static,
     ) {
         use esp_hal::system::Stack;
-        static STACK: StaticCell<Stack<16384>> = StaticCell::new();
+        static STACK: StaticCell<Stack<32768>> = StaticCell::new();
         static EXECUTOR: StaticCell<Executor> = StaticCell::new();
         esp_rtos::start_second_core(control, interrupt, STACK.init_with(Stack::new), || {
             esp_rtos::CurrentThreadHandle::get().set_priority(HIGHEST);

@@ -4,15 +4,17 @@
 //! needs nobody's cooperation; it is the first thing the program does, what a panic does, and what the
 //! [cut-off](crate::cutoff) does when nobody controls the motors any more. Only a disarmed vehicle gets its pins back.
 
-use crate::cutoff;
+use crate::clock::Clock;
+use crate::console::MOTOR_TEST;
 use crate::pins::MotorPins;
+use crate::{cutoff, storage};
 use esp_hal::gpio::{AnyPin, DriveMode, Level, Output, OutputConfig};
 use esp_hal::ledc::channel::{self, Channel, ChannelIFace};
 use esp_hal::ledc::timer::{self, LSClockSource, Timer, TimerIFace};
 use esp_hal::ledc::{LSGlobalClkSource, Ledc, LowSpeed};
 use esp_hal::peripherals::LEDC;
 use esp_hal::time::Rate;
-use stampfly_drivers::{MotorError, MotorOutputs, PwmMotors};
+use stampfly_drivers::{MotorError, MotorOutputs, PwmMotors, Timebase};
 use stampfly_types::messages::MotorOutput;
 use static_cell::StaticCell;
 
@@ -88,13 +90,15 @@ impl MotorOutputs for Motors {
     type Error = MotorError;
 
     fn write(&mut self, output: &MotorOutput) -> Result<(), MotorError> {
+        let mut output = MOTOR_TEST.apply(Clock.now(), *output);
+        output.armed &= !storage::is_writing();
         cutoff::confirm(output.armed);
         if cutoff::has_tripped() {
             if output.armed || !cutoff::reset() {
-                return self.pwm.write(&MotorOutput { armed: false, ..*output });
+                return self.pwm.write(&MotorOutput { armed: false, ..output });
             }
             self.reconnect();
         }
-        self.pwm.write(output)
+        self.pwm.write(&output)
     }
 }

@@ -10,6 +10,7 @@ use core::panic::PanicInfo;
 fn panic(info: &PanicInfo<'_>) -> ! {
     cutoff::trip_for_good();
     esp_println::println!("\n{info}\nMotors are off. Switch off and on again.");
+    cutoff::stand_down();
     loop {
         core::hint::spin_loop();
     }

@@ -6,6 +6,8 @@
 use crate::clock::Clock;
 use core::cell::RefCell;
 use embassy_futures::join::join;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Ticker};
 use esp_hal::efuse::{InterfaceMacAddress, interface_mac_address};
 use esp_hal::peripherals::WIFI;
@@ -19,6 +21,11 @@ use stampfly_types::messages::{Alerts, ArmBlocks};
 
 /// The channel the vehicle listens on.
 const CHANNEL: u8 = 1;
+
+/// Somebody at the console wants a transmitter to be looked for.
+pub static PAIR: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// The vehicle belongs to this transmitter from now on; to be kept.
+pub static PAIRED: Signal<CriticalSectionRawMutex, Address> = Signal::new();
 
 /// What the radio needs.
 pub struct Parts {
@@ -47,8 +54,16 @@ async fn hear(mut receiver: EspNowReceiver, session: &RefCell<Session>, mut pilo
         let received = receiver.receive_async().await;
         let (at, source) = (Clock.now(), Address(received.info.src_address));
         // What is refused is counted there and is no sign of life.
-        if let Ok(input) = session.borrow_mut().receive(at, source, received.data()) {
+        let (input, before, after) = {
+            let mut session = session.borrow_mut();
+            let before = session.peer();
+            (session.receive(at, source, received.data()), before, session.peer())
+        };
+        if let Ok(input) = input {
             pilot.publish(at, &input);
+        }
+        if let Some(peer) = after.filter(|_| before != after) {
+            PAIRED.signal(peer);
         }
     }
 }
@@ -66,6 +81,9 @@ async fn speak(
         ticker.next().await;
         let frame = telemetry.latest().map(|sample| sample.data).unwrap_or_default();
         let wants = frame.blocks.contains(ArmBlocks::PAIRING);
+        if PAIR.try_take().is_some() {
+            let _ = session.borrow_mut().start_pairing(Clock.now(), frame.armed);
+        }
         match (wanted, wants) {
             // Refused with motors armed, and then there is nothing to be done.
             (false, true) => _ = session.borrow_mut().start_pairing(Clock.now(), frame.armed),

@@ -45,7 +45,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
     let (vehicle, outside) = assemble(ports, &config.vehicle);
     let Outside { imu: mut to_imu, tof: mut to_tof, flow: mut to_flow, mag: mut to_mag, .. } = outside;
     let (mut to_baro, mut to_power, mut button) = (outside.baro, outside.power, outside.button);
-    let flight_loop = FlightLoop::new(vehicle, heads, config.simulation.start);
+    let mut flight_loop = FlightLoop::new(vehicle, heads, config.simulation.start);
 
     let (progress, healths) = (Progress::default(), [const { Health::new() }; 6]);
     let (ran, written) = (RefCell::new(vec![0; stampfly_board::plan::COUNT]), Cell::new(0));
@@ -86,7 +86,8 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
         written.set(written.get() + 1);
     };
     let (time, count) = (clock.clone(), &mut count);
-    tasks.spawn(async move { match fly(sensing, flight_loop, outside.motors, motors, time, count, note).await {} });
+    tasks
+        .spawn(async move { match fly(sensing, &mut flight_loop, outside.motors, motors, time, count, note).await {} });
 
     let mut hash = FlightHash::new();
     let end = config.simulation.start + expected.duration;

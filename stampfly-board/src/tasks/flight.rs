@@ -24,11 +24,14 @@ const IDLE: Micros = Micros::from_millis(10);
 /// activation table run what they name. `written` is told the outcome whenever duties have gone to the motors: feed an
 /// independent timer there that stops the motors when this task stops.
 ///
+/// The flight loop is borrowed, because it is large and a future holds what it is given more than once: firmware keeps it
+/// in a `static`.
+///
 /// Other topics that activate a runnable (`on TOPIC`) have to be published from `sensing`, or from a task of the same
 /// executor that wakes this one.
 pub async fn fly<M: MotorOutputs>(
     sensing: impl Future<Output = Infallible>,
-    mut flight_loop: FlightLoop<'_>,
+    flight_loop: &mut FlightLoop<'_>,
     mut duties: wiring::actuator_motor::Rx<'_>,
     mut motors: M,
     clock: impl Timebase,

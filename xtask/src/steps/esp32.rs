@@ -5,6 +5,7 @@
 //! | S3, types | types, features, pins and borrows of the real firmware | machine code, linking, timing |
 //! | S3, a wrong pin | that the check above refuses one | |
 //! | C6, image | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
+//! | C6, memory | that the same statics leave the S3's first core its stack | to the byte: code differs |
 //!
 //! No stock compiler has inline assembly for Xtensa yet, so the first two present a 32-bit architecture that has it under
 //! the S3's target name; nothing it makes is ever run. The third builds the same code for another chip. Debian's compiler
@@ -39,7 +40,9 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     clippy.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
     run_program(&mut clippy)?;
     refuses_a_wrong_pin(s3(repository, "rustc", &target))?;
-    image(repository, &c6(repository)?)
+    let program = c6(repository)?;
+    memory(&program)?;
+    image(repository, &program)
 }
 
 /// The description of a target that says it is an S3.
@@ -85,19 +88,73 @@ fn refuses_a_wrong_pin(mut cargo: Command) -> Result<(), Failure> {
 fn is_about_the_pin(said: &str) -> Result<(), Failure> {
     let errors: Vec<&str> = said.lines().filter(|line| line.starts_with("error[")).collect();
     match errors[..] {
-        [only] if only.contains(WRONG_PIN) => Ok(eprintln!("refused, as it should be: {only}")),
+        [only] if only.contains(WRONG_PIN) => {
+            eprintln!("refused, as it should be: {only}");
+            Ok(())
+        }
         _ => Err(format!("a wrong pin should give one error, about {WRONG_PIN}:\n{said}")),
     }
 }
 
 /// Builds for the ESP32-C6 and returns the program.
-fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
+pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
     cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
     run_program(&mut cargo)?;
     Ok(repository.target("esp32").join(C6).join("release/stampfly-esp32s3"))
+}
+
+/// The S3's data memory, which code in RAM shares (esp-hal's `ld/esp32s3/memory.x`: from 0x3FC88000 to 0x3FCDB700).
+const S3_MEMORY: u32 = 0x3FCD_B700 - 0x3FC8_8000;
+/// The second core's stack, which only the S3 has (`src/main.rs`).
+const S3_SECOND_STACK: u32 = 16 * 1024;
+/// What the first core needs at least: the vehicle is assembled on its stack, and a golden flight is flown there.
+const S3_FIRST_STACK: u32 = 64 * 1024;
+/// The C6's memory, as its program's sections see it.
+const C6_MEMORY: std::ops::Range<u32> = 0x4080_0000..0x4088_0000;
+
+/// Would what the C6 keeps in memory fit into the S3?
+fn memory(program: &Path) -> Result<(), Failure> {
+    let bytes = fs::read(program).map_err(|e| format!("{}: {e}", program.display()))?;
+    let sections = sections(&bytes).ok_or("the program is no 32-bit ELF")?;
+    // What is left over is the stack's, and the boot loader's memory is another region on the S3, too.
+    let kept = sections.iter().filter(|section| !matches!(section.name, ".stack" | ".dram2_uninit"));
+    let kept: u32 = kept.filter(|section| C6_MEMORY.contains(&section.address)).map(|section| section.size).sum();
+    let left = S3_MEMORY.saturating_sub(kept + S3_SECOND_STACK);
+    println!("esp32c6: {kept} bytes of memory in use; on the S3 that would leave {left} bytes of stack");
+    if left < S3_FIRST_STACK {
+        Err(format!("the S3 would have less than {S3_FIRST_STACK} bytes of stack"))
+    } else {
+        Ok(())
+    }
+}
+
+#[derive(Debug, PartialEq)]
+struct Section<'e> {
+    name: &'e str,
+    address: u32,
+    size: u32,
+}
+
+/// The sections of a 32-bit little-endian ELF file.
+fn sections(elf: &[u8]) -> Option<Vec<Section<'_>>> {
+    let half = |at: usize| Some(usize::from(u16::from_le_bytes(elf.get(at..at + 2)?.try_into().ok()?)));
+    let word = |at: usize| Some(u32::from_le_bytes(elf.get(at..at + 4)?.try_into().ok()?));
+    if !elf.starts_with(b"\x7fELF\x01\x01") {
+        return None;
+    }
+    let (table, entry, count, names) = (word(0x20)? as usize, half(0x2E)?, half(0x30)?, half(0x32)?);
+    let names = word(table + names * entry + 0x10)? as usize;
+    (0..count)
+        .map(|index| {
+            let header = table + index * entry;
+            let name = elf.get(names + word(header)? as usize..)?.split(|byte| *byte == 0).next()?;
+            let name = std::str::from_utf8(name).ok()?;
+            Some(Section { name, address: word(header + 0x0C)?, size: word(header + 0x14)? })
+        })
+        .collect()
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.
@@ -119,7 +176,27 @@ fn image(repository: &Repository, program: &Path) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::is_about_the_pin;
+    use super::{Section, is_about_the_pin, sections};
+
+    #[test]
+    fn reads_the_sections_of_an_elf() {
+        // A header of 52 bytes, two section headers of 40, and the names.
+        let mut elf = vec![0u8; 52 + 80];
+        elf[..6].copy_from_slice(b"\x7fELF\x01\x01");
+        let mut put = |at: usize, value: u32| elf[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        put(0x20, 52);
+        put(0x2E, 40 | 2 << 16);
+        put(0x32, 1);
+        put(52, 1);
+        put(52 + 0x0C, 0x4080_0000);
+        put(52 + 0x14, 1234);
+        put(92 + 0x10, 132);
+        elf.extend(b"\0.bss\0");
+        let [bss, _] = &sections(&elf).expect("an ELF")[..] else { panic!("two sections") };
+        assert_eq!(bss, &Section { name: ".bss", address: 0x4080_0000, size: 1234 });
+        assert!(sections(b"#!/bin/sh").is_none());
+        assert!(sections(&elf[..60]).is_none(), "cut off");
+    }
 
     #[test]
     fn only_the_right_refusal_counts() {

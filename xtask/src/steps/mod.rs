@@ -13,6 +13,7 @@ pub mod figures;
 pub mod fmt;
 pub mod golden;
 pub mod loom;
+pub mod memory;
 pub mod no_std;
 pub mod package;
 pub mod panic_proof;
