@@ -99,6 +99,18 @@ const STEPS: &[Step] = &[
         run: steps::determinism::run,
     },
     Step {
+        name: "golden",
+        about: "is the golden flight what is flown, optimised and not? (--fix: record it again)",
+        in_ci: true,
+        run: steps::golden::run,
+    },
+    Step {
+        name: "qemu",
+        about: "the golden flight on emulated cores: the same bits, within the budgets? (--fix: write the table)",
+        in_ci: true,
+        run: steps::qemu::run,
+    },
+    Step {
         name: "docs",
         about: "do the documents' links and tables agree with the sources? (--fix: make them)",
         in_ci: true,

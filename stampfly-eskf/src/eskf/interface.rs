@@ -88,6 +88,12 @@ impl Estimator for Eskf {
         self.force = motion.force;
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
+        // Half way between two looks at gravity, so that no step does both.
+        if let Some(anchor) = self.anchor
+            && self.steps % STILL_DIVIDER == STILL_DIVIDER / 2
+        {
+            self.absorb_standing(anchor);
+        }
         if self.steps.is_multiple_of(STILL_DIVIDER)
             && let Some(accel) = self.accels.take()
         {
