@@ -18,6 +18,7 @@ mod config;
 pub mod console;
 pub mod devices;
 mod flight_loop;
+pub mod golden;
 pub mod messages;
 pub mod parameters;
 pub mod profile;

@@ -4,6 +4,7 @@ use crate::config::VehicleConfig;
 use crate::plan;
 use crate::runnables::*;
 use crate::wiring;
+use stampfly_types::Micros;
 
 /// The ends that belong to the world outside the runnables: drivers, links, motors, lights.
 pub struct Outside<'b> {
@@ -35,6 +36,32 @@ pub struct Outside<'b> {
     pub indicator: wiring::signal::Rx<'b>,
     /// To the ground station.
     pub telemetry: wiring::telemetry::Rx<'b>,
+}
+
+impl Outside<'_> {
+    /// Publishes a recorded sample on the end it came from, by its topic's place in the table. Returns its generation,
+    /// or `None` when the topic's publisher is not outside or the words are not the topic's.
+    pub fn publish_words(&mut self, topic: usize, at: Micros, words: &[u32]) -> Option<u32> {
+        macro_rules! by_topic {
+            ($($topic:ident => $end:ident),+ $(,)?) => {
+                $(if topic == wiring::Id::$topic as usize { return self.$end.publish_words(at, words) })+
+            };
+        }
+        by_topic! {
+            sensor_imu => imu,
+            sensor_tof => tof,
+            sensor_tof_front => tof_front,
+            sensor_flow => flow,
+            sensor_mag => mag,
+            sensor_baro => baro,
+            external_pose => cameras,
+            sensor_power => power,
+            command_pilot => pilot,
+            command_guided => guided,
+            button_contact => button,
+        }
+        None
+    }
 }
 
 /// Builds the vehicle from the ends of a fresh bus.

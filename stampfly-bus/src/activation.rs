@@ -8,6 +8,7 @@
 //! An [`Activation`] is that record. In flight it writes down what was read; in a replay it is filled in
 //! beforehand and decides what is read.
 
+use crate::ring::Copied;
 use crate::topic::{Full, Lossless, Publisher, Sequential, Stamped, Subscriber};
 use stampfly_types::{Message, Micros};
 
@@ -114,18 +115,40 @@ impl Activation {
     where
         T: Message<Words = [u32; W]>,
     {
+        self.newest_copied(from).and_then(Stamped::from_copied)
+    }
+
+    /// Reads the newest sample of a topic into `into`, which stays as it is while there is none.
+    #[inline]
+    pub fn update<T, P, const N: usize, const W: usize>(&mut self, from: &mut Subscriber<'_, T, P, N, W>, into: &mut T)
+    where
+        T: Message<Words = [u32; W]>,
+    {
+        if let Some(data) = self.newest_copied(from).and_then(|(_, copied)| T::from_words(&copied.words)) {
+            *into = data;
+        }
+    }
+
+    #[inline]
+    fn newest_copied<T, P, const N: usize, const W: usize>(
+        &mut self,
+        from: &mut Subscriber<'_, T, P, N, W>,
+    ) -> Option<(u32, Copied<W>)>
+    where
+        T: Message<Words = [u32; W]>,
+    {
         let replaying = self.replaying;
         let input = self.next_input()?;
         let sample = match (replaying, input.taken) {
-            (false, _) => from.latest(),
+            (false, _) => from.newest_copied(),
             (true, 0) => None,
-            (true, _) => from.at_generation(input.generation),
+            (true, _) => from.copied_at(input.generation),
         };
         if replaying {
             self.missing |= sample.is_none() && self.inputs.get(self.count - 1).is_some_and(|i| i.taken > 0);
         } else {
             *input = InputRecord {
-                generation: sample.as_ref().map_or(0, |s| s.generation),
+                generation: sample.as_ref().map_or(0, |(generation, _)| *generation),
                 taken: u16::from(sample.is_some()),
             };
         }

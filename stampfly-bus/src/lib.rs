@@ -10,6 +10,7 @@
 //! | every sample, losses counted per reader | policy `ring(N)` → [`Every`] |
 //! | nothing lost, publisher may be refused | policy `queue(N)` → [`Lossless`] |
 //! | wake a task on publish | [`Hook`], given to `Bus::split` |
+//! | know while compiling that everything is in time | [`schedule!`], [`response_time`] |
 //! | repeat a flight bit for bit | [`Activation`] |
 //!
 //! No `unsafe`, no critical section, no allocation, no `static`: a bus is a value and a test can fly a thousand of
@@ -23,6 +24,7 @@
 extern crate std;
 
 mod activation;
+mod response;
 mod ring;
 mod schedule;
 mod sync;
@@ -30,6 +32,7 @@ mod table;
 mod topic;
 
 pub use activation::{Activation, InputRecord, MAX_INPUTS, Runnable};
+pub use response::{JITTER, Unbounded, response_time};
 pub use schedule::{ActivationInfo, Band, MAX_TRIGGERS, Runnables, Scheduler, Trigger};
 pub use table::{LATEST_DEPTH, TopicInfo};
 pub use topic::{
@@ -42,6 +45,7 @@ pub use sync::weaken;
 
 #[doc(hidden)]
 pub mod __private {
+    pub use crate::response::response_times;
     pub use stampfly_types::{Message, Micros};
 }
 

@@ -192,8 +192,10 @@ pub trait Runnables {
 /// ```
 ///
 /// `Runnable` is a type `Runnable<'b>` that implements [`Runnable`](crate::Runnable). From the table follow
-/// `plan::Vehicle<'b>`, a struct with one field per line that implements [`Runnables`], and `plan::ACTIVATIONS`.
-/// The flight band runs in table order, so `after` may only name a line above it; anything else does not compile.
+/// `plan::Vehicle<'b>`, a struct with one field per line that implements [`Runnables`], `plan::ACTIVATIONS`, and
+/// `plan::RESPONSE_TIMES`: how long after its trigger each line has published at the latest. The flight band runs in table
+/// order, so `after` may only name a line above it; that, and a line that could not finish before it is due again (see
+/// [`response_time`](crate::response_time)), does not compile.
 #[macro_export]
 macro_rules! schedule {
     ($(#[$meta:meta])* $vis:vis mod $plan:ident on $wiring:ident; $($rows:tt)+) => {
@@ -249,6 +251,18 @@ macro_rules! schedule {
                     index += 1;
                 }
             };
+
+            /// How long after its trigger each runnable has published at the latest, if everybody keeps to their budgets.
+            pub const RESPONSE_TIMES: [$crate::__private::Micros; COUNT] =
+                $crate::__private::response_times(&ACTIVATIONS, &$wiring::TOPICS);
+
+            $(const _: () = match $crate::response_time(&ACTIVATIONS, &$wiring::TOPICS, Id::$name as usize) {
+                Ok(_) => {}
+                Err($crate::Unbounded::NoRate) => {
+                    panic!(concat!("`", stringify!($name), "` is activated by a topic without a rate"))
+                }
+                Err(_) => panic!(concat!("`", stringify!($name), "` may not have finished when it is due again")),
+            };)+
 
             /// Every runnable of one vehicle.
             pub struct Vehicle<'b> { $($(#[doc = $doc])+ pub $name: $Type<'b>),+ }

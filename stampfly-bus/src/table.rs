@@ -1,6 +1,6 @@
 //! The topic table: one line per topic, and everything that follows from it.
 
-use stampfly_types::FieldInfo;
+use stampfly_types::{FieldInfo, Micros};
 
 /// What a line of the topic table says, for tools: the command line, the log, the documentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub struct TopicInfo {
     pub depth: usize,
     /// Nominal rate as written in the table, such as `400 Hz` or `on event`.
     pub rate: &'static str,
+    /// Time between two samples at that rate; `None` when they come as they come.
+    pub period: Option<Micros>,
     /// Who publishes it.
     pub publisher: &'static str,
     /// Who reads it. The log tap reads every topic and is not listed.
@@ -109,6 +111,7 @@ macro_rules! topics {
                 policy: stringify!($policy),
                 depth: $crate::topics!(@depth $policy $($depth)?),
                 rate: concat!(stringify!($rate), " ", stringify!($unit)),
+                period: $crate::topics!(@period $rate $unit),
                 publisher: stringify!($publisher),
                 readers: &[$(stringify!($reader)),*],
                 words: <$Message as bus::Message>::WORDS,
@@ -209,6 +212,8 @@ macro_rules! topics {
     (@depth latest) => { $crate::LATEST_DEPTH };
     (@depth ring $depth:literal) => { $depth };
     (@depth queue $depth:literal) => { $depth };
+    (@period on event) => { None };
+    (@period $rate:literal Hz) => { Some(bus::Micros(1_000_000 / $rate)) };
     (@policy latest) => { $crate::Latest };
     (@policy ring) => { $crate::Every };
     (@policy queue) => { $crate::Lossless };

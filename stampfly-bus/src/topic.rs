@@ -9,7 +9,7 @@
 //! One publisher and any number of readers a topic; nobody waits for anybody. Declare topics with
 //! [`topics!`](crate::topics!), which hands out every end exactly once.
 
-use crate::ring::{Ring, next};
+use crate::ring::{Copied, Ring, next};
 use crate::sync::{AtomicU32, Ordering, spin_loop, unless_loom_const};
 use core::marker::PhantomData;
 use stampfly_types::{Message, Micros};
@@ -26,6 +26,14 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
+    #[inline]
+    pub(crate) fn from_copied<const W: usize>((generation, copied): (u32, Copied<W>)) -> Option<Self>
+    where
+        T: Message<Words = [u32; W]>,
+    {
+        Some(Self { at: copied.at, generation, data: T::from_words(&copied.words)? })
+    }
+
     /// How old the data is at `now`; zero when it is stamped in the future.
     #[must_use]
     pub fn age(&self, now: Micros) -> Micros {
@@ -202,7 +210,7 @@ pub struct Subscriber<'b, T, P, const N: usize, const W: usize> {
 
 /// The newest complete sample. Each retry means the writer has published `N` samples during one copy.
 #[inline]
-fn newest<const N: usize, const W: usize>(ring: &Ring<N, W>) -> Option<(u32, crate::ring::Copied<W>)> {
+fn newest<const N: usize, const W: usize>(ring: &Ring<N, W>) -> Option<(u32, Copied<W>)> {
     loop {
         let head = ring.head();
         if head == 0 {
@@ -219,20 +227,29 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     /// The newest sample, read or not; `None` before the first.
     #[inline]
     pub fn latest(&mut self) -> Option<Stamped<T>> {
-        let (generation, copied) = newest(self.ring)?;
-        self.advance(generation);
-        Some(Stamped { at: copied.at, generation, data: T::from_words(&copied.words)? })
+        self.newest_copied().and_then(Stamped::from_copied)
     }
 
     /// The sample of this generation, if the ring still holds it. Moves the cursor there.
     pub fn at_generation(&mut self, generation: u32) -> Option<Stamped<T>> {
+        self.copied_at(generation).and_then(Stamped::from_copied)
+    }
+
+    #[inline]
+    pub(crate) fn newest_copied(&mut self) -> Option<(u32, Copied<W>)> {
+        let (generation, copied) = newest(self.ring)?;
+        self.advance(generation);
+        Some((generation, copied))
+    }
+
+    pub(crate) fn copied_at(&mut self, generation: u32) -> Option<(u32, Copied<W>)> {
         // The sequence number alone could not tell a generation from the one 2³¹ later, nor 2³¹ from an empty slot.
         if generation == 0 || self.ring.head().wrapping_sub(generation) > N as u32 {
             return None;
         }
         let copied = self.ring.read(generation)?;
         self.advance(generation);
-        Some(Stamped { at: copied.at, generation, data: T::from_words(&copied.words)? })
+        Some((generation, copied))
     }
 
     /// Has anything been published since the last read?
@@ -263,7 +280,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
 
     /// The next sample in order, as words. Skips and counts what was overwritten.
     #[inline]
-    fn next_copied(&mut self) -> Option<(u32, crate::ring::Copied<W>)> {
+    fn next_copied(&mut self) -> Option<(u32, Copied<W>)> {
         loop {
             let head = self.ring.head();
             let pending = head.wrapping_sub(self.cursor);
@@ -316,8 +333,7 @@ impl<T: Message<Words = [u32; W]>, P: Sequential, const N: usize, const W: usize
     #[inline]
     #[allow(clippy::should_implement_trait, reason = "a cursor, not an iterator: more may come after `None`")]
     pub fn next(&mut self) -> Option<Stamped<T>> {
-        let (generation, copied) = self.next_copied()?;
-        Some(Stamped { at: copied.at, generation, data: T::from_words(&copied.words)? })
+        self.next_copied().and_then(Stamped::from_copied)
     }
 }
 

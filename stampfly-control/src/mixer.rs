@@ -206,8 +206,10 @@ impl MultirotorMixer {
     fn collective_range(&self, tilt: &[f32; MAX_MOTORS]) -> (f32, f32) {
         let (mut low, mut high) = (0.0f32, f32::MAX);
         for (share, part) in self.shares.iter().zip(tilt).take(self.count) {
-            low = low.max(-part * share.collective);
-            high = high.min((self.thrust_max - part) * share.collective);
+            // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
+            let (least, most) = (-part * share.collective, (self.thrust_max - part) * share.collective);
+            low = if least > low { least } else { low };
+            high = if most < high { most } else { high };
         }
         (low, high)
     }

@@ -36,6 +36,8 @@ struct Chip {
     target: (u8, i16),
     blind: bool,
     boots: bool,
+    /// A bit that changes on the way to the ranging parts' registers.
+    flip: u8,
     /// Faults of the next accesses to a register.
     faults: Vec<(u16, Fault)>,
 }
@@ -55,6 +57,7 @@ impl Chip {
             target: (9, 1_234),
             blind: false,
             boots: true,
+            flip: 0,
             faults: Vec::new(),
         }
     }
@@ -82,6 +85,9 @@ impl Chip {
     fn write(&mut self, register: u16, data: &[u8]) {
         for (offset, value) in data.iter().enumerate() {
             self.registers[usize::from(register) + offset] = *value;
+        }
+        if register == 0x5E {
+            self.registers[0x60] ^= core::mem::take(&mut self.flip);
         }
         match (register, data) {
             (0x0001, [address]) => self.address = *address,
@@ -280,6 +286,19 @@ fn a_reader_that_comes_late_gets_a_fresh_measurement() {
 }
 
 #[test]
+fn a_reader_that_comes_a_little_late_knows_when_the_measurement_was() {
+    let bench = Bench::new();
+    let [mut below, _] = bench.drivers();
+    for round in 0..75 {
+        block_on(below.next()).expect("a sample");
+        bench.clock.advance(30_000 + round * 97);
+        let sample = block_on(below.next()).expect("a sample");
+        let (_, finished) = bench.chips[0].borrow().measured();
+        assert!(sample.at.0.abs_diff(finished - 16_500) <= 1_500, "{} and {finished} in round {round}", sample.at);
+    }
+}
+
+#[test]
 fn the_same_measurement_is_never_delivered_twice_whatever_happens_to_its_end() {
     let bench = Bench::new();
     let [mut below, _] = bench.drivers();
@@ -458,4 +477,13 @@ fn a_driver_that_exists_holds_its_chip_in_reset() {
     assert_eq!(block_on(below.next()), Err(ChipError::AddressTaken));
     let [mut below, mut ahead] = bench.drivers();
     assert!(block_on(below.next()).is_ok() && block_on(ahead.next()).is_ok());
+}
+
+#[test]
+fn a_configuration_that_arrives_garbled_is_told_and_sent_again() {
+    let bench = Bench::new();
+    let [mut below, _] = bench.drivers();
+    bench.chips[0].borrow_mut().flip = 0x08;
+    assert_eq!(block_on(below.next()), Err(ChipError::Configuration { status: 0x07 }));
+    assert!(block_on(below.next()).is_ok());
 }

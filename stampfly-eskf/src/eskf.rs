@@ -227,7 +227,7 @@ impl Eskf {
         Ok(Then { state, rotation: state.rotation(), passage, age })
     }
 
-    /// Compares a measurement with the state of its time: what it would do, and its test ratio.
+    /// Compares a measurement with the state of its time: what it would do.
     #[inline]
     fn compare<const M: usize>(
         &self,
@@ -235,7 +235,7 @@ impl Eskf {
         rows: [Row; M],
         measured: [f32; M],
         variances: [f32; M],
-    ) -> (Projection<M>, f32) {
+    ) -> Projection<M> {
         let carried = |row: &Row| {
             if then.age == 0.0 { row.jacobian } else { then.passage.carry(&then.rotation, &row.jacobian) }
         };
@@ -244,9 +244,13 @@ impl Eskf {
         for (innovation, row) in innovations.iter_mut().zip(&rows) {
             *innovation -= row.predicted;
         }
-        let projection = self.covariance.project(&jacobians, innovations, variances);
-        let ratio = projection.distance() / self.config.gate_distance(M);
-        (projection, ratio)
+        self.covariance.project(&jacobians, innovations, variances)
+    }
+
+    /// The test ratio of a measurement: beyond one it is outside the gate.
+    #[inline]
+    fn ratio<const M: usize>(&self, projection: &Projection<M>) -> f32 {
+        projection.distance() / self.config.gate_distance(M)
     }
 
     /// Lets a measurement into the estimate.
@@ -259,7 +263,8 @@ impl Eskf {
 
     /// Absorbs what is known, not measured: no gate.
     fn know<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
-        let (projection, ratio) = self.compare(&self.present(), rows, values, [sigma * sigma; M]);
+        let projection = self.compare(&self.present(), rows, values, [sigma * sigma; M]);
+        let ratio = self.ratio(&projection);
         self.absorb(&projection, ratio);
     }
 
@@ -328,10 +333,9 @@ impl Eskf {
         self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
     }
 
-    /// What gravity and the ground say, where they are asked.
+    /// What gravity says where it is asked, and what is assumed where nobody can be.
     fn assume(&mut self, accel: Vec3, dt: f32) {
-        if let Some(anchor) = self.anchor {
-            self.absorb_standing(anchor);
+        if self.anchor.is_some() {
             self.absorb_gravity(accel, &Vec3::zeros(), self.config.still_gravity_sigma);
         } else if !self.holds_velocity() {
             if self.config.gravity_use == GravityUse::WhenUnaided {

@@ -173,7 +173,7 @@ impl Failsafe {
 
     fn inspect_motion(&mut self, active: Alerts, imu: &ImuData, state: FlightState) -> Alerts {
         let rate = imu.gyro.norm();
-        if !imu.accel.norm().is_finite() || !rate.is_finite() {
+        if !imu.accel.norm_squared().is_finite() || !rate.is_finite() {
             return active;
         }
         let blow = self.blow.get_or_insert(imu.accel);

@@ -54,7 +54,12 @@ impl Micros {
     /// A span in seconds. Exact to one part in 2²⁴: use it for differences, never for absolute time.
     #[must_use]
     pub fn seconds(self) -> f32 {
-        self.0 as f32 * 1e-6
+        // The same number, in one instruction where 32 bits are a register.
+        let micros = match u32::try_from(self.0) {
+            Ok(micros) => micros as f32,
+            Err(_) => self.0 as f32,
+        };
+        micros * 1e-6
     }
 
     /// The instant in seconds with microsecond resolution, for display and logs.

@@ -9,6 +9,7 @@
 //! for a failed step, 2 for a wrong command line.
 
 mod ci;
+mod elf;
 mod ratchet;
 mod repository;
 mod steps;
@@ -80,6 +81,12 @@ const STEPS: &[Step] = &[
         run: steps::esp32::run,
     },
     Step {
+        name: "memory",
+        about: "does the firmware stay within its flash, memory and stack? (optional: a program)",
+        in_ci: true,
+        run: steps::memory::run,
+    },
+    Step {
         name: "package",
         about: "would each crate, as committed, build from its package?",
         in_ci: true,
@@ -90,6 +97,18 @@ const STEPS: &[Step] = &[
         about: "do optimised and unoptimised flights publish the same bits?",
         in_ci: true,
         run: steps::determinism::run,
+    },
+    Step {
+        name: "golden",
+        about: "is the golden flight what is flown, optimised and not? (--fix: record it again)",
+        in_ci: true,
+        run: steps::golden::run,
+    },
+    Step {
+        name: "qemu",
+        about: "the golden flight on emulated cores: the same bits, within the budgets? (--fix: write the table)",
+        in_ci: true,
+        run: steps::qemu::run,
     },
     Step {
         name: "docs",

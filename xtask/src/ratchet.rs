@@ -24,11 +24,11 @@ impl Budget {
         number(&self.text, name).ok_or_else(|| format!("{}: no number `{name}`", self.document))
     }
 
-    /// Says how instructions per step compare with the figure `name`, and fails when there are too many.
-    pub fn hold(&self, name: &str, measured: f64) -> Result<(), Failure> {
+    /// Says how a figure in `unit` compares with the one committed as `name`, and fails when it is too large.
+    pub fn hold(&self, name: &str, measured: f64, unit: &str) -> Result<(), Failure> {
         let (allowed, tolerance) = (self.number(name)?, self.number("tolerance")?);
         let change = measured / allowed - 1.0;
-        println!("{measured:.0} instructions per step; the budget is {allowed:.0} ({:+.1} %)", change * 100.0);
+        println!("{name}: {measured:.0} {unit}; the budget is {allowed:.0} ({:+.1} %)", change * 100.0);
         if change > tolerance {
             return Err(format!("{:.1} % over budget, {:.1} % is allowed", change * 100.0, tolerance * 100.0));
         }
@@ -60,9 +60,9 @@ mod tests {
     #[test]
     fn lets_pass_what_is_tolerated_and_no_more() {
         let budget = Budget { document: "here", text: "step = 1000\ntolerance = 0.03\n".to_owned() };
-        assert!(budget.hold("step", 800.0).is_ok());
-        assert!(budget.hold("step", 1029.0).is_ok());
-        assert!(budget.hold("step", 1031.0).is_err());
-        assert!(budget.hold("other", 1.0).is_err());
+        assert!(budget.hold("step", 800.0, "bytes").is_ok());
+        assert!(budget.hold("step", 1029.0, "bytes").is_ok());
+        assert!(budget.hold("step", 1031.0, "bytes").is_err());
+        assert!(budget.hold("other", 1.0, "bytes").is_err());
     }
 }

@@ -132,7 +132,7 @@ mod cores {
         start: impl FnOnce(Spawner) + Send + 'static,
     ) {
         use esp_hal::system::Stack;
-        static STACK: StaticCell<Stack<16384>> = StaticCell::new();
+        static STACK: StaticCell<Stack<32768>> = StaticCell::new();
         static EXECUTOR: StaticCell<Executor> = StaticCell::new();
         esp_rtos::start_second_core(control, interrupt, STACK.init_with(Stack::new), || {
             esp_rtos::CurrentThreadHandle::get().set_priority(HIGHEST);

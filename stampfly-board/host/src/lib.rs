@@ -9,6 +9,7 @@
 //! | [`campaign`] | many flights in parallel |
 //! | [`consistency`] | is the estimator as good as it says? |
 //! | [`recorder`], [`replay`] | the log of a flight, and the flight again from its log |
+//! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`flight`] | a flight as columns over time, with units and names |
 //! | [`flight_log`] | a flight from a ULog file of any origin |
 //! | [`dataset`] | recorded sensor data with or without a reference, from five public formats, in our conventions |
@@ -25,6 +26,7 @@ pub mod dataset;
 pub mod estimate;
 pub mod flight;
 pub mod flight_log;
+pub mod golden;
 pub mod ground_station;
 pub mod metrics;
 pub mod mission;

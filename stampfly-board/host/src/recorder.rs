@@ -5,6 +5,7 @@
 //! reads it. Replay relies on that.
 
 use crate::consistency::{FlightConsistency, Observation};
+use crate::golden::{Event, Inputs};
 use stampfly_board::vehicle::assemble;
 use stampfly_board::{FlightLoop, Observer, VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
@@ -56,6 +57,7 @@ pub struct Recorder {
     timing: Option<Vec<Timing>>,
     started: Option<std::time::Instant>,
     consistency: Consistency,
+    inputs: Option<Inputs>,
 }
 
 /// Is somebody to look at the estimator's covariance?
@@ -92,6 +94,7 @@ impl Recorder {
             timing: None,
             started: None,
             consistency: Consistency::No,
+            inputs: None,
         }
     }
 
@@ -111,6 +114,12 @@ impl Recorder {
     #[must_use]
     pub fn with_consistency(self, seed: u64) -> Self {
         Self { consistency: Consistency::Wanted(seed), ..self }
+    }
+
+    /// Collects what the vehicle is given, too.
+    #[must_use]
+    pub fn with_inputs(self) -> Self {
+        Self { inputs: Some(Inputs::default()), ..self }
     }
 
     pub(crate) fn begin(&mut self, start: Micros, config: &VehicleConfig) {
@@ -135,8 +144,18 @@ impl Recorder {
         self.log = open().ok();
     }
 
+    /// The executor is about to look what is due.
+    pub(crate) fn turn(&mut self, clock: Micros) {
+        if let Some(inputs) = &mut self.inputs {
+            inputs.turn(clock);
+        }
+    }
+
     pub(crate) fn sample(&mut self, id: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
         self.hash.publish(id as u16, generation, at, words);
+        if let Some(inputs) = &mut self.inputs {
+            inputs.sample(id, at, words);
+        }
         if let Consistency::Yes(observation) = &mut self.consistency {
             observation.sample(id, at, generation, words);
         }
@@ -179,6 +198,12 @@ impl Recorder {
         if let Consistency::Yes(observation) = self.consistency { Some(observation.finish()) } else { None }
     }
 
+    /// What the vehicle was given, in order; empty when nobody wanted to know.
+    #[must_use]
+    pub fn into_inputs(self) -> Vec<Event> {
+        self.inputs.unwrap_or_default().into_collected()
+    }
+
     /// Wall time per runnable, in table order; empty when it was not measured.
     #[must_use]
     pub fn timing(&self) -> &[Timing] {
@@ -190,6 +215,9 @@ impl Observer for Recorder {
     fn has_read(&mut self, index: usize, activation: &Activation) {
         if let Consistency::Yes(observation) = &mut self.consistency {
             observation.activation(index, activation);
+        }
+        if let Some(inputs) = &mut self.inputs {
+            inputs.activation();
         }
         let Some(log) = &mut self.log else { return };
         let mut record = stampfly_log::Activation::new(index as u8, activation.now());

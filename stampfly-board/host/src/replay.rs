@@ -110,7 +110,8 @@ struct Script {
     start: Micros,
 }
 
-fn is_outside(topic: usize) -> bool {
+/// Is the publisher of this topic none of the runnables?
+pub(crate) fn is_outside(topic: usize) -> bool {
     let publisher = wiring::TOPICS[topic].publisher;
     !plan::ACTIVATIONS.iter().any(|info| info.name == publisher)
 }
@@ -207,7 +208,8 @@ pub fn replay(bytes: &[u8]) -> Result<Replay, ReplayError> {
     for entry in entries {
         match entry {
             Entry::Outside { topic, at, words } => {
-                publish_outside(&mut outside, topic, at, &words)
+                outside
+                    .publish_words(topic, at, &words)
                     .ok_or_else(|| ReplayError::Schema(wiring::TOPICS[topic].name.to_owned()))?;
             }
             Entry::Activation { index, record } => {
@@ -304,32 +306,4 @@ fn show(field: &FieldInfo, words: &[u32]) -> String {
         }
         _ => word.to_string(),
     }
-}
-
-/// Publishes a recorded sample on the end it came from.
-fn publish_outside(
-    outside: &mut stampfly_board::vehicle::Outside<'_>,
-    topic: usize,
-    at: Micros,
-    words: &[u32],
-) -> Option<u32> {
-    macro_rules! by_topic {
-        ($($topic:ident => $end:ident),+ $(,)?) => {
-            $(if topic == wiring::Id::$topic as usize { return outside.$end.publish_words(at, words) })+
-        };
-    }
-    by_topic! {
-        sensor_imu => imu,
-        sensor_tof => tof,
-        sensor_tof_front => tof_front,
-        sensor_flow => flow,
-        sensor_mag => mag,
-        sensor_baro => baro,
-        external_pose => cameras,
-        sensor_power => power,
-        command_pilot => pilot,
-        command_guided => guided,
-        button_contact => button,
-    }
-    None
 }

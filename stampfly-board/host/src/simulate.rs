@@ -279,6 +279,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
         // What came from outside is in the log before the activations that read it.
         drain(&mut taps, &mut watch, recorder, &world);
 
+        recorder.turn(now);
         if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
             flight_at = Some(now + jitter.flight());
         }

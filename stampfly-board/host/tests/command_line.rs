@@ -195,10 +195,40 @@ fn topics_are_listed_as_text_json_and_markdown() {
 }
 
 #[test]
+fn runnables_are_listed_with_their_response_times() {
+    let folder = folder("schedule");
+    let value = json(&run(&folder, &["schedule", "--json"]));
+    let rows = value["activations"].as_array().expect("a list");
+    assert_eq!(rows.len(), stampfly_board::plan::COUNT);
+    let (text, markdown) = (run(&folder, &["schedule"]).out, run(&folder, &["schedule", "--markdown"]).out);
+    assert_eq!(markdown.lines().count(), rows.len() + 2);
+    for row in rows {
+        let name = row["name"].as_str().expect("text");
+        assert!(text.contains(name) && markdown.contains(&format!("| `{name}` |")), "{name}");
+        assert!(row["response_us"].as_u64() >= row["budget_us"].as_u64(), "{row}");
+    }
+    // From a sample to the motors within the period of the samples.
+    let motors = rows.iter().find(|row| row["name"] == "actuation").expect("the table has it");
+    assert!(motors["response_us"].as_u64() < Some(2_500), "{motors}");
+}
+
+#[test]
+fn the_golden_flight_is_what_it_should_be() {
+    let folder = folder("golden");
+    let played = json(&run(&folder, &["golden", "--json"]));
+    assert_eq!(played["verdict"], "identical");
+    let again = run(&folder, &["golden", "--record", "again.bin"]);
+    assert_eq!(again.code, 0, "{}", again.err);
+    let recorded = std::fs::read(folder.join("again.bin")).expect("recorded");
+    assert!(recorded == stampfly_board::golden::FLIGHT, "recorded differently: `cargo xtask golden --fix`");
+    assert_eq!(run(&folder, &["golden", "--record", "no/such/folder"]).code, 1);
+}
+
+#[test]
 fn help_is_everywhere() {
     let folder = folder("help");
     let top = run(&folder, &["--help"]);
-    for command in ["fly", "replay", "topics", "campaign", "estimate"] {
+    for command in ["fly", "replay", "topics", "schedule", "campaign", "estimate", "golden"] {
         assert!(top.out.contains(command), "{}", top.out);
         let ran = run(&folder, &[command, "--help"]);
         assert!(ran.code == 0 && ran.out.contains("Usage: stampfly") && ran.err.is_empty(), "{command}: {}", ran.err);

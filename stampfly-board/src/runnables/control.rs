@@ -69,11 +69,11 @@ impl<'b> Control<'b> {
 impl Runnable for Control<'_> {
     fn read(&mut self, activation: &mut Activation) {
         // Until a topic has its first sample its message's default stands in: nothing valid, not armed.
-        self.estimate = activation.latest(&mut self.ports.estimate).map(|s| s.data).unwrap_or_default();
-        self.command = activation.latest(&mut self.ports.command).map(|s| s.data).unwrap_or_default();
-        self.setpoint = activation.latest(&mut self.ports.setpoint).map(|s| s.data).unwrap_or_default();
-        self.mode = activation.latest(&mut self.ports.mode).map(|s| s.data).unwrap_or_default();
-        self.status = activation.latest(&mut self.ports.status).map(|s| s.data).unwrap_or_default();
+        activation.update(&mut self.ports.estimate, &mut self.estimate);
+        activation.update(&mut self.ports.command, &mut self.command);
+        activation.update(&mut self.ports.setpoint, &mut self.setpoint);
+        activation.update(&mut self.ports.mode, &mut self.mode);
+        activation.update(&mut self.ports.status, &mut self.status);
         self.unmet = activation.latest(&mut self.ports.motors).map_or([0.0; 4], |s| s.data.unmet);
     }
 

@@ -80,9 +80,9 @@ impl Runnable for FailsafeMonitor<'_> {
         activation.drain(&mut self.ports.pilot, &mut self.pilot_frames);
         activation.drain(&mut self.ports.guided, &mut self.guided_commands);
         self.power = activation.latest(&mut self.ports.power);
-        self.estimate = activation.latest(&mut self.ports.estimate).map(|s| s.data).unwrap_or_default();
-        self.status = activation.latest(&mut self.ports.status).map(|s| s.data).unwrap_or_default();
-        self.mode = activation.latest(&mut self.ports.mode).map(|s| s.data).unwrap_or_default();
+        activation.update(&mut self.ports.estimate, &mut self.estimate);
+        activation.update(&mut self.ports.status, &mut self.status);
+        activation.update(&mut self.ports.mode, &mut self.mode);
     }
 
     fn run(&mut self, activation: &mut Activation) {

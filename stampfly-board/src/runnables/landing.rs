@@ -46,10 +46,10 @@ impl<'b> LandingManager<'b> {
 
 impl Runnable for LandingManager<'_> {
     fn read(&mut self, activation: &mut Activation) {
-        self.estimate = activation.latest(&mut self.ports.estimate).map(|s| s.data).unwrap_or_default();
-        self.mode = activation.latest(&mut self.ports.mode).map(|s| s.data).unwrap_or_default();
-        self.setpoint = activation.latest(&mut self.ports.setpoint).map(|s| s.data).unwrap_or_default();
-        self.demand = activation.latest(&mut self.ports.demand).map(|s| s.data).unwrap_or_default();
+        activation.update(&mut self.ports.estimate, &mut self.estimate);
+        activation.update(&mut self.ports.mode, &mut self.mode);
+        activation.update(&mut self.ports.setpoint, &mut self.setpoint);
+        activation.update(&mut self.ports.demand, &mut self.demand);
     }
 
     fn run(&mut self, activation: &mut Activation) {

@@ -69,9 +69,9 @@ impl Runnable for ModeManager<'_> {
     fn read(&mut self, activation: &mut Activation) {
         let now = activation.now();
         self.alerts = activation.latest(&mut self.ports.alert).map(|s| s.data.active).unwrap_or_default();
-        self.estimate = activation.latest(&mut self.ports.estimate).map(|s| s.data).unwrap_or_default();
-        self.calibration = activation.latest(&mut self.ports.calibration).map(|s| s.data).unwrap_or_default();
-        self.status = activation.latest(&mut self.ports.status).map(|s| s.data).unwrap_or_default();
+        activation.update(&mut self.ports.estimate, &mut self.estimate);
+        activation.update(&mut self.ports.calibration, &mut self.calibration);
+        activation.update(&mut self.ports.status, &mut self.status);
         let pilot = activation.latest(&mut self.ports.pilot);
         self.pilot = pilot.filter(|s| s.age(now) < STALE_PILOT).map(|s| s.data);
         activation.drain(&mut self.ports.guided, &mut self.commands);

@@ -52,10 +52,10 @@ impl<'b> Navigation<'b> {
 impl Runnable for Navigation<'_> {
     fn read(&mut self, activation: &mut Activation) {
         activation.drain(&mut self.ports.guided, &mut self.commands);
-        self.mode = activation.latest(&mut self.ports.mode).map(|s| s.data).unwrap_or_default();
-        self.estimate = activation.latest(&mut self.ports.estimate).map(|s| s.data).unwrap_or_default();
-        self.status = activation.latest(&mut self.ports.status).map(|s| s.data).unwrap_or_default();
-        self.command = activation.latest(&mut self.ports.command).map(|s| s.data).unwrap_or_default();
+        activation.update(&mut self.ports.mode, &mut self.mode);
+        activation.update(&mut self.ports.estimate, &mut self.estimate);
+        activation.update(&mut self.ports.status, &mut self.status);
+        activation.update(&mut self.ports.command, &mut self.command);
     }
 
     fn run(&mut self, activation: &mut Activation) {

@@ -33,7 +33,7 @@ impl<'b> Notification<'b> {
 
 impl Runnable for Notification<'_> {
     fn read(&mut self, activation: &mut Activation) {
-        self.mode = activation.latest(&mut self.ports.mode).map(|s| s.data).unwrap_or_default();
+        activation.update(&mut self.ports.mode, &mut self.mode);
         self.alerts = activation.latest(&mut self.ports.alert).map(|s| s.data.active).unwrap_or_default();
     }
 

@@ -25,7 +25,8 @@ impl Eskf {
         let variance = sigma * sigma + 10.0 * excess * excess;
         let then = self.present();
         let rows = aid::gravity::specific_force(&then.state, &then.rotation, acceleration);
-        let (projection, ratio) = self.compare(&then, rows, accel.into(), [variance; 3]);
+        let projection = self.compare(&then, rows, accel.into(), [variance; 3]);
+        let ratio = self.ratio(&projection);
         self.gravity = [accel, Vec3::new(rows[0].predicted, rows[1].predicted, rows[2].predicted)];
         self.status.accel_ratio = ratio;
         let fusion = match self.gates.judge(Sensor::Gravity, self.now, ratio, 4.0 * self.config.lockout) {

@@ -9,8 +9,13 @@ impl Estimator for Eskf {
         if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
             return;
         }
-        let fresh = Self::new(self.config);
-        *self = Self { now: at, initialized: true, calibration: *calibration, command: self.command, ..fresh };
+        // Field by field would forget one; a whole one beside this one would be a second estimator on the stack.
+        let command = self.command;
+        *self = Self::new(self.config);
+        self.now = at;
+        self.initialized = true;
+        self.calibration = *calibration;
+        self.command = command;
         self.state.gyro_bias = calibration.gyro_bias;
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
         self.start = self.state.rotation();
@@ -83,6 +88,12 @@ impl Estimator for Eskf {
         self.force = motion.force;
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
+        // Half way between two looks at gravity, so that no step does both.
+        if let Some(anchor) = self.anchor
+            && self.steps % STILL_DIVIDER == STILL_DIVIDER / 2
+        {
+            self.absorb_standing(anchor);
+        }
         if self.steps.is_multiple_of(STILL_DIVIDER)
             && let Some(accel) = self.accels.take()
         {

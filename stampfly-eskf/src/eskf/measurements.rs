@@ -33,7 +33,8 @@ impl Eskf {
         let cone = tof.distance * (1.0 - cos_tilt);
         let sigma = self.config.tof_sigma.max(tof.sigma) + cone;
         let variance = sigma * sigma;
-        let (projection, ratio) = self.compare(&then, [row], [tof.distance], [variance]);
+        let projection = self.compare(&then, [row], [tof.distance], [variance]);
+        let ratio = self.ratio(&projection);
         self.status.tof_innovation = tof.distance - row.predicted;
         self.status.tof_ratio = ratio;
         match self.gates.judge(Sensor::Tof, self.now, ratio, self.config.lockout) {
@@ -84,7 +85,8 @@ impl Eskf {
         };
         let variances = [variance(&rows[0], raw.y), variance(&rows[1], -raw.x)];
         // Both axes pass or neither does: a single axis locked out drifts unnoticed.
-        let (projection, ratio) = self.compare(&then, rows, measured, variances);
+        let projection = self.compare(&then, rows, measured, variances);
+        let ratio = self.ratio(&projection);
         self.status.flow_innovation = [measured[0] - rows[0].predicted, measured[1] - rows[1].predicted];
         self.status.flow_ratio = ratio;
         // Flow sees two axes of the body's; along the beam the velocity is what it was thought to be.
@@ -127,7 +129,8 @@ impl Eskf {
         let offset = *offset;
         let row = aid::baro::altitude(&then.state, offset.value());
         let innovation = baro.altitude - row.predicted;
-        let (projection, ratio) = self.compare(&then, [row], [baro.altitude], [noise + offset.variance()]);
+        let projection = self.compare(&then, [row], [baro.altitude], [noise + offset.variance()]);
+        let ratio = self.ratio(&projection);
         self.status.baro_innovation = innovation;
         self.status.baro_ratio = ratio;
         match self.gates.judge(Sensor::Baro, self.now, ratio, self.config.lockout) {
@@ -164,14 +167,16 @@ impl Eskf {
         self.status.mag_innovation = -row.predicted;
         match self.config.mag_model {
             MagModel::Heading => {
-                let (projection, ratio) = self.compare(&then, [row], [0.0], [variance]);
+                let projection = self.compare(&then, [row], [0.0], [variance]);
+                let ratio = self.ratio(&projection);
                 Ok(self.judge_mag(&projection, ratio))
             }
             MagModel::Field => {
                 let rows = aid::field::direction(&then.rotation, &reference);
                 let direction = mag.field / strength;
                 let measured = [direction.x, direction.y, direction.z];
-                let (projection, ratio) = self.compare(&then, rows, measured, [variance; 3]);
+                let projection = self.compare(&then, rows, measured, [variance; 3]);
+                let ratio = self.ratio(&projection);
                 Ok(self.judge_mag(&projection, ratio))
             }
         }
@@ -198,7 +203,8 @@ impl Eskf {
         let then = self.admit(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
         let variance = (sigma * sigma).max(1e-6);
         let rows = aid::velocity::world(&then.state);
-        let (projection, ratio) = self.compare(&then, rows, (*velocity).into(), [variance; 3]);
+        let projection = self.compare(&then, rows, (*velocity).into(), [variance; 3]);
+        let ratio = self.ratio(&projection);
         self.acceleration.see(at, *velocity);
         match self.gates.judge(Sensor::Velocity, self.now, ratio, self.config.lockout) {
             Verdict::Fuse => Ok(self.absorb(&projection, ratio)),
@@ -218,7 +224,8 @@ impl Eskf {
         let then = self.admit(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
         let variance = (sigma * sigma).max(1e-8);
         let rows = aid::position::world(&then.state);
-        let (projection, ratio) = self.compare(&then, rows, (*position).into(), [variance; 3]);
+        let projection = self.compare(&then, rows, (*position).into(), [variance; 3]);
+        let ratio = self.ratio(&projection);
         match self.gates.judge(Sensor::Position, self.now, ratio, self.config.lockout) {
             Verdict::Fuse => Ok(self.absorb(&projection, ratio)),
             Verdict::Leave => Ok(Fusion::Gated { ratio }),
@@ -242,7 +249,8 @@ impl Eskf {
         let then = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
         let variance = (sigma * sigma).max(1e-8);
         let missing = aid::attitude::missing(then.state.attitude, [w, x, y, z]);
-        let (projection, ratio) = self.compare(&then, aid::attitude::rows(), missing.into(), [variance; 3]);
+        let projection = self.compare(&then, aid::attitude::rows(), missing.into(), [variance; 3]);
+        let ratio = self.ratio(&projection);
         match self.gates.judge(Sensor::Attitude, self.now, ratio, self.config.lockout) {
             Verdict::Fuse => Ok(self.absorb(&projection, ratio)),
             Verdict::Leave => Ok(Fusion::Gated { ratio }),

@@ -81,16 +81,22 @@ const FLOOR: [f32; N] = [
 /// Adds a multiple of a row.
 #[inline]
 fn add(to: &mut Row, factor: f32, row: &Row) {
-    for (cell, value) in to.iter_mut().zip(row) {
+    for (cell, value) in to[..N].iter_mut().zip(&row[..N]) {
         *cell += factor * value;
     }
 }
 
+/// A sum of multiples of rows, from the column `FIRST` on; zero before.
 #[inline]
-fn combine<const K: usize>(parts: [(f32, &Row); K]) -> Row {
+fn combine<const FIRST: usize, const K: usize>(first: (f32, &Row), others: [(f32, &Row); K]) -> Row {
     let mut out = [0.0; WIDTH];
-    for (factor, row) in parts {
-        add(&mut out, factor, row);
+    for (cell, value) in out[FIRST..N].iter_mut().zip(&first.1[FIRST..N]) {
+        *cell = first.0 * value;
+    }
+    for (factor, row) in others {
+        for (cell, value) in out[FIRST..N].iter_mut().zip(&row[FIRST..N]) {
+            *cell += factor * value;
+        }
     }
     out
 }
@@ -162,28 +168,28 @@ impl Covariance {
 
         let driving = [0.0, noise.velocity, noise.attitude, noise.gyro_bias, noise.accel_bias];
 
-        // Rows: T = F·P for the nine rows that change.
+        // Rows: T = F·P for the nine rows that change, from the diagonal block on.
         let p = &self.rows;
         let mut t = [[0.0; WIDTH]; 9];
         for i in 0..3 {
-            t[i] = combine([(1.0, &p[POSITION + i]), (dt, &p[VELOCITY + i])]);
+            t[i] = combine::<POSITION, 1>((1.0, &p[POSITION + i]), [(dt, &p[VELOCITY + i])]);
             let (a, b) = (by_attitude[i], by_bias[i]);
-            t[3 + i] = combine([
+            t[3 + i] = combine::<VELOCITY, 6>(
                 (1.0, &p[VELOCITY + i]),
-                (a[0], &p[ATTITUDE]),
-                (a[1], &p[ATTITUDE + 1]),
-                (a[2], &p[ATTITUDE + 2]),
-                (b[0], &p[ACCEL_BIAS]),
-                (b[1], &p[ACCEL_BIAS + 1]),
-                (b[2], &p[ACCEL_BIAS + 2]),
-            ]);
+                [
+                    (a[0], &p[ATTITUDE]),
+                    (a[1], &p[ATTITUDE + 1]),
+                    (a[2], &p[ATTITUDE + 2]),
+                    (b[0], &p[ACCEL_BIAS]),
+                    (b[1], &p[ACCEL_BIAS + 1]),
+                    (b[2], &p[ACCEL_BIAS + 2]),
+                ],
+            );
             let c = turn[i];
-            t[6 + i] = combine([
+            t[6 + i] = combine::<ATTITUDE, 3>(
                 (c[0], &p[ATTITUDE]),
-                (c[1], &p[ATTITUDE + 1]),
-                (c[2], &p[ATTITUDE + 2]),
-                (-dt, &p[GYRO_BIAS + i]),
-            ]);
+                [(c[1], &p[ATTITUDE + 1]), (c[2], &p[ATTITUDE + 2]), (-dt, &p[GYRO_BIAS + i])],
+            );
         }
 
         // Columns: the first nine of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
@@ -266,16 +272,20 @@ impl Covariance {
     #[inline]
     pub fn absorb<const M: usize>(&mut self, projection: &Projection<M>) -> [f32; N] {
         let Projection { directions, innovations } = projection;
-        for (i, place) in self.rows.iter_mut().enumerate() {
-            let mut row = *place;
-            for direction in directions {
-                // What is not a number is not spread. Also keeps the compiler from working down the columns.
-                if direction[i].is_nan() {
-                    return [f32::NAN; N];
-                }
-                add(&mut row, -direction[i], direction);
+        // What is not a number is not spread.
+        if directions.iter().flatten().any(|v| v.is_nan()) {
+            return [f32::NAN; N];
+        }
+        // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
+        self.shrink::<POSITION, M>(directions);
+        self.shrink::<VELOCITY, M>(directions);
+        self.shrink::<ATTITUDE, M>(directions);
+        self.shrink::<GYRO_BIAS, M>(directions);
+        self.shrink::<ACCEL_BIAS, M>(directions);
+        for i in 3..N {
+            for j in 0..i / 3 * 3 {
+                self.rows[i][j] = self.rows[j][i];
             }
-            *place = row;
         }
         let mut correction = [0.0; N];
         for (direction, innovation) in directions.iter().zip(innovations) {
@@ -284,6 +294,21 @@ impl Covariance {
             }
         }
         correction
+    }
+}
+
+impl Covariance {
+    /// Subtracts the directions' w·wᵀ from the three rows from `FIRST` on, on the diagonal block and to its right.
+    #[inline]
+    fn shrink<const FIRST: usize, const M: usize>(&mut self, directions: &[Row; M]) {
+        for (i, row) in self.rows.iter_mut().enumerate().skip(FIRST).take(3) {
+            for direction in directions {
+                let factor = -direction[i];
+                for (cell, value) in row[FIRST..N].iter_mut().zip(&direction[FIRST..N]) {
+                    *cell += factor * value;
+                }
+            }
+        }
     }
 }
 

@@ -120,7 +120,10 @@ impl History {
         let (mut sum, mut time, mut end) = (Vec3::zeros(), 0.0, 0.0f32);
         for stretch in self.backwards() {
             let begin = end + stretch.length;
-            let overlap = begin.min(age + length) - end.max(age);
+            // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
+            let from = if end > age { end } else { age };
+            let to = if begin < age + length { begin } else { age + length };
+            let overlap = to - from;
             if overlap > 0.0 {
                 sum += stretch.rate * overlap;
                 time += overlap;

@@ -27,7 +27,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     ]))?;
     let measured = (count(repository, LONG)? - count(repository, SHORT)?) as f64 / (LONG - SHORT) as f64;
 
-    Budget::read(repository, "benches/budget.toml")?.hold("instructions_per_step", measured)
+    Budget::read(repository, "benches/budget.toml")?.hold("instructions_per_step", measured, "instructions per step")
 }
 
 /// Instructions of one run of so many steps.

@@ -31,7 +31,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         if !here.lines().any(|line| line == format!("{name}: hash {hash}")) {
             return Err(format!("{name}: the host's estimates have other bits:\n{here}"));
         }
-        budget.hold(name, mean)?;
+        budget.hold(name, mean, "instructions per step")?;
         if mean > bar {
             return Err(format!("{name}: {mean} instructions per step; {bar} is the most there may ever be"));
         }

@@ -2,7 +2,7 @@
 //!
 //! A link to a line, such as `[`Ring::write`](../stampfly-bus/src/ring.rs#L90)`, is checked: the line must contain the
 //! last word of the link's text. Lines move, so `cargo xtask docs --fix` puts the numbers right and rewrites the
-//! generated topic table; without `--fix` a difference is a failure. Every other link into the repository, relative or by
+//! generated tables; without `--fix` a difference is a failure. Every other link into the repository, relative or by
 //! its address, must lead to a file, and one into the same document to a heading. Every picture must be shown somewhere,
 //! and the guide to tuning must name every field there is to tune.
 
@@ -31,8 +31,24 @@ const ADDRESSES: &[&str] =
 const PICTURES: &str = "docs/images";
 /// The guide to tuning, and the structure whose fields it must name.
 const TUNING: (&str, &str, &str) = ("docs/estimation.md", "stampfly-eskf/src/config.rs", "pub struct EskfConfig {");
-/// The document that is generated.
-const TOPICS: &str = "docs/topics.md";
+/// The documents that are generated: the subcommand of `stampfly` that prints their table, and what comes before it.
+const GENERATED: &[(&str, &str, &str)] = &[
+    (
+        "docs/topics.md",
+        "topics",
+        "# Topics\n\nWho publishes what for whom. Printed from the topic table in \
+         `stampfly-board/src/topic_table.rs` by `cargo xtask docs --fix`; the log reads every topic.",
+    ),
+    (
+        "docs/schedule.md",
+        "schedule",
+        "# Schedule\n\nWho runs when. Printed from the activation table in `stampfly-board/src/activation_table.rs` by \
+         `cargo xtask docs --fix`.\n\nA budget is what an activation may take on the target; `cargo xtask qemu` counts \
+         what it takes. A response is the time from a runnable's trigger until it has published, at the latest, if \
+         everybody keeps to their budgets: for `actuation` that is the time from an inertial sample to the motors. The \
+         compiler computes it (`stampfly-bus/src/response.rs`) and refuses a table in which somebody could be late.",
+    ),
+];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
     let fix = match arguments {
@@ -52,16 +68,15 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
     }
     check_pictures(&repository.root, &all)?;
     check_tuning(&repository.root)?;
-    let mut list = repository.cargo();
-    let (table, _) =
-        capture(list.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "topics", "--markdown"]))?;
-    let page = format!(
-        "# Topics\n\nWho publishes what for whom. Printed from the topic table in \
-         `stampfly-board/src/topic_table.rs` by `cargo xtask docs --fix`; the log reads every topic.\n\n{table}"
-    );
-    let path = repository.root.join(TOPICS);
-    let before = fs::read_to_string(&path).unwrap_or_default();
-    keep(&path, TOPICS, &before, &page, fix, &mut stale)?;
+    for (name, command, introduction) in GENERATED {
+        let mut list = repository.cargo();
+        let (table, _) =
+            capture(list.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", command, "--markdown"]))?;
+        let page = format!("{introduction}\n\n{table}");
+        let path = repository.root.join(name);
+        let before = fs::read_to_string(&path).unwrap_or_default();
+        keep(&path, name, &before, &page, fix, &mut stale)?;
+    }
     if stale.is_empty() { Ok(()) } else { Err(format!("out of date: {stale:?}; run `cargo xtask docs --fix`")) }
 }
 

@@ -97,7 +97,7 @@ fn is_about_the_pin(said: &str) -> Result<(), Failure> {
 }
 
 /// Builds for the ESP32-C6 and returns the program.
-fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
+pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");

@@ -34,7 +34,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
     Ok(())
 }
 
-/// Full paths, because rustup's come first in `PATH`.
+/// Debian's cargo with Debian's compiler. Full paths, because rustup's come first in `PATH`.
 pub fn debian_cargo(repository: &Repository) -> Command {
     let mut cargo = repository.command("/usr/bin/cargo");
     cargo.env("RUSTC_BOOTSTRAP", "1").env("RUSTC", "/usr/bin/rustc").env_remove("RUSTUP_TOOLCHAIN");

@@ -225,9 +225,15 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         }
         let mode = self.config.mode;
         self.port.write(register::PHASECAL_CONFIG_TIMEOUT_MACROP, &[codec::phase_calibration(mode)]).await?;
-        self.port.write(register::RANGE_CONFIG_TIMEOUT_MACROP_A, &codec::ranging(&self.config)).await?;
+        let ranging = codec::ranging(&self.config);
+        self.port.write(register::RANGE_CONFIG_TIMEOUT_MACROP_A, &ranging).await?;
+        // A wrong bit in here would not be noticed as anything but wrong distances.
+        let kept: [u8; 12] = self.port.read(register::RANGE_CONFIG_TIMEOUT_MACROP_A).await?;
+        if kept != ranging {
+            return Err(ChipError::Configuration { status: kept[2] });
+        }
         self.port.write(register::SD_CONFIG_WOI_SD0, &mode.windows()).await?;
-        let oscillator = u16::from_be_bytes(self.port.read(register::RESULT_OSC_CALIBRATE_VAL).await?);
+        let oscillator = u16::from_be_bytes(self.port.read_twice(register::RESULT_OSC_CALIBRATE_VAL).await?);
         let period = codec::inter_measurement(self.config.period, oscillator);
         self.port.write(register::SYSTEM_INTERMEASUREMENT_PERIOD, &period).await
     }
@@ -266,9 +272,13 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             }
             let up = status & 1 != 0;
             if up && !self.stale {
-                self.due = now + early(period);
-                let since = now.since(before.unwrap_or(now));
-                return Ok(now.since(Micros(since.0 / 2)));
+                // Between two looks; or, up at the first look, when the rhythm says, for all that is known.
+                let seen = match before {
+                    Some(before) => before + Micros(now.since(before).0 / 2),
+                    None => now.min(self.due + period.since(early(period))),
+                };
+                self.due = seen + early(period);
+                return Ok(seen);
             }
             if up {
                 self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;

@@ -29,10 +29,14 @@ pub enum Command {
     Replay(ReplayOptions),
     /// List the topics: type, policy, rate, publisher, readers.
     Topics(TopicsOptions),
+    /// List the runnables: what activates them, budget, response time.
+    Schedule(TopicsOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
     /// Run the estimator over recorded sensor data and say how good it is.
     Estimate(EstimateOptions),
+    /// Play the golden flight: does this machine compute what it should?
+    Golden(GoldenOptions),
 }
 
 impl Default for Command {
@@ -114,6 +118,17 @@ impl Default for FlyOptions {
     fn default() -> Self {
         Self { scene: SceneOptions::default(), seed: 1, out: ".".into() }
     }
+}
+
+/// Options of `golden`.
+#[derive(Clone, Debug, Args)]
+pub struct GoldenOptions {
+    /// Fly and record it again, into this file.
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Options of `campaign`.

@@ -9,7 +9,9 @@ mod arguments;
 mod campaign;
 mod estimate;
 mod fly;
+mod golden;
 mod replay;
+mod schedule;
 mod terminal;
 mod topics;
 
@@ -26,8 +28,10 @@ fn main() -> ExitCode {
         Command::Fly(options) => fly::run(&options),
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
+        Command::Schedule(options) => schedule::run(&options),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
+        Command::Golden(options) => golden::run(&options),
     };
     match result {
         Ok(code) => code,

@@ -1,0 +1,264 @@
+//! `qemu`: the golden flight on three emulated cores. The same bits as on this PC? Within the committed instructions, and
+//! within the budgets of the activation table?
+//!
+//! The counts are exact and the same on every host. Instructions are not cycles: the comparison with a budget takes one for
+//! one, and asks for a margin of two because of it. The package `stampfly-board/qemu` is outside the workspace, so its
+//! format and its warnings are looked at here, too.
+
+use crate::Failure;
+use crate::ratchet::Budget;
+use crate::repository::{Repository, add_targets, capture, exists, install, run as run_program};
+use crate::steps::no_std::debian_cargo;
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+
+const PACKAGE: &str = "stampfly-board/qemu";
+const BUDGET: &str = "stampfly-board/qemu/budget.toml";
+/// The document the table is written into, and where.
+const DOCUMENT: &str = "stampfly-board/README.md";
+const BEGIN: &str = "<!-- instructions: cargo xtask qemu --fix -->\n";
+const END: &str = "<!-- end of instructions -->";
+/// A run takes some seconds. One that faulted would never end.
+const SECONDS: &str = "120";
+/// Clock of the ESP32-S3, MHz.
+const CLOCK: f64 = 240.0;
+/// An activation may use this part of its budget, because instructions are not cycles.
+const SHARE: f64 = 0.5;
+/// The flight band.
+const CHAIN: &str = "chain";
+
+/// An emulated machine.
+struct Machine {
+    /// As in the budget and in the table.
+    name: &'static str,
+    /// As in the package's `.cargo/config.toml`.
+    target: &'static str,
+    emulator: &'static str,
+}
+
+const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf", emulator: "qemu-system-xtensa" };
+const MACHINES: [Machine; 3] = [
+    Machine { name: "Cortex-M4F", target: "thumbv7em-none-eabihf", emulator: "qemu-system-arm" },
+    Machine { name: "RV32IMAFC", target: "riscv32imafc-unknown-none-elf", emulator: "qemu-system-riscv32" },
+    XTENSA,
+];
+
+/// Debian's packages: the emulators, a compiler with the sources of its library, and what Xtensa needs besides.
+const EMULATORS: [&str; 2] = ["qemu-system-arm", "qemu-system-misc"];
+const COMPILER: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "lld-22"];
+const BACK_END: [&str; 2] = ["llvm-22", "binutils-xtensa-lx106"];
+
+pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+    let fix = match arguments {
+        [] => false,
+        [flag] if flag == "--fix" => true,
+        _ => return Err("the only argument is --fix".to_owned()),
+    };
+    if MACHINES.iter().any(|machine| !exists(machine.emulator)) {
+        install(repository, &EMULATORS)?;
+    }
+    run_program(inside(repository, repository.cargo()).args(["fmt", "--check"]))?;
+    let mut clippy = inside(repository, repository.cargo());
+    clippy.args(["clippy", "--quiet", "--release", "--locked", "--target-dir"]).arg(repository.target("qemu"));
+    run_program(clippy.args(["--", "-D", "warnings"]))?;
+
+    let mut host = inside(repository, repository.cargo());
+    host.args(["run", "--quiet", "--release", "--locked", "--target-dir"]).arg(repository.target("qemu"));
+    let (host, _) = capture(&mut host)?;
+    let expected = bits(&host);
+    if expected.is_empty() {
+        return Err(format!("this PC says nothing about bits:\n{host}"));
+    }
+    let budget = Budget::read(repository, BUDGET)?;
+    let mut all = Vec::new();
+    for machine in &MACHINES {
+        let said = emulate(repository, machine)?;
+        let found = bits(&said);
+        if found != expected {
+            return Err(format!("{}: other bits than on this PC:\n{found:#?}\n{expected:#?}", machine.name));
+        }
+        println!("{}: {}", machine.name, found.join("; "));
+        let counts = counts(&said)?;
+        hold(&budget, machine, &counts)?;
+        all.push(counts);
+    }
+    let table = table(&all);
+    println!("\n{table}");
+    if fix {
+        repository.fill(DOCUMENT, BEGIN, END, &format!("\n{table}\n"))?;
+    }
+    all.iter().flatten().try_for_each(within_budget)
+}
+
+/// Builds the program for a machine, runs it there and returns what it says.
+fn emulate(repository: &Repository, machine: &Machine) -> Result<String, Failure> {
+    let (mut cargo, options) = toolchain(repository, machine)?;
+    // Apart from running it, which has little time.
+    run_program(cargo.arg("build").args(&options))?;
+    let (cargo, options) = toolchain(repository, machine)?;
+    let mut limited = inside(repository, repository.command("timeout"));
+    limited.envs(cargo.get_envs().filter_map(|(key, value)| Some((key, value?))));
+    limited.arg(SECONDS).arg(cargo.get_program()).arg("run").args(&options);
+    Ok(capture(&mut limited)?.0)
+}
+
+/// The cargo for a machine, and what to tell it: rustup's where it has the target, else Debian's.
+fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec<String>), Failure> {
+    let target_folder = repository.target("qemu").display().to_string();
+    let mut options: Vec<String> =
+        ["--quiet", "--release", "--locked", "--target-dir", &target_folder].map(str::to_owned).into();
+    let mut add = |more: &[&str]| options.extend(more.iter().map(|option| (*option).to_owned()));
+    if machine.target == XTENSA.target {
+        debian(&[&COMPILER[..], &BACK_END].concat(), "/usr/bin/llc-22", repository)?;
+        let mut cargo = inside(repository, debian_cargo(repository));
+        cargo.env("RUSTC", repository.root.join(PACKAGE).join("xtensa/rustc"));
+        // The linker makes one module of everything, and debug information is more than the back end can take.
+        add(&["--config", "profile.release.lto=false", "--config", "profile.release.debug=false"]);
+        add(&["-Zbuild-std=core", "-Zbuild-std-features=compiler-builtins-mem", "-Zjson-target-spec"]);
+        add(&["--target", "xtensa/xtensa-none-elf.json"]);
+        return Ok((cargo, options));
+    }
+    add(&["--target", machine.target]);
+    if add_targets(repository, &[machine.target]).is_ok() {
+        return Ok((inside(repository, repository.cargo()), options));
+    }
+    eprintln!("no rustup target {}: using Debian's compiler instead", machine.target);
+    debian(&COMPILER, "/usr/bin/ld.lld-22", repository)?;
+    add(&["-Zbuild-std=core", "--config", &format!("target.{}.linker=\"ld.lld-22\"", machine.target)]);
+    add(&["--config", &format!("target.{}.rustflags=[\"-Clinker-flavor=ld.lld\"]", machine.target)]);
+    Ok((inside(repository, debian_cargo(repository)), options))
+}
+
+/// Installs Debian's packages unless this last one of them is there.
+fn debian(packages: &[&str], last: &str, repository: &Repository) -> Result<(), Failure> {
+    let there = ["/usr/bin/cargo", last].iter().all(|program| Path::new(program).exists());
+    if there { Ok(()) } else { install(repository, packages) }
+}
+
+/// Runs in the package's folder: its own `.cargo/config.toml` says how it is run, and flags meant for the host would
+/// replace that.
+fn inside(repository: &Repository, mut command: Command) -> Command {
+    command.current_dir(repository.root.join(PACKAGE)).env_remove("RUSTFLAGS");
+    command
+}
+
+/// What the program says that must be the same everywhere.
+fn bits(said: &str) -> Vec<&str> {
+    let same = ["duties deviate by ", "published: ", "recorded: "];
+    said.lines().filter(|line| same.iter().any(|start| line.starts_with(start))).collect()
+}
+
+/// What something took on a machine.
+#[derive(Clone, Debug, PartialEq)]
+struct Count {
+    name: String,
+    /// Of its activation, us; `None` when it is no runnable.
+    budget: Option<f64>,
+    /// Instructions.
+    mean: f64,
+    most: f64,
+}
+
+impl Count {
+    /// From a line `NAME[, budget N us]: mean N most N count N`.
+    fn read(line: &str) -> Option<Self> {
+        let (name, rest) = line.split_once(": ")?;
+        let words: Vec<&str> = rest.split(' ').collect();
+        let ["mean", mean, "most", most, "count", _] = words[..] else { return None };
+        let (name, budget) = match name.split_once(", budget ") {
+            Some((name, budget)) => (name, Some(budget.strip_suffix(" us")?.parse().ok()?)),
+            None => (name, None),
+        };
+        Some(Self { name: name.to_owned(), budget, mean: mean.parse().ok()?, most: most.parse().ok()? })
+    }
+}
+
+/// Everything that was counted.
+fn counts(said: &str) -> Result<Vec<Count>, Failure> {
+    let counts: Vec<Count> = said.lines().filter_map(Count::read).collect();
+    // Nothing counted would be within every budget.
+    let complete = counts.iter().any(|count| count.name == CHAIN) && counts.iter().any(|count| count.budget.is_some());
+    if complete && counts.iter().all(|count| count.most > 0.0) {
+        Ok(counts)
+    } else {
+        Err(format!("no counts:\n{said}"))
+    }
+}
+
+/// Compares the chain with the committed figures of a machine, and with its bars.
+fn hold(budget: &Budget, machine: &Machine, counts: &[Count]) -> Result<(), Failure> {
+    for chain in counts.iter().filter(|count| count.name == CHAIN) {
+        for (what, measured) in [("mean", chain.mean), ("most", chain.most)] {
+            let name = format!("{} {what}", machine.name);
+            print!("{name}: ");
+            budget.hold(&name, measured)?;
+            match budget.number(&format!("{name} bar")) {
+                Ok(bar) if measured > bar => {
+                    return Err(format!("{name}: {measured} instructions; {bar} is the most there may ever be"));
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Does the most a runnable ever took fit into its budget, with the margin?
+fn within_budget(count: &Count) -> Result<(), Failure> {
+    let Count { name, budget: Some(budget), most, .. } = count else { return Ok(()) };
+    let took = most / CLOCK;
+    if took <= budget * SHARE {
+        return Ok(());
+    }
+    Err(format!("{name}: {most} instructions are {took:.0} us at {CLOCK} MHz, more than {SHARE} of its {budget} us"))
+}
+
+/// One row for everything that was counted, two columns a machine.
+fn table(all: &[Vec<Count>]) -> String {
+    let mut text = String::from("| instructions of an activation | budget |");
+    for machine in &MACHINES {
+        let _ = write!(text, " {}, mean | most |", machine.name);
+    }
+    let _ = write!(text, "\n|---|---|{}", "---|---|".repeat(MACHINES.len()));
+    for (row, first) in all.iter().flatten().take(all.first().map_or(0, Vec::len)).enumerate() {
+        let budget = first.budget.map_or_else(String::new, |budget| format!("{budget} us"));
+        let _ = write!(text, "\n| {} | {budget} |", first.name);
+        for count in all.iter().filter_map(|counts| counts.get(row)) {
+            let _ = write!(text, " {} | {} |", count.mean, count.most);
+        }
+    }
+    text + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SAID: &str = "duties deviate by 0\npublished: 3 messages, hash 00ff\nstack: 5 bytes\n\
+                        control, budget 100 us: mean 5 most 9 count 2\nchain: mean 7 most 12001 count 2\n";
+
+    #[test]
+    fn reads_what_the_program_says() {
+        assert_eq!(bits(SAID), ["duties deviate by 0", "published: 3 messages, hash 00ff"]);
+        let counts = counts(SAID).expect("counts");
+        let control = Count { name: "control".to_owned(), budget: Some(100.0), mean: 5.0, most: 9.0 };
+        assert_eq!((&counts[0], counts[1].name.as_str(), counts.len()), (&control, "chain", 2));
+        assert!(super::counts("chain: mean 0 most 0 count 0").is_err());
+        assert!(super::counts("panicked").is_err());
+    }
+
+    #[test]
+    fn asks_for_a_margin_of_two() {
+        let count = |most| Count { name: String::new(), budget: Some(100.0), mean: 0.0, most };
+        assert!(within_budget(&count(12_000.0)).is_ok());
+        assert!(within_budget(&count(12_001.0)).is_err());
+    }
+
+    #[test]
+    fn the_table_has_a_column_pair_a_machine() {
+        let counts = counts(SAID).expect("counts");
+        let table = table(&[counts.clone(), counts.clone(), counts]);
+        assert!(table.contains("| control | 100 us | 5 | 9 | 5 | 9 | 5 | 9 |"), "{table}");
+    }
+}
