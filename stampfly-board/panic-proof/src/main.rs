@@ -2,8 +2,8 @@
 //!
 //! The panic handler calls a function that does not exist. When the compiler can show that nothing ever panics, it
 //! drops the handler and the program links; one index that it cannot bound, anywhere in what is called here, and the
-//! linker misses the function. What is called: every runnable with everything behind it, the bus with its taps, and the
-//! choice between all estimators and controllers, with data the compiler knows nothing about.
+//! linker misses the function. What is called: every runnable with everything behind it, the bus with its taps, the
+//! choice between all estimators and controllers, and the self test, with data the compiler knows nothing about.
 //!
 //! The program is never run. With the feature `control` it has one unchecked index and must not link.
 #![no_std]
@@ -12,7 +12,7 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, wiring};
+use stampfly_board::{FlightLoop, VehicleConfig, golden, wiring};
 use stampfly_bus::Band;
 use stampfly_types::Micros;
 
@@ -53,6 +53,7 @@ extern "C" fn flight() {
             black_box((id, at, generation, words));
         });
     }
+    let _ = black_box(golden::play(black_box(golden::FLIGHT), &mut ()));
     #[cfg(feature = "control")]
     black_box(black_box([1u32, 2, 3])[black_box(1usize)]);
 }
