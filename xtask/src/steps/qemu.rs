@@ -192,7 +192,7 @@ fn hold(budget: &Budget, machine: &Machine, counts: &[Count]) -> Result<(), Fail
         for (what, measured) in [("mean", chain.mean), ("most", chain.most)] {
             let name = format!("{} {what}", machine.name);
             print!("{name}: ");
-            budget.hold(&name, measured)?;
+            budget.hold(&name, measured, "instructions")?;
             match budget.number(&format!("{name} bar")) {
                 Ok(bar) if measured > bar => {
                     return Err(format!("{name}: {measured} instructions; {bar} is the most there may ever be"));
