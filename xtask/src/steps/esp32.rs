@@ -36,11 +36,8 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         install(repository, &DEBIAN)?;
     }
     let target = stand_in(repository)?;
-    // What `cargo clippy` is; spelled so, rustup's would be taken.
-    let mut clippy = s3(repository, "check", &target);
-    clippy.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
-    run_program(&mut clippy)?;
-    refuses_a_wrong_pin(s3(repository, "rustc", &target))?;
+    run_program(&mut s3(repository, &target, "-Dwarnings"))?;
+    refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let program = c6(repository)?;
     memory(&program)?;
     image(repository, &program)
@@ -69,16 +66,20 @@ fn firmware(repository: &Repository, subcommand: &str) -> Command {
     cargo
 }
 
-fn s3(repository: &Repository, subcommand: &str, target: &Path) -> Command {
-    let mut cargo = firmware(repository, subcommand);
+/// Clippy for the S3, with these arguments for the firmware alone.
+fn s3(repository: &Repository, target: &Path, arguments: &str) -> Command {
+    let mut cargo = firmware(repository, "check");
     cargo.env("RUSTFLAGS", "-A explicit_builtin_cfgs_in_flags --cfg target_arch=\"xtensa\"");
-    cargo.args(["-Zjson-target-spec", "--target"]).arg(target);
+    // What `cargo clippy` is; spelled so, rustup's would be taken. Its arguments are separated by this word.
+    cargo.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver");
+    cargo.env("CLIPPY_ARGS", format!("{arguments}__CLIPPY_HACKERY__"));
+    // Macros and build scripts are then the same as for the C6.
+    cargo.args(["--release", "-Zjson-target-spec", "--target"]).arg(target);
     cargo
 }
 
 /// A check that accepts everything would look just like one that found nothing.
 fn refuses_a_wrong_pin(mut cargo: Command) -> Result<(), Failure> {
-    cargo.args(["--profile", "check", "--", "--cfg", "wrong_pin"]);
     match capture(&mut cargo) {
         Ok(_) => Err(format!("the check of the S3 firmware accepts {WRONG_PIN}, which the chip does not have")),
         Err(said) => is_about_the_pin(&said),
