@@ -2,8 +2,11 @@
 //!
 //! The panic handler calls a function that does not exist. When the compiler can show that nothing ever panics, it
 //! drops the handler and the program links; one index that it cannot bound, anywhere in what is called here, and the
-//! linker misses the function. What is called: every runnable with everything behind it, the bus with its taps, and the
-//! choice between all estimators and controllers, with data the compiler knows nothing about.
+//! linker misses the function. What is called, with data the compiler knows nothing about: every runnable with everything
+//! behind it, whichever estimator and controller the parameters choose; the bus with its taps; the black box; the self
+//! test; the radio's packets and session; the decoders of every chip and the motors.
+//!
+//! Not here: the drivers' waiting. An `async` function may be polled once too often only by an executor that is broken.
 //!
 //! The program is never run. With the feature `control` it has one unchecked index and must not link.
 #![no_std]
@@ -11,9 +14,13 @@
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
+use stampfly_board::black_box::BlackBox;
 use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, wiring};
+use stampfly_board::{FlightLoop, VehicleConfig, golden, wiring};
 use stampfly_bus::Band;
+use stampfly_drivers::Decimator;
+use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
+use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
 use stampfly_types::Micros;
 
 unsafe extern "C" {
@@ -29,11 +36,22 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 /// The entry point.
 #[unsafe(no_mangle)]
 extern "C" fn flight() {
+    vehicle();
+    radio();
+    chips();
+    let _ = black_box(golden::play(black_box(golden::FLIGHT), &mut ()));
+    #[cfg(feature = "control")]
+    black_box(black_box([1u32, 2, 3])[black_box(1usize)]);
+}
+
+/// Everything between the sensors' topics and the motors'.
+fn vehicle() {
     let config: VehicleConfig = black_box(VehicleConfig::default());
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
     let (vehicle, mut outside) = assemble(ports, &config);
     let mut flight_loop = FlightLoop::new(vehicle, heads, black_box(Micros::ZERO));
+    let mut memory = BlackBox::<1024>::new(Micros::from_millis(40));
     while black_box(true) {
         let at: Micros = black_box(Micros::ZERO);
         outside.imu.publish(at, &black_box(Default::default()));
@@ -49,10 +67,41 @@ extern "C" fn flight() {
         flight_loop.run_band(Band::Flight, black_box(at), &mut ());
         flight_loop.run_band(Band::Background, black_box(at), &mut ());
         black_box((outside.motors.latest(), outside.indicator.latest(), outside.telemetry.latest()));
-        taps.drain(&mut |id, at, generation, words| {
-            black_box((id, at, generation, words));
-        });
+        taps.drain(&mut |id, at, generation, words| memory.note(id, at, generation, words));
+        black_box(memory.records().count());
     }
-    #[cfg(feature = "control")]
-    black_box(black_box([1u32, 2, 3])[black_box(1usize)]);
+}
+
+/// Every byte that strangers can send.
+fn radio() {
+    let mut session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
+    while black_box(true) {
+        let (at, bytes) = (black_box(Micros::ZERO), black_box(&[0u8; 32][..]));
+        let _ = black_box(session.start_pairing(at, black_box(false)));
+        black_box((session.beacon(at), session.age(at)));
+        let _ = black_box(session.receive(at, black_box(Address([0; 6])), bytes));
+        let _ = black_box((PairingPacket::decode(bytes), TelemetryPacket::decode(bytes)));
+    }
+}
+
+/// Every byte that chips can send.
+fn chips() {
+    if let Some(group) = bmi270::codec::decode_frames(&black_box([0; 52])) {
+        black_box(black_box(Decimator::default()).push(&group));
+    }
+    black_box(bmi270::codec::Status::decode(&black_box([0; 14])).celsius());
+    if let Some(trim) = bmm150::codec::Trim::decode(&black_box([0; 21])) {
+        let reading = bmm150::codec::Reading::decode(&black_box([0; 11]));
+        black_box((trim.compensate(&reading), trim.compensate_integer(&reading)));
+    }
+    if let Some(calibration) = bmp280::codec::Calibration::decode(&black_box([0; 24])) {
+        black_box((
+            calibration.compensate(black_box(0), black_box(0)),
+            bmp280::codec::pressure_altitude(black_box(0.0)),
+        ));
+    }
+    black_box(bmp280::codec::Reading::decode(&black_box([0; 10])));
+    black_box((ina3221::codec::shunt_volts(black_box(0)), ina3221::codec::bus_volts(black_box(0))));
+    black_box(pmw3901::codec::Motion::decode(&black_box([0; 12])).map(|motion| motion.is_valid()));
+    black_box(vl53l3cx::codec::Reading::decode(&black_box([0; 17])).map(|reading| reading.status()));
 }

@@ -191,8 +191,7 @@ fn hold(budget: &Budget, machine: &Machine, counts: &[Count]) -> Result<(), Fail
     for chain in counts.iter().filter(|count| count.name == CHAIN) {
         for (what, measured) in [("mean", chain.mean), ("most", chain.most)] {
             let name = format!("{} {what}", machine.name);
-            print!("{name}: ");
-            budget.hold(&name, measured, "instructions")?;
+            budget.hold(&name, measured, "instructions from sample to motors")?;
             match budget.number(&format!("{name} bar")) {
                 Ok(bar) if measured > bar => {
                     return Err(format!("{name}: {measured} instructions; {bar} is the most there may ever be"));
