@@ -5,6 +5,7 @@ use crate::flight::PROFILE;
 use crate::memory::Memory;
 use crate::motors;
 use crate::radio;
+use crate::self_test::Outcome;
 use crate::sensors::HEALTH;
 use crate::storage::Storage;
 use core::cell::RefCell;
@@ -19,9 +20,8 @@ use heapless::{String, Vec};
 use stampfly_board::console::{Context, LineEditor, MotorTest, Request, SensorLine, answer};
 use stampfly_board::{VehicleConfig, black_box};
 use stampfly_drivers::Timebase;
-use stampfly_log::ulog::{Full, Sample, Sink};
+use stampfly_log::ulog::{Full, Level, Sample, Sink};
 
-const VERSION: &str = concat!("stampfly-esp32s3 ", env!("CARGO_PKG_VERSION"));
 const PROMPT: &str = "> ";
 /// The longest reply is the list of parameters.
 const REPLY: usize = 4 * 1024;
@@ -40,14 +40,19 @@ pub struct Parts {
     pub storage: Storage,
     /// The configuration the vehicle flies with.
     pub config: VehicleConfig,
+    /// How the self test went.
+    pub tested: Outcome,
 }
 
 /// Answers for ever.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { usb, memory, storage, config } = parts;
+    let Parts { usb, memory, storage, config, tested } = parts;
     let (mut keys, screen) = UsbSerialJtag::new(usb).into_async().split();
-    let mut console = Console { screen: Screen(screen), memory, storage, config };
+    let mut version = String::new();
+    // A version that is too long ends early.
+    let _ = write!(version, concat!("stampfly-esp32s3 ", env!("CARGO_PKG_VERSION"), ", {}"), tested);
+    let mut console = Console { screen: Screen(screen), memory, storage, config, version };
     let mut editor = LineEditor::<80>::new();
     let mut typed = [0; 64];
     loop {
@@ -89,6 +94,8 @@ struct Console {
     memory: &'static RefCell<Memory>,
     storage: Storage,
     config: VehicleConfig,
+    /// Which firmware this is, and how its self test went.
+    version: String<128>,
 }
 
 impl Console {
@@ -99,7 +106,7 @@ impl Console {
             memory.catch_up();
             let mut context = Context {
                 now: Clock.now(),
-                version: VERSION,
+                version: &self.version,
                 newest: &memory.newest,
                 sensors: &[
                     SensorLine { name: "imu", health: &HEALTH.imu },
@@ -162,6 +169,7 @@ impl Console {
         let begun = self.memory.borrow().black_box.records().next().map(|record| record.at);
         let Some(begun) = begun else { return self.screen.show("no flight yet\r\n").await };
         let Ok(mut log) = black_box::open(Bytes(&bytes), begun, &self.config) else { return };
+        let _ = log.text(Level::Info, begun, &self.version);
         self.screen.send_all(&bytes).await;
         // Looked up one by one, so that nothing is borrowed while the terminal takes its time.
         let mut index = 0;

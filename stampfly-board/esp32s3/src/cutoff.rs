@@ -4,11 +4,13 @@
 //! flight task waits for a bus that has died, when its executor is stuck, and when its core has stopped with interrupts
 //! off. Once it has acted, motors stay off until the flight task says that it is disarmed.
 //!
-//! Should this core stop, too, the chip's watchdog restarts it all; a chip that starts has its motors off.
+//! Should this core stop, too, and with it the clock the flight task waits by, the chip's watchdog restarts it all: after a
+//! tenth of a second in flight. A chip that starts has its motors off.
 
 use crate::motors;
 use core::ptr::null_mut;
 use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering};
+use embassy_sync::blocking_mutex::raw::{CriticalSectionRawMutex, RawMutex};
 use esp_hal::Blocking;
 use esp_hal::handler;
 use esp_hal::interrupt::Priority;
@@ -23,8 +25,10 @@ const PATIENCE: Duration = Duration::from_millis(25);
 /// How often the timer looks. Motors turn for at most `PATIENCE` and this after the last confirmation.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// Longer than any write to flash, which stops both cores.
-const WATCHDOG: Duration = Duration::from_secs(4);
+/// The watchdog's patience while motors may turn.
+const IN_FLIGHT: Duration = Duration::from_millis(100);
+/// And while they may not: longer than any write to flash, which stops both cores.
+const ON_THE_GROUND: Duration = Duration::from_secs(4);
 
 /// When the flight task last confirmed that it controls the motors: the low bits of the time in microseconds, which is
 /// plenty for differences of milliseconds.
@@ -40,6 +44,8 @@ static WATCH: AtomicPtr<Watch> = AtomicPtr::new(null_mut());
 struct Watch {
     timer: PeriodicTimer<'static, Blocking>,
     watchdog: Wdt<TIMG1<'static>>,
+    /// Which patience the watchdog has.
+    in_flight: bool,
 }
 
 fn now() -> u32 {
@@ -50,14 +56,17 @@ fn now() -> u32 {
 pub fn start(group: TIMG1<'static>) {
     static CELL: StaticCell<Watch> = StaticCell::new();
     let group = TimerGroup::new(group);
-    let watch = CELL.init(Watch { timer: PeriodicTimer::new(group.timer0), watchdog: group.wdt });
+    let watch = CELL.init(Watch { timer: PeriodicTimer::new(group.timer0), watchdog: group.wdt, in_flight: false });
     watch.timer.set_interrupt_handler(look);
     watch.timer.start(PERIOD).expect("a millisecond is within the timer's range");
-    watch.watchdog.set_timeout(MwdtStage::Stage0, WATCHDOG);
+    watch.watchdog.set_timeout(MwdtStage::Stage0, ON_THE_GROUND);
     watch.watchdog.set_stage_action(MwdtStage::Stage0, MwdtStageAction::ResetSystem);
     watch.watchdog.enable();
-    watch.timer.listen();
-    WATCH.store(watch, Ordering::Release);
+    // An interrupt in between would find nothing to clear, and come again for ever.
+    CriticalSectionRawMutex::new().lock(|| {
+        watch.timer.listen();
+        WATCH.store(watch, Ordering::Release);
+    });
 }
 
 /// The flight task controls the motors: to be said with every output. `armed` says whether they may turn.
@@ -98,6 +107,11 @@ fn look() {
     if let Some(watch) = unsafe { WATCH.load(Ordering::Acquire).as_mut() } {
         watch.timer.clear_interrupt();
         watch.watchdog.feed();
+        let armed = ARMED.load(Ordering::Acquire);
+        if watch.in_flight != armed {
+            watch.in_flight = armed;
+            watch.watchdog.set_timeout(MwdtStage::Stage0, if armed { IN_FLIGHT } else { ON_THE_GROUND });
+        }
     }
     let age = now().wrapping_sub(CONFIRMED.load(Ordering::Relaxed));
     if ARMED.load(Ordering::Acquire) && age > PATIENCE.as_micros() as u32 {

@@ -24,6 +24,7 @@ mod panic;
 mod people;
 mod pins;
 mod radio;
+mod self_test;
 mod sensors;
 mod spi;
 mod storage;
@@ -33,10 +34,12 @@ use core::cell::RefCell;
 use embassy_executor::Spawner;
 use embassy_futures::block_on;
 use esp_hal::clock::CpuClock;
+use esp_hal::peripherals::Peripherals;
 use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
 use memory::Memory;
 use pins::*;
+use self_test::Outcome;
 use stampfly_board::{FlightLoop, VehicleConfig, vehicle, wiring};
 use stampfly_drivers::Timebase;
 use static_cell::StaticCell;
@@ -44,13 +47,30 @@ use storage::Storage;
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
+const SECOND_HEAP: usize = 32 * 1024;
+
 #[esp_hal::main]
 fn main() -> ! {
     motors::cut();
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
-    // The first part is memory the boot loader has done with; the radio wants both.
+    // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
     esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
-    esp_alloc::heap_allocator!(size: 36 * 1024);
+    #[cfg(feature = "esp32s3")]
+    esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: SECOND_HEAP);
+    #[cfg(feature = "esp32c6")]
+    esp_alloc::heap_allocator!(size: SECOND_HEAP);
+    let tested = self_test::run();
+    esp_println::println!("{tested}");
+    if !tested.may_fly() {
+        cutoff::trip_for_good();
+    }
+    start(chip, tested)
+}
+
+/// Assembles the vehicle and runs it. Apart from [`main`], so that the self test and this have the stack one after the
+/// other.
+#[inline(never)]
+fn start(chip: Peripherals, tested: Outcome) -> ! {
     motors::start_unit(chip.LEDC);
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
     cutoff::start(chip.TIMG1);
@@ -90,7 +110,7 @@ fn main() -> ! {
     let people =
         people::Parts { pulses: chip.RMT, pins: pins.people, signal: outside.indicator, button: outside.button };
     let radio = radio::Parts { unit: chip.WIFI, peer, pilot: outside.pilot, telemetry: outside.telemetry };
-    let console = console::Parts { usb: chip.USB_DEVICE, memory, storage, config };
+    let console = console::Parts { usb: chip.USB_DEVICE, memory, storage, config, tested };
     let ground = move |spawner: Spawner| {
         spawner.spawn(sensors::run(sensors).expect("spawned once"));
         spawner.spawn(people::run(people).expect("spawned once"));

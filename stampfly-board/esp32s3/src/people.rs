@@ -36,16 +36,21 @@ pub async fn run(parts: Parts) {
     let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
     let status: Chain<{ buffer_size::<RGB8>(1) }> =
         Chain::new(WS2812B_TIMING, pulses.channel0, pins.status_light, PULSE_CLOCK).expect("possible pulses");
+    // Two of the unit's memories, so that the pulses of both lights fit at once and nobody has to refill them in time.
     let body: Chain<{ buffer_size::<RGB8>(2) }> =
-        Chain::new(WS2812B_TIMING, pulses.channel1, pins.body_lights, PULSE_CLOCK).expect("possible pulses");
+        Chain::new_with_memsize(WS2812B_TIMING, pulses.channel1, pins.body_lights, 2, PULSE_CLOCK)
+            .expect("possible pulses");
     let (mut status, mut body) = (Lights::<_, 1>::status(status), Lights::<_, 2>::body(body));
     let mut buzzer = Buzzer::new(Channel::new(pins.buzzer.into()));
     let mut contact = PinButton(Input::new(pins.button, InputConfig::default().with_pull(Pull::Up)));
+    // The buzzer wants to be asked twice as often as the button.
     let mut ticker = Ticker::every(Duration::from_millis(10));
-    loop {
+    for look in [true, false].into_iter().cycle() {
         ticker.next().await;
         let now = Clock.now();
-        button.publish(now, &ButtonContact { pressed: contact.is_pressed() });
+        if look {
+            button.publish(now, &ButtonContact { pressed: contact.is_pressed() });
+        }
         if let Some(sample) = signal.latest() {
             status.show(&sample.data);
             body.show(&sample.data);

@@ -12,7 +12,7 @@ use embassy_time::{Duration, Ticker};
 use esp_hal::efuse::{InterfaceMacAddress, interface_mac_address};
 use esp_hal::peripherals::WIFI;
 use esp_radio::esp_now::{EspNowManager, EspNowReceiver, EspNowSender, EspNowWifiInterface, PeerInfo};
-use esp_radio::wifi::WifiController;
+use esp_radio::wifi::{ControllerConfig, WifiController};
 use stampfly_board::messages::TelemetryFrame;
 use stampfly_board::wiring;
 use stampfly_drivers::Timebase;
@@ -40,7 +40,9 @@ pub struct Parts {
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
     let Parts { unit, peer, pilot, telemetry } = parts;
-    let controller = WifiController::new(unit, Default::default()).expect("the radio starts");
+    // A station without an access point would sleep between packets and miss the pilot's.
+    let config = ControllerConfig::default().with_sta_disconnected_pm(false);
+    let controller = WifiController::new(unit, config).expect("the radio starts");
     let (manager, sender, receiver) = controller.esp_now().split();
     manager.set_channel(CHANNEL).expect("a channel there is");
     let mut vehicle = Address::default();

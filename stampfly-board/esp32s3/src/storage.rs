@@ -5,6 +5,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_embedded_hal::adapter::BlockingAsync;
+use embassy_time::{Duration, Timer};
 use esp_bootloader_esp_idf::partitions::{
     DataPartitionSubType, PARTITION_TABLE_MAX_LEN, PartitionType, read_partition_table,
 };
@@ -20,6 +21,9 @@ use stampfly_types::messages::SystemMode;
 const PEER: [&str; 2] = ["link.peer.first", "link.peer.last"];
 const HALVES: core::ops::RangeInclusive<f32> = 0.0..=16_777_215.0;
 
+/// Several periods of the motors' duties and of the cut-off.
+const NOTICE: Duration = Duration::from_millis(20);
+
 static WRITING: AtomicBool = AtomicBool::new(false);
 
 /// Is flash being written? Then no motor turns.
@@ -31,9 +35,12 @@ pub fn is_writing() -> bool {
 struct Writing;
 
 impl Writing {
-    fn begin() -> Self {
+    /// Returns when the motors and the cut-off have taken notice.
+    async fn begin() -> Self {
         WRITING.store(true, Ordering::Release);
-        Self
+        let writing = Self;
+        Timer::after(NOTICE).await;
+        writing
     }
 }
 
@@ -113,7 +120,7 @@ impl Storage {
         config: &VehicleConfig,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
-        let _still = Writing::begin();
+        let _still = Writing::begin().await;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         for parameter in PARAMETERS {
             let disarmed = proven(&mut mode)?;
@@ -129,7 +136,7 @@ impl Storage {
         peer: Address,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
-        let _still = Writing::begin();
+        let _still = Writing::begin().await;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         let [a, b, c, d, e, f] = peer.0;
         let halves = [[0, a, b, c], [0, d, e, f]].map(u32::from_be_bytes);
@@ -141,7 +148,7 @@ impl Storage {
 
     /// Forgets everything that was kept, the transmitter included.
     pub async fn reset(&mut self, mut mode: impl FnMut() -> Option<SystemMode>) -> Result<(), StorageError> {
-        let _still = Writing::begin();
+        let _still = Writing::begin().await;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         store.erase(proven(&mut mode)?).await.map_err(StorageError::Erase)
     }

@@ -14,6 +14,7 @@
 use super::no_std::debian_cargo;
 use crate::Failure;
 use crate::repository::{Repository, capture, exists, install, python_tool, run as run_program};
+use object::{Object, ObjectSection};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -35,11 +36,8 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         install(repository, &DEBIAN)?;
     }
     let target = stand_in(repository)?;
-    // What `cargo clippy` is; spelled so, rustup's would be taken.
-    let mut clippy = s3(repository, "check", &target);
-    clippy.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
-    run_program(&mut clippy)?;
-    refuses_a_wrong_pin(s3(repository, "rustc", &target))?;
+    run_program(&mut s3(repository, &target, "-Dwarnings"))?;
+    refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let program = c6(repository)?;
     memory(&program)?;
     image(repository, &program)
@@ -68,16 +66,20 @@ fn firmware(repository: &Repository, subcommand: &str) -> Command {
     cargo
 }
 
-fn s3(repository: &Repository, subcommand: &str, target: &Path) -> Command {
-    let mut cargo = firmware(repository, subcommand);
+/// Clippy for the S3, with these arguments for the firmware alone.
+fn s3(repository: &Repository, target: &Path, arguments: &str) -> Command {
+    let mut cargo = firmware(repository, "check");
     cargo.env("RUSTFLAGS", "-A explicit_builtin_cfgs_in_flags --cfg target_arch=\"xtensa\"");
-    cargo.args(["-Zjson-target-spec", "--target"]).arg(target);
+    // What `cargo clippy` is; spelled so, rustup's would be taken. Its arguments are separated by this word.
+    cargo.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver");
+    cargo.env("CLIPPY_ARGS", format!("{arguments}__CLIPPY_HACKERY__"));
+    // Macros and build scripts are then the same as for the C6.
+    cargo.args(["--release", "-Zjson-target-spec", "--target"]).arg(target);
     cargo
 }
 
 /// A check that accepts everything would look just like one that found nothing.
 fn refuses_a_wrong_pin(mut cargo: Command) -> Result<(), Failure> {
-    cargo.args(["--profile", "check", "--", "--cfg", "wrong_pin"]);
     match capture(&mut cargo) {
         Ok(_) => Err(format!("the check of the S3 firmware accepts {WRONG_PIN}, which the chip does not have")),
         Err(said) => is_about_the_pin(&said),
@@ -107,54 +109,31 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
 }
 
 /// The S3's data memory, which code in RAM shares (esp-hal's `ld/esp32s3/memory.x`: from 0x3FC88000 to 0x3FCDB700).
-const S3_MEMORY: u32 = 0x3FCD_B700 - 0x3FC8_8000;
+const S3_MEMORY: u64 = 0x3FCD_B700 - 0x3FC8_8000;
 /// The second core's stack, which only the S3 has (`src/main.rs`).
-const S3_SECOND_STACK: u32 = 16 * 1024;
-/// What the first core needs at least: the vehicle is assembled on its stack, and a golden flight is flown there.
-const S3_FIRST_STACK: u32 = 64 * 1024;
+const S3_SECOND_STACK: u64 = 32 * 1024;
+/// The part of the heap that lies elsewhere on the S3, beside its data cache (`src/main.rs`).
+const S3_ELSEWHERE: u64 = 32 * 1024;
+/// What the first core needs at least: half as much again as the self test, which holds a whole vehicle (see `memory`).
+const S3_FIRST_STACK: u64 = 96 * 1024;
 /// The C6's memory, as its program's sections see it.
-const C6_MEMORY: std::ops::Range<u32> = 0x4080_0000..0x4088_0000;
+const C6_MEMORY: std::ops::Range<u64> = 0x4080_0000..0x4088_0000;
 
 /// Would what the C6 keeps in memory fit into the S3?
 fn memory(program: &Path) -> Result<(), Failure> {
-    let bytes = fs::read(program).map_err(|e| format!("{}: {e}", program.display()))?;
-    let sections = sections(&bytes).ok_or("the program is no 32-bit ELF")?;
+    let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", program.display());
+    let bytes = fs::read(program).map_err(|e| fail(&e))?;
+    let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
     // What is left over is the stack's, and the boot loader's memory is another region on the S3, too.
-    let kept = sections.iter().filter(|section| !matches!(section.name, ".stack" | ".dram2_uninit"));
-    let kept: u32 = kept.filter(|section| C6_MEMORY.contains(&section.address)).map(|section| section.size).sum();
-    let left = S3_MEMORY.saturating_sub(kept + S3_SECOND_STACK);
+    let kept = file.sections().filter(|section| !matches!(section.name(), Ok(".stack" | ".dram2_uninit")));
+    let kept: u64 = kept.filter(|section| C6_MEMORY.contains(&section.address())).map(|section| section.size()).sum();
+    let left = (S3_MEMORY + S3_ELSEWHERE).saturating_sub(kept + S3_SECOND_STACK);
     println!("esp32c6: {kept} bytes of memory in use; on the S3 that would leave {left} bytes of stack");
     if left < S3_FIRST_STACK {
         Err(format!("the S3 would have less than {S3_FIRST_STACK} bytes of stack"))
     } else {
         Ok(())
     }
-}
-
-#[derive(Debug, PartialEq)]
-struct Section<'e> {
-    name: &'e str,
-    address: u32,
-    size: u32,
-}
-
-/// The sections of a 32-bit little-endian ELF file.
-fn sections(elf: &[u8]) -> Option<Vec<Section<'_>>> {
-    let half = |at: usize| Some(usize::from(u16::from_le_bytes(elf.get(at..at + 2)?.try_into().ok()?)));
-    let word = |at: usize| Some(u32::from_le_bytes(elf.get(at..at + 4)?.try_into().ok()?));
-    if !elf.starts_with(b"\x7fELF\x01\x01") {
-        return None;
-    }
-    let (table, entry, count, names) = (word(0x20)? as usize, half(0x2E)?, half(0x30)?, half(0x32)?);
-    let names = word(table + names * entry + 0x10)? as usize;
-    (0..count)
-        .map(|index| {
-            let header = table + index * entry;
-            let name = elf.get(names + word(header)? as usize..)?.split(|byte| *byte == 0).next()?;
-            let name = std::str::from_utf8(name).ok()?;
-            Some(Section { name, address: word(header + 0x0C)?, size: word(header + 0x14)? })
-        })
-        .collect()
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.
@@ -176,27 +155,7 @@ fn image(repository: &Repository, program: &Path) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Section, is_about_the_pin, sections};
-
-    #[test]
-    fn reads_the_sections_of_an_elf() {
-        // A header of 52 bytes, two section headers of 40, and the names.
-        let mut elf = vec![0u8; 52 + 80];
-        elf[..6].copy_from_slice(b"\x7fELF\x01\x01");
-        let mut put = |at: usize, value: u32| elf[at..at + 4].copy_from_slice(&value.to_le_bytes());
-        put(0x20, 52);
-        put(0x2E, 40 | 2 << 16);
-        put(0x32, 1);
-        put(52, 1);
-        put(52 + 0x0C, 0x4080_0000);
-        put(52 + 0x14, 1234);
-        put(92 + 0x10, 132);
-        elf.extend(b"\0.bss\0");
-        let [bss, _] = &sections(&elf).expect("an ELF")[..] else { panic!("two sections") };
-        assert_eq!(bss, &Section { name: ".bss", address: 0x4080_0000, size: 1234 });
-        assert!(sections(b"#!/bin/sh").is_none());
-        assert!(sections(&elf[..60]).is_none(), "cut off");
-    }
+    use super::is_about_the_pin;
 
     #[test]
     fn only_the_right_refusal_counts() {

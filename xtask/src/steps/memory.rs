@@ -98,9 +98,14 @@ fn stacks(program: &Program, budget: &Budget) -> Result<(), Failure> {
 /// A task: its name, parts of the name of the function that polls it, whose stack it runs on.
 type Task = (&'static str, &'static [&'static str], &'static str);
 
-const TASKS: [Task; 4] = [
+const TASKS: [Task; 8] = [
     ("flight", &["TaskStorage<stampfly_esp32s3::flight", ">::poll"], "flight"),
     ("sensors", &["TaskStorage<stampfly_esp32s3::sensors", ">::poll"], "ground"),
     ("people", &["TaskStorage<stampfly_esp32s3::people", ">::poll"], "ground"),
     ("radio", &["TaskStorage<stampfly_esp32s3::radio", ">::poll"], "ground"),
+    ("console", &["TaskStorage<stampfly_esp32s3::console", ">::poll"], "ground"),
+    ("memory", &["TaskStorage<stampfly_esp32s3::memory", ">::poll"], "ground"),
+    // Before any task runs, one after the other. Each holds a whole vehicle.
+    ("self_test", &["stampfly_esp32s3::self_test::run"], "ground"),
+    ("assembly", &["stampfly_esp32s3::start"], "ground"),
 ];
