@@ -66,6 +66,11 @@ impl Attached {
         self.chip.borrow_mut().reset(self.clock.now());
     }
 
+    /// Breaks or mends the sensing element: see [`Chip::set_broken`].
+    pub fn set_broken(&self, broken: bool) {
+        self.chip.borrow_mut().set_broken(broken);
+    }
+
     /// Another part has been soldered: this is what its identity register says from now on.
     pub fn set_id(&self, id: u16) {
         self.chip.borrow_mut().set_id(id);

@@ -3,20 +3,20 @@
 use crate::{standing, wait};
 use embedded_hal::i2c::I2c;
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{Bmm150, I2cBus};
+use stampfly_sim::chips::{Attached, Bmm150, I2cBus};
 
 const ADDRESS: u8 = 0x10;
 
 /// A chip that has been powered but not woken.
-fn chip() -> (Simulation, I2cBus) {
+fn chip() -> (Simulation, I2cBus, Attached) {
     let simulation = standing();
     let bus = I2cBus::new(&simulation.clock, 1);
-    bus.attach(ADDRESS, Bmm150::new(&simulation.world, &simulation.clock, 1));
-    (simulation, bus)
+    let attached = bus.attach(ADDRESS, Bmm150::new(&simulation.world, &simulation.clock, 1));
+    (simulation, bus, attached)
 }
 
 fn awake() -> (Simulation, I2cBus) {
-    let (simulation, mut bus) = chip();
+    let (simulation, mut bus, _) = chip();
     write(&mut bus, 0x4B, 1);
     wait(&simulation, 3_000);
     (simulation, bus)
@@ -55,7 +55,7 @@ fn compensate(trim: &[u8; 21], data: &[u8; 8]) -> [f64; 3] {
 
 #[test]
 fn in_suspend_only_the_power_register_answers() {
-    let (simulation, mut bus) = chip();
+    let (simulation, mut bus, _) = chip();
     wait(&simulation, 10_000);
     assert_eq!((read(&mut bus, 0x40), read(&mut bus, 0x4B)), ([0], [0]));
     write(&mut bus, 0x4B, 1);
@@ -133,4 +133,48 @@ fn a_soft_reset_wants_both_bits_and_ends_in_sleep() {
     write(&mut bus, 0x4B, 0x83);
     wait(&simulation, 3_000);
     assert_eq!((read(&mut bus, 0x51), read(&mut bus, 0x4B), read(&mut bus, 0x40)), ([0], [1], [0x32]));
+}
+
+#[test]
+fn the_self_test_marks_the_axes_and_clears_its_bit() {
+    for broken in [false, true] {
+        let (simulation, mut bus, attached) = chip();
+        attached.set_broken(broken);
+        write(&mut bus, 0x4B, 1);
+        wait(&simulation, 3_000);
+        write(&mut bus, 0x4C, 0x07);
+        assert_eq!(read(&mut bus, 0x4C), [0x07], "running");
+        wait(&simulation, 2_000);
+        assert_eq!(read(&mut bus, 0x4C), [0x06]);
+        let data: [u8; 5] = read(&mut bus, 0x42);
+        assert_eq!([0, 2, 4].map(|place| data[place] & 1), [u8::from(!broken); 3]);
+    }
+    // Only asleep.
+    let (simulation, mut bus) = awake();
+    write(&mut bus, 0x4C, 0x01);
+    wait(&simulation, 2_000);
+    assert_eq!(read::<5>(&mut bus, 0x42)[0] & 1, 0);
+}
+
+#[test]
+fn the_advanced_self_test_turns_its_field_round() {
+    for broken in [false, true] {
+        let (simulation, mut bus, attached) = chip();
+        attached.set_broken(broken);
+        write(&mut bus, 0x4B, 1);
+        wait(&simulation, 3_000);
+        let trim = read(&mut bus, 0x5D);
+        // Only z, five repetitions: within the four milliseconds that the maker's code waits.
+        write(&mut bus, 0x4E, 0x1F);
+        write(&mut bus, 0x52, 4);
+        let [positive, negative] = [0xC2, 0x82].map(|mode| {
+            write(&mut bus, 0x4C, mode);
+            wait(&simulation, 4_000);
+            let data: [u8; 8] = read(&mut bus, 0x42);
+            assert_eq!((data[6] & 1, &data[..4]), (1, &[0; 4][..]), "x and y are not measured");
+            compensate(&trim, &data)[2]
+        });
+        let difference = positive - negative;
+        assert_eq!((180.0..240.0).contains(&difference), !broken, "{difference} µT");
+    }
 }
