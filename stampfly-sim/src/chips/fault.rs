@@ -61,6 +61,12 @@ impl Attached {
         self.faults.set(faults);
     }
 
+    /// What a register holds now, without the bus but with whatever reading does to the chip.
+    #[must_use]
+    pub fn peek(&self, register: u16) -> u16 {
+        self.chip.borrow_mut().read(register, self.clock.now())
+    }
+
     /// The supply dips: the chip loses its settings and starts again.
     pub fn reset(&self) {
         self.chip.borrow_mut().reset(self.clock.now());

@@ -374,7 +374,7 @@ fn over_i2c_it_answers_without_a_byte_of_no_meaning() {
     write(&[0x7C, 0]);
     write(&[0x59, 0]);
     for (burst, bytes) in image().chunks(256).enumerate() {
-        write(&[0x5B, (burst * 128 & 0x0F) as u8, (burst * 8) as u8]);
+        write(&[0x5B, ((burst * 128) & 0x0F) as u8, (burst * 8) as u8]);
         write(&[&[0x5E], bytes].concat());
     }
     write(&[0x59, 1]);

@@ -1,5 +1,6 @@
 //! BMM150 after Bosch BST-BMM150-DS001, with the compensation of Bosch's Sensor API.
 
+use crate::compensation::bmm150 as compensate;
 use crate::{standing, wait};
 use embedded_hal::i2c::I2c;
 use stampfly_sim::Simulation;
@@ -30,27 +31,6 @@ fn read<const N: usize>(bus: &mut I2cBus, register: u8) -> [u8; N] {
 
 fn write(bus: &mut I2cBus, register: u8, value: u8) {
     bus.write(ADDRESS, &[register, value]).unwrap();
-}
-
-/// Field in µT, chip axes.
-fn compensate(trim: &[u8; 21], data: &[u8; 8]) -> [f64; 3] {
-    let short = |register: usize| f64::from(trim[register - 0x5D] as i8);
-    let signed = |register: usize| f64::from(i16::from_le_bytes([trim[register - 0x5D], trim[register - 0x5C]]));
-    let unsigned = |register: usize| f64::from(u16::from_le_bytes([trim[register - 0x5D], trim[register - 0x5C]]));
-    let word = |place: usize| i16::from_le_bytes([data[place], data[place + 1]]);
-    let hall = f64::from(word(6) as u16 >> 2);
-    let xyz1 = unsigned(0x6C);
-    let turn = xyz1 * 16_384.0 / hall - 16_384.0;
-    let gain = short(0x70) * turn * turn / 268_435_456.0 + turn * f64::from(trim[0x71 - 0x5D]) / 16_384.0;
-    let flat = |raw: i16, one: f64, two: f64| {
-        (f64::from(raw >> 3) * ((gain + 256.0) * (two + 160.0)) / 8_192.0 + one * 8.0) / 16.0
-    };
-    let upright = (f64::from(word(4) >> 1) - signed(0x62)) * 131_072.0 - signed(0x6E) * (hall - xyz1);
-    [
-        flat(word(0), short(0x5D), short(0x64)),
-        flat(word(2), short(0x5E), short(0x65)),
-        upright / ((signed(0x68) + unsigned(0x6A) * hall / 32_768.0) * 4.0) / 16.0,
-    ]
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod bmi270;
 mod bmm150;
 mod bmp280;
 mod bus;
+mod compensation;
 mod floating_select;
 mod ina3221;
 mod interrupt_pin;
