@@ -197,3 +197,21 @@ fn over_i2c_it_measures_the_same() {
         }
     }
 }
+
+#[test]
+fn beside_a_floating_select_it_hardly_ever_starts_until_that_is_driven() {
+    let image = stand_in_image();
+    let simulation = standing();
+    let (world, clock) = (&simulation.world, &simulation.clock);
+    let bus = SpiBus::new(clock, 1);
+    let (port, _) = bus.attach(10_000_000, chips::Bmi270::new(world, clock, 1, 1.0, &image));
+    let (flow, _) = bus.attach_floating(2_000_000, chips::Pmw3901::new(world, clock, 1));
+    let mut imu = driver(port, clock, &image, Config::default());
+    let starts: Vec<_> = (0..20).map(|_| timed(clock, imu.start())).collect();
+    let failed = starts.iter().filter(|(_, outcome)| outcome.is_err()).count();
+    assert!(failed >= 12, "{failed} of 20: {starts:?}");
+    assert!(starts.iter().all(|(took, _)| *took < Micros::from_millis(220)), "none hangs: {starts:?}");
+    flow.park();
+    assert_eq!(block_on(clock, imu.start()), Ok(()));
+    assert!((0..100).all(|_| block_on(clock, imu.next()).is_ok()));
+}

@@ -122,3 +122,13 @@ fn the_first_sample_and_the_rhythm_are_in_time() {
     // A measurement begins when the one before has been read, which is up to 2 ms and a read after its end.
     assert!((0.0327..0.0360).contains(&mean), "{mean} s between samples");
 }
+
+#[test]
+fn without_a_target_no_distance_is_vouched_for() {
+    let (simulation, boot) = (standing(), BootAddress::new());
+    let (_below, mut ahead, _) = drivers(&simulation, &boot, Config::default());
+    for _ in 0..60 {
+        let sample = block_on(&simulation.clock, ahead.next()).expect("a measurement");
+        assert!(!sample.data.valid && sample.data.status != 9, "{sample:?}");
+    }
+}

@@ -55,10 +55,12 @@
 mod bus;
 mod fifo;
 mod interrupt;
+mod registers;
+mod sampling;
 mod self_test;
 
 use super::Chip;
-use crate::sensors::imu::{ImuPhysics, to_counts};
+use crate::sensors::imu::ImuPhysics;
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
 use crate::world::World;
@@ -66,7 +68,7 @@ use fifo::Fifo;
 use interrupt::Interrupt;
 pub use interrupt::InterruptPin;
 use self_test::SelfTest;
-use stampfly_types::{GRAVITY, Micros};
+use stampfly_types::Micros;
 
 const ID: u16 = 0x00;
 const STATUS: u16 = 0x03;
@@ -240,23 +242,6 @@ impl Bmi270 {
         self.register(POWER_SAVE) & 1 != 0
     }
 
-    /// Samples at 1600 Hz per output of sensor 0 or 1; none where the rate is not allowed (DS 5.2.45, 5.2.47).
-    fn divider(&self, sensor: usize) -> Option<u64> {
-        let (register, slowest) = [(ACCEL_SETTINGS, 1), (GYRO_SETTINGS, 6)][sensor];
-        let code = self.register(register) & 0x0F;
-        (slowest..=FASTEST).contains(&code).then(|| 1 << (FASTEST - code))
-    }
-
-    /// Counts per m/s² or rad/s (DS 5.2.46, 5.2.48).
-    fn scale(&self, sensor: usize) -> f64 {
-        if sensor == 0 {
-            f64::from(16_384u32 >> (self.register(ACCEL_RANGE) & 3)) / f64::from(GRAVITY)
-        } else {
-            let doublings = (self.register(GYRO_RANGE) & 7).min(4);
-            16.4 * f64::from(1u8 << doublings) * 180.0 / core::f64::consts::PI
-        }
-    }
-
     /// The chip's 24-bit time at `at`.
     fn time(&self, at: Micros) -> [u8; 3] {
         let ticks = (16.0 * (self.schedule.phase(at) - self.schedule.phase(self.epoch).floor())) as u32;
@@ -311,203 +296,5 @@ impl Bmi270 {
         let request = map & AT_WATERMARK != 0 && self.at_watermark()
             || map & DATA_READY != 0 && self.interrupt.pulse_ends().is_some();
         self.interrupt.drive(request, self.register(LATCH) & 1 != 0, self.register(INTERRUPT_PIN));
-    }
-
-    /// One tick of the sensors.
-    fn sample(&mut self, at: Micros) {
-        let [ax, ay, az, gx, gy, gz] = self.physics.sample(at);
-        let force = self.self_test.deflect(self.register(ACCEL_SELF_TEST));
-        // Body is (y, x, −z) of the chip as it is soldered.
-        let axes = [[ay + force[0], ax + force[1], -az + force[2]], [gy, gx, -gz]];
-        let axes = if self.broken { [[0.0; 3]; 2] } else { axes };
-        let mut outputs = [None; 2];
-        for (sensor, values) in axes.into_iter().enumerate() {
-            let started = [ACCEL_START, GYRO_START][sensor];
-            let running = self.on[sensor].is_some_and(|since| at.since(since) >= started && at >= since);
-            let Some(divider) = self.divider(sensor).filter(|_| running) else { continue };
-            let (sum, count) = &mut self.sums[sensor];
-            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-            *count += 1;
-            if !self.tick.is_multiple_of(divider) {
-                continue;
-            }
-            let (sum, count) = core::mem::take(&mut self.sums[sensor]);
-            let scale = self.scale(sensor);
-            let mut bytes = [0; 6];
-            for (pair, sum) in bytes.chunks_exact_mut(2).zip(sum) {
-                pair.copy_from_slice(&to_counts(sum / count as f64, scale).to_le_bytes());
-            }
-            let place = usize::from([ACCEL, GYRO][sensor]);
-            self.registers[place..place + 6].copy_from_slice(&bytes);
-            let flag = [READY_ACCEL, READY_GYRO][sensor];
-            self.set(STATUS, self.register(STATUS) | flag);
-            self.set(INTERRUPTS, self.register(INTERRUPTS) | flag);
-            outputs[sensor] = Some(bytes);
-        }
-        if self.register(POWER) & 8 != 0 {
-            let counts = ((self.physics.temperature(at) - 23.0) * 512.0) as i16;
-            let [low, high] = counts.to_le_bytes();
-            self.set(TEMPERATURE, low);
-            self.set(TEMPERATURE + 1, high);
-        }
-        let content = self.register(FIFO_CONTENT);
-        let [accel, gyro] = [outputs[0].filter(|_| content & 0x40 != 0), outputs[1].filter(|_| content & 0x80 != 0)];
-        if accel.is_some() || gyro.is_some() {
-            self.fifo.push(gyro, accel, content & 0x10 != 0, self.register(FIFO_MODE) & 1 != 0);
-        }
-        if outputs != [None; 2] {
-            self.interrupt.begin_pulse(at);
-        }
-        if self.at_watermark() {
-            self.set(INTERRUPTS, self.register(INTERRUPTS) | AT_WATERMARK);
-        }
-    }
-
-    /// Switches the sensors as the power register says.
-    fn switch(&mut self, now: Micros) {
-        let power = self.register(POWER);
-        for (sensor, bit) in [(0, 4), (1, 2)] {
-            let on = power & bit != 0 && self.register(INTERNAL_STATUS) & 0x0F == 1;
-            self.on[sensor] = on.then(|| self.on[sensor].unwrap_or(now));
-            if !on {
-                self.sums[sensor] = Default::default();
-            }
-        }
-    }
-
-    /// Looks whether the rates are allowed and tells by the event register.
-    fn check_settings(&mut self) {
-        let refused = u8::from(self.divider(0).is_none()) | u8::from(self.divider(1).is_none()) << 1;
-        self.set(EVENT, self.register(EVENT) & !0x1C | refused << 2);
-    }
-}
-
-impl Chip for Bmi270 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
-        self.update(now);
-        if now < self.ready {
-            return 0;
-        }
-        let value = self.register(register);
-        u16::from(match register {
-            ID => self.id,
-            STATUS => value | COMMAND_READY,
-            ACCEL..TIME => {
-                let (first, flag) = if register < GYRO { (ACCEL, READY_ACCEL) } else { (GYRO, READY_GYRO) };
-                let place = usize::from(first - ACCEL);
-                // What arrived during this transfer has not been read.
-                if self.shadow[place..place + 6] == self.registers[usize::from(first)..usize::from(first) + 6] {
-                    self.set(STATUS, self.register(STATUS) & !flag);
-                }
-                self.shadow[usize::from(register - ACCEL)]
-            }
-            TIME..EVENT => self.time(now)[usize::from(register - TIME)],
-            EVENT => {
-                self.set(EVENT, value & !1);
-                value
-            }
-            INTERRUPTS => {
-                self.interrupt.unlatch();
-                core::mem::take(&mut self.registers[usize::from(INTERRUPTS)])
-            }
-            FIFO_LENGTH => self.fifo.len() as u8,
-            0x25 => (self.fifo.len() >> 8) as u8 & 0x3F,
-            FIFO_DATA if self.saves_power() => 0,
-            FIFO_DATA => {
-                let timed = self.register(FIFO_MODE) & 2 != 0 && self.register(FIFO_CONTENT) & 0x10 != 0;
-                self.fifo.pop(timed.then(|| self.time(now)))
-            }
-            UPLOAD_DATA | COMMAND => 0,
-            _ => value,
-        })
-    }
-
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
-        self.update(now);
-        let value = value as u8;
-        if now < self.ready || register >= 0x80 {
-            return;
-        }
-        match register {
-            // Read-only.
-            0x00..=0x2E => {}
-            UPLOAD_CONTROL if self.saves_power() => {}
-            UPLOAD_CONTROL => {
-                self.set(UPLOAD_CONTROL, value);
-                self.prepared = value & 1 == 0;
-                if self.prepared {
-                    self.memory.clear();
-                    self.set(INTERNAL_STATUS, 0);
-                    self.switch(now);
-                } else {
-                    self.check = Some(now + UPLOAD_CHECK);
-                }
-            }
-            UPLOAD_ADDRESS_LOW | UPLOAD_ADDRESS_HIGH => {
-                self.set(register, value);
-                let words = usize::from(self.register(UPLOAD_ADDRESS_HIGH)) << 4
-                    | usize::from(self.register(UPLOAD_ADDRESS_LOW) & 0x0F);
-                self.address = 2 * words;
-            }
-            UPLOAD_DATA if self.saves_power() || !self.prepared => {}
-            UPLOAD_DATA => {
-                if self.address < UPLOAD_SIZE {
-                    self.memory.resize(self.memory.len().max(self.address + 1), 0);
-                    self.memory[self.address] = value;
-                    self.address += 1;
-                }
-            }
-            COMMAND if value == 0xB6 => self.reset(now),
-            COMMAND if value == 0xB0 => self.fifo.clear(),
-            COMMAND if value == 0x02 && !self.saves_power() && self.register(INTERNAL_STATUS) & 0x0F == 1 => {
-                self.set(GYRO_SELF_TEST, 0);
-                self.self_test.begin_gyro(now);
-            }
-            COMMAND | GYRO_SELF_TEST => {}
-            POWER => {
-                self.set(POWER, value & 0x0F);
-                self.switch(now);
-            }
-            ACCEL_SETTINGS..=GYRO_RANGE => {
-                let sensor = usize::from(register >= GYRO_SETTINGS);
-                if self.register(register) != value && self.register(FIFO_CONTENT) & (0x40 << sensor) != 0 {
-                    self.fifo.push_configuration(1 << sensor);
-                }
-                self.set(register, value);
-                self.sums[sensor] = Default::default();
-                self.check_settings();
-            }
-            _ => self.set(register, value),
-        }
-    }
-
-    fn reset(&mut self, now: Micros) {
-        self.registers = [0; 128];
-        for (register, value) in AFTER_RESET {
-            self.set(register, value);
-        }
-        self.ready = now + START_UP;
-        self.epoch = now;
-        self.spi = false;
-        self.idle_until = now;
-        self.prepared = false;
-        self.check = None;
-        self.address = 0;
-        self.memory.clear();
-        self.on = [None; 2];
-        self.sums = Default::default();
-        self.fifo.clear();
-        self.shadow = [0; 12];
-        self.self_test = SelfTest::default();
-        self.interrupt.stop();
-        self.drive_pin();
-    }
-
-    fn set_broken(&mut self, broken: bool) {
-        self.broken = broken;
-    }
-
-    fn set_id(&mut self, id: u16) {
-        self.id = id as u8;
     }
 }
