@@ -37,6 +37,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     let target = stand_in(repository)?;
     // What `cargo clippy` is; spelled so, rustup's would be taken.
     let mut clippy = s3(repository, "check", &target);
+    clippy.args(["--bins", "--examples"]);
     clippy.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
     run_program(&mut clippy)?;
     refuses_a_wrong_pin(s3(repository, "rustc", &target))?;
@@ -101,6 +102,8 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
+    // One example is enough to see that they link.
+    cargo.args(["--bins", "--example", "bmi270"]);
     cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
     run_program(&mut cargo)?;
     Ok(repository.target("esp32").join(C6).join("release/stampfly-esp32s3"))
