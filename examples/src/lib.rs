@@ -1,10 +1,13 @@
-//! One small program per crate, each runs on a PC: `cargo run -p stampfly-examples --example NAME`.
+//! Small programs to copy from: `cargo run -p examples --example NAME`.
+//!
+//! One per crate, on a PC:
 //!
 //! | name | crate | shows |
 //! |---|---|---|
 //! | `types` | `stampfly-types` | declaring a message, its words and its schema |
 //! | `bus` | `stampfly-bus` | a vehicle of two topics and two runnables |
 //! | `eskf` | `stampfly-eskf` | height and climb rate from a noisy accelerometer and range finder |
+//! | `calibration` | `stampfly-eskf` | what a sensor does wrong, found before it is used |
 //! | `control` | `stampfly-control` | a rate loop that learns a disturbance, on a hexacopter's mixer |
 //! | `mode` | `stampfly-mode` | a flight through the state table, and what refuses to arm |
 //! | `log` | `stampfly-log` | writing a log and reading it back |
@@ -12,3 +15,9 @@
 //! | `param` | `stampfly-param` | a value that survives the power cut in the middle of its change |
 //! | `drivers` | `stampfly-drivers` | motors on any PWM channel |
 //! | `sim` | `stampfly-sim` | a hop on virtual time that nobody stabilises |
+//!
+//! One per driver, on a PC with emulated chips and on the StampFly: see [`drivers`], which is the part of them that is
+//! the same on both, and the only part that knows a driver.
+#![no_std]
+
+pub mod drivers;

@@ -36,7 +36,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         install(repository, &DEBIAN)?;
     }
     let target = stand_in(repository)?;
-    run_program(&mut s3(repository, &target, "-Dwarnings"))?;
+    run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let program = c6(repository)?;
     memory(&program)?;
@@ -103,6 +103,8 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
+    // One example is enough to see that they link.
+    cargo.args(["--bins", "--example", "bmi270"]);
     cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
     run_program(&mut cargo)?;
     Ok(repository.target("esp32").join(C6).join("release/stampfly-esp32s3"))

@@ -7,12 +7,13 @@ use std::fs;
 pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     let folder = repository.root.join("examples/examples");
     let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let mut names: Vec<String> =
-        entries.filter_map(|entry| Some(entry.ok()?.path().file_stem()?.to_str()?.to_owned())).collect();
+    // What is no file is what examples share.
+    let programs = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file());
+    let mut names: Vec<String> = programs.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
     names.sort();
     for name in &names {
         let mut example = repository.cargo();
-        example.args(["run", "--quiet", "-p", "stampfly-examples", "--example", name]);
+        example.args(["run", "--quiet", "-p", "examples", "--example", name]);
         let (printed, _) = capture(&mut example)?;
         if printed.is_empty() {
             return Err(format!("the example `{name}` shows nothing"));

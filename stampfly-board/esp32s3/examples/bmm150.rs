@@ -1,0 +1,19 @@
+//! The magnetometer on the StampFly: turn the level vehicle around once.
+#![no_std]
+#![no_main]
+
+mod board;
+
+use board::*;
+use embassy_executor::Spawner;
+use examples::drivers::bmm150;
+
+#[esp_rtos::main]
+async fn main(_spawner: Spawner) {
+    let mut bus = i2c::start(Board::start().i2c).await;
+    let mut out = Printer;
+    if let Err(failure) = bmm150::self_test(&mut bus, Clock, &mut out).await {
+        return end::<(), _>(Err(failure));
+    }
+    end(bmm150::run(bus, Clock, &mut out).await);
+}

@@ -1,0 +1,15 @@
+//! The barometer on the StampFly: lift it after a second.
+#![no_std]
+#![no_main]
+
+mod board;
+
+use board::*;
+use embassy_executor::Spawner;
+use examples::drivers::bmp280;
+
+#[esp_rtos::main]
+async fn main(_spawner: Spawner) {
+    let bus = i2c::start(Board::start().i2c).await;
+    end(bmp280::run(bus, Clock, &mut Printer).await);
+}

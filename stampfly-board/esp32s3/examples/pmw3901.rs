@@ -1,0 +1,16 @@
+//! The optical flow sensor on the StampFly: move it over a floor with a pattern.
+#![no_std]
+#![no_main]
+
+mod board;
+
+use board::*;
+use embassy_executor::Spawner;
+use examples::drivers::pmw3901;
+
+#[esp_rtos::main]
+async fn main(_spawner: Spawner) {
+    let mut bus = spi::Bus::start(Board::start().spi);
+    let (_, flow) = bus.devices();
+    end(pmw3901::run(flow, Clock, &mut Printer).await);
+}
