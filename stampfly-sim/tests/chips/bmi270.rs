@@ -395,3 +395,20 @@ fn over_i2c_it_answers_without_a_byte_of_no_meaning() {
     let frame = read(0x26);
     assert!(frame[0] == 0x8C && (word(&frame[1..], 5) / 4_096.0 - 1.0).abs() < 0.06, "{frame:?}");
 }
+
+#[test]
+fn a_read_that_a_sample_falls_into_sees_one_of_the_two() {
+    let mut chip = Chip::running();
+    chip.wait(100_000);
+    // At 8 MHz the data take 14 µs; every so often a sample comes in their middle.
+    let (mut before, mut changes) = ([0; 12], 0);
+    for _ in 0..4_000 {
+        let data: [u8; 12] = chip.read(0x0C);
+        if data != before {
+            changes += 1;
+            assert!(before == [0; 12] || (before[..6] != data[..6] && before[6..] != data[6..]), "{before:?} {data:?}");
+        }
+        before = data;
+    }
+    assert!(changes > 80, "56 ms: {changes}");
+}

@@ -158,3 +158,20 @@ fn the_advanced_self_test_turns_its_field_round() {
         assert_eq!((180.0..240.0).contains(&difference), !broken, "{difference} µT");
     }
 }
+
+#[test]
+fn a_read_during_a_conversion_gives_the_one_before() {
+    let (simulation, mut bus) = awake();
+    write(&mut bus, 0x51, 4);
+    write(&mut bus, 0x52, 14);
+    write(&mut bus, 0x4C, 0x02);
+    wait(&simulation, 11_000);
+    let first: [u8; 8] = read(&mut bus, 0x42);
+    write(&mut bus, 0x4C, 0x02);
+    wait(&simulation, 5_000);
+    let during: [u8; 8] = read(&mut bus, 0x42);
+    assert_eq!((&during[..6], during[6] & 1), (&first[..6], 0), "the old field, marked as taken");
+    wait(&simulation, 6_000);
+    let second: [u8; 8] = read(&mut bus, 0x42);
+    assert!(second[6] & 1 == 1 && second[..6] != first[..6]);
+}

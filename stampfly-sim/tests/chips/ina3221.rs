@@ -111,3 +111,17 @@ fn the_current_has_a_sign_and_a_range_of_its_own() {
     let truth = f64::from(simulation.truth().battery_current);
     assert!(truth > 1.0 && (amperes / truth - 1.0).abs() < 0.06, "{amperes} {truth}");
 }
+
+#[test]
+fn a_read_during_a_conversion_gives_the_one_before() {
+    let (simulation, mut bus) = chip();
+    // Channel 2, 64 averages of 1.1 ms: 141 ms.
+    write(&mut bus, 0x00, 0b0_010_011_100_100_111);
+    wait(&simulation, 145_000);
+    let first = read(&mut bus, 0x04);
+    assert_eq!(read(&mut bus, 0x0F) & 1, 1);
+    wait(&simulation, 100_000);
+    assert_eq!((read(&mut bus, 0x04), read(&mut bus, 0x0F) & 1), (first, 0), "the second one runs");
+    wait(&simulation, 45_000);
+    assert_eq!(read(&mut bus, 0x0F) & 1, 1);
+}

@@ -137,3 +137,18 @@ fn results_cannot_be_written() {
     assert_eq!(bench.read(0x0096), [0, 0]);
     assert_eq!(bench.read(0x010F), [0xEA]);
 }
+
+#[test]
+fn a_read_during_a_measurement_gives_the_one_before() {
+    let mut bench = Bench::new();
+    bench.start();
+    wait(&bench.simulation, 20_000);
+    assert_eq!((bench.read(0x008B), bench.read(0x0096)), ([0], [0, 0]), "none yet");
+    wait(&bench.simulation, 20_000);
+    let first: [u8; 15] = bench.read(0x0089);
+    bench.write(0x0086, &[1]);
+    wait(&bench.simulation, 20_000);
+    assert_eq!(bench.read(0x0089), first, "the second one runs");
+    wait(&bench.simulation, 30_000);
+    assert_ne!(bench.read(0x0089), first);
+}

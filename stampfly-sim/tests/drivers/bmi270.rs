@@ -13,9 +13,9 @@ use stampfly_types::{Micros, Vec3};
 
 type Driver<'b> = Bmi270<'b, SpiRegisters<SpiPort<chips::Bmi270>>, Clock>;
 
-/// A chip that has just been powered, on SPI at 10 MHz.
-pub fn soldered(simulation: &Simulation) -> (SpiPort<chips::Bmi270>, Attached) {
-    let chip = chips::Bmi270::new(&simulation.world, &simulation.clock, 1, 1.0, &stand_in_image());
+/// A chip that has just been powered, on SPI at 10 MHz. The seed decides how far off its clock is.
+pub fn soldered(simulation: &Simulation, seed: u64) -> (SpiPort<chips::Bmi270>, Attached) {
+    let chip = chips::Bmi270::new(&simulation.world, &simulation.clock, seed, 1.0, &stand_in_image());
     SpiBus::new(&simulation.clock, 1).attach(10_000_000, chip)
 }
 
@@ -34,14 +34,14 @@ fn timed<T>(clock: &Clock, call: impl Future<Output = T>) -> (Micros, T) {
 fn another_part_is_named_and_a_refused_image_too() {
     let simulation = standing();
     let (clock, image) = (&simulation.clock, stand_in_image());
-    let (port, attached) = soldered(&simulation);
+    let (port, attached) = soldered(&simulation, 1);
     attached.set_id(0x43);
     let mut imu = driver(port, clock, &image, Config::default());
     assert_eq!(block_on(clock, imu.start()), Err(ChipError::Identification { found: 0x43 }));
     attached.set_id(0x24);
     assert_eq!(block_on(clock, imu.start()), Ok(()), "from any state");
     let wrong = vec![0x11; 8_192];
-    let (port, _) = soldered(&simulation);
+    let (port, _) = soldered(&simulation, 1);
     let mut imu = driver(port, clock, &wrong, Config::default());
     assert_eq!(block_on(clock, imu.start()), Err(ChipError::Configuration { status: 2 }));
 }
@@ -55,7 +55,7 @@ fn the_chip_is_told_what_the_configuration_says_in_the_promised_time() {
     for (((accel_range, a), (gyro_range, g)), (rate, r)) in accel.into_iter().zip(gyro).zip(rate) {
         let simulation = standing();
         let clock = &simulation.clock;
-        let (port, attached) = soldered(&simulation);
+        let (port, attached) = soldered(&simulation, 1);
         let mut imu = driver(port, clock, &image, Config { accel_range, gyro_range, rate });
         let (took, outcome) = timed(clock, imu.start());
         assert_eq!(outcome, Ok(()));
@@ -92,7 +92,7 @@ fn decimated(frames: &[[f64; 6]]) -> (Vec3, Vec3) {
 fn in_flight_every_sample_is_what_the_fifo_held() {
     let image = stand_in_image();
     let simulation = Simulation::new(&SimulationConfig::default());
-    let (port, _) = soldered(&simulation);
+    let (port, _) = soldered(&simulation, 1);
     let (tap, transfers) = Tap::new(port);
     let Simulation { clock, world, sensors } = simulation;
     let mut imu = Bmi270::spi(tap, clock.clone(), &image, AxisMap::STAMPFLY_IMU, Config::default());
@@ -128,7 +128,7 @@ fn samples_come_at_the_configured_rate_and_a_late_reader_gets_every_one() {
     for (rate, period) in [(Rate::Hz400, 2_500.0), (Rate::Hz200, 5_000.0), (Rate::Hz100, 10_000.0)] {
         let simulation = standing();
         let clock = &simulation.clock;
-        let (port, _) = soldered(&simulation);
+        let (port, _) = soldered(&simulation, 1);
         let mut imu = driver(port, clock, &image, Config { rate, ..Config::default() });
         let (mut before, mut late) = (None, 0.0);
         for number in 0..200 {
@@ -159,7 +159,7 @@ fn the_self_tests_tell_a_healthy_chip_from_a_broken_one() {
     for broken in [false, true] {
         let simulation = standing();
         let clock = &simulation.clock;
-        let (port, attached) = soldered(&simulation);
+        let (port, attached) = soldered(&simulation, 1);
         attached.set_broken(broken);
         let mut imu = driver(port, clock, &image, Config::default());
         let expected = if broken { Err(ChipError::SelfTest) } else { Ok(()) };
