@@ -11,7 +11,7 @@
 //!
 //! | counted | as |
 //! |---|---|
-//! | a topic `@ N Hz` | samples a [tenth](JITTER) of the period early or late |
+//! | a topic `@ N Hz` | samples with that period, each up to a [tenth](JITTER) of it late |
 //! | `every` | its period |
 //! | `or at latest` | one more source of activations, beside the trigger, for it and all that follow |
 //! | an activation | its budget |
@@ -23,7 +23,7 @@ use crate::schedule::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 use crate::table::TopicInfo;
 use stampfly_types::Micros;
 
-/// A sample may be early or late by this part of its topic's period: one over this number.
+/// A sample may be late by this part of its topic's period: one over this number.
 pub const JITTER: u64 = 10;
 
 /// Why an activation has no bounded response time.
@@ -36,7 +36,7 @@ pub enum Unbounded {
     TooLate,
 }
 
-/// What may activate one line of the table: sources with a period, each early by up to its jitter, µs.
+/// What may activate one line of the table: sources with a period, each late by up to its jitter, µs.
 #[derive(Clone, Copy)]
 struct Arrivals {
     sources: [(u64, u64); MAX_TRIGGERS + 1],

@@ -32,9 +32,9 @@ pub async fn run(parts: Parts) {
     let motors = Motors::new(motors);
     let mut bus = spi::Bus::start(spi);
     let mut slots = Slots::new(Clock, devices::RHYTHM);
-    let (imu_chip, flow_chip) = bus.devices();
+    let (imu_chip, flow_chip, ready) = bus.devices();
     let (imu_chip, flow_chip, _) = slots.split(imu_chip, flow_chip, devices::LONGEST_FLOW);
-    let mut imu_chip = devices::imu(imu_chip, Clock, imu_config::FILE);
+    let mut imu_chip = devices::imu(imu_chip, Clock, imu_config::FILE).with_interrupt(ready);
     let mut flow_chip = devices::flow(flow_chip, Clock);
     let sensing =
         pump(async || imu_chip.next().await, |at, sample| _ = imu.publish(at, sample), Clock, RETRY, &HEALTH.imu);

@@ -17,6 +17,7 @@ mod clock;
 mod console;
 mod cutoff;
 mod flight;
+mod i2c;
 mod imu_config;
 mod memory;
 mod motors;

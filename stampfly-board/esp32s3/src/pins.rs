@@ -24,6 +24,7 @@ esp_hal::assign_resources! {
             to_chips: GPIO14,
             from_chips: GPIO43,
             imu_select: GPIO46,
+            imu_ready: GPIO11,
             flow_select: GPIO12,
         },
         /// Magnetometer, barometer, battery monitor, range finders.
@@ -61,6 +62,7 @@ esp_hal::assign_resources! {
             to_chips: GPIO5,
             from_chips: GPIO6,
             imu_select: GPIO7,
+            imu_ready: GPIO22,
             flow_select: GPIO8,
         },
         i2c: I2cPins<'d> {

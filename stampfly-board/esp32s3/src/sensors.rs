@@ -1,27 +1,24 @@
 //! The slow sensors, one after the other on one I2C bus.
 //!
-//! Each driver knows when its chip has something new and sleeps until then; the bus goes to whoever asks first, for one
-//! transfer. All of them live in one task, so a transfer is never interrupted by another.
+//! Each driver knows when its chip has something new and sleeps until then. Whoever wants the bus gets it for one transfer,
+//! in a circle, so nobody waits for more than one transfer of every other. All of them live in one task.
 
 use crate::clock::Clock;
+use crate::i2c;
 use crate::pins::{I2cPins, RangePins};
-use embassy_embedded_hal::shared_bus::asynch::i2c::I2cDevice;
 use embassy_futures::join::join5;
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_sync::mutex::Mutex;
-use esp_hal::gpio::{AnyPin, DriveMode, Flex, Level, Output, OutputConfig, Pull};
-use esp_hal::i2c::master::{BusTimeout, Config, I2c};
+use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
 use esp_hal::peripherals::I2C0;
-use esp_hal::time::Rate;
 use stampfly_board::devices;
 use stampfly_board::tasks::{Health, pump};
 use stampfly_board::wiring;
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
-use stampfly_drivers::{Barometer, Magnetometer, PowerMonitor, RangeFinder, recover_i2c};
+use stampfly_drivers::shared::SharedI2c;
+use stampfly_drivers::{Barometer, Magnetometer, PowerMonitor, RangeFinder};
 use stampfly_types::Micros;
 
-/// A driver that has failed is left alone for this long.
-pub const RETRY: Micros = Micros::from_millis(100);
+/// A driver that has failed is left alone for this long, and longer when it fails again.
+pub const RETRY: Micros = Micros::from_millis(5);
 
 /// How each driver fares.
 pub struct SensorHealth {
@@ -60,21 +57,16 @@ pub struct Parts {
 /// Reads them for ever.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { unit, mut pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power } = parts;
-    free(pins.reborrow()).await;
-    // A chip that holds the clock low is given up by the hardware; the drivers' own limit comes later.
-    let config = Config::default().with_frequency(Rate::from_khz(400)).with_timeout(BusTimeout::Maximum);
-    let bus =
-        I2c::new(unit, config).expect("400 kHz is possible").with_sda(pins.data).with_scl(pins.clock).into_async();
-    let bus: Mutex<NoopRawMutex, _> = Mutex::new(bus);
-    let i2c = || I2cDevice::new(&bus);
+    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power } = parts;
+    let mut bus = SharedI2c::new(i2c::Bus::start(unit, pins).await);
+    let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = bus.split();
     let asleep = |pin: AnyPin<'static>| Output::new(pin, Level::Low, OutputConfig::default());
     let boot = BootAddress::new();
-    let mut down = devices::range_down(i2c(), asleep(range.bottom_enable.into()), &boot, Clock);
-    let mut ahead = devices::range_ahead(i2c(), asleep(range.front_enable.into()), &boot, Clock);
-    let mut mag_chip = devices::magnetometer(i2c(), Clock);
-    let mut baro_chip = devices::barometer(i2c(), Clock);
-    let mut power_chip = devices::power(i2c(), Clock);
+    let mut down = devices::range_down(to_down, asleep(range.bottom_enable.into()), &boot, Clock);
+    let mut ahead = devices::range_ahead(to_ahead, asleep(range.front_enable.into()), &boot, Clock);
+    let mut mag_chip = devices::magnetometer(to_mag, Clock);
+    let mut baro_chip = devices::barometer(to_baro, Clock);
+    let mut power_chip = devices::power(to_power, Clock);
     join5(
         pump(async || down.next().await, |at, sample| _ = tof.publish(at, sample), Clock, RETRY, &HEALTH.tof),
         pump(
@@ -89,21 +81,4 @@ pub async fn run(parts: Parts) {
         pump(async || power_chip.next().await, |at, sample| _ = power.publish(at, sample), Clock, RETRY, &HEALTH.power),
     )
     .await;
-}
-
-/// A chip that was interrupted by a restart of the processor may still hold the data line.
-async fn free(pins: I2cPins<'_>) {
-    let (mut clock, mut data) = (line(pins.clock.into()), line(pins.data.into()));
-    // A bus that stays stuck shows in every driver's errors.
-    let _ = recover_i2c(&mut clock, &mut data, &mut Clock).await;
-}
-
-/// A line that is let go.
-fn line(pin: AnyPin<'_>) -> Flex<'_> {
-    let mut line = Flex::new(pin);
-    line.apply_output_config(&OutputConfig::default().with_drive_mode(DriveMode::OpenDrain).with_pull(Pull::Up));
-    line.set_high();
-    line.set_output_enable(true);
-    line.set_input_enable(true);
-    line
 }

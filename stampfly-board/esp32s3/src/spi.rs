@@ -11,7 +11,7 @@ use embassy_sync::mutex::Mutex;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 use esp_hal::Async;
-use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
+use esp_hal::gpio::{AnyPin, Input, InputConfig, Level, Output, OutputConfig};
 use esp_hal::peripherals::{DMA_CH0, SPI2};
 use esp_hal::spi::master::{Config, Spi, SpiDma};
 use esp_hal::spi::{Error, Mode};
@@ -37,6 +37,7 @@ pub struct Bus {
     shared: Shared,
     imu: Output<'static>,
     flow: Output<'static>,
+    ready: Input<'static>,
 }
 
 /// A chip on the bus.
@@ -63,13 +64,15 @@ impl Bus {
                 dma_tx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
             )
             .into_async();
-        Self { shared: Mutex::new(unit), imu, flow }
+        let ready = Input::new(pins.imu_ready, InputConfig::default());
+        Self { shared: Mutex::new(unit), imu, flow, ready }
     }
 
-    /// The inertial sensor and the flow sensor.
-    pub fn devices(&mut self) -> (Device<'_>, Device<'_>) {
-        let Self { shared, imu, flow } = self;
-        (Device { shared, select: imu, config: imu_config() }, Device { shared, select: flow, config: flow_config() })
+    /// The inertial sensor, the flow sensor, and the pin by which the first says that it has samples.
+    pub fn devices(&mut self) -> (Device<'_>, Device<'_>, &mut Input<'static>) {
+        let Self { shared, imu, flow, ready } = self;
+        let imu = Device { shared, select: imu, config: imu_config() };
+        (imu, Device { shared, select: flow, config: flow_config() }, ready)
     }
 }
 

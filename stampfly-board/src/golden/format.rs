@@ -223,3 +223,42 @@ impl<F: FnMut(&[u8])> Writer<F> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Entries as they can follow each other, at instants before and after the clock.
+    fn entries() -> impl Strategy<Value = std::vec::Vec<Entry>> {
+        let sample = (0..wiring::COUNT, any::<u32>(), any::<u32>()).prop_map(|(topic, at, seed)| Entry::Sample {
+            topic,
+            at: Micros(u64::from(at)),
+            words: (0..wiring::TOPICS[topic].words as u32).map(|word| seed.wrapping_mul(word + 1)).collect(),
+        });
+        let turn = any::<u32>().prop_map(|at| Entry::Turn(Micros(u64::from(at))));
+        let duty = any::<[u16; MOTORS]>().prop_map(|duty| Entry::Duty(duty.map(f32::from)));
+        prop::collection::vec(prop_oneof![sample, turn, duty], 0..40)
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_is_read(entries in entries(), start in any::<u32>(), hash: u64) {
+            let start = Micros(u64::from(start));
+            let mut bytes = std::vec::Vec::new();
+            let mut writer = Writer::new(start, |piece: &[u8]| bytes.extend_from_slice(piece));
+            for entry in &entries {
+                match entry {
+                    Entry::Sample { topic, at, words } => writer.sample(*topic as u8, *at, words),
+                    Entry::Turn(clock) => writer.turn(*clock),
+                    Entry::Duty(duty) => writer.duty(duty),
+                }
+            }
+            let mut record = std::vec::Vec::from(writer.header(hash));
+            record.append(&mut bytes);
+            let (header, reader) = open(&record).expect("a record");
+            prop_assert_eq!(header, Header { start, hash });
+            prop_assert_eq!(reader.collect::<Result<std::vec::Vec<_>, _>>(), Ok(entries));
+        }
+    }
+}

@@ -31,8 +31,8 @@ pub const FLIGHT: &[u8] = include_bytes!("../../golden/flight.bin");
 
 /// Largest deviation of a motor's duty that may still be rounding.
 ///
-/// Sensors that are wrong in their last bits move a duty by less than a tenth of this (see this module's tests): the
-/// record does not react, so errors do not build up.
+/// Sensors that are wrong in their last bits move a duty by less than a tenth of this, which a test of the program that
+/// records asserts: the record does not react, so errors do not build up.
 pub const TOLERANCE: f32 = 0.01;
 
 /// What [`play`] puts on the call stack: a bus and a vehicle, bytes.

@@ -78,27 +78,15 @@ const FLOOR: [f32; N] = [
     1e-9, 1e-9, 1e-9, // accelerometer bias, (0.03 mm/s²)²
 ];
 
-/// Adds a multiple of a row.
+/// Adds multiples of rows to columns `FIRST` to `N` of a row, one after the other, in one pass.
 #[inline]
-fn add(to: &mut Row, factor: f32, row: &Row) {
-    for (cell, value) in to[..N].iter_mut().zip(&row[..N]) {
-        *cell += factor * value;
-    }
-}
-
-/// A sum of multiples of rows, from the column `FIRST` on; zero before.
-#[inline]
-fn combine<const FIRST: usize, const K: usize>(first: (f32, &Row), others: [(f32, &Row); K]) -> Row {
-    let mut out = [0.0; WIDTH];
-    for (cell, value) in out[FIRST..N].iter_mut().zip(&first.1[FIRST..N]) {
-        *cell = first.0 * value;
-    }
-    for (factor, row) in others {
-        for (cell, value) in out[FIRST..N].iter_mut().zip(&row[FIRST..N]) {
-            *cell += factor * value;
+fn add_all<const FIRST: usize, const K: usize>(to: &mut Row, parts: [(f32, &Row); K]) {
+    let parts = parts.map(|(factor, row)| (factor, &row[FIRST..N]));
+    for (column, cell) in to[FIRST..N].iter_mut().enumerate() {
+        for (factor, row) in parts {
+            *cell += factor * row[column];
         }
     }
-    out
 }
 
 impl Covariance {
@@ -172,24 +160,20 @@ impl Covariance {
         let p = &self.rows;
         let mut t = [[0.0; WIDTH]; 9];
         for i in 0..3 {
-            t[i] = combine::<POSITION, 1>((1.0, &p[POSITION + i]), [(dt, &p[VELOCITY + i])]);
-            let (a, b) = (by_attitude[i], by_bias[i]);
-            t[3 + i] = combine::<VELOCITY, 6>(
-                (1.0, &p[VELOCITY + i]),
-                [
-                    (a[0], &p[ATTITUDE]),
-                    (a[1], &p[ATTITUDE + 1]),
-                    (a[2], &p[ATTITUDE + 2]),
-                    (b[0], &p[ACCEL_BIAS]),
-                    (b[1], &p[ACCEL_BIAS + 1]),
-                    (b[2], &p[ACCEL_BIAS + 2]),
-                ],
-            );
-            let c = turn[i];
-            t[6 + i] = combine::<ATTITUDE, 3>(
-                (c[0], &p[ATTITUDE]),
-                [(c[1], &p[ATTITUDE + 1]), (c[2], &p[ATTITUDE + 2]), (-dt, &p[GYRO_BIAS + i])],
-            );
+            let (a, b, c) = (by_attitude[i], by_bias[i], turn[i]);
+            let [x, y, z] = [0, 1, 2].map(|axis| &p[ATTITUDE + axis]);
+            let bias = [0, 1, 2].map(|axis| &p[ACCEL_BIAS + axis]);
+            let mut row = p[POSITION + i];
+            add_all::<POSITION, 1>(&mut row, [(dt, &p[VELOCITY + i])]);
+            t[i] = row;
+            let mut row = p[VELOCITY + i];
+            add_all::<VELOCITY, 3>(&mut row, [(a[0], x), (a[1], y), (a[2], z)]);
+            add_all::<VELOCITY, 3>(&mut row, [(b[0], bias[0]), (b[1], bias[1]), (b[2], bias[2])]);
+            t[3 + i] = row;
+            let mut row = [0.0; WIDTH];
+            add_all::<ATTITUDE, 3>(&mut row, [(c[0], x), (c[1], y), (c[2], z)]);
+            add_all::<ATTITUDE, 1>(&mut row, [(-dt, &p[GYRO_BIAS + i])]);
+            t[6 + i] = row;
         }
 
         // Columns: the first nine of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
@@ -245,16 +229,15 @@ impl Covariance {
             };
             let mut direction = [0.0; WIDTH];
             for block in (0..5).filter(|block| used(*block)) {
-                for (value, row) in blocks[block].iter().zip(&self.rows[3 * block..]) {
-                    add(&mut direction, *value, row);
-                }
+                let ([a, b, c], [x, y, z]) = (blocks[block], &self.rows.as_chunks().0[block]);
+                add_all::<0, 3>(&mut direction, [(a, x), (b, y), (c, z)]);
             }
             // What the axes before it already say about this one.
             let mut innovation = projection.innovations[axis];
             for before in 0..axis {
                 let known = &projection.directions[before];
                 let shared = dot(known);
-                add(&mut direction, -shared, known);
+                add_all::<0, 1>(&mut direction, [(-shared, known)]);
                 innovation -= shared * projection.innovations[before];
             }
             let variance = dot(&direction) + noise;
@@ -272,8 +255,8 @@ impl Covariance {
     #[inline]
     pub fn absorb<const M: usize>(&mut self, projection: &Projection<M>) -> [f32; N] {
         let Projection { directions, innovations } = projection;
-        // What is not a number is not spread.
-        if directions.iter().flatten().any(|v| v.is_nan()) {
+        // What is not a number is not spread: a sum with one in it is none.
+        if directions.iter().flatten().sum::<f32>().is_nan() {
             return [f32::NAN; N];
         }
         // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
@@ -302,12 +285,7 @@ impl Covariance {
     #[inline]
     fn shrink<const FIRST: usize, const M: usize>(&mut self, directions: &[Row; M]) {
         for (i, row) in self.rows.iter_mut().enumerate().skip(FIRST).take(3) {
-            for direction in directions {
-                let factor = -direction[i];
-                for (cell, value) in row[FIRST..N].iter_mut().zip(&direction[FIRST..N]) {
-                    *cell += factor * value;
-                }
-            }
+            add_all::<FIRST, M>(row, directions.each_ref().map(|direction| (-direction[i], direction)));
         }
     }
 }

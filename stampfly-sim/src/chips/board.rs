@@ -11,8 +11,8 @@ const IMU_CLOCK: u32 = 10_000_000;
 /// Clock of the flow sensor's SPI, Hz: the chip's limit.
 const FLOW_CLOCK: u32 = 2_000_000;
 
-/// The chips of one vehicle, just powered. The same configuration is the same specimens as
-/// [`Sensors`](crate::sensors::Sensors).
+/// The chips of one vehicle, just powered, with both chip selects of the SPI driven high. The same configuration is the
+/// same specimens as [`Sensors`](crate::sensors::Sensors).
 ///
 /// ```
 /// use stampfly_drivers::chip::ina3221::{Config, Ina3221};

@@ -61,9 +61,20 @@ impl Attached {
         self.faults.set(faults);
     }
 
+    /// What a register holds now, without the bus but with whatever reading does to the chip.
+    #[must_use]
+    pub fn peek(&self, register: u16) -> u16 {
+        self.chip.borrow_mut().read(register, self.clock.now())
+    }
+
     /// The supply dips: the chip loses its settings and starts again.
     pub fn reset(&self) {
         self.chip.borrow_mut().reset(self.clock.now());
+    }
+
+    /// Breaks or mends the sensing element: see [`Chip::set_broken`].
+    pub fn set_broken(&self, broken: bool) {
+        self.chip.borrow_mut().set_broken(broken);
     }
 
     /// Another part has been soldered: this is what its identity register says from now on.

@@ -170,6 +170,7 @@ impl I2cBus {
                 }
             }
         }
+        chip.stop(after(start, bits * BIT));
         Ok(())
     }
 }

@@ -15,7 +15,7 @@
 //! |---|---|---|---|
 //! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
 //! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
-//! | [`Bmi270`] | [`SpiBus`] | up to 10 MHz | BST-BMI270-DS000 |
+//! | [`Bmi270`] | [`SpiBus`], or [`I2cBus`] | up to 10 MHz, or 0x68 | BST-BMI270-DS000 |
 //! | [`Bmm150`] | [`I2cBus`] | 0x10 | BST-BMM150-DS001 |
 //! | [`Pmw3901`] | [`SpiBus`] | up to 2 MHz | PixArt PMW3901MB |
 //! | [`Vl53l3cx`] | [`I2cBus`] | 0x29, can be moved | ST DS13204 |
@@ -23,8 +23,9 @@
 //! | fault | where |
 //! |---|---|
 //! | dead chip, refused transfers, bit errors, clock stretching | [`Faults`] |
-//! | reset in flight, another part | [`Attached`] |
+//! | reset in flight, another part, a sensing element that is broken | [`Attached`] |
 //! | data line held low | [`I2cBus::hold_sda`] |
+//! | chip select that nobody drives yet | [`SpiBus::attach_floating`] |
 
 mod bmi270;
 mod bmm150;
@@ -38,7 +39,7 @@ mod pmw3901;
 mod spi;
 mod vl53l3cx;
 
-pub use bmi270::Bmi270;
+pub use bmi270::{Bmi270, InterruptPin};
 pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
 pub use board::{AttachedChips, Board, stand_in_image};
@@ -67,6 +68,9 @@ pub trait Chip: fmt::Debug {
     fn reset(&mut self, now: Micros);
     /// Changes what the identity register says.
     fn set_id(&mut self, id: u16);
+    /// Breaks or mends the sensing element: the chip answers as before but feels nothing, and its self tests fail. Of
+    /// the emulators those of chips with a self test do this; the others take no notice.
+    fn set_broken(&mut self, _broken: bool) {}
 }
 
 /// A chip that can sit on an [`I2cBus`]: how it maps bytes to registers.
@@ -80,6 +84,8 @@ pub trait I2cChip: Chip {
     fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool;
     /// Gives byte number `index` after a (repeated) start in read direction.
     fn send(&mut self, index: usize, now: Micros) -> u8;
+    /// The transfer is over.
+    fn stop(&mut self, _now: Micros) {}
 }
 
 /// A chip that can sit on an [`SpiBus`].

@@ -12,6 +12,9 @@ use embedded_hal::spi::{ErrorType, Operation};
 use stampfly_types::Micros;
 use std::rc::Rc;
 
+/// Share of the bits that a chip with a floating select spoils by answering into the same line: its select is taken for
+/// low some of the time, and half of its bits are wrong. *Unverified*: a floating line may do anything.
+const DISTURBANCE: f64 = 0.05;
 /// Stream of the bit errors; no sensor has this number.
 const STREAM: u64 = 102;
 
@@ -19,6 +22,8 @@ struct State {
     clock: Clock,
     busy_until: Cell<Micros>,
     noise: RefCell<Noise>,
+    /// How many chip selects nobody drives.
+    floating: Cell<u32>,
 }
 
 /// The wires that all chips share.
@@ -36,15 +41,28 @@ impl SpiBus {
     #[must_use]
     pub fn new(clock: &Clock, seed: u64) -> Self {
         let noise = RefCell::new(Noise::new(seed, STREAM));
-        Self(Rc::new(State { clock: clock.clone(), busy_until: Cell::new(clock.now()), noise }))
+        Self(Rc::new(State { clock: clock.clone(), busy_until: Cell::new(clock.now()), noise, floating: Cell::new(0) }))
     }
 
-    /// Solders a chip to the bus and to a chip select of its own. `frequency` is the clock for this chip, Hz.
+    /// Solders a chip to the bus and to a chip select of its own, which is driven high. `frequency` is the clock for
+    /// this chip, Hz.
     pub fn attach<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
+        self.solder(frequency, chip, false)
+    }
+
+    /// The same with a chip select that floats: as long as nobody drives it, by [`SpiPort::park`] or a first transfer,
+    /// the chip disturbs what the others answer. So does a flow sensor of the StampFly that is not looked after before
+    /// the inertial sensor is asked.
+    pub fn attach_floating<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
+        self.solder(frequency, chip, true)
+    }
+
+    fn solder<C: SpiChip + 'static>(&self, frequency: u32, chip: C, floating: bool) -> (SpiPort<C>, Attached) {
+        self.0.floating.set(self.0.floating.get() + u32::from(floating));
         let chip = Rc::new(RefCell::new(chip));
         let attached = Attached::new(&self.0.clock, chip.clone());
         let byte = 8_000_000_000 / u64::from(frequency.max(1));
-        (SpiPort { bus: self.clone(), chip, attached: attached.clone(), byte }, attached)
+        (SpiPort { bus: self.clone(), chip, attached: attached.clone(), byte, floating: Cell::new(floating) }, attached)
     }
 }
 
@@ -55,6 +73,8 @@ pub struct SpiPort<C> {
     attached: Attached,
     /// Nanoseconds per byte.
     byte: u64,
+    /// Nobody has driven the chip select yet.
+    floating: Cell<bool>,
 }
 
 impl<C: SpiChip> core::fmt::Debug for SpiPort<C> {
@@ -63,9 +83,23 @@ impl<C: SpiChip> core::fmt::Debug for SpiPort<C> {
     }
 }
 
+impl<C> SpiPort<C> {
+    /// Drives the chip select, high until the next transfer.
+    pub fn park(&self) {
+        let others = self.bus.0.floating.get() - u32::from(self.floating.take());
+        self.bus.0.floating.set(others);
+    }
+
+    /// The clock of the bus and the chip, for pins that the chip has beside it.
+    pub(super) fn chip(&self) -> (Clock, Rc<RefCell<C>>) {
+        (self.bus.0.clock.clone(), self.chip.clone())
+    }
+}
+
 impl<C: SpiChip> SpiPort<C> {
     /// Takes the bus. Returns the start, the end, and what is already known to fail.
     fn begin(&self, operations: &[Operation<'_, u8>]) -> (Micros, Micros, Result<(), BusError>) {
+        self.park();
         let state = &self.bus.0;
         let start = state.clock.now();
         let refusals = self.attached.faults().refusals;
@@ -88,6 +122,7 @@ impl<C: SpiChip> SpiPort<C> {
     /// Exchanges the bytes of a transfer that began at `start` and ended at `end`.
     fn exchange(&self, operations: &mut [Operation<'_, u8>], start: Micros, end: Micros) {
         let faults = self.attached.faults();
+        let disturbance = if self.bus.0.floating.get() > 0 { DISTURBANCE } else { 0.0 };
         let mut chip = self.chip.borrow_mut();
         let mut noise = self.bus.0.noise.borrow_mut();
         let (mut index, mut nanoseconds) = (0, 0);
@@ -98,7 +133,7 @@ impl<C: SpiChip> SpiPort<C> {
             let out = carry(out, faults.bit_errors, &mut noise);
             let answer = chip.exchange(index, out, after(start, nanoseconds));
             index += 1;
-            carry(answer, faults.bit_errors, &mut noise)
+            carry(answer, faults.bit_errors.max(disturbance), &mut noise)
         };
         for operation in operations {
             match operation {

@@ -8,13 +8,15 @@
 mod pilot;
 
 use core::cell::RefCell;
+use embedded_hal::digital::OutputPin;
 use stampfly_drivers::chip::AxisMap;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
-use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, Sample};
+use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
+use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample};
 use stampfly_sim::chips::{Board, stand_in_image};
 use stampfly_sim::sensors::Sensors;
 use stampfly_sim::time::Tasks;
@@ -67,7 +69,7 @@ macro_rules! watch {
         $tasks.spawn(async move {
             loop {
                 let Sample { at, data } = sensor.next().await.expect("no fault is simulated");
-                into.borrow_mut().push((at, $channels(data)));
+                into.borrow_mut().extend($channels(data).map(|channels| (at, channels)));
             }
         });
     }};
@@ -85,7 +87,7 @@ fn compare(seed: u64) {
     let image = stand_in_image();
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let board = Board::new(&world, &clock, &config, &image);
-    let Sensors { imu, flow, mag, baro, power, mut motors, .. } = sensors;
+    let Sensors { imu, flow, tof, mag, baro, power, mut motors, .. } = sensors;
     // Every chip has started up.
     clock.advance_to(Micros::from_millis(60));
 
@@ -93,31 +95,41 @@ fn compare(seed: u64) {
     let [flow_driver, flow_model] = [const { RefCell::new(Series::<2>::new()) }; 2];
     let [mag_driver, mag_model] = [const { RefCell::new(Series::<3>::new()) }; 2];
     let [baro_driver, baro_model] = [const { RefCell::new(Series::<1>::new()) }; 2];
+    let [range_driver, range_model] = [const { RefCell::new(Series::<1>::new()) }; 2];
     let [power_driver, power_model] = [const { RefCell::new(Series::<2>::new()) }; 2];
     let mut tasks = Tasks::new(clock.clone());
     let time = || clock.clone();
     let driver = Bmi270::spi(board.imu, time(), &image, AxisMap::STAMPFLY_IMU, bmi270::Config::default());
     let imu_channels = |data: stampfly_types::messages::ImuData| {
         let (a, g) = (data.accel, data.gyro);
-        [a.x, a.y, a.z, g.x, g.y, g.z]
+        Some([a.x, a.y, a.z, g.x, g.y, g.z])
     };
     watch!(tasks, driver, imu_driver, imu_channels);
     watch!(tasks, imu, imu_model, imu_channels);
     let driver = Pmw3901::new(board.flow, time(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default());
-    let flow_channels = |data: stampfly_types::messages::FlowData| [data.delta_x, data.delta_y];
+    let flow_channels = |data: stampfly_types::messages::FlowData| Some([data.delta_x, data.delta_y]);
     watch!(tasks, driver, flow_driver, flow_channels);
     watch!(tasks, flow, flow_model, flow_channels);
     let axes = AxisMap::STAMPFLY_MAGNETOMETER;
     let driver = Bmm150::new(board.i2c.clone(), Bmm150::ALL_LOW, time(), axes, bmm150::Config::default());
-    let mag_channels = |data: stampfly_types::messages::MagData| [data.field.x, data.field.y, data.field.z];
+    let mag_channels = |data: stampfly_types::messages::MagData| Some([data.field.x, data.field.y, data.field.z]);
     watch!(tasks, driver, mag_driver, mag_channels);
     watch!(tasks, mag, mag_model, mag_channels);
     let driver = Bmp280::new(board.i2c.clone(), Bmp280::SDO_LOW, time(), bmp280::Config::default());
-    let baro_channels = |data: stampfly_types::messages::BaroData| [data.pressure];
+    let baro_channels = |data: stampfly_types::messages::BaroData| Some([data.pressure]);
     watch!(tasks, driver, baro_driver, baro_channels);
     watch!(tasks, baro, baro_model, baro_channels);
+    let boot = BootAddress::new();
+    let (i2c, shutdown) = (board.i2c.clone(), board.shutdown_bottom);
+    // The one that looks ahead stays in reset: both answer at the same address after power-on.
+    let mut shutdown_front = board.shutdown_front;
+    let Ok(()) = shutdown_front.set_low();
+    let driver = Vl53l3cx::new(i2c, shutdown, &boot, 0x30, time(), vl53l3cx::Config::default());
+    let range_channels = |data: stampfly_types::messages::TofData| data.valid.then_some([data.distance]);
+    watch!(tasks, driver, range_driver, range_channels);
+    watch!(tasks, tof, range_model, range_channels);
     let driver = Ina3221::new(board.i2c, Ina3221::A0_GROUND, time(), ina3221::Config::default());
-    let power_channels = |data: stampfly_types::messages::PowerData| [data.voltage, data.current];
+    let power_channels = |data: stampfly_types::messages::PowerData| Some([data.voltage, data.current]);
     watch!(tasks, driver, power_driver, power_channels);
     watch!(tasks, power, power_model, power_channels);
     let pilot_clock = clock.clone();
@@ -146,6 +158,8 @@ fn compare(seed: u64) {
     // Each draws its own weather: 0.12 Pa/√s, four deviations of the difference after fourteen seconds.
     close("baro", &difference(&baro_driver.borrow(), &baro_model.borrow()), &[2.5]);
     close("power", &difference(&power_driver.borrow(), &power_model.borrow()), &[0.008, 0.004]);
+    // A count is a millimetre.
+    close("range", &difference(&range_driver.borrow(), &range_model.borrow()), &[0.001]);
     // What is counted adds up, and so does its noise: four deviations of the difference after eleven seconds.
     close("flow", &difference(&summed(&flow_driver.borrow()), &summed(&flow_model.borrow())), &[80.0 * 0.00222; 2]);
 }

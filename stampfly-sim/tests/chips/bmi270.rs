@@ -1,24 +1,25 @@
 //! BMI270 after Bosch BST-BMI270-DS000.
 
 use crate::{standing, wait};
+use embedded_hal::i2c::I2c;
 use embedded_hal::spi::SpiDevice;
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{Attached, Bmi270, SpiBus, SpiPort};
+use stampfly_sim::chips::{Attached, Bmi270, I2cBus, SpiBus, SpiPort};
 
 /// A stand-in for the maker's file, in which no two bursts are equal.
 fn image() -> Vec<u8> {
     (0..8_192u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()
 }
 
-struct Chip {
-    simulation: Simulation,
-    port: SpiPort<Bmi270>,
-    attached: Attached,
+pub struct Chip {
+    pub simulation: Simulation,
+    pub port: SpiPort<Bmi270>,
+    pub attached: Attached,
 }
 
 impl Chip {
     /// Just powered.
-    fn cold() -> Self {
+    pub fn cold() -> Self {
         let simulation = standing();
         let chip = Bmi270::new(&simulation.world, &simulation.clock, 1, 1.0, &image());
         let (port, attached) = SpiBus::new(&simulation.clock, 1).attach(8_000_000, chip);
@@ -45,7 +46,7 @@ impl Chip {
     }
 
     /// Everything at 1600 Hz, ±8 g and ±2000 °/s, with both sensors in the FIFO.
-    fn running() -> Self {
+    pub fn running() -> Self {
         let mut chip = Self::initialised();
         for (register, value) in [(0x40, 0xAC), (0x41, 2), (0x42, 0xAC), (0x43, 0), (0x49, 0xD0), (0x7D, 0x0E)] {
             chip.write(register, value);
@@ -54,18 +55,18 @@ impl Chip {
         chip
     }
 
-    fn wait(&self, microseconds: u64) {
+    pub fn wait(&self, microseconds: u64) {
         wait(&self.simulation, microseconds);
     }
 
-    fn read<const N: usize>(&mut self, register: u8) -> [u8; N] {
+    pub fn read<const N: usize>(&mut self, register: u8) -> [u8; N] {
         let mut bytes = vec![0; N + 2];
         bytes[0] = register | 0x80;
         self.port.transfer_in_place(&mut bytes).unwrap();
         bytes[2..].try_into().unwrap()
     }
 
-    fn read_fifo(&mut self, length: usize) -> Vec<u8> {
+    pub fn read_fifo(&mut self, length: usize) -> Vec<u8> {
         let mut bytes = vec![0; length + 2];
         bytes[0] = 0xA6;
         self.port.transfer_in_place(&mut bytes).unwrap();
@@ -76,7 +77,7 @@ impl Chip {
         usize::from(u16::from_le_bytes(self.read(0x24)))
     }
 
-    fn write(&mut self, register: u8, value: u8) {
+    pub fn write(&mut self, register: u8, value: u8) {
         self.port.write(&[register, value]).unwrap();
     }
 
@@ -300,4 +301,97 @@ fn a_soft_reset_forgets_everything_and_returns_to_i2c() {
     chip.wait(5_000);
     chip.read::<1>(0);
     assert_eq!((chip.read(0x0C), chip.read(0x21)), ([0; 12], [0]));
+}
+
+/// Mean of 40 samples of the accelerometer, g, after the 50 ms a self test takes to arrive.
+fn accel_at_16_g(chip: &mut Chip, self_test: u8, pause: u64) -> [f64; 3] {
+    chip.write(0x6D, self_test);
+    chip.wait(pause);
+    let mut mean = [0.0; 3];
+    for _ in 0..40 {
+        chip.wait(640);
+        let data: [u8; 6] = chip.read(0x0C);
+        mean.iter_mut().enumerate().for_each(|(place, mean)| *mean += word(&data, place) / 2_048.0 / 40.0);
+    }
+    mean
+}
+
+#[test]
+fn the_self_test_moves_the_mass_both_ways_along_every_axis() {
+    let difference = |range: u8, size: u8, pause: u64, broken: bool| {
+        let mut chip = Chip::running();
+        chip.attached.set_broken(broken);
+        chip.write(0x41, range);
+        chip.wait(3_000);
+        let still = accel_at_16_g(&mut chip, 0, 50_000);
+        let [positive, negative] = [0x05, 0x01].map(|sign| accel_at_16_g(&mut chip, size | sign, pause));
+        let after = accel_at_16_g(&mut chip, 0, 50_000);
+        assert!(still.iter().zip(after).all(|(still, after)| (still - after).abs() < 0.01), "{still:?} {after:?}");
+        [0, 1, 2].map(|axis| positive[axis] - negative[axis])
+    };
+    let passes = |[x, y, z]: [f64; 3]| x > 16.0 && y < -15.0 && z > 10.0;
+    let right = difference(3, 0x08, 50_000, false);
+    assert!(passes(right), "{right:?}");
+    assert!(!passes(difference(3, 0x08, 50_000, true)), "nothing moves");
+    assert!(!passes(difference(3, 0x00, 50_000, false)), "the small amplitude");
+    // At ±8 g half of the counts are of half the size, and the ends are cut off.
+    assert!(!passes(difference(2, 0x08, 50_000, false).map(|g| g / 2.0)), "beyond the range");
+    assert!(!passes(difference(3, 0x08, 2_000, false)), "too early");
+}
+
+#[test]
+fn the_gyroscope_tests_itself_on_command() {
+    for broken in [false, true] {
+        let mut chip = Chip::started();
+        chip.attached.set_broken(broken);
+        chip.write(0x7E, 0x02);
+        chip.wait(200_000);
+        assert_eq!(chip.read(0x6E), [0], "without the image there is nobody to test");
+        chip.write(0x7C, 0);
+        chip.wait(450);
+        chip.upload();
+        chip.wait(20_000);
+        chip.write(0x69, 0x04);
+        chip.wait(2);
+        chip.write(0x7E, 0x02);
+        chip.wait(50_000);
+        assert_eq!((chip.read(0x6E), chip.read(0x69)), ([0], [4]), "running");
+        chip.wait(50_000);
+        assert_eq!((chip.read(0x6E), chip.read(0x69)), ([if broken { 1 } else { 0x0F }], [0]));
+    }
+}
+
+#[test]
+fn over_i2c_it_answers_without_a_byte_of_no_meaning() {
+    let simulation = standing();
+    let mut bus = I2cBus::new(&simulation.clock, 1);
+    bus.attach(0x68, Bmi270::new(&simulation.world, &simulation.clock, 1, 1.0, &image()));
+    wait(&simulation, 2_000);
+    let mut write = |bytes: &[u8]| {
+        I2c::write(&mut bus, 0x68, bytes).unwrap();
+        wait(&simulation, 450);
+    };
+    write(&[0x7C, 0]);
+    write(&[0x59, 0]);
+    for (burst, bytes) in image().chunks(256).enumerate() {
+        write(&[0x5B, ((burst * 128) & 0x0F) as u8, (burst * 8) as u8]);
+        write(&[&[0x5E], bytes].concat());
+    }
+    write(&[0x59, 1]);
+    wait(&simulation, 20_000);
+    for (register, value) in [(0x40, 0xAC), (0x42, 0xAC), (0x49, 0xD0), (0x7D, 0x0E)] {
+        I2c::write(&mut bus, 0x68, &[register, value]).unwrap();
+    }
+    wait(&simulation, 100_000);
+    I2c::write(&mut bus, 0x68, &[0x7E, 0xB0]).unwrap();
+    wait(&simulation, 5_000);
+    let mut read = |register: u8| {
+        let mut bytes = [0; 13];
+        bus.write_read(0x68, &[register], &mut bytes).unwrap();
+        bytes
+    };
+    assert_eq!((read(0)[0], read(0x21)[0]), (0x24, 1));
+    assert!((word(&read(0x0C), 2) / 4_096.0 - 1.0).abs() < 0.06, "gravity");
+    let frame = read(0x26);
+    assert!(frame[0] == 0x8C && (word(&frame[1..], 5) / 4_096.0 - 1.0).abs() < 0.06, "{frame:?}");
 }

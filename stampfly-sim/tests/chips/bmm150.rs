@@ -1,22 +1,23 @@
 //! BMM150 after Bosch BST-BMM150-DS001, with the compensation of Bosch's Sensor API.
 
+use crate::compensation::bmm150 as compensate;
 use crate::{standing, wait};
 use embedded_hal::i2c::I2c;
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{Bmm150, I2cBus};
+use stampfly_sim::chips::{Attached, Bmm150, I2cBus};
 
 const ADDRESS: u8 = 0x10;
 
 /// A chip that has been powered but not woken.
-fn chip() -> (Simulation, I2cBus) {
+fn chip() -> (Simulation, I2cBus, Attached) {
     let simulation = standing();
     let bus = I2cBus::new(&simulation.clock, 1);
-    bus.attach(ADDRESS, Bmm150::new(&simulation.world, &simulation.clock, 1));
-    (simulation, bus)
+    let attached = bus.attach(ADDRESS, Bmm150::new(&simulation.world, &simulation.clock, 1));
+    (simulation, bus, attached)
 }
 
 fn awake() -> (Simulation, I2cBus) {
-    let (simulation, mut bus) = chip();
+    let (simulation, mut bus, _) = chip();
     write(&mut bus, 0x4B, 1);
     wait(&simulation, 3_000);
     (simulation, bus)
@@ -32,30 +33,9 @@ fn write(bus: &mut I2cBus, register: u8, value: u8) {
     bus.write(ADDRESS, &[register, value]).unwrap();
 }
 
-/// Field in µT, chip axes.
-fn compensate(trim: &[u8; 21], data: &[u8; 8]) -> [f64; 3] {
-    let short = |register: usize| f64::from(trim[register - 0x5D] as i8);
-    let signed = |register: usize| f64::from(i16::from_le_bytes([trim[register - 0x5D], trim[register - 0x5C]]));
-    let unsigned = |register: usize| f64::from(u16::from_le_bytes([trim[register - 0x5D], trim[register - 0x5C]]));
-    let word = |place: usize| i16::from_le_bytes([data[place], data[place + 1]]);
-    let hall = f64::from(word(6) as u16 >> 2);
-    let xyz1 = unsigned(0x6C);
-    let turn = xyz1 * 16_384.0 / hall - 16_384.0;
-    let gain = short(0x70) * turn * turn / 268_435_456.0 + turn * f64::from(trim[0x71 - 0x5D]) / 16_384.0;
-    let flat = |raw: i16, one: f64, two: f64| {
-        (f64::from(raw >> 3) * ((gain + 256.0) * (two + 160.0)) / 8_192.0 + one * 8.0) / 16.0
-    };
-    let upright = (f64::from(word(4) >> 1) - signed(0x62)) * 131_072.0 - signed(0x6E) * (hall - xyz1);
-    [
-        flat(word(0), short(0x5D), short(0x64)),
-        flat(word(2), short(0x5E), short(0x65)),
-        upright / ((signed(0x68) + unsigned(0x6A) * hall / 32_768.0) * 4.0) / 16.0,
-    ]
-}
-
 #[test]
 fn in_suspend_only_the_power_register_answers() {
-    let (simulation, mut bus) = chip();
+    let (simulation, mut bus, _) = chip();
     wait(&simulation, 10_000);
     assert_eq!((read(&mut bus, 0x40), read(&mut bus, 0x4B)), ([0], [0]));
     write(&mut bus, 0x4B, 1);
@@ -133,4 +113,48 @@ fn a_soft_reset_wants_both_bits_and_ends_in_sleep() {
     write(&mut bus, 0x4B, 0x83);
     wait(&simulation, 3_000);
     assert_eq!((read(&mut bus, 0x51), read(&mut bus, 0x4B), read(&mut bus, 0x40)), ([0], [1], [0x32]));
+}
+
+#[test]
+fn the_self_test_marks_the_axes_and_clears_its_bit() {
+    for broken in [false, true] {
+        let (simulation, mut bus, attached) = chip();
+        attached.set_broken(broken);
+        write(&mut bus, 0x4B, 1);
+        wait(&simulation, 3_000);
+        write(&mut bus, 0x4C, 0x07);
+        assert_eq!(read(&mut bus, 0x4C), [0x07], "running");
+        wait(&simulation, 2_000);
+        assert_eq!(read(&mut bus, 0x4C), [0x06]);
+        let data: [u8; 5] = read(&mut bus, 0x42);
+        assert_eq!([0, 2, 4].map(|place| data[place] & 1), [u8::from(!broken); 3]);
+    }
+    // Only asleep.
+    let (simulation, mut bus) = awake();
+    write(&mut bus, 0x4C, 0x01);
+    wait(&simulation, 2_000);
+    assert_eq!(read::<5>(&mut bus, 0x42)[0] & 1, 0);
+}
+
+#[test]
+fn the_advanced_self_test_turns_its_field_round() {
+    for broken in [false, true] {
+        let (simulation, mut bus, attached) = chip();
+        attached.set_broken(broken);
+        write(&mut bus, 0x4B, 1);
+        wait(&simulation, 3_000);
+        let trim = read(&mut bus, 0x5D);
+        // Only z, five repetitions: within the four milliseconds that the maker's code waits.
+        write(&mut bus, 0x4E, 0x1F);
+        write(&mut bus, 0x52, 4);
+        let [positive, negative] = [0xC2, 0x82].map(|mode| {
+            write(&mut bus, 0x4C, mode);
+            wait(&simulation, 4_000);
+            let data: [u8; 8] = read(&mut bus, 0x42);
+            assert_eq!((data[6] & 1, &data[..4]), (1, &[0; 4][..]), "x and y are not measured");
+            compensate(&trim, &data)[2]
+        });
+        let difference = positive - negative;
+        assert_eq!((180.0..240.0).contains(&difference), !broken, "{difference} µT");
+    }
 }

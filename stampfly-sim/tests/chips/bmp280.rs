@@ -1,6 +1,7 @@
 //! BMP280 after BST-BMP280-DS001, with the integer compensation of its section 3.11.3 where the emulator inverts the
 //! floating-point one of section 8.1.
 
+use crate::compensation::bmp280 as compensate;
 use crate::{standing, wait};
 use embedded_hal::i2c::I2c;
 use stampfly_sim::Simulation;
@@ -27,27 +28,6 @@ fn read<const N: usize>(bus: &mut I2cBus, register: u8) -> [u8; N] {
 
 fn write(bus: &mut I2cBus, bytes: &[u8]) {
     bus.write(ADDRESS, bytes).unwrap();
-}
-
-/// Temperature, °C, and pressure, Pa, by the 64-bit integer formula.
-fn compensate(calibration: &[u8; 24], data: &[u8; 6]) -> (f64, f64) {
-    let unsigned = |n: usize| i64::from(u16::from_le_bytes([calibration[2 * n], calibration[2 * n + 1]]));
-    let signed = |n: usize| i64::from(i16::from_le_bytes([calibration[2 * n], calibration[2 * n + 1]]));
-    let adc = |at: usize| i64::from(data[at]) << 12 | i64::from(data[at + 1]) << 4 | i64::from(data[at + 2]) >> 4;
-    let (adc_p, adc_t) = (adc(0), adc(3));
-    let (t1, t2, t3, p1) = (unsigned(0), signed(1), signed(2), unsigned(3));
-    let p = |n: usize| signed(n + 2);
-    let linear = (((adc_t >> 3) - (t1 << 1)) * t2) >> 11;
-    let square = (((((adc_t >> 4) - t1) * ((adc_t >> 4) - t1)) >> 12) * t3) >> 14;
-    let fine = linear + square;
-    let x = fine - 128_000;
-    let offset = x * x * p(6) + ((x * p(5)) << 17) + (p(4) << 35);
-    let slope = ((x * x * p(3)) >> 8) + ((x * p(2)) << 12);
-    let slope = (((1 << 47) + slope) * p1) >> 33;
-    let y = (((1_048_576 - adc_p) << 31) - offset) * 3_125 / slope;
-    let corrections = ((p(9) * (y >> 13) * (y >> 13)) >> 25) + ((p(8) * y) >> 19);
-    let pressure = ((y + corrections) >> 8) + (p(7) << 4);
-    (((fine * 5 + 128) >> 8) as f64 / 100.0, pressure as f64 / 256.0)
 }
 
 #[test]

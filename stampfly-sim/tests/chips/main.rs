@@ -5,7 +5,10 @@ mod bmi270;
 mod bmm150;
 mod bmp280;
 mod bus;
+mod compensation;
+mod floating_select;
 mod ina3221;
+mod interrupt_pin;
 mod pmw3901;
 mod vl53l3cx;
 

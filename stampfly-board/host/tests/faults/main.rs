@@ -1,9 +1,11 @@
 //! Every chip, every fault: a typed error within its time, neighbours that notice nothing, recovery without a restart.
 //!
-//! All seven drivers run as in flight on the two buses. A fault begins after one second and ends 0.4 s later.
+//! All seven drivers run as in flight on the two buses. A fault begins after one second and ends 0.4 s later; a clock
+//! that is held, which takes turns away from everybody, two seconds later.
 
 mod rig;
 
+use core::ops::Range;
 use rig::{Access, NAMES, Said, run};
 use stampfly_drivers::SensorErrorKind;
 use stampfly_sim::chips::Faults;
@@ -11,6 +13,7 @@ use stampfly_types::Micros;
 
 const BEGIN: Micros = Micros::from_millis(1_000);
 const FAULT_ENDS: Micros = Micros::from_millis(1_400);
+const FAULT: Range<Micros> = BEGIN..FAULT_ENDS;
 const END: Micros = Micros::from_millis(3_500);
 
 /// What each driver promises, ms: time between samples, from a fault to an error, from its end to a sample.
@@ -49,17 +52,17 @@ fn longest_gap(said: &[Said], begin: Micros, end: Micros) -> Micros {
 }
 
 /// The same from one second after the start on, when everything runs.
-fn assert_unharmed(index: usize, said: &[Said], what: &str) {
+fn assert_unharmed(index: usize, said: &[Said], end: Micros, what: &str) {
     let late: Vec<_> = errors(said).into_iter().filter(|(at, _)| *at >= BEGIN).collect();
     assert!(late.is_empty(), "{what}: {} said {late:?}", NAMES[index]);
     let [period, ..] = promise(index);
-    let gap = longest_gap(said, BEGIN, END);
+    let gap = longest_gap(said, BEGIN, end);
     // A sample may come late by what the bus is busy, and one range finder by its look every 2 ms.
     assert!(gap <= period + period, "{what}: {} was silent for {gap}", NAMES[index]);
 }
 
 /// Samples come again within the promised time, and say what they said before.
-fn assert_recovered(index: usize, said: &[Said], from: Micros, what: &str) {
+fn assert_recovered(index: usize, said: &[Said], from: Micros, end: Micros, what: &str) {
     let [.., recovery] = promise(index);
     let again = samples(said).map(|(at, _)| at).find(|at| *at > from);
     let took = again.map(|at| at.since(from));
@@ -68,7 +71,7 @@ fn assert_recovered(index: usize, said: &[Said], from: Micros, what: &str) {
         let figures: Vec<f32> = samples(said).filter(|(at, _)| (begin..end).contains(at)).map(|(_, f)| f).collect();
         figures.iter().sum::<f32>() / figures.len() as f32
     };
-    let (before, after) = (mean(Micros::from_millis(700), BEGIN), mean(END.since(Micros::from_millis(700)), END));
+    let (before, after) = (mean(Micros::from_millis(700), BEGIN), mean(end.since(Micros::from_millis(700)), end));
     // Noise of the mean of some samples: m/s², rad, µT, Pa, V, m, share.
     let tolerance = [0.05, 0.002, 1.0, 2.0, 0.02, 0.002, 0.1][index];
     assert!((before - after).abs() < tolerance, "{what}: {} says {after} after {before}", NAMES[index]);
@@ -85,9 +88,9 @@ fn each(
     for &index in chips {
         let said = run(END, &[(BEGIN, &|access| on(access, index)), (FAULT_ENDS, &|access| off(access, index))]);
         look(index, &said[index]);
-        assert_recovered(index, &said[index], FAULT_ENDS, what);
+        assert_recovered(index, &said[index], FAULT_ENDS, END, what);
         for other in (0..NAMES.len()).filter(|other| *other != index) {
-            assert_unharmed(other, &said[other], &format!("{what} of {}", NAMES[index]));
+            assert_unharmed(other, &said[other], END, &format!("{what} of {}", NAMES[index]));
         }
     }
 }
@@ -104,13 +107,13 @@ fn heal(access: &Access, index: usize) {
 }
 
 /// An error of one of these kinds came in time, and no sample during the fault but those already on their way.
-fn assert_failed(index: usize, said: &[Said], kinds: &[SensorErrorKind], what: &str) {
+fn assert_failed(index: usize, said: &[Said], fault: &Range<Micros>, kinds: &[SensorErrorKind], what: &str) {
     let [_, limit, _] = promise(index);
-    let during: Vec<_> = errors(said).into_iter().filter(|(at, _)| (BEGIN..=FAULT_ENDS).contains(at)).collect();
-    let first = during.first().map(|(at, _)| at.since(BEGIN));
+    let during: Vec<_> = errors(said).into_iter().filter(|(at, _)| fault.contains(at)).collect();
+    let first = during.first().map(|(at, _)| at.since(fault.start));
     assert!(first.is_some_and(|first| first <= limit), "{what}: {} said {first:?}", NAMES[index]);
     assert!(during.iter().all(|(_, kind)| kinds.contains(kind)), "{what}: {} said {during:?}", NAMES[index]);
-    let samples = samples(said).filter(|(at, _)| (BEGIN + limit..FAULT_ENDS).contains(at)).count();
+    let samples = samples(said).filter(|(at, _)| (fault.start + limit..fault.end).contains(at)).count();
     assert_eq!(samples, 0, "{what}: {} measures on", NAMES[index]);
 }
 
@@ -118,7 +121,7 @@ fn assert_failed(index: usize, said: &[Said], kinds: &[SensorErrorKind], what: &
 fn without_a_fault_nobody_says_an_error() {
     let said = run(END, &[]);
     for (index, said) in said.iter().enumerate() {
-        assert_unharmed(index, said, "no fault");
+        assert_unharmed(index, said, END, "no fault");
         let first = samples(said).next().map(|(at, _)| at);
         assert!(first.is_some_and(|at| at < Micros::from_millis(700)), "{} began {first:?}", NAMES[index]);
     }
@@ -130,7 +133,7 @@ fn a_dead_chip() {
     use SensorErrorKind::*;
     let dead = Faults { dead: true, ..Faults::default() };
     each(&ALL, "death", set(dead), heal, |index, said| {
-        assert_failed(index, said, &[Bus, Timeout, Identification, Configuration, Data, Other], "death");
+        assert_failed(index, said, &FAULT, &[Bus, Timeout, Identification, Configuration, Data, Other], "death");
     });
 }
 
@@ -139,7 +142,7 @@ fn refused_transfers() {
     let refusing = Faults { refusals: 1.0, ..Faults::default() };
     each(&ALL, "refusal", set(refusing), heal, |index, said| {
         // A range finder that does not acknowledge may have restarted at its first address.
-        assert_failed(index, said, &[SensorErrorKind::Bus, SensorErrorKind::Other], "refusal");
+        assert_failed(index, said, &FAULT, &[SensorErrorKind::Bus, SensorErrorKind::Other], "refusal");
     });
 }
 
@@ -161,25 +164,34 @@ fn bit_errors() {
 fn a_stretched_clock() {
     // Half a millisecond in every transfer: slow, but within what every driver allows.
     let slow = Faults { stretch: Micros(500), ..Faults::default() };
-    each(&ON_I2C, "stretching", set(slow), heal, |index, said| assert_unharmed(index, said, "stretching"));
+    each(&ON_I2C, "stretching", set(slow), heal, |index, said| assert_unharmed(index, said, END, "stretching"));
 }
 
 #[test]
 fn a_clock_that_is_held() {
     // 15 ms in every transfer is given up. Nobody can use the bus meanwhile, so the neighbours miss samples; but in
-    // between they have their turns, and nobody is worse off afterwards.
+    // between they have their turns, and nobody is worse off afterwards. Who waits behind a held transfer is given up
+    // with it and asks again after 80 ms at most, so which turns are lost is a matter of chance: in two seconds the
+    // slowest neighbour is served some twenty times, and less than half of that would be starving.
     let held = Faults { stretch: Micros::from_millis(15), ..Faults::default() };
+    let ends = Micros::from_millis(3_000);
+    let end = Micros::from_millis(5_100);
     for index in ON_I2C {
-        let said =
-            run(END, &[(BEGIN, &|access| set(held)(access, index)), (FAULT_ENDS, &|access| heal(access, index))]);
-        assert_failed(index, &said[index], &[SensorErrorKind::Timeout, SensorErrorKind::Bus], "held clock");
+        let said = run(end, &[(BEGIN, &|access| set(held)(access, index)), (ends, &|access| heal(access, index))]);
+        let fault = BEGIN..ends;
+        assert_failed(index, &said[index], &fault, &[SensorErrorKind::Timeout, SensorErrorKind::Bus], "held clock");
         for other in ON_I2C {
-            assert_recovered(other, &said[other], FAULT_ENDS, "held clock");
-            let served = samples(&said[other]).filter(|(at, _)| (BEGIN..FAULT_ENDS).contains(at)).count();
-            assert!(other == index || served > 0, "held clock of {}: {} starves", NAMES[index], NAMES[other]);
+            assert_recovered(other, &said[other], ends, end, "held clock");
+            let served = samples(&said[other]).filter(|(at, _)| fault.contains(at)).count();
+            assert!(
+                other == index || served >= 8,
+                "held clock of {}: {} is served {served} times",
+                NAMES[index],
+                NAMES[other]
+            );
         }
-        assert_unharmed(0, &said[0], "held clock");
-        assert_unharmed(1, &said[1], "held clock");
+        assert_unharmed(0, &said[0], end, "held clock");
+        assert_unharmed(1, &said[1], end, "held clock");
     }
 }
 
@@ -191,7 +203,7 @@ fn a_reset_in_flight() {
         |access, index| access.chip(index).reset(),
         |_, _| {},
         |index, said| {
-            assert_recovered(index, said, BEGIN + promise(index)[1], "reset");
+            assert_recovered(index, said, BEGIN + promise(index)[1], END, "reset");
         },
     );
 }
@@ -227,9 +239,9 @@ fn a_data_line_that_is_held() {
     let failed: usize = ON_I2C.iter().map(|index| errors(&said[*index]).len()).sum();
     assert_eq!(failed, 1, "the one whose turn it was frees the bus for all");
     for index in ON_I2C {
-        assert_recovered(index, &said[index], BEGIN, "held data line");
+        assert_recovered(index, &said[index], BEGIN, END, "held data line");
     }
     for index in [0, 1] {
-        assert_unharmed(index, &said[index], "held data line");
+        assert_unharmed(index, &said[index], END, "held data line");
     }
 }

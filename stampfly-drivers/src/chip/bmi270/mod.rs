@@ -69,10 +69,11 @@ impl Default for Config {
 /// The driver. Implements [`Imu`].
 ///
 /// `Sample::at` is the middle of the decimation filter: at 400 Hz three chip samples (1.9 ms) before the newest one,
-/// by the chip's clock, good to one of its ticks (39 µs) and the time the status takes on the bus (13 µs at 10 MHz).
-/// The chip's own low-pass delays a little more; that is not taken off.
+/// by the chip's clock, good to one of its ticks (39 µs) and the time that the address takes on the bus (4 µs on SPI at
+/// 10 MHz, 0.1 ms on I2C at 400 kHz). The chip's own low-pass delays a little more; that is not taken off.
 ///
-/// A reader that comes late gets every sample, up to 90 ms (at 400 Hz). Beyond that, or when a read is cancelled or
+/// A reader that comes late gets every sample, up to 90 ms (at 400 Hz), each stamped by the nominal rate: off by what
+/// the chip's clock is in the time it was late, 2 % of it. Beyond that, or when a read is cancelled or
 /// garbled, the FIFO is emptied and the filter starts anew, which takes two output periods. Gives up on the chip
 /// ([`ChipError::NoSample`]) after four output periods without a sample.
 ///
@@ -113,6 +114,8 @@ pub struct Bmi270<'b, R, T, P = NoPin> {
     decimator: Decimator,
     /// When to look again.
     due: Micros,
+    /// The shortest time a status took: the bus alone, without waiting for it.
+    on_bus: Micros,
     cross_axis: f32,
     temperature: f32,
 }
@@ -143,6 +146,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
             reading: false,
             decimator: Decimator::default(),
             due: Micros::ZERO,
+            on_bus: Micros::from_secs(1),
             cross_axis: 0.0,
             // The zero of the chip's scale, until it has measured.
             temperature: 23.0,
@@ -151,10 +155,23 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
 
     /// The same chip, with the pin its INT1 is wired to. The chip drives it, high when four samples are there.
     pub fn with_interrupt<P: Wait>(self, pin: P) -> Bmi270<'b, R, T, P> {
-        let Self { port, blob, axes, config, reading, decimator, due, cross_axis, temperature, .. } = self;
+        let Self { port, blob, axes, config, reading, decimator, due, on_bus, cross_axis, temperature, .. } = self;
         let interrupt = Interrupt::on(pin);
         // It is set up anew, with the interrupt.
-        Bmi270 { port, interrupt, blob, axes, config, running: false, reading, decimator, due, cross_axis, temperature }
+        Bmi270 {
+            port,
+            interrupt,
+            blob,
+            axes,
+            config,
+            running: false,
+            reading,
+            decimator,
+            due,
+            on_bus,
+            cross_axis,
+            temperature,
+        }
     }
 }
 
@@ -181,7 +198,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
         self.port.wait(GYRO_START).await;
         let kept: [u8; 4] = self.port.read(register::ACC_CONF).await?;
-        let status = self.status().await?;
+        let (status, ..) = self.status().await?;
         if kept != wanted || status.configuration_error {
             return Err(ChipError::Configuration { status: kept[0] });
         }
@@ -289,8 +306,16 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         Ok(())
     }
 
-    async fn status(&mut self) -> Result<Status, ChipError<R::Error>> {
-        Ok(Status::decode(&self.port.read(register::SENSORTIME_0).await?))
+    /// The status, the instant of the time in it, and how long after that at most the fill level was read.
+    async fn status(&mut self) -> Result<(Status, Micros, Micros), ChipError<R::Error>> {
+        let asked = self.port.now();
+        let status = Status::decode(&self.port.read(register::SENSORTIME_0).await?);
+        let answered = self.port.now();
+        let took = answered.since(asked);
+        self.on_bus = self.on_bus.min(took);
+        // The time comes first, after the addresses: a quarter of the burst, on I2C as on SPI.
+        let before = Micros(self.on_bus.0 / 4);
+        Ok((status, answered.since(self.on_bus.since(before)), took.since(before)))
     }
 
     /// Empties the FIFO and forgets what the filter remembers.
@@ -311,13 +336,11 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
     async fn group(&mut self, deadline: Micros) -> Result<Option<(Micros, [[i16; 6]; 4])>, ChipError<R::Error>> {
         loop {
             self.interrupt.wait(&mut self.port, self.due, ticks_to_micros(AIM)).await;
-            let asked = self.port.now();
-            if asked > deadline {
+            if self.port.now() > deadline {
                 self.running = false;
                 return Err(ChipError::NoSample);
             }
-            let status = self.status().await?;
-            let answered = self.port.now();
+            let (status, told, after) = self.status().await?;
             if status.start_up != Status::RUNNING {
                 self.running = false;
                 return Err(ChipError::Restarted);
@@ -326,9 +349,9 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let period = self.config.rate.ticks();
             let age = u64::from(status.sensor_time) % period;
             let frames = u64::from(status.fifo_bytes) / FRAME_BYTES as u64;
-            let newest = answered.since(ticks_to_micros(age));
+            let newest = told.since(ticks_to_micros(age));
             // Would the next sample have come while the status was on the bus?
-            let ambiguous = age < EARLIEST || ticks_to_micros(age) + answered.since(asked) >= ticks_to_micros(period);
+            let ambiguous = age < EARLIEST || ticks_to_micros(age) + after >= ticks_to_micros(period);
             self.interrupt.judge(frames >= 4);
             if frames < 4 || ambiguous {
                 let missing = 4u64.saturating_sub(frames).max(u64::from(age >= EARLIEST));

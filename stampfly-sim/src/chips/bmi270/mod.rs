@@ -1,4 +1,4 @@
-//! The inertial sensor BMI270: Bosch BST-BMI270-DS000 ("DS" below), on SPI.
+//! The inertial sensor BMI270: Bosch BST-BMI270-DS000 ("DS" below), on SPI or I²C.
 //!
 //! | register | content | after reset | DS |
 //! |---|---|---|---|
@@ -8,18 +8,25 @@
 //! | 0x0C–0x11, 0x12–0x17 | accelerometer, gyroscope, low byte first | 0 | 5.2.8, 5.2.14 |
 //! | 0x18–0x1A | time, 39.0625 µs | | 5.2.20 |
 //! | 0x1B | event: bit 0 power-on, cleared by reading; (4:2) settings refused | 1 | 5.2.23 |
-//! | 0x1D | interrupt status: accelerometer (7), gyroscope (6) ready, cleared by reading | 0 | 5.2.25 |
+//! | 0x1D | interrupt status: accelerometer (7), gyroscope (6) ready, FIFO at its watermark (1), cleared by reading | 0 | 5.2.25 |
 //! | 0x21 | (3:0) 0 not initialised, 1 ready, 2 failed | 0 | 5.2.30 |
 //! | 0x22–0x23 | temperature, 1/512 K above 23 °C, 0x8000 invalid | 0x8000 | 5.2.31 |
 //! | 0x24–0x25, 0x26 | FIFO fill level, FIFO data | 0 | 5.2.33 to 5.2.35 |
 //! | 0x40, 0x41 | accelerometer filter and rate, range | 0xA8, 0x02 | 5.2.45, 5.2.46 |
 //! | 0x42, 0x43 | gyroscope filter and rate, range | 0xA9, 0x00 | 5.2.47, 5.2.48 |
+//! | 0x46, 0x47 | FIFO watermark, bytes (4:0 of the second) | 0x00, 0x02 | 5.2.51, 5.2.52 |
 //! | 0x48, 0x49 | FIFO: stop when full (0), time (1); header (4), accelerometer (6), gyroscope (7) | 0x02, 0x10 | 5.2.53, 5.2.54 |
+//! | 0x53 | interrupt pin 1: output (3), open drain (2), active high (1) | 0 | 5.2.63 |
+//! | 0x55 | bit 0: interrupts are latched | 0 | 5.2.65 |
+//! | 0x58 | to pin 1: data ready (2), FIFO watermark (1) | 0 | 5.2.68 |
 //! | 0x59 | 0 prepares, 1 ends the upload | 0 | 5.2.69 |
 //! | 0x5B, 0x5C, 0x5E | word address (3:0, 11:4), data of the upload | 0 | 5.2.70 to 5.2.72 |
+//! | 0x69 | bit 2: a test of the gyroscope runs | 0 | 5.2.75 |
+//! | 0x6D | accelerometer self test: on (0), positive (2), large (3) | 0 | 5.2.79 |
+//! | 0x6E | gyroscope self test: done (0), x, y, z in order (1 to 3) | 0 | 5.2.80 |
 //! | 0x7C | bit 0: advanced power save | 0x03 | 5.2.98 |
 //! | 0x7D | gyroscope (1), accelerometer (2), temperature (3) on | 0 | 5.2.99 |
-//! | 0x7E | 0xB6 resets, 0xB0 empties the FIFO | 0 | 5.2.100 |
+//! | 0x7E | 0xB6 resets, 0xB0 empties the FIFO, 0x02 tests the gyroscope | 0 | 5.2.100 |
 //!
 //! The section numbers of single registers follow the order of the register map and are *unverified*; the contents
 //! are those of the map in DS 5.1.
@@ -28,6 +35,13 @@
 //! edge of chip select as the choice of SPI, so the first transfer after power-on and after a reset is lost (DS 6.1).
 //! A read goes on to the next register, except at 0x26 and 0x5E. In advanced power save neither the FIFO nor the
 //! upload can be reached, and writes need 450 µs between them, otherwise 2 µs (DS 4.4, 6.5).
+//!
+//! The chip can also be asked over I²C, at 0x68 or 0x69, as long as chip select stays high; then a read has no byte
+//! without meaning (DS 6.4).
+//!
+//! *Unverified* about pin 1: that it follows the watermark as long as it is not latched, that data ready is a pulse of
+//! 312 µs, and that a latched one is set again at once where its cause persists. On the board the pin has a pull-up, so
+//! it is high while it is no output, and open drain makes no difference. About the self tests: see `self_test.rs`.
 //!
 //! The time counts sixteen ticks a sample and a sample falls on a multiple of them: Bosch says so of this part's
 //! siblings (BMI160, 2.3.1 table 11; BMA400, "Sensor Time") and their drivers rely on it.
@@ -38,15 +52,23 @@
 //! below 1600 Hz; the four bytes after header 0x48. Not modelled: rates above 1600 Hz, interrupt pins, FIFO
 //! downsampling and watermark, features, the auxiliary bus, filter delay.
 
+mod bus;
 mod fifo;
+mod interrupt;
+mod registers;
+mod sampling;
+mod self_test;
 
-use super::{Chip, SpiChip};
-use crate::sensors::imu::{ImuPhysics, to_counts};
+use super::Chip;
+use crate::sensors::imu::ImuPhysics;
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
 use crate::world::World;
 use fifo::Fifo;
-use stampfly_types::{GRAVITY, Micros};
+use interrupt::Interrupt;
+pub use interrupt::InterruptPin;
+use self_test::SelfTest;
+use stampfly_types::Micros;
 
 const ID: u16 = 0x00;
 const STATUS: u16 = 0x03;
@@ -63,12 +85,19 @@ const ACCEL_SETTINGS: u16 = 0x40;
 const ACCEL_RANGE: u16 = 0x41;
 const GYRO_SETTINGS: u16 = 0x42;
 const GYRO_RANGE: u16 = 0x43;
+const WATERMARK: u16 = 0x46;
 const FIFO_MODE: u16 = 0x48;
 const FIFO_CONTENT: u16 = 0x49;
+const INTERRUPT_PIN: u16 = 0x53;
+const LATCH: u16 = 0x55;
+const INTERRUPT_MAP: u16 = 0x58;
 const UPLOAD_CONTROL: u16 = 0x59;
 const UPLOAD_ADDRESS_LOW: u16 = 0x5B;
 const UPLOAD_ADDRESS_HIGH: u16 = 0x5C;
 const UPLOAD_DATA: u16 = 0x5E;
+const GYRO_TEST: u16 = 0x69;
+const ACCEL_SELF_TEST: u16 = 0x6D;
+const GYRO_SELF_TEST: u16 = 0x6E;
 const POWER_SAVE: u16 = 0x7C;
 const POWER: u16 = 0x7D;
 const COMMAND: u16 = 0x7E;
@@ -90,6 +119,10 @@ const AFTER_RESET: [(u16, u8); 11] = [
 const READY_ACCEL: u8 = 0x80;
 const READY_GYRO: u8 = 0x40;
 const COMMAND_READY: u8 = 0x10;
+/// The FIFO has reached its watermark, as interrupt status and as what pin 1 may say.
+const AT_WATERMARK: u8 = 0x02;
+/// Data ready, as what pin 1 may say.
+const DATA_READY: u8 = 0x04;
 const START_UP: Micros = Micros(2_000);
 const UPLOAD_CHECK: Micros = Micros(10_000);
 const ACCEL_START: Micros = Micros(2_000);
@@ -149,6 +182,10 @@ pub struct Bmi270 {
     /// Sums of the samples since the last output, accelerometer and gyroscope, and how many.
     sums: [([f64; 3], u64); 2],
     fifo: Fifo,
+    interrupt: Interrupt,
+    self_test: SelfTest,
+    /// The sensing elements do not move.
+    broken: bool,
     /// The address byte of this transfer.
     command: u8,
     pointer: u16,
@@ -182,6 +219,9 @@ impl Bmi270 {
             on: [None; 2],
             sums: Default::default(),
             fifo: Fifo::default(),
+            interrupt: Interrupt::default(),
+            self_test: SelfTest::default(),
+            broken: false,
             command: 0,
             pointer: 0,
             shadow: [0; 12],
@@ -202,23 +242,6 @@ impl Bmi270 {
         self.register(POWER_SAVE) & 1 != 0
     }
 
-    /// Samples at 1600 Hz per output of sensor 0 or 1; none where the rate is not allowed (DS 5.2.45, 5.2.47).
-    fn divider(&self, sensor: usize) -> Option<u64> {
-        let (register, slowest) = [(ACCEL_SETTINGS, 1), (GYRO_SETTINGS, 6)][sensor];
-        let code = self.register(register) & 0x0F;
-        (slowest..=FASTEST).contains(&code).then(|| 1 << (FASTEST - code))
-    }
-
-    /// Counts per m/s² or rad/s (DS 5.2.46, 5.2.48).
-    fn scale(&self, sensor: usize) -> f64 {
-        if sensor == 0 {
-            f64::from(16_384u32 >> (self.register(ACCEL_RANGE) & 3)) / f64::from(GRAVITY)
-        } else {
-            let doublings = (self.register(GYRO_RANGE) & 7).min(4);
-            16.4 * f64::from(1u8 << doublings) * 180.0 / core::f64::consts::PI
-        }
-    }
-
     /// The chip's 24-bit time at `at`.
     fn time(&self, at: Micros) -> [u8; 3] {
         let ticks = (16.0 * (self.schedule.phase(at) - self.schedule.phase(self.epoch).floor())) as u32;
@@ -233,229 +256,45 @@ impl Bmi270 {
             self.set(INTERNAL_STATUS, if complete { 1 } else { 2 });
             self.switch(instant);
         }
+        if self.self_test.gyro_ends(now) {
+            self.set(GYRO_SELF_TEST, if self.broken { 0x01 } else { 0x0F });
+            self.set(GYRO_TEST, self.register(GYRO_TEST) & !0x04);
+        }
         while self.schedule.instant(self.tick) <= now {
             let at = self.schedule.instant(self.tick);
+            self.end_pulse(at);
             self.tick += 1;
             if self.on != [None; 2] {
                 self.sample(at);
+                self.drive_pin();
             }
+        }
+        self.end_pulse(now);
+    }
+
+    /// The earliest instant at which something can happen without a transfer.
+    fn next_event(&self) -> Option<Micros> {
+        let sample = (self.on != [None; 2]).then(|| self.schedule.instant(self.tick));
+        [sample, self.check, self.interrupt.pulse_ends()].into_iter().flatten().min()
+    }
+
+    fn end_pulse(&mut self, now: Micros) {
+        if self.interrupt.end_pulse(now) {
+            self.drive_pin();
         }
     }
 
-    /// One tick of the sensors.
-    fn sample(&mut self, at: Micros) {
-        let [ax, ay, az, gx, gy, gz] = self.physics.sample(at);
-        // Body is (y, x, −z) of the chip as it is soldered.
-        let body = [[ay, ax, -az], [gy, gx, -gz]];
-        let mut outputs = [None; 2];
-        for (sensor, values) in body.into_iter().enumerate() {
-            let started = [ACCEL_START, GYRO_START][sensor];
-            let running = self.on[sensor].is_some_and(|since| at.since(since) >= started && at >= since);
-            let Some(divider) = self.divider(sensor).filter(|_| running) else { continue };
-            let (sum, count) = &mut self.sums[sensor];
-            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-            *count += 1;
-            if !self.tick.is_multiple_of(divider) {
-                continue;
-            }
-            let (sum, count) = core::mem::take(&mut self.sums[sensor]);
-            let scale = self.scale(sensor);
-            let mut bytes = [0; 6];
-            for (pair, sum) in bytes.chunks_exact_mut(2).zip(sum) {
-                pair.copy_from_slice(&to_counts(sum / count as f64, scale).to_le_bytes());
-            }
-            let place = usize::from([ACCEL, GYRO][sensor]);
-            self.registers[place..place + 6].copy_from_slice(&bytes);
-            let flag = [READY_ACCEL, READY_GYRO][sensor];
-            self.set(STATUS, self.register(STATUS) | flag);
-            self.set(INTERRUPTS, self.register(INTERRUPTS) | flag);
-            outputs[sensor] = Some(bytes);
-        }
-        if self.register(POWER) & 8 != 0 {
-            let counts = ((self.physics.temperature(at) - 23.0) * 512.0) as i16;
-            let [low, high] = counts.to_le_bytes();
-            self.set(TEMPERATURE, low);
-            self.set(TEMPERATURE + 1, high);
-        }
-        let content = self.register(FIFO_CONTENT);
-        let [accel, gyro] = [outputs[0].filter(|_| content & 0x40 != 0), outputs[1].filter(|_| content & 0x80 != 0)];
-        if accel.is_some() || gyro.is_some() {
-            self.fifo.push(gyro, accel, content & 0x10 != 0, self.register(FIFO_MODE) & 1 != 0);
-        }
+    /// Whether the FIFO holds as much as its watermark says, which is at least a byte (DS 4.8).
+    fn at_watermark(&self) -> bool {
+        let bytes = usize::from(self.register(WATERMARK)) | usize::from(self.register(WATERMARK + 1) & 0x1F) << 8;
+        self.fifo.len() >= bytes.max(1)
     }
 
-    /// Switches the sensors as the power register says.
-    fn switch(&mut self, now: Micros) {
-        let power = self.register(POWER);
-        for (sensor, bit) in [(0, 4), (1, 2)] {
-            let on = power & bit != 0 && self.register(INTERNAL_STATUS) & 0x0F == 1;
-            self.on[sensor] = on.then(|| self.on[sensor].unwrap_or(now));
-            if !on {
-                self.sums[sensor] = Default::default();
-            }
-        }
-    }
-
-    /// Looks whether the rates are allowed and tells by the event register.
-    fn check_settings(&mut self) {
-        let refused = u8::from(self.divider(0).is_none()) | u8::from(self.divider(1).is_none()) << 1;
-        self.set(EVENT, self.register(EVENT) & !0x1C | refused << 2);
-    }
-}
-
-impl Chip for Bmi270 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
-        self.update(now);
-        if now < self.ready {
-            return 0;
-        }
-        let value = self.register(register);
-        u16::from(match register {
-            ID => self.id,
-            STATUS => value | COMMAND_READY,
-            ACCEL..TIME => {
-                let (first, flag) = if register < GYRO { (ACCEL, READY_ACCEL) } else { (GYRO, READY_GYRO) };
-                let place = usize::from(first - ACCEL);
-                // What arrived during this transfer has not been read.
-                if self.shadow[place..place + 6] == self.registers[usize::from(first)..usize::from(first) + 6] {
-                    self.set(STATUS, self.register(STATUS) & !flag);
-                }
-                self.shadow[usize::from(register - ACCEL)]
-            }
-            TIME..EVENT => self.time(now)[usize::from(register - TIME)],
-            EVENT => {
-                self.set(EVENT, value & !1);
-                value
-            }
-            INTERRUPTS => core::mem::take(&mut self.registers[usize::from(INTERRUPTS)]),
-            FIFO_LENGTH => self.fifo.len() as u8,
-            0x25 => (self.fifo.len() >> 8) as u8 & 0x3F,
-            FIFO_DATA if self.saves_power() => 0,
-            FIFO_DATA => {
-                let timed = self.register(FIFO_MODE) & 2 != 0 && self.register(FIFO_CONTENT) & 0x10 != 0;
-                self.fifo.pop(timed.then(|| self.time(now)))
-            }
-            UPLOAD_DATA | COMMAND => 0,
-            _ => value,
-        })
-    }
-
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
-        self.update(now);
-        let value = value as u8;
-        if now < self.ready || register >= 0x80 {
-            return;
-        }
-        match register {
-            // Read-only.
-            0x00..=0x2E => {}
-            UPLOAD_CONTROL if self.saves_power() => {}
-            UPLOAD_CONTROL => {
-                self.set(UPLOAD_CONTROL, value);
-                self.prepared = value & 1 == 0;
-                if self.prepared {
-                    self.memory.clear();
-                    self.set(INTERNAL_STATUS, 0);
-                    self.switch(now);
-                } else {
-                    self.check = Some(now + UPLOAD_CHECK);
-                }
-            }
-            UPLOAD_ADDRESS_LOW | UPLOAD_ADDRESS_HIGH => {
-                self.set(register, value);
-                let words = usize::from(self.register(UPLOAD_ADDRESS_HIGH)) << 4
-                    | usize::from(self.register(UPLOAD_ADDRESS_LOW) & 0x0F);
-                self.address = 2 * words;
-            }
-            UPLOAD_DATA if self.saves_power() || !self.prepared => {}
-            UPLOAD_DATA => {
-                if self.address < UPLOAD_SIZE {
-                    self.memory.resize(self.memory.len().max(self.address + 1), 0);
-                    self.memory[self.address] = value;
-                    self.address += 1;
-                }
-            }
-            COMMAND if value == 0xB6 => self.reset(now),
-            COMMAND if value == 0xB0 => self.fifo.clear(),
-            COMMAND => {}
-            POWER => {
-                self.set(POWER, value & 0x0F);
-                self.switch(now);
-            }
-            ACCEL_SETTINGS..=GYRO_RANGE => {
-                let sensor = usize::from(register >= GYRO_SETTINGS);
-                if self.register(register) != value && self.register(FIFO_CONTENT) & (0x40 << sensor) != 0 {
-                    self.fifo.push_configuration(1 << sensor);
-                }
-                self.set(register, value);
-                self.sums[sensor] = Default::default();
-                self.check_settings();
-            }
-            _ => self.set(register, value),
-        }
-    }
-
-    fn reset(&mut self, now: Micros) {
-        self.registers = [0; 128];
-        for (register, value) in AFTER_RESET {
-            self.set(register, value);
-        }
-        self.ready = now + START_UP;
-        self.epoch = now;
-        self.spi = false;
-        self.idle_until = now;
-        self.prepared = false;
-        self.check = None;
-        self.address = 0;
-        self.memory.clear();
-        self.on = [None; 2];
-        self.sums = Default::default();
-        self.fifo.clear();
-        self.shadow = [0; 12];
-    }
-
-    fn set_id(&mut self, id: u16) {
-        self.id = id as u8;
-    }
-}
-
-impl SpiChip for Bmi270 {
-    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
-        if index == 0 {
-            self.update(now);
-            self.command = byte;
-            self.accepts = now >= self.idle_until;
-            self.pointer = u16::from(byte & 0x7F);
-            self.shadow.copy_from_slice(&self.registers[usize::from(ACCEL)..usize::from(TIME)]);
-            return 0xFF;
-        }
-        let reads = self.command & 0x80 != 0;
-        if !self.spi {
-            return 0xFF;
-        }
-        if reads && index == 1 {
-            return 0;
-        }
-        let register = self.pointer;
-        if register != FIFO_DATA && register != UPLOAD_DATA {
-            self.pointer = (self.pointer + 1) & 0x7F;
-        }
-        if reads {
-            return self.read(register, now) as u8;
-        }
-        if self.accepts {
-            self.write(register, u16::from(byte), now);
-        }
-        0xFF
-    }
-
-    fn release(&mut self, now: Micros) {
-        if self.spi && self.command & 0x80 == 0 && self.accepts {
-            let idle = if self.saves_power() { 450 } else { 2 };
-            self.idle_until = now + Micros(idle);
-        }
-        // The rising edge chooses SPI, but not in the start-up, so not at the end of the transfer that resets.
-        self.spi = now >= self.ready;
-        self.fifo.release();
+    /// Sets pin 1 as the settings and what there is to say want it.
+    fn drive_pin(&mut self) {
+        let map = self.register(INTERRUPT_MAP);
+        let request = map & AT_WATERMARK != 0 && self.at_watermark()
+            || map & DATA_READY != 0 && self.interrupt.pulse_ends().is_some();
+        self.interrupt.drive(request, self.register(LATCH) & 1 != 0, self.register(INTERRUPT_PIN));
     }
 }

@@ -1,0 +1,94 @@
+//! The two ways to the registers of the BMI270 (DS 6): SPI with its byte without meaning, and I²C without it.
+
+use super::{ACCEL, Bmi270, FIFO_DATA, TIME, UPLOAD_DATA};
+use crate::chips::{Chip, I2cChip, SpiChip};
+use stampfly_types::Micros;
+
+impl Bmi270 {
+    /// A transfer begins at this register.
+    fn begin(&mut self, register: u8, now: Micros) {
+        self.update(now);
+        self.accepts = now >= self.idle_until;
+        self.pointer = u16::from(register & 0x7F);
+        self.shadow.copy_from_slice(&self.registers[usize::from(ACCEL)..usize::from(TIME)]);
+    }
+
+    /// The register of the next byte, which is the following one except for data that come through a single register.
+    fn step(&mut self) -> u16 {
+        let register = self.pointer;
+        if register != FIFO_DATA && register != UPLOAD_DATA {
+            self.pointer = (self.pointer + 1) & 0x7F;
+        }
+        register
+    }
+
+    fn take(&mut self, byte: u8, now: Micros) {
+        let register = self.step();
+        if self.accepts {
+            self.write(register, u16::from(byte), now);
+        }
+    }
+
+    /// A transfer is over.
+    fn end(&mut self, wrote: bool, now: Micros) {
+        if wrote && self.accepts {
+            let idle = if self.saves_power() { 450 } else { 2 };
+            self.idle_until = now + Micros(idle);
+        }
+        self.fifo.release();
+        self.drive_pin();
+        self.interrupt.wake();
+    }
+}
+
+impl SpiChip for Bmi270 {
+    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
+        if index == 0 {
+            self.command = byte;
+            self.begin(byte, now);
+            return 0xFF;
+        }
+        let reads = self.command & 0x80 != 0;
+        if !self.spi {
+            return 0xFF;
+        }
+        if reads && index == 1 {
+            return 0;
+        }
+        if reads {
+            let register = self.step();
+            return self.read(register, now) as u8;
+        }
+        self.take(byte, now);
+        0xFF
+    }
+
+    fn release(&mut self, now: Micros) {
+        let wrote = self.spi && self.command & 0x80 == 0;
+        // The rising edge chooses SPI, but not in the start-up, so not at the end of the transfer that resets.
+        self.spi = now >= self.ready;
+        self.end(wrote, now);
+    }
+}
+
+impl I2cChip for Bmi270 {
+    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+        if index == 0 {
+            self.command = 0;
+            self.begin(byte, now);
+        } else {
+            self.command = 1;
+            self.take(byte, now);
+        }
+        true
+    }
+
+    fn send(&mut self, _: usize, now: Micros) -> u8 {
+        let register = self.step();
+        self.read(register, now) as u8
+    }
+
+    fn stop(&mut self, now: Micros) {
+        self.end(self.command != 0, now);
+    }
+}

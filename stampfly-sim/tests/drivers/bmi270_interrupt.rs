@@ -1,0 +1,154 @@
+//! BMI270 with its interrupt pin, which may be right, silent or stuck.
+
+use crate::bmi270::soldered;
+use crate::{Tap, registers, standing};
+use core::cell::{Cell, RefCell};
+use core::convert::Infallible;
+use core::future::pending;
+use embedded_hal::digital::ErrorType;
+use embedded_hal_async::digital::Wait;
+use stampfly_drivers::Imu;
+use stampfly_drivers::chip::AxisMap;
+use stampfly_drivers::chip::bmi270::{Bmi270, Config};
+use stampfly_sim::Simulation;
+use stampfly_sim::chips::{InterruptPin, stand_in_image};
+use stampfly_sim::time::Tasks;
+use stampfly_types::Micros;
+
+/// What may be wrong with the wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Wire {
+    Right,
+    /// Torn: always low.
+    Silent,
+    /// Shorted to the supply: always high.
+    Stuck,
+}
+
+/// The pin at the end of that wire. It breaks between two waits.
+struct Pin<'w> {
+    pin: InterruptPin,
+    wire: &'w Cell<Wire>,
+}
+
+impl ErrorType for Pin<'_> {
+    type Error = Infallible;
+}
+
+impl Wait for Pin<'_> {
+    async fn wait_for_high(&mut self) -> Result<(), Infallible> {
+        match self.wire.get() {
+            Wire::Right => self.pin.wait_for_high().await,
+            Wire::Silent => pending().await,
+            Wire::Stuck => Ok(()),
+        }
+    }
+    async fn wait_for_low(&mut self) -> Result<(), Infallible> {
+        unreachable!("the driver waits for the level")
+    }
+    async fn wait_for_rising_edge(&mut self) -> Result<(), Infallible> {
+        unreachable!("the driver waits for the level")
+    }
+    async fn wait_for_falling_edge(&mut self) -> Result<(), Infallible> {
+        unreachable!("the driver waits for the level")
+    }
+    async fn wait_for_any_edge(&mut self) -> Result<(), Infallible> {
+        unreachable!("the driver waits for the level")
+    }
+}
+
+/// What came of two seconds.
+struct Run {
+    /// When samples were delivered, and for when.
+    samples: Vec<(Micros, Micros)>,
+    /// When the pin itself rose: the instants of every fourth sample in the chip.
+    rises: Vec<Micros>,
+    /// How often the status was read, all in all.
+    looks: usize,
+}
+
+/// The wire is `before` for a second and `after` for another.
+fn run(before: Wire, after: Wire) -> Run {
+    let simulation = standing();
+    let (port, attached) = soldered(&simulation);
+    let (pin, mut watched) = (port.interrupt_pin(), port.interrupt_pin());
+    let (tap, transfers) = Tap::new(port);
+    let Simulation { clock, .. } = simulation;
+    let (image, wire) = (stand_in_image(), Cell::new(before));
+    let imu = Bmi270::spi(tap, clock.clone(), &image, AxisMap::STAMPFLY_IMU, Config::default());
+    let mut imu = imu.with_interrupt(Pin { pin, wire: &wire });
+    let (samples, rises) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
+    let mut tasks = Tasks::new(clock.clone());
+    tasks.spawn(async {
+        loop {
+            let sample = imu.next().await.expect("a sample");
+            samples.borrow_mut().push((clock.now(), sample.at));
+        }
+    });
+    tasks.spawn(async {
+        loop {
+            let Ok(()) = watched.wait_for_rising_edge().await;
+            rises.borrow_mut().push(clock.now());
+        }
+    });
+    tasks.run_until(Micros::from_secs(1));
+    wire.set(after);
+    tasks.run_until(Micros::from_secs(2));
+    drop(tasks);
+    // Four frames, push-pull, active high, not latched, watermark on the pin.
+    assert_eq!(registers(&attached, 0x46), [52, 0]);
+    assert_eq!([0x53, 0x55, 0x58].map(|register| attached.peek(register)), [0x0A, 0x00, 0x02]);
+    let looks = transfers.borrow().iter().filter(|(command, _)| *command == 0x98).count();
+    Run { samples: samples.into_inner(), rises: rises.into_inner(), looks }
+}
+
+/// The longest time from the last chip sample in a delivered one, which is three of them after its stamp, to delivery.
+fn latest(samples: &[(Micros, Micros)]) -> u64 {
+    samples.iter().map(|(seen, at)| seen.since(*at).0.saturating_sub(3 * 625)).max().expect("samples")
+}
+
+fn longest_gap(samples: &[(Micros, Micros)]) -> u64 {
+    samples.windows(2).map(|pair| pair[1].0.since(pair[0].0).0).max().expect("samples")
+}
+
+#[test]
+fn samples_come_by_the_pin_one_look_each() {
+    let run = run(Wire::Right, Wire::Right);
+    assert!(run.samples.len() > 700, "{}", run.samples.len());
+    assert!(run.looks <= run.samples.len() + 5, "{} looks for {} samples", run.looks, run.samples.len());
+    // Three ticks after the edge, and two transfers.
+    assert!(latest(&run.samples) < 117 + 60 + 60, "{} µs", latest(&run.samples));
+    for (seen, at) in &run.samples {
+        let rise = run.rises.iter().rev().find(|rise| *rise <= seen).expect("a rise before every sample");
+        // Three periods of the chip's clock, which may be off by two per cent; one tick; the status on the bus.
+        let error = rise.since(*at).0.abs_diff(3 * 625);
+        assert!(error <= 38 + 40 + 13, "stamped {error} µs off");
+    }
+}
+
+#[test]
+fn a_pin_that_is_wrong_from_the_start_costs_a_few_late_samples() {
+    let right = run(Wire::Right, Wire::Right).samples.len();
+    for wire in [Wire::Silent, Wire::Stuck] {
+        let run = run(wire, wire);
+        assert!(run.samples.len() + 3 >= right, "{wire:?}: {} samples instead of {right}", run.samples.len());
+        assert!(longest_gap(&run.samples) < 2_500 + 625, "{wire:?}: {} µs", longest_gap(&run.samples));
+        // Without the pin, by the driver's own clock: half a period late at worst.
+        let settled = &run.samples[20..];
+        assert!(latest(settled) < 117 + 60 + 60 + 100, "{wire:?}: {} µs", latest(settled));
+    }
+}
+
+#[test]
+fn a_pin_that_breaks_in_flight_is_not_missed() {
+    for wire in [Wire::Silent, Wire::Stuck] {
+        let run = run(Wire::Right, wire);
+        assert!(run.samples.len() > 700 && longest_gap(&run.samples) < 2_500 + 625, "{wire:?}");
+    }
+}
+
+#[test]
+fn the_same_run_gives_the_same_instants() {
+    let [one, two] = [run(Wire::Right, Wire::Stuck), run(Wire::Right, Wire::Stuck)];
+    assert_eq!((one.samples, one.rises, one.looks), (two.samples, two.rises, two.looks));
+}

@@ -1,0 +1,73 @@
+//! Inertial and flow sensor on one bus in slots: the one on time, the other in between.
+
+use core::cell::{Cell, RefCell};
+use stampfly_drivers::chip::AxisMap;
+use stampfly_drivers::chip::bmi270::{self, Bmi270};
+use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
+use stampfly_drivers::slot::{Rhythm, Slots};
+use stampfly_drivers::{Imu, OpticalFlow};
+use stampfly_sim::chips::{Board, stand_in_image};
+use stampfly_sim::time::Tasks;
+use stampfly_sim::{Simulation, SimulationConfig};
+use stampfly_types::Micros;
+
+/// The flow sensor's longest transfer.
+const LONGEST: Micros = Micros(200);
+const END: Micros = Micros::from_secs(30);
+/// Both have started.
+const BEGIN: Micros = Micros::from_secs(1);
+
+/// The worst of one vehicle: age of an inertial sample at its delivery, and time between two flow samples.
+fn worst(seed: u64) -> [Micros; 2] {
+    let config = SimulationConfig { seed, ..Default::default() };
+    let Simulation { clock, world, .. } = Simulation::new(&config);
+    let image = stand_in_image();
+    let Board { imu, flow, .. } = Board::new(&world, &clock, &config, &image);
+    let mut slots = Slots::new(clock.clone(), Rhythm::HZ_400);
+    let (lead, guest, bus) = slots.split(imu, flow, LONGEST);
+    let mut imu = Bmi270::spi(lead, clock.clone(), &image, AxisMap::STAMPFLY_IMU, bmi270::Config::default());
+    let mut flow = Pmw3901::new(guest, clock.clone(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default());
+    let [age, interval] = [const { Cell::new(Micros::ZERO) }; 2];
+    let counts = RefCell::new([0; 2]);
+    let mut tasks = Tasks::new(clock.clone());
+    tasks.spawn(async {
+        loop {
+            let sample = imu.next().await.expect("no error");
+            if clock.now() > BEGIN {
+                age.set(age.get().max(clock.now().since(sample.at)));
+                counts.borrow_mut()[0] += 1;
+            }
+        }
+    });
+    tasks.spawn(async {
+        let mut before = None;
+        loop {
+            let sample = flow.next().await.expect("no error");
+            if clock.now() > BEGIN {
+                let gap = before.map_or(Micros::ZERO, |before| sample.at.since(before));
+                interval.set(interval.get().max(gap));
+                counts.borrow_mut()[1] += 1;
+            }
+            before = Some(sample.at);
+        }
+    });
+    tasks.run_until(BEGIN);
+    // The inertial sensor's long transfers of its start are over.
+    let before = bus.delays();
+    tasks.run_until(END);
+    drop(tasks);
+    assert_eq!(bus.delays(), before, "seed {seed}: the lead never waits");
+    let [samples, flows] = counts.into_inner();
+    assert!(samples > 29 * 390 && flows > 29 * 93, "seed {seed}: {samples} and {flows}");
+    [age.get(), interval.get()]
+}
+
+#[test]
+fn the_lead_never_waits_and_the_guest_hardly() {
+    let figures: Vec<_> = (1..=8).map(worst).collect();
+    let most = |index: usize| figures.iter().map(|figure| figure[index]).max().expect("eight");
+    println!("inertial sample {} old, {} between flow samples, at worst", most(0), most(1));
+    // Three chip samples of a slow clock (1.91 ms) and the read-out; 10 ms and what fits no earlier slot.
+    assert!(most(0) <= Micros(2_150), "{figures:?}");
+    assert!(most(1) <= Micros(10_750), "{figures:?}");
+}
