@@ -12,6 +12,10 @@ const END: &str = "<!-- end of figures -->";
 /// Title, arguments of `stampfly`, and what the reader should know.
 const CAMPAIGNS: &[(&str, &[&str])] = &[
     ("Reference mission, 100 seeds, gusts of 0.5 m/s", &["campaign", "--flights", "100"]),
+    (
+        "The same through the real drivers and emulated chips on simulated buses",
+        &["campaign", "--flights", "100", "--chips"],
+    ),
     ("A minute of hovering, 100 seeds", &["campaign", "--flights", "100", "--mission", "hover"]),
     ("Four times the recorded vibration, 100 seeds", &["campaign", "--flights", "100", "--vibration", "4"]),
 ];
