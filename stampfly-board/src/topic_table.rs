@@ -29,6 +29,9 @@ topics! {
     /// Battery.
     sensor_power: PowerData = ring(8) @ 10 Hz from power => [failsafe, actuation, telemetry];
 
+    /// What the self test at power-on found.
+    self_test: SelfTest = latest @ on event from self_test => [failsafe];
+
     // Commands.
     /// Frames from the pilot's transmitter.
     command_pilot: PilotInput = ring(8) @ 50 Hz from link => [command, failsafe, mode];

@@ -22,6 +22,8 @@ pub struct Outside<'b> {
     pub baro: wiring::sensor_baro::Tx<'b>,
     /// From a motion capture system.
     pub cameras: wiring::external_pose::Tx<'b>,
+    /// From the self test at power-on.
+    pub self_test: wiring::self_test::Tx<'b>,
     /// From the battery monitor.
     pub power: wiring::sensor_power::Tx<'b>,
     /// From the pilot's radio.
@@ -55,6 +57,7 @@ impl Outside<'_> {
             sensor_mag => mag,
             sensor_baro => baro,
             external_pose => cameras,
+            self_test => self_test,
             sensor_power => power,
             command_pilot => pilot,
             command_guided => guided,
@@ -76,6 +79,7 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
         sensor_mag,
         sensor_baro,
         external_pose,
+        self_test,
         sensor_power,
         command_pilot,
         command_guided,
@@ -120,6 +124,7 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
             guided: command_guided.failsafe,
             estimate: estimate_state.failsafe,
             status: estimate_status.failsafe,
+            self_test: self_test.failsafe,
             mode: system_mode.failsafe,
             alert: system_alert.tx,
         }),
@@ -204,6 +209,7 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
         mag: sensor_mag.tx,
         baro: sensor_baro.tx,
         cameras: external_pose.tx,
+        self_test: self_test.tx,
         power: sensor_power.tx,
         pilot: command_pilot.tx,
         guided: command_guided.tx,

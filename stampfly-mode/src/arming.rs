@@ -20,6 +20,7 @@ const MAX_TILT: f32 = 0.35;
 /// | `PAIRING` | pairing with a transmitter |
 /// | `THROTTLE` | manual throttle is not at rest |
 /// | `ARM_SWITCH` | the arm switch has been on since before the vehicle saw it off |
+/// | `SELF_TEST` | the self test at power-on failed |
 /// | `CRASHED` | a crash nobody has acknowledged by a disarm command or the button |
 #[must_use]
 pub fn blocks(
@@ -44,6 +45,7 @@ pub fn blocks(
         .set(ArmBlocks::TILTED, frame::tilt(&input.estimate.attitude) > MAX_TILT)
         .set(ArmBlocks::SENSOR, alerts.intersects(Alerts::IMU_DEGRADED | Alerts::IMU_LOST))
         .set(ArmBlocks::ESTIMATE, alerts.contains(Alerts::ESTIMATE_DIVERGED))
+        .set(ArmBlocks::SELF_TEST, alerts.contains(Alerts::SELF_TEST_FAILED))
         .set(ArmBlocks::PAIRING, pairing)
         .set(ArmBlocks::THROTTLE, throttle_up)
         .set(ArmBlocks::ARM_SWITCH, stale_switch)

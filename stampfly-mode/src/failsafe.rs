@@ -17,8 +17,8 @@
 //! vibration, peaks of 18; the six-sigma condition keeps a badly balanced propeller from looking like a crash.
 
 use stampfly_types::messages::{
-    Alerts, EstimatorStatus, FlightMode, FlightState, ImuData, PowerData, StateEstimate, SystemAlert, SystemMode,
-    Validity,
+    Alerts, EstimatorStatus, FlightMode, FlightState, ImuData, PowerData, SelfTestVerdict, StateEstimate, SystemAlert,
+    SystemMode, Validity,
 };
 use stampfly_types::{GRAVITY, Micros, Vec3, frame, math};
 
@@ -90,6 +90,8 @@ pub struct FailsafeInput<'a> {
     pub tof: Option<Micros>,
     /// Newest usable flow.
     pub flow: Option<Micros>,
+    /// How the self test at power-on ended.
+    pub self_test: SelfTestVerdict,
     /// State and mode one step ago.
     pub mode: &'a SystemMode,
 }
@@ -103,7 +105,7 @@ pub struct FailsafeInput<'a> {
 /// let imu = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: Some((Micros(0), &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: None, command: None, tof: None, flow: None, mode: &SystemMode::default(),
+///     power: None, command: None, tof: None, flow: None, self_test: SelfTestVerdict::NotRun, mode: &SystemMode::default(),
 /// };
 /// assert!(failsafe.step(Micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -164,7 +166,9 @@ impl Failsafe {
             .set(Alerts::COMM_LOST, input.command.is_some() && silent(input.command, self.config.link_silence))
             .set(Alerts::TOF_LOST, airborne && silent(input.tof, self.config.aiding_silence))
             .set(Alerts::FLOW_LOST, airborne && silent(input.flow, self.config.aiding_silence))
-            .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
+            .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged)
+            .set(Alerts::SELF_TEST_FAILED, input.self_test == SelfTestVerdict::Failed)
+            .set(Alerts::SELF_TEST_DIFFERS, input.self_test == SelfTestVerdict::WithinTolerance);
         self.last_step = Some(now);
         self.active = active;
         self.seen |= active;
@@ -280,6 +284,7 @@ mod tests {
                 command: Some(now),
                 tof: Some(now),
                 flow: Some(now),
+                self_test: SelfTestVerdict::NotRun,
                 mode: &self.mode,
             };
             self.failsafe.step(now, &input).active
@@ -355,6 +360,7 @@ mod tests {
                 command: None,
                 tof: None,
                 flow: None,
+                self_test: SelfTestVerdict::NotRun,
                 mode: &mode,
             };
             failsafe.step(at, &input).active
@@ -366,5 +372,30 @@ mod tests {
         assert!((100..200).map(|k| step(k, 2.9)).last().is_some_and(|a| a.contains(Alerts::CRITICAL_BATTERY)));
         assert!((200..300).map(|k| step(k, 3.05)).last().is_some_and(|a| a.contains(Alerts::CRITICAL_BATTERY)));
         assert!((300..400).map(|k| step(k, 3.2)).last().is_some_and(|a| a == Alerts::LOW_BATTERY), "hysteresis");
+    }
+
+    #[test]
+    fn a_failed_self_test_is_an_alert_for_good() {
+        let (estimate, status, mode) = Default::default();
+        let mut failsafe = Failsafe::default();
+        let mut step = |self_test| {
+            let (estimate, status, mode): (&StateEstimate, &EstimatorStatus, &SystemMode) = (&estimate, &status, &mode);
+            let power = None;
+            let input = FailsafeInput {
+                imu: None,
+                estimate,
+                status,
+                power,
+                command: None,
+                tof: None,
+                flow: None,
+                self_test,
+                mode,
+            };
+            failsafe.step(Micros::ZERO, &input).active
+        };
+        assert_eq!(step(SelfTestVerdict::Identical), Alerts::NONE);
+        assert_eq!(step(SelfTestVerdict::WithinTolerance), Alerts::SELF_TEST_DIFFERS);
+        assert_eq!(step(SelfTestVerdict::Failed), Alerts::SELF_TEST_FAILED);
     }
 }

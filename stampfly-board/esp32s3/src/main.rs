@@ -85,7 +85,8 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         esp_println::println!("{unusable} kept parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
-    let (vehicle, outside) = vehicle::assemble(ports, &config);
+    let (vehicle, mut outside) = vehicle::assemble(ports, &config);
+    outside.self_test.publish(Clock.now(), &tested.message());
     static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
     let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
     let pins: Pins<'static> = split_resources!(chip);

@@ -5,12 +5,24 @@
 
 use core::fmt;
 use stampfly_board::golden::{self, GoldenError, Report, Verdict};
+use stampfly_types::messages::{SelfTest, SelfTestVerdict};
 
 /// How the test went.
 #[derive(Clone, Copy)]
 pub struct Outcome(Result<Report, GoldenError>);
 
 impl Outcome {
+    /// For the vehicle: a failure keeps it from arming, other bits are an alert, and both are in the log.
+    pub fn message(&self) -> SelfTest {
+        let (verdict, worst) = match self.0 {
+            Ok(Report { verdict: Verdict::Identical, .. }) => (SelfTestVerdict::Identical, 0.0),
+            Ok(Report { verdict: Verdict::WithinTolerance { worst }, .. }) => (SelfTestVerdict::WithinTolerance, worst),
+            Ok(Report { verdict: Verdict::Beyond { worst, .. }, .. }) => (SelfTestVerdict::Failed, worst),
+            Err(_) => (SelfTestVerdict::Failed, f32::INFINITY),
+        };
+        SelfTest { verdict, worst }
+    }
+
     /// May the motors turn?
     pub fn may_fly(&self) -> bool {
         matches!(self.0, Ok(Report { verdict: Verdict::Identical | Verdict::WithinTolerance { .. }, .. }))

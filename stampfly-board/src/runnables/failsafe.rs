@@ -19,6 +19,7 @@ pub struct FailsafeMonitor<'b> {
     power: Option<Stamped<PowerData>>,
     estimate: StateEstimate,
     status: EstimatorStatus,
+    self_test: SelfTest,
     mode: SystemMode,
     last_command: Option<Micros>,
     last_tof: Option<Micros>,
@@ -43,6 +44,8 @@ pub struct FailsafePorts<'b> {
     pub estimate: wiring::estimate_state::Rx<'b>,
     /// The estimator's opinion of itself.
     pub status: wiring::estimate_status::Rx<'b>,
+    /// The self test at power-on.
+    pub self_test: wiring::self_test::Rx<'b>,
     /// State and mode one step ago.
     pub mode: wiring::system_mode::Rx<'b>,
     /// What was found.
@@ -64,6 +67,7 @@ impl<'b> FailsafeMonitor<'b> {
             power: None,
             estimate: StateEstimate::default(),
             status: EstimatorStatus::default(),
+            self_test: SelfTest::default(),
             mode: SystemMode::default(),
             last_command: None,
             last_tof: None,
@@ -82,6 +86,7 @@ impl Runnable for FailsafeMonitor<'_> {
         self.power = activation.latest(&mut self.ports.power);
         activation.update(&mut self.ports.estimate, &mut self.estimate);
         activation.update(&mut self.ports.status, &mut self.status);
+        activation.update(&mut self.ports.self_test, &mut self.self_test);
         activation.update(&mut self.ports.mode, &mut self.mode);
     }
 
@@ -103,6 +108,7 @@ impl Runnable for FailsafeMonitor<'_> {
             command: self.last_command,
             tof: self.last_tof,
             flow: self.last_flow,
+            self_test: self.self_test.verdict,
             mode: &self.mode,
         };
         // Every sample counts for the impact detector, also those that came while something else ran.

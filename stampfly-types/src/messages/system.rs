@@ -63,6 +63,8 @@ message_flags! {
         ARM_SWITCH = 10,
         /// A crash was detected and nobody has acknowledged it.
         CRASHED = 11,
+        /// The self test at power-on failed.
+        SELF_TEST = 12,
     }
 }
 
@@ -116,6 +118,34 @@ message_flags! {
         FLOW_LOST = 11,
         /// The estimated tilt disagrees with gravity while standing.
         TILT_MISMATCH = 12,
+        /// The self test at power-on failed: this machine computes something else.
+        SELF_TEST_FAILED = 13,
+        /// The self test gave other bits than recorded, within its tolerance.
+        SELF_TEST_DIFFERS = 14,
+    }
+}
+
+message_enum! {
+    /// How the self test at power-on ended.
+    pub enum SelfTestVerdict {
+        /// It was not run.
+        NotRun = 0,
+        /// Every bit as recorded.
+        Identical = 1,
+        /// Other bits; outputs within the tolerance.
+        WithinTolerance = 2,
+        /// Outputs beyond the tolerance, or the test could not be run.
+        Failed = 3,
+    }
+}
+
+message! {
+    /// What the self test at power-on found.
+    pub struct SelfTest {
+        /// How it ended.
+        verdict: SelfTestVerdict ["1"],
+        /// Largest deviation of a motor's duty; infinite when one was no number.
+        worst: f32 ["1"],
     }
 }
 
