@@ -6,10 +6,11 @@ use emulated::{Hand, Terminal};
 use examples::drivers::{Failure, bmi270};
 use stampfly_drivers::chip::ChipError;
 use stampfly_sim::chips::BusError;
+use stampfly_sim::time::block_on;
 use stampfly_types::frame;
 
 fn main() -> Result<(), Failure<ChipError<BusError>>> {
-    let (simulation, board, image) = emulated::vehicle(None);
+    let (simulation, mut board, image) = emulated::vehicle(None);
     let script = |time: f64| {
         let level = Hand::default();
         match time {
@@ -22,6 +23,8 @@ fn main() -> Result<(), Failure<ChipError<BusError>>> {
         }
     };
     let clock = simulation.clock.clone();
+    let sound = block_on(&clock, bmi270::self_test(&mut board.imu, clock.clone(), &image, &mut Terminal))?;
+    assert!(sound, "the emulated gyroscope did not pass");
     let found = emulated::run(&simulation, script, bmi270::run(board.imu, clock, &image, &mut Terminal))?;
 
     let truth = frame::roll_pitch_yaw(&simulation.truth().attitude);

@@ -11,7 +11,7 @@ use examples::drivers::bmi270;
 #[esp_rtos::main]
 async fn main(_spawner: Spawner) {
     let mut bus = spi::Bus::start(Board::start().spi);
-    let (mut imu, _) = bus.devices();
+    let (mut imu, ..) = bus.devices();
     let mut out = Printer;
     if let Err(failure) = bmi270::self_test(&mut imu, Clock, imu_config::FILE, &mut out).await {
         return end::<(), _>(Err(failure));

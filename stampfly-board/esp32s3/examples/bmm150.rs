@@ -10,7 +10,8 @@ use examples::drivers::bmm150;
 
 #[esp_rtos::main]
 async fn main(_spawner: Spawner) {
-    let mut bus = i2c::start(Board::start().i2c).await;
+    let board = Board::start();
+    let mut bus = i2c::Bus::start(board.i2c, board.i2c_pins).await;
     let mut out = Printer;
     if let Err(failure) = bmm150::self_test(&mut bus, Clock, &mut out).await {
         return end::<(), _>(Err(failure));

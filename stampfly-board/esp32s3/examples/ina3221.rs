@@ -10,6 +10,7 @@ use examples::drivers::ina3221;
 
 #[esp_rtos::main]
 async fn main(_spawner: Spawner) {
-    let bus = i2c::start(Board::start().i2c).await;
+    let board = Board::start();
+    let bus = i2c::Bus::start(board.i2c, board.i2c_pins).await;
     end(ina3221::run(bus, Clock, &mut Printer).await);
 }

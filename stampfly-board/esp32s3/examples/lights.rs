@@ -25,7 +25,9 @@ async fn main(_spawner: Spawner) {
     let pulses = Rmt::new(board.pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
     let status: Chain<{ buffer_size::<RGB8>(1) }> =
         Chain::new(WS2812B_TIMING, pulses.channel0, board.people.status_light, PULSE_CLOCK).expect("possible pulses");
+    // Two of the unit's memories, one for the pulses of each light.
     let body: Chain<{ buffer_size::<RGB8>(2) }> =
-        Chain::new(WS2812B_TIMING, pulses.channel1, board.people.body_lights, PULSE_CLOCK).expect("possible pulses");
+        Chain::new_with_memsize(WS2812B_TIMING, pulses.channel1, board.people.body_lights, 2, PULSE_CLOCK)
+            .expect("possible pulses");
     end(lights::run(status, body, Clock, &mut Printer).await);
 }

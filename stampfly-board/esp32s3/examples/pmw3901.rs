@@ -11,6 +11,6 @@ use examples::drivers::pmw3901;
 #[esp_rtos::main]
 async fn main(_spawner: Spawner) {
     let mut bus = spi::Bus::start(Board::start().spi);
-    let (_, flow) = bus.devices();
+    let (_, flow, _) = bus.devices();
     end(pmw3901::run(flow, Clock, &mut Printer).await);
 }

@@ -11,6 +11,7 @@ pub mod buzzer;
 pub mod clock;
 #[path = "../../src/cutoff.rs"]
 pub mod cutoff;
+#[path = "../../src/i2c.rs"]
 pub mod i2c;
 #[path = "../../src/imu_config.rs"]
 pub mod imu_config;
@@ -29,7 +30,7 @@ pub use esp_println::Printer;
 
 use core::fmt::Debug;
 use esp_hal::clock::CpuClock;
-use esp_hal::peripherals::RMT;
+use esp_hal::peripherals::{I2C0, RMT};
 use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
 use examples::drivers::Failure;
@@ -55,7 +56,9 @@ pub mod storage {
 pub struct Board {
     pub motors: MotorPins<'static>,
     pub spi: spi::Parts,
-    pub i2c: i2c::Parts,
+    /// The unit of the slow sensors' bus.
+    pub i2c: I2C0<'static>,
+    pub i2c_pins: I2cPins<'static>,
     pub range: RangePins<'static>,
     pub people: PeoplePins<'static>,
     /// The unit that makes the lights' pulses.
@@ -76,7 +79,8 @@ impl Board {
         Self {
             motors: pins.motors,
             spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi },
-            i2c: i2c::Parts { unit: chip.I2C0, pins: pins.i2c },
+            i2c: chip.I2C0,
+            i2c_pins: pins.i2c,
             range: pins.range,
             people: pins.people,
             pulses: chip.RMT,
