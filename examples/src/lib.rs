@@ -13,7 +13,6 @@
 //! | `log` | `stampfly-log` | writing a log and reading it back |
 //! | `link` | `stampfly-link` | a vehicle that looks for a transmitter in a room full of them |
 //! | `param` | `stampfly-param` | a value that survives the power cut in the middle of its change |
-//! | `drivers` | `stampfly-drivers` | motors on any PWM channel |
 //! | `sim` | `stampfly-sim` | a hop on virtual time that nobody stabilises |
 //!
 //! One per driver, on a PC with emulated chips and on the StampFly: see [`drivers`], which is the part of them that is
