@@ -4,13 +4,28 @@ use crate::SensorError;
 use stampfly_types::Micros;
 use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
 
-/// A measurement and the instant it is valid for.
+/// A measurement and the instant it is valid for. How good it is, is part of the measurement: `valid`, `sigma`, `quality`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample<T> {
     /// The instant the data is valid for.
     pub at: Micros,
     /// The measurement.
     pub data: T,
+}
+
+impl<T> Sample<T> {
+    /// How old the data is at `now`; zero when it is stamped in the future.
+    ///
+    /// ```
+    /// use stampfly_drivers::Sample;
+    /// use stampfly_types::Micros;
+    /// let sample = Sample { at: Micros(1_000), data: () };
+    /// assert_eq!((sample.age(Micros(3_000)), sample.age(Micros::ZERO)), (Micros(2_000), Micros::ZERO));
+    /// ```
+    #[must_use]
+    pub fn age(&self, now: Micros) -> Micros {
+        now.since(self.at)
+    }
 }
 
 macro_rules! sensor_trait {
