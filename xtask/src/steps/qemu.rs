@@ -16,7 +16,7 @@ use std::process::Command;
 const PACKAGE: &str = "stampfly-board/qemu";
 const BUDGET: &str = "stampfly-board/qemu/budget.toml";
 /// The document the table is written into, and where.
-const DOCUMENT: &str = "stampfly-board/README.md";
+const DOCUMENT: &str = "README.md";
 const BEGIN: &str = "<!-- instructions: cargo xtask qemu --fix -->\n";
 const END: &str = "<!-- end of instructions -->";
 /// A run takes some seconds. One that faulted would never end.
