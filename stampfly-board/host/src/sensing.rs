@@ -150,10 +150,11 @@ pub(crate) fn start_drivers<'a>(
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = shared.i2c.split();
     let chips::Board { imu, flow, shutdown_bottom, shutdown_front, .. } = board;
     let time = || clock.clone();
+    let ready = imu.interrupt_pin();
     let (imu, flow, _) = shared.slots.split(imu, flow, devices::LONGEST_FLOW);
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
-    spawn!(tasks, clock, devices::imu(imu, time(), &IMAGE) => topics.imu, health.imu);
+    spawn!(tasks, clock, devices::imu(imu, time(), &IMAGE).with_interrupt(ready) => topics.imu, health.imu);
     spawn!(tasks, clock, down => topics.tof, health.tof);
     spawn!(tasks, clock, ahead => topics.tof_front, health.tof_front);
     spawn!(tasks, clock, devices::flow(flow, time()) => topics.flow, health.flow);
