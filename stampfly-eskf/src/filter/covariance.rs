@@ -78,13 +78,27 @@ const FLOOR: [f32; N] = [
     1e-9, 1e-9, 1e-9, // accelerometer bias, (0.03 mm/s²)²
 ];
 
-/// Adds multiples of rows to columns `FIRST` to `N` of a row, one after the other, in one pass.
+/// Does a row fit a few vector registers? Then whole rows cost less than the half of them that is needed. The sums are the
+/// same, term by term and bit by bit.
+const WHOLE_ROWS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
+
+/// Adds multiples of rows to columns `FIRST` to `N` of a row, one after the other. The columns before `FIRST` may be
+/// written as well.
 #[inline]
 fn add_all<const FIRST: usize, const K: usize>(to: &mut Row, parts: [(f32, &Row); K]) {
-    let parts = parts.map(|(factor, row)| (factor, &row[FIRST..N]));
-    for (column, cell) in to[FIRST..N].iter_mut().enumerate() {
+    if WHOLE_ROWS {
         for (factor, row) in parts {
-            *cell += factor * row[column];
+            for (cell, value) in to.iter_mut().zip(row) {
+                *cell += factor * value;
+            }
+        }
+    } else {
+        // In one pass.
+        let parts = parts.map(|(factor, row)| (factor, &row[FIRST..N]));
+        for (column, cell) in to[FIRST..N].iter_mut().enumerate() {
+            for (factor, row) in parts {
+                *cell += factor * row[column];
+            }
         }
     }
 }
@@ -259,15 +273,29 @@ impl Covariance {
         if directions.iter().flatten().sum::<f32>().is_nan() {
             return [f32::NAN; N];
         }
-        // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
-        self.shrink::<POSITION, M>(directions);
-        self.shrink::<VELOCITY, M>(directions);
-        self.shrink::<ATTITUDE, M>(directions);
-        self.shrink::<GYRO_BIAS, M>(directions);
-        self.shrink::<ACCEL_BIAS, M>(directions);
-        for i in 3..N {
-            for j in 0..i / 3 * 3 {
-                self.rows[i][j] = self.rows[j][i];
+        if WHOLE_ROWS {
+            for (i, place) in self.rows.iter_mut().enumerate() {
+                let mut row = *place;
+                for direction in directions {
+                    // Never; it keeps the compiler from working down the columns.
+                    if direction[i].is_nan() {
+                        return [f32::NAN; N];
+                    }
+                    add_all::<0, 1>(&mut row, [(-direction[i], direction)]);
+                }
+                *place = row;
+            }
+        } else {
+            // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
+            self.shrink::<POSITION, M>(directions);
+            self.shrink::<VELOCITY, M>(directions);
+            self.shrink::<ATTITUDE, M>(directions);
+            self.shrink::<GYRO_BIAS, M>(directions);
+            self.shrink::<ACCEL_BIAS, M>(directions);
+            for i in 3..N {
+                for j in 0..i / 3 * 3 {
+                    self.rows[i][j] = self.rows[j][i];
+                }
             }
         }
         let mut correction = [0.0; N];
