@@ -161,12 +161,20 @@ static TOPICS: [Topic; wiring::COUNT] = {
 /// # Errors
 /// When the sink refuses.
 pub fn open<S: Sink>(sink: S, at: Micros, config: &VehicleConfig) -> Result<Writer<'static, S>, WriteError<S::Error>> {
+    head(sink, at, config)?.data(&TOPICS, &[])
+}
+
+/// The beginning of every log of this vehicle: its name and every parameter, so that a replay flies with them.
+///
+/// # Errors
+/// When the sink refuses.
+pub fn head<S: Sink>(sink: S, at: Micros, config: &VehicleConfig) -> Result<Definitions<S>, WriteError<S::Error>> {
     let mut head = Definitions::start(sink, at)?;
     head.info("sys_name", "StampFly")?;
     for parameter in parameters::PARAMETERS {
         head.parameter(parameter.name, ParameterValue::Float(parameter.get(config)))?;
     }
-    head.data(&TOPICS, &[])
+    Ok(head)
 }
 
 #[cfg(test)]

@@ -7,9 +7,9 @@
 use crate::consistency::{FlightConsistency, Observation};
 use crate::golden::{Event, Inputs};
 use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, Observer, VehicleConfig, parameters, plan, wiring};
+use stampfly_board::{FlightLoop, Observer, VehicleConfig, black_box, plan, wiring};
 use stampfly_bus::Activation;
-use stampfly_log::ulog::{Definitions, ParameterValue, Sample, Sink, Topic, Writer};
+use stampfly_log::ulog::{Sample, Sink, Topic, Writer};
 use stampfly_log::{ActivationTopic, FlightHash, Input};
 use stampfly_sim::Truth;
 use stampfly_types::{Message, Micros};
@@ -131,13 +131,9 @@ impl Recorder {
         }
         let facts = &self.facts;
         let open = || {
-            let mut head = Definitions::start(Memory::default(), start)?;
-            head.info("sys_name", "StampFly")?;
+            let mut head = black_box::head(Memory::default(), start, config)?;
             for (key, value) in facts {
                 head.info(key, value)?;
-            }
-            for parameter in parameters::PARAMETERS {
-                head.parameter(parameter.name, ParameterValue::Float(parameter.get(config)))?;
             }
             head.data(&TOPICS, &ACTIVATIONS)
         };

@@ -5,9 +5,7 @@ use stampfly_board::{devices, wiring};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
-use stampfly_drivers::{
-    Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, SensorErrorKind,
-};
+use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_sim::chips::{self, I2cBus, stand_in_image};
 use stampfly_sim::sensors::{BaroModel, CameraModel, FlowModel, ImuModel, MagModel, PowerModel, RangeModel};
 use stampfly_sim::time::{Clock, Tasks};
@@ -49,24 +47,6 @@ pub struct Healths {
     pub power: Health,
     /// Motion capture.
     pub cameras: Health,
-}
-
-impl Healths {
-    /// Errors so far and the newest of each sensor, by name.
-    pub fn errors(&self) -> impl Iterator<Item = (&'static str, u32, Option<SensorErrorKind>)> {
-        [
-            ("imu", &self.imu),
-            ("tof", &self.tof),
-            ("tof_front", &self.tof_front),
-            ("flow", &self.flow),
-            ("mag", &self.mag),
-            ("baro", &self.baro),
-            ("power", &self.power),
-            ("cameras", &self.cameras),
-        ]
-        .into_iter()
-        .map(|(name, health)| (name, health.errors(), health.last_error()))
-    }
 }
 
 /// The ends that sensors publish to.

@@ -77,8 +77,9 @@ impl Reader {
     fn jump_to(&mut self, register: usize, offset: i64, is_call: bool) {
         match self.known[register] {
             Some(base) => self.jump(base + offset),
-            // A return, or the table of a `match`.
-            None if !is_call => {}
+            // A return.
+            None if !is_call && register == RA => {}
+            // A call, perhaps the last thing the function does; the table of a `match` looks the same and counts as one.
             None => self.code.indirect += 1,
         }
         self.forget();
@@ -197,6 +198,8 @@ mod tests {
         // lui t0, 13; addi t0, t0, -16; sub sp, sp, t0; jalr ra, a5
         let code = read(&words(&[0x0000_d2b7, 0xff02_8293, 0x4051_0133, 0x0007_80e7]), 0x1000);
         assert_eq!(code, Code { frame: 0xd000 - 16, calls: [].into(), indirect: 1, unbounded: false });
+        // jalr zero, a5: perhaps the last call of a function, without a way back
+        assert_eq!(read(&words(&[0x0007_8067]), 0).indirect, 1);
         // sub sp, sp, a0
         assert!(read(&words(&[0x40a1_0133]), 0).unbounded);
     }

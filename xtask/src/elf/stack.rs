@@ -15,8 +15,6 @@ pub struct Depth {
     pub way: Vec<(String, u64)>,
     /// What cannot be bounded: functions that call themselves, or lower the stack by an unknown amount.
     pub unbounded: BTreeSet<String>,
-    /// Functions that call through a pointer.
-    pub through_pointer: BTreeSet<String>,
 }
 
 /// What may be behind a pointer: where the caller's name contains the first, functions whose name contains one of the
@@ -73,17 +71,13 @@ impl<'a> Stack<'a> {
             return Depth { unbounded: [symbol.name.clone()].into(), ..Depth::default() };
         }
         let mut deepest = if code.indirect > 0 { self.behind_pointers_of(&symbol.name) } else { Depth::default() };
-        let (mut unbounded, mut through_pointer) = (BTreeSet::new(), BTreeSet::new());
+        let mut unbounded = BTreeSet::new();
         if code.unbounded {
             unbounded.insert(symbol.name.clone());
-        }
-        if code.indirect > 0 {
-            through_pointer.insert(symbol.name.clone());
         }
         for call in &code.calls {
             let depth = self.below(*call);
             unbounded.extend(depth.unbounded.iter().cloned());
-            through_pointer.extend(depth.through_pointer.iter().cloned());
             if depth.bytes > deepest.bytes {
                 deepest = depth;
             }
@@ -91,7 +85,7 @@ impl<'a> Stack<'a> {
         self.open.remove(&address);
         let mut way = vec![(symbol.name.clone(), code.frame)];
         way.extend(deepest.way);
-        let depth = Depth { bytes: code.frame + deepest.bytes, way, unbounded, through_pointer };
+        let depth = Depth { bytes: code.frame + deepest.bytes, way, unbounded };
         self.known.insert(address, depth.clone());
         depth
     }

@@ -31,7 +31,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
     let program = Program::read(&path)?;
     let budget = Budget::read(repository, BUDGET)?;
     sizes(&program, &budget)?;
-    stacks(&program, &budget)
+    stacks(repository, &program, &budget)
 }
 
 /// Bytes of flash and of memory.
@@ -69,17 +69,28 @@ fn sizes(program: &Program, budget: &Budget) -> Result<(), Failure> {
     budget.hold("memory", all.memory as f64, "bytes of static memory")
 }
 
-fn stacks(program: &Program, budget: &Budget) -> Result<(), Failure> {
+fn stacks(repository: &Repository, program: &Program, budget: &Budget) -> Result<(), Failure> {
     let configured = [
-        ("flight", budget.number("configured.flight")?),
+        ("flight", esp32::flight_stack(repository)? as f64),
         ("ground", (program.linker("_stack_start")? - program.linker("_stack_end")?) as f64),
     ];
+    for part in POINTERS.iter().flat_map(|(_, targets)| *targets) {
+        // A table that no longer fits the program would make every bound smaller.
+        if program.functions(&[part]).next().is_none() {
+            return Err(format!("the program has no function `{part}`, which is said to be behind a pointer"));
+        }
+    }
     let mut stack = Stack::new(program, POINTERS);
     for (task, parts, of) in TASKS {
         let root = program.functions(parts).map(|(address, _)| stack.below(address)).max_by_key(|depth| depth.bytes);
         let depth = root.ok_or_else(|| format!("the program has no task {parts:?}"))?;
-        if !depth.unbounded.is_empty() {
-            println!("{task}: without a bound: {:?}", depth.unbounded);
+        // A path is a Rust name; what the radio's libraries do below is not ours to bound.
+        let (ours, radios): (Vec<_>, Vec<_>) = depth.unbounded.iter().partition(|name| name.contains("::"));
+        if !radios.is_empty() {
+            println!("{task}: without a bound in the radio's libraries: {radios:?}");
+        }
+        if !ours.is_empty() {
+            return Err(format!("{task}: without a bound: {ours:?}"));
         }
         budget.hold(&format!("stack.{task}"), depth.bytes as f64, "bytes of stack")?;
         for (name, frame) in depth.way.iter().filter(|(_, frame)| *frame >= 256) {
