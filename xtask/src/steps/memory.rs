@@ -13,14 +13,19 @@ use crate::repository::Repository;
 use std::collections::BTreeMap;
 
 const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
-/// What is called through pointers, by whom: runnables reach the estimator and the controller that the parameters chose,
-/// the scheduler asks topics for their newest, everybody else wakes tasks.
+/// What is called through pointers, by whom: estimation reaches the estimator that the parameters chose, the scheduler
+/// asks topics for their newest, a drained bus hands messages to a closure, formatted text asks each value to write
+/// itself, everybody else wakes tasks.
 const POINTERS: Pointers<'_> = &[
-    ("FlightLoop>::complete", &[" as stampfly_eskf::estimator::Estimator>::", " as stampfly_control::"]),
+    ("runnables::estimation::Estimation", ESTIMATOR),
+    ("FlightLoop>::complete", ESTIMATOR),
     ("FlightLoop>", &["AnyTopic>::"]),
     ("Scheduler", &["AnyTopic>::"]),
-    ("", &["raw::waker::", "raw::wake_task", "Waker>::wake"]),
+    ("drain", &["FnOnce<(stampfly_board::topic_table::wiring::Id"]),
+    ("core::fmt::", &[" as core::fmt::"]),
+    ("", &["raw::waker::"]),
 ];
+const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyTopic>::"];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
     let path = match arguments {
