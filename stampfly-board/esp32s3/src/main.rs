@@ -16,6 +16,7 @@ mod buzzer;
 mod clock;
 mod console;
 mod cutoff;
+mod flash;
 mod flight;
 mod i2c;
 mod imu_config;
@@ -52,7 +53,7 @@ const SECOND_HEAP: usize = 32 * 1024;
 
 #[esp_hal::main]
 fn main() -> ! {
-    motors::cut();
+    motors::hold_low();
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
     // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
     esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
@@ -97,7 +98,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         flow: outside.flow,
         duties: outside.motors,
         motors: pins.motors,
-        spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi },
+        spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi, interrupts: chip.IO_MUX },
     };
     let sensors = sensors::Parts {
         unit: chip.I2C0,
