@@ -86,14 +86,17 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         esp_println::println!("{unusable} kept parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
-    let (vehicle, mut outside) = vehicle::assemble(ports, &config);
+    // Moved from here to where it stays, without a copy in between: there is not stack enough for two vehicles.
+    let assembled = vehicle::assemble(ports, heads, &config, Clock.now());
+    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
+    let flight_loop = FLIGHT_LOOP.init(assembled.flight_loop);
+    let mut outside = assembled.outside;
     outside.self_test.publish(Clock.now(), &tested.message());
     static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
     let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
     let pins: Pins<'static> = split_resources!(chip);
-    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
     let flight = flight::Parts {
-        flight_loop: FLIGHT_LOOP.init_with(|| FlightLoop::new(vehicle, heads, Clock.now())),
+        flight_loop,
         imu: outside.imu,
         flow: outside.flow,
         duties: outside.motors,
