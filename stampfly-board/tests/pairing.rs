@@ -5,7 +5,7 @@ use stampfly_board::vehicle::{Assembled, Outside, assemble};
 use stampfly_board::{FlightLoop, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
-use stampfly_types::messages::{ArmBlocks, ImuData, PilotInput, PowerData, TofData};
+use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, ImuData, PilotInput, PowerData, TofData};
 use stampfly_types::{GRAVITY, Micros, Vec3};
 
 const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
@@ -18,15 +18,20 @@ struct Bench<'b> {
     outside: Outside<'b>,
     session: Session,
     wanted: bool,
+    /// Does the battery monitor answer?
+    monitor: bool,
+    /// Does a program say that it is there?
+    program: bool,
     now: Micros,
 }
 
 impl<'b> Bench<'b> {
-    fn new(bus: &'b mut wiring::Bus) -> Self {
+    fn new(bus: &'b mut wiring::Bus, peer: Option<Address>) -> Self {
         let wiring::Split { ports, heads, .. } = bus.split(None);
         let Assembled { flight_loop: flight, outside } =
             assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
-        Self { flight, outside, session: Session::new(VEHICLE, 1, Some(OLD)), wanted: false, now: Micros::ZERO }
+        let session = Session::new(VEHICLE, 1, peer);
+        Self { flight, outside, session, wanted: false, monitor: true, program: false, now: Micros::ZERO }
     }
 
     fn blocks(&mut self) -> ArmBlocks {
@@ -35,6 +40,11 @@ impl<'b> Bench<'b> {
 
     fn armed(&mut self) -> bool {
         self.outside.telemetry.latest().is_some_and(|frame| frame.data.armed)
+    }
+
+    fn command(&mut self, kind: GuidedKind) {
+        let command = GuidedCommand { kind, ..Default::default() };
+        self.outside.guided.publish(self.now, command).expect("room in the queue");
     }
 
     /// Lets time pass. Every transmitter sends its packet every 20 ms; returns what became of the last one's.
@@ -49,7 +59,12 @@ impl<'b> Bench<'b> {
             if now.0.is_multiple_of(20_000) {
                 self.outside.button.publish(now, &ButtonContact { pressed });
                 self.outside.tof.publish(now, &TofData { distance: 0.03, valid: true, ..Default::default() });
-                self.outside.power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
+                if self.monitor {
+                    self.outside.power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
+                }
+                if self.program {
+                    self.command(GuidedKind::None);
+                }
                 for (source, arm) in air {
                     let sticks = PilotInput { arm: *arm, ..Default::default() };
                     let bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
@@ -62,8 +77,9 @@ impl<'b> Bench<'b> {
                 // As the firmware's radio does it.
                 let wants = self.blocks().contains(ArmBlocks::PAIRING);
                 let armed = self.armed();
+                self.session.set_armed(armed);
                 match (self.wanted, wants) {
-                    (false, true) => _ = self.session.start_pairing(now, armed),
+                    (false, true) => _ = self.session.start_pairing(now),
                     (true, false) => self.session.stop_pairing(),
                     _ => {}
                 }
@@ -80,7 +96,7 @@ impl<'b> Bench<'b> {
 #[test]
 fn a_vehicle_changes_its_transmitter() {
     let mut bus = wiring::Bus::new();
-    let mut bench = Bench::new(&mut bus);
+    let mut bench = Bench::new(&mut bus, Some(OLD));
     assert_eq!(bench.pass(6_000, false, &[(OLD, false)]), Some(Ok(())));
     assert_eq!(bench.blocks(), ArmBlocks::NONE, "calibrated and ready");
 
@@ -102,15 +118,92 @@ fn a_vehicle_changes_its_transmitter() {
     bench.pass(200, false, &[(OLD, false), (NEW, true)]);
     assert!(bench.armed(), "the new one's does");
 
-    // With motors armed nobody looks for a transmitter.
+    // A hand on the button stops the motors within a moment, and this touch does nothing else, however long it is.
+    bench.pass(100, true, &[(NEW, true)]);
+    assert!(!bench.armed());
     bench.pass(3_500, true, &[(NEW, true)]);
     assert!(!bench.session.is_pairing() && bench.session.peer() == Some(NEW));
+    bench.pass(1_000, false, &[(NEW, true)]);
+    assert!(!bench.armed());
+}
+
+#[test]
+fn a_vehicle_that_never_had_a_transmitter_takes_none_while_a_program_flies_it() {
+    let mut bus = wiring::Bus::new();
+    let mut bench = Bench::new(&mut bus, None);
+    bench.program = true;
+    bench.pass(6_000, false, &[]);
+    assert_eq!(bench.blocks(), ArmBlocks::NONE);
+    bench.command(GuidedKind::Arm);
+    bench.pass(100, false, &[]);
+    assert!(bench.armed());
+    assert_eq!(bench.pass(2_000, false, &[(NEW, false)]), Some(Err(Rejected::Stranger)));
+    assert!(bench.armed() && bench.session.peer().is_none());
+    bench.command(GuidedKind::Disarm);
+    bench.pass(100, false, &[(NEW, false)]);
+    assert_eq!((bench.armed(), bench.session.peer()), (false, Some(NEW)), "on the ground it does");
+}
+
+#[test]
+fn a_vehicle_armed_while_it_looks_goes_back_to_its_transmitter() {
+    let mut bus = wiring::Bus::new();
+    let mut bench = Bench::new(&mut bus, Some(OLD));
+    bench.program = true;
+    bench.pass(6_000, false, &[(OLD, false)]);
+    // At the console, which the mode machine knows nothing of.
+    assert_eq!(bench.session.start_pairing(bench.now), Ok(()));
+    bench.command(GuidedKind::Arm);
+    bench.pass(100, false, &[]);
+    assert!(bench.armed() && !bench.session.is_pairing());
+    assert_eq!(bench.pass(2_000, false, &[(NEW, false)]), Some(Err(Rejected::Stranger)));
+    assert_eq!(bench.pass(500, false, &[(OLD, false)]), Some(Ok(())));
+    assert!(bench.armed() && bench.session.peer() == Some(OLD));
+}
+
+#[test]
+fn a_click_without_a_transmitter_does_nothing() {
+    for peer in [None, Some(OLD)] {
+        let mut bus = wiring::Bus::new();
+        let mut bench = Bench::new(&mut bus, peer);
+        bench.pass(6_000, false, &[]);
+        assert_eq!(bench.blocks(), ArmBlocks::NO_LINK);
+        bench.pass(200, true, &[]);
+        bench.pass(1_000, false, &[]);
+        assert!(!bench.armed(), "never heard");
+        bench.pass(1_000, false, &[(OLD, false)]);
+        assert_eq!(bench.blocks(), ArmBlocks::NONE);
+        bench.pass(1_000, false, &[]);
+        bench.pass(200, true, &[]);
+        bench.pass(1_000, false, &[]);
+        assert_eq!((bench.armed(), bench.blocks()), (false, ArmBlocks::NO_LINK), "switched off again");
+        bench.pass(200, true, &[(OLD, false)]);
+        bench.pass(600, false, &[(OLD, false)]);
+        assert!(bench.armed(), "heard");
+    }
+}
+
+#[test]
+fn a_silent_battery_monitor_refuses_arming() {
+    let mut bus = wiring::Bus::new();
+    let mut bench = Bench::new(&mut bus, Some(OLD));
+    bench.monitor = false;
+    bench.pass(6_000, false, &[(OLD, false)]);
+    bench.pass(200, false, &[(OLD, true)]);
+    assert_eq!((bench.armed(), bench.blocks()), (false, ArmBlocks::SENSOR));
+    assert!(bench.outside.telemetry.latest().is_some_and(|frame| frame.data.alerts == Alerts::POWER_LOST));
+    bench.monitor = true;
+    bench.pass(200, false, &[(OLD, false)]);
+    bench.pass(200, false, &[(OLD, true)]);
+    assert!(bench.armed());
+    bench.monitor = false;
+    bench.pass(2_000, false, &[(OLD, true)]);
+    assert!(bench.armed(), "it is no reason to stop");
 }
 
 #[test]
 fn who_changes_his_mind_keeps_his_transmitter() {
     let mut bus = wiring::Bus::new();
-    let mut bench = Bench::new(&mut bus);
+    let mut bench = Bench::new(&mut bus, Some(OLD));
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.pass(3_500, true, &[(OLD, false)]);
     assert!(bench.session.is_pairing());

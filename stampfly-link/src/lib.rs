@@ -21,7 +21,7 @@
 //!
 //! let (vehicle, transmitter) = (Address([1; 6]), Address([2; 6]));
 //! let mut session = Session::new(vehicle, 1, None);
-//! session.start_pairing(Micros(0), false)?;
+//! session.start_pairing(Micros(0))?;
 //! assert!(session.beacon(Micros(0)).is_some(), "calls for a transmitter");
 //!
 //! let bytes = ControlPacket::from_pilot(vehicle, &PilotInput::default()).to_bytes();

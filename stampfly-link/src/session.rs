@@ -1,9 +1,12 @@
 //! The vehicle's end of the link: whom it listens to, and what it throws away.
 //!
 //! Before it is paired, and while it looks for a new transmitter, the vehicle calls twice a second and takes the first
-//! station that answers with a whole control packet for this very vehicle and its arm switch off. From then on it listens to that station and
-//! to nobody else. Looking starts only on the pilot's demand and never with motors armed, so nobody can talk a flying
-//! vehicle out of its pilot's hands by shouting.
+//! station that answers with a whole control packet for this very vehicle and its arm switch off. From then on it
+//! listens to that station and to nobody else. Looking starts only on the pilot's demand.
+//!
+//! With motors armed, of which [`Session::set_armed`] is told, it never looks, whoever armed them: it keeps the
+//! transmitter it has, and without one it listens to nobody. So nobody can talk a flying vehicle out of its pilot's hands
+//! by shouting.
 //!
 //! Nothing that was refused counts as a sign of life: [`Session::receive`] is the only door, and what it lets through is
 //! what may be published.
@@ -83,7 +86,8 @@ impl core::error::Error for PairingRefused {}
 /// let (vehicle, pilot) = (Address([1; 6]), Address([2; 6]));
 /// let mut session = Session::new(vehicle, 1, Some(pilot));
 /// assert_eq!(session.beacon(Micros(0)), None, "paired: it does not call");
-/// assert!(session.start_pairing(Micros(0), true).is_err(), "not with motors armed");
+/// session.set_armed(true);
+/// assert!(session.start_pairing(Micros(0)).is_err(), "not with motors armed");
 ///
 /// let bytes = ControlPacket::centred(vehicle).to_bytes();
 /// assert!(session.receive(Micros(0), Address([3; 6]), &bytes).is_err());
@@ -96,7 +100,8 @@ pub struct Session {
     vehicle: Address,
     channel: u8,
     peer: Option<Address>,
-    /// While looking for a transmitter: when to call next.
+    armed: bool,
+    /// While looking for a transmitter, and without one while armed: when to call next.
     next_call: Option<Micros>,
     newest: Option<Micros>,
     /// While looking: when the present transmitter was last heard, or looking began.
@@ -113,6 +118,7 @@ impl Session {
             vehicle,
             channel,
             peer,
+            armed: false,
             next_call,
             newest: None,
             present_heard: Micros::ZERO,
@@ -120,12 +126,21 @@ impl Session {
         }
     }
 
+    /// Says whether the motors may turn; call it at least as often as [`Session::beacon`] is asked. Who looks for a
+    /// transmitter when that begins goes back to the present one; who has none goes on looking when it is over.
+    pub fn set_armed(&mut self, armed: bool) {
+        self.armed = armed;
+        if armed {
+            self.stop_pairing();
+        }
+    }
+
     /// Looks for a transmitter. The present one is heard no more, until it has been silent for a second.
     ///
     /// # Errors
     /// With motors armed; nothing has changed then.
-    pub fn start_pairing(&mut self, now: Micros, armed: bool) -> Result<(), PairingRefused> {
-        if armed {
+    pub fn start_pairing(&mut self, now: Micros) -> Result<(), PairingRefused> {
+        if self.armed {
             return Err(PairingRefused);
         }
         (self.next_call, self.present_heard) = (Some(now), now);
@@ -142,12 +157,12 @@ impl Session {
     /// Is the vehicle looking for a transmitter?
     #[must_use]
     pub fn is_pairing(&self) -> bool {
-        self.next_call.is_some()
+        self.next_call.is_some() && !self.armed
     }
 
     /// The call that is due now, for everybody: ask at least as often as it is due.
     pub fn beacon(&mut self, now: Micros) -> Option<[u8; PairingPacket::LENGTH]> {
-        let next = self.next_call.filter(|next| now >= *next)?;
+        let next = self.next_call.filter(|next| now >= *next && !self.armed)?;
         // From the plan, not from now, so that late questions do not add up; but never two at once.
         let planned = next + CALL_PERIOD;
         self.next_call = Some(if planned > now { planned } else { now + CALL_PERIOD });

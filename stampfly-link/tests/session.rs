@@ -31,12 +31,14 @@ fn an_unpaired_vehicle_calls_twice_a_second_and_takes_the_first_that_answers() {
 #[test]
 fn a_paired_vehicle_looks_only_when_told_and_never_armed() {
     let mut session = Session::new(VEHICLE, 1, Some(PILOT));
-    assert_eq!(session.start_pairing(Micros(0), true), Err(PairingRefused));
+    session.set_armed(true);
+    assert_eq!(session.start_pairing(Micros(0)), Err(PairingRefused));
+    session.set_armed(false);
     assert!(!session.is_pairing());
-    assert_eq!(session.start_pairing(Micros(0), false), Ok(()));
+    assert_eq!(session.start_pairing(Micros(0)), Ok(()));
     session.stop_pairing();
     assert!(!session.is_pairing() && session.peer() == Some(PILOT), "changed its mind");
-    assert_eq!(session.start_pairing(Micros(0), false), Ok(()));
+    assert_eq!(session.start_pairing(Micros(0)), Ok(()));
     assert!(session.receive(Micros(1), STRANGER, &packet()).is_ok());
     assert_eq!(session.peer(), Some(STRANGER));
     assert_eq!(session.receive(Micros(2), PILOT, &packet()), Err(Rejected::Stranger));
@@ -45,7 +47,7 @@ fn a_paired_vehicle_looks_only_when_told_and_never_armed() {
 #[test]
 fn the_present_transmitter_wins_only_after_a_silence() {
     let mut session = Session::new(VEHICLE, 1, Some(PILOT));
-    assert_eq!(session.start_pairing(Micros::from_millis(10), false), Ok(()));
+    assert_eq!(session.start_pairing(Micros::from_millis(10)), Ok(()));
     for ms in (20..5_000).step_by(20) {
         assert_eq!(session.receive(Micros::from_millis(ms), PILOT, &packet()), Err(Rejected::Stranger), "still on");
     }
@@ -54,6 +56,40 @@ fn the_present_transmitter_wins_only_after_a_silence() {
     assert_eq!(other.peer(), Some(STRANGER));
     assert!(session.receive(Micros::from_millis(6_100), PILOT, &packet()).is_ok(), "switched off and on again");
     assert!(!session.is_pairing() && session.peer() == Some(PILOT));
+}
+
+#[test]
+fn an_armed_vehicle_that_never_had_a_transmitter_gets_none() {
+    let mut session = Session::new(VEHICLE, 1, None);
+    session.set_armed(true);
+    assert!(!session.is_pairing());
+    for ms in (0..5_000).step_by(20) {
+        let now = Micros::from_millis(ms);
+        session.set_armed(true);
+        assert_eq!(session.beacon(now), None, "it does not call");
+        assert_eq!(session.receive(now, STRANGER, &packet()), Err(Rejected::Stranger));
+    }
+    assert_eq!((session.peer(), session.age(Micros::from_secs(5))), (None, None));
+    session.set_armed(false);
+    assert!(session.is_pairing(), "it goes on looking");
+    assert!(session.beacon(Micros::from_secs(5)).is_some());
+    assert_eq!(session.beacon(Micros::from_secs(5)), None, "at its old pace");
+    assert!(session.receive(Micros::from_secs(5), PILOT, &packet()).is_ok());
+}
+
+#[test]
+fn who_is_armed_while_looking_goes_back_to_the_present_transmitter() {
+    let mut session = Session::new(VEHICLE, 1, Some(PILOT));
+    assert_eq!(session.start_pairing(Micros(0)), Ok(()));
+    assert!(session.beacon(Micros(0)).is_some());
+    session.set_armed(true);
+    assert!(!session.is_pairing());
+    assert_eq!(session.beacon(Micros::from_secs(1)), None);
+    assert_eq!(session.receive(Micros::from_secs(1), STRANGER, &packet()), Err(Rejected::Stranger));
+    assert!(session.receive(Micros::from_secs(1), PILOT, &packet()).is_ok(), "without a silence first");
+    session.set_armed(false);
+    assert!(!session.is_pairing(), "for good");
+    assert_eq!(session.receive(Micros::from_secs(2), STRANGER, &packet()), Err(Rejected::Stranger));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What a press of the button meant.
 //!
-//! Debounced over 50 ms. A press shorter than three seconds is a click, a second one within 400 ms makes it a double
-//! click; holding reports once at three seconds (pair) and once at five (restart), while the button is still down.
+//! Debounced over 50 ms. Every press is reported as soon as it is sure, for whoever has to stop something; what it
+//! becomes follows. Shorter than three seconds it is a click, a second one within 400 ms makes it a double click;
+//! holding reports once at three seconds (pair) and once at five (restart), while the button is still down.
 
 use stampfly_types::Micros;
 use stampfly_types::messages::{ButtonEvent, ButtonGesture};
@@ -21,7 +22,7 @@ const HOLD_RESET: Micros = Micros::from_secs(5);
 /// for ms in (0..2_000).step_by(20) {
 ///     gestures.extend(button.step(Micros::from_millis(ms), (100..300).contains(&ms)).map(|event| event.gesture));
 /// }
-/// assert_eq!(gestures, [ButtonGesture::Click]);
+/// assert_eq!(gestures, [ButtonGesture::Press, ButtonGesture::Click]);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ButtonDecoder {
@@ -31,7 +32,7 @@ pub struct ButtonDecoder {
     /// The debounced level and since when.
     pressed: bool,
     pressed_since: Micros,
-    /// What this press has already reported.
+    /// Which hold this press has already reported.
     reported: ButtonGesture,
     /// A click that may still become a double click, and how long it was.
     click: Option<(Micros, f32)>,
@@ -49,7 +50,10 @@ impl ButtonDecoder {
             self.pressed_since = self.raw_since;
             if self.pressed {
                 self.reported = ButtonGesture::None;
-            } else if self.reported == ButtonGesture::None {
+                let held = now.since(self.pressed_since).seconds();
+                return Some(ButtonEvent { gesture: ButtonGesture::Press, held });
+            }
+            if self.reported == ButtonGesture::None {
                 if self.click.take().is_some() {
                     return Some(ButtonEvent { gesture: ButtonGesture::DoubleClick, held });
                 }
@@ -65,6 +69,8 @@ impl ButtonDecoder {
             };
             if reached > event {
                 self.reported = reached;
+                // Whoever holds has not clicked before.
+                self.click = None;
                 return Some(ButtonEvent { gesture: reached, held: held.seconds() });
             }
             return None;
@@ -91,10 +97,27 @@ mod tests {
 
     #[test]
     fn gestures_are_told_apart() {
+        use ButtonGesture::{Click, DoubleClick, HoldPair, HoldReset, Press};
         assert_eq!(gestures(|ms| ms == 100), [], "bounce");
-        assert_eq!(gestures(|ms| (100..300).contains(&ms)), [ButtonGesture::Click]);
-        assert_eq!(gestures(|ms| (100..200).contains(&ms) || (400..500).contains(&ms)), [ButtonGesture::DoubleClick]);
-        assert_eq!(gestures(|ms| (100..3_500).contains(&ms)), [ButtonGesture::HoldPair]);
-        assert_eq!(gestures(|ms| (100..9_000).contains(&ms)), [ButtonGesture::HoldPair, ButtonGesture::HoldReset]);
+        assert_eq!(gestures(|ms| (100..300).contains(&ms)), [Press, Click]);
+        assert_eq!(gestures(|ms| (100..200).contains(&ms) || (400..500).contains(&ms)), [Press, Press, DoubleClick]);
+        assert_eq!(gestures(|ms| (100..3_500).contains(&ms)), [Press, HoldPair]);
+        assert_eq!(gestures(|ms| (100..200).contains(&ms) || (400..4_000).contains(&ms)), [Press, Press, HoldPair]);
+        assert_eq!(gestures(|ms| (100..9_000).contains(&ms)), [Press, HoldPair, HoldReset]);
+    }
+
+    #[test]
+    fn a_press_is_reported_before_it_is_over_and_only_once() {
+        for start in 100..120 {
+            let mut button = ButtonDecoder::default();
+            let events: Vec<_> = (0..2_900)
+                .step_by(20)
+                .filter_map(|ms| Some((ms, button.step(Micros::from_millis(ms), ms >= start)?)))
+                .collect();
+            let [(at, event)] = events[..] else { panic!("{events:?}") };
+            assert_eq!(event.gesture, ButtonGesture::Press);
+            assert!((50..80).contains(&(at - start)), "{} ms after contact", at - start);
+            assert!((0.05..0.07).contains(&event.held), "{}", event.held);
+        }
     }
 }

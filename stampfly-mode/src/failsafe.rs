@@ -6,8 +6,9 @@
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running | when disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms, except in ACRO | when disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms | with the next sample; `IMU_LOST` when disarmed |
-//! | `COMM_LOST` | no command for 500 ms, once there was one | with the next command |
+//! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
 //! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
+//! | `POWER_LOST` | no battery sample for 1 s; a voltage below 0.1 V is one: no meter is fitted | with the next one |
 //! | `USB_POWER` | voltage below 3.3 V while disarmed | 0.1 V higher |
 //! | `TOF_LOST`, `FLOW_LOST` | no usable sample for 1 s in the air | with the next one |
 //! | `TILT_MISMATCH` | gravity and estimated tilt 10° apart for 0.5 s on the ground | with agreement |
@@ -47,6 +48,8 @@ pub struct FailsafeConfig {
     pub battery_hysteresis: f32,
     /// Time constant of the battery low-pass, s.
     pub battery_time: f32,
+    /// Silence of the battery monitor.
+    pub power_silence: Micros,
     /// Silence of range and flow in the air.
     pub aiding_silence: Micros,
     /// Disagreement of gravity and tilt on the ground, rad, and for how long, s.
@@ -67,6 +70,7 @@ impl Default for FailsafeConfig {
             usb: 3.3,
             battery_hysteresis: 0.1,
             battery_time: 2.0,
+            power_silence: Micros::from_secs(1),
             aiding_silence: Micros::from_secs(1),
             tilt_mismatch: [0.1745, 0.5],
         }
@@ -103,9 +107,10 @@ pub struct FailsafeInput<'a> {
 /// use stampfly_types::{Micros, Vec3, messages::*};
 /// let mut failsafe = Failsafe::default();
 /// let imu = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), ..Default::default() };
+/// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: Some((Micros(0), &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: None, command: None, tof: None, flow: None, self_test: SelfTestVerdict::NotRun, mode: &SystemMode::default(),
+///     power: Some((Micros(0), &power)), command: Some(Micros(0)), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, mode: &SystemMode::default(),
 /// };
 /// assert!(failsafe.step(Micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -159,11 +164,11 @@ impl Failsafe {
             active |= Alerts::IMU_LOST;
         }
         active = self.inspect_attitude(active, now, input);
-        active = self.inspect_power(active, input, disarmed);
+        active = self.inspect_power(active, now, input, disarmed);
         let airborne = matches!(input.mode.state, FlightState::Flying | FlightState::Landing);
         let silent = |last: Option<Micros>, limit| last.is_none_or(|at| now.since(at) >= limit);
         active = active
-            .set(Alerts::COMM_LOST, input.command.is_some() && silent(input.command, self.config.link_silence))
+            .set(Alerts::COMM_LOST, silent(input.command, self.config.link_silence))
             .set(Alerts::TOF_LOST, airborne && silent(input.tof, self.config.aiding_silence))
             .set(Alerts::FLOW_LOST, airborne && silent(input.flow, self.config.aiding_silence))
             .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged)
@@ -223,13 +228,20 @@ impl Failsafe {
         if tumbled { active | Alerts::TUMBLED } else { active }
     }
 
-    fn inspect_power(&mut self, active: Alerts, input: &FailsafeInput<'_>, disarmed: bool) -> Alerts {
-        let Some((at, power)) = input.power else { return active };
-        if self.last_power == Some(at) || !power.voltage.is_finite() || power.voltage < 0.1 {
-            return active; // No new reading, or no meter.
-        }
-        let dt = self.last_power.map_or(0.0, |last| at.since(last).seconds());
+    fn inspect_power(&mut self, active: Alerts, now: Micros, input: &FailsafeInput<'_>, disarmed: bool) -> Alerts {
+        let last = self.last_power;
+        let fresh = input.power.filter(|(at, power)| last != Some(*at) && power.voltage.is_finite());
+        let Some((at, power)) = fresh else {
+            // At power-on the monitor gets as long for its first sample.
+            let silence = last.map_or(now, |at| now.since(at));
+            return active.set(Alerts::POWER_LOST, silence >= self.config.power_silence);
+        };
         self.last_power = Some(at);
+        let active = active.set(Alerts::POWER_LOST, now.since(at) >= self.config.power_silence);
+        if power.voltage < 0.1 {
+            return active; // No meter.
+        }
+        let dt = last.map_or(0.0, |last| at.since(last).seconds());
         let before = self.voltage.unwrap_or(power.voltage);
         let voltage = before + (power.voltage - before) * (dt / (self.config.battery_time + dt));
         self.voltage = Some(voltage);
@@ -258,6 +270,7 @@ fn lasts(since: &mut Option<Micros>, now: Micros, holds: bool, seconds: f32) -> 
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::vec::Vec;
 
     struct Rig {
         failsafe: Failsafe,
@@ -280,7 +293,7 @@ mod tests {
                 imu: Some((now, &imu)),
                 estimate: &StateEstimate { valid: Validity::ALL, ..Default::default() },
                 status: &EstimatorStatus::default(),
-                power: None,
+                power: Some((now, &PowerData { voltage: 4.1, ..Default::default() })),
                 command: Some(now),
                 tof: Some(now),
                 flow: Some(now),
@@ -357,7 +370,7 @@ mod tests {
                 estimate: &StateEstimate::default(),
                 status: &EstimatorStatus::default(),
                 power: Some((at, &power)),
-                command: None,
+                command: Some(at),
                 tof: None,
                 flow: None,
                 self_test: SelfTestVerdict::NotRun,
@@ -374,6 +387,59 @@ mod tests {
         assert!((300..400).map(|k| step(k, 3.2)).last().is_some_and(|a| a == Alerts::LOW_BATTERY), "hysteresis");
     }
 
+    /// Alerts of a disarmed vehicle at `millis`, with a command and a battery sample at these instants.
+    fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Option<(u64, f32)>) -> Alerts {
+        let imu = ImuData { accel: REST, ..Default::default() };
+        let battery = PowerData { voltage: power.map_or(0.0, |(_, voltage)| voltage), ..Default::default() };
+        let now = Micros::from_millis(millis);
+        let input = FailsafeInput {
+            imu: Some((now, &imu)),
+            estimate: &StateEstimate::default(),
+            status: &EstimatorStatus::default(),
+            power: power.map(|(at, _)| (Micros::from_millis(at), &battery)),
+            command: command.map(Micros::from_millis),
+            tof: None,
+            flow: None,
+            self_test: SelfTestVerdict::NotRun,
+            mode: &SystemMode::default(),
+        };
+        failsafe.step(now, &input).active
+    }
+
+    #[test]
+    fn a_link_that_never_was_is_lost() {
+        let mut failsafe = Failsafe::default();
+        let battery = |now| Some((now, 4.1));
+        for now in (0..3_000).step_by(10) {
+            assert_eq!(quiet(&mut failsafe, now, None, battery(now)), Alerts::COMM_LOST, "{now}");
+        }
+        assert_eq!(quiet(&mut failsafe, 3_000, Some(3_000), battery(3_000)), Alerts::NONE);
+        assert_eq!(quiet(&mut failsafe, 3_490, Some(3_000), battery(3_490)), Alerts::NONE);
+        assert_eq!(quiet(&mut failsafe, 3_500, Some(3_000), battery(3_500)), Alerts::COMM_LOST);
+    }
+
+    #[test]
+    fn a_battery_monitor_that_says_nothing_is_lost() {
+        let lost_at = |battery: fn(u64) -> Option<(u64, f32)>| {
+            let mut failsafe = Failsafe::default();
+            let lost: Vec<u64> = (0..5_000)
+                .step_by(10)
+                .filter(|now| quiet(&mut failsafe, *now, Some(*now), battery(*now)).contains(Alerts::POWER_LOST))
+                .collect();
+            lost.first().copied().zip(lost.last().copied())
+        };
+        assert_eq!(lost_at(|_| None), Some((1_000, 4_990)), "never");
+        assert_eq!(
+            lost_at(|now| Some((now.min(2_000), 4.1))),
+            Some((3_000, 4_990)),
+            "the same sample, again and again"
+        );
+        assert_eq!(lost_at(|now| Some((now, f32::NAN))), Some((1_000, 4_990)), "no number");
+        assert_eq!(lost_at(|now| Some((if now < 3_000 { 0 } else { now }, 4.1))), Some((1_000, 2_990)), "it returns");
+        assert_eq!(lost_at(|now| Some((now / 100 * 100, 4.1))), None);
+        assert_eq!(lost_at(|now| Some((now / 100 * 100, 0.0))), None, "no meter is fitted");
+    }
+
     #[test]
     fn a_failed_self_test_is_an_alert_for_good() {
         let (estimate, status, mode) = Default::default();
@@ -386,7 +452,7 @@ mod tests {
                 estimate,
                 status,
                 power,
-                command: None,
+                command: Some(Micros::ZERO),
                 tof: None,
                 flow: None,
                 self_test,

@@ -138,6 +138,9 @@ const SPOOL: Micros = Micros::from_millis(300);
 const ARMED_TIMEOUT: Micros = Micros::from_secs(10);
 /// Height above the ground that means somebody has lifted the vehicle, m, and below which it stands again.
 const HELD_HEIGHT: [f32; 2] = [0.15, 0.08];
+/// After an emergency stop by the button, presses mean nothing until it has been left alone for this long: a hand in a
+/// hurry presses more than once.
+const CALM: Micros = Micros::from_secs(2);
 /// Manual throttle that takes off.
 const THROTTLE_TAKE_OFF: f32 = 0.1;
 
@@ -173,6 +176,7 @@ pub struct ModeMachine {
     crashed: bool,
     silent_since: Option<Micros>,
     was_diverged: bool,
+    touch: Touch,
     /// While pairing: has the transmitter of before fallen silent?
     unheard: bool,
 }
@@ -181,26 +185,24 @@ impl ModeMachine {
     /// One step, at the control rate.
     pub fn step(&mut self, now: Micros, input: &ModeInput<'_>) -> ModeOutput {
         let switch = self.pilot_switch(input);
+        // Nobody can touch the button of an armed vehicle without holding it.
+        let grabbed = self.touch.grabs(now, input.button, is_armed(self.output.mode.state));
+        let input = &ModeInput { button: self.touch.meaning(input.button), ..*input };
         self.choose_mode(input);
         let mode = &mut self.output.mode;
-        if let Some(gesture) = input.button {
-            match gesture {
-                ButtonGesture::HoldPair if !is_armed(mode.state) => {
-                    mode.pairing = !mode.pairing;
-                    self.unheard = false;
-                    // Another transmitter has to show its arm switch off, too.
-                    self.switch = None;
-                }
-                _ => {}
-            }
+        if input.button == Some(ButtonGesture::HoldPair) {
+            mode.pairing = !mode.pairing;
+            self.unheard = false;
+            // Another transmitter has to show its arm switch off, too.
+            self.switch = None;
         }
         // The first frame after silence is the new transmitter's: the link listens to no other.
         if mode.pairing && input.pilot.is_some() && self.unheard {
             mode.pairing = false;
         }
         self.unheard = mode.pairing && (self.unheard || input.pilot.is_none());
-        mode.blocks = arming::blocks(mode.state, mode.pairing, self.crashed, switch.is_stale, input);
-        let happened = self.happened(now, input, &switch);
+        mode.blocks = arming::blocks(mode, self.crashed, switch.is_stale, input);
+        let happened = self.happened(now, input, &switch, grabbed);
         if self.acknowledges(input, &switch) {
             self.crashed = false;
         }
@@ -220,7 +222,7 @@ impl ModeMachine {
     }
 
     /// Which of [`Event::ALL`] have happened, in the same order.
-    fn happened(&mut self, now: Micros, input: &ModeInput<'_>, switch: &Switch) -> [bool; 10] {
+    fn happened(&mut self, now: Micros, input: &ModeInput<'_>, switch: &Switch, grabbed: bool) -> [bool; 10] {
         let mode = &self.output.mode;
         let commanded = |kind: Command| input.commands.contains(&kind);
         let clicked = input.button == Some(ButtonGesture::Click);
@@ -240,11 +242,11 @@ impl ModeMachine {
         let lifts_off = if manual { throttle_up } else { self.takes_off && waited >= SPOOL };
         let airborne_by_hand = manual && input.status.contact == GroundContact::Air;
         [
-            input.alerts.intersects(CUT) || commanded(Command::Kill) || input.pilot.is_some_and(|pilot| pilot.kill),
-            commanded(Command::Disarm)
-                || switch.falls
-                || (clicked && armed)
-                || (mode.state == FlightState::Armed && waited >= ARMED_TIMEOUT),
+            input.alerts.intersects(CUT)
+                || commanded(Command::Kill)
+                || grabbed
+                || input.pilot.is_some_and(|pilot| pilot.kill),
+            commanded(Command::Disarm) || switch.falls || (mode.state == FlightState::Armed && waited >= ARMED_TIMEOUT),
             input.status.landed,
             commanded(Command::Land) || abandoned || input.alerts.intersects(LAND),
             input.status.takeoff_complete || airborne_by_hand,
@@ -309,7 +311,13 @@ impl ModeMachine {
     }
 
     fn pilot_switch(&mut self, input: &ModeInput<'_>) -> Switch {
-        let Some(pilot) = input.pilot else { return Switch::default() };
+        let Some(pilot) = input.pilot else {
+            // Whatever the switch does meanwhile, nobody sees it: it has to be seen off again before it arms.
+            if !is_armed(self.output.mode.state) {
+                self.switch = None;
+            }
+            return Switch::default();
+        };
         let before = self.switch;
         if before.is_some() || !pilot.arm {
             self.switch = Some(pilot.arm);
@@ -324,7 +332,34 @@ impl ModeMachine {
     /// Somebody has come to look at a crashed vehicle.
     fn acknowledges(&self, input: &ModeInput<'_>, switch: &Switch) -> bool {
         let idle = !is_armed(self.output.mode.state);
-        idle && (switch.falls || input.button.is_some() || input.commands.contains(&Command::Disarm))
+        // A press alone is none: what it becomes may be a click, which must not find the crash acknowledged and arm.
+        let touched = input.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
+        idle && (switch.falls || touched || input.commands.contains(&Command::Disarm))
+    }
+}
+
+/// A hand on the button. The touch that stops the motors means nothing else, and neither do those right after it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Touch {
+    /// It has stopped the motors.
+    spent: bool,
+    /// When the button was last heard of.
+    last: Micros,
+}
+
+impl Touch {
+    /// Does this gesture stop the motors?
+    fn grabs(&mut self, now: Micros, gesture: Option<ButtonGesture>, armed: bool) -> bool {
+        let Some(gesture) = gesture.filter(|gesture| *gesture != ButtonGesture::None) else { return false };
+        let calm = now.since(self.last) >= CALM;
+        self.spent = armed || (self.spent && !(gesture == ButtonGesture::Press && calm));
+        self.last = now;
+        armed
+    }
+
+    /// What remains of the gesture for everything else.
+    fn meaning(&self, gesture: Option<ButtonGesture>) -> Option<ButtonGesture> {
+        gesture.filter(|gesture| !self.spent && *gesture != ButtonGesture::None)
     }
 }
 
@@ -339,17 +374,21 @@ struct Switch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_types::messages::ArmBlocks;
     use std::collections::BTreeSet;
     use std::vec;
     use std::vec::Vec;
 
     /// A situation the machine can be put into.
+    #[derive(Clone)]
     struct World {
         estimate: StateEstimate,
         calibration: CalibrationResult,
         status: VehicleStatus,
         alerts: Alerts,
         pilot: Option<PilotInput>,
+        /// Happens in the next step, and not again.
+        button: Option<ButtonGesture>,
         now: u64,
     }
 
@@ -361,6 +400,7 @@ mod tests {
                 status: VehicleStatus::default(),
                 alerts: Alerts::NONE,
                 pilot: None,
+                button: None,
                 now: 0,
             }
         }
@@ -374,7 +414,7 @@ mod tests {
                 status: &self.status,
                 pilot: self.pilot.as_ref(),
                 commands,
-                button: None,
+                button: self.button.take(),
             };
             machine.step(Micros(self.now), &input)
         }
@@ -384,17 +424,8 @@ mod tests {
     fn pairing_ends_with_the_first_frame_after_a_silence_and_its_arm_switch_must_be_seen_off() {
         let (mut machine, mut world) = in_state(FlightState::IdleGround);
         let hold = |world: &mut World, machine: &mut ModeMachine| {
-            world.now += 2_500;
-            let input = ModeInput {
-                alerts: world.alerts,
-                estimate: &world.estimate,
-                calibration: &world.calibration,
-                status: &world.status,
-                pilot: world.pilot.as_ref(),
-                commands: &[],
-                button: Some(ButtonGesture::HoldPair),
-            };
-            machine.step(Micros(world.now), &input).mode.pairing
+            world.button = Some(ButtonGesture::HoldPair);
+            world.step(machine, &[]).mode.pairing
         };
         world.pilot = Some(PilotInput::default());
         world.step(&mut machine, &[]);
@@ -455,11 +486,11 @@ mod tests {
         }
     }
 
-    /// Every state × every single alert and pair of alerts × every command: motors never start, a cutting alert always
-    /// stops them within the step, and only transitions of the table are taken.
+    /// Every state × every single alert and pair of alerts × every command and gesture: motors never start unasked, a
+    /// cutting alert or a touch always stops them within the step, and only transitions of the table are taken.
     #[test]
     fn exhaustive_single_step() {
-        let bits: Vec<Alerts> = (0..13).map(|bit| Alerts::NAMES[bit].1).map(bits_to_alerts).collect();
+        let bits: Vec<Alerts> = Alerts::NAMES.iter().map(|(_, bit)| bits_to_alerts(*bit)).collect();
         let mut sets = vec![Alerts::NONE];
         for (i, a) in bits.iter().enumerate() {
             sets.extend(bits[i..].iter().map(|b| *a | *b));
@@ -468,18 +499,22 @@ mod tests {
         for &state in FlightState::ALL {
             let start = in_state(state);
             for &alerts in &sets {
-                for &command in GuidedKind::ALL {
-                    let (mut machine, mut world) = (start.0.clone(), World { ..copy(&start.1) });
-                    world.alerts = alerts;
-                    let output = world.step(&mut machine, &[command]).mode;
+                let commands = GuidedKind::ALL.iter().map(|command| (Some(*command), ButtonGesture::None));
+                for (command, gesture) in commands.chain(ButtonGesture::ALL.iter().map(|gesture| (None, *gesture))) {
+                    let (mut machine, mut world) = start.clone();
+                    (world.alerts, world.button) = (alerts, Some(gesture));
+                    let output = world.step(&mut machine, command.as_slice()).mode;
                     assert_eq!(output.armed, is_armed(output.state));
                     if alerts.intersects(CUT) {
                         assert!(!output.armed, "{state:?} {alerts:?} {command:?}");
                     }
+                    if gesture != ButtonGesture::None && is_armed(state) {
+                        assert_eq!(output.state, FlightState::IdleGround, "{state:?} {alerts:?} {gesture:?}");
+                    }
                     if output.armed && !is_armed(state) {
-                        assert!(
-                            state == FlightState::IdleGround && command == Command::Arm && output.blocks.is_empty()
-                        );
+                        let heard = command.is_some() || !alerts.contains(Alerts::COMM_LOST);
+                        assert!(heard && state == FlightState::IdleGround && output.blocks.is_empty());
+                        assert!(command == Some(Command::Arm) || gesture == ButtonGesture::Click);
                     }
                     let legal = Event::ALL.iter().any(|e| next(state, *e, true) == Some(output.state));
                     assert!(output.state == state || legal, "{state:?} → {:?}", output.state);
@@ -493,17 +528,6 @@ mod tests {
     fn bits_to_alerts(mask: u32) -> Alerts {
         use stampfly_types::Field;
         Alerts::read(&[mask]).expect("a named bit")
-    }
-
-    fn copy(world: &World) -> World {
-        World {
-            estimate: world.estimate,
-            calibration: world.calibration,
-            status: world.status,
-            alerts: world.alerts,
-            pilot: world.pilot,
-            now: world.now,
-        }
     }
 
     #[test]
@@ -520,22 +544,123 @@ mod tests {
     }
 
     #[test]
+    fn a_switch_that_moved_while_nobody_was_heard_does_not_arm() {
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let frame = |arm| Some(PilotInput { arm, ..Default::default() });
+        for pilot in [frame(false), None, frame(true)] {
+            world.pilot = pilot;
+            assert!(!world.step(&mut machine, &[]).mode.armed);
+        }
+        assert!(world.step(&mut machine, &[]).mode.blocks.contains(ArmBlocks::ARM_SWITCH));
+        for pilot in [frame(false), frame(true)] {
+            world.pilot = pilot;
+            world.step(&mut machine, &[]);
+        }
+        assert!(machine.output.mode.armed, "seen off, then on");
+        for pilot in [None, frame(false)] {
+            world.pilot = pilot;
+            world.step(&mut machine, &[]);
+        }
+        assert!(!machine.output.mode.armed, "but it disarms");
+    }
+
+    #[test]
+    fn nobody_arms_a_vehicle_that_hears_nobody() {
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        world.alerts = Alerts::COMM_LOST;
+        for gesture in [ButtonGesture::Press, ButtonGesture::Click] {
+            world.button = Some(gesture);
+            let mode = world.step(&mut machine, &[]).mode;
+            assert_eq!((mode.armed, mode.blocks), (false, ArmBlocks::NO_LINK), "{gesture:?}");
+        }
+        world.pilot = Some(PilotInput::default());
+        world.step(&mut machine, &[]);
+        world.pilot = Some(PilotInput { arm: true, ..Default::default() });
+        assert!(!world.step(&mut machine, &[]).mode.armed, "the failsafe decides who is heard");
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        world.alerts = Alerts::COMM_LOST;
+        assert!(world.step(&mut machine, &[Command::Arm]).mode.armed, "a command is a sign of life itself");
+    }
+
+    /// Lets time pass without a gesture, then one.
+    fn touch(world: &mut World, machine: &mut ModeMachine, after: Micros, gesture: ButtonGesture) -> SystemMode {
+        world.now += after.0;
+        world.button = Some(gesture);
+        world.step(machine, &[]).mode
+    }
+
+    #[test]
+    fn a_press_stops_the_motors_in_every_state_and_means_nothing_else() {
+        use ButtonGesture::{Click, DoubleClick, HoldPair, HoldReset, Press};
+        let millis = Micros::from_millis;
+        for state in [FlightState::Armed, FlightState::TakeOff, FlightState::Flying, FlightState::Landing] {
+            for rest in [Click, DoubleClick, HoldPair, HoldReset] {
+                let (mut machine, mut world) = in_state(state);
+                let stopped = touch(&mut world, &mut machine, Micros(0), Press);
+                assert_eq!((stopped.state, stopped.armed), (FlightState::IdleGround, false), "{state:?}");
+                let later = touch(&mut world, &mut machine, millis(3_000), rest);
+                assert!(!later.armed && !later.pairing, "{state:?} {rest:?}");
+                // A hand in a hurry presses again.
+                for (after, gesture) in [(300, Press), (500, Click), (1_500, Press), (500, Click), (900, Press)] {
+                    assert!(!touch(&mut world, &mut machine, millis(after), gesture).armed, "{state:?} {rest:?}");
+                }
+                assert!(!touch(&mut world, &mut machine, millis(3_000), HoldPair).pairing, "{state:?} {rest:?}");
+                // Left alone for a while, it is a button again.
+                assert!(!touch(&mut world, &mut machine, millis(2_000), Press).armed);
+                assert!(touch(&mut world, &mut machine, millis(500), Click).armed, "{state:?} {rest:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn who_touches_the_button_while_somebody_else_arms_stops_the_motors() {
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        assert!(!touch(&mut world, &mut machine, Micros(0), ButtonGesture::Press).armed);
+        assert!(world.step(&mut machine, &[Command::Arm]).mode.armed);
+        assert!(!touch(&mut world, &mut machine, Micros::from_millis(500), ButtonGesture::Click).armed);
+    }
+
+    #[test]
+    fn a_touch_that_acknowledges_a_crash_does_not_arm() {
+        let (mut machine, mut world) = in_state(FlightState::Flying);
+        world.alerts = Alerts::IMPACT;
+        world.step(&mut machine, &[]);
+        world.alerts = Alerts::NONE;
+        let millis = Micros::from_millis;
+        touch(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
+        assert_eq!(world.step(&mut machine, &[]).mode.blocks, ArmBlocks::CRASHED, "not yet");
+        assert!(!touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed);
+        assert_eq!(world.step(&mut machine, &[]).mode.blocks, ArmBlocks::NONE);
+        touch(&mut world, &mut machine, millis(500), ButtonGesture::Press);
+        assert!(touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed, "the next touch does");
+    }
+
+    #[test]
+    fn a_raised_stick_does_not_arm_a_vehicle_that_cannot_hold_height() {
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let frame = |arm| Some(PilotInput { arm, throttle: 0.6, mode: FlightMode::AltHold, ..Default::default() });
+        world.estimate.valid = Validity::TILT;
+        for arm in [false, true] {
+            world.pilot = frame(arm);
+            let mode = world.step(&mut machine, &[]).mode;
+            assert_eq!((mode.armed, mode.mode, mode.blocks), (false, FlightMode::Stabilize, ArmBlocks::THROTTLE));
+        }
+        world.estimate.valid = Validity::ALL;
+        for arm in [false, true] {
+            world.pilot = frame(arm);
+            world.step(&mut machine, &[]);
+        }
+        assert!(machine.output.mode.armed, "where the stick is a climb rate, it does");
+    }
+
+    #[test]
     fn a_click_takes_off_and_holds_the_place() {
-        let (mut machine, world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_state(FlightState::IdleGround);
         machine.wanted = FlightMode::Stabilize;
-        let mut input = ModeInput {
-            alerts: Alerts::NONE,
-            estimate: &world.estimate,
-            calibration: &world.calibration,
-            status: &world.status,
-            pilot: None,
-            commands: &[],
-            button: Some(ButtonGesture::Click),
-        };
-        let clicked = machine.step(Micros(world.now), &input).mode;
+        let clicked = touch(&mut world, &mut machine, Micros(0), ButtonGesture::Click);
         assert_eq!((clicked.state, clicked.mode), (FlightState::Armed, FlightMode::PosHold));
-        input.button = None;
-        let later = machine.step(Micros(world.now) + SPOOL, &input).mode;
+        world.now += SPOOL.0;
+        let later = world.step(&mut machine, &[]).mode;
         assert_eq!((later.state, later.mode), (FlightState::TakeOff, FlightMode::PosHold));
     }
 

@@ -46,6 +46,9 @@ pub struct Signaller {
     tone_count: u32,
 }
 
+/// What the vehicle should not fly with.
+const FAULT: Alerts =
+    Alerts::IMU_LOST.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::TILT_MISMATCH).with(Alerts::POWER_LOST);
 /// A low battery is called out again after this long.
 const REPEAT: Micros = Micros::from_secs(10);
 
@@ -53,7 +56,8 @@ impl Signaller {
     /// What to show now; call at about 30 Hz.
     pub fn step(&mut self, now: Micros, mode: &SystemMode, alerts: Alerts) -> Signal {
         let low = alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY);
-        let fault = alerts.intersects(Alerts::IMU_LOST | Alerts::ESTIMATE_DIVERGED | Alerts::TILT_MISMATCH);
+        let fault = alerts.intersects(FAULT);
+        let silent = alerts.contains(Alerts::COMM_LOST);
         if self.last_state != Some(mode.state) {
             let tone = match (self.last_state, mode.state) {
                 (None, _) => Tone::Start,
@@ -75,6 +79,9 @@ impl Signaller {
             (low, CYAN, Blink::Slow),
             (mode.pairing, BLUE, Blink::Fast),
             (mode.state == FlightState::Init, MAGENTA, Blink::Slow),
+            // Nobody is heard: a hint while it stands, an alarm while the motors may turn.
+            (silent && mode.armed, ORANGE, Blink::Fast),
+            (silent && mode.state == FlightState::IdleGround, BLUE, Blink::Solid),
             (mode.state == FlightState::IdleGround, GREEN, Blink::Solid),
             (mode.state == FlightState::IdleHeld, CYAN, Blink::Fast),
             (mode.state == FlightState::Armed, GREEN, Blink::Slow),
@@ -125,6 +132,30 @@ mod tests {
             assert_ne!(signaller.step(Micros(0), &mode, Alerts::NONE).status, OFF, "{state:?}");
             assert_eq!(signaller.step(Micros(0), &mode, Alerts::LOW_BATTERY).status, CYAN);
             assert_eq!(signaller.step(Micros(0), &mode, Alerts::LOW_BATTERY | Alerts::IMU_LOST).status, RED);
+        }
+    }
+
+    #[test]
+    fn a_vehicle_nobody_flies_waits_in_blue_and_calls_in_the_air() {
+        let mut signaller = Signaller::default();
+        let mut status = |state, armed, millis| {
+            let mode = SystemMode { state, armed, ..Default::default() };
+            signaller.step(Micros::from_millis(millis), &mode, Alerts::COMM_LOST).status
+        };
+        for millis in (0..2_000).step_by(30) {
+            assert_eq!(status(FlightState::IdleGround, false, millis), BLUE, "it does not blink at {millis}");
+        }
+        assert_eq!(status(FlightState::Init, false, 0), MAGENTA);
+        for state in [FlightState::Armed, FlightState::TakeOff, FlightState::Flying, FlightState::Landing] {
+            assert_eq!([0, 125].map(|millis| status(state, true, millis)), [ORANGE, OFF], "{state:?}");
+        }
+    }
+
+    #[test]
+    fn faults_are_red() {
+        for fault in [Alerts::IMU_LOST, Alerts::ESTIMATE_DIVERGED, Alerts::TILT_MISMATCH, Alerts::POWER_LOST] {
+            let mode = SystemMode { state: FlightState::IdleGround, ..Default::default() };
+            assert_eq!(Signaller::default().step(Micros(0), &mode, fault).status, RED, "{fault:?}");
         }
     }
 

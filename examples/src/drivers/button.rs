@@ -1,4 +1,4 @@
-//! A button: clicks, double clicks and holds, as they happen.
+//! A button: clicks, double clicks and holds, as they happen. That it was pressed at all is not shown.
 
 use super::Failure;
 use core::convert::Infallible;
@@ -41,7 +41,8 @@ pub async fn run<B: Button, T: Timebase>(
     while clock.now() < begun + SPAN {
         if let Some(event) = decoder.step(clock.now(), button.is_pressed()) {
             let (what, count) = match event.gesture {
-                ButtonGesture::None => continue,
+                // Of a press only what it becomes is counted.
+                ButtonGesture::None | ButtonGesture::Press => continue,
                 ButtonGesture::Click => ("click", &mut pressed.clicks),
                 ButtonGesture::DoubleClick => ("double click", &mut pressed.double_clicks),
                 ButtonGesture::HoldPair => ("long press", &mut pressed.long),

@@ -22,6 +22,10 @@ use stampfly_types::messages::{Alerts, ArmBlocks};
 /// The channel the vehicle listens on.
 const CHANNEL: u8 = 1;
 
+/// What the transmitter shows as a sensor's error.
+const SENSOR_ERROR: Alerts =
+    Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::TOF_LOST).with(Alerts::POWER_LOST);
+
 /// Somebody at the console wants a transmitter to be looked for.
 pub static PAIR: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// The vehicle belongs to this transmitter from now on; to be kept.
@@ -83,12 +87,13 @@ async fn speak(
         ticker.next().await;
         let frame = telemetry.latest().map(|sample| sample.data).unwrap_or_default();
         let wants = frame.blocks.contains(ArmBlocks::PAIRING);
+        session.borrow_mut().set_armed(frame.armed);
+        // Refused with motors armed, and then there is nothing to be done.
         if PAIR.try_take().is_some() {
-            let _ = session.borrow_mut().start_pairing(Clock.now(), frame.armed);
+            let _ = session.borrow_mut().start_pairing(Clock.now());
         }
         match (wanted, wants) {
-            // Refused with motors armed, and then there is nothing to be done.
-            (false, true) => _ = session.borrow_mut().start_pairing(Clock.now(), frame.armed),
+            (false, true) => _ = session.borrow_mut().start_pairing(Clock.now()),
             (true, false) => session.borrow_mut().stop_pairing(),
             _ => {}
         }
@@ -135,7 +140,7 @@ fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
         attitude: frame.attitude,
         state: frame.state.into(),
         low_battery: frame.alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY),
-        sensor_error: frame.alerts.intersects(Alerts::IMU_DEGRADED | Alerts::IMU_LOST | Alerts::TOF_LOST),
+        sensor_error: frame.alerts.intersects(SENSOR_ERROR),
         link_lost: frame.alerts.intersects(Alerts::COMM_LOST),
         calibrating: frame.blocks.contains(ArmBlocks::CALIBRATING),
     }

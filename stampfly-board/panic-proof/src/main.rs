@@ -76,7 +76,8 @@ fn radio() {
     let mut session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
     while black_box(true) {
         let (at, bytes) = (black_box(Micros::ZERO), black_box(&[0u8; 32][..]));
-        let _ = black_box(session.start_pairing(at, black_box(false)));
+        session.set_armed(black_box(false));
+        let _ = black_box(session.start_pairing(at));
         black_box((session.beacon(at), session.age(at)));
         let _ = black_box(session.receive(at, black_box(Address([0; 6])), bytes));
         let _ = black_box((PairingPacket::decode(bytes), TelemetryPacket::decode(bytes)));

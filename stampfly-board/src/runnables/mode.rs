@@ -84,6 +84,10 @@ impl Runnable for ModeManager<'_> {
             // As many as the queue holds.
             let _ = commands.push(command.data.kind);
         }
+        // One in a step, but for a loop that was held up: then what stops the motors is not missed.
+        let mut gestures = self.gestures.iter().map(|s| s.data.gesture);
+        let newest = self.gestures.last().map(|s| s.data.gesture);
+        let button = gestures.find(|gesture| *gesture == ButtonGesture::Press).or(newest);
         let input = ModeInput {
             alerts: self.alerts,
             estimate: &self.estimate,
@@ -91,7 +95,7 @@ impl Runnable for ModeManager<'_> {
             status: &self.status,
             pilot: self.pilot.as_ref(),
             commands: &commands,
-            button: self.gestures.last().map(|s| s.data.gesture),
+            button,
         };
         let output = self.machine.step(activation.now(), &input);
         self.ports.mode.publish(activation.now(), &output.mode);

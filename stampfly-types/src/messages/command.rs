@@ -77,15 +77,17 @@ message_enum! {
         HoldPair = 3,
         /// Held for five seconds: restart.
         HoldReset = 4,
+        /// Pressed just now; another gesture follows when it is clear what this press is.
+        Press = 5,
     }
 }
 
 message! {
-    /// A finished gesture on the board's button.
+    /// What happened on the board's button: every press at once, and what became of it.
     pub struct ButtonEvent {
         /// What happened.
         gesture: ButtonGesture ["1"],
-        /// How long the button was down.
+        /// How long the button has been down, or was.
         held: f32 ["s"],
     }
 }

@@ -49,7 +49,7 @@ message_flags! {
         LOW_BATTERY = 3,
         /// Attitude is unknown or disagrees with gravity.
         ATTITUDE = 4,
-        /// A sensor the mode needs is silent.
+        /// The inertial sensor or the battery monitor is silent.
         SENSOR = 5,
         /// The estimate is lost.
         ESTIMATE = 6,
@@ -57,7 +57,7 @@ message_flags! {
         PAIRING = 7,
         /// Tilted too far to take off.
         TILTED = 8,
-        /// The throttle is not at rest.
+        /// The throttle is not at rest in a mode where it commands thrust.
         THROTTLE = 9,
         /// The arm switch was on before the vehicle saw it off.
         ARM_SWITCH = 10,
@@ -65,6 +65,8 @@ message_flags! {
         CRASHED = 11,
         /// The self test at power-on failed.
         SELF_TEST = 12,
+        /// Neither a pilot nor a program is heard.
+        NO_LINK = 13,
     }
 }
 
@@ -92,7 +94,7 @@ message_flags! {
     /// Conditions the failsafe has found. Level-triggered: a bit stays while its condition does, and the ones that
     /// must not be missed stay until the vehicle is disarmed.
     pub struct Alerts {
-        /// No authentic command for too long.
+        /// No authentic command for too long, or never one.
         COMM_LOST = 0,
         /// Acceleration beyond the impact limit.
         IMPACT = 1,
@@ -122,6 +124,8 @@ message_flags! {
         SELF_TEST_FAILED = 13,
         /// The self test gave other bits than recorded, within its tolerance.
         SELF_TEST_DIFFERS = 14,
+        /// No sample from the battery monitor.
+        POWER_LOST = 15,
     }
 }
 
