@@ -51,7 +51,7 @@ fn vehicle() {
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
     let (vehicle, mut outside) = assemble(ports, &config);
     let mut flight_loop = FlightLoop::new(vehicle, heads, black_box(Micros::ZERO));
-    let mut memory = BlackBox::<1024>::new(Micros::from_millis(40));
+    let mut memory = BlackBox::<1024>::new();
     while black_box(true) {
         let at: Micros = black_box(Micros::ZERO);
         outside.imu.publish(at, &black_box(Default::default()));
