@@ -146,6 +146,7 @@ impl Console {
             }
             Request::ResetParameters => {
                 let outcome = self.storage.reset(mode).await;
+                self.unkept = self.unkept.filter(|_| outcome.is_err());
                 self.report(outcome, "forgotten, the transmitter, too; defaults apply after a reboot").await;
             }
             Request::Pair => {
