@@ -54,9 +54,9 @@ impl Pages {
 
     /// Erases everything and leaves the mark.
     pub async fn format<F: NorFlash>(&self, flash: &mut F) -> Result<(), EraseError<F::Error>> {
-        // Two steps, because nobody promises in which order the pages of one go.
-        for pages in [&self.mark, &self.values] {
-            flash.erase(pages.start, pages.end).await.map_err(EraseError::Flash)?;
+        // One page at a time, the mark's first: that is how long everything else on the chip has to wait.
+        for from in (self.mark.start..self.values.end).step_by(F::ERASE_SIZE.max(1)) {
+            flash.erase(from, from.saturating_add(F::ERASE_SIZE as u32)).await.map_err(EraseError::Flash)?;
         }
         flash.write(self.mark.start, &self.expected().0).await.map_err(EraseError::Flash)?;
         if self.are_ours(flash).await.map_err(EraseError::Flash)? { Ok(()) } else { Err(EraseError::NotKept) }

@@ -1,8 +1,8 @@
 //! What the firmware's black box tells of an accident, from the arming to the text on the terminal.
 
 use stampfly_board::black_box::{BlackBox, DumpError, HASTE, ROOM, Refused, dump};
-use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, parameters, wiring};
+use stampfly_board::vehicle::{Assembled, assemble};
+use stampfly_board::{VehicleConfig, parameters, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::blocking::block_on;
 use stampfly_host::flight_log;
@@ -26,8 +26,7 @@ static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Micros)> = LazyLock::new(|| {
     let mut black_box = Box::new(BlackBox::new());
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, mut outside) = assemble(ports, &VehicleConfig::default());
-    let mut flight_loop = FlightLoop::new(vehicle, heads, Micros::ZERO);
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
     let (mut armed_at, mut stopped_at, mut pilot) = (None, None, 0u32);
     for event in recorder.into_inputs() {
         match event {
