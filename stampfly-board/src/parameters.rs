@@ -5,6 +5,10 @@
 
 use crate::config::VehicleConfig;
 
+/// The name in flash of the transmitter the vehicle belongs to: the six bytes of its address, as one value, because half
+/// an address is somebody else's.
+pub const PEER: &str = "link.peer";
+
 /// One parameter.
 #[derive(Clone, Copy)]
 pub struct Parameter {
@@ -145,6 +149,7 @@ pub fn set(config: &mut VehicleConfig, name: &str, value: f32) -> Result<(), Par
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::Vec;
 
     #[test]
     fn every_default_is_in_range_and_every_name_is_unique() {
@@ -158,10 +163,11 @@ mod tests {
 
     #[test]
     fn no_two_names_share_a_place_in_flash() {
-        for (index, parameter) in PARAMETERS.iter().enumerate() {
-            let key = stampfly_param::key(parameter.name);
-            let twin = PARAMETERS[..index].iter().find(|other| stampfly_param::key(other.name) == key);
-            assert!(twin.is_none(), "{}", parameter.name);
+        let names: Vec<&str> = PARAMETERS.iter().map(|parameter| parameter.name).chain([PEER]).collect();
+        for (index, name) in names.iter().enumerate() {
+            let key = stampfly_param::key(name);
+            let twin = names[..index].iter().find(|other| stampfly_param::key(other) == key);
+            assert!(twin.is_none(), "{name}");
         }
     }
 

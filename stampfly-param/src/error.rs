@@ -3,9 +3,17 @@
 use core::fmt;
 use sequential_storage::Error;
 
-/// The flash range is not at least two whole pages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NoRoom;
+/// Why there is no store.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum OpenError<E> {
+    /// The range is not at least three whole pages.
+    NoRoom,
+    /// The flash gives back something else than what was written.
+    NotKept,
+    /// The flash.
+    Flash(E),
+}
 
 /// Why a value could not be loaded. The default applies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +30,7 @@ pub enum LoadError<E> {
     Flash(E),
 }
 
-/// Why a value was not saved. What was stored before still is.
+/// Why a value was not saved. What was stored before still is, unless the flash does [not keep](Self::NotKept) things.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SaveError<E> {
@@ -30,6 +38,8 @@ pub enum SaveError<E> {
     OutOfRange,
     /// More names than the pages have room for.
     Full,
+    /// The flash took the value and gives back something else.
+    NotKept,
     /// The pages make no sense. [`ParameterStore::erase`](crate::ParameterStore::erase) helps.
     Corrupted,
     /// The flash.
@@ -40,8 +50,19 @@ pub enum SaveError<E> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum EraseError<E> {
+    /// The flash gives back something else than what was written.
+    NotKept,
     /// The flash.
     Flash(E),
+}
+
+impl<E> From<EraseError<E>> for OpenError<E> {
+    fn from(error: EraseError<E>) -> Self {
+        match error {
+            EraseError::NotKept => Self::NotKept,
+            EraseError::Flash(error) => Self::Flash(error),
+        }
+    }
 }
 
 impl<E> From<Error<E>> for LoadError<E> {
@@ -63,9 +84,15 @@ impl<E> From<Error<E>> for SaveError<E> {
     }
 }
 
-impl fmt::Display for NoRoom {
+const NOT_KEPT: &str = "the flash does not keep what is written";
+
+impl<E: fmt::Debug> fmt::Display for OpenError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("parameters need at least two whole pages of flash")
+        match self {
+            Self::NoRoom => f.write_str("parameters need at least three whole pages of flash"),
+            Self::NotKept => f.write_str(NOT_KEPT),
+            Self::Flash(error) => write!(f, "flash: {error:?}"),
+        }
     }
 }
 
@@ -84,6 +111,7 @@ impl<E: fmt::Debug> fmt::Display for SaveError<E> {
         match self {
             Self::OutOfRange => f.write_str("the value is out of range"),
             Self::Full => f.write_str("no room for another parameter"),
+            Self::NotKept => f.write_str(NOT_KEPT),
             Self::Corrupted => f.write_str("the stored parameters are damaged"),
             Self::Flash(error) => write!(f, "flash: {error:?}"),
         }
@@ -93,12 +121,13 @@ impl<E: fmt::Debug> fmt::Display for SaveError<E> {
 impl<E: fmt::Debug> fmt::Display for EraseError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::NotKept => f.write_str(NOT_KEPT),
             Self::Flash(error) => write!(f, "flash: {error:?}"),
         }
     }
 }
 
-impl core::error::Error for NoRoom {}
+impl<E: fmt::Debug> core::error::Error for OpenError<E> {}
 impl<E: fmt::Debug> core::error::Error for LoadError<E> {}
 impl<E: fmt::Debug> core::error::Error for SaveError<E> {}
 impl<E: fmt::Debug> core::error::Error for EraseError<E> {}

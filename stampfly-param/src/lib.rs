@@ -1,4 +1,4 @@
-//! Parameters that survive a power cut: numbers with names, in flash.
+//! Parameters that survive a power cut: values with names, in flash.
 //!
 //! | type | what it is |
 //! |---|---|
@@ -14,6 +14,10 @@
 //! # What a power cut can do
 //! A value is appended and becomes valid with its last word, so after a cut each name has the value before it or the one
 //! that was being written. The tests cut every write and every erasure at every word.
+//!
+//! # What was in flash before
+//! It may be anything: the first page of a store says that the store has erased the others. Where it does not say so
+//! [`ParameterStore::open`] erases all of them, which takes some 50 ms a page and happens once.
 #![no_std]
 
 #[cfg(test)]
@@ -21,10 +25,11 @@ extern crate std;
 
 mod disarmed;
 mod error;
+mod pages;
 mod store;
 
 pub use disarmed::Disarmed;
-pub use error::{EraseError, LoadError, NoRoom, SaveError};
+pub use error::{EraseError, LoadError, OpenError, SaveError};
 pub use store::{ParameterStore, key};
 
 /// The README's example, compiled.

@@ -7,28 +7,31 @@ use crate::motors;
 use crate::radio;
 use crate::self_test::Outcome;
 use crate::sensors::HEALTH;
-use crate::storage::Storage;
+use crate::storage::{Storage, StorageError};
 use core::cell::RefCell;
 use core::fmt::Write as _;
-use embassy_futures::select::{Either, select};
-use embassy_time::{Duration, with_timeout};
+use embassy_futures::select::{Either3, select3};
+use embassy_time::{Duration, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
 use esp_hal::Async;
 use esp_hal::peripherals::USB_DEVICE;
 use esp_hal::usb::usb_serial_jtag::{UsbSerialJtag, UsbSerialJtagTx};
-use heapless::{String, Vec};
+use heapless::String;
+use stampfly_board::VehicleConfig;
+use stampfly_board::black_box::{DumpError, Refused, dump};
 use stampfly_board::console::{Context, LineEditor, MotorTest, Request, SensorLine, answer};
-use stampfly_board::{VehicleConfig, black_box};
 use stampfly_drivers::Timebase;
-use stampfly_log::ulog::{Full, Level, Sample, Sink};
+use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
 /// The longest reply is the list of parameters.
 const REPLY: usize = 4 * 1024;
 /// A terminal that takes nothing for this long is none.
 const PATIENCE: Duration = Duration::from_millis(200);
-/// Bytes of the log in a line of its dump.
-const LINE: usize = 32;
+/// A terminal in the middle of a log is one, and may be busy.
+const PATIENCE_WITH_LOG: Duration = Duration::from_secs(3);
+/// How often it is tried again to keep the transmitter that was paired.
+const AGAIN: Duration = Duration::from_secs(1);
 
 /// The motor test, asked for here and applied where duties go to the motors.
 pub static MOTOR_TEST: MotorTest = MotorTest::new();
@@ -52,21 +55,25 @@ pub async fn run(parts: Parts) {
     let mut version = String::new();
     // A version that is too long ends early.
     let _ = write!(version, concat!("stampfly-esp32s3 ", env!("CARGO_PKG_VERSION"), ", {}"), tested);
-    let mut console = Console { screen: Screen(screen), memory, storage, config, version };
+    let flown = config.clone();
+    let mut console = Console { screen: Screen(screen), memory, storage, config, flown, version, unkept: None };
     let mut editor = LineEditor::<80>::new();
     let mut typed = [0; 64];
     loop {
-        let count = match select(keys.read(&mut typed), radio::PAIRED.wait()).await {
-            Either::First(count) => count.unwrap_or_default(),
-            Either::Second(peer) => {
-                let memory = console.memory;
-                let kept = console.storage.save_peer(peer, || newest_mode(memory)).await;
-                let mut said = String::<96>::new();
-                let _ = match kept {
-                    Ok(()) => write!(said, "paired with {peer}\r\n"),
-                    Err(error) => write!(said, "paired with {peer}, not kept: {error}\r\n"),
-                };
-                console.screen.show(&said).await;
+        let again = async {
+            match console.unkept {
+                Some(_) => Timer::after(AGAIN).await,
+                None => core::future::pending().await,
+            }
+        };
+        let count = match select3(keys.read(&mut typed), radio::PAIRED.wait(), again).await {
+            Either3::First(count) => count.unwrap_or_default(),
+            Either3::Second(peer) => {
+                console.paired(peer).await;
+                continue;
+            }
+            Either3::Third(()) => {
+                console.keep_peer().await;
                 continue;
             }
         };
@@ -93,9 +100,14 @@ struct Console {
     screen: Screen,
     memory: &'static RefCell<Memory>,
     storage: Storage,
+    /// What the vehicle flies with after the next start.
     config: VehicleConfig,
+    /// What it has flown with since the last.
+    flown: VehicleConfig,
     /// Which firmware this is, and how its self test went.
     version: String<128>,
+    /// A transmitter that was paired and is still to be kept.
+    unkept: Option<Address>,
 }
 
 impl Console {
@@ -134,6 +146,7 @@ impl Console {
             }
             Request::ResetParameters => {
                 let outcome = self.storage.reset(mode).await;
+                self.unkept = self.unkept.filter(|_| outcome.is_err());
                 self.report(outcome, "forgotten, the transmitter, too; defaults apply after a reboot").await;
             }
             Request::Pair => {
@@ -165,24 +178,34 @@ impl Console {
 
     /// Sends the black box as a log in hexadecimal, a format that survives every terminal.
     async fn dump(&mut self) {
-        let bytes = RefCell::new(Vec::new());
-        let begun = self.memory.borrow().black_box.records().next().map(|record| record.at);
-        let Some(begun) = begun else { return self.screen.show("no flight yet\r\n").await };
-        let Ok(mut log) = black_box::open(Bytes(&bytes), begun, &self.config) else { return };
-        let _ = log.text(Level::Info, begun, &self.version);
-        self.screen.send_all(&bytes).await;
-        // Looked up one by one, so that nothing is borrowed while the terminal takes its time.
-        let mut index = 0;
-        loop {
-            let record = self.memory.borrow().black_box.records().nth(index);
-            let Some(record) = record else { break };
-            let sample = Sample { at: record.at, generation: record.generation, words: record.words() };
-            // A sample the log refuses is left out.
-            let _ = log.sample(record.topic, &sample);
-            self.screen.send_all(&bytes).await;
-            index += 1;
+        let Self { screen, memory, flown, version, .. } = self;
+        let mut cursor = memory.borrow().black_box.begin();
+        // Borrowed for one record at a time, so that nothing is while the terminal takes its time.
+        let next = || memory.borrow().black_box.next(&mut cursor);
+        let show = async |line: &str| screen.offer(line, PATIENCE_WITH_LOG).await;
+        if let Err(error) = dump(next, flown, version, show).await {
+            self.report(Err::<(), DumpError>(error), "").await;
         }
-        self.screen.show("\r\n").await;
+    }
+
+    /// The vehicle belongs to this transmitter now.
+    async fn paired(&mut self, peer: Address) {
+        let mut said = String::<96>::new();
+        let _ = write!(said, "paired with {peer}\r\n");
+        self.screen.show(&said).await;
+        self.unkept = Some(peer);
+        self.keep_peer().await;
+    }
+
+    /// Keeps the transmitter. On an armed vehicle nothing is kept; then it is for later.
+    async fn keep_peer(&mut self) {
+        let Some(peer) = self.unkept else { return };
+        let memory = self.memory;
+        let outcome = self.storage.save_peer(peer, || newest_mode(memory)).await;
+        if !matches!(outcome, Err(StorageError::Armed)) {
+            self.unkept = None;
+            self.report(outcome, "transmitter kept").await;
+        }
     }
 }
 
@@ -193,39 +216,15 @@ impl Screen {
     /// Shows a text. Without a terminal it is lost.
     async fn show(&mut self, text: &str) {
         if !text.is_empty() {
-            let _ = with_timeout(PATIENCE, self.0.write_all(text.as_bytes())).await;
+            let _ = self.offer(text, PATIENCE).await;
         }
     }
 
-    /// Sends bytes in lines of hexadecimal digits, and forgets them.
-    async fn send_all(&mut self, bytes: &RefCell<Vec<u8, LOG_PIECE>>) {
-        let mut sent = 0;
-        loop {
-            let mut line = String::<{ 2 * LINE + 2 }>::new();
-            for byte in bytes.borrow().iter().skip(sent).take(LINE) {
-                let _ = write!(line, "{byte:02x}");
-            }
-            if line.is_empty() {
-                break;
-            }
-            sent += LINE;
-            let _ = line.push_str("\r\n");
-            self.show(&line).await;
+    /// Shows a text to a terminal that takes it in this time.
+    async fn offer(&mut self, text: &str, patience: Duration) -> Result<(), Refused> {
+        match with_timeout(patience, self.0.write_all(text.as_bytes())).await {
+            Ok(Ok(())) => Ok(()),
+            _ => Err(Refused),
         }
-        bytes.borrow_mut().clear();
-    }
-}
-
-/// The longest piece of a log that is made at once: what explains its topics.
-const LOG_PIECE: usize = 10 * 1024;
-
-/// Collects what a log is made of.
-struct Bytes<'b>(&'b RefCell<Vec<u8, LOG_PIECE>>);
-
-impl Sink for Bytes<'_> {
-    type Error = Full;
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Full> {
-        self.0.borrow_mut().extend_from_slice(bytes).map_err(|_| Full)
     }
 }

@@ -5,19 +5,13 @@ use crate::motors;
 use core::cell::RefCell;
 use embassy_time::{Duration, Ticker};
 use esp_hal::system::software_reset;
-use stampfly_board::black_box::BlackBox;
+use stampfly_board::black_box::{BlackBox, ROOM};
 use stampfly_board::console::Newest;
 use stampfly_board::wiring;
 use stampfly_drivers::Timebase;
 use stampfly_types::Micros;
 use stampfly_types::messages::{ButtonEvent, ButtonGesture, SystemMode};
 
-/// 32 kB: between two and three seconds.
-const WORDS: usize = 8 * 1024;
-/// One sample of each topic per interval.
-const INTERVAL: Micros = Micros::from_millis(40);
-/// Remembering goes on for this long after the motors have stopped.
-const AFTERMATH: Micros = Micros::from_secs(1);
 /// A gesture on the button that is older was meant for something else.
 const FRESH: Micros = Micros::from_millis(100);
 /// Two periods of the fastest topic: none has room for fewer samples than that.
@@ -29,33 +23,22 @@ pub struct Memory {
     /// The newest sample of every topic.
     pub newest: Newest,
     /// The last flight.
-    pub black_box: BlackBox<WORDS>,
-    /// Until when the flight is worth remembering.
-    until: Micros,
+    pub black_box: BlackBox<ROOM>,
 }
 
 impl Memory {
     /// Nothing yet.
     pub const fn new(taps: wiring::Taps<'static>) -> Self {
-        Self { taps, newest: Newest::new(), black_box: BlackBox::new(INTERVAL), until: Micros::ZERO }
+        Self { taps, newest: Newest::new(), black_box: BlackBox::new() }
     }
 
     /// Takes in what was published since the last time.
     pub fn catch_up(&mut self) {
-        let Self { taps, newest, black_box, until } = self;
-        let now = Clock.now();
+        let Self { taps, newest, black_box } = self;
         taps.drain(&mut |topic, at, generation, words| {
             newest.note(topic, at, words);
-            if now < *until {
-                black_box.note(topic, at, generation, words);
-            }
+            black_box.note(topic, at, generation, words);
         });
-        if self.mode().is_some_and(|mode| mode.armed) {
-            if now >= self.until {
-                self.black_box.clear();
-            }
-            self.until = now + AFTERMATH;
-        }
     }
 
     /// The mode machine's newest decision.

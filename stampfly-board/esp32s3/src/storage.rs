@@ -6,6 +6,7 @@
 use crate::flash::Flash;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_embedded_hal::adapter::BlockingAsync;
+use embassy_futures::block_on;
 use embassy_time::{Duration, Timer};
 use esp_bootloader_esp_idf::partitions::{
     DataPartitionSubType, PARTITION_TABLE_MAX_LEN, PartitionType, read_partition_table,
@@ -13,14 +14,10 @@ use esp_bootloader_esp_idf::partitions::{
 use esp_hal::peripherals::FLASH;
 use esp_storage::{FlashStorage, FlashStorageError};
 use stampfly_board::VehicleConfig;
-use stampfly_board::parameters::PARAMETERS;
+use stampfly_board::parameters::{PARAMETERS, PEER};
 use stampfly_link::Address;
-use stampfly_param::{Disarmed, EraseError, LoadError, ParameterStore, SaveError};
+use stampfly_param::{Disarmed, EraseError, ParameterStore, SaveError};
 use stampfly_types::messages::SystemMode;
-
-/// Half of an address is a number of 24 bits, which single precision holds exactly.
-const PEER: [&str; 2] = ["link.peer.first", "link.peer.last"];
-const HALVES: core::ops::RangeInclusive<f32> = 0.0..=16_777_215.0;
 
 /// Several periods of the motors' duties and of the cut-off.
 const NOTICE: Duration = Duration::from_millis(20);
@@ -56,7 +53,7 @@ impl Drop for Writing {
 pub enum StorageError {
     /// The vehicle is armed.
     Armed,
-    /// There is no partition `nvs`.
+    /// There is no partition `nvs`, or it could not be opened.
     NoPartition,
     /// A value was not written.
     Save(SaveError<FlashStorageError>),
@@ -68,7 +65,7 @@ impl core::fmt::Display for StorageError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Armed => f.write_str("the vehicle is armed"),
-            Self::NoPartition => f.write_str("there is no partition nvs"),
+            Self::NoPartition => f.write_str("there is no partition nvs, or its flash does not obey"),
             Self::Save(error) => error.fmt(f),
             Self::Erase(error) => error.fmt(f),
         }
@@ -81,7 +78,8 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// Looks for the partition.
+    /// Looks for the partition, and erases what earlier firmware has left in it. Before the vehicle is assembled: nobody
+    /// can arm what is not there.
     pub fn open(flash: FLASH<'static>) -> Self {
         Self { store: find(FlashStorage::new(flash)) }
     }
@@ -102,14 +100,8 @@ impl Storage {
 
     /// The transmitter the vehicle belongs to, if it has one.
     pub async fn load_peer(&mut self) -> Option<Address> {
-        let store = self.store.as_mut()?;
-        let mut halves = [0; 2];
-        for (half, name) in halves.iter_mut().zip(PEER) {
-            let value: Result<Option<f32>, LoadError<_>> = store.load(name, HALVES).await;
-            *half = value.ok().flatten()? as u32;
-        }
-        let [[_, a, b, c], [_, d, e, f]] = halves.map(u32::to_be_bytes);
-        Some(Address([a, b, c, d, e, f])).filter(|address| address.is_station())
+        let stored = self.store.as_mut()?.load_bytes(PEER).await.ok()?;
+        stored.map(Address).filter(|address| address.is_station())
     }
 
     /// Keeps the parameters. `mode` tells the newest decision of the mode machine; it is asked before every value.
@@ -134,14 +126,11 @@ impl Storage {
         peer: Address,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
+        // Before the motors are kept still: nobody has asked whether this is a good moment.
+        let _ = proven(&mut mode)?;
         let _still = Writing::begin().await;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
-        let [a, b, c, d, e, f] = peer.0;
-        let halves = [[0, a, b, c], [0, d, e, f]].map(u32::from_be_bytes);
-        for (half, name) in halves.into_iter().zip(PEER) {
-            store.save(proven(&mut mode)?, name, half as f32, HALVES).await.map_err(StorageError::Save)?;
-        }
-        Ok(())
+        store.save_bytes(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
     }
 
     /// Forgets everything that was kept, the transmitter included.
@@ -162,5 +151,5 @@ fn find(mut flash: FlashStorage<'static>) -> Option<ParameterStore<BlockingAsync
     let table = read_partition_table(&mut flash, &mut table).ok()?;
     let nvs = table.find_partition(PartitionType::Data(DataPartitionSubType::Nvs)).ok()??;
     let range = nvs.offset()..nvs.offset() + nvs.len();
-    ParameterStore::new(BlockingAsync::new(Flash::new(flash)), range).ok()
+    block_on(ParameterStore::open(BlockingAsync::new(Flash::new(flash)), range)).ok()
 }

@@ -50,7 +50,7 @@ fn vehicle() {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
     let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &config, black_box(Micros::ZERO));
-    let mut memory = BlackBox::<1024>::new(Micros::from_millis(40));
+    let mut memory = BlackBox::<1024>::new();
     while black_box(true) {
         let at: Micros = black_box(Micros::ZERO);
         outside.imu.publish(at, &black_box(Default::default()));

@@ -5,7 +5,7 @@ use embedded_storage_async::nor_flash::{
 };
 
 const PAGE: usize = 256;
-const PAGES: usize = 4;
+const PAGES: usize = 5;
 
 /// The power was cut, or somebody asked for something a flash does not do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,13 +29,20 @@ pub struct Flash {
     words_left: Option<usize>,
     /// What the word under way becomes when the power fails: none of its zeros, or some of them.
     torn: bool,
+    /// Says that it has written, and has not.
+    pub deaf: bool,
     pub words_written: usize,
 }
 
 #[allow(dead_code, reason = "each test uses what it needs")]
 impl Flash {
     pub fn new() -> Self {
-        Self { bytes: vec![0xFF; PAGE * PAGES], words_left: None, torn: false, words_written: 0 }
+        Self::with(vec![0xFF; PAGE * PAGES])
+    }
+
+    /// What somebody else has left.
+    pub fn with(bytes: Vec<u8>) -> Self {
+        Self { bytes, words_left: None, torn: false, deaf: false, words_written: 0 }
     }
 
     /// Fails after so many words, in the middle of the next one if `torn`.
@@ -66,6 +73,9 @@ impl Flash {
             None => {}
         }
         self.words_written += 1;
+        if self.deaf {
+            return Ok(());
+        }
         for (index, byte) in word.iter_mut().enumerate() {
             *byte = change(*byte, index);
         }
