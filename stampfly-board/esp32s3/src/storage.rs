@@ -33,12 +33,13 @@ pub fn is_writing() -> bool {
 struct Writing;
 
 impl Writing {
-    /// Returns when the motors and the cut-off have taken notice.
-    async fn begin() -> Self {
+    /// Returns when the motors and the cut-off have taken notice. A vehicle that is armed already notices nothing.
+    async fn begin(mode: &mut impl FnMut() -> Option<SystemMode>) -> Result<Self, StorageError> {
+        proven(mode)?;
         WRITING.store(true, Ordering::Release);
         let writing = Self;
         Timer::after(NOTICE).await;
-        writing
+        Ok(writing)
     }
 }
 
@@ -110,7 +111,7 @@ impl Storage {
         config: &VehicleConfig,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
-        let _still = Writing::begin().await;
+        let _still = Writing::begin(&mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         for parameter in PARAMETERS {
             let disarmed = proven(&mut mode)?;
@@ -126,16 +127,14 @@ impl Storage {
         peer: Address,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
-        // Before the motors are kept still: nobody has asked whether this is a good moment.
-        let _ = proven(&mut mode)?;
-        let _still = Writing::begin().await;
+        let _still = Writing::begin(&mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         store.save_bytes(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
     }
 
     /// Forgets everything that was kept, the transmitter included.
     pub async fn reset(&mut self, mut mode: impl FnMut() -> Option<SystemMode>) -> Result<(), StorageError> {
-        let _still = Writing::begin().await;
+        let _still = Writing::begin(&mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         store.erase(proven(&mut mode)?).await.map_err(StorageError::Erase)
     }
