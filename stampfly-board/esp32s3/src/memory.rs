@@ -24,21 +24,26 @@ pub struct Memory {
     pub newest: Newest,
     /// The last flight.
     pub black_box: BlackBox<ROOM>,
+    /// When the vehicle was last seen armed.
+    armed_at: Micros,
 }
 
 impl Memory {
     /// Nothing yet.
     pub const fn new(taps: wiring::Taps<'static>) -> Self {
-        Self { taps, newest: Newest::new(), black_box: BlackBox::new() }
+        Self { taps, newest: Newest::new(), black_box: BlackBox::new(), armed_at: Micros::ZERO }
     }
 
     /// Takes in what was published since the last time.
     pub fn catch_up(&mut self) {
-        let Self { taps, newest, black_box } = self;
+        let Self { taps, newest, black_box, .. } = self;
         taps.drain(&mut |topic, at, generation, words| {
             newest.note(topic, at, words);
             black_box.note(topic, at, generation, words);
         });
+        if self.mode().is_some_and(|mode| mode.armed) {
+            self.armed_at = Clock.now();
+        }
     }
 
     /// The mode machine's newest decision.
@@ -46,10 +51,11 @@ impl Memory {
         self.newest.get(wiring::Id::system_mode).map(|(_, mode)| mode)
     }
 
-    /// Has the button just been held for long, on a disarmed vehicle?
+    /// Has the button just been held for long, on a vehicle disarmed all the while? A press that stopped the motors and
+    /// was held on does not count: it would lose what is remembered of the flight.
     fn wants_restart(&self) -> bool {
         let Some((at, event)) = self.newest.get::<ButtonEvent>(wiring::Id::button_event) else { return false };
-        let disarmed = self.mode().is_some_and(|mode| !mode.armed);
+        let disarmed = self.mode().is_some_and(|mode| !mode.armed) && at.since(self.armed_at).seconds() > event.held;
         event.gesture == ButtonGesture::HoldReset && disarmed && Clock.now().since(at) < FRESH
     }
 }

@@ -35,7 +35,7 @@ struct Writing;
 impl Writing {
     /// Returns when the motors and the cut-off have taken notice. A vehicle that is armed already notices nothing.
     async fn begin(mode: &mut impl FnMut() -> Option<SystemMode>) -> Result<Self, StorageError> {
-        proven(mode)?;
+        let _ = proven(mode)?;
         WRITING.store(true, Ordering::Release);
         let writing = Self;
         Timer::after(NOTICE).await;
