@@ -26,6 +26,8 @@ struct Chip {
     header: Option<u8>,
     /// Faults of the next reads of a register.
     faults: Vec<(u8, Fault)>,
+    /// A bit of the next read of a register arrives the other way round.
+    flip: Option<(u8, usize)>,
     starts: bool,
     frozen: bool,
     /// Chip period in nanoseconds.
@@ -45,6 +47,7 @@ impl Chip {
             consumed: 0,
             header: None,
             faults: Vec::new(),
+            flip: None,
             starts: true,
             frozen: false,
             period: PERIOD,
@@ -101,6 +104,9 @@ impl Chip {
                     }
                 } else {
                     into.copy_from_slice(&self.registers[usize::from(register)..][..into.len()]);
+                }
+                if let Some((_, bit)) = self.flip.take_if(|(at, _)| *at == register) {
+                    into[bit / 8] ^= 1 << (bit % 8);
                 }
             }
         }
@@ -311,6 +317,44 @@ fn a_brown_out_is_noticed_at_the_next_read_and_healed_by_the_one_after() {
     chip.borrow_mut().registers[0x21] = 0;
     assert_eq!(block_on(imu.next()), Err(ChipError::Restarted));
     block_on(imu.next()).expect("a sample");
+}
+
+#[test]
+fn one_wrong_bit_anywhere_in_flight_costs_no_more_than_a_sample() {
+    for (register, bytes) in [(0x18, 14), (0x26, 52)] {
+        for bit in 0..8 * bytes {
+            let (clock, chip) = bench();
+            let mut imu = driver(&clock, &chip, Config::default());
+            let mut sample = block_on(imu.next()).expect("a sample");
+            let mut came = clock.now();
+            chip.borrow_mut().flip = Some((register, bit));
+            for _ in 0..5 {
+                let before = core::mem::replace(&mut sample, block_on(imu.next()).expect("a sample"));
+                let (gap, step) = (clock.now().since(came), sample.at.since(before.at));
+                came = clock.now();
+                let place = format!("bit {bit} of {register:#04x}");
+                assert!(gap <= Micros::from_millis(5), "{place}: {gap} without a sample");
+                assert!((Micros(1_800)..=Micros(3_200)).contains(&step), "{place}: the next one is {step} later");
+            }
+            assert_eq!(chip.borrow().flip, None, "it was read");
+        }
+    }
+}
+
+#[test]
+fn after_refused_transfers_the_samples_made_meanwhile_come_at_once() {
+    let (clock, chip) = bench();
+    let mut imu = driver(&clock, &chip, Config::default());
+    for register in [0x18, 0x26] {
+        block_on(imu.next()).expect("a sample");
+        chip.borrow_mut().faults.push((register, Fault::Nack));
+        assert_eq!(block_on(imu.next()), Err(ChipError::Bus(Fault::Nack)));
+        clock.advance(18_000);
+        let begun = clock.now();
+        let sample = block_on(imu.next()).expect("a sample");
+        assert!(clock.now().since(begun) < Micros(1_000), "{}", clock.now().since(begun));
+        assert!(begun.since(sample.at) > Micros(10_000), "from the time of the refusals");
+    }
 }
 
 #[test]

@@ -12,4 +12,4 @@ mod flight;
 mod sensing;
 
 pub use flight::fly;
-pub use sensing::{Health, pump};
+pub use sensing::{Health, Retry, pump};

@@ -147,6 +147,21 @@ fn refused_transfers() {
 }
 
 #[test]
+fn a_short_refusal_leaves_a_short_gap_in_the_inertial_samples() {
+    // Motors are cut after 25 ms without a sample. A period has passed when the fault begins, and a pause after its end.
+    let (unavoidable, end) = (Micros(5_200), Micros::from_millis(1_100));
+    for refused in [1, 8, 18].map(Micros::from_millis) {
+        for begin in (0..10).map(|n| BEGIN + Micros(270 * n)) {
+            let refusing = set(Faults { refusals: 1.0, ..Faults::default() });
+            let said =
+                run(end, &[(begin, &|access| refusing(access, 0)), (begin + refused, &|access| heal(access, 0))]);
+            let gap = longest_gap(&said[0], BEGIN, end);
+            assert!(gap <= refused + unavoidable, "{refused} of refused transfers leave a gap of {gap}");
+        }
+    }
+}
+
+#[test]
 fn bit_errors() {
     // Every other transfer of a few bytes is hit. What is garbled cannot always be known, but nobody hangs.
     let noisy = Faults { bit_errors: 0.01, ..Faults::default() };

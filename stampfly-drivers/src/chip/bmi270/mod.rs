@@ -73,9 +73,13 @@ impl Default for Config {
 /// 10 MHz, 0.1 ms on I2C at 400 kHz). The chip's own low-pass delays a little more; that is not taken off.
 ///
 /// A reader that comes late gets every sample, up to 90 ms (at 400 Hz), each stamped by the nominal rate: off by what
-/// the chip's clock is in the time it was late, 2 % of it. Beyond that, or when a read is cancelled or
-/// garbled, the FIFO is emptied and the filter starts anew, which takes two output periods. Gives up on the chip
-/// ([`ChipError::NoSample`]) after four output periods without a sample.
+/// the chip's clock is in the time it was late, 2 % of it. Beyond that, or when the FIFO holds something else than
+/// samples, it is emptied and the filter starts anew, which takes two output periods. After a read that failed or was
+/// cancelled the filter starts anew with what the FIFO still holds. Gives up on the chip ([`ChipError::NoSample`]) after
+/// four output periods without a sample.
+///
+/// One wrong bit on the bus costs no sample, wherever it is: a status that cannot be is read again before the chip
+/// counts as restarted, and a frame's header may have one. What it does to a measured value cannot be known.
 ///
 /// [`with_interrupt`](Self::with_interrupt) takes the pin that INT1 is wired to (GPIO 11 on the StampFly).
 ///
@@ -340,7 +344,13 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
                 self.running = false;
                 return Err(ChipError::NoSample);
             }
-            let (status, told, after) = self.status().await?;
+            let mut asked = self.status().await?;
+            if !is_believable(&asked.0) {
+                // A wrong bit on the bus is a hundred times as likely as a chip that restarted, and setting it up again
+                // takes longer than motors turn without it.
+                asked = self.status().await?;
+            }
+            let (status, told, after) = asked;
             if status.start_up != Status::RUNNING {
                 self.running = false;
                 return Err(ChipError::Restarted);
@@ -365,10 +375,15 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let bytes = self.port.read(register::FIFO_DATA).await?;
             self.reading = false;
             self.due = newest + ticks_to_micros(8u64.saturating_sub(frames) * period + AIM);
-            let Some(group) = codec::decode_frames(&bytes) else { return Ok(None) };
+            let Some(group) = codec::decode_frames(&bytes, status.holds_whole_frames()) else { return Ok(None) };
             return Ok(Some((newest.since(self.chip_period(frames - 1)), group)));
         }
     }
+}
+
+/// Is this what a chip that runs says?
+const fn is_believable(status: &Status) -> bool {
+    status.start_up == Status::RUNNING && status.holds_whole_frames()
 }
 
 const fn ticks_to_micros(ticks: u64) -> Micros {
@@ -383,8 +398,9 @@ impl<R: Registers, T: Timebase, P: Wait> Imu for Bmi270<'_, R, T, P> {
             self.start().await?;
         }
         let deadline = self.port.now() + self.chip_period(4 * PATIENCE);
-        if self.reading {
-            self.restart_fifo().await?;
+        if core::mem::take(&mut self.reading) {
+            // Nobody knows which frames that read took out; those that are still there begin anew.
+            self.decimator = Decimator::default();
         }
         loop {
             let Some((at, group)) = self.group(deadline).await? else {
