@@ -40,7 +40,12 @@ impl Access {
 
 /// Runs for `duration`; at each instant of `events` something is done.
 pub fn run(duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
-    let config = SimulationConfig { wind: WindConfig::CALM, ..Default::default() };
+    run_with(SimulationConfig::default().seed, duration, events)
+}
+
+/// The same with chips and noise of this seed.
+pub fn run_with(seed: u64, duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
+    let config = SimulationConfig { wind: WindConfig::CALM, seed, ..Default::default() };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
     let Board { i2c, imu, flow, shutdown_bottom, shutdown_front, attached } =
@@ -70,15 +75,16 @@ pub fn run(duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
         }};
     }
     use stampfly_types::messages::*;
+    let share = |good: bool| f32::from(u8::from(good));
     let down = devices::range_down(to_down, shutdown_bottom, &boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &boot, time());
     watch!(0, PROMPT, devices::imu(imu, time(), &image), |data: &ImuData| data.accel.norm());
-    watch!(1, PATIENT, devices::flow(flow, time()), |data: &FlowData| data.delta_x);
+    watch!(1, PATIENT, devices::flow(flow, time()), |data: &FlowData| share(data.valid && data.quality > 0));
     watch!(2, PATIENT, devices::magnetometer(to_mag, time()), |data: &MagData| data.field.norm());
     watch!(3, PATIENT, devices::barometer(to_baro, time()), |data: &BaroData| data.pressure);
     watch!(4, PATIENT, devices::power(to_power, time()), |data: &PowerData| data.voltage);
     watch!(5, PATIENT, down, |data: &TofData| data.distance);
-    watch!(6, PATIENT, ahead, |data: &TofData| f32::from(u8::from(data.valid)));
+    watch!(6, PATIENT, ahead, |data: &TofData| share(data.valid));
     for (instant, action) in events {
         tasks.run_until(*instant);
         action(&access);
