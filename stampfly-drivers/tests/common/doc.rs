@@ -68,7 +68,13 @@ impl I2c for Chip {
         let [i2c::Operation::Write(address), data] = operations else { panic!("not a register access") };
         let register = address.iter().fold(0, |number, byte| number << 8 | u16::from(*byte));
         match data {
-            i2c::Operation::Read(into) => self.load(register, into),
+            i2c::Operation::Read(into) => {
+                self.load(register, into);
+                // A range finder numbers its results.
+                if let Some((_, result)) = self.pieces.iter_mut().find(|piece| piece.0 == 0x89 && register == 0x89) {
+                    result[2] = result[2].wrapping_add(1);
+                }
+            }
             i2c::Operation::Write(data) => self.store(register, data),
         }
         Ok(())

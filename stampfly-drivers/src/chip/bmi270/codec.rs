@@ -15,8 +15,10 @@ pub mod register {
     pub const INTERNAL_STATUS: u8 = 0x21;
     /// Which page of features the registers from 0x30 on show.
     pub const FEAT_PAGE: u8 = 0x2F;
-    /// On page 1: what [`GYRO_TRIGGER`](super::GYRO_TRIGGER) starts, 2 bytes.
+    /// On page 1: longest burst, then what [`GYRO_TRIGGER`](super::GYRO_TRIGGER) starts, a byte each.
     pub const G_TRIG_1: u8 = 0x32;
+    /// On page 0: why the command was not carried out.
+    pub const GYR_GAIN_STATUS: u8 = 0x38;
     /// FIFO output.
     pub const FIFO_DATA: u8 = 0x26;
     /// Gyroscope cross-axis factor.
@@ -41,6 +43,8 @@ pub mod register {
     pub const INIT_ADDR_0: u8 = 0x5B;
     /// Configuration data.
     pub const INIT_DATA: u8 = 0x5E;
+    /// A test of the gyroscope runs: [`GYRO_TEST_RUNS`](super::GYRO_TEST_RUNS).
+    pub const GYR_CRT_CONF: u8 = 0x69;
     /// Accelerometer self test.
     pub const ACC_SELF_TEST: u8 = 0x6D;
     /// Outcome of the gyroscope's self test.
@@ -71,8 +75,12 @@ pub const NOT_LATCHED: u8 = 0x00;
 pub const WATERMARK_ON_INT1: u8 = 0x02;
 /// Command: what [`register::G_TRIG_1`] selects, register 0x7E.
 pub const GYRO_TRIGGER: u8 = 0x02;
-/// The self test, not the calibration of the sensitivity; data in blocks as after a reset, register 0x32 of page 1.
+/// The self test and not the calibration of the sensitivity (bit 0 of the second byte), not to be given up (its bit 1),
+/// data in no bursts as after a reset (the first byte): registers 0x32 and 0x33 of page 1. The features are written in
+/// words of two bytes.
 pub const SELECT_GYRO_SELF_TEST: [u8; 2] = [0x00, 0x00];
+/// Set before the command, cleared by the chip when the test is over, register 0x69.
+pub const GYRO_TEST_RUNS: u8 = 0x04;
 /// Accelerometer only, register 0x7D.
 pub const ACCELEROMETER_ONLY: u8 = 0x04;
 /// Advanced power saving off, FIFO self wake-up on, register 0x7C.
@@ -316,6 +324,12 @@ pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
 #[must_use]
 pub const fn gyro_self_test(axes: u8) -> Option<bool> {
     if axes & 1 == 0 { None } else { Some(axes & 0x0E == 0x0E) }
+}
+
+/// Was the command of the gyroscope's test refused, given up or not prepared for, register 0x38 of page 0?
+#[must_use]
+pub const fn gyro_trigger_failed(status: u8) -> bool {
+    status & 0x38 != 0
 }
 
 #[cfg(test)]

@@ -37,8 +37,10 @@ const START_UP_LIMIT: Micros = Micros::from_millis(150);
 const GYRO_START: Micros = Micros::from_millis(50);
 /// Each deflection of the self test settles for 50 ms (§4 "Sensor self-test").
 const SELF_TEST_SETTLE: Micros = Micros::from_millis(51);
-/// How long the gyroscope's self test may take. The data sheet gives no figure.
-const GYRO_SELF_TEST_LIMIT: Micros = Micros::from_millis(500);
+/// How long the gyroscope's self test may take. The data sheet gives no figure; Bosch's sensor API waits as long.
+const GYRO_SELF_TEST_LIMIT: Micros = Micros::from_secs(2);
+/// From the accelerometer on to the selection of the test, as in Bosch's sensor API.
+const BEFORE_GYRO_SELF_TEST: Micros = Micros::from_millis(1);
 /// Ticks of sensor time from a sample to the read the driver aims at, and to the earliest one it trusts: before, the
 /// FIFO may or may not hold the sample.
 const AIM: u64 = 3;
@@ -240,31 +242,40 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         if codec::passes_self_test(positive, negative) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
-    /// Lets the chip test its gyroscope's drive. The vehicle has to stand still. Given up after 700 ms.
+    /// Lets the chip test its gyroscope's drive. The vehicle has to stand still. Given up after 2.2 s.
     ///
-    /// The test is a feature of the configuration file: the short file that has the FIFO only fails it. **Unverified** on
-    /// a chip. Leaves the chip to be set up by the next call.
+    /// The test is a feature of the configuration file: the short file that has the FIFO only fails it. The order is that
+    /// of Bosch's sensor API; the data sheet names the registers only. **Unverified** on a chip. Leaves the chip to be set
+    /// up by the next call.
     ///
     /// # Errors
     /// [`ChipError::SelfTest`], also when it does not end, and those of [`start`](Self::start).
     pub async fn gyro_self_test(&mut self) -> Result<(), ChipError<R::Error>> {
         self.running = false;
         self.upload().await?;
-        // The test wants the accelerometer on, which tells it whether the vehicle stands still.
+        self.write(register::GYR_CRT_CONF, &[codec::GYRO_TEST_RUNS]).await?;
+        // The gyroscope off; the accelerometer on, which tells the test whether the vehicle stands still.
         self.write(register::PWR_CTRL, &[codec::ACCELEROMETER_ONLY]).await?;
+        self.port.wait(BEFORE_GYRO_SELF_TEST).await;
         self.write(register::FEAT_PAGE, &[1]).await?;
         self.write(register::G_TRIG_1, &codec::SELECT_GYRO_SELF_TEST).await?;
         self.write(register::CMD, &[codec::GYRO_TRIGGER]).await?;
         let deadline = self.port.now() + GYRO_SELF_TEST_LIMIT;
         loop {
             self.port.wait(Micros::from_millis(1)).await;
-            let [axes]: [u8; 1] = self.port.read(register::GYR_SELF_TEST_AXES).await?;
-            match codec::gyro_self_test(axes) {
-                Some(true) => return Ok(()),
-                None if self.port.now() < deadline => {}
-                _ => return Err(ChipError::SelfTest),
+            let [running]: [u8; 1] = self.port.read(register::GYR_CRT_CONF).await?;
+            if running & codec::GYRO_TEST_RUNS == 0 {
+                break;
+            }
+            if self.port.now() > deadline {
+                return Err(ChipError::SelfTest);
             }
         }
+        self.write(register::FEAT_PAGE, &[0]).await?;
+        let [status]: [u8; 1] = self.port.read(register::GYR_GAIN_STATUS).await?;
+        let [axes]: [u8; 1] = self.port.read(register::GYR_SELF_TEST_AXES).await?;
+        let passed = codec::gyro_self_test(axes) == Some(true) && !codec::gyro_trigger_failed(status);
+        if passed { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
     /// Reset, identification, configuration file, until the chip says it runs.
