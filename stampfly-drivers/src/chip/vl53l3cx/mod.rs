@@ -66,7 +66,7 @@ impl Default for Config {
 ///
 /// A sample is vouched for (`valid`) when the chip calls it [`RangeStatus::Valid`] and it is above zero and within the
 /// mode's reach. The first one after a start is not: the chip tells a target beyond its reach from one within by
-/// comparing measurements. `status` is the chip's own code; [`reading`](Self::reading) has everything it said.
+/// comparing measurements. `status` is [`RangeStatus::number`]; [`reading`](Self::reading) has everything it said.
 ///
 /// # Several on a bus
 /// Every chip wakes up at 0x29, so each has a pin on its XSHUT and is given an address of its own. Creating a driver
@@ -366,7 +366,7 @@ impl<I: I2c, X: OutputPin, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
         let data = TofData {
             distance: distance.max(0.0),
             sigma: reading.sigma,
-            status: reading.code,
+            status: reading.status().number(),
             valid: checked && plausible && reading.status() == RangeStatus::Valid,
         };
         Ok(Sample { at: seen.since(Micros(self.config.budget.0 / 2)), data })
