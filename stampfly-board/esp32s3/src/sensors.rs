@@ -72,9 +72,27 @@ pub async fn run(parts: Parts) {
             Retry::PATIENT,
             &HEALTH.tof_front,
         ),
-        pump(async || mag_chip.next().await, |at, sample| _ = mag.publish(at, sample), Clock, Retry::PATIENT, &HEALTH.mag),
-        pump(async || baro_chip.next().await, |at, sample| _ = baro.publish(at, sample), Clock, Retry::PATIENT, &HEALTH.baro),
-        pump(async || power_chip.next().await, |at, sample| _ = power.publish(at, sample), Clock, Retry::PATIENT, &HEALTH.power),
+        pump(
+            async || mag_chip.next().await,
+            |at, sample| _ = mag.publish(at, sample),
+            Clock,
+            Retry::PATIENT,
+            &HEALTH.mag,
+        ),
+        pump(
+            async || baro_chip.next().await,
+            |at, sample| _ = baro.publish(at, sample),
+            Clock,
+            Retry::PATIENT,
+            &HEALTH.baro,
+        ),
+        pump(
+            async || power_chip.next().await,
+            |at, sample| _ = power.publish(at, sample),
+            Clock,
+            Retry::PATIENT,
+            &HEALTH.power,
+        ),
     )
     .await;
 }
