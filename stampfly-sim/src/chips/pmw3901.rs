@@ -262,6 +262,8 @@ impl Chip for Pmw3901 {
 }
 
 impl SpiChip for Pmw3901 {
+    const HIGHEST_CLOCK: u32 = 2_000_000;
+
     fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
         if index == 0 {
             self.command = byte;
