@@ -1,6 +1,8 @@
 //! Motors.
 
 use crate::{ArmToken, Interlock};
+use core::error::Error;
+use core::fmt;
 use embedded_hal::pwm::SetDutyCycle;
 use stampfly_types::Micros;
 use stampfly_types::messages::MotorOutput;
@@ -29,6 +31,14 @@ pub struct MotorError {
     /// Index of the first channel that refused.
     pub channel: usize,
 }
+
+impl fmt::Display for MotorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "motor channel {} refused its duty", self.channel)
+    }
+}
+
+impl Error for MotorError {}
 
 /// Brushed motors behind transistors, one PWM channel each.
 ///
@@ -198,7 +208,9 @@ mod tests {
         let seen: [Cell<u16>; 2] = core::array::from_fn(|_| Cell::new(0));
         let mut motors = PwmMotors::new([Channel(&seen[0], true), Channel(&seen[1], false)]);
         let output = MotorOutput { duty: [1.0; 8], count: 2, armed: true, unmet: [0.0; 4] };
-        assert_eq!(motors.write(&MotorOutput::default()), Err(MotorError { channel: 0 }));
+        let refused = motors.write(&MotorOutput::default());
+        assert_eq!(refused, Err(MotorError { channel: 0 }));
+        assert_eq!(std::format!("{}", MotorError { channel: 2 }), "motor channel 2 refused its duty");
         assert_eq!(motors.write(&output), Err(MotorError { channel: 0 }));
         assert_eq!(seen[1].get(), 255);
     }

@@ -4,7 +4,8 @@
 //! for all of them, as in `embedded-hal`.
 
 use core::convert::Infallible;
-use core::fmt::Debug;
+use core::error::Error;
+use core::fmt::{self, Debug, Display};
 
 /// The kind of a sensor error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -25,6 +26,22 @@ pub enum SensorErrorKind {
     /// None of the above.
     Other,
 }
+
+impl Display for SensorErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bus => "the bus refused or garbled a transfer",
+            Self::Timeout => "no new sample in time",
+            Self::Identification => "another chip, or none, answered",
+            Self::Configuration => "the chip did not accept its configuration",
+            Self::SelfTest => "the self test failed",
+            Self::Data => "the chip answered with data that cannot be",
+            Self::Other => "another error of the sensor",
+        })
+    }
+}
+
+impl Error for SensorErrorKind {}
 
 /// An error of a sensor driver.
 pub trait SensorError: Debug {

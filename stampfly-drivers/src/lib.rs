@@ -36,6 +36,10 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod actuator;
 pub mod blocking;
 pub mod chip;

@@ -6,6 +6,7 @@
 //! afterwards. Not for drivers, which share the bus, and no help against a device that holds the *clock* line: that
 //! one needs its reset pin or its power.
 
+use core::fmt;
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_async::delay::DelayNs;
 
@@ -39,6 +40,18 @@ pub enum RecoveryError {
     /// A pin could not be set or read.
     Pin,
 }
+
+impl fmt::Display for RecoveryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ClockStuck => "the clock line stays low",
+            Self::DataStuck => "the data line stays low after nine clocks",
+            Self::Pin => "a pin could not be set or read",
+        })
+    }
+}
+
+impl core::error::Error for RecoveryError {}
 
 /// Clocks the bus until nobody holds the data line, then sends a STOP (UM10204 §3.1.16). At most 1 ms, by this delay's
 /// clock.

@@ -48,6 +48,7 @@
 use crate::Timebase;
 use crate::time::{sleep_until, within};
 use core::cell::Cell;
+use core::fmt::{self, Debug, Display};
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
 use embedded_hal_async::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
@@ -120,6 +121,17 @@ impl<E: Error> Error for SlotError<E> {
         }
     }
 }
+
+impl<E: Debug> Display for SlotError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Device(error) => write!(f, "the device says {error:?}"),
+            Self::TooLong => f.write_str("the transfer took longer than promised and was given up"),
+        }
+    }
+}
+
+impl<E: Debug> core::error::Error for SlotError<E> {}
 
 /// What a guest that wants to transfer has to do.
 enum Opening {

@@ -26,6 +26,8 @@ struct Chip {
     header: Option<u8>,
     /// Faults of the next reads of a register.
     faults: Vec<(u8, Fault)>,
+    /// A bit of the next read of a register arrives the other way round.
+    flip: Option<(u8, usize)>,
     starts: bool,
     frozen: bool,
     /// Chip period in nanoseconds.
@@ -45,6 +47,7 @@ impl Chip {
             consumed: 0,
             header: None,
             faults: Vec::new(),
+            flip: None,
             starts: true,
             frozen: false,
             period: PERIOD,
@@ -101,6 +104,9 @@ impl Chip {
                     }
                 } else {
                     into.copy_from_slice(&self.registers[usize::from(register)..][..into.len()]);
+                }
+                if let Some((_, bit)) = self.flip.take_if(|(at, _)| *at == register) {
+                    into[bit / 8] ^= 1 << (bit % 8);
                 }
             }
         }
@@ -314,6 +320,44 @@ fn a_brown_out_is_noticed_at_the_next_read_and_healed_by_the_one_after() {
 }
 
 #[test]
+fn one_wrong_bit_anywhere_in_flight_costs_no_more_than_a_sample() {
+    for (register, bytes) in [(0x18, 14), (0x26, 52)] {
+        for bit in 0..8 * bytes {
+            let (clock, chip) = bench();
+            let mut imu = driver(&clock, &chip, Config::default());
+            let mut sample = block_on(imu.next()).expect("a sample");
+            let mut came = clock.now();
+            chip.borrow_mut().flip = Some((register, bit));
+            for _ in 0..5 {
+                let before = core::mem::replace(&mut sample, block_on(imu.next()).expect("a sample"));
+                let (gap, step) = (clock.now().since(came), sample.at.since(before.at));
+                came = clock.now();
+                let place = format!("bit {bit} of {register:#04x}");
+                assert!(gap <= Micros::from_millis(5), "{place}: {gap} without a sample");
+                assert!((Micros(1_800)..=Micros(3_200)).contains(&step), "{place}: the next one is {step} later");
+            }
+            assert_eq!(chip.borrow().flip, None, "it was read");
+        }
+    }
+}
+
+#[test]
+fn after_refused_transfers_the_samples_made_meanwhile_come_at_once() {
+    let (clock, chip) = bench();
+    let mut imu = driver(&clock, &chip, Config::default());
+    for register in [0x18, 0x26] {
+        block_on(imu.next()).expect("a sample");
+        chip.borrow_mut().faults.push((register, Fault::Nack));
+        assert_eq!(block_on(imu.next()), Err(ChipError::Bus(Fault::Nack)));
+        clock.advance(18_000);
+        let begun = clock.now();
+        let sample = block_on(imu.next()).expect("a sample");
+        assert!(clock.now().since(begun) < Micros(1_000), "{}", clock.now().since(begun));
+        assert!(begun.since(sample.at) > Micros(10_000), "from the time of the refusals");
+    }
+}
+
+#[test]
 fn bus_faults_cost_one_call_each_and_bounded_time() {
     let (clock, chip) = bench();
     let mut imu = driver(&clock, &chip, Config::default());
@@ -485,21 +529,46 @@ fn a_pin_that_cannot_be_trusted_is_ignored() {
 
 #[test]
 fn the_gyroscopes_self_test_is_started_awaited_and_given_up() {
-    for (axes, outcome) in [
-        (0x0F, Ok(())),
-        (0x0D, Err(ChipError::SelfTest)),
-        (0x01, Err(ChipError::SelfTest)),
-        (0, Err(ChipError::SelfTest)),
+    for (axes, status, ends, outcome) in [
+        (0x0F, 0x00, true, Ok(())),
+        (0x0F, 0x07, true, Ok(())),
+        (0x0D, 0x00, true, Err(ChipError::SelfTest)),
+        (0x01, 0x00, true, Err(ChipError::SelfTest)),
+        (0x00, 0x00, true, Err(ChipError::SelfTest)),
+        (0x0F, 0x08, true, Err(ChipError::SelfTest)),
+        (0x0F, 0x00, false, Err(ChipError::SelfTest)),
     ] {
         let (clock, chip) = bench();
         chip.borrow_mut().registers[0x6E] = axes;
-        let mut imu = driver(&clock, &chip, Config::default());
+        chip.borrow_mut().registers[0x38] = status;
+        let (shared, time, mut asked) = (chip.clone(), clock.clone(), None);
+        let bus = SpiBus {
+            clock: clock.clone(),
+            chip: move |access: Access<'_>| {
+                let mut chip = shared.borrow_mut();
+                if let Access::Read(0x69, _) = access {
+                    let command = chip.writes.last().expect("writes");
+                    assert_eq!((command.0, &command.1[..]), (0x7E, &[0x02][..]));
+                    // A third of a second.
+                    let begun = *asked.get_or_insert(time.now());
+                    if ends && time.now().since(begun) > Micros::from_millis(333) {
+                        chip.registers[0x69] = 0;
+                    }
+                }
+                chip.access(access)
+            },
+        };
+        let mut imu = Bmi270::spi(bus, clock.clone(), &BLOB, AxisMap::STAMPFLY_IMU, Config::default());
         let begun = clock.now();
-        assert_eq!(block_on(imu.gyro_self_test()), outcome);
-        assert!(clock.now().since(begun) < Micros::from_millis(700));
+        assert_eq!(block_on(imu.gyro_self_test()), outcome, "{axes:#04x} {status:#04x}");
+        let took = clock.now().since(begun);
+        assert!(took < Micros::from_millis(2_200) && took > Micros::from_millis(333), "{took}");
         let writes = chip.borrow().writes.clone();
-        let last: Vec<(u8, &[u8])> = writes.iter().rev().take(3).rev().map(|write| (write.0, &write.1[..])).collect();
-        assert_eq!(last, [(0x2F, &[1][..]), (0x32, &[0, 0]), (0x7E, &[0x02])]);
+        let test: Vec<(u8, &[u8])> = writes.iter().map(|write| (write.0, &write.1[..])).collect();
+        let expected: [(u8, &[u8]); 5] =
+            [(0x69, &[0x04]), (0x7D, &[0x04]), (0x2F, &[1]), (0x32, &[0, 0]), (0x7E, &[0x02])];
+        assert!(test.windows(5).any(|five| five == expected), "{test:02x?}");
+        chip.borrow_mut().registers[0x69] = 0;
         block_on(imu.next()).expect("set up again");
     }
 }

@@ -19,6 +19,8 @@ struct Chip {
     conversions: u32,
     duration: u64,
     fault: Option<Fault>,
+    /// So many commands to convert arrive as sleep.
+    deaf: u32,
 }
 
 impl Chip {
@@ -39,6 +41,7 @@ impl Chip {
             conversions: 0,
             duration: 13_500,
             fault: None,
+            deaf: 0,
         }
     }
 
@@ -46,6 +49,10 @@ impl Chip {
         let now = self.clock.now();
         match access {
             Access::Write(0xE0, [0xB6]) => self.registers[0xF4..0xF6].fill(0),
+            Access::Write(0xF4, [control]) if self.deaf > 0 => {
+                self.deaf -= 1;
+                self.registers[0xF4] = control & 0xFC;
+            }
             Access::Write(0xF4, [control]) => {
                 assert!(now >= self.busy_until, "a conversion is still running");
                 assert_eq!(control & 3, 1, "forced mode");
@@ -95,6 +102,21 @@ fn every_sample_is_a_conversion_of_its_own_at_the_instant_it_was_made() {
         assert_eq!(chip.borrow().conversions, count);
         before = sample.at;
     }
+}
+
+#[test]
+fn a_conversion_that_did_not_start_is_started_again_and_never_delivered_twice() {
+    let (clock, chip, mut baro) = bench();
+    for round in 0..10 {
+        chip.borrow_mut().deaf = round % 2;
+        let sample = block_on(baro.next()).expect("a sample");
+        assert_eq!(chip.borrow().conversions, round + 1);
+        assert!(clock.now().since(sample.at) < Micros::from_millis(8));
+    }
+    chip.borrow_mut().deaf = 2;
+    assert_eq!(block_on(baro.next()), Err(ChipError::NoSample));
+    assert_eq!(chip.borrow().conversions, 10);
+    block_on(baro.next()).expect("set up again");
 }
 
 #[test]

@@ -29,12 +29,20 @@ struct Chip {
     refusals: u32,
     /// A register that can be written only.
     forgets_witness: bool,
+    /// The write of so many from now on arrives with another value.
+    garbles: Option<u32>,
 }
 
 impl Chip {
     fn new() -> Self {
-        let registers =
-            [((0, 0x00), 0x49), ((0, 0x5F), 0xB6), ((0x0E, 0x73), 0x00), ((0x0E, 0x70), 20), ((0x0E, 0x71), 80)];
+        let registers = [
+            ((0, 0x00), 0x49),
+            ((0, 0x5F), 0xB6),
+            ((0x0E, 0x73), 0x00),
+            ((0x0E, 0x67), 0x00),
+            ((0x0E, 0x70), 20),
+            ((0x0E, 0x71), 80),
+        ];
         Self {
             registers: registers.into(),
             bank: 0,
@@ -47,11 +55,15 @@ impl Chip {
             ready: Micros::ZERO,
             refusals: 0,
             forgets_witness: false,
+            garbles: None,
         }
     }
 
     fn write(&mut self, register: u8, value: u8) {
         self.writes.push((register, value));
+        let garbled = self.garbles == Some(0);
+        self.garbles = self.garbles.and_then(|writes| writes.checked_sub(1));
+        let value = value ^ if garbled { 0x04 } else { 0 };
         match register {
             0x7F => self.bank = value,
             _ => drop(self.registers.insert((self.bank, register), value)),
@@ -74,7 +86,8 @@ impl Chip {
                 self.refusals = self.refusals.saturating_sub(1);
             }
             (0, 0x4E) if self.forgets_witness => into[0] = 0,
-            key => into[0] = self.registers.get(&key).copied().unwrap_or(0),
+            // What was never written looks like no setting.
+            key => into[0] = self.registers.get(&key).copied().unwrap_or(0xEE),
         }
     }
 }
@@ -123,11 +136,11 @@ fn the_whole_list_is_written_with_the_chips_own_calibration() {
     let (_, chip, mut flow) = bench();
     block_on(flow.start()).expect("starts");
     let chip = chip.borrow();
-    assert_eq!(chip.writes[0], (0x3A, 0x5A));
-    assert_eq!(chip.writes[1..6], codec::PREPARE);
-    assert_eq!(chip.writes[6], (0x48, 0x02));
-    assert_eq!(chip.writes[7..12], codec::PREPARE_CALIBRATION);
-    assert_eq!(chip.writes[12..18], [(0x7F, 0), (0x61, 0xAD), (0x51, 34), (0x7F, 0x0E), (0x70, 34), (0x71, 36)]);
+    assert_eq!(chip.writes[..2], [(0x7F, 0x00), (0x3A, 0x5A)]);
+    assert_eq!(chip.writes[2..7], codec::PREPARE);
+    assert_eq!(chip.writes[7], (0x48, 0x02));
+    assert_eq!(chip.writes[8..13], codec::PREPARE_CALIBRATION);
+    assert_eq!(chip.writes[13..19], [(0x7F, 0), (0x61, 0xAD), (0x51, 0x70), (0x7F, 0x0E), (0x70, 34), (0x71, 36)]);
     let rest: Vec<_> = codec::PERFORMANCE
         .iter()
         .filter_map(|step| match step {
@@ -135,7 +148,9 @@ fn the_whole_list_is_written_with_the_chips_own_calibration() {
             codec::Step::Wait(_) => None,
         })
         .collect();
-    assert_eq!(chip.writes[18..], rest);
+    assert_eq!(chip.writes[19..][..rest.len()], rest);
+    assert!(chip.writes[19 + rest.len()..].iter().all(|(register, _)| *register == 0x7F), "only read back after that");
+    assert_eq!(chip.bank, 0);
 }
 
 #[test]
@@ -145,7 +160,7 @@ fn a_chip_with_a_calibration_of_its_own_keeps_it() {
     chip.borrow_mut().registers.insert((0x0E, 0x67), 0x80);
     block_on(flow.start()).expect("starts");
     let chip = chip.borrow();
-    assert_eq!(chip.writes[6], (0x48, 0x04));
+    assert_eq!(chip.writes[7], (0x48, 0x04));
     assert!(!chip.writes.iter().any(|write| write.0 == 0x51 && write.1 != 0x7B));
 }
 
@@ -277,4 +292,36 @@ fn a_chip_that_does_not_give_the_witness_back_is_left_alone() {
     for _ in 0..300 {
         block_on(flow.next()).expect("a sample");
     }
+}
+
+#[test]
+fn a_setting_that_is_garbled_on_its_way_is_noticed_and_the_list_written_again() {
+    // The list: 73 writes after the first nineteen.
+    for write in 19..19 + 73 {
+        let (_, chip, mut flow) = bench();
+        chip.borrow_mut().garbles = Some(write);
+        block_on(flow.start()).expect("starts");
+        let chip = chip.borrow();
+        for (bank, register, value) in codec::settings() {
+            assert_eq!(chip.registers.get(&(bank, register)), Some(&value), "write {write}: {register:#04x} of {bank}");
+        }
+    }
+}
+
+#[test]
+fn a_chip_that_sees_nothing_for_ten_seconds_is_set_up_again() {
+    let (clock, chip, mut flow) = bench();
+    block_on(flow.next()).expect("a sample");
+    chip.borrow_mut().quality = 0;
+    let begun = clock.now();
+    let error = loop {
+        if let Err(error) = block_on(flow.next()) {
+            break error;
+        }
+    };
+    assert_eq!(error, ChipError::NoSample);
+    assert!((9_900_000..10_100_000).contains(&clock.now().since(begun).0), "{}", clock.now().since(begun));
+    chip.borrow_mut().writes.clear();
+    block_on(flow.next()).expect("a sample, blind or not");
+    assert!(chip.borrow().writes.len() > 70);
 }

@@ -40,6 +40,10 @@ struct Chip {
     looks: u32,
     /// A bit that changes on the way to the ranging parts' registers.
     flip: u8,
+    /// The next clear of the interrupt is acknowledged and does nothing.
+    deaf: bool,
+    /// Until the interrupt is taken back the chip has this measurement and makes no other.
+    held: Option<u64>,
     /// Faults of the next accesses to a register.
     faults: Vec<(u16, Fault)>,
 }
@@ -61,6 +65,8 @@ impl Chip {
             boots: true,
             looks: 0,
             flip: 0,
+            deaf: false,
+            held: None,
             faults: Vec::new(),
         }
     }
@@ -75,6 +81,9 @@ impl Chip {
 
     /// Finished measurements, and when the newest was.
     fn measured(&self) -> (u64, u64) {
+        if let Some(held) = self.held {
+            return (held, 0);
+        }
         let Some((begun, period)) = self.ranging.filter(|_| !self.blind) else { return (self.cleared, 0) };
         // One budget of 33 ms for the first, then one per period.
         let Some(since) = (self.clock.now().0).checked_sub(begun + 33_000) else { return (0, 0) };
@@ -94,7 +103,11 @@ impl Chip {
         }
         match (register, data) {
             (0x0001, [address]) => self.address = *address,
-            (0x0086, [1]) => self.cleared = self.measured().0,
+            (0x0086, [1]) if core::mem::take(&mut self.deaf) => {}
+            (0x0086, [1]) => {
+                self.held = None;
+                self.cleared = self.measured().0;
+            }
             (0x0087, [0x40]) => {
                 let ticks = u32::from_be_bytes(self.registers[0x6C..0x70].try_into().expect("four bytes"));
                 assert_eq!(self.registers[0x30], 0x01, "configured");
@@ -224,7 +237,7 @@ fn two_on_a_bus_are_moved_one_by_one_and_range_side_by_side() {
         let (down, front) = (block_on(below.next()).expect("a sample"), block_on(ahead.next()).expect("a sample"));
         assert!((down.data.distance - 1.234).abs() < 1e-6 && (front.data.distance - 0.5).abs() < 1e-6);
         assert!(down.data.valid && front.data.valid);
-        assert_eq!((down.data.sigma, down.data.status), (0.0025, 9));
+        assert_eq!((down.data.sigma, down.data.status), (0.0025, 0));
     }
     assert_eq!(bench.chips.each_ref().map(|chip| chip.borrow().resets), [1, 1]);
 }
@@ -234,7 +247,7 @@ fn samples_come_at_30_hz_once_each_and_are_stamped_in_the_middle() {
     let bench = Bench::new();
     let [mut below, _] = bench.drivers();
     let first = block_on(below.next()).expect("a sample");
-    assert!(!first.data.valid && first.data.status == 9, "nothing to check the first one against");
+    assert!(!first.data.valid && first.data.status == 0, "nothing to check the first one against");
     let mut before = first.at;
     for _ in 0..300 {
         let sample = block_on(below.next()).expect("a sample");
@@ -269,10 +282,26 @@ fn what_the_chip_does_not_vouch_for_is_a_sample_that_is_not_valid() {
     ] {
         bench.chips[0].borrow_mut().target = (code, millimetres);
         let sample = block_on(below.next()).expect("a sample");
-        assert_eq!((sample.data.valid, sample.data.status), (valid, code), "{millimetres} mm");
+        assert_eq!((sample.data.valid, sample.data.status), (valid, status.number()), "{millimetres} mm");
         assert_eq!(below.reading().map(|reading| reading.status()), Some(status));
         let expected = (f32::from(millimetres) / 1_000.0 + 0.01).max(0.0);
         assert!((sample.data.distance - expected).abs() < 1e-6, "the offset is added");
+    }
+}
+
+#[test]
+fn a_measurement_whose_clear_was_garbled_is_not_delivered_again() {
+    let bench = Bench::new();
+    let [mut below, _] = bench.drivers();
+    block_on(below.next()).expect("a sample");
+    for _ in 0..5 {
+        bench.chips[0].borrow_mut().deaf = true;
+        let before = block_on(below.next()).expect("a sample");
+        let held = bench.chips[0].borrow().measured().0;
+        bench.chips[0].borrow_mut().held = Some(held);
+        let sample = block_on(below.next()).expect("a sample");
+        assert!(below.reading().is_some_and(|reading| reading.count > held as u8), "another one");
+        assert!(sample.at.since(before.at) > Micros(50_000), "{} after the one before", sample.at.since(before.at));
     }
 }
 

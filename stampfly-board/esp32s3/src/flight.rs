@@ -3,11 +3,11 @@
 use crate::clock::Clock;
 use crate::motors::Motors;
 use crate::pins::MotorPins;
-use crate::sensors::{HEALTH, RETRY};
+use crate::sensors::HEALTH;
 use crate::{imu_config, spi};
 use embassy_futures::join::join;
 use stampfly_board::profile::{Profile, Stopwatch};
-use stampfly_board::tasks::{fly, pump};
+use stampfly_board::tasks::{Retry, fly, pump};
 use stampfly_board::{FlightLoop, devices, wiring};
 use stampfly_drivers::slot::Slots;
 use stampfly_drivers::{Imu, OpticalFlow};
@@ -36,10 +36,20 @@ pub async fn run(parts: Parts) {
     let (imu_chip, flow_chip, _) = slots.split(imu_chip, flow_chip, devices::LONGEST_FLOW);
     let mut imu_chip = devices::imu(imu_chip, Clock, imu_config::FILE).with_interrupt(ready);
     let mut flow_chip = devices::flow(flow_chip, Clock);
-    let sensing =
-        pump(async || imu_chip.next().await, |at, sample| _ = imu.publish(at, sample), Clock, RETRY, &HEALTH.imu);
-    let looking_down =
-        pump(async || flow_chip.next().await, |at, sample| _ = flow.publish(at, sample), Clock, RETRY, &HEALTH.flow);
+    let sensing = pump(
+        async || imu_chip.next().await,
+        |at, sample| _ = imu.publish(at, sample),
+        Clock,
+        Retry::PROMPT,
+        &HEALTH.imu,
+    );
+    let looking_down = pump(
+        async || flow_chip.next().await,
+        |at, sample| _ = flow.publish(at, sample),
+        Clock,
+        Retry::PATIENT,
+        &HEALTH.flow,
+    );
     let mut stopwatch = Stopwatch::new(&PROFILE, Clock);
     // A motor channel that refuses has nobody to tell in flight; the cut-off remains.
     let flying = fly(sensing, flight_loop, duties, motors, Clock, &mut stopwatch, |_| {});

@@ -56,6 +56,8 @@ pub async fn run(parts: Parts) {
             body.show(&sample.data);
             buzzer.show(&sample.data);
         }
+        status.step(now);
+        body.step(now);
         // A buzzer that refuses is tried again the next time.
         let _ = buzzer.step(now);
     }

@@ -10,15 +10,11 @@ use embassy_futures::join::join5;
 use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
 use esp_hal::peripherals::I2C0;
 use stampfly_board::devices;
-use stampfly_board::tasks::{Health, pump};
+use stampfly_board::tasks::{Health, Retry, pump};
 use stampfly_board::wiring;
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::{Barometer, Magnetometer, PowerMonitor, RangeFinder};
-use stampfly_types::Micros;
-
-/// A driver that has failed is left alone for this long, and longer when it fails again.
-pub const RETRY: Micros = Micros::from_millis(5);
 
 /// How each driver fares.
 pub struct SensorHealth {
@@ -68,17 +64,35 @@ pub async fn run(parts: Parts) {
     let mut baro_chip = devices::barometer(to_baro, Clock);
     let mut power_chip = devices::power(to_power, Clock);
     join5(
-        pump(async || down.next().await, |at, sample| _ = tof.publish(at, sample), Clock, RETRY, &HEALTH.tof),
+        pump(async || down.next().await, |at, sample| _ = tof.publish(at, sample), Clock, Retry::PATIENT, &HEALTH.tof),
         pump(
             async || ahead.next().await,
             |at, sample| _ = tof_front.publish(at, sample),
             Clock,
-            RETRY,
+            Retry::PATIENT,
             &HEALTH.tof_front,
         ),
-        pump(async || mag_chip.next().await, |at, sample| _ = mag.publish(at, sample), Clock, RETRY, &HEALTH.mag),
-        pump(async || baro_chip.next().await, |at, sample| _ = baro.publish(at, sample), Clock, RETRY, &HEALTH.baro),
-        pump(async || power_chip.next().await, |at, sample| _ = power.publish(at, sample), Clock, RETRY, &HEALTH.power),
+        pump(
+            async || mag_chip.next().await,
+            |at, sample| _ = mag.publish(at, sample),
+            Clock,
+            Retry::PATIENT,
+            &HEALTH.mag,
+        ),
+        pump(
+            async || baro_chip.next().await,
+            |at, sample| _ = baro.publish(at, sample),
+            Clock,
+            Retry::PATIENT,
+            &HEALTH.baro,
+        ),
+        pump(
+            async || power_chip.next().await,
+            |at, sample| _ = power.publish(at, sample),
+            Clock,
+            Retry::PATIENT,
+            &HEALTH.power,
+        ),
     )
     .await;
 }

@@ -1,6 +1,6 @@
 //! The tasks that feed the bus: models of the sensors, or the real drivers over emulated chips.
 
-use stampfly_board::tasks::{Health, pump};
+use stampfly_board::tasks::{Health, Retry, pump};
 use stampfly_board::{devices, wiring};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
@@ -9,7 +9,6 @@ use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow,
 use stampfly_sim::chips::{self, I2cBus, stand_in_image};
 use stampfly_sim::sensors::{BaroModel, CameraModel, FlowModel, ImuModel, MagModel, PowerModel, RangeModel};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_types::Micros;
 use std::sync::LazyLock;
 
 /// How far the simulation goes down.
@@ -24,9 +23,6 @@ pub enum Sensing {
 
 /// What stands in for the inertial sensor's configuration file, at both ends of the bus.
 pub(crate) static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
-
-/// A driver that has failed is asked again after this long.
-const RETRY: Micros = Micros::from_millis(5);
 
 /// How each sensor's driver fares.
 #[derive(Debug, Default)]
@@ -72,14 +68,14 @@ pub(crate) struct Models {
 
 /// A task that publishes a sensor's samples for as long as the vehicle is on.
 macro_rules! spawn {
-    ($tasks:ident, $clock:ident, $sensor:expr => $publisher:expr, $health:expr) => {{
+    ($tasks:ident, $clock:ident, $retry:ident, $sensor:expr => $publisher:expr, $health:expr) => {{
         let (mut sensor, mut publisher) = ($sensor, $publisher);
         let (clock, health): (_, &Health) = ($clock.clone(), &$health);
         $tasks.spawn(async move {
             let publish = |at, data: &_| {
                 publisher.publish(at, data);
             };
-            match pump(async || sensor.next().await, publish, clock, RETRY, health).await {}
+            match pump(async || sensor.next().await, publish, clock, Retry::$retry, health).await {}
         });
     }};
 }
@@ -92,12 +88,12 @@ pub(crate) fn start_models<'a>(
     topics: Topics<'a>,
     health: &'a Healths,
 ) {
-    spawn!(tasks, clock, models.imu => topics.imu, health.imu);
-    spawn!(tasks, clock, models.tof => topics.tof, health.tof);
-    spawn!(tasks, clock, models.flow => topics.flow, health.flow);
-    spawn!(tasks, clock, models.mag => topics.mag, health.mag);
-    spawn!(tasks, clock, models.baro => topics.baro, health.baro);
-    spawn!(tasks, clock, models.power => topics.power, health.power);
+    spawn!(tasks, clock, PROMPT, models.imu => topics.imu, health.imu);
+    spawn!(tasks, clock, PATIENT, models.tof => topics.tof, health.tof);
+    spawn!(tasks, clock, PATIENT, models.flow => topics.flow, health.flow);
+    spawn!(tasks, clock, PATIENT, models.mag => topics.mag, health.mag);
+    spawn!(tasks, clock, PATIENT, models.baro => topics.baro, health.baro);
+    spawn!(tasks, clock, PATIENT, models.power => topics.power, health.power);
 }
 
 /// What the drivers of one vehicle share; to be made before the tasks.
@@ -134,13 +130,13 @@ pub(crate) fn start_drivers<'a>(
     let (imu, flow, _) = shared.slots.split(imu, flow, devices::LONGEST_FLOW);
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
-    spawn!(tasks, clock, devices::imu(imu, time(), &IMAGE).with_interrupt(ready) => topics.imu, health.imu);
-    spawn!(tasks, clock, down => topics.tof, health.tof);
-    spawn!(tasks, clock, ahead => topics.tof_front, health.tof_front);
-    spawn!(tasks, clock, devices::flow(flow, time()) => topics.flow, health.flow);
-    spawn!(tasks, clock, devices::magnetometer(to_mag, time()) => topics.mag, health.mag);
-    spawn!(tasks, clock, devices::barometer(to_baro, time()) => topics.baro, health.baro);
-    spawn!(tasks, clock, devices::power(to_power, time()) => topics.power, health.power);
+    spawn!(tasks, clock, PROMPT, devices::imu(imu, time(), &IMAGE).with_interrupt(ready) => topics.imu, health.imu);
+    spawn!(tasks, clock, PATIENT, down => topics.tof, health.tof);
+    spawn!(tasks, clock, PATIENT, ahead => topics.tof_front, health.tof_front);
+    spawn!(tasks, clock, PATIENT, devices::flow(flow, time()) => topics.flow, health.flow);
+    spawn!(tasks, clock, PATIENT, devices::magnetometer(to_mag, time()) => topics.mag, health.mag);
+    spawn!(tasks, clock, PATIENT, devices::barometer(to_baro, time()) => topics.baro, health.baro);
+    spawn!(tasks, clock, PATIENT, devices::power(to_power, time()) => topics.power, health.power);
 }
 
 /// Starts the task of the cameras.
@@ -151,5 +147,5 @@ pub(crate) fn start_cameras<'a>(
     topic: wiring::external_pose::Tx<'a>,
     health: &'a Healths,
 ) {
-    spawn!(tasks, clock, cameras => topic, health.cameras);
+    spawn!(tasks, clock, PATIENT, cameras => topic, health.cameras);
 }

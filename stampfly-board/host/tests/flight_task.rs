@@ -1,7 +1,7 @@
 //! The task that firmware flies with, on virtual time: the same flight as the host's own loop, bit for bit.
 
 use core::cell::{Cell, RefCell};
-use stampfly_board::tasks::{Health, fly, pump};
+use stampfly_board::tasks::{Health, Retry, fly, pump};
 use stampfly_board::vehicle::{Assembled, Outside, assemble};
 use stampfly_board::{Observer, wiring};
 use stampfly_bus::Activation;
@@ -58,7 +58,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
                 let publish = |at, data: &_| {
                     $publisher.publish(at, data);
                 };
-                match pump(async || $sensor.next().await, publish, clock, Micros(5_000), $health).await {}
+                match pump(async || $sensor.next().await, publish, clock, Retry::PATIENT, $health).await {}
             });
         }};
     }
@@ -79,7 +79,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
     let publish = |at, data: &_| {
         to_imu.publish(at, data);
     };
-    let sensing = pump(async || imu.next().await, publish, clock.clone(), Micros(5_000), imu_health);
+    let sensing = pump(async || imu.next().await, publish, clock.clone(), Retry::PROMPT, imu_health);
     let note = |outcome: Result<(), Infallible>| {
         let Ok(()) = outcome;
         written.set(written.get() + 1);

@@ -16,4 +16,4 @@ mod sensing;
 
 pub use dead_man::DeadMan;
 pub use flight::fly;
-pub use sensing::{Health, pump};
+pub use sensing::{Health, Retry, pump};

@@ -64,26 +64,51 @@ impl Health {
     }
 }
 
-/// A pause of so many microseconds, less up to a quarter.
+/// A pause of so long, less up to a quarter.
 ///
 /// Two drivers that fail together, one because the other's chip holds the bus, would otherwise ask together for ever,
 /// and the healthy one would starve. The clock scatters them: no seed is needed, and the same flight pauses the same.
-fn pause(now: Micros, micros: u64) -> Micros {
-    let scattered = now.0.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
-    Micros(micros - scattered.checked_rem(micros / 4).unwrap_or(0))
+fn scattered(now: Micros, Micros(pause): Micros) -> Micros {
+    let scatter = now.0.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
+    Micros(pause - scatter.checked_rem(pause / 4).unwrap_or(0))
 }
 
 /// After so many doublings the pause before the next attempt grows no more.
 const LONGEST_RETRY: u32 = 4;
 
-/// Publishes a driver's samples for ever. After an error the driver is left alone for `retry`, after another one twice
-/// as long and so on up to sixteen times, so that a dead chip costs its neighbours on the bus next to nothing. Each pause is
-/// up to a quarter shorter, so that two drivers do not get into each other's way for ever.
+/// How long a driver that failed is left alone.
+///
+/// A pause follows every error. After `even` errors in a row each is twice as long as the one before, up to sixteen
+/// times `pause`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Retry {
+    /// The first pause.
+    pub pause: Micros,
+    /// How many pauses are of that length.
+    pub even: u32,
+}
+
+impl Retry {
+    /// For a chip that shares its bus with others that are as important: it makes room at once.
+    pub const PATIENT: Self = Self { pause: Micros::from_millis(5), even: 1 };
+    /// For the sensor that the motors wait for, on a bus that it leads: asked again in its own rhythm for 40 ms, longer
+    /// than motors turn without it.
+    pub const PROMPT: Self = Self { pause: Micros(2_500), even: 16 };
+
+    /// The pause after so many errors in a row.
+    fn after(self, errors: u32) -> Micros {
+        Micros(self.pause.0 << LONGEST_RETRY.min(errors.saturating_sub(self.even)))
+    }
+}
+
+/// Publishes a driver's samples for ever. After an error the driver is left alone for the pause that `retry` says, which
+/// grows, so that a dead chip costs its neighbours on the bus next to nothing. Each pause is up to a quarter shorter, so
+/// that two drivers do not get into each other's way for ever.
 ///
 /// Silence is not this task's business: whoever reads the topic sees the age of the newest sample.
 ///
 /// ```
-/// use stampfly_board::tasks::{Health, pump};
+/// use stampfly_board::tasks::{Health, Retry, pump};
 /// use stampfly_drivers::blocking::{BlockingClock, block_on};
 /// use stampfly_drivers::{Sample, SensorErrorKind};
 /// use stampfly_types::Micros;
@@ -102,7 +127,7 @@ const LONGEST_RETRY: u32 = 4;
 ///     },
 ///     |at, data: &u64| published.push((at, *data)),
 ///     clock,
-///     Micros::from_millis(5),
+///     Retry::PATIENT,
 ///     &health,
 /// );
 /// # use core::{future::Future, pin::pin, task::{Context, Waker}};
@@ -114,10 +139,10 @@ pub async fn pump<M, E: SensorError>(
     mut next: impl AsyncFnMut() -> Result<Sample<M>, E>,
     mut publish: impl FnMut(Micros, &M),
     mut clock: impl Timebase,
-    retry: Micros,
+    retry: Retry,
     health: &Health,
 ) -> Infallible {
-    let mut failures = 0;
+    let mut failures = 0u32;
     loop {
         match next().await {
             Ok(sample) => {
@@ -128,9 +153,8 @@ pub async fn pump<M, E: SensorError>(
             Err(error) => {
                 health.note(error.kind());
                 let now = clock.now();
-                let again = now + pause(now, retry.0 << failures);
-                failures = LONGEST_RETRY.min(failures + 1);
-                sleep_until(&mut clock, again).await;
+                failures = failures.saturating_add(1);
+                sleep_until(&mut clock, now + scattered(now, retry.after(failures))).await;
             }
         }
     }
@@ -138,19 +162,32 @@ pub async fn pump<M, E: SensorError>(
 
 #[cfg(test)]
 mod tests {
-    use super::pause;
+    use super::{Retry, scattered};
     use stampfly_types::Micros;
     use std::vec::Vec;
 
     #[test]
     fn drivers_that_fail_a_little_apart_do_not_stay_a_little_apart() {
-        let pauses = (0..1_000u64).map(|n| pause(Micros(1_000_000 + 97 * n), 80_000).0);
+        let pauses = (0..1_000u64).map(|n| scattered(Micros(1_000_000 + 97 * n), Micros(80_000)).0);
         let apart: Vec<i64> = pauses.clone().zip(pauses.clone().skip(1)).map(|(a, b)| a as i64 - b as i64).collect();
         assert!(
             apart.iter().filter(|apart| apart.abs() > 5_000).count() > 400,
             "most are further than a transfer apart"
         );
         assert!(pauses.clone().all(|pause| (60_000..=80_000).contains(&pause)));
-        assert!((0..4).all(|short| pause(Micros(12_345), short) == Micros(short)), "nothing to scatter");
+        assert!((0..4).map(Micros).all(|short| scattered(Micros(12_345), short) == short), "nothing to scatter");
+    }
+
+    #[test]
+    fn pauses_grow_after_the_even_ones_and_not_for_ever() {
+        let pauses = |retry: Retry, errors: &[u32]| -> Vec<u64> { errors.iter().map(|n| retry.after(*n).0).collect() };
+        assert_eq!(
+            pauses(Retry::PATIENT, &[1, 2, 3, 4, 5, 6, u32::MAX]),
+            [5_000, 10_000, 20_000, 40_000, 80_000, 80_000, 80_000]
+        );
+        assert_eq!(
+            pauses(Retry::PROMPT, &[1, 2, 16, 17, 20, 21, u32::MAX]),
+            [2_500, 2_500, 2_500, 5_000, 40_000, 40_000, 40_000]
+        );
     }
 }

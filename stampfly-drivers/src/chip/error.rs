@@ -1,7 +1,8 @@
 //! What can go wrong with a chip on a bus.
 
 use crate::{SensorError, SensorErrorKind};
-use core::fmt::Debug;
+use core::error::Error;
+use core::fmt::{self, Debug, Display};
 
 /// An error of a chip driver; `E` is the bus's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,5 +51,42 @@ impl<E: Debug> SensorError for ChipError<E> {
             Self::SelfTest => SensorErrorKind::SelfTest,
             Self::Data => SensorErrorKind::Data,
         }
+    }
+}
+
+impl<E: Debug> Display for ChipError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let said = match self {
+            Self::Bus(error) => return write!(f, "the bus refused or garbled the transfer: {error:?}"),
+            Self::Identification { found } => return write!(f, "another chip answered: it calls itself {found:#x}"),
+            Self::Configuration { status } => {
+                return write!(f, "the chip did not start or did not keep its settings: it says {status:#04x}");
+            }
+            Self::BusTimeout => "the transfer took too long and was given up",
+            Self::NoSample => "the chip answers but made no new sample in time",
+            Self::Pin => "a pin of the chip could not be set",
+            Self::AddressTaken => "another chip answers at the address this one starts up with",
+            Self::InvalidConfiguration => "the configuration cannot be, nothing was sent",
+            Self::Restarted => "the chip lost its settings",
+            Self::SelfTest => "the self test failed",
+            Self::Data => "the chip answered with data that cannot be",
+        };
+        f.write_str(said)
+    }
+}
+
+impl<E: Debug> Error for ChipError<E> {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn what_the_chip_said_is_in_the_words() {
+        let error: std::boxed::Box<dyn Error> = std::boxed::Box::new(ChipError::<()>::Identification { found: 0xD1 });
+        assert_eq!(error.to_string(), "another chip answered: it calls itself 0xd1");
+        assert!(ChipError::Bus("no acknowledge").to_string().ends_with("\"no acknowledge\""));
+        assert!(ChipError::<()>::Configuration { status: 2 }.to_string().ends_with("0x02"));
     }
 }

@@ -15,11 +15,14 @@
 //!   [`blocking`](crate::blocking); there is no second driver for it.
 //!
 //! # What every one of them promises
-//! * Creating it does no I/O. The first `next` sets the chip up; so does `start`, for who wants to know early.
+//! * Creating it does not touch the bus. The first `next` sets the chip up; so does `start`, for who wants to know early.
+//!   (Creating a [`vl53l3cx`] driver pulls the chip's XSHUT low, so that it is not in its neighbour's way.)
 //! * A transfer that takes longer than its length allows ([`TransferLimit`]) is given up ([`ChipError::BusTimeout`]),
 //!   and so is a chip that makes no new sample in time ([`ChipError::NoSample`]).
-//! * Every read brings back whether the chip still holds its configuration. One that lost it (brown-out, ESD) is
-//!   [`ChipError::Restarted`] once, and the next call sets it up again.
+//! * A chip that lost its configuration (brown-out, ESD) is [`ChipError::Restarted`] once, and the next call sets it up
+//!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s do not, and it is asked once a second.
+//! * No conversion is delivered twice, also not when a command to the chip is garbled on its way.
+//! * A start may fail or be dropped at any point; the next one begins from whatever state that left.
 //!
 //! # What they expect of the board
 //! On a shared SPI every chip select has to be high before the first transfer to any chip: one that floats low answers

@@ -2,12 +2,17 @@
 
 use super::Indicator;
 use smart_leds_trait::{RGB8, SmartLedsWrite};
+use stampfly_types::Micros;
 use stampfly_types::messages::Signal;
+
+/// How often lights are written that show what they should, for all that is known.
+const REFRESH: Micros = Micros::from_secs(1);
 
 /// A chain of `N` lights that all show the same colour.
 ///
-/// Writes when the colour changes, and again after a write that failed; for as long as the writer takes, which is
-/// 30 µs per light. The order of the colours on the wire is the writer's.
+/// [`show`](Indicator::show) writes when the colour changes, and again after a write that failed; for as long as the
+/// writer takes, which is 30 µs per light. [`step`](Self::step) writes again once a second: a light that lost its supply
+/// for a moment is dark and cannot say so. The order of the colours on the wire is the writer's.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -22,7 +27,7 @@ use stampfly_types::messages::Signal;
 /// #     }
 /// # }
 /// use stampfly_drivers::{Indicator, Lights};
-/// use stampfly_types::messages::Signal;
+/// use stampfly_types::{Micros, messages::Signal};
 ///
 /// // One light for the state, two below and above the body for the flight mode, as on the StampFly.
 /// let (mut status, mut body) = (Lights::<_, 1>::status(Chain::default()), Lights::<_, 2>::body(Chain::default()));
@@ -31,26 +36,32 @@ use stampfly_types::messages::Signal;
 /// body.show(&signal);
 /// assert_eq!(status.writer().0, [RGB8::new(0, 32, 0)]);
 /// assert_eq!(body.writer().0, [RGB8::new(32, 0, 32); 2]);
+/// // Now and then, with the time.
+/// status.step(Micros::from_secs(5));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Lights<W, const N: usize> {
     writer: W,
     colour: fn(&Signal) -> [u8; 3],
+    /// What they were told to show; `None` before they were.
+    wanted: Option<[u8; 3]>,
     /// `None` when nobody knows.
     shown: Option<[u8; 3]>,
+    /// When to write again.
+    due: Option<Micros>,
 }
 
 impl<W, const N: usize> Lights<W, N> {
     /// Lights that show the state.
     #[must_use]
     pub const fn status(writer: W) -> Self {
-        Self { writer, colour: |signal| signal.status, shown: None }
+        Self { writer, colour: |signal| signal.status, wanted: None, shown: None, due: None }
     }
 
     /// Lights that show the flight mode.
     #[must_use]
     pub const fn body(writer: W) -> Self {
-        Self { writer, colour: |signal| signal.body, shown: None }
+        Self { writer, colour: |signal| signal.body, wanted: None, shown: None, due: None }
     }
 
     /// What writes them.
@@ -59,16 +70,35 @@ impl<W, const N: usize> Lights<W, N> {
     }
 }
 
+impl<W: SmartLedsWrite, const N: usize> Lights<W, N>
+where
+    RGB8: Into<W::Color>,
+{
+    /// Writes what is shown again when a second has passed since this was called for the last time and did so. To be
+    /// called as often as anybody likes.
+    pub fn step(&mut self, now: Micros) {
+        if self.due.is_none_or(|due| now >= due) {
+            self.due = Some(now + REFRESH);
+            self.write();
+        }
+    }
+
+    fn write(&mut self) {
+        if let Some([red, green, blue]) = self.wanted {
+            let written = self.writer.write([RGB8 { r: red, g: green, b: blue }; N]);
+            self.shown = self.wanted.filter(|_| written.is_ok());
+        }
+    }
+}
+
 impl<W: SmartLedsWrite, const N: usize> Indicator for Lights<W, N>
 where
     RGB8: Into<W::Color>,
 {
     fn show(&mut self, signal: &Signal) {
-        let colour = (self.colour)(signal);
-        if self.shown != Some(colour) {
-            let [red, green, blue] = colour;
-            let written = self.writer.write([RGB8 { r: red, g: green, b: blue }; N]);
-            self.shown = written.is_ok().then_some(colour);
+        self.wanted = Some((self.colour)(signal));
+        if self.shown != self.wanted {
+            self.write();
         }
     }
 }
@@ -76,6 +106,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec;
     use std::vec::Vec;
 
     #[derive(Default)]
@@ -113,5 +144,18 @@ mod tests {
         lights.show(&signal);
         lights.show(&signal);
         assert_eq!(lights.writer.writes.len(), 4, "tried until it worked");
+    }
+
+    #[test]
+    fn what_is_shown_is_written_again_once_a_second() {
+        let mut lights = Lights::<_, 1>::body(Chain::default());
+        lights.step(Micros::ZERO);
+        assert!(lights.writer.writes.is_empty(), "nothing to show yet");
+        lights.show(&Signal { body: [7; 3], ..Default::default() });
+        for millis in 0..5_000 {
+            lights.step(Micros::from_millis(millis));
+        }
+        // The colour, and again at one to four seconds.
+        assert_eq!(lights.writer.writes, vec![[RGB8::new(7, 7, 7)]; 5]);
     }
 }

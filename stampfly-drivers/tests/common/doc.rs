@@ -27,15 +27,17 @@ impl stampfly_drivers::Timebase for Clock {
 
 /// A bus with one chip, and the pin that keeps it in reset.
 struct Chip {
-    memory: [u8; 1024],
+    memory: [u8; 4096],
     /// Registers that are read in one piece, longest memory first.
     pieces: Vec<(u16, Vec<u8>)>,
+    /// The flow sensor's bank of registers, 128 of them.
+    bank: u16,
     awake: Rc<Cell<bool>>,
 }
 
 impl Chip {
     fn new(content: &[(u16, &[u8])]) -> Self {
-        let mut chip = Self { memory: [0; 1024], pieces: Vec::new(), awake: Rc::new(Cell::new(true)) };
+        let mut chip = Self { memory: [0; 4096], bank: 0, pieces: Vec::new(), awake: Rc::new(Cell::new(true)) };
         for (register, data) in content {
             chip.store(*register, data);
         }
@@ -66,7 +68,13 @@ impl I2c for Chip {
         let [i2c::Operation::Write(address), data] = operations else { panic!("not a register access") };
         let register = address.iter().fold(0, |number, byte| number << 8 | u16::from(*byte));
         match data {
-            i2c::Operation::Read(into) => self.load(register, into),
+            i2c::Operation::Read(into) => {
+                self.load(register, into);
+                // A range finder numbers its results.
+                if let Some((_, result)) = self.pieces.iter_mut().find(|piece| piece.0 == 0x89 && register == 0x89) {
+                    result[2] = result[2].wrapping_add(1);
+                }
+            }
             i2c::Operation::Write(data) => self.store(register, data),
         }
         Ok(())
@@ -83,8 +91,9 @@ impl SpiDevice for Chip {
         match operations {
             [Write([register, _]), Read(into)] => self.load(u16::from(register & 0x7F), into),
             [Write([register]), Write(data)] => self.store(u16::from(*register), data),
-            [Write([register]), DelayNs(_), Read(into)] => self.load(u16::from(*register), into),
-            [Write([register, value]), DelayNs(_)] => self.store(u16::from(register & 0x7F), &[*value]),
+            [Write([register]), DelayNs(_), Read(into)] => self.load(self.bank << 7 | u16::from(*register), into),
+            [Write([0xFF, bank]), DelayNs(_)] => self.bank = u16::from(*bank),
+            [Write([register, value]), DelayNs(_)] => self.store(self.bank << 7 | u16::from(register & 0x7F), &[*value]),
             _ => panic!("not a register access"),
         }
         Ok(())

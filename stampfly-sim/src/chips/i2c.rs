@@ -84,7 +84,8 @@ impl I2cBus {
         }))
     }
 
-    /// Solders a chip to the bus at a 7-bit address. Where two have the same address the first one answers.
+    /// Solders a chip to the bus at a 7-bit address. Where several have the same, all of them take what is written, and
+    /// what is read is zero wherever one of them sends a zero: the line is pulled low.
     pub fn attach(&self, address: u8, chip: impl I2cChip + 'static) -> Attached {
         let chip = Rc::new(RefCell::new(chip));
         let attached = Attached::new(&self.0.clock, chip.clone());
@@ -113,22 +114,24 @@ impl I2cBus {
         self.0.clock.clone()
     }
 
-    fn faults(&self, address: u8) -> Option<Faults> {
+    /// How long the chips at this address hold the clock; `None` when nobody acknowledges.
+    fn stretch(&self, address: u8) -> Option<Micros> {
+        let acknowledges = |faults: &Faults| {
+            let refused = faults.refusals > 0.0 && self.0.noise.borrow_mut().chance(faults.refusals);
+            !faults.dead && !refused
+        };
         let devices = self.0.devices.borrow();
-        devices.iter().find(|device| device.answers(address)).map(|device| device.attached.faults())
+        let answering = devices.iter().filter(|device| device.answers(address)).map(|device| device.attached.faults());
+        answering.filter(acknowledges).map(|faults| faults.stretch).max()
     }
 
     /// Takes the bus. Returns the start, the end, and what is already known to fail.
     fn begin(&self, address: u8, operations: &[Operation<'_>]) -> (Micros, Micros, Result<(), BusError>) {
         let start = self.0.clock.now();
-        let answers = self.faults(address).filter(|faults| {
-            let refused = faults.refusals > 0.0 && self.0.noise.borrow_mut().chance(faults.refusals);
-            !faults.dead && !refused
-        });
-        let (bits, stretch, outcome) = match answers {
+        let (bits, stretch, outcome) = match self.stretch(address) {
             _ if !self.sda_is_high() => (1, Micros::ZERO, Err(BusError::ArbitrationLost)),
             None => (2 + BYTE, Micros::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
-            Some(faults) => (length(operations), faults.stretch, Ok(())),
+            Some(stretch) => (length(operations), stretch, Ok(())),
         };
         let end = start + Micros((bits * BIT).div_ceil(1_000)) + stretch;
         self.0.busy_until.set(end);
@@ -138,11 +141,12 @@ impl I2cBus {
     /// Exchanges the bytes of a transfer that began at `start`.
     fn exchange(&self, address: u8, operations: &mut [Operation<'_>], start: Micros) -> Result<(), BusError> {
         let devices = self.0.devices.borrow();
-        let Some(device) = devices.iter().find(|device| device.answers(address)) else {
+        let answering = |device: &&Device| device.answers(address) && !device.attached.faults().dead;
+        let answering: Vec<&Device> = devices.iter().filter(answering).collect();
+        if answering.is_empty() {
             return Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address));
-        };
-        let errors = device.attached.faults().bit_errors;
-        let mut chip = device.chip.borrow_mut();
+        }
+        let errors = |device: &Device| device.attached.faults().bit_errors;
         let mut noise = self.0.noise.borrow_mut();
         let (mut bits, mut index, mut before) = (0, 0, None);
         for operation in operations {
@@ -155,7 +159,12 @@ impl I2cBus {
                 Operation::Write(bytes) => {
                     for byte in *bytes {
                         bits += BYTE;
-                        if !chip.receive(index, carry(*byte, errors, &mut noise), after(start, bits * BIT)) {
+                        let mut acknowledged = false;
+                        for device in &answering {
+                            let byte = carry(*byte, errors(device), &mut noise);
+                            acknowledged |= device.chip.borrow_mut().receive(index, byte, after(start, bits * BIT));
+                        }
+                        if !acknowledged {
                             return Err(BusError::NoAcknowledge(NoAcknowledgeSource::Data));
                         }
                         index += 1;
@@ -164,13 +173,18 @@ impl I2cBus {
                 Operation::Read(bytes) => {
                     for byte in bytes.iter_mut() {
                         bits += BYTE;
-                        *byte = carry(chip.send(index, after(start, bits * BIT)), errors, &mut noise);
+                        *byte = answering.iter().fold(0xFF, |byte, device| {
+                            let sent = device.chip.borrow_mut().send(index, after(start, bits * BIT));
+                            byte & carry(sent, errors(device), &mut noise)
+                        });
                         index += 1;
                     }
                 }
             }
         }
-        chip.stop(after(start, bits * BIT));
+        for device in &answering {
+            device.chip.borrow_mut().stop(after(start, bits * BIT));
+        }
         Ok(())
     }
 }

@@ -90,6 +90,8 @@ pub trait I2cChip: Chip {
 
 /// A chip that can sit on an [`SpiBus`].
 pub trait SpiChip: Chip {
+    /// The fastest clock that the chip allows, Hz.
+    const HIGHEST_CLOCK: u32;
     /// Takes and gives byte number `index` since the chip was selected.
     fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8;
     /// Chip select goes high.

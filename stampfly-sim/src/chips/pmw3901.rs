@@ -18,7 +18,7 @@
 //! *Unverified*: that data clocked out too early is zero and commands that come too early are lost (the burst without
 //! its pause is reported to work in practice); zero motion and quality without the performance settings; 0x08 at 0x47
 //! of bank 0x0E, and what 0x67, 0x70, 0x71 and 0x73 say; which of the list's entries matter (those in which its
-//! public copies agree are wanted, in any order); 5 ms for a reset; observation 0xBF; the picture's sum, maximum and
+//! public copies agree are wanted, in their order and with their pause); that the list can be read back; 5 ms for a reset; observation 0xBF; the picture's sum, maximum and
 //! minimum, which only follow the quality. Section numbers differ between the public revisions and are not given.
 //! Not modelled: shutdown, frame capture, the motion pin.
 
@@ -40,20 +40,28 @@ const BANK: u16 = 0x7F;
 /// Below this quality the shutter is fully open.
 const DARK: u8 = 25;
 
-/// Bank, register and value that the performance list leaves behind, where its public copies agree.
+/// The performance list, bank, register and value in the order in which its public copies agree. It begins with what the
+/// specimen's own values at 0x70 and 0x71 of bank 0x0E become: 26 + 14 and 45 % of 96.
 #[rustfmt::skip]
-const PERFORMANCE: [(u8, u8, u8); 50] = [
-    (0x00, 0x61, 0xAD), (0x03, 0x40, 0x00), (0x05, 0x41, 0xB3), (0x05, 0x43, 0xF1), (0x05, 0x45, 0x14),
-    (0x05, 0x5B, 0x32), (0x05, 0x5F, 0x34), (0x05, 0x7B, 0x08), (0x06, 0x44, 0x1B), (0x06, 0x40, 0xBF),
-    (0x06, 0x4E, 0x3F), (0x08, 0x65, 0x20), (0x08, 0x6A, 0x18), (0x09, 0x4F, 0xAF), (0x09, 0x5F, 0x40),
-    (0x09, 0x48, 0x80), (0x09, 0x49, 0x80), (0x09, 0x57, 0x77), (0x09, 0x60, 0x78), (0x09, 0x61, 0x78),
-    (0x09, 0x62, 0x08), (0x0A, 0x45, 0x60), (0x00, 0x4D, 0x11), (0x00, 0x55, 0x80), (0x00, 0x74, 0x1F),
+const PERFORMANCE: [(u8, u8, u8); 57] = [
+    (0x00, 0x61, 0xAD), (0x00, 0x51, 0x70), (0x0E, 0x70, 0x28), (0x0E, 0x71, 0x2B), (0x00, 0x61, 0xAD),
+    (0x03, 0x40, 0x00), (0x05, 0x41, 0xB3), (0x05, 0x43, 0xF1), (0x05, 0x45, 0x14), (0x05, 0x5B, 0x32),
+    (0x05, 0x5F, 0x34), (0x05, 0x7B, 0x08), (0x06, 0x44, 0x1B), (0x06, 0x40, 0xBF), (0x06, 0x4E, 0x3F),
+    (0x08, 0x65, 0x20), (0x08, 0x6A, 0x18), (0x09, 0x4F, 0xAF), (0x09, 0x5F, 0x40), (0x09, 0x48, 0x80),
+    (0x09, 0x49, 0x80), (0x09, 0x57, 0x77), (0x09, 0x60, 0x78), (0x09, 0x61, 0x78), (0x09, 0x62, 0x08),
+    (0x09, 0x63, 0x50), (0x0A, 0x45, 0x60), (0x00, 0x4D, 0x11), (0x00, 0x55, 0x80), (0x00, 0x74, 0x1F),
     (0x00, 0x75, 0x1F), (0x00, 0x4A, 0x78), (0x00, 0x4B, 0x78), (0x00, 0x44, 0x08), (0x00, 0x45, 0x50),
     (0x00, 0x64, 0xFF), (0x00, 0x65, 0x1F), (0x14, 0x66, 0x08), (0x07, 0x41, 0x0D), (0x07, 0x43, 0x14),
     (0x07, 0x4B, 0x0E), (0x07, 0x45, 0x0F), (0x07, 0x44, 0x42), (0x07, 0x4C, 0x80), (0x10, 0x5B, 0x02),
-    (0x07, 0x70, 0x00), (0x07, 0x40, 0x40), (0x06, 0x62, 0xF0), (0x06, 0x63, 0x00), (0x0D, 0x48, 0xC0),
-    (0x0D, 0x6F, 0xD5), (0x00, 0x5B, 0xA0), (0x00, 0x4E, 0xA8), (0x00, 0x5A, 0x50), (0x00, 0x40, 0x80),
+    (0x07, 0x40, 0x41), (0x07, 0x70, 0x00), (0x07, 0x32, 0x44), (0x07, 0x40, 0x40), (0x06, 0x62, 0xF0),
+    (0x06, 0x63, 0x00), (0x0D, 0x48, 0xC0), (0x0D, 0x6F, 0xD5), (0x00, 0x5B, 0xA0), (0x00, 0x4E, 0xA8),
+    (0x00, 0x5A, 0x50), (0x00, 0x40, 0x80),
 ];
+/// Bank and register of the list's entries of whose values the copies differ.
+const DISPUTED: [(u8, u8); 3] = [(0x14, 0x65), (0x14, 0x63), (0x15, 0x48)];
+/// The entry before which every copy pauses, and for how long at least.
+const AFTER_PAUSE: (u8, u8, u8) = (0x07, 0x32, 0x44);
+const PAUSE: Micros = Micros(10_000);
 /// The specimen's own values at 0x70 and 0x71 of bank 0, from which the list makes settings where 0x73 reads zero.
 const FACTORY: [u8; 2] = [0x1A, 0x60];
 
@@ -82,6 +90,9 @@ pub struct Pmw3901 {
     ready: Micros,
     banks: Vec<[u8; 128]>,
     bank: u8,
+    /// Entries of the performance list that have been written in its order, and when the last was.
+    tuned: usize,
+    tuned_at: Micros,
     /// Counts as the last latch left them.
     latched: [i16; 2],
     moved: bool,
@@ -106,6 +117,8 @@ impl Pmw3901 {
             ready: now,
             banks: Vec::new(),
             bank: 0,
+            tuned: 0,
+            tuned_at: now,
             latched: [0; 2],
             moved: false,
             idle_until: now,
@@ -120,9 +133,27 @@ impl Pmw3901 {
 
     /// Has the performance list been written?
     fn is_tuned(&self) -> bool {
-        PERFORMANCE
-            .iter()
-            .all(|(bank, register, value)| self.banks[usize::from(*bank)][usize::from(*register)] == *value)
+        self.tuned == PERFORMANCE.len()
+    }
+
+    /// Follows the performance list: what comes out of its order spoils it.
+    fn tune(&mut self, entry: (u8, u8, u8), now: Micros) {
+        let paused = entry != AFTER_PAUSE || now.since(self.tuned_at) >= PAUSE;
+        self.tuned = match PERFORMANCE.get(self.tuned) {
+            Some(expected) if *expected == entry && paused => self.tuned + 1,
+            _ if DISPUTED.contains(&(entry.0, entry.1)) => return,
+            // Written again as it is, or what the list does not know.
+            None if PERFORMANCE
+                .iter()
+                .rev()
+                .find(|known| (known.0, known.1) == (entry.0, entry.1))
+                .is_none_or(|known| known.2 == entry.2) =>
+            {
+                return;
+            }
+            _ => usize::from(entry == PERFORMANCE[0]),
+        };
+        self.tuned_at = now;
     }
 
     fn quality(&mut self, now: Micros) -> u8 {
@@ -186,8 +217,10 @@ impl Chip for Pmw3901 {
             return 0;
         }
         let register = register & 0x7F;
-        // The check of the list works on bank 0x0E, the values of the specimen on bank 0 and 0x0E alike.
-        let measured = if matches!(self.bank, 0x00 | 0x0E) { self.measure(register, now) } else { None };
+        // The check of the list works on bank 0x0E, the values of the specimen on bank 0 and 0x0E alike; in this bank they
+        // can be overwritten.
+        let specimen = self.bank == 0x0E && !matches!(register, 0x70 | 0x71);
+        let measured = if self.bank == 0 || specimen { self.measure(register, now) } else { None };
         let stored = self.banks[usize::from(self.bank)][usize::from(register)];
         let checked = self.bank == 0x0E && register == 0x47 && self.banks[0x0E][0x43] == 0x10;
         u16::from(if checked { 0x08 } else { measured.unwrap_or(stored) })
@@ -204,7 +237,10 @@ impl Chip for Pmw3901 {
                 self.reset(now);
                 self.ready = now + RESET_TIME;
             }
-            _ => self.banks[usize::from(self.bank)][usize::from(register)] = value,
+            _ => {
+                self.banks[usize::from(self.bank)][usize::from(register)] = value;
+                self.tune((self.bank, register as u8, value), now);
+            }
         }
     }
 
@@ -212,7 +248,9 @@ impl Chip for Pmw3901 {
         self.ready = now + START_UP;
         // Memory that was never written must not look like a setting: no value of the list is 0xEE.
         self.banks = vec![[0xEE; 128]; 32];
+        self.banks[0x0E][0x70..0x72].copy_from_slice(&FACTORY);
         self.bank = 0;
+        self.tuned = 0;
         self.latched = [0; 2];
         self.moved = false;
         self.physics.read(now);
@@ -224,6 +262,8 @@ impl Chip for Pmw3901 {
 }
 
 impl SpiChip for Pmw3901 {
+    const HIGHEST_CLOCK: u32 = 2_000_000;
+
     fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
         if index == 0 {
             self.command = byte;

@@ -15,6 +15,8 @@ use std::rc::Rc;
 /// Share of the bits that a chip with a floating select spoils by answering into the same line: its select is taken for
 /// low some of the time, and half of its bits are wrong. *Unverified*: a floating line may do anything.
 const DISTURBANCE: f64 = 0.05;
+/// Share of the bits that are wrong on a clock faster than the chip allows. *Unverified*: some chips take a little more.
+const TOO_FAST: f64 = 0.05;
 /// Stream of the bit errors; no sensor has this number.
 const STREAM: u64 = 102;
 
@@ -45,7 +47,7 @@ impl SpiBus {
     }
 
     /// Solders a chip to the bus and to a chip select of its own, which is driven high. `frequency` is the clock for
-    /// this chip, Hz.
+    /// this chip, Hz; above the [highest](SpiChip::HIGHEST_CLOCK) that it allows its transfers are garbled.
     pub fn attach<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
         self.solder(frequency, chip, false)
     }
@@ -62,7 +64,18 @@ impl SpiBus {
         let chip = Rc::new(RefCell::new(chip));
         let attached = Attached::new(&self.0.clock, chip.clone());
         let byte = 8_000_000_000 / u64::from(frequency.max(1));
-        (SpiPort { bus: self.clone(), chip, attached: attached.clone(), byte, floating: Cell::new(floating) }, attached)
+        let garbled = if frequency > C::HIGHEST_CLOCK { TOO_FAST } else { 0.0 };
+        (
+            SpiPort {
+                bus: self.clone(),
+                chip,
+                attached: attached.clone(),
+                byte,
+                garbled,
+                floating: Cell::new(floating),
+            },
+            attached,
+        )
     }
 }
 
@@ -73,6 +86,8 @@ pub struct SpiPort<C> {
     attached: Attached,
     /// Nanoseconds per byte.
     byte: u64,
+    /// Share of the bits that this clock spoils.
+    garbled: f64,
     /// Nobody has driven the chip select yet.
     floating: Cell<bool>,
 }
@@ -130,10 +145,11 @@ impl<C: SpiChip> SpiPort<C> {
             if faults.dead {
                 return 0xFF;
             }
-            let out = carry(out, faults.bit_errors, &mut noise);
+            let errors = faults.bit_errors.max(self.garbled);
+            let out = carry(out, errors, &mut noise);
             let answer = chip.exchange(index, out, after(start, nanoseconds));
             index += 1;
-            carry(answer, faults.bit_errors.max(disturbance), &mut noise)
+            carry(answer, errors.max(disturbance), &mut noise)
         };
         for operation in operations {
             match operation {

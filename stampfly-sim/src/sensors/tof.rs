@@ -20,13 +20,13 @@ const MAXIMUM: f64 = 4.0;
 /// Share of measurements lost for no reason that can be seen.
 const DROPOUTS: f64 = 0.003;
 
-/// The chip's range status "valid".
+/// `TofData::status`: valid.
 pub const STATUS_VALID: u8 = 0;
-/// The chip's range status "sigma failure": the repeatability is too poor.
+/// `TofData::status`: the repeatability is too poor.
 pub const STATUS_SIGMA: u8 = 1;
-/// The chip's range status "signal failure": too little light came back.
+/// `TofData::status`: too little light came back.
 pub const STATUS_SIGNAL: u8 = 2;
-/// The chip's range status "out of bounds": phase outside the valid range.
+/// `TofData::status`: phase outside the valid range.
 pub const STATUS_OUT_OF_BOUNDS: u8 = 4;
 
 /// Which way a range finder looks.

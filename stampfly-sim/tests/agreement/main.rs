@@ -18,8 +18,9 @@ use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample};
 use stampfly_sim::chips::{Board, stand_in_image};
+use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::sensors::Sensors;
-use stampfly_sim::time::Tasks;
+use stampfly_sim::time::{Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::Micros;
 
@@ -162,4 +163,28 @@ fn compare(seed: u64) {
     close("range", &difference(&range_driver.borrow(), &range_model.borrow()), &[0.001]);
     // What is counted adds up, and so does its noise: four deviations of the difference after eleven seconds.
     close("flow", &difference(&summed(&flow_driver.borrow()), &summed(&flow_model.borrow())), &[80.0 * 0.00222; 2]);
+}
+
+#[test]
+fn drivers_and_models_say_the_same_of_a_range_that_is_none() {
+    // Too near, near, too far for enough light, nothing there.
+    for (height, status) in [(0.015, 4), (1.0, 0), (4.2, 2), (30.0, 2)] {
+        let plant = PlantParameters { gravity: 0.0, ground_height: 0.005, drag_quadratic: 0.0, ..Default::default() };
+        let pose = Some(Pose { rotors: 0.0, ..Pose::hovering(height) });
+        let config = SimulationConfig { plant, wind: WindConfig::CALM, pose, ..Default::default() };
+        let Simulation { clock, world, mut sensors } = Simulation::new(&config);
+        let board = Board::new(&world, &clock, &config, &stand_in_image());
+        let (boot, mut shutdown_front) = (BootAddress::new(), board.shutdown_front);
+        let Ok(()) = shutdown_front.set_low();
+        let range = vl53l3cx::Config::default();
+        let mut driver = Vl53l3cx::new(board.i2c, board.shutdown_bottom, &boot, 0x30, clock.clone(), range);
+        block_on(&clock, driver.next()).expect("the first one, which is not vouched for");
+        for _ in 0..20 {
+            let driven = block_on(&clock, driver.next()).expect("a measurement").data;
+            let Ok(Sample { data: modelled, .. }) = block_on(&clock, sensors.tof.next());
+            for data in [driven, modelled] {
+                assert_eq!((data.status, data.valid), (status, status == 0), "{height} m: {driven:?} {modelled:?}");
+            }
+        }
+    }
 }

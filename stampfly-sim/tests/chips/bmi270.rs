@@ -351,13 +351,30 @@ fn the_gyroscope_tests_itself_on_command() {
         chip.wait(450);
         chip.upload();
         chip.wait(20_000);
-        chip.write(0x69, 0x04);
-        chip.wait(2);
-        chip.write(0x7E, 0x02);
+        let preparation = [(0x69, 0x04), (0x7D, 0x04), (0x2F, 1), (0x32, 0), (0x33, 0)];
+        let test = |chip: &mut Chip, preparation: &[(u8, u8)]| {
+            for (register, value) in preparation.iter().chain(&[(0x7E, 0x02)]) {
+                chip.write(*register, *value);
+                chip.wait(2);
+            }
+        };
+        test(&mut chip, &preparation);
         chip.wait(50_000);
         assert_eq!((chip.read(0x6E), chip.read(0x69)), ([0], [4]), "running");
         chip.wait(50_000);
         assert_eq!((chip.read(0x6E), chip.read(0x69)), ([if broken { 1 } else { 0x0F }], [0]));
+        chip.write(0x2F, 0);
+        chip.wait(2);
+        assert_eq!(chip.read(0x38), [0], "carried out");
+        // Not announced, the gyroscope on, retrimming, given up, in bursts.
+        for (place, other) in [(0, (0x69, 0)), (1, (0x7D, 0x06)), (4, (0x33, 1)), (4, (0x33, 2)), (3, (0x32, 8))] {
+            let mut wrong = preparation;
+            wrong[place] = other;
+            test(&mut chip, &wrong);
+            chip.write(0x2F, 0);
+            chip.wait(200_000);
+            assert_eq!((chip.read(0x6E), chip.read(0x38)), ([0], [0x08]), "{other:02x?}");
+        }
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::standing;
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource, Operation};
-use stampfly_sim::chips::{Bmp280, BusError, Chip, Faults, I2cBus, SpiBus, SpiChip};
+use embedded_hal::spi::Operation as SpiOperation;
+use stampfly_sim::chips::{Bmp280, BusError, Chip, Faults, I2cBus, Pmw3901, SpiBus, SpiChip};
 use stampfly_sim::time::{Clock, Tasks, block_on};
 use stampfly_types::Micros;
 use std::cell::RefCell;
@@ -163,6 +164,8 @@ impl Chip for Echo {
 }
 
 impl SpiChip for Echo {
+    const HIGHEST_CLOCK: u32 = 10_000_000;
+
     fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
         self.times.push((index, now.0));
         core::mem::replace(&mut self.last, byte)
@@ -248,4 +251,42 @@ fn two_chips_share_the_spi_wires_one_after_the_other() {
     drop(tasks);
     // The slow chip holds the wires for 43 µs; the first answer of the other one is the choice of SPI.
     assert_eq!(ends.into_inner(), [(43, 0x49), (46, 0xFF), (49, 0x24)]);
+}
+
+#[test]
+fn chips_at_one_address_all_listen_and_pull_each_others_ones_down() {
+    use embedded_hal::i2c::I2c;
+    let simulation = standing();
+    let mut bus = I2cBus::new(&simulation.clock, 1);
+    let chips = [1, 2].map(|seed| bus.attach(ADDRESS, Bmp280::new(&simulation.world, &simulation.clock, seed)));
+    simulation.clock.advance_to(Micros::from_millis(2));
+    bus.write(ADDRESS, &[0xF5, 0x08]).unwrap();
+    assert_eq!(chips.each_ref().map(|chip| chip.peek(0xF5)), [0x08; 2], "both took it");
+    chips[1].set_id(0x61);
+    assert_eq!(id(&mut bus), Ok(0x58 & 0x61));
+    chips[0].set_faults(Faults { dead: true, ..Faults::default() });
+    assert_eq!(id(&mut bus), Ok(0x61), "the other one still acknowledges");
+    bus.write(ADDRESS, &[0xF5, 0x10]).unwrap();
+    assert_eq!(chips.each_ref().map(|chip| chip.peek(0xF5)), [0x08, 0x10]);
+}
+
+#[test]
+fn a_clock_that_is_too_fast_garbles() {
+    use embedded_hal::spi::SpiDevice;
+    let simulation = standing();
+    simulation.clock.advance_to(Micros::from_millis(45));
+    for (frequency, garbles) in [(2_000_000, false), (2_100_000, true)] {
+        let chip = Pmw3901::new(&simulation.world, &simulation.clock, 1);
+        let (mut port, _) = SpiBus::new(&simulation.clock, 1).attach(frequency, chip);
+        simulation.clock.advance_to(simulation.clock.now() + Micros::from_millis(45));
+        let wrong = (0..100).filter(|_| {
+            let mut id = [0];
+            let mut read = [SpiOperation::Write(&[0]), SpiOperation::DelayNs(35_000), SpiOperation::Read(&mut id)];
+            port.transaction(&mut read).unwrap();
+            simulation.clock.advance_to(simulation.clock.now() + Micros(20));
+            id != [0x49]
+        });
+        let wrong = wrong.count();
+        assert!(if garbles { wrong > 20 } else { wrong == 0 }, "{wrong} of 100 at {frequency} Hz");
+    }
 }

@@ -7,12 +7,13 @@ use stampfly_sim::chips::{Attached, Pmw3901, SpiBus, SpiPort};
 use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::{Simulation, SimulationConfig};
 
-/// The performance settings: register and value, in their order.
+/// The performance settings: register and value, in their order, beginning with those made of the chip's calibration.
 #[rustfmt::skip]
 const LIST: &[u16] = &[
+    0x7F00, 0x61AD, 0x5170, 0x7F0E, 0x7028, 0x712B,
     0x7F00, 0x61AD, 0x7F03, 0x4000, 0x7F05, 0x41B3, 0x43F1, 0x4514, 0x5B32, 0x5F34, 0x7B08, 0x7F06, 0x441B, 0x40BF,
     0x4E3F, 0x7F08, 0x6520, 0x6A18, 0x7F09, 0x4FAF, 0x5F40, 0x4880, 0x4980, 0x5777, 0x6078, 0x6178, 0x6208,
-    0x7F07, 0x6350, 0x7F0A, 0x4560, 0x7F00, 0x4D11, 0x5580, 0x741F, 0x751F, 0x4A78, 0x4B78, 0x4408, 0x4550, 0x64FF,
+    0x6350, 0x7F0A, 0x4560, 0x7F00, 0x4D11, 0x5580, 0x741F, 0x751F, 0x4A78, 0x4B78, 0x4408, 0x4550, 0x64FF,
     0x651F, 0x7F14, 0x6567, 0x6608, 0x6370, 0x7F15, 0x4848, 0x7F07, 0x410D, 0x4314, 0x4B0E, 0x450F, 0x4442, 0x4C80,
     0x7F10, 0x5B02, 0x7F07, 0x4041, 0x7000, 0x3244, 0x7F07, 0x4040, 0x7F06, 0x62F0, 0x6300, 0x7F0D, 0x48C0, 0x6FD5,
     0x7F00, 0x5BA0, 0x4EA8, 0x5A50, 0x4080,
@@ -44,10 +45,18 @@ impl Chip {
     fn tuned(height: f64, velocity: [f64; 3]) -> Self {
         let mut chip = Self::cold(height, velocity);
         wait(&chip.simulation, 45_000);
-        for entry in LIST {
-            chip.write(*entry);
-        }
+        chip.tune(LIST);
         chip
+    }
+
+    /// Writes the list, with its pause.
+    fn tune(&mut self, list: &[u16]) {
+        for entry in list {
+            if *entry == 0x3244 {
+                wait(&self.simulation, 10_000);
+            }
+            self.write(*entry);
+        }
     }
 
     /// Writes register and value, and waits as long as prescribed.
@@ -170,4 +179,30 @@ fn reset_forgets_the_list() {
     assert_eq!(chip.read(0x00), 0x49);
     wait(&chip.simulation, 50_000);
     assert_eq!(chip.burst()[6], 0);
+}
+
+#[test]
+fn the_list_counts_in_its_order_only() {
+    let sees = |list: &[u16]| {
+        let mut chip = Chip::cold(1.0, [0.0; 3]);
+        wait(&chip.simulation, 45_000);
+        chip.tune(list);
+        chip.burst()[6] > 0
+    };
+    assert!(sees(LIST));
+    // Of these there are two sets of values.
+    let disputed = |entry: &u16| [0x6567, 0x6370, 0x4848].contains(entry);
+    for place in (0..LIST.len()).filter(|place| !disputed(&LIST[*place])) {
+        let mut missing = LIST.to_vec();
+        let entry = missing.remove(place);
+        // Those that select the bank that is selected already.
+        let repeats = place == 0 || LIST[place - 1] == 0x3244;
+        assert_eq!(sees(&missing), repeats, "without {entry:#06x}");
+        // After 0x3244 comes the bank that it is in.
+        if entry >> 8 != 0x7F && entry != 0x3244 && LIST.get(place + 1).is_some_and(|next| !disputed(next)) {
+            let mut late = LIST.to_vec();
+            late.swap(place, place + 1);
+            assert!(!sees(&late), "{entry:#06x} after its successor");
+        }
+    }
 }

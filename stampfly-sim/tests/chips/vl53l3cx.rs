@@ -152,3 +152,20 @@ fn a_read_during_a_measurement_gives_the_one_before() {
     wait(&bench.simulation, 30_000);
     assert_ne!(bench.read(0x0089), first);
 }
+
+#[test]
+fn two_that_are_awake_at_once_move_together() {
+    let mut bench = Bench::new();
+    let (front, mut shutdown) = Vl53l3cx::new(&bench.simulation.world, &bench.simulation.clock, 2, Mount::Front);
+    let front = bench.bus.attach(FIRST, front);
+    wait(&bench.simulation, 2_000);
+    bench.write(0x0001, &[0x30]);
+    assert_eq!([&bench.chip, &front].map(|chip| chip.peek(0x0001)), [0x30; 2]);
+    assert!(bench.try_read::<1>(FIRST, 0x010F).is_err(), "nobody stayed");
+    // In reset it keeps out of it.
+    let Ok(()) = shutdown.set_low();
+    bench.bus.write(0x30, &[0x00, 0x01, 0x31]).unwrap();
+    let Ok(()) = shutdown.set_high();
+    wait(&bench.simulation, 2_000);
+    assert_eq!([&bench.chip, &front].map(|chip| chip.peek(0x0001)), [0x31, 0x29]);
+}

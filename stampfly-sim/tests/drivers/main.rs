@@ -14,6 +14,7 @@ mod neighbours;
 mod pilot;
 mod pmw3901;
 mod slots;
+mod starts;
 mod vl53l3cx;
 
 use core::cell::RefCell;

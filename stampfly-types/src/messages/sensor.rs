@@ -24,7 +24,9 @@ message! {
         distance: f32 ["m"],
         /// One standard deviation as the chip reports it; zero when it does not.
         sigma: f32 ["m"],
-        /// The chip's own range status, unchanged, for the log.
+        /// What the sensor says of the measurement, for the log, as ST's drivers number it: 0 valid, 1 standard deviation
+        /// too high, 2 signal too low, 4 phase out of bounds, 5 hardware, 6 valid but not checked for wrap-around,
+        /// 7 wrapped around, 8 not computed, 9 cover glass, 10 starting, 11 merged targets, 13 too close, 255 nothing new.
         status: u8 ["1"],
         /// Does the driver vouch for the distance?
         valid: bool ["1"],

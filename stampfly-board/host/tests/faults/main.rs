@@ -6,7 +6,7 @@
 mod rig;
 
 use core::ops::Range;
-use rig::{Access, NAMES, Said, run};
+use rig::{Access, NAMES, Said, run, run_with};
 use stampfly_drivers::SensorErrorKind;
 use stampfly_sim::chips::Faults;
 use stampfly_types::Micros;
@@ -72,8 +72,8 @@ fn assert_recovered(index: usize, said: &[Said], from: Micros, end: Micros, what
         figures.iter().sum::<f32>() / figures.len() as f32
     };
     let (before, after) = (mean(Micros::from_millis(700), BEGIN), mean(end.since(Micros::from_millis(700)), end));
-    // Noise of the mean of some samples: m/s², rad, µT, Pa, V, m, share.
-    let tolerance = [0.05, 0.002, 1.0, 2.0, 0.02, 0.002, 0.1][index];
+    // Noise of the mean of some samples: m/s², share, µT, Pa, V, m, share.
+    let tolerance = [0.05, 0.1, 1.0, 2.0, 0.02, 0.002, 0.1][index];
     assert!((before - after).abs() < tolerance, "{what}: {} says {after} after {before}", NAMES[index]);
 }
 
@@ -147,17 +147,46 @@ fn refused_transfers() {
 }
 
 #[test]
-fn bit_errors() {
-    // Every other transfer of a few bytes is hit. What is garbled cannot always be known, but nobody hangs.
-    let noisy = Faults { bit_errors: 0.01, ..Faults::default() };
-    each(&ALL, "noise", set(noisy), heal, |index, said| {
-        let [period, _, recovery] = promise(index);
-        let mut last = BEGIN;
-        for (at, _) in said.iter().filter(|(at, _)| (BEGIN..FAULT_ENDS).contains(at)) {
-            assert!(at.since(last) <= period + recovery, "{} said nothing for {}", NAMES[index], at.since(last));
-            last = *at;
+fn a_short_refusal_leaves_a_short_gap_in_the_inertial_samples() {
+    // Motors are cut after 25 ms without a sample. A period has passed when the fault begins, and a pause after its end.
+    let (unavoidable, end) = (Micros(5_200), Micros::from_millis(1_100));
+    for refused in [1, 8, 18].map(Micros::from_millis) {
+        for begin in (0..10).map(|n| BEGIN + Micros(270 * n)) {
+            let refusing = set(Faults { refusals: 1.0, ..Faults::default() });
+            let said =
+                run(end, &[(begin, &|access| refusing(access, 0)), (begin + refused, &|access| heal(access, 0))]);
+            let gap = longest_gap(&said[0], BEGIN, end);
+            assert!(gap <= refused + unavoidable, "{refused} of refused transfers leave a gap of {gap}");
         }
-    });
+    }
+}
+
+#[test]
+fn bit_errors() {
+    // At a hundredth every other transfer of a few bytes is hit, and hardly any start succeeds; at a thousandth starts do
+    // succeed. What is garbled cannot always be known, but nobody hangs, and nobody stays wrong.
+    for (seed, bit_errors) in (1..=4).flat_map(|seed| [0.01, 0.001].map(|bit_errors| (seed, bit_errors))) {
+        let noisy = set(Faults { bit_errors, ..Faults::default() });
+        for index in ALL {
+            let said = run_with(
+                seed,
+                END,
+                &[(BEGIN, &|access| noisy(access, index)), (FAULT_ENDS, &|access| heal(access, index))],
+            );
+            let what = format!("noise of {bit_errors} with seed {seed}");
+            let [period, _, recovery] = promise(index);
+            let mut last = BEGIN;
+            for (at, _) in said[index].iter().filter(|(at, _)| (BEGIN..FAULT_ENDS).contains(at)) {
+                let silence = at.since(last);
+                assert!(silence <= period + recovery, "{what}: {} said nothing for {silence}", NAMES[index]);
+                last = *at;
+            }
+            assert_recovered(index, &said[index], FAULT_ENDS, END, &what);
+            for other in (0..NAMES.len()).filter(|other| *other != index) {
+                assert_unharmed(other, &said[other], END, &format!("{what} of {}", NAMES[index]));
+            }
+        }
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use core::cell::RefCell;
 use stampfly_board::devices;
-use stampfly_board::tasks::{Health, pump};
+use stampfly_board::tasks::{Health, Retry, pump};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
@@ -20,9 +20,6 @@ pub type Said = (Micros, Result<f32, SensorErrorKind>);
 
 /// Something that is done to the rig, and when.
 pub type Event<'a> = (Micros, &'a dyn Fn(&Access));
-
-/// A driver that has failed is asked again after this long and longer, as in flight.
-const RETRY: Micros = Micros::from_millis(5);
 
 /// The chips' names, in the order of what [`run`] returns.
 pub const NAMES: [&str; 7] = ["imu", "flow", "mag", "baro", "power", "tof", "tof_front"];
@@ -43,7 +40,12 @@ impl Access {
 
 /// Runs for `duration`; at each instant of `events` something is done.
 pub fn run(duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
-    let config = SimulationConfig { wind: WindConfig::CALM, ..Default::default() };
+    run_with(SimulationConfig::default().seed, duration, events)
+}
+
+/// The same with chips and noise of this seed.
+pub fn run_with(seed: u64, duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
+    let config = SimulationConfig { wind: WindConfig::CALM, seed, ..Default::default() };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
     let Board { i2c, imu, flow, shutdown_bottom, shutdown_front, attached } =
@@ -58,7 +60,7 @@ pub fn run(duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
     let healths: [Health; 7] = Default::default();
     let mut tasks = Tasks::new(clock.clone());
     macro_rules! watch {
-        ($index:literal, $driver:expr, $figure:expr) => {{
+        ($index:literal, $retry:ident, $driver:expr, $figure:expr) => {{
             let (mut driver, clock, note) = ($driver, clock.clone(), &notes[$index]);
             let health = &healths[$index];
             tasks.spawn(async move {
@@ -68,20 +70,21 @@ pub fn run(duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
                     note.borrow_mut().push((clock.now(), said));
                     outcome
                 };
-                match pump(noted, |_, _| {}, clock.clone(), RETRY, health).await {}
+                match pump(noted, |_, _| {}, clock.clone(), Retry::$retry, health).await {}
             });
         }};
     }
     use stampfly_types::messages::*;
+    let share = |good: bool| f32::from(u8::from(good));
     let down = devices::range_down(to_down, shutdown_bottom, &boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &boot, time());
-    watch!(0, devices::imu(imu, time(), &image), |data: &ImuData| data.accel.norm());
-    watch!(1, devices::flow(flow, time()), |data: &FlowData| data.delta_x);
-    watch!(2, devices::magnetometer(to_mag, time()), |data: &MagData| data.field.norm());
-    watch!(3, devices::barometer(to_baro, time()), |data: &BaroData| data.pressure);
-    watch!(4, devices::power(to_power, time()), |data: &PowerData| data.voltage);
-    watch!(5, down, |data: &TofData| data.distance);
-    watch!(6, ahead, |data: &TofData| f32::from(u8::from(data.valid)));
+    watch!(0, PROMPT, devices::imu(imu, time(), &image), |data: &ImuData| data.accel.norm());
+    watch!(1, PATIENT, devices::flow(flow, time()), |data: &FlowData| share(data.valid && data.quality > 0));
+    watch!(2, PATIENT, devices::magnetometer(to_mag, time()), |data: &MagData| data.field.norm());
+    watch!(3, PATIENT, devices::barometer(to_baro, time()), |data: &BaroData| data.pressure);
+    watch!(4, PATIENT, devices::power(to_power, time()), |data: &PowerData| data.voltage);
+    watch!(5, PATIENT, down, |data: &TofData| data.distance);
+    watch!(6, PATIENT, ahead, |data: &TofData| share(data.valid));
     for (instant, action) in events {
         tasks.run_until(*instant);
         action(&access);

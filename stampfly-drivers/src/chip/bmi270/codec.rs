@@ -15,8 +15,10 @@ pub mod register {
     pub const INTERNAL_STATUS: u8 = 0x21;
     /// Which page of features the registers from 0x30 on show.
     pub const FEAT_PAGE: u8 = 0x2F;
-    /// On page 1: what [`GYRO_TRIGGER`](super::GYRO_TRIGGER) starts, 2 bytes.
+    /// On page 1: longest burst, then what [`GYRO_TRIGGER`](super::GYRO_TRIGGER) starts, a byte each.
     pub const G_TRIG_1: u8 = 0x32;
+    /// On page 0: why the command was not carried out.
+    pub const GYR_GAIN_STATUS: u8 = 0x38;
     /// FIFO output.
     pub const FIFO_DATA: u8 = 0x26;
     /// Gyroscope cross-axis factor.
@@ -41,6 +43,8 @@ pub mod register {
     pub const INIT_ADDR_0: u8 = 0x5B;
     /// Configuration data.
     pub const INIT_DATA: u8 = 0x5E;
+    /// A test of the gyroscope runs: [`GYRO_TEST_RUNS`](super::GYRO_TEST_RUNS).
+    pub const GYR_CRT_CONF: u8 = 0x69;
     /// Accelerometer self test.
     pub const ACC_SELF_TEST: u8 = 0x6D;
     /// Outcome of the gyroscope's self test.
@@ -71,8 +75,12 @@ pub const NOT_LATCHED: u8 = 0x00;
 pub const WATERMARK_ON_INT1: u8 = 0x02;
 /// Command: what [`register::G_TRIG_1`] selects, register 0x7E.
 pub const GYRO_TRIGGER: u8 = 0x02;
-/// The self test, not the calibration of the sensitivity; data in blocks as after a reset, register 0x32 of page 1.
+/// The self test and not the calibration of the sensitivity (bit 0 of the second byte), not to be given up (its bit 1),
+/// data in no bursts as after a reset (the first byte): registers 0x32 and 0x33 of page 1. The features are written in
+/// words of two bytes.
 pub const SELECT_GYRO_SELF_TEST: [u8; 2] = [0x00, 0x00];
+/// Set before the command, cleared by the chip when the test is over, register 0x69.
+pub const GYRO_TEST_RUNS: u8 = 0x04;
 /// Accelerometer only, register 0x7D.
 pub const ACCELEROMETER_ONLY: u8 = 0x04;
 /// Advanced power saving off, FIFO self wake-up on, register 0x7C.
@@ -81,6 +89,8 @@ pub const NORMAL_POWER: u8 = 0x02;
 pub const FIFO_FILTERED: u8 = 0x88;
 /// Overwrite the oldest, no sensor time frame; headers, accelerometer and gyroscope, register 0x48 and register 0x49.
 pub const FIFO_WITH_HEADERS: [u8; 2] = [0x00, 0xD0];
+/// Header of a frame with both sensors, §4 "FIFO".
+const BOTH_SENSORS: u8 = 0x8C;
 /// Bytes of a frame with both sensors: header, gyroscope, accelerometer, §4 "FIFO".
 pub const FRAME_BYTES: usize = 13;
 /// The longest configuration the chip holds, bytes, §4 "Device initialization".
@@ -246,6 +256,12 @@ impl Status {
         }
     }
 
+    /// Is there nothing in the FIFO but frames of both sensors? No single wrong bit makes one such fill level of another.
+    #[must_use]
+    pub const fn holds_whole_frames(&self) -> bool {
+        (self.fifo_bytes as usize).is_multiple_of(FRAME_BYTES)
+    }
+
     /// Die temperature, °C, register 0x22.
     #[must_use]
     pub fn celsius(&self) -> Option<f32> {
@@ -257,27 +273,30 @@ impl Status {
 ///
 /// `None` when there is anything else among them: a skip frame (samples were lost), a frame of one sensor (the other is
 /// starting up), a configuration change, the end of data. §4 "FIFO".
+///
+/// Every other frame is shorter than these, and what follows it is not in its place. So when the FIFO held whole frames
+/// only ([`Status::holds_whole_frames`]) and three headers are right, one wrong bit in the fourth is the bus's error.
 #[must_use]
-pub fn decode_frames(bytes: &[u8; 4 * FRAME_BYTES]) -> Option<[[i16; 6]; 4]> {
+pub fn decode_frames(bytes: &[u8; 4 * FRAME_BYTES], whole: bool) -> Option<[[i16; 6]; 4]> {
     let mut group = [[0; 6]; 4];
+    let mut wrong_bits = 0;
     let (frames, _) = bytes.as_chunks::<FRAME_BYTES>();
     for (sample, frame) in group.iter_mut().zip(frames) {
-        *sample = decode_frame(frame)?;
+        let (header, values) = decode_frame(frame)?;
+        // Bits 1:0 are the tags of the interrupt pins, which are not used.
+        wrong_bits += ((header ^ BOTH_SENSORS) & 0xFC).count_ones();
+        *sample = values;
     }
-    Some(group)
+    (wrong_bits <= u32::from(whole)).then_some(group)
 }
 
-fn decode_frame(frame: &[u8; FRAME_BYTES]) -> Option<[i16; 6]> {
+fn decode_frame(frame: &[u8; FRAME_BYTES]) -> Option<(u8, [i16; 6])> {
     let [header, gx0, gx1, gy0, gy1, gz0, gz1, ax0, ax1, ay0, ay1, az0, az1] = *frame;
-    // Bits 1:0 are the tags of the interrupt pins, which are not used.
-    if header & 0xFC != 0x8C {
-        return None;
-    }
     let gyro = [[gx0, gx1], [gy0, gy1], [gz0, gz1]].map(i16::from_le_bytes);
     let [ax, ay, az] = [[ax0, ax1], [ay0, ay1], [az0, az1]].map(i16::from_le_bytes);
     let [gx, gy, gz] = gyro;
     // The code of a gyroscope without data, register 0x12; not a reading, which saturates on one axis before all three.
-    (gyro != [i16::MIN; 3]).then_some([ax, ay, az, gx, gy, gz])
+    (gyro != [i16::MIN; 3]).then_some((header, [ax, ay, az, gx, gy, gz]))
 }
 
 /// Accelerometer x, y, z in counts, of the data registers.
@@ -305,6 +324,12 @@ pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
 #[must_use]
 pub const fn gyro_self_test(axes: u8) -> Option<bool> {
     if axes & 1 == 0 { None } else { Some(axes & 0x0E == 0x0E) }
+}
+
+/// Was the command of the gyroscope's test refused, given up or not prepared for, register 0x38 of page 0?
+#[must_use]
+pub const fn gyro_trigger_failed(status: u8) -> bool {
+    status & 0x38 != 0
 }
 
 #[cfg(test)]
@@ -362,15 +387,29 @@ mod tests {
             frame[1..7].copy_from_slice(&[number as u8, 0, 0xFF, 0xFF, 0x00, 0x80]);
             frame[7..13].copy_from_slice(&[1, 0, 2, 0, 0, 0x10]);
         }
-        let group = decode_frames(&bytes).expect("four frames");
+        let group = decode_frames(&bytes, false).expect("four frames");
         assert_eq!(group[3], [1, 2, 4096, 3, -1, i16::MIN]);
         for header in [0x40, 0x44, 0x48, 0x80, 0x84, 0x88, 0x00, 0xFF] {
             let mut other = bytes;
             other[26] = header;
-            assert_eq!(decode_frames(&other), None, "{header:#04x}");
+            assert_eq!(decode_frames(&other, false), None, "{header:#04x}");
+            let one_bit = matches!(header, 0x84 | 0x88);
+            assert_eq!(decode_frames(&other, true), one_bit.then_some(group), "{header:#04x}");
         }
+        let mut twice = bytes;
+        (twice[0], twice[26]) = (0x84, 0x84);
+        assert_eq!(decode_frames(&twice, true), None, "two wrong bits are no accident");
         bytes[1..7].copy_from_slice(&[0x00, 0x80, 0x00, 0x80, 0x00, 0x80]);
-        assert_eq!(decode_frames(&bytes), None, "a gyroscope that is starting up");
+        assert_eq!(decode_frames(&bytes, true), None, "a gyroscope that is starting up");
+    }
+
+    #[test]
+    fn no_wrong_bit_makes_a_believable_fill_level() {
+        let held = |fifo_bytes| Status { fifo_bytes, ..Status::decode(&[0; 14]) }.holds_whole_frames();
+        for frames in 0..157u16 {
+            let bytes = frames * FRAME_BYTES as u16;
+            assert!(held(bytes) && (0..14).all(|bit| !held(bytes ^ 1 << bit)), "{bytes}");
+        }
     }
 
     #[test]

@@ -25,6 +25,10 @@ pub const IDENTIFICATIONS: [u8; 2] = [0x58, 0x60];
 pub const SOFT_RESET: u8 = 0xB6;
 /// One conversion, then sleep, §3.6.2.
 pub const FORCED: u8 = 0x01;
+/// The mode in [`register::CTRL_MEAS`], which is sleep, zero, again after a forced conversion, §4.3.4.
+pub const MODE: u8 = 0x03;
+/// A conversion is running, §4.3.3.
+pub const MEASURING: u8 = 0x08;
 /// Calibration is being copied, §4.3.3.
 pub const COPYING: u8 = 0x01;
 
@@ -108,7 +112,7 @@ impl Reading {
     pub const fn decode(burst: &[u8; 10]) -> Self {
         let [status, control, config, _, p2, p1, p0, t2, t1, t0] = *burst;
         Self {
-            measuring: status & 0x08 != 0,
+            measuring: status & MEASURING != 0,
             oversampling_bits: control & 0xFC,
             filter_bits: config & 0x1C,
             pressure: i32::from_be_bytes([0, p2, p1, p0]) >> 4,

@@ -19,6 +19,8 @@ use stampfly_types::messages::BaroData;
 const START_UP: Micros = Micros::from_millis(2);
 /// How long the chip may copy its calibration.
 const COPY_LIMIT: Micros = Micros::from_millis(20);
+/// How often a conversion is started before the chip counts as broken.
+const ATTEMPTS: usize = 2;
 const POLL: Micros = Micros::from_millis(1);
 /// What the chip can measure, Pa with eight bits after the point, §1 table 2.
 const RANGE: core::ops::RangeInclusive<u32> = 30_000 << 8..=110_000 << 8;
@@ -51,7 +53,8 @@ impl Default for Config {
 /// The driver. Implements [`Barometer`].
 ///
 /// `Sample::at` is the middle of the pressure conversion; the filter's delay of a few samples is not taken off. A call
-/// that is dropped loses its conversion, and the next one starts another when that one is over. The chip has no self
+/// that is dropped loses its conversion, and the next one starts another when that one is over. The driver asks whether a
+/// conversion has really started, so none is delivered twice. The chip has no self
 /// test; pressures outside of what it can measure are [`ChipError::Data`]. `next` ends within an interval and two
 /// conversions, 30 ms later when it sets the chip up.
 ///
@@ -132,16 +135,33 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
         Ok(calibration)
     }
 
-    /// One conversion, from its start to its raw result.
-    async fn convert(&mut self, begun: Micros) -> Result<Reading, ChipError<I::Error>> {
-        let control = codec::oversampling_bits(&self.config);
+    /// Starts a conversion, and gives the instant.
+    ///
+    /// Without one the data registers hold the conversion before, and nothing tells the two apart.
+    async fn begin(&mut self) -> Result<Micros, ChipError<I::Error>> {
         let limit = codec::conversion_limit(&self.config);
-        self.due = begun + self.config.interval.max(limit);
-        self.port.write(register::CTRL_MEAS, &[control | codec::FORCED]).await?;
+        for _ in 0..ATTEMPTS {
+            let begun = self.port.now();
+            self.due = begun + self.config.interval.max(limit);
+            let control = codec::oversampling_bits(&self.config) | codec::FORCED;
+            self.port.write(register::CTRL_MEAS, &[control]).await?;
+            let [status, mode]: [u8; 2] = self.port.read(register::STATUS).await?;
+            if status & codec::MEASURING != 0 || mode & codec::MODE != 0 {
+                return Ok(begun);
+            }
+        }
+        self.calibration = None;
+        Err(ChipError::NoSample)
+    }
+
+    /// The raw result of the conversion that began at this instant.
+    async fn finish(&mut self, begun: Micros) -> Result<Reading, ChipError<I::Error>> {
+        let wanted = (codec::oversampling_bits(&self.config), codec::filter_bits(&self.config));
+        let limit = codec::conversion_limit(&self.config);
         self.port.wait_until(begun + limit).await;
         loop {
             let reading = Reading::decode(&self.port.read(register::STATUS).await?);
-            if (reading.oversampling_bits, reading.filter_bits) != (control, codec::filter_bits(&self.config)) {
+            if (reading.oversampling_bits, reading.filter_bits) != wanted {
                 self.calibration = None;
                 return Err(ChipError::Restarted);
             }
@@ -166,8 +186,8 @@ impl<I: I2c, T: Timebase> Barometer for Bmp280<I2cRegisters<I>, T> {
             None => self.set_up().await?,
         };
         self.port.wait_until(self.due).await;
-        let begun = self.port.now();
-        let reading = self.convert(begun).await?;
+        let begun = self.begin().await?;
+        let reading = self.finish(begun).await?;
         if reading.pressure == Reading::SKIPPED || reading.temperature == Reading::SKIPPED {
             return Err(ChipError::Data);
         }

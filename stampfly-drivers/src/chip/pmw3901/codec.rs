@@ -50,7 +50,16 @@ pub const fn calibration(first: u8, second: u8) -> [u8; 2] {
     [raised, (second as u16 * 45 / 100) as u8]
 }
 
+/// Says that the calibration comes next, in bank 0.
+pub const BEFORE_CALIBRATION: [(u8, u8); 4] = [(0x7F, 0x00), (0x61, 0xAD), (0x51, 0x70), (0x7F, 0x0E)];
+
 /// The rest of the list ("Performance optimization registers").
+///
+/// The data sheet prints it in columns, and its public copies read those in two ways. This is the way of PX4, of
+/// Crazyflie's firmware, of Bitcraze's library for Arduino and of ten further copies; the StampFly's own firmware has
+/// 0x63 in bank 7 and 0x32 in bank 9 after a pause of its own, and writes the calibration's first value to 0x51 instead
+/// of 0x70. Of 0x65 and 0x63 in bank 0x14 and 0x48 in bank 0x15 there are two sets of values; Bitcraze's library has
+/// 0x60, 0x78 and 0x58. The pause is 10 ms or 100 ms. **Unverified** which of it matters to the chip.
 #[rustfmt::skip]
 pub const PERFORMANCE: &[Step] = {
     use Step::{Wait as P, Write as W};
@@ -61,10 +70,7 @@ pub const PERFORMANCE: &[Step] = {
         W(0x7F, 0x06), W(0x44, 0x1B), W(0x40, 0xBF), W(0x4E, 0x3F),
         W(0x7F, 0x08), W(0x65, 0x20), W(0x6A, 0x18),
         W(0x7F, 0x09), W(0x4F, 0xAF), W(0x5F, 0x40), W(0x48, 0x80), W(0x49, 0x80), W(0x57, 0x77), W(0x60, 0x78),
-        W(0x61, 0x78), W(0x62, 0x08),
-        P(10),
-        W(0x32, 0x44),
-        W(0x7F, 0x07), W(0x63, 0x50),
+        W(0x61, 0x78), W(0x62, 0x08), W(0x63, 0x50),
         W(0x7F, 0x0A), W(0x45, 0x60),
         W(0x7F, 0x00), W(0x4D, 0x11), W(0x55, 0x80), W(0x74, 0x1F), W(0x75, 0x1F), W(0x4A, 0x78), W(0x4B, 0x78),
         W(0x44, 0x08), W(0x45, 0x50), W(0x64, 0xFF), W(0x65, 0x1F),
@@ -74,7 +80,8 @@ pub const PERFORMANCE: &[Step] = {
         W(0x7F, 0x10), W(0x5B, 0x02),
         W(0x7F, 0x07), W(0x40, 0x41), W(0x70, 0x00),
         P(10),
-        W(0x40, 0x40),
+        W(0x32, 0x44),
+        W(0x7F, 0x07), W(0x40, 0x40),
         W(0x7F, 0x06), W(0x62, 0xF0), W(0x63, 0x00),
         W(0x7F, 0x0D), W(0x48, 0xC0), W(0x6F, 0xD5),
         W(0x7F, 0x00), W(0x5B, 0xA0), W(0x4E, 0xA8), W(0x5A, 0x50), W(0x40, 0x80),
@@ -84,6 +91,36 @@ pub const PERFORMANCE: &[Step] = {
 /// A register of the list, in the bank where the list ends, and what it is told. A chip that restarted has another
 /// value there.
 pub const WITNESS: (u8, u8) = (0x4E, 0xA8);
+
+/// How many registers the list leaves behind.
+pub const SETTINGS: usize = 55;
+
+/// What [`PERFORMANCE`] leaves behind: bank, register and value, in the order of the list. Where it writes a register
+/// twice, the last value.
+pub fn settings() -> impl Iterator<Item = (u8, u8, u8)> {
+    let mut written = writes();
+    core::iter::from_fn(move || {
+        loop {
+            let (bank, register, value) = written.next()?;
+            if !written.clone().any(|later| (later.0, later.1) == (bank, register)) {
+                return Some((bank, register, value));
+            }
+        }
+    })
+}
+
+/// The list's writes, each with its bank.
+fn writes() -> impl Iterator<Item = (u8, u8, u8)> + Clone {
+    let mut bank = 0;
+    PERFORMANCE.iter().filter_map(move |step| match *step {
+        Step::Write(register::BANK, selected) => {
+            bank = selected;
+            None
+        }
+        Step::Write(register, value) => Some((bank, register, value)),
+        Step::Wait(_) => None,
+    })
+}
 
 /// One motion burst ("Burst mode").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,6 +226,14 @@ mod tests {
         });
         assert_eq!(banks.next_back(), Some(0));
         let writes = PERFORMANCE.iter().filter(|step| matches!(step, Step::Write(..))).count();
-        assert_eq!((writes, PERFORMANCE.len()), (73, 75));
+        assert_eq!((writes, PERFORMANCE.len()), (73, 74));
+    }
+
+    #[test]
+    fn what_the_list_leaves_behind_is_the_last_value_of_every_register() {
+        assert_eq!(settings().count(), SETTINGS);
+        assert_eq!(settings().filter(|setting| (setting.0, setting.1) == (0x07, 0x40)).count(), 1);
+        assert!(settings().any(|setting| setting == (0x07, 0x40, 0x40)), "not 0x41, which it had before");
+        assert_eq!(settings().last(), Some((0x00, 0x40, 0x80)));
     }
 }

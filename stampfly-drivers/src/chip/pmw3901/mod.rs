@@ -32,6 +32,10 @@ const WRITE_HOLD: u32 = 20_000;
 const WITNESS_INTERVAL: Micros = Micros::from_secs(1);
 /// How often the chip's calibration is asked for before it counts as broken.
 const ATTEMPTS: usize = 10;
+/// Settings that depend on the chip.
+const CALIBRATED: usize = 5;
+/// So long a chip may see nothing at all before it is set up again.
+const BLIND: Micros = Micros::from_secs(10);
 
 /// What the driver is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,20 +60,22 @@ impl Default for Config {
 /// failed or was cancelled nobody knows what was lost: the driver empties the counts and begins a new interval, so no
 /// sample ever covers less time than it says.
 ///
-/// A chip that restarted goes on counting, badly and without saying so. Once a second the driver therefore reads back a
-/// register that it wrote: another value is [`ChipError::Restarted`], and the next call sets the chip up again. That
-/// register is undocumented; a chip that does not give it back even after a start is not asked. The chip has no self
-/// test.
+/// A chip without its settings goes on counting, badly and without saying so. A start therefore reads back all of them,
+/// and once a second `next` reads back one: another value is [`ChipError::Restarted`], and the next call sets the chip up
+/// again. The registers are undocumented. One that reads the same other value at two starts in a row cannot be read back
+/// and is not asked. What else may have gone wrong costs ten seconds: after as long with a quality of zero, which is also
+/// what it sees in the dark, `next` says [`ChipError::NoSample`], and the one after sets the chip up again. The chip has
+/// no self test.
 ///
 /// A sample costs 110 µs of bus, most of it the pause between address and data. `next` ends within the interval and
-/// 40 ms; when it has to start the chip and every access is slow, within 1.2 s.
+/// 40 ms; when it has to start the chip and every access is slow, within 4 s.
 ///
 /// ```
 /// # #![allow(dead_code)]
 /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
 /// # fn main() {
 /// # let (device, clock) = (Chip::new(&[
-/// #     (0x00, &[0x49]), (0x5F, &[0xB6]), (0x47, &[0x08]), (0x16, &[0x80, 0, 3, 0, 0, 0, 90, 1, 90, 9, 2, 7]),
+/// #     (0x00, &[0x49]), (0x5F, &[0xB6]), (0x747, &[0x08]), (0x16, &[0x80, 0, 3, 0, 0, 0, 90, 1, 90, 9, 2, 7]),
 /// # ]), Clock::default());
 /// use stampfly_drivers::OpticalFlow;
 /// use stampfly_drivers::blocking::block_on;
@@ -92,23 +98,57 @@ pub struct Pmw3901<S, T> {
     emptied: Option<Micros>,
     /// When to ask next whether the chip restarted; `None` when it cannot be asked.
     witness: Option<Micros>,
+    /// What the settings read back as after the last start.
+    kept: Option<[u8; CALIBRATED + codec::SETTINGS]>,
+    /// When it last saw anything.
+    saw: Micros,
 }
 
 impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
     /// A driver of the chip on this device.
     pub const fn new(device: S, clock: T, axes: AxisMap, config: Config) -> Self {
-        Self { device, clock, axes, config, running: false, emptied: None, witness: None }
+        Self {
+            device,
+            clock,
+            axes,
+            config,
+            running: false,
+            emptied: None,
+            witness: None,
+            kept: None,
+            saw: Micros::ZERO,
+        }
     }
 
-    /// Sets the chip up: reset, both identifications, calibration, performance registers. About 85 ms.
+    /// Sets the chip up: reset, both identifications, calibration, performance registers, which it reads back. About
+    /// 75 ms, twice that when something reads back otherwise.
     ///
     /// # Errors
-    /// Another chip, one that does not give its calibration, the bus.
+    /// Another chip, one that does not give its calibration or keep its settings, the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<S::Error>> {
         self.running = false;
         self.emptied = None;
+        let calibrated = self.configure().await?;
+        if self.proof_read(calibrated).await?.is_some() {
+            let calibrated = self.configure().await?;
+            if let Some(status) = self.proof_read(calibrated).await? {
+                return Err(ChipError::Configuration { status });
+            }
+        }
+        let (register, value) = codec::WITNESS;
+        let kept = self.read(register).await? == value;
+        self.saw = self.clock.now();
+        self.witness = kept.then(|| self.saw + WITNESS_INTERVAL);
+        self.running = true;
+        Ok(())
+    }
+
+    /// From any state to the end of the list. Gives the settings that depend on the chip: bank, register, value.
+    async fn configure(&mut self) -> Result<[Option<(u8, u8, u8)>; CALIBRATED], ChipError<S::Error>> {
         let ready = self.clock.now() + POWER_UP;
         sleep_until(&mut self.clock, ready).await;
+        // Reset is in the first bank, and a start that failed may have left another.
+        self.write(register::BANK, 0).await?;
         self.write(register::POWER_UP_RESET, codec::RESET).await?;
         self.wait(AFTER_RESET).await;
         let (found, inverse) = (self.read(register::PRODUCT_ID).await?, self.read(register::INVERSE_PRODUCT_ID).await?);
@@ -118,18 +158,45 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         for offset in 0..5 {
             self.read(register::MOTION + offset).await?;
         }
-        self.calibrate().await?;
+        let calibrated = self.calibrate().await?;
         for step in codec::PERFORMANCE {
             match *step {
                 Step::Write(register, value) => self.write(register, value).await?,
                 Step::Wait(millis) => self.wait(Micros::from_millis(u64::from(millis))).await,
             }
         }
-        let (register, value) = codec::WITNESS;
-        let kept = self.read(register).await? == value;
-        self.witness = kept.then(|| self.clock.now() + WITNESS_INTERVAL);
-        self.running = true;
-        Ok(())
+        Ok(calibrated)
+    }
+
+    /// Reads every setting back. Gives the first that is neither what was written nor what it was after the start
+    /// before, which is all that a register that cannot be read back will ever say.
+    async fn proof_read(
+        &mut self,
+        calibrated: [Option<(u8, u8, u8)>; CALIBRATED],
+    ) -> Result<Option<u8>, ChipError<S::Error>> {
+        let before = self.kept.take();
+        let mut kept = [0; CALIBRATED + codec::SETTINGS];
+        let mut wrong = None;
+        // The list ends in the first bank. It comes last, so that its last registers tell that this is selected.
+        let mut bank = 0;
+        let settings = calibrated.into_iter().chain(codec::settings().map(Some));
+        for (number, (setting, kept)) in settings.zip(&mut kept).enumerate() {
+            let Some((selected, register, value)) = setting else { continue };
+            if core::mem::replace(&mut bank, selected) != selected {
+                self.write(register::BANK, selected).await?;
+            }
+            *kept = self.read(register).await?;
+            if *kept != value {
+                // It may have been garbled on its way back.
+                *kept = self.read(register).await?;
+            }
+            let as_before = before.and_then(|before| before.get(number).copied()) == Some(*kept);
+            if *kept != value && !as_before {
+                wrong = wrong.or(Some(*kept));
+            }
+        }
+        self.kept = Some(kept);
+        Ok(wrong)
     }
 
     /// Has the chip lost what it was told?
@@ -140,7 +207,8 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         // From the end of the last burst.
         self.wait(AFTER_READ).await;
         let (register, value) = codec::WITNESS;
-        if self.read(register).await? == value {
+        // Twice, before a wrong bit on the bus costs a start.
+        if self.read(register).await? == value || self.read(register).await? == value {
             self.witness = Some(self.clock.now() + WITNESS_INTERVAL);
             return Ok(());
         }
@@ -149,7 +217,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
     }
 
     /// The part of the list that depends on the chip.
-    async fn calibrate(&mut self) -> Result<(), ChipError<S::Error>> {
+    async fn calibrate(&mut self) -> Result<[Option<(u8, u8, u8)>; CALIBRATED], ChipError<S::Error>> {
         for (register, value) in codec::PREPARE {
             self.write(register, value).await?;
         }
@@ -164,20 +232,21 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         if status != 0x08 {
             return Err(ChipError::Configuration { status });
         }
-        let high = self.read(0x67).await? & 0x80 != 0;
-        self.write(0x48, if high { 0x04 } else { 0x02 }).await?;
+        let range = if self.read_twice(0x67).await? & 0x80 != 0 { 0x04 } else { 0x02 };
+        self.write(0x48, range).await?;
         for (register, value) in codec::PREPARE_CALIBRATION {
             self.write(register, value).await?;
         }
-        if self.read(0x73).await? == 0 {
-            let [first, second] = codec::calibration(self.read(0x70).await?, self.read(0x71).await?);
-            for (register, value) in
-                [(0x7F, 0x00), (0x61, 0xAD), (0x51, first), (0x7F, 0x0E), (0x70, first), (0x71, second)]
-            {
-                self.write(register, value).await?;
-            }
+        if self.read_twice(0x73).await? != 0 {
+            return Ok([Some((0x00, 0x50, 0x00)), Some((0x00, 0x51, 0x7B)), Some((0x0E, 0x48, range)), None, None]);
         }
-        Ok(())
+        let [first, second] = codec::calibration(self.read_twice(0x70).await?, self.read_twice(0x71).await?);
+        for (register, value) in codec::BEFORE_CALIBRATION.into_iter().chain([(0x70, first), (0x71, second)]) {
+            self.write(register, value).await?;
+        }
+        let fixed = [(0x00, 0x50, 0x00), (0x00, 0x51, 0x70), (0x0E, 0x48, range)];
+        let [a, b, c] = fixed.map(Some);
+        Ok([a, b, c, Some((0x0E, 0x70, first)), Some((0x0E, 0x71, second))])
     }
 
     async fn burst(&mut self) -> Result<Motion, ChipError<S::Error>> {
@@ -204,6 +273,12 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         self.wait(AFTER_READ).await;
         let [value] = bytes;
         Ok(value)
+    }
+
+    /// Reads what will be believed until the next start.
+    async fn read_twice(&mut self, register: u8) -> Result<u8, ChipError<S::Error>> {
+        let first = self.read(register).await?;
+        if self.read(register).await? == first { Ok(first) } else { Err(ChipError::Data) }
     }
 
     async fn write(&mut self, register: u8, value: u8) -> Result<(), ChipError<S::Error>> {
@@ -242,6 +317,12 @@ impl<S: SpiDevice, T: Timebase> OpticalFlow for Pmw3901<S, T> {
         let motion = self.burst().await?;
         let at = self.clock.now();
         self.emptied = Some(at);
+        if motion.quality > 0 {
+            self.saw = at;
+        } else if at.since(self.saw) > BLIND {
+            self.running = false;
+            return Err(ChipError::NoSample);
+        }
         let counts = Vec3::new(f32::from(motion.delta_x), f32::from(motion.delta_y), 0.0);
         let angle = self.axes.to_body(counts) * self.config.radians_per_count;
         let data = FlowData {

@@ -252,6 +252,26 @@ impl RangeStatus {
             _ => Self::Processing,
         }
     }
+
+    /// The number that ST's drivers and [`TofData::status`](stampfly_types::messages::TofData) give it.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Valid => 0,
+            Self::SigmaTooHigh => 1,
+            Self::SignalTooLow => 2,
+            Self::OutOfBounds => 4,
+            Self::Hardware => 5,
+            Self::NotCheckedForWrap => 6,
+            Self::WrapAround => 7,
+            Self::Processing => 8,
+            Self::CoverGlass => 9,
+            Self::Starting => 10,
+            Self::MergedTargets => 11,
+            Self::TooClose => 13,
+            Self::NoUpdate => 255,
+        }
+    }
 }
 
 /// One measurement.
@@ -373,6 +393,15 @@ mod tests {
         assert_eq!(Reading::decode(&block).expect("a result").distance, -0.007);
         assert_eq!(Reading::decode(&[0xFF; RESULT_BYTES]), None);
         assert_eq!(Reading::decode(&[0; RESULT_BYTES]), None);
+    }
+
+    #[test]
+    fn every_status_has_a_number_of_its_own_and_valid_is_zero() {
+        let mut numbers: std::vec::Vec<u8> = (0..32).map(|code| RangeStatus::decode(code).number()).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        assert_eq!(numbers, [0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 13, 255]);
+        assert_eq!(RangeStatus::decode(9).number(), 0);
     }
 
     #[test]

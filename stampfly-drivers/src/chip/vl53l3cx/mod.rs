@@ -35,6 +35,8 @@ const NEIGHBOUR_LIMIT: Micros = Micros::from_millis(200);
 const DRIFT: u64 = 32;
 /// After so many periods half of one may have drifted away: the rhythm is not known any more.
 const IN_RHYTHM: u64 = DRIFT / 2;
+/// A result that has been seen before is taken back and waited out so often.
+const REPETITIONS: usize = 2;
 /// How often the interrupt is looked at once it may be up.
 const POLL: Micros = Micros::from_millis(2);
 
@@ -64,7 +66,7 @@ impl Default for Config {
 ///
 /// A sample is vouched for (`valid`) when the chip calls it [`RangeStatus::Valid`] and it is above zero and within the
 /// mode's reach. The first one after a start is not: the chip tells a target beyond its reach from one within by
-/// comparing measurements. `status` is the chip's own code; [`reading`](Self::reading) has everything it said.
+/// comparing measurements. `status` is [`RangeStatus::number`]; [`reading`](Self::reading) has everything it said.
 ///
 /// # Several on a bus
 /// Every chip wakes up at 0x29, so each has a pin on its XSHUT and is given an address of its own. Creating a driver
@@ -78,7 +80,7 @@ impl Default for Config {
 ///
 /// # Times
 /// The first sample takes 10 ms and two measurements, 80 ms in all. `next` ends within two periods and 20 ms
-/// ([`ChipError::NoSample`]); when it has to start the chip, within four more periods and 350 ms.
+/// ([`ChipError::NoSample`]), one period later for each of up to two results that it has seen before; when it has to start the chip, within four more periods and 350 ms.
 ///
 /// ```
 /// # #![allow(dead_code)]
@@ -119,6 +121,8 @@ pub struct Vl53l3cx<'b, I, X, T> {
     first: bool,
     /// When the next measurement may be there.
     due: Micros,
+    /// The newest result since the start, as it came.
+    block: Option<[u8; RESULT_BYTES]>,
     reading: Option<Reading>,
 }
 
@@ -143,6 +147,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             stale: false,
             first: true,
             due: Micros::ZERO,
+            block: None,
             reading: None,
         }
     }
@@ -168,6 +173,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.port.write(register::SYSTEM_MODE_START, &[codec::RANGING]).await?;
         self.stale = false;
         self.first = true;
+        self.block = None;
         self.due = self.port.now() + self.config.budget;
         self.ready().await?;
         self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;
@@ -258,6 +264,24 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         }
     }
 
+    /// Waits for a result that has not been there before, and takes its interrupt back.
+    async fn result(&mut self) -> Result<(Micros, [u8; RESULT_BYTES]), ChipError<I::Error>> {
+        for _ in 0..=REPETITIONS {
+            let seen = self.ready().await?;
+            // Until the interrupt has been taken back, what follows may be this measurement again.
+            self.stale = true;
+            let block: [u8; RESULT_BYTES] = self.read(register::RESULT_RANGE_STATUS).await?;
+            self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;
+            self.stale = false;
+            // The chip numbers its results: the same one again means that it did not understand the last clear.
+            if self.block.replace(block) != Some(block) {
+                return Ok((seen, block));
+            }
+        }
+        self.ranging = false;
+        Err(ChipError::NoSample)
+    }
+
     /// Waits for a new measurement, and gives the instant it was there.
     async fn ready(&mut self) -> Result<Micros, ChipError<I::Error>> {
         let period = self.config.period;
@@ -268,7 +292,11 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.port.wait_until(self.due).await;
         let mut before = None;
         loop {
-            let [control, status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
+            let [mut control, mut status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
+            if control != codec::ACTIVE_HIGH {
+                // Twice, before a wrong bit on the bus costs a start.
+                [control, status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
+            }
             let now = self.port.now();
             if control != codec::ACTIVE_HIGH {
                 self.ranging = false;
@@ -328,12 +356,7 @@ impl<I: I2c, X: OutputPin, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
         if !self.ranging {
             self.start().await?;
         }
-        let seen = self.ready().await?;
-        // Until the interrupt has been taken back, what follows may be this measurement again.
-        self.stale = true;
-        let block: [u8; RESULT_BYTES] = self.read(register::RESULT_RANGE_STATUS).await?;
-        self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;
-        self.stale = false;
+        let (seen, block) = self.result().await?;
         let reading = Reading::decode(&block).ok_or(ChipError::Data)?;
         self.reading = Some(reading);
         let checked = !core::mem::replace(&mut self.first, false);
@@ -343,7 +366,7 @@ impl<I: I2c, X: OutputPin, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
         let data = TofData {
             distance: distance.max(0.0),
             sigma: reading.sigma,
-            status: reading.code,
+            status: reading.status().number(),
             valid: checked && plausible && reading.status() == RangeStatus::Valid,
         };
         Ok(Sample { at: seen.since(Micros(self.config.budget.0 / 2)), data })

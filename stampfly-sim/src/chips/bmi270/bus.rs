@@ -42,6 +42,8 @@ impl Bmi270 {
 }
 
 impl SpiChip for Bmi270 {
+    const HIGHEST_CLOCK: u32 = 10_000_000;
+
     fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
         if index == 0 {
             self.command = byte;

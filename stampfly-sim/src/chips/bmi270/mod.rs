@@ -12,6 +12,9 @@
 //! | 0x21 | (3:0) 0 not initialised, 1 ready, 2 failed | 0 | 5.2.30 |
 //! | 0x22–0x23 | temperature, 1/512 K above 23 °C, 0x8000 invalid | 0x8000 | 5.2.31 |
 //! | 0x24–0x25, 0x26 | FIFO fill level, FIFO data | 0 | 5.2.33 to 5.2.35 |
+//! | 0x2F | page of the features, which are 0x30 to 0x3F | 0 | 5.2.36 |
+//! | 0x32, 0x33 | page 1: longest burst; (0) retrim instead of a test of the gyroscope, (1) give it up | 0 | |
+//! | 0x38 | page 0: (5:3) what became of the command to test | 0 | |
 //! | 0x40, 0x41 | accelerometer filter and rate, range | 0xA8, 0x02 | 5.2.45, 5.2.46 |
 //! | 0x42, 0x43 | gyroscope filter and rate, range | 0xA9, 0x00 | 5.2.47, 5.2.48 |
 //! | 0x46, 0x47 | FIFO watermark, bytes (4:0 of the second) | 0x00, 0x02 | 5.2.51, 5.2.52 |
@@ -81,6 +84,12 @@ const INTERNAL_STATUS: u16 = 0x21;
 const TEMPERATURE: u16 = 0x22;
 const FIFO_LENGTH: u16 = 0x24;
 const FIFO_DATA: u16 = 0x26;
+const FEATURE_PAGE: u16 = 0x2F;
+/// On page 1: longest burst, and what a test of the gyroscope is to be.
+const TEST_WORD_LOW: u16 = 0x32;
+const TEST_WORD_HIGH: u16 = 0x33;
+/// On page 0: what became of the command to test.
+const TEST_STATUS: u16 = 0x38;
 const ACCEL_SETTINGS: u16 = 0x40;
 const ACCEL_RANGE: u16 = 0x41;
 const GYRO_SETTINGS: u16 = 0x42;
@@ -116,6 +125,8 @@ const AFTER_RESET: [(u16, u8); 11] = [
     (TEMPERATURE + 1, 0x80),
     (POWER_SAVE, 0x03),
 ];
+/// In [`TEST_STATUS`]: the command came without its preparation.
+const NOT_PREPARED: u8 = 0x08;
 const READY_ACCEL: u8 = 0x80;
 const READY_GYRO: u8 = 0x40;
 const COMMAND_READY: u8 = 0x10;
@@ -184,6 +195,9 @@ pub struct Bmi270 {
     fifo: Fifo,
     interrupt: Interrupt,
     self_test: SelfTest,
+    /// The features' word about tests of the gyroscope, and their answer.
+    test_word: [u8; 2],
+    test_status: u8,
     /// The sensing elements do not move.
     broken: bool,
     /// The address byte of this transfer.
@@ -221,6 +235,8 @@ impl Bmi270 {
             fifo: Fifo::default(),
             interrupt: Interrupt::default(),
             self_test: SelfTest::default(),
+            test_word: [0; 2],
+            test_status: 0,
             broken: false,
             command: 0,
             pointer: 0,

@@ -1,10 +1,11 @@
 //! What reading and writing the BMI270's registers does, beside what it reads and writes.
 
 use super::{
-    ACCEL, ACCEL_SETTINGS, AFTER_RESET, Bmi270, COMMAND, COMMAND_READY, EVENT, FIFO_CONTENT, FIFO_DATA, FIFO_LENGTH,
-    FIFO_MODE, GYRO, GYRO_RANGE, GYRO_SELF_TEST, GYRO_SETTINGS, ID, INTERNAL_STATUS, INTERRUPTS, POWER, READY_ACCEL,
-    READY_GYRO, START_UP, STATUS, SelfTest, TIME, UPLOAD_ADDRESS_HIGH, UPLOAD_ADDRESS_LOW, UPLOAD_CHECK,
-    UPLOAD_CONTROL, UPLOAD_DATA, UPLOAD_SIZE,
+    ACCEL, ACCEL_SETTINGS, AFTER_RESET, Bmi270, COMMAND, COMMAND_READY, EVENT, FEATURE_PAGE, FIFO_CONTENT, FIFO_DATA,
+    FIFO_LENGTH, FIFO_MODE, GYRO, GYRO_RANGE, GYRO_SELF_TEST, GYRO_SETTINGS, GYRO_TEST, ID, INTERNAL_STATUS,
+    INTERRUPTS, NOT_PREPARED, POWER, READY_ACCEL, READY_GYRO, START_UP, STATUS, SelfTest, TEST_STATUS, TEST_WORD_HIGH,
+    TEST_WORD_LOW, TIME, UPLOAD_ADDRESS_HIGH, UPLOAD_ADDRESS_LOW, UPLOAD_CHECK, UPLOAD_CONTROL, UPLOAD_DATA,
+    UPLOAD_SIZE,
 };
 use crate::chips::Chip;
 use stampfly_types::Micros;
@@ -36,6 +37,10 @@ impl Chip for Bmi270 {
             INTERRUPTS => {
                 self.interrupt.unlatch();
                 core::mem::take(&mut self.registers[usize::from(INTERRUPTS)])
+            }
+            TEST_STATUS if self.register(FEATURE_PAGE) == 0 => self.test_status,
+            TEST_WORD_LOW | TEST_WORD_HIGH if self.register(FEATURE_PAGE) == 1 => {
+                self.test_word[usize::from(register - TEST_WORD_LOW)]
             }
             FIFO_LENGTH => self.fifo.len() as u8,
             0x25 => (self.fifo.len() >> 8) as u8 & 0x3F,
@@ -87,9 +92,24 @@ impl Chip for Bmi270 {
             COMMAND if value == 0xB6 => self.reset(now),
             COMMAND if value == 0xB0 => self.fifo.clear(),
             COMMAND if value == 0x02 && !self.saves_power() && self.register(INTERNAL_STATUS) & 0x0F == 1 => {
+                let selected = self.test_word[1] & 0x03 == 0;
+                let announced = self.register(GYRO_TEST) & 0x04 != 0;
+                let prepared = self.register(POWER) & 0x06 == 0x04 && self.test_word[0] == 0;
                 self.set(GYRO_SELF_TEST, 0);
-                self.self_test.begin_gyro(now);
+                if announced && selected && prepared {
+                    self.self_test.begin_gyro(now);
+                    self.test_status = 0;
+                } else {
+                    // What was not prepared for is over at once.
+                    self.test_status = NOT_PREPARED;
+                    self.set(GYRO_TEST, self.register(GYRO_TEST) & !0x04);
+                }
             }
+            TEST_WORD_LOW | TEST_WORD_HIGH if self.register(FEATURE_PAGE) == 1 => {
+                self.test_word[usize::from(register - TEST_WORD_LOW)] = value;
+            }
+            // What the features say on page 0 is read-only.
+            0x30..=0x3F if self.register(FEATURE_PAGE) == 0 => {}
             COMMAND | GYRO_SELF_TEST => {}
             POWER => {
                 self.set(POWER, value & 0x0F);
@@ -126,6 +146,8 @@ impl Chip for Bmi270 {
         self.fifo.clear();
         self.shadow = [0; 12];
         self.self_test = SelfTest::default();
+        self.test_word = [0; 2];
+        self.test_status = 0;
         self.interrupt.stop();
         self.drive_pin();
     }

@@ -2,11 +2,13 @@
 //!
 //! Bosch's Sensor API for this chip names the bits and wants, at ±16 g and 50 ms after each change, that the positive
 //! less the negative deflection is more than 16 g along x, less than −15 g along y and more than 10 g along z. The
-//! gyroscope's test begins with command 0x02.
+//! gyroscope's test wants bit 2 of 0x69 set, the gyroscope off and the accelerometer on, and the test selected in the
+//! features' word at 0x32 of page 1 before command 0x02; it has ended when the chip clears that bit, and then bits 5:3 of
+//! 0x38 of page 0 are zero.
 //!
-//! *Unverified*: by how much this specimen exceeds those limits, a small deflection of a quarter of the large one, a
-//! mass that moves evenly and arrives after 45 ms at the latest, 85 ms for the test of the gyroscope, and that it works
-//! whichever sensors are on. The features' choice between this test and retrimming is not modelled.
+//! *Unverified*: that a command without all this ends at once with a code of one in those bits; by how much this
+//! specimen exceeds those limits, a small deflection of a quarter of the large one, a mass that moves evenly and arrives
+//! after 45 ms at the latest, 85 ms for the test of the gyroscope. Retrimming is not modelled.
 
 use stampfly_types::{GRAVITY, Micros};
 
