@@ -122,26 +122,23 @@ pub fn flight_stack(repository: &Repository) -> Result<u64, Failure> {
 
 /// The part of the heap that lies elsewhere on the S3, beside its data cache (`src/main.rs`).
 const S3_ELSEWHERE: u64 = 32 * 1024;
-/// What the first core needs at least: half as much again as the self test, which holds a whole vehicle (see `memory`).
-const S3_FIRST_STACK: u64 = 96 * 1024;
 /// The C6's memory, as its program's sections see it.
 const C6_MEMORY: std::ops::Range<u64> = 0x4080_0000..0x4088_0000;
 
-/// Would what the C6 keeps in memory fit into the S3?
-fn memory(repository: &Repository, program: &Path) -> Result<(), Failure> {
+/// If what the C6 keeps in memory were in the S3's: how much would be left, for the first core's stack? What that has to
+/// suffice for is asked by the step `memory`.
+pub fn memory(repository: &Repository, program: &Path) -> Result<u64, Failure> {
     let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", program.display());
     let bytes = fs::read(program).map_err(|e| fail(&e))?;
     let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
     // What is left over is the stack's, and the boot loader's memory is another region on the S3, too.
     let kept = file.sections().filter(|section| !matches!(section.name(), Ok(".stack" | ".dram2_uninit")));
     let kept: u64 = kept.filter(|section| C6_MEMORY.contains(&section.address())).map(|section| section.size()).sum();
-    let left = (S3_MEMORY + S3_ELSEWHERE).saturating_sub(kept + flight_stack(repository)?);
+    let used = kept + flight_stack(repository)?;
+    let left = (S3_MEMORY + S3_ELSEWHERE).checked_sub(used);
+    let left = left.ok_or_else(|| format!("{used} bytes are more than the S3 has"))?;
     println!("esp32c6: {kept} bytes of memory in use; on the S3 that would leave {left} bytes of stack");
-    if left < S3_FIRST_STACK {
-        Err(format!("the S3 would have less than {S3_FIRST_STACK} bytes of stack"))
-    } else {
-        Ok(())
-    }
+    Ok(left)
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.
