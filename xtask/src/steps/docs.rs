@@ -6,8 +6,8 @@
 //! its address, must lead to a file, and one into the same document to a heading. Every picture must be shown somewhere,
 //! and the guide to tuning must name every field there is to tune.
 
-use crate::Failure;
 use crate::repository::{Repository, capture};
+use crate::{FIX, Failure, asks};
 use std::fs;
 use std::path::Path;
 
@@ -51,11 +51,7 @@ const GENERATED: &[(&str, &str, &str)] = &[
 ];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = match arguments {
-        [] => false,
-        [flag] if flag == "--fix" => true,
-        _ => return Err("the only argument is --fix".to_owned()),
-    };
+    let fix = asks(arguments, FIX);
     let mut stale = Vec::new();
     let mut all = String::new();
     for name in DOCUMENTS {

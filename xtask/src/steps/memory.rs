@@ -8,11 +8,11 @@
 //! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
 use super::esp32;
-use crate::Failure;
 use crate::elf::stack::{Behind, Stack};
 use crate::elf::{C, CONSTANTS, Program, Sizes};
 use crate::ratchet::Budget;
 use crate::repository::Repository;
+use crate::{FIX, Failure, asks};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -40,15 +40,13 @@ const ROM: u64 = 512;
 const SHARE: f64 = 0.5;
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let (flags, paths): (Vec<_>, Vec<_>) = arguments.iter().partition(|argument| argument.starts_with("--"));
-    let path = match paths[..] {
-        [] => esp32::c6(repository)?,
-        [path] => path.into(),
-        _ => return Err("one program at a time".to_owned()),
+    let path = match arguments.iter().find(|argument| *argument != FIX) {
+        None => esp32::c6(repository)?,
+        Some(path) => path.into(),
     };
     let program = Program::read(&path)?;
     let budget = Budget::read(repository, BUDGET)?;
-    let mut ledger = Ledger { budget, fix: !flags.is_empty(), failures: Vec::new() };
+    let mut ledger = Ledger { budget, fix: asks(arguments, FIX), failures: Vec::new() };
     sizes(&program, &mut ledger)?;
     stacks(repository, &path, &program, &mut ledger)?;
     ledger.close()

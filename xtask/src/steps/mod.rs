@@ -1,5 +1,6 @@
 //! One file a step.
 
+pub mod bars;
 pub mod budget;
 pub mod clippy;
 pub mod consumers;

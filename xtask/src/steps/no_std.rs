@@ -3,8 +3,8 @@
 //! The targets come from rustup. Where rustup cannot deliver them, Debian's compiler builds the core library from its
 //! own sources instead; it is installed when it is missing.
 
-use crate::Failure;
 use crate::repository::{Repository, add_targets, install, run as run_program};
+use crate::{Failure, asks};
 use std::path::Path;
 use std::process::Command;
 
@@ -12,11 +12,8 @@ const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "riscv32imac-unknown-none-e
 const DEBIAN: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let debian = match arguments {
-        [] => add_targets(repository, &TARGETS).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err(),
-        [only] if only == "--debian" => true,
-        _ => return Err(format!("what is {arguments:?}?")),
-    };
+    let debian = asks(arguments, "--debian")
+        || add_targets(repository, &TARGETS).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err();
     if debian && !Path::new("/usr/bin/cargo").exists() {
         install(repository, &DEBIAN)?;
     }

@@ -5,10 +5,10 @@
 //! one, and asks for a margin of two because of it. The package `stampfly-board/qemu` is outside the workspace, so its
 //! format and its warnings are looked at here, too.
 
-use crate::Failure;
 use crate::ratchet::Budget;
 use crate::repository::{Repository, add_targets, capture, exists, install, run as run_program};
 use crate::steps::no_std::debian_cargo;
+use crate::{FIX, Failure, asks};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
@@ -52,11 +52,7 @@ const COMPILER: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "lld-22"]
 const BACK_END: [&str; 2] = ["llvm-22", "binutils-xtensa-lx106"];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = match arguments {
-        [] => false,
-        [flag] if flag == "--fix" => true,
-        _ => return Err("the only argument is --fix".to_owned()),
-    };
+    let fix = asks(arguments, FIX);
     if MACHINES.iter().any(|machine| !exists(machine.emulator)) {
         install(repository, &EMULATORS)?;
     }

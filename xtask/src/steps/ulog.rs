@@ -15,8 +15,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
             run_program(&mut fly)?;
             folder.join("flight.ulg")
         }
-        [path] => std::path::absolute(path).map_err(io)?,
-        _ => return Err("one log at a time".to_owned()),
+        [path, ..] => std::path::absolute(path).map_err(io)?,
     };
 
     let (info, _) = capture(python_tool(repository, "pyulog", "ulog_info")?.arg(&log))?;
