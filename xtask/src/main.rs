@@ -115,6 +115,12 @@ const STEPS: &[Step] = &[
         .within(300.0),
     check("memory", "does the firmware stay within its flash, memory and stack, or this program?", steps::memory::run)
         .accepting(&[FIX, PATH]),
+    check(
+        "panic-calls",
+        "does flight code in the firmware, or in this program, call what panics?",
+        steps::panic_calls::run,
+    )
+    .accepting(&[PATH]),
     check("package", "would each crate, as committed, build from its package?", steps::package::run),
     check("determinism", "do optimised and unoptimised flights publish the same bits?", steps::determinism::run),
     check("bars", "do a hundred flights keep every bar?", steps::bars::run),

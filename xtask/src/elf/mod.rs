@@ -132,6 +132,21 @@ impl Program {
     }
 }
 
+/// Is this one of the functions that never return, because something is wrong that cannot be?
+pub fn panics(name: &str) -> bool {
+    let starts =
+        ["core::panicking::", "core::slice::index::slice_", "core::slice::copy_from_slice_impl::len_mismatch_fail"];
+    let names = [
+        "core::cell::panic_already_borrowed",
+        "core::cell::panic_already_mutably_borrowed",
+        "core::option::expect_failed",
+        "core::option::unwrap_failed",
+        "core::result::unwrap_failed",
+        "core::str::slice_error_fail",
+    ];
+    starts.iter().any(|start| name.starts_with(start)) || names.contains(&name)
+}
+
 fn place<'d>(section: &impl ObjectSection<'d>) -> Option<Place> {
     let name = section.name().unwrap_or_default();
     // Initialised variables and code for the memory are loaded from flash.
@@ -169,8 +184,27 @@ fn owning_crate(name: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{owner, owning_crate};
+pub mod tests {
+    use super::riscv::Code;
+    use super::{Place, Program, Symbol, owner, owning_crate, panics};
+
+    /// Functions at 16, 32 ...: name, frame, whom it calls, calls through a pointer.
+    pub fn program(functions: &[(&str, u64, &[u64], usize)]) -> Program {
+        let symbols = functions.iter().zip(1..).map(|((name, frame, calls, indirect), index)| {
+            let code =
+                Code { frame: *frame, calls: calls.iter().copied().collect(), indirect: *indirect, unbounded: false };
+            let (name, owner) = ((*name).to_owned(), owning_crate(name));
+            (16 * index, Symbol { name, owner, size: 16, place: Place::Flash, code: Some(code) })
+        });
+        Program { symbols: symbols.collect(), ..Program::default() }
+    }
+
+    #[test]
+    fn what_panics_is_known_by_name() {
+        assert!(panics("core::panicking::panic_const::panic_const_div_by_zero"));
+        assert!(panics("core::slice::index::slice_index_fail"));
+        assert!(!panics("core::slice::sort::heapsort"));
+    }
 
     #[test]
     fn a_name_says_whose_it_is() {

@@ -5,7 +5,7 @@
 //! row of the table, as with a value whose text contains another value's, the row has to say how often. Recursion
 //! otherwise, and frames of unknown size, have no bound and are named; so are functions whose code is not in the program.
 
-use super::{Program, Symbol};
+use super::{Program, Symbol, panics};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How deep, and by which way.
@@ -44,9 +44,6 @@ pub struct Stack<'a> {
     known: BTreeMap<State, Depth>,
     open: BTreeSet<State>,
 }
-
-/// Functions that never return: what comes after them is no flight.
-const PANICS: [&str; 2] = ["core::panicking::", "core::str::slice_error_fail"];
 
 /// A function, and how many calls by each row are open above it.
 type State = (u64, Vec<u8>);
@@ -92,8 +89,8 @@ impl<'a> Stack<'a> {
             let way = vec![(name.clone(), self.allowance)];
             return Depth { bytes: self.allowance, way, elsewhere: [name].into(), ..Depth::default() };
         };
-        let panics = PANICS.iter().any(|start| symbol.name.starts_with(start));
-        let Some(code) = symbol.code.as_ref().filter(|_| !panics) else {
+        // What comes after a panic is no flight.
+        let Some(code) = symbol.code.as_ref().filter(|_| !panics(&symbol.name)) else {
             return Depth::default();
         };
         let state = (start, state.1);
@@ -167,20 +164,8 @@ fn calls_through_pointers(symbol: &Symbol) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::riscv::Code;
-    use super::super::{Place, Program, Symbol};
+    use super::super::tests::program;
     use super::{Behind, Stack};
-
-    /// Functions at 16, 32 ...: name, frame, whom it calls, calls through a pointer.
-    fn program(functions: &[(&str, u64, &[u64], usize)]) -> Program {
-        let symbols = functions.iter().zip(1..).map(|((name, frame, calls, indirect), index)| {
-            let code =
-                Code { frame: *frame, calls: calls.iter().copied().collect(), indirect: *indirect, unbounded: false };
-            let owner = "us".to_owned();
-            (16 * index, Symbol { name: (*name).to_owned(), owner, size: 16, place: Place::Flash, code: Some(code) })
-        });
-        Program { symbols: symbols.collect(), ..Program::default() }
-    }
 
     const fn behind<'a>(callers: &'a str, targets: &'a [&'a str], nests: Option<u8>) -> Behind<'a> {
         Behind { callers, targets, nests }

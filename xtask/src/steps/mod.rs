@@ -17,6 +17,7 @@ pub mod loom;
 pub mod memory;
 pub mod no_std;
 pub mod package;
+pub mod panic_calls;
 pub mod panic_proof;
 pub mod peers;
 pub mod qemu;
