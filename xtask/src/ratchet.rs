@@ -28,10 +28,15 @@ impl Budget {
         number(&self.text, name).ok_or_else(|| format!("{}: no number `{name}`", self.document))
     }
 
+    /// How far a figure may be off, as a part of it.
+    pub fn tolerance(&self) -> Result<f64, Failure> {
+        self.number("tolerance")
+    }
+
     /// Says how a figure in `unit` compares with the one committed as `name`, and fails when it is too large, or so small
     /// that the committed one ought to follow.
     pub fn hold(&self, name: &str, measured: f64, unit: &str) -> Result<(), Failure> {
-        let (committed, tolerance) = (self.number(name)?, self.number("tolerance")?);
+        let (committed, tolerance) = (self.number(name)?, self.tolerance()?);
         let slack = number(&self.text, "slack").unwrap_or_default();
         let change = measured - committed;
         let per_cent = if change == 0.0 { 0.0 } else { change / committed * 100.0 };

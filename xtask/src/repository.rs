@@ -49,14 +49,21 @@ impl Repository {
         if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
     }
 
+    /// The text between two marks of a document.
+    pub fn between(&self, document: &str, begin: &str, end: &str) -> Result<String, Failure> {
+        let text = std::fs::read_to_string(self.root.join(document)).map_err(|e| format!("{document}: {e}"))?;
+        let [_, inside, _] =
+            split(&text, begin, end).ok_or_else(|| format!("{document} has no place for it: {begin}"))?;
+        Ok(inside.to_owned())
+    }
+
     /// Puts generated text between two marks of a document.
     pub fn fill(&self, document: &str, begin: &str, end: &str, text: &str) -> Result<(), Failure> {
         let io = |e: std::io::Error| format!("{document}: {e}");
         let path = self.root.join(document);
         let before = std::fs::read_to_string(&path).map_err(io)?;
-        let missing = || format!("{document} has no place for it: {begin}");
-        let (head, rest) = before.split_once(begin).ok_or_else(missing)?;
-        let (_, tail) = rest.split_once(end).ok_or_else(missing)?;
+        let [head, _, tail] =
+            split(&before, begin, end).ok_or_else(|| format!("{document} has no place for it: {begin}"))?;
         std::fs::write(&path, format!("{head}{begin}{text}{end}{tail}")).map_err(io)
     }
 
@@ -71,6 +78,13 @@ impl Repository {
     pub fn cargo(&self) -> Command {
         self.command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
     }
+}
+
+/// A text before, between and after two marks.
+fn split<'t>(text: &'t str, begin: &str, end: &str) -> Option<[&'t str; 3]> {
+    let (head, rest) = text.split_once(begin)?;
+    let (inside, tail) = rest.split_once(end)?;
+    Some([head, inside, tail])
 }
 
 /// Says what is run, runs it, and turns a failure into a sentence.

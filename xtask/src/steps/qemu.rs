@@ -81,10 +81,12 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
         hold(&budget, machine, &counts)?;
         all.push(counts);
     }
-    let table = table(&all);
+    let table = table(&all)?;
     println!("\n{table}");
     if fix {
         repository.fill(DOCUMENT, BEGIN, END, &format!("\n{table}\n"))?;
+    } else if !agree(&repository.between(DOCUMENT, BEGIN, END)?, &table, budget.tolerance()?) {
+        return Err(format!("the table in {DOCUMENT} is out of date; run `cargo xtask qemu --fix`"));
     }
     all.iter().flatten().try_for_each(within_budget)
 }
@@ -216,20 +218,37 @@ fn within_budget(count: &Count) -> Result<(), Failure> {
 }
 
 /// One row for everything that was counted, two columns a machine.
-fn table(all: &[Vec<Count>]) -> String {
+fn table(all: &[Vec<Count>]) -> Result<String, Failure> {
     let mut text = String::from("| instructions of an activation | budget |");
     for machine in &MACHINES {
         let _ = write!(text, " {}, mean | most |", machine.name);
     }
     let _ = write!(text, "\n|---|---|{}", "---|---|".repeat(MACHINES.len()));
-    for (row, first) in all.iter().flatten().take(all.first().map_or(0, Vec::len)).enumerate() {
-        let budget = first.budget.map_or_else(String::new, |budget| format!("{budget} us"));
-        let _ = write!(text, "\n| {} | {budget} |", first.name);
-        for count in all.iter().filter_map(|counts| counts.get(row)) {
+    let Some((first, others)) = all.split_first() else { return Ok(text) };
+    if let Some(other) = others.iter().find(|other| other.len() != first.len()) {
+        return Err(format!("machines count different things: {first:?}, {other:?}"));
+    }
+    for Count { name, budget, .. } in first {
+        let budget = budget.map_or_else(String::new, |budget| format!("{budget} us"));
+        let _ = write!(text, "\n| {name} | {budget} |");
+        for counts in all {
+            let count = counts.iter().find(|count| count.name == *name);
+            let count = count.ok_or_else(|| format!("not every machine counts {name}: {counts:?}"))?;
             let _ = write!(text, " {} | {} |", count.mean, count.most);
         }
     }
-    text + "\n"
+    Ok(text + "\n")
+}
+
+/// Do two tables say the same, but for what one compiler's counts differ from another's?
+fn agree(written: &str, counted: &str, tolerance: f64) -> bool {
+    let cells = |text: &str| text.trim().split(['|', '\n']).map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+    let (written, counted) = (cells(written), cells(counted));
+    let near = |(a, b): (&String, &String)| match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= tolerance * b,
+        _ => a == b,
+    };
+    written.len() == counted.len() && written.iter().zip(&counted).all(near)
 }
 
 #[cfg(test)]
@@ -269,7 +288,22 @@ mod tests {
     #[test]
     fn the_table_has_a_column_pair_a_machine() {
         let counts = counts(SAID).expect("counts");
-        let table = table(&[counts.clone(), counts.clone(), counts]);
+        // In whatever order a machine says it.
+        let reversed: Vec<_> = counts.iter().rev().cloned().collect();
+        let table = table(&[counts.clone(), reversed, counts.clone()]).expect("complete");
         assert!(table.contains("| control | 100 us | 5 | 9 | 5 | 9 | 5 | 9 |"), "{table}");
+        assert!(super::table(&[counts.clone(), counts[..1].to_vec()]).is_err());
+        let other = Count { name: "other".to_owned(), ..counts[0].clone() };
+        assert!(super::table(&[counts.clone(), vec![other, counts[1].clone()]]).is_err());
+    }
+
+    #[test]
+    fn a_table_is_out_of_date_when_a_count_is() {
+        let table = table(&[counts(SAID).expect("counts")]).expect("complete");
+        assert!(agree(&format!("\n{table}\n"), &table, 0.03));
+        assert!(agree(&table.replace("12001", "12300"), &table, 0.03));
+        assert!(!agree(&table.replace("12001", "12400"), &table, 0.03));
+        assert!(!agree(&table.replace("control", "mode"), &table, 0.03));
+        assert!(!agree("", &table, 0.03));
     }
 }
