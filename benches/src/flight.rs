@@ -4,7 +4,7 @@
 //! vehicle repeats the flight without the simulator, so that only the flight stack is measured; that the motors are
 //! told the same bits again shows that the replay is the flight.
 
-use stampfly_board::vehicle::{Outside, assemble};
+use stampfly_board::vehicle::{Assembled, Outside, assemble};
 use stampfly_board::{FlightLoop, Observer, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample};
@@ -50,8 +50,8 @@ struct Vehicle<'b> {
 impl<'b> Vehicle<'b> {
     fn new(bus: &'b mut wiring::Bus) -> Self {
         let wiring::Split { ports, heads, .. } = bus.split(None);
-        let (vehicle, outside) = assemble(ports, &VehicleConfig::default());
-        Self { flight: FlightLoop::new(vehicle, heads, Micros::ZERO), outside }
+        let Assembled { flight_loop, outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
+        Self { flight: flight_loop, outside }
     }
 
     /// Publishes a sample. One from the inertial sensor completes a step: everything due runs.

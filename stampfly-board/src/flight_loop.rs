@@ -42,7 +42,7 @@ pub struct FlightLoop<'b> {
 impl<'b> FlightLoop<'b> {
     /// A vehicle at power-on.
     #[must_use]
-    pub fn new(vehicle: plan::Vehicle<'b>, heads: [&'b dyn AnyTopic; wiring::COUNT], start: Micros) -> Self {
+    pub(crate) fn new(vehicle: plan::Vehicle<'b>, heads: [&'b dyn AnyTopic; wiring::COUNT], start: Micros) -> Self {
         Self { vehicle, scheduler: Scheduler::new(&plan::ACTIVATIONS, start), heads }
     }
 

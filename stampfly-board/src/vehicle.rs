@@ -1,9 +1,11 @@
 //! The assembly: every end of every topic handed to whoever owns it, once.
 
 use crate::config::VehicleConfig;
+use crate::flight_loop::FlightLoop;
 use crate::plan;
 use crate::runnables::*;
 use crate::wiring;
+use stampfly_bus::AnyTopic;
 use stampfly_types::Micros;
 
 /// The ends that belong to the world outside the runnables: drivers, links, motors, lights.
@@ -67,9 +69,24 @@ impl Outside<'_> {
     }
 }
 
-/// Builds the vehicle from the ends of a fresh bus.
+/// A vehicle at power-on: what drives it, and what the world outside has in hand.
+///
+/// The first is large. Whoever has little stack borrows it from here instead of moving it.
+pub struct Assembled<'b> {
+    /// Every runnable, with the scheduler.
+    pub flight_loop: FlightLoop<'b>,
+    /// The other ends.
+    pub outside: Outside<'b>,
+}
+
+/// Builds the vehicle from the ends of a fresh bus. Its scheduler counts from `start`.
 #[must_use]
-pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::Vehicle<'b>, Outside<'b>) {
+pub fn assemble<'b>(
+    ports: wiring::Ports<'b>,
+    heads: [&'b dyn AnyTopic; wiring::COUNT],
+    config: &VehicleConfig,
+    start: Micros,
+) -> Assembled<'b> {
     // Taken apart without `..`: an end that nobody gets is an unused variable.
     let wiring::Ports {
         sensor_imu,
@@ -218,5 +235,5 @@ pub fn assemble<'b>(ports: wiring::Ports<'b>, config: &VehicleConfig) -> (plan::
         indicator: signal.indicator,
         telemetry: telemetry.link,
     };
-    (vehicle, outside)
+    Assembled { flight_loop: FlightLoop::new(vehicle, heads, start), outside }
 }

@@ -1,7 +1,7 @@
 //! Button, mode machine, radio and arm switch together, as the firmware joins them: a vehicle changes its transmitter.
 
 use stampfly_board::messages::ButtonContact;
-use stampfly_board::vehicle::{Outside, assemble};
+use stampfly_board::vehicle::{Assembled, Outside, assemble};
 use stampfly_board::{FlightLoop, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
@@ -24,8 +24,8 @@ struct Bench<'b> {
 impl<'b> Bench<'b> {
     fn new(bus: &'b mut wiring::Bus) -> Self {
         let wiring::Split { ports, heads, .. } = bus.split(None);
-        let (vehicle, outside) = assemble(ports, &VehicleConfig::default());
-        let flight = FlightLoop::new(vehicle, heads, Micros::ZERO);
+        let Assembled { flight_loop: flight, outside } =
+            assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
         Self { flight, outside, session: Session::new(VEHICLE, 1, Some(OLD)), wanted: false, now: Micros::ZERO }
     }
 

@@ -1,7 +1,7 @@
 //! A machine that computes something else does not arm, and says why; one with other bits only says so.
 
-use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, messages::TelemetryFrame, wiring};
+use stampfly_board::vehicle::{Assembled, assemble};
+use stampfly_board::{VehicleConfig, messages::TelemetryFrame, wiring};
 use stampfly_bus::Band;
 use stampfly_types::Micros;
 use stampfly_types::messages::{Alerts, ArmBlocks, SelfTest, SelfTestVerdict};
@@ -10,8 +10,7 @@ use stampfly_types::messages::{Alerts, ArmBlocks, SelfTest, SelfTestVerdict};
 fn after(verdict: SelfTestVerdict) -> TelemetryFrame {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, .. } = bus.split(None);
-    let (vehicle, mut outside) = assemble(ports, &VehicleConfig::default());
-    let mut flight_loop = FlightLoop::new(vehicle, heads, Micros::ZERO);
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
     outside.self_test.publish(Micros::ZERO, &SelfTest { verdict, worst: 0.0 });
     for step in 1..=40 {
         let now = Micros(2_500 * step);

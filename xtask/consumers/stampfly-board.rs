@@ -1,15 +1,14 @@
 //! A stranger's program: the vehicle, assembled.
 
-use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, wiring};
+use stampfly_board::vehicle::{Assembled, assemble};
+use stampfly_board::{VehicleConfig, wiring};
 use stampfly_types::{Micros, messages::ImuData};
 
 fn main() {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, mut taps } = bus.split(None);
-    let (vehicle, mut outside) = assemble(ports, &VehicleConfig::default());
-    let flight = FlightLoop::new(vehicle, heads, Micros::ZERO);
-    assert_eq!(flight.next_tick(), Some(Micros::from_millis(5)), "the failsafe runs even when no sensor does");
+    let Assembled { flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
+    assert_eq!(flight_loop.next_tick(), Some(Micros::from_millis(5)), "the failsafe runs even when no sensor does");
 
     outside.imu.publish(Micros(2_500), &ImuData::default());
     let mut logged = Vec::new();

@@ -7,21 +7,25 @@
 //! Should this core stop, too, and with it the clock the flight task waits by, the chip's watchdog restarts it all: after a
 //! tenth of a second in flight. A chip that starts has its motors off.
 
+use crate::clock::Clock;
 use crate::motors;
 use core::ptr::null_mut;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicPtr, Ordering};
 use embassy_sync::blocking_mutex::raw::{CriticalSectionRawMutex, RawMutex};
 use esp_hal::Blocking;
 use esp_hal::handler;
 use esp_hal::interrupt::Priority;
 use esp_hal::peripherals::TIMG1;
-use esp_hal::time::{Duration, Instant};
+use esp_hal::time::Duration;
 use esp_hal::timer::PeriodicTimer;
 use esp_hal::timer::timg::{MwdtStage, MwdtStageAction, TimerGroup, Wdt};
+use stampfly_board::tasks::DeadMan;
+use stampfly_drivers::Timebase;
+use stampfly_types::Micros;
 use static_cell::StaticCell;
 
 /// Motors that nobody has confirmed for this long are stopped.
-const PATIENCE: Duration = Duration::from_millis(25);
+const PATIENCE: Micros = Micros::from_millis(25);
 /// How often the timer looks. Motors turn for at most `PATIENCE` and this after the last confirmation.
 const PERIOD: Duration = Duration::from_millis(1);
 
@@ -30,14 +34,8 @@ const IN_FLIGHT: Duration = Duration::from_millis(100);
 /// And while they may not: longer than any write to flash, which stops both cores.
 const ON_THE_GROUND: Duration = Duration::from_secs(4);
 
-/// When the flight task last confirmed that it controls the motors: the low bits of the time in microseconds, which is
-/// plenty for differences of milliseconds.
-static CONFIRMED: AtomicU32 = AtomicU32::new(0);
-/// May the motors turn? While they may not, there is nothing to cut.
-static ARMED: AtomicBool = AtomicBool::new(false);
-static TRIPPED: AtomicBool = AtomicBool::new(false);
-/// Set by a panic: the motors stay off until the vehicle is switched off.
-static FOR_GOOD: AtomicBool = AtomicBool::new(false);
+/// Shared by the flight task and the timer's interrupt.
+static SWITCH: DeadMan = DeadMan::new(PATIENCE);
 /// For the interrupt only.
 static WATCH: AtomicPtr<Watch> = AtomicPtr::new(null_mut());
 
@@ -46,10 +44,6 @@ struct Watch {
     watchdog: Wdt<TIMG1<'static>>,
     /// Which patience the watchdog has.
     in_flight: bool,
-}
-
-fn now() -> u32 {
-    Instant::now().duration_since_epoch().as_micros() as u32
 }
 
 /// Starts to watch. Called on the core that does not fly.
@@ -71,27 +65,22 @@ pub fn start(group: TIMG1<'static>) {
 
 /// The flight task controls the motors: to be said with every output. `armed` says whether they may turn.
 pub fn confirm(armed: bool) {
-    CONFIRMED.store(now(), Ordering::Relaxed);
-    ARMED.store(armed, Ordering::Release);
+    SWITCH.confirm(Clock.now(), armed);
 }
 
 /// Has the cut-off acted, and nobody reset it since?
 pub fn has_tripped() -> bool {
-    TRIPPED.load(Ordering::Acquire) || FOR_GOOD.load(Ordering::Acquire)
+    SWITCH.has_tripped()
 }
 
 /// Lets the motors turn again. Returns whether they may.
 pub fn reset() -> bool {
-    let allowed = !FOR_GOOD.load(Ordering::Acquire);
-    if allowed {
-        TRIPPED.store(false, Ordering::Release);
-    }
-    allowed
+    SWITCH.reset()
 }
 
 /// Stops the motors until the vehicle is switched off.
 pub fn trip_for_good() {
-    FOR_GOOD.store(true, Ordering::Release);
+    SWITCH.trip_for_good();
     motors::cut();
 }
 
@@ -107,18 +96,14 @@ fn look() {
     if let Some(watch) = unsafe { WATCH.load(Ordering::Acquire).as_mut() } {
         watch.timer.clear_interrupt();
         watch.watchdog.feed();
-        let armed = ARMED.load(Ordering::Acquire);
+        let armed = SWITCH.is_armed();
         if watch.in_flight != armed {
             watch.in_flight = armed;
             watch.watchdog.set_timeout(MwdtStage::Stage0, if armed { IN_FLIGHT } else { ON_THE_GROUND });
         }
     }
-    let age = now().wrapping_sub(CONFIRMED.load(Ordering::Relaxed));
-    if ARMED.load(Ordering::Acquire) && age > PATIENCE.as_micros() as u32 {
-        TRIPPED.store(true, Ordering::Release);
-    }
     // Again and again: whatever gave the pins back, tripped means off.
-    if has_tripped() {
+    if SWITCH.must_cut(|| Clock.now()) {
         motors::cut();
     }
 }

@@ -16,6 +16,7 @@ mod buzzer;
 mod clock;
 mod console;
 mod cutoff;
+mod flash;
 mod flight;
 mod i2c;
 mod imu_config;
@@ -52,7 +53,7 @@ const SECOND_HEAP: usize = 32 * 1024;
 
 #[esp_hal::main]
 fn main() -> ! {
-    motors::cut();
+    motors::hold_low();
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
     // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
     esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
@@ -85,19 +86,22 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         esp_println::println!("{unusable} kept parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
-    let (vehicle, mut outside) = vehicle::assemble(ports, &config);
+    // Moved from here to where it stays, without a copy in between: there is not stack enough for two vehicles.
+    let assembled = vehicle::assemble(ports, heads, &config, Clock.now());
+    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
+    let flight_loop = FLIGHT_LOOP.init(assembled.flight_loop);
+    let mut outside = assembled.outside;
     outside.self_test.publish(Clock.now(), &tested.message());
     static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
     let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
     let pins: Pins<'static> = split_resources!(chip);
-    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
     let flight = flight::Parts {
-        flight_loop: FLIGHT_LOOP.init_with(|| FlightLoop::new(vehicle, heads, Clock.now())),
+        flight_loop,
         imu: outside.imu,
         flow: outside.flow,
         duties: outside.motors,
         motors: pins.motors,
-        spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi },
+        spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi, interrupts: chip.IO_MUX },
     };
     let sensors = sensors::Parts {
         unit: chip.I2C0,

@@ -9,8 +9,9 @@ use core::panic::PanicInfo;
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cutoff::trip_for_good();
-    esp_println::println!("\n{info}\nMotors are off. Switch off and on again.");
+    // Before the message, which takes its time: a restart would lose it.
     cutoff::stand_down();
+    esp_println::println!("\n{info}\nMotors are off. Switch off and on again.");
     loop {
         core::hint::spin_loop();
     }

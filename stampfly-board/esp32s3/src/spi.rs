@@ -11,8 +11,9 @@ use embassy_sync::mutex::Mutex;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 use esp_hal::Async;
-use esp_hal::gpio::{AnyPin, Input, InputConfig, Level, Output, OutputConfig};
-use esp_hal::peripherals::{DMA_CH0, SPI2};
+use esp_hal::gpio::{AnyPin, Input, InputConfig, Io, Level, Output, OutputConfig};
+use esp_hal::interrupt::Priority;
+use esp_hal::peripherals::{DMA_CH0, IO_MUX, SPI2};
 use esp_hal::spi::master::{Config, Spi, SpiDma};
 use esp_hal::spi::{Error, Mode};
 use esp_hal::time::Rate;
@@ -28,6 +29,8 @@ pub struct Parts {
     pub unit: SPI2<'static>,
     pub dma: DMA_CH0<'static>,
     pub pins: SpiPins<'static>,
+    /// Whose interrupts all pins share.
+    pub interrupts: IO_MUX<'static>,
 }
 
 type Shared = Mutex<NoopRawMutex, SpiDma<'static, Async>>;
@@ -64,6 +67,8 @@ impl Bus {
                 dma_tx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
             )
             .into_async();
+        // Until now they went to the core that started the chip, and to whatever its radio leaves over.
+        Io::new(parts.interrupts).set_interrupt_priority(Priority::Priority1);
         let ready = Input::new(pins.imu_ready, InputConfig::default());
         Self { shared: Mutex::new(unit), imu, flow, ready }
     }

@@ -3,6 +3,7 @@
 //! A write stops both cores for up to 200 ms. It takes the mode machine's word that the vehicle is disarmed, and from
 //! before that word is asked for until the write is done the motors stay still, whatever happens in between.
 
+use crate::flash::Flash;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_time::{Duration, Timer};
@@ -76,16 +77,13 @@ impl core::fmt::Display for StorageError {
 
 /// Flash, or none: a vehicle without one flies with its defaults.
 pub struct Storage {
-    store: Option<ParameterStore<BlockingAsync<FlashStorage<'static>>>>,
+    store: Option<ParameterStore<BlockingAsync<Flash>>>,
 }
 
 impl Storage {
     /// Looks for the partition.
     pub fn open(flash: FLASH<'static>) -> Self {
-        let flash = FlashStorage::new(flash);
-        #[cfg(feature = "esp32s3")]
-        let flash = flash.multicore_auto_park();
-        Self { store: find(flash) }
+        Self { store: find(FlashStorage::new(flash)) }
     }
 
     /// Overlays the defaults with what was kept. Returns how many values were kept but cannot be used.
@@ -159,10 +157,10 @@ fn proven(mode: &mut impl FnMut() -> Option<SystemMode>) -> Result<Disarmed, Sto
     mode().and_then(|mode| Disarmed::proven_by(&mode)).ok_or(StorageError::Armed)
 }
 
-fn find(mut flash: FlashStorage<'static>) -> Option<ParameterStore<BlockingAsync<FlashStorage<'static>>>> {
+fn find(mut flash: FlashStorage<'static>) -> Option<ParameterStore<BlockingAsync<Flash>>> {
     let mut table = [0; PARTITION_TABLE_MAX_LEN];
     let table = read_partition_table(&mut flash, &mut table).ok()?;
     let nvs = table.find_partition(PartitionType::Data(DataPartitionSubType::Nvs)).ok()??;
     let range = nvs.offset()..nvs.offset() + nvs.len();
-    ParameterStore::new(BlockingAsync::new(flash), range).ok()
+    ParameterStore::new(BlockingAsync::new(Flash::new(flash)), range).ok()
 }

@@ -7,7 +7,7 @@
 use crate::consistency::{FlightConsistency, Observation};
 use crate::golden::{Event, Inputs};
 use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, Observer, VehicleConfig, black_box, plan, wiring};
+use stampfly_board::{Observer, VehicleConfig, black_box, plan, wiring};
 use stampfly_bus::Activation;
 use stampfly_log::ulog::{Sample, Sink, Topic, Writer};
 use stampfly_log::{ActivationTopic, FlightHash, Input};
@@ -29,8 +29,7 @@ pub static TOPICS: LazyLock<Vec<Topic>> = LazyLock::new(|| {
 static ACTIVATIONS: LazyLock<Vec<ActivationTopic>> = LazyLock::new(|| {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, .. } = bus.split(None);
-    let (vehicle, _) = assemble(ports, &VehicleConfig::default());
-    let inputs = FlightLoop::new(vehicle, heads, Micros::ZERO).count_inputs();
+    let inputs = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO).flight_loop.count_inputs();
     let rows = plan::ACTIVATIONS.iter().zip(inputs).enumerate();
     rows.map(|(index, (info, inputs))| ActivationTopic { name: info.name, index: index as u8, inputs }).collect()
 });

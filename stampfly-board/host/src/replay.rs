@@ -5,8 +5,8 @@
 //! with the log, bit for bit. The first difference is named.
 
 use crate::recorder::TOPICS;
-use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, parameters, plan, wiring};
+use stampfly_board::vehicle::{Assembled, assemble};
+use stampfly_board::{VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::{Activation, InputRecord};
 use stampfly_log::ActivationTopic;
 use stampfly_log::trace::TOPIC_PREFIX;
@@ -201,8 +201,7 @@ pub fn replay(bytes: &[u8]) -> Result<Replay, ReplayError> {
     let Script { entries, mut recorded, config, start } = read(bytes)?;
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, mut outside) = assemble(ports, &config);
-    let mut flight_loop = FlightLoop::new(vehicle, heads, start);
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &config, start);
     let inputs = flight_loop.count_inputs();
     let mut result = Replay { activations: 0, samples: 0, difference: None };
     for entry in entries {

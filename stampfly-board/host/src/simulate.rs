@@ -15,8 +15,8 @@ use crate::sensing::{self, Healths, Models, Sensing, Shared, Topics};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stampfly_board::messages::ButtonContact;
-use stampfly_board::vehicle::{Outside, assemble};
-use stampfly_board::{FlightLoop, Pending, VehicleConfig, wiring};
+use stampfly_board::vehicle::{Assembled, Outside, assemble};
+use stampfly_board::{Pending, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
 use stampfly_sim::chips;
@@ -229,9 +229,8 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
     let Sensors { imu, tof, flow, mag, baro, cameras, power, mut motors, mut indicator, button } = sensors;
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, outside) = assemble(ports, &config.vehicle);
+    let Assembled { mut flight_loop, outside } = assemble(ports, heads, &config.vehicle, start);
     let (mut duties, mut signals) = (outside.motors, outside.indicator);
-    let mut flight_loop = FlightLoop::new(vehicle, heads, start);
     recorder.begin(start, &config.vehicle);
 
     let (progress, health) = (Progress::default(), Healths::default());

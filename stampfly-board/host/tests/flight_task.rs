@@ -2,8 +2,8 @@
 
 use core::cell::{Cell, RefCell};
 use stampfly_board::tasks::{Health, fly, pump};
-use stampfly_board::vehicle::{Outside, assemble};
-use stampfly_board::{FlightLoop, Observer, wiring};
+use stampfly_board::vehicle::{Assembled, Outside, assemble};
+use stampfly_board::{Observer, wiring};
 use stampfly_bus::Activation;
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_host::ground_station::{self, Progress};
@@ -42,10 +42,9 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
     let Sensors { mut imu, mut tof, mut flow, mut mag, mut baro, mut power, motors, .. } = sensors;
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, outside) = assemble(ports, &config.vehicle);
+    let Assembled { mut flight_loop, outside } = assemble(ports, heads, &config.vehicle, config.simulation.start);
     let Outside { imu: mut to_imu, tof: mut to_tof, flow: mut to_flow, mag: mut to_mag, .. } = outside;
     let (mut to_baro, mut to_power, mut button) = (outside.baro, outside.power, outside.button);
-    let mut flight_loop = FlightLoop::new(vehicle, heads, config.simulation.start);
 
     let (progress, healths) = (Progress::default(), [const { Health::new() }; 6]);
     let (ran, written) = (RefCell::new(vec![0; stampfly_board::plan::COUNT]), Cell::new(0));

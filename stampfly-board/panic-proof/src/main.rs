@@ -15,8 +15,8 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use stampfly_board::black_box::BlackBox;
-use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, golden, wiring};
+use stampfly_board::vehicle::{Assembled, assemble};
+use stampfly_board::{VehicleConfig, golden, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::Decimator;
 use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
@@ -49,8 +49,7 @@ fn vehicle() {
     let config: VehicleConfig = black_box(VehicleConfig::default());
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, mut outside) = assemble(ports, &config);
-    let mut flight_loop = FlightLoop::new(vehicle, heads, black_box(Micros::ZERO));
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &config, black_box(Micros::ZERO));
     let mut memory = BlackBox::<1024>::new(Micros::from_millis(40));
     while black_box(true) {
         let at: Micros = black_box(Micros::ZERO);

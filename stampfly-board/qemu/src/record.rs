@@ -1,7 +1,7 @@
 //! The flight record, as the vehicle keeps it: a ULog with every sample of every topic and every activation.
 
 use stampfly_board::vehicle::assemble;
-use stampfly_board::{FlightLoop, VehicleConfig, parameters, plan, wiring};
+use stampfly_board::{VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
 use stampfly_log::ulog::{Definitions, Ram, Sample, Topic, Writer};
 use stampfly_log::{ActivationTopic, Input};
@@ -22,8 +22,7 @@ static TOPICS: [Topic; wiring::COUNT] = {
 pub fn activations() -> [ActivationTopic; plan::COUNT] {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, .. } = bus.split(None);
-    let (vehicle, _) = assemble(ports, &VehicleConfig::default());
-    let inputs = FlightLoop::new(vehicle, heads, Micros::ZERO).count_inputs();
+    let inputs = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO).flight_loop.count_inputs();
     core::array::from_fn(|index| ActivationTopic {
         name: plan::ACTIVATIONS[index].name,
         index: index as u8,

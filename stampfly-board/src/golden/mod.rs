@@ -17,7 +17,7 @@ mod format;
 
 pub use format::{MOTORS, Writer, tables};
 
-use crate::vehicle::assemble;
+use crate::vehicle::{Assembled, assemble};
 use crate::{FlightLoop, Observer, VehicleConfig, plan, wiring};
 use core::fmt;
 use format::Entry;
@@ -124,8 +124,9 @@ pub fn play(record: &[u8], witness: &mut impl Witness) -> Result<Report, GoldenE
     let (header, entries) = format::open(record)?;
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, mut outside) = assemble(ports, &VehicleConfig::default());
-    let mut flight = FlightLoop::new(vehicle, heads, header.start);
+    // Not taken apart by value: a second copy of a vehicle is more than some stacks can spare.
+    let mut assembled = assemble(ports, heads, &VehicleConfig::default(), header.start);
+    let Assembled { flight_loop, outside } = &mut assembled;
     let mut hash = FlightHash::new();
     let mut drain = |hash: &mut FlightHash, witness: &mut _| drain(&mut taps, hash, witness);
     let (mut clock, mut deviation) = (header.start, Deviation::default());
@@ -140,7 +141,7 @@ pub fn play(record: &[u8], witness: &mut impl Witness) -> Result<Report, GoldenE
                 clock = now;
                 for band in [Band::Flight, Band::Background] {
                     witness.band_begins(band, now);
-                    flight.run_band(band, now, witness);
+                    flight_loop.run_band(band, now, witness);
                     witness.band_ended(band);
                 }
                 drain(&mut hash, witness);

@@ -68,7 +68,7 @@ pub struct Board {
 impl Board {
     /// Stops the motors, then starts the processor, the clock and the cut-off. The first thing a program does.
     pub fn start() -> Self {
-        motors::cut();
+        motors::hold_low();
         let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
         // Memory the boot loader has done with.
         esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
@@ -78,7 +78,7 @@ impl Board {
         let pins: Pins<'static> = split_resources!(chip);
         Self {
             motors: pins.motors,
-            spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi },
+            spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi, interrupts: chip.IO_MUX },
             i2c: chip.I2C0,
             i2c_pins: pins.i2c,
             range: pins.range,

@@ -4,7 +4,8 @@
 //! command there is, press the button and silence the inertial sensor.
 
 use stampfly_board::messages::{ButtonContact, TelemetryFrame};
-use stampfly_board::{FlightLoop, VehicleConfig, vehicle::assemble, wiring};
+use stampfly_board::vehicle::{Assembled, assemble};
+use stampfly_board::{VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_drivers::{
     Barometer, Button, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
@@ -147,9 +148,8 @@ pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Sc
     let mut bus = wiring::Bus::new();
     let imu_silent = &Cell::new(false);
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let (vehicle, outside) = assemble(ports, &VehicleConfig::default());
+    let Assembled { mut flight_loop, outside } = assemble(ports, heads, &VehicleConfig::default(), config.start);
     let mut duties = outside.motors;
-    let mut flight_loop = FlightLoop::new(vehicle, heads, config.start);
 
     let mut tasks = Tasks::new(clock.clone());
     tasks.spawn(pump!(imu, outside.imu, imu_silent.get()));
