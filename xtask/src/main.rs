@@ -10,6 +10,7 @@
 
 mod ci;
 mod elf;
+mod machine;
 mod ratchet;
 mod repository;
 mod steps;
@@ -95,6 +96,7 @@ fn asks(arguments: &[String], flag: &str) -> bool {
 
 /// In the order `ci` runs them: what fails fast and often comes first.
 const STEPS: &[Step] = &[
+    check("machine", "is everything there that the steps need?", steps::machine::run),
     check("fmt", "is everything formatted?", steps::fmt::run),
     check("clippy", "no warning in any target?", steps::clippy::run),
     check("test", "does `cargo test` pass, recorded data included?", steps::test::run).accepting(&[ANYTHING]),

@@ -39,8 +39,7 @@ impl Budget {
         let (committed, tolerance) = (self.number(name)?, self.tolerance()?);
         let slack = number(&self.text, "slack").unwrap_or_default();
         let change = measured - committed;
-        let per_cent = if change == 0.0 { 0.0 } else { change / committed * 100.0 };
-        println!("{name}: {measured:.0} {unit}; the budget is {committed:.0} ({per_cent:+.1} %)");
+        println!("{name}: {measured:.0} {unit}; the budget is {committed:.0} ({change:+.0})");
         if change.abs() <= (committed * tolerance).max(slack) {
             return Ok(());
         }

@@ -5,8 +5,9 @@
 //! the workspace, so its format and its warnings are looked at here, too.
 
 use crate::Failure;
+use crate::machine::{EMULATED_ARM, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, exists, install, run as run_program};
+use crate::repository::{Repository, add_targets, capture, run as run_program};
 use std::process::Command;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -43,9 +44,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
 /// Builds the firmware, runs it and returns what it says.
 pub fn emulate(repository: &Repository) -> Result<String, Failure> {
     add_targets(repository, &[TARGET])?;
-    if !exists("qemu-system-arm") {
-        install(repository, &["qemu-system-arm"])?;
-    }
+    provide(repository, &[&EMULATED_ARM])?;
     let target = repository.target("cortex-m4f");
     // Apart from running it, which has little time.
     let build = ["build", "--quiet", "--release", "--locked", "--target-dir"];

@@ -13,28 +13,28 @@
 
 use super::no_std::debian_cargo;
 use crate::Failure;
-use crate::repository::{Repository, capture, exists, install, python_tool, run as run_program};
+use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
+use crate::repository::{Repository, capture, python_tool, run as run_program};
 use object::{Object, ObjectSection};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const PACKAGE: &str = "stampfly-board/esp32s3";
-const DEBIAN: [&str; 5] = ["rustc-web", "cargo-web", "rust-web-src", "rust-web-clippy", "lld-22"];
 /// A 32-bit architecture with inline assembly and 32-bit atomics, which is all the type check needs.
 const STAND_IN: &str = "loongarch32-unknown-none-softfloat";
 /// The name cargo and esp-hal know the S3 by.
 const S3: &str = "xtensa-esp32s3-none-elf.json";
 const C6: &str = "riscv32imac-unknown-none-elf";
+/// Espressif's tool, the version whose words are read here.
+const ESPTOOL: &str = "esptool==5.6.0";
 /// No S3 has this pin; `src/pins.rs` asks for it when told to.
 const WRONG_PIN: &str = "GPIO22";
 
 pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     let format = repository.root.join(PACKAGE).join("Cargo.toml");
     run_program(repository.cargo().args(["fmt", "--check", "--manifest-path"]).arg(format))?;
-    if !Path::new("/usr/bin/cargo-clippy").exists() || !exists("ld.lld-22") {
-        install(repository, &DEBIAN)?;
-    }
+    provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let target = stand_in(repository)?;
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
@@ -100,6 +100,7 @@ fn is_about_the_pin(said: &str) -> Result<(), Failure> {
 
 /// Builds for the ESP32-C6 and returns the program.
 pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
+    provide(repository, &[&COMPILER, &LINKER])?;
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
@@ -144,10 +145,10 @@ pub fn memory(repository: &Repository, program: &Path) -> Result<u64, Failure> {
 /// Makes a flash image with Espressif's own tool and says how large it is.
 fn image(repository: &Repository, program: &Path) -> Result<(), Failure> {
     let image = program.with_extension("bin");
-    let mut esptool = python_tool(repository, "esptool", "esptool")?;
+    let mut esptool = python_tool(repository, ESPTOOL, "esptool")?;
     esptool.args(["--chip", "esp32c6", "elf2image", "--flash-mode", "dio", "--flash-size", "4MB", "-o"]);
     capture(esptool.arg(&image).arg(program))?;
-    let mut esptool = python_tool(repository, "esptool", "esptool")?;
+    let mut esptool = python_tool(repository, ESPTOOL, "esptool")?;
     let (said, _) = capture(esptool.args(["--chip", "esp32c6", "image-info"]).arg(&image))?;
     let bytes = fs::metadata(&image).map_err(|e| format!("{}: {e}", image.display()))?.len();
     let valid = said.lines().any(|line| line.starts_with("Validation hash") && line.contains("(valid)"));

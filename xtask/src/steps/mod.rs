@@ -14,6 +14,7 @@ pub mod figures;
 pub mod fmt;
 pub mod golden;
 pub mod loom;
+pub mod machine;
 pub mod memory;
 pub mod no_std;
 pub mod package;

@@ -5,12 +5,12 @@
 //! one, and asks for a margin of two because of it. The package `stampfly-board/qemu` is outside the workspace, so its
 //! format and its warnings are looked at here, too.
 
+use crate::machine::{COMPILER, EMULATED_ARM, EMULATED_OTHERS, LINKER, XTENSA as XTENSA_BACK_END, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, exists, install, run as run_program};
+use crate::repository::{Repository, add_targets, capture, run as run_program};
 use crate::steps::no_std::debian_cargo;
 use crate::{FIX, Failure, asks};
 use std::fmt::Write;
-use std::path::Path;
 use std::process::Command;
 
 const PACKAGE: &str = "stampfly-board/qemu";
@@ -36,26 +36,18 @@ struct Machine {
     name: &'static str,
     /// As in the package's `.cargo/config.toml`.
     target: &'static str,
-    emulator: &'static str,
 }
 
-const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf", emulator: "qemu-system-xtensa" };
+const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf" };
 const MACHINES: [Machine; 3] = [
-    Machine { name: "Cortex-M4F", target: "thumbv7em-none-eabihf", emulator: "qemu-system-arm" },
-    Machine { name: "RV32IMAFC", target: "riscv32imafc-unknown-none-elf", emulator: "qemu-system-riscv32" },
+    Machine { name: "Cortex-M4F", target: "thumbv7em-none-eabihf" },
+    Machine { name: "RV32IMAFC", target: "riscv32imafc-unknown-none-elf" },
     XTENSA,
 ];
 
-/// Debian's packages: the emulators, a compiler with the sources of its library, and what Xtensa needs besides.
-const EMULATORS: [&str; 2] = ["qemu-system-arm", "qemu-system-misc"];
-const COMPILER: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "lld-22"];
-const BACK_END: [&str; 2] = ["llvm-22", "binutils-xtensa-lx106"];
-
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
     let fix = asks(arguments, FIX);
-    if MACHINES.iter().any(|machine| !exists(machine.emulator)) {
-        install(repository, &EMULATORS)?;
-    }
+    provide(repository, &[&EMULATED_ARM, &EMULATED_OTHERS])?;
     run_program(inside(repository, repository.cargo()).args(["fmt", "--check"]))?;
     let mut clippy = inside(repository, repository.cargo());
     clippy.args(["clippy", "--quiet", "--release", "--locked", "--target-dir"]).arg(repository.target("qemu"));
@@ -110,7 +102,7 @@ fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec
         ["--quiet", "--release", "--locked", "--target-dir", &target_folder].map(str::to_owned).into();
     let mut add = |more: &[&str]| options.extend(more.iter().map(|option| (*option).to_owned()));
     if machine.target == XTENSA.target {
-        debian(&[&COMPILER[..], &BACK_END].concat(), "/usr/bin/llc-22", repository)?;
+        provide(repository, &[&COMPILER, &LINKER, &XTENSA_BACK_END])?;
         let mut cargo = inside(repository, debian_cargo(repository));
         cargo.env("RUSTC", repository.root.join(PACKAGE).join("xtensa/rustc"));
         // The linker makes one module of everything, and debug information is more than the back end can take.
@@ -124,16 +116,10 @@ fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec
         return Ok((inside(repository, repository.cargo()), options));
     }
     eprintln!("no rustup target {}: using Debian's compiler instead", machine.target);
-    debian(&COMPILER, "/usr/bin/ld.lld-22", repository)?;
+    provide(repository, &[&COMPILER, &LINKER])?;
     add(&["-Zbuild-std=core", "--config", &format!("target.{}.linker=\"ld.lld-22\"", machine.target)]);
     add(&["--config", &format!("target.{}.rustflags=[\"-Clinker-flavor=ld.lld\"]", machine.target)]);
     Ok((inside(repository, debian_cargo(repository)), options))
-}
-
-/// Installs Debian's packages unless this last one of them is there.
-fn debian(packages: &[&str], last: &str, repository: &Repository) -> Result<(), Failure> {
-    let there = ["/usr/bin/cargo", last].iter().all(|program| Path::new(program).exists());
-    if there { Ok(()) } else { install(repository, packages) }
 }
 
 /// Runs in the package's folder: its own `.cargo/config.toml` says how it is run, and flags meant for the host would

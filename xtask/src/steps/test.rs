@@ -6,11 +6,9 @@
 
 use crate::Failure;
 use crate::repository::{Repository, run as run_program};
-use std::path::PathBuf;
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let data = std::env::var_os("STAMPFLY_DATA").map_or_else(|| repository.root.join("../shared/data"), PathBuf::from);
-    let data = data.canonicalize().ok().filter(|folder| folder.is_dir());
+    let data = repository.data();
     let in_ci = std::env::var("CI").is_ok_and(|value| value == "true");
     match &data {
         Some(folder) => eprintln!("recorded data: {}", folder.display()),
