@@ -39,7 +39,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let program = c6(repository)?;
-    memory(repository, &program)?;
+    memory(&program)?;
     image(repository, &program)
 }
 
@@ -113,30 +113,23 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
 
 /// The S3's data memory, which code in RAM shares (esp-hal's `ld/esp32s3/memory.x`: from 0x3FC88000 to 0x3FCDB700).
 const S3_MEMORY: u64 = 0x3FCD_B700 - 0x3FC8_8000;
-/// The size of the flight core's stack, which only the S3 has apart, as the firmware's `main` configures it.
-pub fn flight_stack(repository: &Repository) -> Result<u64, Failure> {
-    let path = repository.root.join(PACKAGE).join("src/main.rs");
-    let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let size = text.split_once("StaticCell<Stack<").and_then(|(_, rest)| rest.split_once('>')?.0.parse().ok());
-    size.ok_or_else(|| format!("{} configures no stack for the second core", path.display()))
-}
-
-/// The part of the heap that lies elsewhere on the S3, beside its data cache (`src/main.rs`).
-const S3_ELSEWHERE: u64 = 32 * 1024;
+/// What the firmware sets aside: on the S3 the flight core's stack comes on top, and a part of the heap lies elsewhere.
+#[path = "../../../stampfly-board/esp32s3/src/sizes.rs"]
+pub mod sizes;
 /// The C6's memory, as its program's sections see it.
 const C6_MEMORY: std::ops::Range<u64> = 0x4080_0000..0x4088_0000;
 
 /// If what the C6 keeps in memory were in the S3's: how much would be left, for the first core's stack? What that has to
 /// suffice for is asked by the step `memory`.
-pub fn memory(repository: &Repository, program: &Path) -> Result<u64, Failure> {
+pub fn memory(program: &Path) -> Result<u64, Failure> {
     let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", program.display());
     let bytes = fs::read(program).map_err(|e| fail(&e))?;
     let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
     // What is left over is the stack's, and the boot loader's memory is another region on the S3, too.
     let kept = file.sections().filter(|section| !matches!(section.name(), Ok(".stack" | ".dram2_uninit")));
     let kept: u64 = kept.filter(|section| C6_MEMORY.contains(&section.address())).map(|section| section.size()).sum();
-    let used = kept + flight_stack(repository)?;
-    let left = (S3_MEMORY + S3_ELSEWHERE).checked_sub(used);
+    let used = kept + sizes::FLIGHT_STACK as u64;
+    let left = (S3_MEMORY + sizes::SECOND_HEAP as u64).checked_sub(used);
     let left = left.ok_or_else(|| format!("{used} bytes are more than the S3 has"))?;
     println!("esp32c6: {kept} bytes of memory in use; on the S3 that would leave {left} bytes of stack");
     Ok(left)

@@ -48,7 +48,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
     let budget = Budget::read(repository, BUDGET)?;
     let mut ledger = Ledger { budget, fix: asks(arguments, FIX), failures: Vec::new() };
     sizes(&program, &mut ledger)?;
-    stacks(repository, &path, &program, &mut ledger)?;
+    stacks(&path, &program, &mut ledger)?;
     ledger.close()
 }
 
@@ -117,10 +117,9 @@ fn rows_held<'a>(owners: &BTreeMap<&'a str, Sizes>) -> BTreeMap<&'a str, Sizes> 
     rows
 }
 
-fn stacks(repository: &Repository, path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failure> {
-    let flight = esp32::flight_stack(repository)?;
+fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failure> {
     // What this program leaves of the S3's memory, not of the larger one it was built for.
-    let ground = esp32::memory(repository, path)?;
+    let ground = esp32::memory(path)?;
     let mut stack = Stack::new(program, POINTERS, ROM)?;
     let mut elsewhere = BTreeSet::new();
     for (task, parts, core) in TASKS {
@@ -140,7 +139,7 @@ fn stacks(repository: &Repository, path: &Path, program: &Program, held: &mut Le
             println!("    {frame:>6}  {:.100}", name);
         }
         let available = match core {
-            Core::Flight => flight,
+            Core::Flight => esp32::sizes::FLIGHT_STACK as u64,
             Core::Ground => ground,
             Core::OnTopOfAssembly => continue,
         };
