@@ -8,7 +8,7 @@
 //! | [`flow`] | PMW3901 | SPI, mode 3, 2 MHz | 100 |
 //! | [`magnetometer`] | BMM150 | I2C, 0x10 | 25 |
 //! | [`barometer`] | BMP280 | I2C, 0x76 | 25 |
-//! | [`power`] | INA3221, channel 2, 10 mΩ | I2C, 0x40 | 10 |
+//! | [`power`] | INA3221, channel 2, 10 mΩ | I2C, 0x40 | 13.3 |
 //! | [`range_down`], [`range_ahead`] | VL53L3CX | I2C, 0x29, moved to 0x30 and 0x31 | 30 |
 //!
 //! The two on SPI share it in [slots](stampfly_drivers::slot): the inertial sensor leads at [`RHYTHM`], the flow sensor

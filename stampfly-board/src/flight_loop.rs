@@ -10,11 +10,11 @@ use stampfly_types::Micros;
 
 /// Somebody who wants to know about activations: the log, a profiler.
 pub trait Observer {
+    /// A runnable is about to read its inputs.
+    fn starts(&mut self, _index: usize) {}
+
     /// A runnable has read its inputs. The order of these calls is the order a replay repeats.
     fn has_read(&mut self, index: usize, activation: &Activation);
-
-    /// A runnable is about to compute.
-    fn starts(&mut self, _index: usize) {}
 
     /// A runnable has published.
     fn finished(&mut self, _index: usize, _activation: &Activation) {}
@@ -66,6 +66,7 @@ impl<'b> FlightLoop<'b> {
 
     #[inline]
     fn start(&mut self, index: usize, activation: &mut Activation, clock: Micros, observer: &mut impl Observer) {
+        observer.starts(index);
         self.scheduler.started(index, activation.now(), clock, &self.heads);
         self.vehicle.read(index, activation);
         observer.has_read(index, activation);
@@ -73,7 +74,6 @@ impl<'b> FlightLoop<'b> {
 
     #[inline]
     fn complete(&mut self, index: usize, activation: &mut Activation, observer: &mut impl Observer) {
-        observer.starts(index);
         self.vehicle.run(index, activation);
         self.scheduler.finished(index);
         observer.finished(index, activation);

@@ -4,7 +4,7 @@
 //! histogram a runnable, with classes that are shares of its budget in the activation table, because the question is not
 //! how long something takes but whether it takes too long. Costs two looks at the clock and two stores an activation.
 //!
-//! Counts wall-clock time from inputs read to outputs published: interrupts in between are included, reading is not.
+//! Counts wall-clock time from the first input to the last output, as budgets do: interrupts in between are included.
 
 use crate::{Observer, plan};
 use core::fmt;

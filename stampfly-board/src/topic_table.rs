@@ -1,6 +1,7 @@
 //! Who publishes what for whom: the vehicle's topics, one line each.
 //!
-//! The first twelve are document 000's, at its rates. The log reads every topic through its tap and is not named.
+//! The first twelve are document 000's, at its rates; barometer and battery monitor at what their chips give. The log
+//! reads every topic through its tap and is not named.
 //! `docs/topics.md` and `stampfly topics` are printed from this table.
 
 use crate::messages::{ButtonContact, TelemetryFrame};
@@ -23,11 +24,11 @@ topics! {
     /// Magnetic field.
     sensor_mag: MagData = ring(8) @ 25 Hz from mag => [estimation, calibration];
     /// Air pressure.
-    sensor_baro: BaroData = ring(8) @ 50 Hz from baro => [estimation, calibration];
+    sensor_baro: BaroData = ring(8) @ 25 Hz from baro => [estimation, calibration];
     /// Where cameras see the vehicle.
     external_pose: ExternalPose = ring(8) @ 100 Hz from cameras => [estimation];
     /// Battery.
-    sensor_power: PowerData = ring(8) @ 10 Hz from power => [failsafe, actuation, telemetry];
+    sensor_power: PowerData = ring(8) @ 14 Hz from power => [failsafe, actuation, telemetry];
 
     /// What the self test at power-on found.
     self_test: SelfTest = latest @ on event from self_test => [failsafe];

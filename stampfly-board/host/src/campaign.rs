@@ -65,6 +65,12 @@ pub fn run(configs: &[FlightConfig], done: &(dyn Fn(&Flight) + Sync)) -> Vec<Fli
     run_recorded(configs, &|_| Recorder::hash_only(), done)
 }
 
+/// On how many cores that many flights are flown at once: all there are.
+#[must_use]
+pub fn workers(flights: usize) -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from).min(flights.max(1))
+}
+
 /// The same with a recorder of one's own for each flight.
 pub fn run_recorded(
     configs: &[FlightConfig],
@@ -73,7 +79,7 @@ pub fn run_recorded(
 ) -> Vec<Flight> {
     let next = AtomicUsize::new(0);
     let flights = Mutex::new(BTreeMap::new());
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(configs.len().max(1));
+    let workers = workers(configs.len());
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {

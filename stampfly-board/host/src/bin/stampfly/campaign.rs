@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::arguments::CampaignOptions;
 use crate::terminal;
 use serde_json::{Map, json};
-use stampfly_host::campaign::{run_recorded, spreads};
+use stampfly_host::campaign::{run_recorded, spreads, workers};
 use stampfly_host::consistency::{ABOVE, INSIDE, Line, Summary};
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::FlightConfig;
@@ -66,7 +66,10 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
                 None => outln!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
             }
         }
-        outln!("\n{landed} of {} flights landed and disarmed; {:.0} × real time", flights.len(), simulated / wall);
+        let (all, cores) = (flights.len(), workers(flights.len()));
+        let plural = if cores == 1 { "" } else { "s" };
+        let factor = simulated / wall;
+        outln!("\n{landed} of {all} flights landed and disarmed; {factor:.0} × real time on {cores} core{plural}");
         if !failed.is_empty() {
             outln!("seeds that did not: {failed:?}");
         }
