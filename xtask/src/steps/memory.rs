@@ -33,8 +33,8 @@ const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "", targets: &["raw::waker::"], nests: None },
 ];
 const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyTopic>::"];
-/// Bytes of stack that a function may take whose code is not in the program: those in ROM, which copy memory, read the
-/// clock tree, print a character or ask the flash chip.
+/// Bytes of stack that a function is assumed to take whose code is not in the program: those in ROM, which compute with
+/// floating point, copy memory, wait, or ask the flash chip, and call little. Nothing in the program tells.
 const ROM: u64 = 512;
 /// Part of its stack that a task may take; the rest is for interrupts, and for what nobody thought of.
 const SHARE: f64 = 0.5;
