@@ -22,8 +22,8 @@ const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
 /// itself, executors run tasks, everybody else wakes them.
 const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "runnables::estimation::Estimation", targets: ESTIMATOR, nests: None },
-    Behind { callers: "FlightLoop>::complete", targets: ESTIMATOR, nests: None },
-    Behind { callers: "FlightLoop>", targets: &["AnyTopic>::"], nests: None },
+    // Wherever in it the compiler puts estimation.
+    Behind { callers: "FlightLoop>", targets: ESTIMATOR, nests: None },
     Behind { callers: "Scheduler", targets: &["AnyTopic>::"], nests: None },
     Behind { callers: "drain", targets: &["FnOnce<(stampfly_board::topic_table::wiring::Id"], nests: None },
     // The deepest: the console's text has a storage error (1) whose text has the flash driver's error (2), whose number (3)
