@@ -86,6 +86,11 @@ impl Repository {
     }
 }
 
+/// Is this continuous integration, where a check may not be left out?
+pub fn in_ci() -> bool {
+    std::env::var("CI").is_ok_and(|value| value == "true")
+}
+
 /// A text before, between and after two marks.
 fn split<'t>(text: &'t str, begin: &str, end: &str) -> Option<[&'t str; 3]> {
     let (head, rest) = text.split_once(begin)?;
