@@ -15,7 +15,7 @@ pub fn run(repository: &Repository, steps: &[Step]) -> Result<(), Failure> {
         }
         eprintln!("\n=== {}: {}", step.name, step.about);
         let begun = Instant::now();
-        let outcome = (step.run)(repository, &[]);
+        let outcome = step.check(repository, &[]);
         let seconds = begun.elapsed().as_secs_f64();
         table.push((step.name, if outcome.is_ok() { "ok" } else { "FAILED" }, seconds));
         failed = outcome.err().map(|failure| format!("step `{}` failed: {failure}", step.name));

@@ -34,6 +34,12 @@ impl Repository {
         self.root.join(folder).join(name)
     }
 
+    /// The folder of the recorded flights: where `STAMPFLY_DATA` says, or beside the repository.
+    pub fn data(&self) -> Option<PathBuf> {
+        let folder = std::env::var_os("STAMPFLY_DATA").map_or_else(|| "../shared/data".into(), PathBuf::from);
+        self.root.join(folder).canonicalize().ok().filter(|folder| folder.is_dir())
+    }
+
     /// Every library crate: the folders `stampfly-*` with a `src/lib.rs`. A new crate is checked without being listed.
     pub fn libraries(&self) -> Result<Vec<Library>, Failure> {
         let entries = std::fs::read_dir(&self.root).map_err(|e| format!("{}: {e}", self.root.display()))?;
@@ -49,14 +55,21 @@ impl Repository {
         if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
     }
 
+    /// The text between two marks of a document.
+    pub fn between(&self, document: &str, begin: &str, end: &str) -> Result<String, Failure> {
+        let text = std::fs::read_to_string(self.root.join(document)).map_err(|e| format!("{document}: {e}"))?;
+        let [_, inside, _] =
+            split(&text, begin, end).ok_or_else(|| format!("{document} has no place for it: {begin}"))?;
+        Ok(inside.to_owned())
+    }
+
     /// Puts generated text between two marks of a document.
     pub fn fill(&self, document: &str, begin: &str, end: &str, text: &str) -> Result<(), Failure> {
         let io = |e: std::io::Error| format!("{document}: {e}");
         let path = self.root.join(document);
         let before = std::fs::read_to_string(&path).map_err(io)?;
-        let missing = || format!("{document} has no place for it: {begin}");
-        let (head, rest) = before.split_once(begin).ok_or_else(missing)?;
-        let (_, tail) = rest.split_once(end).ok_or_else(missing)?;
+        let [head, _, tail] =
+            split(&before, begin, end).ok_or_else(|| format!("{document} has no place for it: {begin}"))?;
         std::fs::write(&path, format!("{head}{begin}{text}{end}{tail}")).map_err(io)
     }
 
@@ -71,6 +84,18 @@ impl Repository {
     pub fn cargo(&self) -> Command {
         self.command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()))
     }
+}
+
+/// Is this continuous integration, where a check may not be left out?
+pub fn in_ci() -> bool {
+    std::env::var("CI").is_ok_and(|value| value == "true")
+}
+
+/// A text before, between and after two marks.
+fn split<'t>(text: &'t str, begin: &str, end: &str) -> Option<[&'t str; 3]> {
+    let (head, rest) = text.split_once(begin)?;
+    let (inside, tail) = rest.split_once(end)?;
+    Some([head, inside, tail])
 }
 
 /// Says what is run, runs it, and turns a failure into a sentence.
@@ -92,23 +117,10 @@ pub fn capture(command: &mut Command) -> Result<(String, String), Failure> {
     }
 }
 
-/// Is there such a program?
-pub fn exists(program: &str) -> bool {
-    let version = Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-    version.is_ok_and(|status| status.success())
-}
-
-/// Installs Debian packages.
-pub fn install(repository: &Repository, packages: &[&str]) -> Result<(), Failure> {
-    let missing = |e| format!("{e}; install {packages:?} by hand");
-    run(repository.command("apt-get").args(["update", "-qq"])).map_err(missing)?;
-    run(repository.command("apt-get").args(["install", "-y", "-qq", "--no-install-recommends"]).args(packages))
-        .map_err(missing)
-}
-
-/// A program of a Python package, which is installed into a place of its own when it is missing.
+/// A program of a Python package of this version, `NAME==VERSION`, which is installed into a place of its own when it is
+/// missing.
 pub fn python_tool(repository: &Repository, package: &str, tool: &str) -> Result<Command, Failure> {
-    let place = repository.target("python").join(package);
+    let place = repository.target("python").join(package.replace("==", "-"));
     let program = |name: &str| place.join("bin").join(name).to_string_lossy().into_owned();
     if !Path::new(&program(tool)).exists() {
         run(repository.command("python3").args(["-m", "venv"]).arg(&place))?;
@@ -119,9 +131,6 @@ pub fn python_tool(repository: &Repository, package: &str, tool: &str) -> Result
 
 /// Makes rustup install targets that are missing.
 pub fn add_targets(repository: &Repository, targets: &[&str]) -> Result<(), Failure> {
-    if !exists("rustup") {
-        return Err("there is no rustup".to_owned());
-    }
     let (installed, _) = capture(repository.command("rustup").args(["target", "list", "--installed"]))?;
     for target in targets.iter().filter(|target| !installed.lines().any(|line| line == **target)) {
         run(repository.command("rustup").args(["target", "add", target]))?;

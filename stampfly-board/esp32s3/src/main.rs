@@ -28,6 +28,8 @@ mod pins;
 mod radio;
 mod self_test;
 mod sensors;
+#[cfg_attr(feature = "esp32c6", allow(dead_code, reason = "it has one core"))]
+mod sizes;
 mod spi;
 mod storage;
 
@@ -49,8 +51,6 @@ use storage::Storage;
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
-const SECOND_HEAP: usize = 32 * 1024;
-
 #[esp_hal::main]
 fn main() -> ! {
     motors::hold_low();
@@ -58,9 +58,9 @@ fn main() -> ! {
     // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
     esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
     #[cfg(feature = "esp32s3")]
-    esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: SECOND_HEAP);
+    esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
     #[cfg(feature = "esp32c6")]
-    esp_alloc::heap_allocator!(size: SECOND_HEAP);
+    esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
     let tested = self_test::run();
     esp_println::println!("{tested}");
     if !tested.may_fly() {
@@ -158,7 +158,7 @@ mod cores {
         start: impl FnOnce(Spawner) + Send + 'static,
     ) {
         use esp_hal::system::Stack;
-        static STACK: StaticCell<Stack<32768>> = StaticCell::new();
+        static STACK: StaticCell<Stack<{ super::sizes::FLIGHT_STACK }>> = StaticCell::new();
         static EXECUTOR: StaticCell<Executor> = StaticCell::new();
         esp_rtos::start_second_core(control, interrupt, STACK.init_with(Stack::new), || {
             esp_rtos::CurrentThreadHandle::get().set_priority(HIGHEST);

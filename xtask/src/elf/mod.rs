@@ -4,16 +4,22 @@ mod riscv;
 pub mod stack;
 
 use crate::Failure;
-use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+use object::elf::SHF_ALLOC;
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Whose text, tables and merged variables the compiler named itself: some Rust crate's.
+pub const CONSTANTS: &str = "constants";
+/// Whose names are not Rust's.
+pub const C: &str = "C";
 
 /// One function or object.
 #[derive(Debug)]
 pub struct Symbol {
     /// As written in the source; a path for Rust, one word for C.
     pub name: String,
-    /// The crate, or `C`.
+    /// The crate; [`CONSTANTS`] for a nameless object of Rust's, of which the crate is not known; [`C`].
     pub owner: String,
     /// Bytes.
     pub size: u64,
@@ -34,10 +40,35 @@ pub enum Place {
     Memory,
 }
 
+/// Bytes of flash and of memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sizes {
+    /// Bytes of flash.
+    pub flash: u64,
+    /// Bytes of memory.
+    pub memory: u64,
+}
+
+impl Sizes {
+    /// Something of this size, at this place.
+    pub fn add(&mut self, size: u64, place: Place) {
+        self.flash += if place == Place::Memory { 0 } else { size };
+        self.memory += if place == Place::Flash { 0 } else { size };
+    }
+
+    /// What is left without these.
+    pub fn checked_sub(self, part: Self) -> Option<Self> {
+        Some(Self { flash: self.flash.checked_sub(part.flash)?, memory: self.memory.checked_sub(part.memory)? })
+    }
+}
+
 /// The program.
+#[derive(Default)]
 pub struct Program {
     /// By address.
     pub symbols: BTreeMap<u64, Symbol>,
+    /// Of all sections together, what no symbol covers included. Without the stack, which is what is left over.
+    pub sections: Sizes,
     /// Values of the linker's own symbols.
     linker: BTreeMap<String, u64>,
 }
@@ -48,7 +79,15 @@ impl Program {
         let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
         let bytes = std::fs::read(path).map_err(|e| fail(&e))?;
         let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
-        let mut program = Self { symbols: BTreeMap::new(), linker: BTreeMap::new() };
+        let mut program = Self::default();
+        for section in file.sections() {
+            let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
+            let is_gap = matches!(section.name(), Ok(".stack" | ".text_gap"));
+            if let (Some(place), false, true) = (place(&section), is_gap, sh_flags & u64::from(SHF_ALLOC) != 0) {
+                program.sections.add(section.size(), place);
+            }
+        }
+        let crate_name = file.symbols().filter(|symbol| symbol.kind() == SymbolKind::File).find_map(main_crate);
         for symbol in file.symbols() {
             let name = symbol.name().unwrap_or_default();
             let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
@@ -63,16 +102,27 @@ impl Program {
                 riscv::read(data.unwrap_or_default(), symbol.address())
             });
             let readable = format!("{:#}", rustc_demangle::demangle(name));
-            let owner = if readable == name { "C".to_owned() } else { owner(&readable) };
+            let owner = match name {
+                // The entry has a name that start-up code knows.
+                "main" => crate_name.clone().unwrap_or_else(|| C.to_owned()),
+                name => owner(name, &readable),
+            };
             let thing = Symbol { name: readable, owner, size: symbol.size(), place, code };
             program.symbols.insert(symbol.address(), thing);
         }
         if program.symbols.is_empty() { Err(fail(&"no symbols")) } else { Ok(program) }
     }
 
-    /// The value of a symbol that the linker script defines.
-    pub fn linker(&self, name: &str) -> Result<u64, Failure> {
-        self.linker.get(name).copied().ok_or_else(|| format!("the program has no symbol `{name}`"))
+    /// The symbol that this address lies in, and where it begins.
+    pub fn at(&self, address: u64) -> Option<(u64, &Symbol)> {
+        let (start, symbol) = self.symbols.range(..=address).next_back()?;
+        (address - start < symbol.size).then_some((*start, symbol))
+    }
+
+    /// What to call an address that lies in no symbol: a function in ROM, or one in assembly that says no size.
+    pub fn outside(&self, address: u64) -> String {
+        let named = self.linker.iter().find(|(name, value)| **value == address && !name.is_empty());
+        named.map_or_else(|| format!("{address:#x}"), |(name, _)| name.clone())
     }
 
     /// The functions whose name contains all of these parts.
@@ -80,6 +130,21 @@ impl Program {
         let matches = |symbol: &Symbol| symbol.code.is_some() && parts.iter().all(|part| symbol.name.contains(part));
         self.symbols.iter().filter(move |(_, symbol)| matches(symbol)).map(|(address, symbol)| (*address, symbol))
     }
+}
+
+/// Is this one of the functions that never return, because something is wrong that cannot be?
+pub fn panics(name: &str) -> bool {
+    let starts =
+        ["core::panicking::", "core::slice::index::slice_", "core::slice::copy_from_slice_impl::len_mismatch_fail"];
+    let names = [
+        "core::cell::panic_already_borrowed",
+        "core::cell::panic_already_mutably_borrowed",
+        "core::option::expect_failed",
+        "core::option::unwrap_failed",
+        "core::result::unwrap_failed",
+        "core::str::slice_error_fail",
+    ];
+    starts.iter().any(|start| name.starts_with(start)) || names.contains(&name)
 }
 
 fn place<'d>(section: &impl ObjectSection<'d>) -> Option<Place> {
@@ -95,22 +160,65 @@ fn place<'d>(section: &impl ObjectSection<'d>) -> Option<Place> {
     }
 }
 
+/// The crate that is linked into a program: the first unit of Rust code is called `CRATE.HASH-cgu.N`.
+fn main_crate<'d>(file: impl ObjectSymbol<'d>) -> Option<String> {
+    let (name, unit) = file.name().ok()?.split_once('.')?;
+    unit.contains("-cgu.").then(|| name.to_owned())
+}
+
+/// Who a symbol belongs to, by its own name and its readable one.
+fn owner(name: &str, readable: &str) -> String {
+    match name {
+        _ if readable != name => owning_crate(readable),
+        // Private names of LLVM; the radio's libraries were made with GCC, which leaves none in a program.
+        _ if name.starts_with(".L") => CONSTANTS.to_owned(),
+        _ => C.to_owned(),
+    }
+}
+
 /// The crate a readable name belongs to: `a` in `a::b`, `<a::B as c::D>::e` and `<[a::B]>::c`.
-fn owner(name: &str) -> String {
+fn owning_crate(name: &str) -> String {
     let start = name.trim_start_matches(|c: char| !c.is_alphanumeric() && c != '_');
     let start = ["mut ", "dyn ", "const "].iter().fold(start, |rest, word| rest.strip_prefix(word).unwrap_or(rest));
     start.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::owner;
+pub mod tests {
+    use super::riscv::Code;
+    use super::{Place, Program, Symbol, owner, owning_crate, panics};
+
+    /// Functions at 16, 32 ...: name, frame, whom it calls, calls through a pointer.
+    pub fn program(functions: &[(&str, u64, &[u64], usize)]) -> Program {
+        let symbols = functions.iter().zip(1..).map(|((name, frame, calls, indirect), index)| {
+            let code =
+                Code { frame: *frame, calls: calls.iter().copied().collect(), indirect: *indirect, unbounded: false };
+            let (name, owner) = ((*name).to_owned(), owning_crate(name));
+            (16 * index, Symbol { name, owner, size: 16, place: Place::Flash, code: Some(code) })
+        });
+        Program { symbols: symbols.collect(), ..Program::default() }
+    }
+
+    #[test]
+    fn what_panics_is_known_by_name() {
+        assert!(panics("core::panicking::panic_const::panic_const_div_by_zero"));
+        assert!(panics("core::slice::index::slice_index_fail"));
+        assert!(!panics("core::slice::sort::heapsort"));
+    }
 
     #[test]
     fn a_name_says_whose_it_is() {
-        assert_eq!(owner("stampfly_eskf::eskf::Eskf::new"), "stampfly_eskf");
-        assert_eq!(owner("<stampfly_eskf::eskf::Eskf as stampfly_eskf::Estimator>::predict"), "stampfly_eskf");
-        assert_eq!(owner("<&mut dyn embassy_time::Driver>::now"), "embassy_time");
-        assert_eq!(owner("core::fmt::write"), "core");
+        assert_eq!(owning_crate("stampfly_eskf::eskf::Eskf::new"), "stampfly_eskf");
+        assert_eq!(owning_crate("<stampfly_eskf::eskf::Eskf as stampfly_eskf::Estimator>::predict"), "stampfly_eskf");
+        assert_eq!(owning_crate("<&mut dyn embassy_time::Driver>::now"), "embassy_time");
+        assert_eq!(owning_crate("core::fmt::write"), "core");
+    }
+
+    #[test]
+    fn what_the_compiler_named_is_not_cs() {
+        assert_eq!(owner(".Lanon.aca3.930", ".Lanon.aca3.930"), "constants");
+        assert_eq!(owner(".Lswitch.table.x", ".Lswitch.table.x"), "constants");
+        assert_eq!(owner("sta_input", "sta_input"), "C");
+        assert_eq!(owner("_RNvCs_4core3fmt", "core::fmt"), "core");
     }
 }

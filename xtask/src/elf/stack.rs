@@ -1,9 +1,11 @@
 //! The deepest a function can get, over everything it calls.
 //!
-//! A call through a pointer could go anywhere; the caller says which functions may be behind one, and the deepest of
-//! them counts at every such call. Recursion and frames of unknown size have no bound and are named.
+//! A call through a pointer could go anywhere; a table says which functions may be behind whose, and the deepest of them
+//! counts at every such call. What is behind a pointer may call through pointers itself. When that leads back to the same
+//! row of the table, as with a value whose text contains another value's, the row has to say how often. Recursion
+//! otherwise, and frames of unknown size, have no bound and are named; so are functions whose code is not in the program.
 
-use super::Program;
+use super::{Program, Symbol, panics};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How deep, and by which way.
@@ -13,80 +15,229 @@ pub struct Depth {
     pub bytes: u64,
     /// Functions with their frames, from the root to the deepest.
     pub way: Vec<(String, u64)>,
-    /// What cannot be bounded: functions that call themselves, or lower the stack by an unknown amount.
+    /// What cannot be bounded: functions that call themselves, or lower the stack by an unknown amount, and rows of the
+    /// table that lead back to themselves without saying how often.
     pub unbounded: BTreeSet<String>,
+    /// Functions that are not in the program. Each counts as the allowance.
+    pub elsewhere: BTreeSet<String>,
 }
 
-/// What may be behind a pointer: where the caller's name contains the first, functions whose name contains one of the
-/// second. The first line that fits a caller counts; one with an empty first part fits every caller.
-pub type Pointers<'p> = &'p [(&'p str, &'p [&'p str])];
+/// A row of the table: what may be behind a pointer.
+#[derive(Clone, Copy, Debug)]
+pub struct Behind<'p> {
+    /// A part of the caller's name. The first row that fits a caller counts; an empty part fits every caller.
+    pub callers: &'p str,
+    /// Parts of the names of what may be called.
+    pub targets: &'p [&'p str],
+    /// How many calls by this row may be open at once, where what is called can come back to such a call.
+    pub nests: Option<u8>,
+}
 
 /// Looks through a program.
 pub struct Stack<'a> {
     program: &'a Program,
-    pointers: Pointers<'a>,
-    /// The deepest behind each line of `pointers`.
-    behind: Vec<Depth>,
-    known: BTreeMap<u64, Depth>,
-    open: BTreeSet<u64>,
+    table: &'a [Behind<'a>],
+    /// Bytes that a function elsewhere may take.
+    allowance: u64,
+    /// The functions behind each row.
+    targets: Vec<Vec<u64>>,
+    known: BTreeMap<State, Depth>,
+    open: BTreeSet<State>,
 }
 
-impl<'a> Stack<'a> {
-    /// Of this program.
-    pub fn new(program: &'a Program, pointers: Pointers<'a>) -> Self {
-        let behind = vec![Depth::default(); pointers.len()];
-        let mut stack = Self { program, pointers, behind, known: BTreeMap::new(), open: BTreeSet::new() };
-        for _ in 0..2 {
-            let deepest = |(_, targets): &(&str, &[&str])| {
-                let matches = targets.iter().flat_map(|part| program.functions(std::slice::from_ref(part)));
-                let ours: Vec<u64> = matches.filter(|(_, s)| s.owner != "C").map(|(address, _)| address).collect();
-                ours.into_iter().map(|address| stack.below(address)).max_by_key(|depth| depth.bytes).unwrap_or_default()
-            };
-            stack.behind = pointers.iter().map(deepest).collect();
-            stack.known.clear();
-        }
-        stack
-    }
+/// A function, and how many calls by each row are open above it.
+type State = (u64, Vec<u8>);
 
-    /// The deepest that this function may reach through a pointer.
-    fn behind_pointers_of(&self, caller: &str) -> Depth {
-        let lines = self.pointers.iter().zip(&self.behind);
-        lines
-            .into_iter()
-            .find(|((part, _), _)| caller.contains(part))
-            .map(|(_, depth)| depth.clone())
-            .unwrap_or_default()
+impl<'a> Stack<'a> {
+    /// Of this program. Refuses a table with a row that fits nothing in it: every bound would be smaller than it seems.
+    pub fn new(program: &'a Program, table: &'a [Behind<'a>], allowance: u64) -> Result<Self, String> {
+        let callers: BTreeSet<_> = program
+            .symbols
+            .values()
+            .filter(|symbol| calls_through_pointers(symbol))
+            .filter_map(|symbol| row(table, &symbol.name))
+            .collect();
+        for (index, behind) in table.iter().enumerate() {
+            if !callers.contains(&index) {
+                return Err(format!("no `{}` that calls through a pointer is left for its row", behind.callers));
+            }
+            for part in behind.targets {
+                if program.functions(std::slice::from_ref(part)).next().is_none() {
+                    return Err(format!("no function `{part}`, which is said to be behind a pointer"));
+                }
+            }
+        }
+        let targets = table.iter().map(|behind| {
+            let matches = behind.targets.iter().flat_map(|part| program.functions(std::slice::from_ref(part)));
+            matches.filter(|(_, symbol)| symbol.owner != super::C).map(|(address, _)| address).collect()
+        });
+        let targets = targets.collect();
+        Ok(Self { program, table, allowance, targets, known: BTreeMap::new(), open: BTreeSet::new() })
     }
 
     /// The depth of the function at this address.
     pub fn below(&mut self, address: u64) -> Depth {
-        if let Some(depth) = self.known.get(&address) {
+        self.depth((address, vec![0; self.table.len()]))
+    }
+
+    fn depth(&mut self, state: State) -> Depth {
+        if let Some(depth) = self.known.get(&state) {
             return depth.clone();
         }
-        let Some(symbol) = self.program.symbols.get(&address) else { return Depth::default() };
-        let Some(code) = symbol.code.as_ref().filter(|_| !symbol.name.starts_with("core::panicking")) else {
+        let Some((start, symbol)) = self.program.at(state.0) else {
+            let name = self.program.outside(state.0);
+            let way = vec![(name.clone(), self.allowance)];
+            return Depth { bytes: self.allowance, way, elsewhere: [name].into(), ..Depth::default() };
+        };
+        // What comes after a panic is no flight.
+        let Some(code) = symbol.code.as_ref().filter(|_| !panics(&symbol.name)) else {
             return Depth::default();
         };
-        if !self.open.insert(address) {
+        let state = (start, state.1);
+        if !self.open.insert(state.clone()) {
             return Depth { unbounded: [symbol.name.clone()].into(), ..Depth::default() };
         }
-        let mut deepest = if code.indirect > 0 { self.behind_pointers_of(&symbol.name) } else { Depth::default() };
-        let mut unbounded = BTreeSet::new();
-        if code.unbounded {
-            unbounded.insert(symbol.name.clone());
+        let mut deepest = Depth::default();
+        if code.indirect > 0 {
+            deepest.add(self.behind_pointers_of(&symbol.name, &state.1));
         }
         for call in &code.calls {
-            let depth = self.below(*call);
-            unbounded.extend(depth.unbounded.iter().cloned());
-            if depth.bytes > deepest.bytes {
-                deepest = depth;
+            let depth = self.depth((*call, state.1.clone()));
+            deepest.add(depth);
+        }
+        deepest.bytes += code.frame;
+        deepest.way.insert(0, (symbol.name.clone(), code.frame));
+        if code.unbounded {
+            deepest.unbounded.insert(symbol.name.clone());
+        }
+        self.open.remove(&state);
+        self.known.insert(state, deepest.clone());
+        deepest
+    }
+
+    /// The deepest that this function may reach through a pointer.
+    fn behind_pointers_of(&mut self, caller: &str, open: &[u8]) -> Depth {
+        let mut deepest = Depth::default();
+        let Some(row) = row(self.table, caller) else {
+            deepest
+                .unbounded
+                .insert(format!("{caller}, which calls through a pointer of which the table says nothing"));
+            return deepest;
+        };
+        match (open[row], self.table[row].nests) {
+            (0, _) => {}
+            (count, Some(most)) if count < most => {}
+            (_, Some(_)) => return deepest,
+            (_, None) => {
+                deepest.unbounded.insert(format!("{caller}, a pointer behind which is such a call again"));
+                return deepest;
             }
         }
-        self.open.remove(&address);
-        let mut way = vec![(symbol.name.clone(), code.frame)];
-        way.extend(deepest.way);
-        let depth = Depth { bytes: code.frame + deepest.bytes, way, unbounded };
-        self.known.insert(address, depth.clone());
-        depth
+        let mut open = open.to_vec();
+        open[row] += 1;
+        for target in self.targets[row].clone() {
+            let depth = self.depth((target, open.clone()));
+            deepest.add(depth);
+        }
+        deepest
+    }
+}
+
+impl Depth {
+    /// One more way down from the same place.
+    fn add(&mut self, other: Self) {
+        self.unbounded.extend(other.unbounded);
+        self.elsewhere.extend(other.elsewhere);
+        if other.bytes > self.bytes {
+            (self.bytes, self.way) = (other.bytes, other.way);
+        }
+    }
+}
+
+fn row(table: &[Behind<'_>], caller: &str) -> Option<usize> {
+    table.iter().position(|behind| caller.contains(behind.callers))
+}
+
+fn calls_through_pointers(symbol: &Symbol) -> bool {
+    symbol.code.as_ref().is_some_and(|code| code.indirect > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::program;
+    use super::{Behind, Stack};
+
+    const fn behind<'a>(callers: &'a str, targets: &'a [&'a str], nests: Option<u8>) -> Behind<'a> {
+        Behind { callers, targets, nests }
+    }
+
+    #[test]
+    fn the_deepest_way_counts() {
+        let program = program(&[("a", 10, &[32, 48], 0), ("b", 5, &[], 0), ("c", 7, &[], 0)]);
+        let depth = Stack::new(&program, &[], 0).expect("fits").below(16);
+        assert_eq!((depth.bytes, depth.way), (17, vec![("a".to_owned(), 10), ("c".to_owned(), 7)]));
+        assert!(depth.unbounded.is_empty() && depth.elsewhere.is_empty());
+    }
+
+    #[test]
+    fn recursion_has_no_bound() {
+        let program = program(&[("a", 10, &[32], 0), ("b", 5, &[16], 0)]);
+        let depth = Stack::new(&program, &[], 0).expect("fits").below(16);
+        assert_eq!(depth.unbounded, ["a".to_owned()].into());
+    }
+
+    #[test]
+    fn a_jump_into_a_function_is_a_call_of_it() {
+        let program = program(&[("a", 10, &[36], 0), ("b", 5, &[], 0)]);
+        assert_eq!(Stack::new(&program, &[], 0).expect("fits").below(16).bytes, 15);
+    }
+
+    #[test]
+    fn what_is_elsewhere_is_named_and_allowed_for() {
+        let mut program = program(&[("a", 10, &[4096], 0)]);
+        program.linker.insert("rom_read".to_owned(), 4096);
+        let depth = Stack::new(&program, &[], 100).expect("fits").below(16);
+        assert_eq!((depth.bytes, depth.elsewhere), (110, ["rom_read".to_owned()].into()));
+    }
+
+    #[test]
+    fn a_pointer_behind_a_pointer() {
+        let program = program(&[("a", 10, &[], 1), ("b", 5, &[], 1), ("c", 7, &[64], 0), ("d", 1, &[], 0)]);
+        let table = [behind("a", &["b"], None), behind("b", &["c"], None)];
+        assert_eq!(Stack::new(&program, &table, 0).expect("fits").below(16).bytes, 23);
+    }
+
+    #[test]
+    fn what_has_no_bound_behind_a_pointer_is_named() {
+        let program = program(&[("a", 10, &[64], 1), ("b", 5, &[48], 0), ("c", 7, &[32], 0), ("deep", 99, &[], 0)]);
+        let depth = Stack::new(&program, &[behind("a", &["b"], None)], 0).expect("fits").below(16);
+        assert_eq!((depth.bytes, depth.unbounded), (109, ["b".to_owned()].into()));
+    }
+
+    #[test]
+    fn a_row_that_leads_back_to_itself_must_say_how_often() {
+        let program = program(&[("write", 10, &[], 1), ("show", 5, &[16], 0)]);
+        let bytes = |nests| {
+            let table = [behind("write", &["show"], nests)];
+            let depth = Stack::new(&program, &table, 0).expect("fits").below(16);
+            (depth.bytes, depth.unbounded.len())
+        };
+        assert_eq!(bytes(Some(1)), (25, 0));
+        assert_eq!(bytes(Some(3)), (55, 0));
+        assert_eq!(bytes(None).1, 1);
+    }
+
+    #[test]
+    fn a_table_that_does_not_fit_is_refused() {
+        let program = program(&[("a", 10, &[], 1), ("b", 5, &[], 0)]);
+        let fits = |table: &[Behind<'_>]| Stack::new(&program, table, 0).is_ok();
+        assert!(fits(&[behind("a", &["b"], None)]));
+        assert!(!fits(&[behind("a", &["gone"], None)]));
+        // It calls nothing through a pointer.
+        assert!(!fits(&[behind("b", &["a"], None), behind("", &["b"], None)]));
+        // The first row leaves nothing for it.
+        assert!(!fits(&[behind("", &["b"], None), behind("a", &["b"], None)]));
+        // No row at all: a call to anywhere.
+        assert_eq!(Stack::new(&program, &[], 0).expect("fits").below(16).unbounded.len(), 1);
     }
 }

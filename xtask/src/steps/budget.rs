@@ -5,17 +5,16 @@
 //! enough to notice a per cent, which a clock on a shared machine is not.
 
 use crate::Failure;
+use crate::machine::{VALGRIND, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, capture, exists, install, run as run_program};
+use crate::repository::{Repository, capture, run as run_program};
 
 /// Steps of the two runs: both end in hover.
 const SHORT: u64 = 6_000;
 const LONG: u64 = 8_000;
 
 pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
-    if !exists("valgrind") {
-        install(repository, &["valgrind"])?;
-    }
+    provide(repository, &[&VALGRIND])?;
     run_program(repository.cargo().args([
         "build",
         "--quiet",

@@ -3,27 +3,15 @@
 //! A link to a line, such as `[`Ring::write`](../stampfly-bus/src/ring.rs#L90)`, is checked: the line must contain the
 //! last word of the link's text. Lines move, so `cargo xtask docs --fix` puts the numbers right and rewrites the
 //! generated tables; without `--fix` a difference is a failure. Every other link into the repository, relative or by
-//! its address, must lead to a file, and one into the same document to a heading. Every picture must be shown somewhere,
+//! its address, must lead to a file, and one to a heading of a document must find it there. Every document is checked that
+//! git knows or would take. Every picture must be shown somewhere,
 //! and the guide to tuning must name every field there is to tune.
 
-use crate::Failure;
 use crate::repository::{Repository, capture};
+use crate::{FIX, Failure, asks};
 use std::fs;
 use std::path::Path;
 
-/// Documents that are checked, relative to the top folder.
-const DOCUMENTS: &[&str] = &[
-    "README.md",
-    "docs/architecture.md",
-    "docs/decisions.md",
-    "docs/estimation.md",
-    "docs/first-flight.md",
-    "docs/msrv.md",
-    "stampfly-board/esp32s3/README.md",
-    "stampfly-board/host/README.md",
-    "stampfly-eskf/README.md",
-    "stampfly-sim/README.md",
-];
 /// Addresses of the repository's files, for documents that are read elsewhere.
 const ADDRESSES: &[&str] =
     &["https://github.com/stampfly/stampfly/blob/main/", "https://raw.githubusercontent.com/stampfly/stampfly/main/"];
@@ -51,14 +39,12 @@ const GENERATED: &[(&str, &str, &str)] = &[
 ];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = match arguments {
-        [] => false,
-        [flag] if flag == "--fix" => true,
-        _ => return Err("the only argument is --fix".to_owned()),
-    };
+    let fix = asks(arguments, FIX);
     let mut stale = Vec::new();
     let mut all = String::new();
-    for name in DOCUMENTS {
+    let (documents, _) =
+        capture(repository.command("git").args(["ls-files", "--cached", "--others", "--exclude-standard", "*.md"]))?;
+    for name in documents.lines() {
         let path = repository.root.join(name);
         let text = fs::read_to_string(&path).map_err(|e| format!("{name}: {e}"))?;
         let folder = path.parent().unwrap_or(&repository.root);
@@ -152,10 +138,8 @@ fn check_links(text: &str, folder: &Path, root: &Path) -> Result<String, Failure
         {
             return Err(format!("link to #{anchor}: no such heading"));
         }
-        if let Some(file) = ADDRESSES.iter().find_map(|address| target.strip_prefix(address))
-            && !root.join(file).exists()
-        {
-            return Err(format!("link to {target}: {file} does not exist"));
+        if let Some(file) = ADDRESSES.iter().find_map(|address| target.strip_prefix(address)) {
+            leads_somewhere(root, file)?;
         }
         out.push_str(&check_link(before, target, folder)?);
         rest = &after[end..];
@@ -168,12 +152,11 @@ fn check_link(before: &str, target: &str, folder: &Path) -> Result<String, Failu
     if target.contains("://") || target.starts_with('#') {
         return Ok(target.to_owned());
     }
-    let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
+    leads_somewhere(folder, target)?;
+    let Some((file, line)) = target.split_once("#L").filter(|(_, line)| line.parse::<usize>().is_ok()) else {
+        return Ok(target.to_owned());
+    };
     let path = folder.join(file);
-    if !path.exists() {
-        return Err(format!("link to {file}, which does not exist"));
-    }
-    let Some(line) = anchor.and_then(|anchor| anchor.strip_prefix('L')) else { return Ok(target.to_owned()) };
     let text = &before[before.rfind('[').map_or(0, |at| at + 1)..];
     let word = text.trim_matches('`').rsplit([':', '.', ' ']).next().unwrap_or_default().trim_matches('`');
     let source = fs::read_to_string(&path).map_err(|e| format!("{file}: {e}"))?;
@@ -190,6 +173,22 @@ fn check_link(before: &str, target: &str, folder: &Path) -> Result<String, Failu
     let found = lines.clone().find(|(_, line)| defines(line)).or_else(|| lines.find(|(_, line)| fits(line)));
     let (index, _) = found.ok_or_else(|| format!("link to {target}: no line has '{word}'"))?;
     Ok(format!("{file}#L{}", index + 1))
+}
+
+/// Is there a file where this leads, and in a document the heading?
+fn leads_somewhere(folder: &Path, target: &str) -> Result<(), Failure> {
+    let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
+    let path = folder.join(file);
+    if !path.exists() {
+        return Err(format!("link to {file}, which does not exist"));
+    }
+    match anchor.filter(|_| file.ends_with(".md")) {
+        None => Ok(()),
+        Some(anchor) => {
+            let text = fs::read_to_string(&path).map_err(|e| format!("{file}: {e}"))?;
+            if has_heading(&text, anchor) { Ok(()) } else { Err(format!("link to {target}: no such heading")) }
+        }
+    }
 }
 
 /// Does the line hold these words, not as a part of longer ones?
@@ -222,6 +221,13 @@ mod tests {
         assert!(checked("[x](https://github.com/stampfly/stampfly/blob/main/Cargo.toml)").is_ok());
         assert!(checked("[x](https://github.com/stampfly/stampfly/blob/main/nowhere.md)").is_err());
         assert!(checked("[x](https://example.org/nowhere.md)").is_ok());
+        let other = "../stampfly-eskf/README.md";
+        let text = include_str!("../../../stampfly-eskf/README.md");
+        let heading = text.lines().find_map(|line| line.strip_prefix("## ")).expect("it has headings").to_lowercase();
+        let slug: String =
+            heading.replace(' ', "-").chars().filter(|c| c.is_alphanumeric() || "-_".contains(*c)).collect();
+        assert_eq!(checked(&format!("[x]({other}#{slug})")).err(), None);
+        assert!(checked(&format!("[x]({other}#no-such-heading)")).is_err());
     }
 
     #[test]

@@ -13,33 +13,33 @@
 
 use super::no_std::debian_cargo;
 use crate::Failure;
-use crate::repository::{Repository, capture, exists, install, python_tool, run as run_program};
+use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
+use crate::repository::{Repository, capture, python_tool, run as run_program};
 use object::{Object, ObjectSection};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const PACKAGE: &str = "stampfly-board/esp32s3";
-const DEBIAN: [&str; 5] = ["rustc-web", "cargo-web", "rust-web-src", "rust-web-clippy", "lld-22"];
 /// A 32-bit architecture with inline assembly and 32-bit atomics, which is all the type check needs.
 const STAND_IN: &str = "loongarch32-unknown-none-softfloat";
 /// The name cargo and esp-hal know the S3 by.
 const S3: &str = "xtensa-esp32s3-none-elf.json";
 const C6: &str = "riscv32imac-unknown-none-elf";
+/// Espressif's tool, the version whose words are read here.
+const ESPTOOL: &str = "esptool==5.6.0";
 /// No S3 has this pin; `src/pins.rs` asks for it when told to.
 const WRONG_PIN: &str = "GPIO22";
 
 pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     let format = repository.root.join(PACKAGE).join("Cargo.toml");
     run_program(repository.cargo().args(["fmt", "--check", "--manifest-path"]).arg(format))?;
-    if !Path::new("/usr/bin/cargo-clippy").exists() || !exists("ld.lld-22") {
-        install(repository, &DEBIAN)?;
-    }
+    provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let target = stand_in(repository)?;
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let program = c6(repository)?;
-    memory(repository, &program)?;
+    memory(&program)?;
     image(repository, &program)
 }
 
@@ -100,6 +100,7 @@ fn is_about_the_pin(said: &str) -> Result<(), Failure> {
 
 /// Builds for the ESP32-C6 and returns the program.
 pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
+    provide(repository, &[&COMPILER, &LINKER])?;
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
@@ -112,45 +113,35 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
 
 /// The S3's data memory, which code in RAM shares (esp-hal's `ld/esp32s3/memory.x`: from 0x3FC88000 to 0x3FCDB700).
 const S3_MEMORY: u64 = 0x3FCD_B700 - 0x3FC8_8000;
-/// The size of the flight core's stack, which only the S3 has apart, as the firmware's `main` configures it.
-pub fn flight_stack(repository: &Repository) -> Result<u64, Failure> {
-    let path = repository.root.join(PACKAGE).join("src/main.rs");
-    let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let size = text.split_once("StaticCell<Stack<").and_then(|(_, rest)| rest.split_once('>')?.0.parse().ok());
-    size.ok_or_else(|| format!("{} configures no stack for the second core", path.display()))
-}
-
-/// The part of the heap that lies elsewhere on the S3, beside its data cache (`src/main.rs`).
-const S3_ELSEWHERE: u64 = 32 * 1024;
-/// What the first core needs at least: half as much again as the self test, which holds a whole vehicle (see `memory`).
-const S3_FIRST_STACK: u64 = 96 * 1024;
+/// What the firmware sets aside: on the S3 the flight core's stack comes on top, and a part of the heap lies elsewhere.
+#[path = "../../../stampfly-board/esp32s3/src/sizes.rs"]
+pub mod sizes;
 /// The C6's memory, as its program's sections see it.
 const C6_MEMORY: std::ops::Range<u64> = 0x4080_0000..0x4088_0000;
 
-/// Would what the C6 keeps in memory fit into the S3?
-fn memory(repository: &Repository, program: &Path) -> Result<(), Failure> {
+/// If what the C6 keeps in memory were in the S3's: how much would be left, for the first core's stack? What that has to
+/// suffice for is asked by the step `memory`.
+pub fn memory(program: &Path) -> Result<u64, Failure> {
     let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", program.display());
     let bytes = fs::read(program).map_err(|e| fail(&e))?;
     let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
     // What is left over is the stack's, and the boot loader's memory is another region on the S3, too.
     let kept = file.sections().filter(|section| !matches!(section.name(), Ok(".stack" | ".dram2_uninit")));
     let kept: u64 = kept.filter(|section| C6_MEMORY.contains(&section.address())).map(|section| section.size()).sum();
-    let left = (S3_MEMORY + S3_ELSEWHERE).saturating_sub(kept + flight_stack(repository)?);
+    let used = kept + sizes::FLIGHT_STACK as u64;
+    let left = (S3_MEMORY + sizes::SECOND_HEAP as u64).checked_sub(used);
+    let left = left.ok_or_else(|| format!("{used} bytes are more than the S3 has"))?;
     println!("esp32c6: {kept} bytes of memory in use; on the S3 that would leave {left} bytes of stack");
-    if left < S3_FIRST_STACK {
-        Err(format!("the S3 would have less than {S3_FIRST_STACK} bytes of stack"))
-    } else {
-        Ok(())
-    }
+    Ok(left)
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.
 fn image(repository: &Repository, program: &Path) -> Result<(), Failure> {
     let image = program.with_extension("bin");
-    let mut esptool = python_tool(repository, "esptool", "esptool")?;
+    let mut esptool = python_tool(repository, ESPTOOL, "esptool")?;
     esptool.args(["--chip", "esp32c6", "elf2image", "--flash-mode", "dio", "--flash-size", "4MB", "-o"]);
     capture(esptool.arg(&image).arg(program))?;
-    let mut esptool = python_tool(repository, "esptool", "esptool")?;
+    let mut esptool = python_tool(repository, ESPTOOL, "esptool")?;
     let (said, _) = capture(esptool.args(["--chip", "esp32c6", "image-info"]).arg(&image))?;
     let bytes = fs::metadata(&image).map_err(|e| format!("{}: {e}", image.display()))?.len();
     let valid = said.lines().any(|line| line.starts_with("Validation hash") && line.contains("(valid)"));

@@ -3,8 +3,8 @@
 //!
 //! Recorded again by `--fix`, after a change that is meant to change flights.
 
-use crate::Failure;
 use crate::repository::{Repository, capture};
+use crate::{FIX, Failure, asks};
 use std::fs;
 use std::process::Command;
 
@@ -14,11 +14,7 @@ const PROFILES: [&str; 2] = ["release", "unoptimised"];
 const MOST_BYTES: usize = 150_000;
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = match arguments {
-        [] => false,
-        [flag] if flag == "--fix" => true,
-        _ => return Err("the only argument is --fix".to_owned()),
-    };
+    let fix = asks(arguments, FIX);
     let committed = repository.root.join(RECORD);
     let folder = repository.target("golden");
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -10,7 +10,9 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
             .cargo()
             .env("RUSTFLAGS", "--cfg loom")
             .env("RUST_BACKTRACE", "0")
-            .args(["test", "--release", "-p", "stampfly-bus", "--test", "loom", "--target-dir", "target/loom", "--"])
+            .args(["test", "--release", "-p", "stampfly-bus", "--test", "loom", "--target-dir"])
+            .arg(repository.target("loom"))
+            .arg("--")
             .args(arguments),
     )
 }

@@ -1,5 +1,6 @@
 //! One file a step.
 
+pub mod bars;
 pub mod budget;
 pub mod clippy;
 pub mod consumers;
@@ -13,9 +14,11 @@ pub mod figures;
 pub mod fmt;
 pub mod golden;
 pub mod loom;
+pub mod machine;
 pub mod memory;
 pub mod no_std;
 pub mod package;
+pub mod panic_calls;
 pub mod panic_proof;
 pub mod peers;
 pub mod qemu;

@@ -3,28 +3,24 @@
 //! The targets come from rustup. Where rustup cannot deliver them, Debian's compiler builds the core library from its
 //! own sources instead; it is installed when it is missing.
 
-use crate::Failure;
-use crate::repository::{Repository, add_targets, install, run as run_program};
-use std::path::Path;
+use crate::machine::{COMPILER, provide};
+use crate::repository::{Repository, add_targets, run as run_program};
+use crate::{Failure, asks};
 use std::process::Command;
 
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
-const DEBIAN: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let debian = match arguments {
-        [] => add_targets(repository, &TARGETS).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err(),
-        [only] if only == "--debian" => true,
-        _ => return Err(format!("what is {arguments:?}?")),
-    };
-    if debian && !Path::new("/usr/bin/cargo").exists() {
-        install(repository, &DEBIAN)?;
+    let debian = asks(arguments, "--debian")
+        || add_targets(repository, &TARGETS).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err();
+    if debian {
+        provide(repository, &[&COMPILER])?;
     }
     for target in TARGETS {
         let mut build = if debian { debian_cargo(repository) } else { repository.cargo() };
         build.args(["build", "--quiet", "--target", target]);
         if debian {
-            build.args(["-Zbuild-std=core,alloc", "--target-dir", "target/debian"]);
+            build.args(["-Zbuild-std=core,alloc", "--target-dir"]).arg(repository.target("debian"));
         }
         for library in repository.libraries()?.iter().filter(|library| library.bare_metal) {
             build.args(["-p", &library.name]);

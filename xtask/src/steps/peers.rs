@@ -5,9 +5,9 @@
 //! bar is the ratio, for people to read. Beside it stand figures of programs in C and C++, measured once elsewhere: the
 //! two crates that were measured there, too, tell how the machines compare.
 
-use crate::Failure;
 use crate::repository::{Repository, capture};
 use crate::steps::cortex_m4f::{self, Counted};
+use crate::{FIX, Failure, asks};
 use std::fmt::Write;
 use std::fs;
 
@@ -33,11 +33,7 @@ const ELSEWHERE: &[(&str, u32, u32)] = &[
 ];
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = match arguments {
-        [] => false,
-        [flag] if flag == "--fix" => true,
-        _ => return Err("the only argument is --fix".to_owned()),
-    };
+    let fix = asks(arguments, FIX);
     let mut reports = Vec::new();
     for (folder, flags) in SETTINGS {
         let mut bench = repository.cargo();

@@ -5,16 +5,13 @@
 //! (`CI=true`) their absence is an error, so that a green run is never one that looked at nothing.
 
 use crate::Failure;
-use crate::repository::{Repository, run as run_program};
-use std::path::PathBuf;
+use crate::repository::{Repository, in_ci, run as run_program};
 
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let data = std::env::var_os("STAMPFLY_DATA").map_or_else(|| repository.root.join("../shared/data"), PathBuf::from);
-    let data = data.canonicalize().ok().filter(|folder| folder.is_dir());
-    let in_ci = std::env::var("CI").is_ok_and(|value| value == "true");
+    let data = repository.data();
     match &data {
         Some(folder) => eprintln!("recorded data: {}", folder.display()),
-        None if in_ci => return Err("CI=true and no recorded data: set STAMPFLY_DATA to its folder".to_owned()),
+        None if in_ci() => return Err("CI=true and no recorded data: set STAMPFLY_DATA to its folder".to_owned()),
         None => eprintln!("recorded data: none (STAMPFLY_DATA names its folder)"),
     }
     let mut test = repository.cargo();

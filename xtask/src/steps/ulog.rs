@@ -4,6 +4,8 @@ use crate::Failure;
 use crate::repository::{Repository, capture, python_tool, run as run_program};
 use std::fs;
 
+const PYULOG: &str = "pyulog==1.3.0";
+
 pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
     let folder = repository.target("ulog");
     let io = |e: std::io::Error| format!("{}: {e}", folder.display());
@@ -15,16 +17,15 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
             run_program(&mut fly)?;
             folder.join("flight.ulg")
         }
-        [path] => std::path::absolute(path).map_err(io)?,
-        _ => return Err("one log at a time".to_owned()),
+        [path, ..] => std::path::absolute(path).map_err(io)?,
     };
 
-    let (info, _) = capture(python_tool(repository, "pyulog", "ulog_info")?.arg(&log))?;
+    let (info, _) = capture(python_tool(repository, PYULOG, "ulog_info")?.arg(&log))?;
     println!("{info}");
     let tables = folder.join("csv");
     let _ = fs::remove_dir_all(&tables);
     fs::create_dir_all(&tables).map_err(io)?;
-    run_program(python_tool(repository, "pyulog", "ulog2csv")?.arg("-o").arg(&tables).arg(&log))?;
+    run_program(python_tool(repository, PYULOG, "ulog2csv")?.arg("-o").arg(&tables).arg(&log))?;
 
     let mut rows = 0;
     let mut topics = 0;

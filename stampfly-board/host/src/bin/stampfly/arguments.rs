@@ -13,7 +13,11 @@ use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
 #[derive(Debug, Parser)]
-#[command(name = "stampfly", version)]
+#[command(
+    name = "stampfly",
+    version,
+    after_help = "Exit code: 0 when all went well, 1 when a flight or a comparison did not, 2 when the command line was wrong."
+)]
 pub struct Arguments {
     /// What to do; without it, a mission is flown.
     #[command(subcommand)]

@@ -1,0 +1,149 @@
+//! `bars`: do a hundred flights keep every bar, and are they simulated fast enough?
+//!
+//! The bars of the flights stand in `stampfly-board/host/bars.rs`, where the tests find them, too; the reference mission has
+//! to keep its own both over models of the sensors and through the real drivers. The bars of speed are for one core and
+//! depend on the machine: they are less than half of what a PC of 2024 does. Processor time counts, and the best of some
+//! short runs, because a shared machine has other things to do.
+
+use crate::Failure;
+use crate::repository::{Repository, capture, run as run_program};
+use std::fs;
+
+/// Mission, figure, statistic, bar.
+const BARS: [(&str, &str, &str, f64); 7] = include!("../../../stampfly-board/host/bars.rs");
+/// Mission, and arguments besides.
+const CAMPAIGNS: [(&str, &[&str]); 3] = [("square", &[]), ("square", &["--chips"]), ("hover", &[])];
+const FLIGHTS: &str = "100";
+/// Arguments, and times real time that a core has to simulate at least.
+const SPEEDS: [(&[&str], f64); 2] = [(&[], 300.0), (&["--chips"], 100.0)];
+/// Flights of a run that is timed, and the most runs.
+const TIMED: &str = "8";
+const RUNS: usize = 5;
+
+pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
+    let mut failures = Vec::new();
+    for (mission, arguments) in CAMPAIGNS {
+        let title = [&[mission], arguments].concat().join(" ");
+        let mut campaign = repository.command(&stampfly(repository));
+        campaign.args(["campaign", "--json", "--flights", FLIGHTS, "--mission", mission]).args(arguments);
+        // It fails by itself when a flight does not land or disarm.
+        let report = match capture(&mut campaign) {
+            Ok((report, _)) => report,
+            Err(said) => {
+                failures.push(format!("{title}: {said}"));
+                continue;
+            }
+        };
+        for (bar, kept) in check(mission, &report)? {
+            println!("{title}: {bar}");
+            failures.extend((!kept).then(|| format!("{title}: {bar}")));
+        }
+    }
+    for (arguments, least) in SPEEDS {
+        let speed = speed(repository, arguments, least)?;
+        let said =
+            format!("one core simulates {speed:.0} times as fast as real time {arguments:?}; {least} is the least");
+        println!("{said}");
+        failures.extend((speed < least).then_some(said));
+    }
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
+}
+
+fn stampfly(repository: &Repository) -> String {
+    repository.target("release/stampfly").display().to_string()
+}
+
+/// Every bar of a mission in words, and whether the campaign's report keeps it.
+fn check(mission: &str, report: &str) -> Result<Vec<(String, bool)>, Failure> {
+    let of_mission = BARS.iter().filter(|(of, ..)| *of == mission);
+    of_mission
+        .map(|(_, figure, statistic, bar)| {
+            let spread = value(report, figure).and_then(|rest| rest.strip_prefix('{')?.split('}').next());
+            let spread = spread.ok_or_else(|| format!("no `{figure}` in {report}"))?;
+            let measured = number(spread, statistic).ok_or_else(|| format!("no `{statistic}` of {figure}"))?;
+            Ok((format!("{figure} {statistic} {measured:.3}; the bar is {bar}"), measured <= *bar))
+        })
+        .collect()
+}
+
+/// The best of some runs on one core. Stops as soon as the bar is reached.
+fn speed(repository: &Repository, arguments: &[&str], least: f64) -> Result<f64, Failure> {
+    let status = fs::read_to_string("/proc/self/status").map_err(|e| format!("/proc/self/status: {e}"))?;
+    let core = first_core(&status).ok_or("no Cpus_allowed_list")?;
+    let mut best = 0.0_f64;
+    for _ in 0..RUNS {
+        let mut timed = repository.command("bash");
+        timed.env("LC_ALL", "C").args(["-c", "TIMEFORMAT='%R %U %S'; time \"$@\"", "time"]);
+        timed.args(["taskset", "-c", core, &stampfly(repository), "campaign", "--json", "--flights", TIMED]);
+        let (report, times) = capture(timed.args(arguments))?;
+        let factor = number(&report, "realtime_factor").ok_or("no `realtime_factor`")?;
+        let share = processor_share(&times).ok_or_else(|| format!("no times in `{times}`"))?;
+        best = best.max(factor / share);
+        if best >= least {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// Processor time, as a part of the time that passed, from `real user system`.
+fn processor_share(times: &str) -> Option<f64> {
+    let numbers: Vec<f64> = times.lines().last()?.split(' ').map(|word| word.parse().ok()).collect::<Option<_>>()?;
+    let [real, user, system] = numbers[..] else { return None };
+    (real > 0.0 && user > 0.0).then_some((user + system) / real)
+}
+
+/// The first core that we may use.
+fn first_core(status: &str) -> Option<&str> {
+    let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"))?;
+    list.trim().split([',', '-']).next()
+}
+
+/// What follows a key in a JSON object.
+fn value<'j>(json: &'j str, key: &str) -> Option<&'j str> {
+    let (_, rest) = json.split_once(&format!("\"{key}\""))?;
+    Some(rest.trim_start().strip_prefix(':')?.trim_start())
+}
+
+fn number(json: &str, key: &str) -> Option<f64> {
+    value(json, key)?.split([',', '}']).next()?.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(overshoot: f64) -> String {
+        let figures = BARS.iter().filter(|(mission, ..)| *mission == "square").map(|(_, figure, ..)| {
+            let worst = if *figure == "takeoff_overshoot_m" { overshoot } else { 0.01 };
+            format!("\"{figure}\":{{\"max\":{worst},\"p50\":0.0,\"p95\":9.0}}")
+        });
+        format!("{{{},\"realtime_factor\":363.5}}", figures.collect::<Vec<_>>().join(","))
+    }
+
+    #[test]
+    fn a_bar_is_kept_or_not() {
+        let broken = |report: &str| check("square", report).expect("complete").iter().filter(|(_, kept)| !kept).count();
+        assert_eq!(check("square", &report(0.1)).map(|bars| bars.len()), Ok(6));
+        assert_eq!((broken(&report(0.1)), broken(&report(0.1001))), (0, 1));
+        // A figure that no flight has is `null`.
+        assert!(check("square", &report(0.1).replace("{\"max\":0.1,\"p50\":0.0,\"p95\":9.0}", "null")).is_err());
+        assert!(check("square", "{}").is_err());
+    }
+
+    #[test]
+    fn the_hover_is_judged_by_most_flights() {
+        let report = "{\"hover_drift_m\":{\"max\":0.4,\"p50\":0.1,\"p95\":0.25}}";
+        assert!(check("hover", report).is_ok_and(|bars| bars.len() == 1 && bars[0].1));
+    }
+
+    #[test]
+    fn reads_numbers_and_cores() {
+        assert_eq!(number(&report(0.0), "realtime_factor"), Some(363.5));
+        assert_eq!(first_core("Name: x\nCpus_allowed_list:\t2-3,7\n"), Some("2"));
+        assert_eq!(first_core("Name: x\n"), None);
+        assert_eq!(processor_share("noise\n4.000 0.900 0.100\n"), Some(0.25));
+        assert_eq!(processor_share("4.000 0.900"), None);
+    }
+}
