@@ -11,6 +11,7 @@ use stampfly_board::wiring;
 use stampfly_drivers::Timebase;
 use stampfly_types::Micros;
 use stampfly_types::messages::{ButtonEvent, ButtonGesture, SystemMode};
+use static_cell::ConstStaticCell;
 
 /// A gesture on the button that is older was meant for something else.
 const FRESH: Micros = Micros::from_millis(100);
@@ -23,15 +24,17 @@ pub struct Memory {
     /// The newest sample of every topic.
     pub newest: Newest,
     /// The last flight.
-    pub black_box: BlackBox<ROOM>,
+    pub black_box: &'static mut BlackBox<ROOM>,
     /// When the vehicle was last seen armed.
     armed_at: Micros,
 }
 
 impl Memory {
-    /// Nothing yet.
-    pub const fn new(taps: wiring::Taps<'static>) -> Self {
-        Self { taps, newest: Newest::new(), black_box: BlackBox::new(), armed_at: Micros::ZERO }
+    /// Nothing yet. Once only.
+    pub fn new(taps: wiring::Taps<'static>) -> Self {
+        // Not on anybody's stack on its way here: it is as large as some.
+        static BLACK_BOX: ConstStaticCell<BlackBox<ROOM>> = ConstStaticCell::new(BlackBox::new());
+        Self { taps, newest: Newest::new(), black_box: BLACK_BOX.take(), armed_at: Micros::ZERO }
     }
 
     /// Takes in what was published since the last time.
