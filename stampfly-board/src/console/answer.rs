@@ -1,7 +1,7 @@
 //! What is asked → a reply, and what only the board can do.
 
 use super::command::{COMMANDS, Command};
-use super::{MotorTestRefused, Newest};
+use super::Newest;
 use crate::parameters::{self, PARAMETERS, Parameter};
 use crate::profile::{HEADING, Profile};
 use crate::tasks::Health;
@@ -145,7 +145,8 @@ fn say(reply: &mut impl Write, what: &impl fmt::Display) -> Result<Request, fmt:
 fn if_disarmed(request: Request, context: &Context<'_>, reply: &mut impl Write) -> Result<Request, fmt::Error> {
     match context.newest.get::<SystemMode>(wiring::Id::system_mode) {
         Some((_, mode)) if !mode.armed => Ok(request),
-        _ => say(reply, &MotorTestRefused::Armed),
+        Some(_) => say(reply, &"the vehicle is armed"),
+        None => say(reply, &"nobody knows yet whether the vehicle is armed"),
     }
 }
 
