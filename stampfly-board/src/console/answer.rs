@@ -1,7 +1,7 @@
 //! What is asked → a reply, and what only the board can do.
 
-use super::command::{COMMANDS, Command};
 use super::Newest;
+use super::command::{COMMANDS, Command};
 use crate::parameters::{self, PARAMETERS, Parameter};
 use crate::profile::{HEADING, Profile};
 use crate::tasks::Health;
