@@ -86,7 +86,7 @@ fn radio() {
 
 /// Every byte that chips can send.
 fn chips() {
-    if let Some(group) = bmi270::codec::decode_frames(&black_box([0; 52])) {
+    if let Some(group) = bmi270::codec::decode_frames(&black_box([0; 52]), black_box(true)) {
         black_box(black_box(Decimator::default()).push(&group));
     }
     black_box(bmi270::codec::Status::decode(&black_box([0; 14])).celsius());
