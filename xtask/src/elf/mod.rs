@@ -69,6 +69,8 @@ pub struct Program {
     pub symbols: BTreeMap<u64, Symbol>,
     /// Of all sections together, what no symbol covers included. Without the stack, which is what is left over.
     pub sections: Sizes,
+    /// Constants in flash, with their addresses.
+    constants: Vec<(u64, Vec<u8>)>,
     /// Values of the linker's own symbols.
     linker: BTreeMap<String, u64>,
 }
@@ -81,6 +83,9 @@ impl Program {
         let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
         let mut program = Self::default();
         for section in file.sections() {
+            if section.kind() == SectionKind::ReadOnlyData || section.name().is_ok_and(|name| name == ".rodata") {
+                program.constants.push((section.address(), section.data().map_err(|e| fail(&e))?.to_vec()));
+            }
             let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
             let is_gap = matches!(section.name(), Ok(".stack" | ".text_gap"));
             if let (Some(place), false, true) = (place(&section), is_gap, sh_flags & u64::from(SHF_ALLOC) != 0) {
@@ -111,6 +116,20 @@ impl Program {
             program.symbols.insert(symbol.address(), thing);
         }
         if program.symbols.is_empty() { Err(fail(&"no symbols")) } else { Ok(program) }
+    }
+
+    /// The place in a source file that a `core::panic::Location` at this address tells: `FILE:LINE`.
+    pub fn location(&self, address: u64) -> Option<String> {
+        let word = |index: u64| Some(u32::from_le_bytes(self.bytes(address + 4 * index, 4)?.try_into().ok()?));
+        let file = std::str::from_utf8(self.bytes(u64::from(word(0)?), u64::from(word(1)?))?).ok()?;
+        file.ends_with(".rs").then(|| Some(format!("{file}:{}", word(2)?)))?
+    }
+
+    fn bytes(&self, address: u64, size: u64) -> Option<&[u8]> {
+        self.constants.iter().find_map(|(start, bytes)| {
+            let offset = usize::try_from(address.checked_sub(*start)?).ok()?;
+            bytes.get(offset..offset.checked_add(usize::try_from(size).ok()?)?)
+        })
     }
 
     /// The symbol that this address lies in, and where it begins.
@@ -191,12 +210,22 @@ pub mod tests {
     /// Functions at 16, 32 ...: name, frame, whom it calls, calls through a pointer.
     pub fn program(functions: &[(&str, u64, &[u64], usize)]) -> Program {
         let symbols = functions.iter().zip(1..).map(|((name, frame, calls, indirect), index)| {
-            let code =
-                Code { frame: *frame, calls: calls.iter().copied().collect(), indirect: *indirect, unbounded: false };
+            let constants = calls.iter().map(|call| (*call, Vec::new())).collect();
+            let calls = calls.iter().copied().collect();
+            let code = Code { frame: *frame, calls, constants, indirect: *indirect, unbounded: false };
             let (name, owner) = ((*name).to_owned(), owning_crate(name));
             (16 * index, Symbol { name, owner, size: 16, place: Place::Flash, code: Some(code) })
         });
         Program { symbols: symbols.collect(), ..Program::default() }
+    }
+
+    #[test]
+    fn a_location_is_read() {
+        let mut bytes = vec![0x10, 0x10, 0, 0, 4, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0];
+        bytes.extend(b"a.rsx");
+        let program = Program { constants: vec![(0x1000, bytes)], ..Program::default() };
+        assert_eq!(program.location(0x1000).as_deref(), Some("a.rs:7"));
+        assert_eq!((program.location(0x1004), program.location(0x2000)), (None, None));
     }
 
     #[test]

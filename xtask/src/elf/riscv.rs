@@ -12,6 +12,8 @@ pub struct Code {
     pub frame: u64,
     /// Functions it calls or jumps to.
     pub calls: BTreeSet<u64>,
+    /// For each of those calls, in order: whom, and the arguments that are constants.
+    pub constants: Vec<(u64, Vec<u64>)>,
     /// Calls through a pointer.
     pub indirect: usize,
     /// It lowers the stack pointer by what only it knows when it runs.
@@ -20,6 +22,8 @@ pub struct Code {
 
 const SP: usize = 2;
 const RA: usize = 1;
+/// Registers that arguments are passed in.
+const ARGUMENTS: std::ops::Range<usize> = 10..18;
 
 /// Sign-extends the lowest `bits` of a number.
 fn signed(value: u32, bits: u32) -> i64 {
@@ -70,6 +74,8 @@ impl Reader {
         let target = target as u64 & 0xFFFF_FFFF;
         if !(self.start..self.end).contains(&target) {
             self.code.calls.insert(target);
+            let arguments = self.known[ARGUMENTS].iter().flatten().map(|value| *value as u64 & 0xFFFF_FFFF);
+            self.code.constants.push((target, arguments.collect()));
         }
     }
 
@@ -194,10 +200,16 @@ mod tests {
     fn frames_and_calls() {
         // addi sp, sp, -32; auipc ra, 1; jalr ra, 8(ra); addi sp, sp, 32; ret
         let code = read(&words(&[0xfe01_0113, 0x0000_1097, 0x0080_80e7, 0x0201_0113, 0x0000_8067]), 0x1000);
-        assert_eq!(code, Code { frame: 32, calls: [0x200c].into(), indirect: 0, unbounded: false });
+        assert_eq!(
+            code,
+            Code { frame: 32, calls: [0x200c].into(), constants: vec![(0x200c, vec![])], ..Code::default() }
+        );
         // lui t0, 13; addi t0, t0, -16; sub sp, sp, t0; jalr ra, a5
         let code = read(&words(&[0x0000_d2b7, 0xff02_8293, 0x4051_0133, 0x0007_80e7]), 0x1000);
-        assert_eq!(code, Code { frame: 0xd000 - 16, calls: [].into(), indirect: 1, unbounded: false });
+        assert_eq!(code, Code { frame: 0xd000 - 16, indirect: 1, ..Code::default() });
+        // lui a0, 13; addi a0, a0, -16; auipc ra, 1; jalr ra, 8(ra)
+        let code = read(&words(&[0x0000_d537, 0xff05_0513, 0x0000_1097, 0x0080_80e7]), 0x1000);
+        assert_eq!(code.constants, [(0x2010, vec![0xd000 - 16])]);
         // jalr zero, a5: perhaps the last call of a function, without a way back
         assert_eq!(read(&words(&[0x0007_8067]), 0).indirect, 1);
         // sub sp, sp, a0
