@@ -142,7 +142,8 @@ impl Sink for Window<'_> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), Full> {
         let wanted = bytes.get(self.skip..).unwrap_or_default();
         self.skip = self.skip.saturating_sub(bytes.len());
-        let mut room = self.bytes.borrow_mut();
+        // Nobody looks into it while it is written.
+        let mut room = self.bytes.try_borrow_mut().map_err(|_| Full)?;
         let fits = wanted.len().min(PIECE - room.len());
         room.extend_from_slice(wanted.get(..fits).unwrap_or_default()).map_err(|_| Full)?;
         if fits == wanted.len() { Ok(()) } else { Err(Full) }
