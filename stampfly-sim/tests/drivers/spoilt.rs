@@ -6,27 +6,28 @@ use stampfly_sim::chips::BusError;
 use stampfly_sim::time::Clock;
 use stampfly_types::Micros;
 
+/// What becomes of the answer of a register.
+pub type Change = Box<dyn Fn(u16, &mut [u8])>;
+
 /// What is wrong with the bus.
-#[derive(Clone, Copy)]
 pub struct Spoil {
     /// How much longer every transfer takes.
     pub delay: Micros,
-    /// What becomes of the answer of a register.
-    pub change: fn(register: u16, answer: &mut [u8]),
+    pub change: Option<Change>,
 }
 
 impl Spoil {
     /// Nothing.
-    pub const NOT: Self = Self { delay: Micros::ZERO, change: |_, _| () };
+    pub const NOT: Self = Self { delay: Micros::ZERO, change: None };
 
     /// Answers are changed.
-    pub const fn changed(change: fn(u16, &mut [u8])) -> Self {
-        Self { change, ..Self::NOT }
+    pub fn changed(change: Change) -> Self {
+        Self { change: Some(change), ..Self::NOT }
     }
 
     /// Every transfer takes so much longer.
     pub const fn slow(delay: Micros) -> Self {
-        Self { delay, ..Self::NOT }
+        Self { delay, change: None }
     }
 }
 
@@ -43,7 +44,9 @@ impl<B> Spoilt<B> {
     }
 
     fn answer(&self, register: &[u8], answer: &mut [u8]) {
-        (self.spoil.change)(register.iter().fold(0, |register, byte| register << 8 | u16::from(*byte)), answer);
+        if let Some(change) = &self.spoil.change {
+            change(register.iter().fold(0, |register, byte| register << 8 | u16::from(*byte)), answer);
+        }
     }
 }
 

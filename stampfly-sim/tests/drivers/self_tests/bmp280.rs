@@ -1,6 +1,6 @@
 //! BMP280.
 
-use super::{Bench, Change, FAILED, Outcome, configuration, identification};
+use super::{Bench, FAILED, Outcome, configuration, identification, put};
 use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::Barometer;
@@ -32,111 +32,34 @@ fn ends_in_time() {
 
 #[test]
 fn says_what_failed() {
-    // The result: status, control, configuration, nothing, pressure, temperature.
+    const NO_SAMPLE: Outcome = Err(ChipError::NoSample);
+    const DATA: Outcome = Err(ChipError::Data);
     says!(
         barometer,
         60,
         [
-            (
-                |register, answer| if register == 0xD0 {
-                    answer[0] = 0x55
-                },
-                identification(0x55)
-            ),
-            (
-                |register, answer| if register == 0x88 {
-                    answer.fill(0)
-                },
-                Err(ChipError::Data)
-            ),
-            (
-                |register, answer| if register == 0x88 {
-                    answer.fill(0xFF)
-                },
-                Err(ChipError::Data)
-            ),
-            // T1, P1.
-            (
-                |register, answer| if register == 0x88 {
-                    answer[..2].fill(0)
-                },
-                Err(ChipError::Data)
-            ),
-            (
-                |register, answer| if register == 0x88 {
-                    answer[6..8].fill(0)
-                },
-                Err(ChipError::Data)
-            ),
-            // Copies its calibration for ever.
-            (
-                |register, answer| if (register, answer.len()) == (0xF3, 1) {
-                    answer[0] = 1
-                },
-                configuration(1)
-            ),
-            (
-                |register, answer| if register == 0xF4 {
-                    answer[0] = 0x24
-                },
-                configuration(0x24)
-            ),
-            (
-                |register, answer| if register == 0xF4 {
-                    answer[1] = 0
-                },
-                configuration(0)
-            ),
+            (put(0xD0, 1, 0, &[0x55]), identification(0x55)),
+            // No calibration, no T1, no P1; P1 that makes any pressure too high.
+            (put(0x88, 24, 0, &[0; 24]), DATA),
+            (put(0x88, 24, 0, &[0xFF; 24]), DATA),
+            (put(0x88, 24, 0, &[0, 0]), DATA),
+            (put(0x88, 24, 6, &[0, 0]), DATA),
+            (put(0x88, 24, 6, &[1, 0]), FAILED),
+            // Copies its calibration for ever; keeps neither oversampling nor filter.
+            (put(0xF3, 1, 0, &[1]), configuration(1)),
+            (put(0xF4, 2, 0, &[0x24]), configuration(0x24)),
+            (put(0xF4, 2, 1, &[0]), configuration(0)),
             // Begins no conversion, ends none.
-            (
-                |register, answer| if (register, answer.len()) == (0xF3, 2) {
-                    answer.fill(0)
-                },
-                Err(ChipError::NoSample)
-            ),
-            (
-                |register, answer| if answer.len() == 10 && register == 0xF3 {
-                    answer[0] = 8
-                },
-                Err(ChipError::NoSample)
-            ),
-            // Never measured; either one at an end; 90 °C.
-            (
-                |_, answer| if answer.len() == 10 {
-                    answer[4..7].copy_from_slice(&[0x80, 0, 0])
-                },
-                FAILED
-            ),
-            (
-                |_, answer| if answer.len() == 10 {
-                    answer[7..].copy_from_slice(&[0x80, 0, 0])
-                },
-                FAILED
-            ),
-            (
-                |_, answer| if answer.len() == 10 {
-                    answer[4..7].fill(0)
-                },
-                FAILED
-            ),
-            (
-                |_, answer| if answer.len() == 10 {
-                    answer[4..7].fill(0xFF)
-                },
-                FAILED
-            ),
-            (
-                |_, answer| if answer.len() == 10 {
-                    answer[7..].fill(0)
-                },
-                FAILED
-            ),
-            (
-                |_, answer| if answer.len() == 10 {
-                    answer[7..].copy_from_slice(&[0xB1, 0x40, 0])
-                },
-                FAILED
-            ),
+            (put(0xF3, 2, 0, &[0, 0]), NO_SAMPLE),
+            (put(0xF3, 10, 0, &[8]), NO_SAMPLE),
+            // Pressure and temperature: never measured, at either end; 90 °C.
+            (put(0xF3, 10, 4, &[0x80, 0, 0]), FAILED),
+            (put(0xF3, 10, 7, &[0x80, 0, 0]), FAILED),
+            (put(0xF3, 10, 4, &[0; 3]), FAILED),
+            (put(0xF3, 10, 4, &[0xFF; 3]), FAILED),
+            (put(0xF3, 10, 7, &[0; 3]), FAILED),
+            (put(0xF3, 10, 7, &[0xFF; 3]), FAILED),
+            (put(0xF3, 10, 7, &[0xB1, 0x40, 0]), FAILED),
         ]
     );
 }

@@ -1,6 +1,6 @@
 //! INA3221.
 
-use super::{Bench, Change, FAILED, Outcome, configuration, identification};
+use super::{Bench, FAILED, Outcome, configuration, identification, put};
 use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::PowerMonitor;
@@ -39,61 +39,16 @@ fn says_what_failed() {
         monitor,
         30,
         [
-            (
-                |register, answer| if register == 0xFE {
-                    answer.fill(0)
-                },
-                identification(0)
-            ),
-            (
-                |register, answer| if register == 0xFF {
-                    answer[1] = 0x60
-                },
-                identification(0x3260)
-            ),
-            (
-                |register, answer| if register == 0 {
-                    answer.copy_from_slice(&[0x71, 0x27])
-                },
-                configuration(0x71)
-            ),
-            (
-                |register, answer| if register == 0x0F {
-                    answer[1] &= !1
-                },
-                Err(ChipError::NoSample)
-            ),
-            // 0 V, −8 mV, 26.008 V, the scale's end.
-            (
-                |register, answer| if register == 4 {
-                    answer.fill(0)
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 4 {
-                    answer.copy_from_slice(&[0xFF, 0xF8])
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 4 {
-                    answer.copy_from_slice(&[0x65, 0x98])
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 3 {
-                    answer.copy_from_slice(&[0x7F, 0xF8])
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 3 {
-                    answer.copy_from_slice(&[0x80, 0x00])
-                },
-                FAILED
-            ),
+            (put(0xFE, 2, 0, &[0, 0]), identification(0)),
+            (put(0xFF, 2, 1, &[0x60]), identification(0x3260)),
+            (put(0x00, 2, 0, &[0x71, 0x27]), configuration(0x71)),
+            (put(0x0F, 2, 1, &[0]), Err(ChipError::NoSample)),
+            // 0 V, −8 mV, 26.008 V; either end of the shunt's scale.
+            (put(4, 2, 0, &[0, 0]), FAILED),
+            (put(4, 2, 0, &[0xFF, 0xF8]), FAILED),
+            (put(4, 2, 0, &[0x65, 0x98]), FAILED),
+            (put(3, 2, 0, &[0x7F, 0xF8]), FAILED),
+            (put(3, 2, 0, &[0x80, 0x00]), FAILED),
         ]
     );
 }

@@ -1,6 +1,6 @@
 //! PMW3901.
 
-use super::{Bench, Change, FAILED, LAST, Outcome, configuration, identification};
+use super::{Bench, FAILED, Outcome, configuration, identification, put, restless};
 use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::OpticalFlow;
@@ -31,64 +31,21 @@ fn ends_in_time() {
 
 #[test]
 fn says_what_failed() {
-    // The burst: motion, observation, x, y, quality, sum, brightest, darkest, shutter.
     says!(
         flow,
         300,
         [
-            (
-                |register, answer| if register == 0x00 {
-                    answer[0] = 0x42
-                },
-                identification(0x42B6)
-            ),
-            (
-                |register, answer| if register == 0x5F {
-                    answer[0] = 0x49
-                },
-                identification(0x4949)
-            ),
-            (
-                |register, answer| if register == 0x47 {
-                    answer[0] = 0
-                },
-                configuration(0)
-            ),
-            // Another value every time it is asked; one that stays counts as one that cannot be read back. Two banks have
-            // such a register, each is asked twice: the sixth answer is the one that the second start ends with.
-            (
-                |register, answer| {
-                    if register == 0x4E {
-                        LAST.set(LAST.get() % 100 + 1);
-                        answer[0] = LAST.get();
-                    }
-                },
-                configuration(6),
-            ),
-            (
-                |register, answer| if register == 0x16 {
-                    answer.fill(0xFF)
-                },
-                Err(ChipError::Data)
-            ),
-            (
-                |register, answer| if register == 0x16 {
-                    answer[8..10].copy_from_slice(&[0x10, 0x11])
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 0x16 {
-                    answer[7..10].fill(0)
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 0x16 {
-                    answer[10..].fill(0)
-                },
-                FAILED
-            ),
+            (put(0x00, 1, 0, &[0x42]), identification(0x42B6)),
+            (put(0x5F, 1, 0, &[0x49]), identification(0x4949)),
+            (put(0x47, 1, 0, &[0]), configuration(0)),
+            // A value that stays counts as one that cannot be read back. Two banks have such a register, each is asked twice:
+            // the sixth answer is the one that the second start ends with.
+            (restless(0x4E), configuration(6)),
+            // The burst: brightest and darkest from place 8, the shutter from 10.
+            (put(0x16, 12, 0, &[0xFF; 12]), Err(ChipError::Data)),
+            (put(0x16, 12, 8, &[0x10, 0x11]), FAILED),
+            (put(0x16, 12, 7, &[0; 3]), FAILED),
+            (put(0x16, 12, 10, &[0; 2]), FAILED),
         ]
     );
 }
@@ -99,18 +56,8 @@ fn passes_in_the_dark() {
         flow,
         200,
         [
-            (
-                |register, answer| if register == 0x16 {
-                    answer[2..].copy_from_slice(&[0, 0, 0, 0, 0, 1, 2, 1, 0x1F, 0xFF])
-                },
-                Ok(())
-            ),
-            (
-                |register, answer| if register == 0x16 {
-                    answer[2..].copy_from_slice(&[0, 0, 0, 0, 0, 0, 0, 0, 0x1F, 0xFF])
-                },
-                Ok(())
-            ),
+            (put(0x16, 12, 2, &[0, 0, 0, 0, 0, 1, 2, 1, 0x1F, 0xFF]), Ok(())),
+            (put(0x16, 12, 2, &[0, 0, 0, 0, 0, 0, 0, 0, 0x1F, 0xFF]), Ok(())),
         ]
     );
 }

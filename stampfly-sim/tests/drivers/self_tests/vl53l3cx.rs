@@ -1,6 +1,6 @@
 //! VL53L3CX.
 
-use super::{Bench, Change, FAILED, LAST, Outcome, configuration, identification};
+use super::{Bench, FAILED, Outcome, configuration, identification, put, restless};
 use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::RangeFinder;
@@ -41,96 +41,27 @@ fn ends_in_time() {
 
 #[test]
 fn says_what_failed() {
+    const NO_SAMPLE: Outcome = Err(ChipError::NoSample);
     says!(
         range,
         500,
         [
-            (
-                |register, answer| if register == 0x10F {
-                    answer[0] = 0xCC
-                },
-                identification(0xCCAA)
-            ),
-            (
-                |register, answer| if register == 0x10F {
-                    answer[1] = 0
-                },
-                identification(0xEA00)
-            ),
-            (
-                |register, answer| if register == 0xE5 {
-                    answer[0] = 2
-                },
-                configuration(2)
-            ),
-            (
-                |register, answer| if register == 0x5E {
-                    answer[2] = 0x0B
-                },
-                configuration(0x0B)
-            ),
-            (
-                |register, answer| if register == 0xDE {
-                    answer[0] = LAST.replace(answer[0] ^ 1)
-                },
-                Err(ChipError::Data)
-            ),
-            // No measurement, none after the first, all of one number.
-            (
-                |register, answer| if register == 0x30 {
-                    answer[1] = 0
-                },
-                Err(ChipError::NoSample)
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer[2] = 7
-                },
-                Err(ChipError::NoSample)
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer.fill(7)
-                },
-                Err(ChipError::NoSample)
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer.fill(0xFF)
-                },
-                Err(ChipError::Data)
-            ),
+            (put(0x10F, 2, 0, &[0xCC]), identification(0xCCAA)),
+            (put(0x10F, 2, 1, &[0]), identification(0xEA00)),
+            (put(0xE5, 1, 0, &[2]), configuration(2)),
+            (put(0x5E, 12, 2, &[0x0B]), configuration(0x0B)),
+            (restless(0xDE), Err(ChipError::Data)),
+            // No measurement; all of one number; all the same; nobody on the bus.
+            (put(0x30, 2, 1, &[0]), NO_SAMPLE),
+            (put(0x89, 17, 2, &[7]), NO_SAMPLE),
+            (put(0x89, 17, 0, &[7; 17]), NO_SAMPLE),
+            (put(0x89, 17, 0, &[0xFF; 17]), Err(ChipError::Data)),
             // Nothing measured, laser, detector, computation, no status at all.
-            (
-                |register, answer| if register == 0x89 {
-                    answer[0] = 0
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer[0] = 2
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer[0] = 3
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer[0] = 10
-                },
-                FAILED
-            ),
-            (
-                |register, answer| if register == 0x89 {
-                    answer[0] = 31
-                },
-                FAILED
-            ),
+            (put(0x89, 17, 0, &[0]), FAILED),
+            (put(0x89, 17, 0, &[2]), FAILED),
+            (put(0x89, 17, 0, &[3]), FAILED),
+            (put(0x89, 17, 0, &[10]), FAILED),
+            (put(0x89, 17, 0, &[31]), FAILED),
         ]
     );
 }
