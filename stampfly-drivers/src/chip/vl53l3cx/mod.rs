@@ -188,7 +188,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
-    /// Resets and sets the chip up, has it keep its times and limits and measure three times. 0.18 s by default; within 21 periods
+    /// Resets and sets the chip up, has it keep its times and limits and measure three times. 0.15 s by default; within 21 periods
     /// and one second, however slow the bus.
     ///
     /// The chip's own tests of laser and detector come with every measurement: this one asks whether they passed and whether

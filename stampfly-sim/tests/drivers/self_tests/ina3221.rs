@@ -25,7 +25,7 @@ fn monitor(spoil: Spoil) -> Bench<Ina3221<I2cRegisters<Spoilt<I2cBus>>, Clock>> 
 
 #[test]
 fn tells_a_healthy_chip_from_a_broken_one() {
-    tells_healthy_from_broken!(monitor, 12, voltage, 0.03);
+    tells_healthy_from_broken!(monitor, 6, voltage, 0.03);
 }
 
 #[test]

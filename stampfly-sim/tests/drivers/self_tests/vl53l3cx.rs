@@ -30,7 +30,7 @@ fn range(spoil: Spoil) -> Bench<Range> {
 
 #[test]
 fn tells_a_healthy_chip_from_a_broken_one() {
-    tells_healthy_from_broken!(range, 250, distance, 0.01);
+    tells_healthy_from_broken!(range, 160, distance, 0.01);
 }
 
 #[test]
