@@ -6,14 +6,16 @@ use emulated::{Hand, Terminal};
 use examples::drivers::{Failure, bmp280};
 use stampfly_drivers::chip::ChipError;
 use stampfly_sim::chips::BusError;
+use stampfly_sim::time::block_on;
 
 fn main() -> Result<(), Failure<ChipError<BusError>>> {
-    let (simulation, board, _) = emulated::vehicle(None);
+    let (simulation, mut board, _) = emulated::vehicle(None);
     let script = |time: f64| {
         let climb = if time < 4.0 { 0.8 } else { 0.0 };
         (time > 1.5).then_some(Hand { climb, ..Hand::default() })
     };
     let clock = simulation.clock.clone();
+    block_on(&clock, bmp280::self_test(&mut board.i2c, clock.clone(), &mut Terminal))?;
     let found = emulated::run(&simulation, script, bmp280::run(board.i2c, clock, &mut Terminal))?;
 
     let truth = -simulation.truth().position.z;

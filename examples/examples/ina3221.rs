@@ -6,9 +6,10 @@ use emulated::{Hand, Terminal};
 use examples::drivers::{Failure, ina3221};
 use stampfly_drivers::chip::ChipError;
 use stampfly_sim::chips::BusError;
+use stampfly_sim::time::block_on;
 
 fn main() -> Result<(), Failure<ChipError<BusError>>> {
-    let (simulation, board, _) = emulated::vehicle(None);
+    let (simulation, mut board, _) = emulated::vehicle(None);
     let before = simulation.truth();
     let script = |time: f64| match time {
         0.0..1.5 => None,
@@ -17,6 +18,7 @@ fn main() -> Result<(), Failure<ChipError<BusError>>> {
         _ => None,
     };
     let clock = simulation.clock.clone();
+    block_on(&clock, ina3221::self_test(&mut board.i2c, clock.clone(), &mut Terminal))?;
     let found = emulated::run(&simulation, script, ina3221::run(board.i2c, clock, &mut Terminal))?;
 
     let after = simulation.truth();

@@ -11,10 +11,15 @@ use stampfly_sim::plant::Pose;
 fn main() -> Result<(), Failure<ChipError<BusError>>> {
     let mut pose = Pose::hovering(1.0);
     (pose.velocity.x, pose.velocity.y) = (0.6, -0.3);
-    let (simulation, board, _) = emulated::vehicle(Some(pose));
+    let (simulation, mut board, _) = emulated::vehicle(Some(pose));
     let clock = simulation.clock.clone();
     let level = |_| Some(Hand::default());
-    let found = emulated::run(&simulation, level, pmw3901::run(board.flow, clock, &mut Terminal))?;
+    // The self test in flight, too: meanwhile nobody else would hold the vehicle.
+    let example = async {
+        pmw3901::self_test(&mut board.flow, clock.clone(), &mut Terminal).await?;
+        pmw3901::run(board.flow, clock, &mut Terminal).await
+    };
+    let found = emulated::run(&simulation, level, example)?;
 
     let truth = simulation.truth().position;
     println!("in truth it is {:.2} m to the north and {:.2} m to the east of its start", truth.x, truth.y);

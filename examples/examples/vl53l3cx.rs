@@ -15,9 +15,14 @@ fn main() -> Result<(), Failure<ChipError<BusError>>> {
         let pitch = if (2.0..2.7).contains(&time) { -0.7 } else { 0.0 };
         Some(Hand { climb: if time < 2.0 { 0.1 } else { 0.3 }, pitch, ..Hand::default() })
     };
-    let (buses, pins) = ([board.i2c.clone(), board.i2c], [board.shutdown_bottom, board.shutdown_front]);
+    let (mut buses, mut pins) = ([board.i2c.clone(), board.i2c], [board.shutdown_bottom, board.shutdown_front]);
     let clock = simulation.clock.clone();
-    let found = emulated::run(&simulation, script, vl53l3cx::run(buses, pins, clock, &mut Terminal))?;
+    // The self test in flight, too: meanwhile nobody else would hold the vehicle.
+    let example = async {
+        vl53l3cx::self_test(buses.each_mut(), pins.each_mut(), clock.clone(), &mut Terminal).await?;
+        vl53l3cx::run(buses, pins, clock, &mut Terminal).await
+    };
+    let found = emulated::run(&simulation, script, example)?;
 
     let truth = -simulation.truth().position.z;
     println!("in truth it is {truth:.2} m above the floor");

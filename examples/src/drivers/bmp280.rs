@@ -29,6 +29,19 @@ pub struct Found {
     pub pressure: f32,
 }
 
+/// Has the driver look whether the chip measures at all.
+///
+/// # Errors
+/// Those of [`Bmp280::self_test`].
+pub async fn self_test<I: I2c, T: Timebase>(
+    i2c: I,
+    clock: T,
+    out: &mut impl Write,
+) -> Result<(), Failure<ChipError<I::Error>>> {
+    Bmp280::new(i2c, Bmp280::SDO_LOW, clock, Config::default()).self_test().await?;
+    Ok(writeln!(out, "self test: passed")?)
+}
+
 /// Shows the sensor for six seconds, the first of which makes the zero.
 ///
 /// # Errors

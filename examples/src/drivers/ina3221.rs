@@ -27,6 +27,19 @@ pub struct Found {
     pub charge: f32,
 }
 
+/// Has the driver look whether the chip measures at all, and whether there is a battery.
+///
+/// # Errors
+/// Those of [`Ina3221::self_test`].
+pub async fn self_test<I: I2c, T: Timebase>(
+    i2c: I,
+    clock: T,
+    out: &mut impl Write,
+) -> Result<(), Failure<ChipError<I::Error>>> {
+    Ina3221::new(i2c, Ina3221::A0_GROUND, clock, Config::default()).self_test().await?;
+    Ok(writeln!(out, "self test: passed")?)
+}
+
 /// Shows the battery for five seconds.
 ///
 /// # Errors

@@ -26,6 +26,19 @@ pub struct Found {
     pub good: f32,
 }
 
+/// Has the driver look whether the chip takes pictures at all, in whatever light.
+///
+/// # Errors
+/// Those of [`Pmw3901::self_test`].
+pub async fn self_test<S: SpiDevice, T: Timebase>(
+    spi: S,
+    clock: T,
+    out: &mut impl Write,
+) -> Result<(), Failure<ChipError<S::Error>>> {
+    Pmw3901::new(spi, clock, AxisMap::STAMPFLY_FLOW, Config::default()).self_test().await?;
+    Ok(writeln!(out, "self test: passed")?)
+}
+
 /// Shows the sensor for five seconds.
 ///
 /// # Errors

@@ -32,6 +32,25 @@ pub struct Found {
     pub seen: [u32; 2],
 }
 
+/// Has the drivers look whether the chips measure at all, one after the other. Buses and pins as for [`run`].
+///
+/// # Errors
+/// Those of [`Vl53l3cx::self_test`], of either.
+pub async fn self_test<I: I2c, X: OutputPin, T: Timebase>(
+    [bus_down, bus_ahead]: [I; 2],
+    [shutdown_down, shutdown_ahead]: [X; 2],
+    clock: T,
+    out: &mut impl Write,
+) -> Result<(), Failure<ChipError<I::Error>>> {
+    let boot = BootAddress::new();
+    let mut down = Vl53l3cx::new(bus_down, shutdown_down, &boot, DOWN, clock.clone(), Config::default());
+    let mut ahead = Vl53l3cx::new(bus_ahead, shutdown_ahead, &boot, AHEAD, clock, Config::default());
+    down.self_test().await?;
+    writeln!(out, "self test of the one that looks down: passed")?;
+    ahead.self_test().await?;
+    Ok(writeln!(out, "self test of the one that looks ahead: passed")?)
+}
+
 /// Shows both for five seconds. The buses are handles of the same one; the pins are wired to each chip's XSHUT.
 ///
 /// # Errors

@@ -11,6 +11,10 @@ use examples::drivers::ina3221;
 #[esp_rtos::main]
 async fn main(_spawner: Spawner) {
     let board = Board::start();
-    let bus = i2c::Bus::start(board.i2c, board.i2c_pins).await;
-    end(ina3221::run(bus, Clock, &mut Printer).await);
+    let mut bus = i2c::Bus::start(board.i2c, board.i2c_pins).await;
+    let mut out = Printer;
+    if let Err(failure) = ina3221::self_test(&mut bus, Clock, &mut out).await {
+        return end::<(), _>(Err(failure));
+    }
+    end(ina3221::run(bus, Clock, &mut out).await);
 }

@@ -11,6 +11,10 @@ use examples::drivers::pmw3901;
 #[esp_rtos::main]
 async fn main(_spawner: Spawner) {
     let mut bus = spi::Bus::start(Board::start().spi);
-    let (_, flow, _) = bus.devices();
-    end(pmw3901::run(flow, Clock, &mut Printer).await);
+    let (_, mut flow, _) = bus.devices();
+    let mut out = Printer;
+    if let Err(failure) = pmw3901::self_test(&mut flow, Clock, &mut out).await {
+        return end::<(), _>(Err(failure));
+    }
+    end(pmw3901::run(flow, Clock, &mut out).await);
 }

@@ -14,8 +14,12 @@ use stampfly_drivers::shared::SharedI2c;
 async fn main(_spawner: Spawner) {
     let board = Board::start();
     let mut bus = SharedI2c::new(i2c::Bus::start(board.i2c, board.i2c_pins).await);
-    let (buses, _) = bus.split();
+    let (mut buses, _) = bus.split();
     let asleep = |pin: AnyPin<'static>| Output::new(pin, Level::Low, OutputConfig::default());
-    let shutdown = [asleep(board.range.bottom_enable.into()), asleep(board.range.front_enable.into())];
-    end(vl53l3cx::run(buses, shutdown, Clock, &mut Printer).await);
+    let mut shutdown = [asleep(board.range.bottom_enable.into()), asleep(board.range.front_enable.into())];
+    let mut out = Printer;
+    if let Err(failure) = vl53l3cx::self_test(buses.each_mut(), shutdown.each_mut(), Clock, &mut out).await {
+        return end::<(), _>(Err(failure));
+    }
+    end(vl53l3cx::run(buses, shutdown, Clock, &mut out).await);
 }

@@ -32,7 +32,7 @@ pub enum ChipError<E> {
     },
     /// The chip lost its configuration since the last call. The next call sets it up again.
     Restarted,
-    /// The self test failed.
+    /// The self test failed: the chip answers, but does not measure.
     SelfTest,
     /// The chip answered with data that cannot be.
     Data,

@@ -23,6 +23,10 @@
 //!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s do not, and it is asked once a second.
 //! * No conversion is delivered twice, also not when a command to the chip is garbled on its way.
 //! * A start may fail or be dropped at any point; the next one begins from whatever state that left.
+//! * `self_test` says whether the chip measures at all: by the chip's own test, or else by its identity, its settings read
+//!   back and one measurement that the part can physically give. It ends in bounded time, and `next` works after it as
+//!   before. A measurement that cannot be is [`ChipError::SelfTest`]; whatever else failed has its own error. Call it on
+//!   the ground: samples are missing meanwhile.
 //!
 //! # What they expect of the board
 //! On a shared SPI every chip select has to be high before the first transfer to any chip: one that floats low answers

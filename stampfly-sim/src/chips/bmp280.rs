@@ -16,7 +16,8 @@
 //!
 //! *Unverified*: that the chip acknowledges, ignores writes and shows a zero calibration in the two milliseconds of
 //! its start-up (DS table 2 gives only the time); the noise per oversampling, which is scaled from this project's
-//! static records at ×4 and filter 4 by the root of the number of samples.
+//! static records at ×4 and filter 4 by the root of the number of samples; that a dead sensing element leaves the data
+//! registers at their reset value, while conversions go on.
 
 use super::{Chip, I2cChip};
 use crate::noise::{Noise, Stream};
@@ -110,6 +111,8 @@ pub struct Bmp280 {
     config: u8,
     /// A mode written during a conversion.
     pending: Option<u8>,
+    /// The sensing element feels nothing.
+    broken: bool,
     last_conversion: Micros,
     /// Pressure and temperature as the converter gives them.
     data: [u32; 2],
@@ -137,6 +140,7 @@ impl Bmp280 {
             control: 0,
             config: 0,
             pending: None,
+            broken: false,
             last_conversion: now,
             data: [SKIPPED; 2],
             shadow: [SKIPPED; 2],
@@ -189,6 +193,7 @@ impl Bmp280 {
         let counts = [samples, temperature_samples];
         self.data = core::array::from_fn(|i| match counts[i] {
             0 => SKIPPED,
+            _ if self.broken => SKIPPED,
             // 16 bits and one more per doubling; 20 with the filter (DS 3.3.1, 3.3.2, 3.3.3).
             _ if coefficient > 1.0 => filtered[i] as u32,
             count => filtered[i] as u32 & !((16 / count as u32) - 1),
@@ -275,6 +280,10 @@ impl Chip for Bmp280 {
 
     fn set_id(&mut self, id: u16) {
         self.id = id as u8;
+    }
+
+    fn set_broken(&mut self, broken: bool) {
+        self.broken = broken;
     }
 }
 

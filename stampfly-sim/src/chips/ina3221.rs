@@ -16,7 +16,8 @@
 //! by a write to the configuration that does not power down (DS 8.6.2.15).
 //!
 //! Not modelled: alerts and the sum. *Unverified*: that channels 1 and 3, which are connected to nothing, read zero;
-//! that a read goes on with the same register after two bytes; that half a word written is ignored.
+//! that a read goes on with the same register after two bytes; that half a word written is ignored; that a dead converter
+//! reads zero and is ready all the same.
 
 use super::{Chip, I2cChip};
 use crate::noise::{Noise, Stream};
@@ -72,6 +73,8 @@ pub struct Ina3221 {
     registers: [u16; 18],
     /// Begin of the running conversion; none when powered down or done.
     begun: Option<Micros>,
+    /// The converter feels nothing.
+    broken: bool,
     pointer: u16,
     /// First byte of a word that is being written.
     half: u8,
@@ -85,7 +88,16 @@ impl Ina3221 {
         let now = clock.now();
         let pace = Schedule::new(now, RATE, 0.02, &mut noise).period() * RATE * 1e-6;
         let physics = PowerPhysics::new(world, now, noise);
-        Self { physics, pace, part: 0x3220, registers: AFTER_RESET, begun: Some(now), pointer: 0, half: 0 }
+        Self {
+            physics,
+            pace,
+            part: 0x3220,
+            registers: AFTER_RESET,
+            begun: Some(now),
+            broken: false,
+            pointer: 0,
+            half: 0,
+        }
     }
 
     fn configuration(&self) -> u16 {
@@ -125,7 +137,8 @@ impl Ina3221 {
         if self.configuration() & CHANNEL_TWO == 0 {
             return;
         }
-        let [volts, amperes] = self.physics.mean(first, first + length);
+        let means = self.physics.mean(first, first + length);
+        let [volts, amperes] = if self.broken { [0.0; 2] } else { means };
         let word = |value: f64| ((value.round().clamp(-4_096.0, 4_095.0) as i16) << 3) as u16;
         let [shunt, bus] = self.measures();
         if shunt {
@@ -179,6 +192,10 @@ impl Chip for Ina3221 {
 
     fn set_id(&mut self, id: u16) {
         self.part = id;
+    }
+
+    fn set_broken(&mut self, broken: bool) {
+        self.broken = broken;
     }
 }
 

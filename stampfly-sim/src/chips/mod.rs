@@ -68,8 +68,8 @@ pub trait Chip: fmt::Debug {
     fn reset(&mut self, now: Micros);
     /// Changes what the identity register says.
     fn set_id(&mut self, id: u16);
-    /// Breaks or mends the sensing element: the chip answers as before but feels nothing, and its self tests fail. Of
-    /// the emulators those of chips with a self test do this; the others take no notice.
+    /// Breaks or mends the sensing element: the chip answers as before but feels nothing, and its self tests, or those of
+    /// its driver, fail. Every emulator says what that looks like; a chip that feels nothing anyway takes no notice.
     fn set_broken(&mut self, _broken: bool) {}
 }
 

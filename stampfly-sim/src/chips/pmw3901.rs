@@ -19,7 +19,8 @@
 //! its pause is reported to work in practice); zero motion and quality without the performance settings; 0x08 at 0x47
 //! of bank 0x0E, and what 0x67, 0x70, 0x71 and 0x73 say; which of the list's entries matter (those in which its
 //! public copies agree are wanted, in their order and with their pause); that the list can be read back; 5 ms for a reset; observation 0xBF; the picture's sum, maximum and
-//! minimum, which only follow the quality. Section numbers differ between the public revisions and are not given.
+//! minimum, which only follow the quality, also in the dark; that a dead array gives pictures without light and without
+//! an exposure. Section numbers differ between the public revisions and are not given.
 //! Not modelled: shutdown, frame capture, the motion pin.
 
 use super::{Chip, SpiChip};
@@ -96,6 +97,8 @@ pub struct Pmw3901 {
     /// Counts as the last latch left them.
     latched: [i16; 2],
     moved: bool,
+    /// The array sees nothing.
+    broken: bool,
     /// The next command may begin from here on.
     idle_until: Micros,
     /// The address byte of this transfer, when it came, and whether it came late enough.
@@ -121,6 +124,7 @@ impl Pmw3901 {
             tuned_at: now,
             latched: [0; 2],
             moved: false,
+            broken: false,
             idle_until: now,
             command: 0,
             commanded: now,
@@ -158,13 +162,23 @@ impl Pmw3901 {
 
     fn quality(&mut self, now: Micros) -> u8 {
         let quality = self.physics.quality(now);
-        if self.is_tuned() { quality } else { 0 }
+        if self.is_tuned() && !self.broken { quality } else { 0 }
+    }
+
+    /// Sum, maximum and minimum of a picture of this quality, upper and lower byte of its shutter.
+    const fn picture(&self, quality: u8) -> [u8; 5] {
+        if self.broken {
+            return [0; 5];
+        }
+        // Seven bits.
+        let light = quality / 4;
+        [light + 20, light + 40, light, if quality < DARK { 0x1F } else { 0x03 }, 0x80]
     }
 
     fn latch(&mut self, now: Micros) {
         let counts = self.physics.read(now);
         // Flow along body x is −y of the chip as it is soldered, along body y it is x.
-        self.latched = if self.is_tuned() { [counts[1] as i16, -counts[0] as i16] } else { [0; 2] };
+        self.latched = if self.is_tuned() && !self.broken { [counts[1] as i16, -counts[0] as i16] } else { [0; 2] };
         self.moved = self.latched != [0; 2];
     }
 
@@ -183,14 +197,14 @@ impl Pmw3901 {
             0x05 => y[0],
             0x06 => y[1],
             0x07 => self.quality(now),
-            0x08..=0x0A => self.quality(now) / 2 + 20 * (register as u8 - 0x08),
-            0x0B => 0x80,
+            0x08..=0x0A => {
+                let quality = self.quality(now);
+                self.picture(quality)[usize::from(register - 0x08)]
+            }
+            0x0B => self.picture(0)[4],
             0x0C => {
-                if self.quality(now) < DARK {
-                    0x1F
-                } else {
-                    0x03
-                }
+                let quality = self.quality(now);
+                self.picture(quality)[3]
             }
             0x15 => 0xBF,
             0x67 => 0x80,
@@ -204,10 +218,10 @@ impl Pmw3901 {
         self.latch(now);
         let quality = self.quality(now);
         let [[x_low, x_high], [y_low, y_high]] = self.latched.map(i16::to_le_bytes);
-        let shutter = if quality < DARK { 0x1F } else { 0x03 };
+        let [sum, maximum, minimum, shutter_high, shutter_low] = self.picture(quality);
         let moved = u8::from(self.moved) << 7;
-        let light = quality / 2;
-        self.burst = [moved, 0xBF, x_low, x_high, y_low, y_high, quality, light, light + 20, light + 40, shutter, 0x80];
+        self.burst =
+            [moved, 0xBF, x_low, x_high, y_low, y_high, quality, sum, maximum, minimum, shutter_high, shutter_low];
     }
 }
 
@@ -258,6 +272,10 @@ impl Chip for Pmw3901 {
 
     fn set_id(&mut self, id: u16) {
         self.id = id as u8;
+    }
+
+    fn set_broken(&mut self, broken: bool) {
+        self.broken = broken;
     }
 }
 

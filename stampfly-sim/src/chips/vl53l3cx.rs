@@ -17,7 +17,7 @@
 //! | 0x0086 | bit 0 clears the interrupt and lets the next measurement begin | |
 //! | 0x0087 | 0x40 measures again and again, 0x10 once, 0x80 and 0 stop | 0 |
 //! | 0x0088 | interrupt status, (2:0) | 0 |
-//! | 0x0089 | (4:0) 9 valid, 6 sigma, 4 signal, 5 phase | 0 |
+//! | 0x0089 | (4:0) 9 valid, 6 sigma, 4 signal, 5 phase, 3 no bias voltage | 0 |
 //! | 0x008B | number of the measurement, 0 to 255 and then from 128 | 0 |
 //! | 0x008C | spads that saw something, 8.8 | 0 |
 //! | 0x008E, 0x0090 | signal and ambient rate, 9.7 Mcps | 0 |
@@ -32,7 +32,7 @@
 //! acknowledges. A measurement takes the two time-outs and 14 ms more, *unverified*; the next one does not begin before
 //! the interrupt of the one before has been cleared, and not before the period is over. What is set during a
 //! measurement acts on the next one. The chip has no other memory than these registers: an edge of XSHUT or a dip of
-//! the supply brings it back to 0x29.
+//! the supply brings it back to 0x29. A dead detector is one for which no bias voltage is found, so it counts nothing.
 //!
 //! Not modelled: the histogram and several targets, thresholds, calibration data, the region of interest.
 
@@ -62,6 +62,8 @@ const MODE: u16 = 0x0087;
 const RESULT: u16 = 0x0088;
 const OSCILLATOR: u16 = 0x00DE;
 const MODEL: u16 = 0x010F;
+/// Status of a measurement without a bias voltage for the detector.
+const NO_BIAS: u8 = 3;
 /// Everything a driver may write lies below.
 const SIZE: usize = 0x0140;
 
@@ -126,6 +128,8 @@ struct State {
     begin: Option<Micros>,
     /// A measurement waits to be taken note of.
     pending: bool,
+    /// The detector feels nothing.
+    broken: bool,
     pointer: u16,
 }
 
@@ -195,6 +199,15 @@ impl State {
 
     fn measure(&mut self, begin: Micros) {
         let reading = self.physics.measure(begin + Micros(self.duration().0 / 2));
+        let number = match self.byte(RESULT + 3) {
+            255 => 128,
+            number => number + 1,
+        };
+        if self.broken {
+            self.set(RESULT, &[3, NO_BIAS, 0, number]);
+            (0x008C..0x009A).for_each(|register| self.set(register, &[0]));
+            return;
+        }
         let millimetres = (reading.distance * 1e3 + 0.5) as u16;
         let code = match reading.status {
             STATUS_VALID => 9,
@@ -206,10 +219,6 @@ impl State {
         // Light comes back with the square of the distance; 40 Mcps at ten centimetres on a bright floor.
         let metres = f64::from(reading.distance).max(0.1);
         let signal = if reading.status == STATUS_SIGNAL { 0.1 } else { 0.4 / (metres * metres) };
-        let number = match self.byte(RESULT + 3) {
-            255 => 128,
-            number => number + 1,
-        };
         let rate = |mega_counts: f64| ((mega_counts * 128.0) as u16).to_be_bytes();
         self.set(RESULT, &[3, code, 0, number]);
         self.set(0x008C, &(200u16 << 8).to_be_bytes());
@@ -235,6 +244,7 @@ impl Vl53l3cx {
             registers: Box::new([0; SIZE]),
             begin: None,
             pending: false,
+            broken: false,
             pointer: 0,
         };
         state.restart(Some(clock.now() + BOOT));
@@ -310,6 +320,10 @@ impl Chip for Vl53l3cx {
         let mut state = self.0.borrow_mut();
         state.id = id as u8;
         state.set(MODEL, &[id as u8]);
+    }
+
+    fn set_broken(&mut self, broken: bool) {
+        self.0.borrow_mut().broken = broken;
     }
 }
 

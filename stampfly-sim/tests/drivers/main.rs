@@ -13,7 +13,9 @@ mod neighbours;
 #[path = "../hover/pilot.rs"]
 mod pilot;
 mod pmw3901;
+mod self_tests;
 mod slots;
+mod spoilt;
 mod starts;
 mod vl53l3cx;
 

@@ -132,3 +132,17 @@ fn without_a_target_no_distance_is_vouched_for() {
         assert!(!sample.data.valid && sample.data.status == 2, "{sample:?}");
     }
 }
+
+#[test]
+fn the_self_test_of_one_is_not_noticed_by_the_other() {
+    let (simulation, boot) = (standing(), BootAddress::new());
+    let (mut below, mut ahead, attached) = drivers(&simulation, &boot, Config::default());
+    let clock = &simulation.clock;
+    block_on(clock, ahead.next()).expect("a measurement");
+    for broken in [false, true] {
+        attached[0].set_broken(broken);
+        assert_eq!(block_on(clock, below.self_test()), if broken { Err(ChipError::SelfTest) } else { Ok(()) });
+        assert!(block_on(clock, ahead.next()).is_ok(), "still there");
+    }
+    assert_eq!(block_on(clock, ahead.self_test()), Ok(()), "one is broken, the other is not");
+}

@@ -274,3 +274,26 @@ fn a_data_line_that_is_held() {
         assert_unharmed(index, &said[index], END, "held data line");
     }
 }
+
+/// The chips answer and measure nothing, which only some of them can tell: the barometer's result cannot be, the others
+/// say zero or that they do not vouch for it.
+#[test]
+fn a_dead_sensing_element() {
+    each(
+        &ALL,
+        "dead element",
+        |access, index| access.chip(index).set_broken(true),
+        |access, index| access.chip(index).set_broken(false),
+        |index, said| {
+            if NAMES[index] == "baro" {
+                return assert_failed(index, said, &FAULT, &[SensorErrorKind::Data], "dead element");
+            }
+            let [_, limit, _] = promise(index);
+            let figures = samples(said).filter(|(at, _)| (BEGIN + limit..FAULT_ENDS).contains(at));
+            let (count, most) = figures.fold((0, 0.0f32), |(count, most), (_, figure)| (count + 1, most.max(figure)));
+            // m/s², share, µT, nothing, V, m, share: zero and noise. The one that looks ahead sees nothing anyway.
+            let expected = [1.0, 0.1, 3.0, 0.0, 0.1, 0.001, 0.1][index];
+            assert!(count > 0 && most < expected, "{} says {most} in {count} samples", NAMES[index]);
+        },
+    );
+}

@@ -26,6 +26,11 @@ pub const DIE_VALUE: u16 = 0x3220;
 pub const RESET: u16 = 0x8000;
 /// All conversions of the enabled channels are done; reading it clears it. In [`register::MASK_ENABLE`].
 pub const CONVERSION_READY: u16 = 0x0001;
+/// A supply on a bus pin in counts of 8 mV: something, and no more than 26 V ("Recommended operating conditions"), though
+/// the register could say more.
+const BUS: core::ops::RangeInclusive<i16> = 1..=3_250;
+/// The shunt registers' ends, without their three low bits: what does not fit is one of them.
+const SHUNT_ENDS: [i16; 2] = [-4_096, 4_095];
 /// Shunt and bus, continuously.
 const CONTINUOUS: u16 = 0b111;
 
@@ -135,6 +140,13 @@ pub fn bus_volts(register: u16) -> f32 {
     f32::from((register as i16) >> 3) * 8e-3
 }
 
+/// Are these two registers, of shunt and bus, what a supply on this channel can give? Something, but no more than the pin
+/// may have, and a shunt voltage within the scale.
+#[must_use]
+pub fn is_measurable(shunt: u16, bus: u16) -> bool {
+    BUS.contains(&((bus as i16) >> 3)) && !SHUNT_ENDS.contains(&((shunt as i16) >> 3))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,6 +170,16 @@ mod tests {
         assert_eq!(configuration(&Config { channel: Channel::Three, ..config }), 0x1127);
         assert_eq!(configuration(&Config { average: Average::A1024, ..config }), 0x2F27);
         assert_eq!((Channel::Two.shunt_register(), Channel::Two.bus_register()), (3, 4));
+    }
+
+    #[test]
+    fn a_supply_is_above_nothing_and_below_what_the_pin_may_have() {
+        // 3.8 V, 40 µV.
+        assert!(is_measurable(0x0008, 475 << 3) && is_measurable(0xFFF8, 475 << 3), "either direction");
+        assert!(is_measurable(0x7FF0, 1 << 3) && is_measurable(0x8008, 3_250 << 3), "the last before the ends");
+        assert!(!is_measurable(8, 0), "no supply");
+        assert!(!is_measurable(8, 3_251 << 3) && !is_measurable(8, 0xFFF8), "26.008 V, −8 mV");
+        assert!(!is_measurable(0x7FF8, 475 << 3) && !is_measurable(0x8000, 475 << 3), "an open shunt");
     }
 
     #[test]

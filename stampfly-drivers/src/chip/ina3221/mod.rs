@@ -18,6 +18,8 @@ use stampfly_types::messages::PowerData;
 const AFTER_RESET: Micros = Micros::from_millis(1);
 /// How often the flag is looked at once it may be up.
 const POLL: Micros = Micros::from_millis(2);
+/// The single conversion of the self test takes 2.2 ms.
+const SELF_TEST_LIMIT: Micros = Micros::from_millis(10);
 
 /// What the chip and the driver are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,8 +44,8 @@ impl Default for Config {
 /// The driver. Implements [`PowerMonitor`].
 ///
 /// `Sample::at` is the middle of the average. The resolution of 40 µV is 4 mA at 0.01 Ω, the range ±16 A. The chip
-/// keeps only its newest result and does not say since when: a reader that comes late gets the one after it. The chip
-/// has no self test. `next` ends within two averages and 20 ms.
+/// keeps only its newest result and does not say since when: a reader that comes late gets the one after it. `next` ends
+/// within two averages and 20 ms.
 ///
 /// ```
 /// # #![allow(dead_code)]
@@ -106,6 +108,44 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         self.due = self.port.now() + codec::cycle(&self.config);
         self.running = true;
         Ok(())
+    }
+
+    /// Sets the chip up, has it keep its settings and make one conversion, whatever the average. 6 ms, within 0.2 s
+    /// however slow the bus.
+    ///
+    /// The chip has no self test of its own: this one asks whether there is a supply on the configured channel, and whether
+    /// the shunt's voltage can be measured. 0 V do not pass: no battery, another channel's shunt and a dead converter look
+    /// the same. Leaves the chip to be set up by the next call.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start); [`ChipError::Configuration`] when the settings were not kept, with the upper byte of
+    /// what is there instead; [`ChipError::NoSample`] without a conversion; [`ChipError::SelfTest`] for a supply that is
+    /// not above 0 V and at most 26 V, or a shunt beyond the scale of ±163.8 mV, as an open one is.
+    pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.start().await?;
+        self.running = false;
+        let config = self.config;
+        self.keeps(&config).await?;
+        let single = Config { average: Average::A1, time: ConversionTime::Us1100, ..config };
+        self.write(codec::configuration(&single)).await?;
+        self.keeps(&single).await?;
+        let deadline = self.port.now() + SELF_TEST_LIMIT;
+        while self.read(register::MASK_ENABLE).await? & codec::CONVERSION_READY == 0 {
+            if self.port.now() > deadline {
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+        let shunt = self.read(config.channel.shunt_register()).await?;
+        let bus = self.read(config.channel.bus_register()).await?;
+        if codec::is_measurable(shunt, bus) { Ok(()) } else { Err(ChipError::SelfTest) }
+    }
+
+    /// Refuses a chip that does not hold this configuration.
+    async fn keeps(&mut self, config: &Config) -> Result<(), ChipError<I::Error>> {
+        let kept = self.read(register::CONFIGURATION).await?;
+        let [status, _] = kept.to_be_bytes();
+        if kept == codec::configuration(config) { Ok(()) } else { Err(ChipError::Configuration { status }) }
     }
 
     async fn read(&mut self, register: u8) -> Result<u16, ChipError<I::Error>> {

@@ -160,6 +160,17 @@ impl Motion {
         })
     }
 
+    /// Can this be a picture that the chip has taken?
+    ///
+    /// No without an exposure, when the darkest pixel is brighter than the brightest, and when all is black though the
+    /// shutter is not fully open, which it is in the dark. How bright a picture is in the dark is **unverified**, so any is
+    /// accepted.
+    #[must_use]
+    pub const fn is_exposed(&self) -> bool {
+        let dark = self.shutter >> 8 == SHUTTER_OPEN as u16;
+        self.shutter > 0 && self.darkest <= self.brightest && (self.brightest > 0 || dark)
+    }
+
     /// Does the picture carry the counts?
     ///
     /// No when the data sheet's rule says so: low quality in the dark. Also not when nothing moved in a picture of low
@@ -199,6 +210,21 @@ mod tests {
         assert!(!burst(0x18, 0x1E, 0), "sees nothing");
         assert!(burst(0x19, 0x1E, 0), "stands still");
         assert!(!burst(0, 0xFF, 3), "reserved bits of the shutter do not open it");
+    }
+
+    #[test]
+    fn a_picture_goes_with_its_exposure() {
+        let burst = |brightest, darkest, shutter: [u8; 2]| {
+            let [high, low] = shutter;
+            let bytes = [0, 0xBF, 0, 0, 0, 0, 0, 0, brightest, darkest, high, low];
+            Motion::decode(&bytes).expect("a burst").is_exposed()
+        };
+        assert!(burst(0x60, 0x10, [0x01, 0x40]), "a floor");
+        assert!(burst(0x20, 0x20, [0x00, 0x01]), "a sheet of paper in the sun");
+        assert!(burst(2, 0, [0x1F, 0xFF]) && burst(0, 0, [0x1F, 0x00]), "the dark");
+        assert!(!burst(0, 0, [0x01, 0x40]), "black, and no longer exposed");
+        assert!(!burst(0x10, 0x11, [0x01, 0x40]), "the darkest is the brightest");
+        assert!(!burst(0x60, 0x10, [0, 0]) && !burst(0x60, 0x10, [0xE0, 0]), "never exposed");
     }
 
     #[test]

@@ -253,6 +253,12 @@ impl RangeStatus {
         }
     }
 
+    /// Has the chip measured, whatever it found?
+    #[must_use]
+    pub const fn is_measurement(self) -> bool {
+        !matches!(self, Self::Starting | Self::Hardware | Self::Processing | Self::NoUpdate)
+    }
+
     /// The number that ST's drivers and [`TofData::status`](stampfly_types::messages::TofData) give it.
     #[must_use]
     pub const fn number(self) -> u8 {
@@ -402,6 +408,12 @@ mod tests {
         numbers.dedup();
         assert_eq!(numbers, [0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 13, 255]);
         assert_eq!(RangeStatus::decode(9).number(), 0);
+    }
+
+    #[test]
+    fn a_chip_without_a_target_has_measured_and_one_without_a_laser_has_not() {
+        let measured: std::vec::Vec<u8> = (0..32).filter(|code| RangeStatus::decode(*code).is_measurement()).collect();
+        assert_eq!(measured, [4, 5, 6, 7, 8, 9, 12, 19, 20, 21, 22, 23]);
     }
 
     #[test]

@@ -1,0 +1,81 @@
+//! A bus that changes what a chip answers, or takes its time.
+
+use embedded_hal_async::i2c::{self, I2c};
+use embedded_hal_async::spi::{self, SpiDevice};
+use stampfly_sim::chips::BusError;
+use stampfly_sim::time::Clock;
+use stampfly_types::Micros;
+
+/// What becomes of the answer of a register.
+pub type Change = Box<dyn Fn(u16, &mut [u8])>;
+
+/// What is wrong with the bus.
+pub struct Spoil {
+    /// How much longer every transfer takes.
+    pub delay: Micros,
+    pub change: Option<Change>,
+}
+
+impl Spoil {
+    /// Nothing.
+    pub const NOT: Self = Self { delay: Micros::ZERO, change: None };
+
+    /// Answers are changed.
+    pub fn changed(change: Change) -> Self {
+        Self { change: Some(change), ..Self::NOT }
+    }
+
+    /// Every transfer takes so much longer.
+    pub const fn slow(delay: Micros) -> Self {
+        Self { delay, change: None }
+    }
+}
+
+/// A bus with that.
+pub struct Spoilt<B> {
+    pub bus: B,
+    pub clock: Clock,
+    pub spoil: Spoil,
+}
+
+impl<B> Spoilt<B> {
+    async fn wait(&self) {
+        self.clock.sleep_until(self.clock.now() + self.spoil.delay).await;
+    }
+
+    fn answer(&self, register: &[u8], answer: &mut [u8]) {
+        if let Some(change) = &self.spoil.change {
+            change(register.iter().fold(0, |register, byte| register << 8 | u16::from(*byte)), answer);
+        }
+    }
+}
+
+impl<B: I2c<Error = BusError>> i2c::ErrorType for Spoilt<B> {
+    type Error = BusError;
+}
+
+impl<B: I2c<Error = BusError>> I2c for Spoilt<B> {
+    async fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), BusError> {
+        self.wait().await;
+        self.bus.transaction(address, operations).await?;
+        if let [i2c::Operation::Write(register), i2c::Operation::Read(answer)] = operations {
+            self.answer(register, answer);
+        }
+        Ok(())
+    }
+}
+
+impl<B: SpiDevice<Error = BusError>> spi::ErrorType for Spoilt<B> {
+    type Error = BusError;
+}
+
+impl<B: SpiDevice<Error = BusError>> SpiDevice for Spoilt<B> {
+    async fn transaction(&mut self, operations: &mut [spi::Operation<'_, u8>]) -> Result<(), BusError> {
+        self.wait().await;
+        self.bus.transaction(operations).await?;
+        if let [spi::Operation::Write(register), .., spi::Operation::Read(answer)] = operations {
+            self.answer(register, answer);
+        }
+        Ok(())
+    }
+}
