@@ -23,6 +23,8 @@ pub enum SensorErrorKind {
     SelfTest,
     /// The chip answered with data that cannot be.
     Data,
+    /// The chip lost its settings; the next call sets it up again.
+    Restarted,
     /// None of the above.
     Other,
 }
@@ -36,6 +38,7 @@ impl Display for SensorErrorKind {
             Self::Configuration => "the chip did not accept its configuration",
             Self::SelfTest => "the self test failed",
             Self::Data => "the chip answered with data that cannot be",
+            Self::Restarted => "the chip lost its settings",
             Self::Other => "another error of the sensor",
         })
     }

@@ -2,15 +2,63 @@
 
 mod common;
 
-use common::{Access, Clock, Fault, I2cBus, SpiBus};
+use common::{Access, Clock, Fault, I2cBus, SpiBus, finish};
+use core::convert::Infallible;
+use embedded_hal::digital::{ErrorType, OutputPin};
+use embedded_hal_async::{i2c, spi};
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
+use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
+use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
-use stampfly_drivers::{Barometer, Imu, Magnetometer, PowerMonitor, Timebase};
+use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
 use stampfly_types::Micros;
+
+/// Goes nowhere.
+struct Pin;
+
+impl ErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// A bus of either kind on which every transfer fails.
+struct Broken {
+    clock: Clock,
+    fault: Fault,
+}
+
+impl i2c::ErrorType for Broken {
+    type Error = Fault;
+}
+
+impl i2c::I2c for Broken {
+    async fn transaction(&mut self, _: u8, _: &mut [i2c::Operation<'_>]) -> Result<(), Fault> {
+        finish(&self.clock, Err(self.fault)).await
+    }
+}
+
+impl spi::ErrorType for Broken {
+    type Error = Fault;
+}
+
+impl spi::SpiDevice for Broken {
+    async fn transaction(&mut self, _: &mut [spi::Operation<'_, u8>]) -> Result<(), Fault> {
+        finish(&self.clock, Err(self.fault)).await
+    }
+}
 
 fn silent(_: Access<'_>) -> Result<(), Fault> {
     Err(Fault::Hang)
@@ -62,18 +110,22 @@ macro_rules! worst {
 #[test]
 fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() {
     for fault in [Fault::Nack, Fault::Hang] {
+        let boot = BootAddress::default();
         let clock = Clock::new();
-        let i2c = |address| I2cBus { address, clock: clock.clone(), chip: move |_: Access<'_>| Err(fault) };
-        let spi = || SpiBus { clock: clock.clone(), chip: move |_: Access<'_>| Err(fault) };
+        let bus = || Broken { clock: clock.clone(), fault };
         let imu = bmi270::Config::default();
         let worst = [
-            worst!(clock, Bmi270::spi(spi(), clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
-            worst!(clock, Bmi270::i2c(i2c(0x68), 0x68, clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
-            worst!(clock, Bmp280::new(i2c(0x76), 0x76, clock.clone(), bmp280::Config::default())),
-            worst!(clock, Ina3221::new(i2c(0x40), 0x40, clock.clone(), ina3221::Config::default())),
-            worst!(clock, Bmm150::new(i2c(0x10), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())),
+            worst!(clock, Bmi270::spi(bus(), clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
+            worst!(clock, Bmi270::i2c(bus(), 0x68, clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
+            worst!(clock, Bmp280::new(bus(), 0x76, clock.clone(), bmp280::Config::default())),
+            worst!(clock, Ina3221::new(bus(), 0x40, clock.clone(), ina3221::Config::default())),
+            worst!(clock, Bmm150::new(bus(), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())),
+            worst!(clock, Pmw3901::new(bus(), clock.clone(), AxisMap::IDENTITY, pmw3901::Config::default())),
+            worst!(clock, Vl53l3cx::new(bus(), Pin, &boot, 0x30, clock.clone(), vl53l3cx::Config::default())),
         ];
-        let limits = [Micros(400), Micros(11_000), Micros(11_000), Micros(11_000), Micros(15_000)];
+        // The last two first leave their chips the time to start up.
+        let milliseconds = [1, 11, 11, 11, 15, 60, 125];
+        let limits = milliseconds.map(Micros::from_millis);
         for (worst, limit) in worst.into_iter().zip(limits) {
             assert!(worst > Micros::ZERO && worst < limit, "{worst} with {fault:?}");
         }

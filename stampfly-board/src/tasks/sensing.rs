@@ -16,13 +16,14 @@ pub struct Health {
 }
 
 /// Every kind of error there is, so that one fits into a word.
-const KINDS: [SensorErrorKind; 7] = [
+const KINDS: [SensorErrorKind; 8] = [
     SensorErrorKind::Bus,
     SensorErrorKind::Timeout,
     SensorErrorKind::Identification,
     SensorErrorKind::Configuration,
     SensorErrorKind::SelfTest,
     SensorErrorKind::Data,
+    SensorErrorKind::Restarted,
     SensorErrorKind::Other,
 ];
 

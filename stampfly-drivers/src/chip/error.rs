@@ -47,7 +47,8 @@ impl<E: Debug> SensorError for ChipError<E> {
             Self::InvalidConfiguration | Self::Configuration { .. } | Self::AddressTaken => {
                 SensorErrorKind::Configuration
             }
-            Self::Restarted | Self::Pin => SensorErrorKind::Other,
+            Self::Restarted => SensorErrorKind::Restarted,
+            Self::Pin => SensorErrorKind::Other,
             Self::SelfTest => SensorErrorKind::SelfTest,
             Self::Data => SensorErrorKind::Data,
         }

@@ -133,7 +133,7 @@ fn a_dead_chip() {
     use SensorErrorKind::*;
     let dead = Faults { dead: true, ..Faults::default() };
     each(&ALL, "death", set(dead), heal, |index, said| {
-        assert_failed(index, said, &FAULT, &[Bus, Timeout, Identification, Configuration, Data, Other], "death");
+        assert_failed(index, said, &FAULT, &[Bus, Timeout, Identification, Configuration, Data, Restarted], "death");
     });
 }
 
@@ -142,7 +142,7 @@ fn refused_transfers() {
     let refusing = Faults { refusals: 1.0, ..Faults::default() };
     each(&ALL, "refusal", set(refusing), heal, |index, said| {
         // A range finder that does not acknowledge may have restarted at its first address.
-        assert_failed(index, said, &FAULT, &[SensorErrorKind::Bus, SensorErrorKind::Other], "refusal");
+        assert_failed(index, said, &FAULT, &[SensorErrorKind::Bus, SensorErrorKind::Restarted], "refusal");
     });
 }
 
@@ -226,13 +226,19 @@ fn a_clock_that_is_held() {
 
 #[test]
 fn a_reset_in_flight() {
+    use SensorErrorKind::*;
     each(
         &ALL,
         "reset",
         |access, index| access.chip(index).reset(),
         |_, _| {},
         |index, said| {
-            assert_recovered(index, said, BEGIN + promise(index)[1], END, "reset");
+            let [_, limit, _] = promise(index);
+            let (first, kind) = errors(said).into_iter().find(|(at, _)| *at >= BEGIN).expect("a chip that was reset");
+            assert!(first.since(BEGIN) <= limit, "{} said so after {}", NAMES[index], first.since(BEGIN));
+            // Some notice it by an answer that is none, before they look.
+            assert!([Restarted, Bus, Timeout, Data].contains(&kind), "{} said {kind:?}", NAMES[index]);
+            assert_recovered(index, said, BEGIN + limit, END, "reset");
         },
     );
 }
