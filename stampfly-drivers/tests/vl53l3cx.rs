@@ -365,7 +365,7 @@ fn a_chip_that_restarts_is_noticed_and_moved_again_without_its_neighbour() {
     bench.chips[0].borrow_mut().restart();
     let (outcome, time) = bench.timed(below.next());
     let error = outcome.expect_err("it is gone");
-    assert_eq!((error, error.kind()), (ChipError::Restarted, SensorErrorKind::Other));
+    assert_eq!((error, error.kind()), (ChipError::Restarted, SensorErrorKind::Restarted));
     assert!(time < Micros(40_000), "{time}");
     block_on(ahead.next()).expect("the neighbour goes on");
     let (outcome, time) = bench.timed(below.next());

@@ -3,6 +3,7 @@
 //! | module | decides | steps |
 //! |---|---|---|
 //! | [`machine`] | state and flight mode: the only place where they change | 400 Hz |
+//! | [`transitions`] | which event leads to which state | inside the machine |
 //! | [`arming`] | whether the motors may be armed, and if not, why | inside the machine |
 //! | [`failsafe`] | what is wrong: detects, never acts | 400 Hz |
 //! | [`landing`] | contact with the ground, take-off and landing | 400 Hz |
@@ -24,6 +25,8 @@ pub mod failsafe;
 pub mod landing;
 pub mod machine;
 pub mod signal;
+mod touch;
+pub mod transitions;
 
 pub use authority::{Authority, AuthorityConfig};
 pub use button::ButtonDecoder;

@@ -1,99 +1,17 @@
-//! State management: the only place where the vehicle changes state.
+//! The mode machine: the only place where the vehicle changes state.
 //!
-//! [`next`] is the whole table: one total function from state and event to state. [`ModeMachine::step`] finds out
-//! which events have happened, most urgent first, takes at most one transition a step, and runs what leaving and
-//! entering a state means (resets of controller and estimator). The failsafe is an event, never a state.
-//!
-//! ```text
-//! INIT ─ready─► IDLE_GROUND ◄─lifted/set down─► IDLE_HELD
-//!                 │ arm                 ▲ disarm, emergency
-//!                 ▼                     │ (from every state below)
-//!               ARMED ─take off─► TAKEOFF ─complete─► FLYING ─land─► LANDING ─touchdown─► IDLE_GROUND
-//! ```
+//! [`ModeMachine::step`] finds out which events have happened, most urgent first, takes at most one transition of the
+//! [table](crate::transitions) a step, and runs what leaving and entering a state means (resets of controller and
+//! estimator). The failsafe is an event, never a state.
 
 use crate::arming;
+use crate::touch::Touch;
+use crate::transitions::{Event, is_armed, next};
 use stampfly_types::Micros;
 use stampfly_types::messages::{
     Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightState, GroundContact, GuidedKind,
     PilotInput, StateEstimate, SystemMode, Validity, VehicleStatus,
 };
-
-/// Something that may change the state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// Sensors, calibration and estimate are ready.
-    Ready,
-    /// A hand has lifted the vehicle.
-    Lifted,
-    /// It stands again.
-    SetDown,
-    /// Arming was asked for and nothing speaks against it.
-    Arm,
-    /// Take-off was asked for.
-    TakeOff,
-    /// The take-off height is reached.
-    TakeOffComplete,
-    /// Landing was asked for, or the failsafe demands it.
-    Land,
-    /// Touchdown is sure.
-    Touchdown,
-    /// Disarming was asked for.
-    Disarm,
-    /// Motors off now.
-    Emergency,
-}
-
-impl Event {
-    /// Every event, most urgent first: the order in which [`ModeMachine::step`] looks at them.
-    pub const ALL: [Self; 10] = [
-        Self::Emergency,
-        Self::Disarm,
-        Self::Touchdown,
-        Self::Land,
-        Self::TakeOffComplete,
-        Self::TakeOff,
-        Self::Arm,
-        Self::SetDown,
-        Self::Lifted,
-        Self::Ready,
-    ];
-}
-
-/// The transition table. `holds_height` says whether the flight mode holds height by itself: then a disarm in the air
-/// lands first.
-#[must_use]
-pub const fn next(state: FlightState, event: Event, holds_height: bool) -> Option<FlightState> {
-    use Event as E;
-    use FlightState as S;
-    match (state, event) {
-        (S::Init, E::Ready) => Some(S::IdleGround),
-        (S::IdleGround, E::Lifted) => Some(S::IdleHeld),
-        (S::IdleHeld, E::SetDown) => Some(S::IdleGround),
-        (S::IdleGround, E::Arm) => Some(S::Armed),
-        (S::Armed, E::TakeOff) => Some(S::TakeOff),
-        (S::TakeOff, E::TakeOffComplete) => Some(S::Flying),
-        (S::TakeOff | S::Flying, E::Land) => Some(S::Landing),
-        (S::TakeOff | S::Flying, E::Disarm) => Some(if holds_height { S::Landing } else { S::IdleGround }),
-        (S::Landing, E::Touchdown | E::Disarm) | (S::Armed, E::Disarm | E::Land) => Some(S::IdleGround),
-        (S::Armed | S::TakeOff | S::Flying | S::Landing, E::Emergency) => Some(S::IdleGround),
-        (S::Init, E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
-        | (S::Init, E::Disarm | E::Emergency)
-        | (S::IdleGround, E::Ready | E::SetDown | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
-        | (S::IdleGround, E::Disarm | E::Emergency)
-        | (S::IdleHeld, E::Ready | E::Lifted | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
-        | (S::IdleHeld, E::Disarm | E::Emergency)
-        | (S::Armed, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOffComplete | E::Touchdown)
-        | (S::TakeOff, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::Touchdown)
-        | (S::Flying, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Touchdown)
-        | (S::Landing, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land) => None,
-    }
-}
-
-/// May the motors turn in this state?
-#[must_use]
-pub const fn is_armed(state: FlightState) -> bool {
-    matches!(state, FlightState::Armed | FlightState::TakeOff | FlightState::Flying | FlightState::Landing)
-}
 
 /// A command from a program or the board, since the last step.
 pub type Command = GuidedKind;
@@ -138,9 +56,6 @@ const SPOOL: Micros = Micros::from_millis(300);
 const ARMED_TIMEOUT: Micros = Micros::from_secs(10);
 /// Height above the ground that means somebody has lifted the vehicle, m, and below which it stands again.
 const HELD_HEIGHT: [f32; 2] = [0.15, 0.08];
-/// After an emergency stop by the button, presses mean nothing until it has been left alone for this long: a hand in a
-/// hurry presses more than once.
-const CALM: Micros = Micros::from_secs(2);
 /// Manual throttle that takes off.
 const THROTTLE_TAKE_OFF: f32 = 0.1;
 
@@ -335,31 +250,6 @@ impl ModeMachine {
         // A press alone is none: what it becomes may be a click, which must not find the crash acknowledged and arm.
         let touched = input.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
         idle && (switch.falls || touched || input.commands.contains(&Command::Disarm))
-    }
-}
-
-/// A hand on the button. The touch that stops the motors means nothing else, and neither do those right after it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Touch {
-    /// It has stopped the motors.
-    spent: bool,
-    /// When the button was last heard of.
-    last: Micros,
-}
-
-impl Touch {
-    /// Does this gesture stop the motors?
-    fn grabs(&mut self, now: Micros, gesture: Option<ButtonGesture>, armed: bool) -> bool {
-        let Some(gesture) = gesture.filter(|gesture| *gesture != ButtonGesture::None) else { return false };
-        let calm = now.since(self.last) >= CALM;
-        self.spent = armed || (self.spent && !(gesture == ButtonGesture::Press && calm));
-        self.last = now;
-        armed
-    }
-
-    /// What remains of the gesture for everything else.
-    fn meaning(&self, gesture: Option<ButtonGesture>) -> Option<ButtonGesture> {
-        gesture.filter(|gesture| !self.spent && *gesture != ButtonGesture::None)
     }
 }
 
