@@ -10,7 +10,7 @@ use stampfly_host::campaign::{Flight, run};
 use stampfly_host::mission::{Mission, Step};
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::{FlightConfig, fly};
-use stampfly_mode::machine::{Event, next};
+use stampfly_mode::transitions::{Event, next};
 use stampfly_sim::plant::Pose;
 use stampfly_types::Micros;
 use stampfly_types::messages::FlightState;
