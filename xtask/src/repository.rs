@@ -1,6 +1,7 @@
 //! Where the sources are, what the library crates are called, and how a program is run.
 
 use crate::Failure;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -103,6 +104,11 @@ pub fn run(command: &mut Command) -> Result<(), Failure> {
     let shown = announce(command);
     let status = command.status().map_err(|e| format!("`{shown}` could not be started: {e}"))?;
     if status.success() { Ok(()) } else { Err(format!("`{shown}` ended with {status}")) }
+}
+
+/// What a command of ours printed with `--json`.
+pub fn json(report: &str) -> Result<Value, Failure> {
+    serde_json::from_str(report).map_err(|e| format!("{report}: {e}"))
 }
 
 /// Like [`run`], and returns what the program wrote to stdout and to stderr.

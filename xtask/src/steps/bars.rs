@@ -6,7 +6,8 @@
 //! short runs, because a shared machine has other things to do.
 
 use crate::Failure;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::repository::{Repository, capture, json, run as run_program};
+use serde_json::Value;
 use std::fs;
 
 /// Mission, figure, statistic, bar.
@@ -35,7 +36,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
                 continue;
             }
         };
-        for (bar, kept) in check(mission, &report)? {
+        for (bar, kept) in check(mission, &json(&report)?)? {
             println!("{title}: {bar}");
             failures.extend((!kept).then(|| format!("{title}: {bar}")));
         }
@@ -55,13 +56,12 @@ fn stampfly(repository: &Repository) -> String {
 }
 
 /// Every bar of a mission in words, and whether the campaign's report keeps it.
-fn check(mission: &str, report: &str) -> Result<Vec<(String, bool)>, Failure> {
+fn check(mission: &str, report: &Value) -> Result<Vec<(String, bool)>, Failure> {
     let of_mission = BARS.iter().filter(|(of, ..)| *of == mission);
     of_mission
         .map(|(_, figure, statistic, bar)| {
-            let spread = value(report, figure).and_then(|rest| rest.strip_prefix('{')?.split('}').next());
-            let spread = spread.ok_or_else(|| format!("no `{figure}` in {report}"))?;
-            let measured = number(spread, statistic).ok_or_else(|| format!("no `{statistic}` of {figure}"))?;
+            // A figure that no flight has is `null`, and so is whatever is asked of it.
+            let measured = report[figure][statistic].as_f64().ok_or_else(|| format!("no {statistic} of {figure}"))?;
             Ok((format!("{figure} {statistic} {measured:.3}; the bar is {bar}"), measured <= *bar))
         })
         .collect()
@@ -77,7 +77,7 @@ fn speed(repository: &Repository, arguments: &[&str], least: f64) -> Result<f64,
         timed.env("LC_ALL", "C").args(["-c", "TIMEFORMAT='%R %U %S'; time \"$@\"", "time"]);
         timed.args(["taskset", "-c", core, &stampfly(repository), "campaign", "--json", "--flights", TIMED]);
         let (report, times) = capture(timed.args(arguments))?;
-        let factor = number(&report, "realtime_factor").ok_or("no `realtime_factor`")?;
+        let factor = json(&report)?["realtime_factor"].as_f64().ok_or("no `realtime_factor`")?;
         let share = processor_share(&times).ok_or_else(|| format!("no times in `{times}`"))?;
         best = best.max(factor / share);
         if best >= least {
@@ -100,47 +100,39 @@ fn first_core(status: &str) -> Option<&str> {
     list.trim().split([',', '-']).next()
 }
 
-/// What follows a key in a JSON object.
-fn value<'j>(json: &'j str, key: &str) -> Option<&'j str> {
-    let (_, rest) = json.split_once(&format!("\"{key}\""))?;
-    Some(rest.trim_start().strip_prefix(':')?.trim_start())
-}
-
-fn number(json: &str, key: &str) -> Option<f64> {
-    value(json, key)?.split([',', '}']).next()?.trim().parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
-    fn report(overshoot: f64) -> String {
+    fn report(overshoot: f64) -> Value {
         let figures = BARS.iter().filter(|(mission, ..)| *mission == "square").map(|(_, figure, ..)| {
             let worst = if *figure == "takeoff_overshoot_m" { overshoot } else { 0.01 };
-            format!("\"{figure}\":{{\"max\":{worst},\"p50\":0.0,\"p95\":9.0}}")
+            (figure.to_string(), json!({ "max": worst, "p50": 0.0, "p95": 9.0 }))
         });
-        format!("{{{},\"realtime_factor\":363.5}}", figures.collect::<Vec<_>>().join(","))
+        Value::Object(figures.collect())
     }
 
     #[test]
     fn a_bar_is_kept_or_not() {
-        let broken = |report: &str| check("square", report).expect("complete").iter().filter(|(_, kept)| !kept).count();
+        let broken =
+            |report: &Value| check("square", report).expect("complete").iter().filter(|(_, kept)| !kept).count();
         assert_eq!(check("square", &report(0.1)).map(|bars| bars.len()), Ok(6));
         assert_eq!((broken(&report(0.1)), broken(&report(0.1001))), (0, 1));
-        // A figure that no flight has is `null`.
-        assert!(check("square", &report(0.1).replace("{\"max\":0.1,\"p50\":0.0,\"p95\":9.0}", "null")).is_err());
-        assert!(check("square", "{}").is_err());
+        let mut without = report(0.1);
+        without["takeoff_overshoot_m"] = Value::Null;
+        assert!(check("square", &without).is_err());
+        assert!(check("square", &json!({})).is_err());
     }
 
     #[test]
     fn the_hover_is_judged_by_most_flights() {
-        let report = "{\"hover_drift_m\":{\"max\":0.4,\"p50\":0.1,\"p95\":0.25}}";
-        assert!(check("hover", report).is_ok_and(|bars| bars.len() == 1 && bars[0].1));
+        let report = json!({ "hover_drift_m": { "max": 0.4, "p50": 0.1, "p95": 0.25 } });
+        assert!(check("hover", &report).is_ok_and(|bars| bars.len() == 1 && bars[0].1));
     }
 
     #[test]
-    fn reads_numbers_and_cores() {
-        assert_eq!(number(&report(0.0), "realtime_factor"), Some(363.5));
+    fn reads_times_and_cores() {
         assert_eq!(first_core("Name: x\nCpus_allowed_list:\t2-3,7\n"), Some("2"));
         assert_eq!(first_core("Name: x\n"), None);
         assert_eq!(processor_share("noise\n4.000 0.900 0.100\n"), Some(0.25));
