@@ -3,7 +3,7 @@
 //! Every other crate of the family depends on this one and on none of its siblings, so what two crates
 //! must agree on lives here and nothing else does:
 //!
-//! * [`time`]: [`Micros`], the only time there is;
+//! * [`time`]: [`Instant`] and [`Duration`], the only time there is;
 //! * [`frame`]: vectors, quaternions and the conventions they follow;
 //! * [`math`]: the one door to transcendental functions;
 //! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`];
@@ -35,4 +35,4 @@ pub mod time;
 
 pub use frame::{GRAVITY, Quat, Vec3};
 pub use message::{Field, FieldInfo, FieldKind, Message};
-pub use time::Micros;
+pub use time::{Duration, Instant};

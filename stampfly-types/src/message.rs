@@ -8,7 +8,7 @@
 //! [`message_enum!`](crate::message_enum!) and bit sets with [`message_flags!`](crate::message_flags!). Do not
 //! implement [`Message`] by hand. For bytes on a radio use a codec instead: words are for inside the vehicle.
 
-use crate::{Micros, Quat, Vec3};
+use crate::{Duration, Instant, Quat, Vec3};
 
 /// One value inside a message: how many words it takes, and how to write and read them.
 pub trait Field: Copy {
@@ -137,19 +137,25 @@ impl Field for u64 {
     }
 }
 
-impl Field for Micros {
-    const KIND: FieldKind = FieldKind::U64;
-    const COUNT: usize = 1;
-    const WORDS: usize = 2;
-    #[inline]
-    fn write(&self, words: &mut [u32]) {
-        self.0.write(words);
-    }
-    #[inline]
-    fn read(words: &[u32]) -> Option<Self> {
-        u64::read(words).map(Micros)
-    }
+macro_rules! microseconds {
+    ($($type:ty),*) => { $(
+        impl Field for $type {
+            const KIND: FieldKind = FieldKind::U64;
+            const COUNT: usize = 1;
+            const WORDS: usize = 2;
+            #[inline]
+            fn write(&self, words: &mut [u32]) {
+                self.as_micros().write(words);
+            }
+            #[inline]
+            fn read(words: &[u32]) -> Option<Self> {
+                u64::read(words).map(Self::from_micros)
+            }
+        }
+    )* };
 }
+
+microseconds!(Instant, Duration);
 
 impl<T: Field + Default, const N: usize> Field for [T; N] {
     const KIND: FieldKind = T::KIND;

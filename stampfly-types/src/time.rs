@@ -1,57 +1,170 @@
-//! Time as an argument.
+//! Time as an argument: instants and durations.
 //!
-//! Nothing below the firmware package reads a clock: every step is told what time it is. [`Micros`] counts
-//! microseconds since power-on in 64 bits, because 32 bits wrap after 71.6 minutes, in flight.
+//! Nothing below the firmware package reads a clock: every step is told what time it is, as an [`Instant`]. What lies
+//! between two instants is a [`Duration`]: a period, a deadline, a budget, the age of a sample. They are two types
+//! because mixing them up compiles when both are a number, and then a stamp is compared with a timeout.
+//!
+//! | | `+ Instant` | `+ Duration` | `- Instant` | `- Duration` |
+//! |---|---|---|---|---|
+//! | [`Instant`] | does not compile | [`Instant`] | [`Instant::since`] | [`Instant`] |
+//! | [`Duration`] | does not compile | [`Duration`] | does not compile | [`Duration`] |
+//!
+//! Both count microseconds in 64 bits, which last 584,000 years; 32 bits, as other firmware uses, wrap after 71.6
+//! minutes, in flight. All arithmetic saturates: no operator panics, and none wraps. `core::time::Duration` is not used
+//! because it is 96 bits of seconds and nanoseconds, whose arithmetic panics on overflow.
 
 use core::fmt;
-use core::ops::{Add, AddAssign};
+use core::ops::{Add, AddAssign, Mul, Sub};
 
-/// Microseconds: an instant since power-on, or the length of a span.
+const MICROS_PER_MILLI: u64 = 1_000;
+const MICROS_PER_SECOND: u64 = 1_000_000;
+
+/// A point in time: microseconds since power-on.
 ///
-/// Subtraction is only offered as [`Micros::since`], which saturates: a stamp that lies in the future is
-/// "no time ago" instead of 584,000 years ago.
+/// The difference of two instants is only offered as [`Instant::since`], which saturates: a stamp that lies in the
+/// future is zero old instead of 584,000 years.
 ///
 /// ```
-/// use stampfly_types::Micros;
-/// let sampled = Micros::from_millis(100);
-/// let now = sampled + Micros(2_500);
-/// assert_eq!(now.since(sampled), Micros(2_500));
-/// assert_eq!(sampled.since(now), Micros::ZERO);
-/// assert_eq!(now.since(sampled).seconds(), 0.0025);
+/// use stampfly_types::{Duration, Instant};
+/// let sampled = Instant::from_millis(100);
+/// let now = sampled + Duration::from_micros(2_500);
+/// assert_eq!(now.as_micros(), 102_500);
+/// assert_eq!(now.since(sampled), Duration::from_micros(2_500));
+/// assert_eq!(sampled.since(now), Duration::ZERO);
+/// assert_eq!(now.to_string(), "0.102500 s");
+/// ```
+///
+/// Two instants do not add up, and an instant is no duration:
+///
+/// ```compile_fail,E0277
+/// use stampfly_types::Instant;
+/// let sum = Instant::from_secs(1) + Instant::from_secs(2);
+/// ```
+/// ```compile_fail,E0277
+/// use stampfly_types::Instant;
+/// let difference = Instant::from_secs(2) - Instant::from_secs(1);
+/// ```
+/// ```compile_fail,E0308
+/// use stampfly_types::{Duration, Instant};
+/// let timeout: Duration = Instant::from_secs(2);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Micros(pub u64);
+pub struct Instant(u64);
 
-impl Micros {
-    /// Power-on, or no time at all.
+impl Instant {
+    /// Power-on.
     pub const ZERO: Self = Self(0);
+    /// The last instant that can be told, 584,000 years after power-on: "never" for a deadline.
+    pub const MAX: Self = Self(u64::MAX);
+
+    /// The instant so many microseconds after power-on.
+    #[must_use]
+    pub const fn from_micros(micros: u64) -> Self {
+        Self(micros)
+    }
+
+    /// The instant so many milliseconds after power-on.
+    #[must_use]
+    pub const fn from_millis(millis: u64) -> Self {
+        Self(millis.saturating_mul(MICROS_PER_MILLI))
+    }
+
+    /// The instant so many seconds after power-on.
+    #[must_use]
+    pub const fn from_secs(secs: u64) -> Self {
+        Self(secs.saturating_mul(MICROS_PER_SECOND))
+    }
+
+    /// Microseconds since power-on.
+    #[must_use]
+    pub const fn as_micros(self) -> u64 {
+        self.0
+    }
+
+    /// The time from `earlier` to `self`; zero when `earlier` lies in the future.
+    #[must_use]
+    pub const fn since(self, earlier: Self) -> Duration {
+        Duration(self.0.saturating_sub(earlier.0))
+    }
+
+    /// The signed difference `self − other` in seconds.
+    #[must_use]
+    pub fn signed_seconds_since(self, other: Self) -> f32 {
+        if self >= other { self.since(other).seconds() } else { -other.since(self).seconds() }
+    }
+
+    /// Seconds since power-on with microsecond resolution, for display and logs.
+    #[must_use]
+    pub fn seconds_f64(self) -> f64 {
+        self.0 as f64 * 1e-6
+    }
+}
+
+/// A length of time in microseconds, never negative.
+///
+/// ```
+/// use stampfly_types::Duration;
+/// let period = Duration::from_micros(2_500);
+/// assert_eq!(period.seconds(), 0.0025);
+/// assert_eq!(period * 400, Duration::from_secs(1));
+/// assert_eq!(period - Duration::from_millis(3), Duration::ZERO);
+/// assert_eq!(Duration::from_seconds(0.0025), period);
+/// assert_eq!(period.to_string(), "0.002500 s");
+/// ```
+///
+/// A duration added to an instant is an instant, but nothing is added to a duration except durations:
+///
+/// ```compile_fail,E0308
+/// use stampfly_types::{Duration, Instant};
+/// let later = Duration::from_secs(2) + Instant::from_secs(1);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Duration(u64);
+
+impl Duration {
+    /// No time at all.
+    pub const ZERO: Self = Self(0);
+    /// The longest duration, 584,000 years.
+    pub const MAX: Self = Self(u64::MAX);
+
+    /// A number of microseconds.
+    #[must_use]
+    pub const fn from_micros(micros: u64) -> Self {
+        Self(micros)
+    }
 
     /// A number of milliseconds.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
-        Self(millis.saturating_mul(1_000))
+        Self(millis.saturating_mul(MICROS_PER_MILLI))
     }
 
     /// A number of seconds.
     #[must_use]
     pub const fn from_secs(secs: u64) -> Self {
-        Self(secs.saturating_mul(1_000_000))
+        Self(secs.saturating_mul(MICROS_PER_SECOND))
     }
 
-    /// A span in seconds, rounded to the microsecond. Negative and NaN give zero.
+    /// A number of seconds, rounded to the microsecond. Negative and NaN give zero.
     #[must_use]
     pub fn from_seconds(seconds: f32) -> Self {
         // `as` saturates and maps NaN to zero, which is exactly what is promised.
         Self((f64::from(seconds) * 1e6 + 0.5) as u64)
     }
 
-    /// The span from `earlier` to `self`; zero when `earlier` lies in the future.
+    /// The duration in microseconds.
     #[must_use]
-    pub const fn since(self, earlier: Self) -> Self {
-        Self(self.0.saturating_sub(earlier.0))
+    pub const fn as_micros(self) -> u64 {
+        self.0
     }
 
-    /// A span in seconds. Exact to one part in 2²⁴: use it for differences, never for absolute time.
+    /// The duration in whole milliseconds, rounded down.
+    #[must_use]
+    pub const fn as_millis(self) -> u64 {
+        self.0 / MICROS_PER_MILLI
+    }
+
+    /// The duration in seconds. Exact to one part in 2²⁴.
     #[must_use]
     pub fn seconds(self) -> f32 {
         // The same number, in one instruction where 32 bits are a register.
@@ -62,62 +175,133 @@ impl Micros {
         micros * 1e-6
     }
 
-    /// The instant in seconds with microsecond resolution, for display and logs.
+    /// The duration in seconds with microsecond resolution, for display and logs.
     #[must_use]
     pub fn seconds_f64(self) -> f64 {
         self.0 as f64 * 1e-6
     }
-
-    /// The signed difference `self − other` in seconds.
-    #[must_use]
-    pub fn signed_seconds_since(self, other: Self) -> f32 {
-        if self >= other { self.since(other).seconds() } else { -other.since(self).seconds() }
-    }
 }
 
-impl Add for Micros {
+impl Add<Duration> for Instant {
     type Output = Self;
-    fn add(self, span: Self) -> Self {
-        Self(self.0.saturating_add(span.0))
+    fn add(self, duration: Duration) -> Self {
+        Self(self.0.saturating_add(duration.0))
     }
 }
 
-impl AddAssign for Micros {
-    fn add_assign(&mut self, span: Self) {
-        *self = *self + span;
+impl AddAssign<Duration> for Instant {
+    fn add_assign(&mut self, duration: Duration) {
+        *self = *self + duration;
     }
 }
 
-impl fmt::Display for Micros {
+/// Saturates at power-on.
+impl Sub<Duration> for Instant {
+    type Output = Self;
+    fn sub(self, duration: Duration) -> Self {
+        Self(self.0.saturating_sub(duration.0))
+    }
+}
+
+impl Add for Duration {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+}
+
+impl AddAssign for Duration {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+/// Saturates at zero.
+impl Sub for Duration {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.saturating_sub(other.0))
+    }
+}
+
+impl Mul<u64> for Duration {
+    type Output = Self;
+    fn mul(self, factor: u64) -> Self {
+        Self(self.0.saturating_mul(factor))
+    }
+}
+
+impl fmt::Display for Instant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{:06} s", self.0 / 1_000_000, self.0 % 1_000_000)
+        seconds(self.0, f)
     }
+}
+
+impl fmt::Display for Duration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        seconds(self.0, f)
+    }
+}
+
+fn seconds(micros: u64, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "{}.{:06} s", micros / MICROS_PER_SECOND, micros % MICROS_PER_SECOND)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
 
     proptest! {
         #[test]
         fn since_undoes_add_and_never_wraps(start: u64, span in 0u64..1 << 60) {
-            let later = Micros(start) + Micros(span);
-            prop_assert!(later.since(Micros(start)) <= Micros(span));
-            prop_assert_eq!(Micros(start).since(later), Micros::ZERO);
+            let (start, span) = (Instant::from_micros(start), Duration::from_micros(span));
+            let later = start + span;
+            prop_assert!(later.since(start) <= span);
+            prop_assert!(later == Instant::MAX || later.since(start) == span);
+            prop_assert_eq!(start.since(later), Duration::ZERO);
+        }
+
+        #[test]
+        fn arithmetic_saturates(a: u64, b: u64, factor: u64) {
+            let (instant, x, y) = (Instant::from_micros(a), Duration::from_micros(a), Duration::from_micros(b));
+            prop_assert_eq!((instant + y).as_micros(), a.saturating_add(b));
+            prop_assert_eq!((instant - y).as_micros(), a.saturating_sub(b));
+            prop_assert_eq!((x + y).as_micros(), a.saturating_add(b));
+            prop_assert_eq!((x - y).as_micros(), a.saturating_sub(b));
+            prop_assert_eq!((x * factor).as_micros(), a.saturating_mul(factor));
+        }
+
+        #[test]
+        fn signed_difference_changes_its_sign(a in 0u64..1 << 40, b in 0u64..1 << 40) {
+            let [a, b] = [a, b].map(Instant::from_micros);
+            prop_assert_eq!(a.signed_seconds_since(b), -b.signed_seconds_since(a));
+            prop_assert_eq!(a.signed_seconds_since(b) > 0.0, a > b);
         }
 
         #[test]
         fn seconds_round_trip(micros in 0u64..10_000_000) {
-            let back = Micros::from_seconds(Micros(micros).seconds());
-            prop_assert!(back.0.abs_diff(micros) <= 1);
+            let back = Duration::from_seconds(Duration::from_micros(micros).seconds());
+            prop_assert!(back.as_micros().abs_diff(micros) <= 1);
         }
     }
 
     #[test]
     fn hostile_seconds_are_harmless() {
-        assert_eq!(Micros::from_seconds(f32::NAN), Micros::ZERO);
-        assert_eq!(Micros::from_seconds(-1.0), Micros::ZERO);
-        assert_eq!(Micros::from_seconds(f32::INFINITY), Micros(u64::MAX));
+        assert_eq!(Duration::from_seconds(f32::NAN), Duration::ZERO);
+        assert_eq!(Duration::from_seconds(-1.0), Duration::ZERO);
+        assert_eq!(Duration::from_seconds(f32::INFINITY), Duration::MAX);
+    }
+
+    #[test]
+    fn units_agree() {
+        assert_eq!(Instant::from_secs(3), Instant::from_millis(3_000));
+        assert_eq!(Instant::from_millis(3), Instant::from_micros(3_000));
+        assert_eq!(Duration::from_secs(3), Duration::from_micros(3_000_000));
+        assert_eq!(Duration::from_micros(2_999).as_millis(), 2);
+        assert_eq!(Instant::from_secs(u64::MAX), Instant::MAX);
+        assert_eq!(Instant::from_micros(1_250_000).seconds_f64(), 1.25);
+        assert_eq!(Instant::from_micros(61_000_002).to_string(), "61.000002 s");
     }
 }
