@@ -1,8 +1,8 @@
-//! Typed topics on a lock-free broadcast ring, and the table that says who runs when.
+//! Typed topics on a lock-free broadcast ring, and the table that says what runs when.
 //!
 //! A vehicle is two tables. [`topics!`] says what is published, by whom, how often and for whom; [`schedule!`]
-//! says what runs when. From the first follow a typed publisher (exactly one), a typed subscriber per named reader,
-//! the log's taps and the listing on the command line; from the second the dispatch that every executor shares.
+//! says what runs when. From the first follow the ends of every participant (one publisher and one subscriber per named
+//! reader), the log's taps and the listing on the command line; from the second the dispatch that every executor shares.
 //!
 //! | need | use |
 //! |---|---|
@@ -10,6 +10,7 @@
 //! | every sample, losses counted per reader | policy `ring(N)` → [`Every`] |
 //! | nothing lost, publisher may be refused | policy `queue(N)` → [`Lossless`] |
 //! | wake a task on publish | [`Hook`], given to `Bus::split` |
+//! | code for any vehicle's tables | [`TopicTable`], [`Schedule`] |
 //! | know while compiling that everything is in time | [`schedule!`], [`response_time`] |
 //! | repeat a flight bit for bit | [`Activation`] |
 //!
@@ -23,18 +24,29 @@
 #[cfg(any(test, loom))]
 extern crate std;
 
+// The tables name this crate by its name, here as elsewhere.
+extern crate self as stampfly_bus;
+
 mod activation;
+mod input;
+mod macros;
 mod response;
 mod ring;
 mod schedule;
+mod scheduler;
 mod sync;
 mod table;
 mod topic;
 
-pub use activation::{Activation, InputRecord, MAX_INPUTS, Runnable};
+pub use activation::{Activation, ReadInputs, Runnable};
+pub use input::{NewestInput, SamplesInput};
+pub use macros::{schedule, topics};
 pub use response::{JITTER, Unbounded, response_time};
-pub use schedule::{ActivationInfo, Band, MAX_TRIGGERS, Runnables, Scheduler, Trigger};
-pub use table::{LATEST_DEPTH, TopicInfo};
+pub use schedule::{ActivationInfo, Band, MAX_TRIGGERS, Schedule, Trigger};
+pub use scheduler::{ActivationState, Scheduler};
+pub use stampfly_types::activation::MAX_INPUTS;
+pub use stampfly_types::{Duration, Instant, Message};
+pub use table::{LATEST_DEPTH, PublishWords, Split, Taps, TopicInfo, TopicTable};
 pub use topic::{
     AnyTopic, Every, Full, Hook, Latest, Lossless, Overwriting, Publisher, Sequential, Stamped, Subscriber, Tap, Topic,
 };
@@ -42,12 +54,6 @@ pub use topic::{
 #[cfg(loom)]
 #[doc(hidden)]
 pub use sync::weaken;
-
-#[doc(hidden)]
-pub mod __private {
-    pub use crate::response::response_times;
-    pub use stampfly_types::{Message, Micros};
-}
 
 /// The README's example, compiled and run.
 #[cfg(doctest)]

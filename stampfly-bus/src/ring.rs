@@ -12,7 +12,7 @@
 //! Use the typed [`Topic`](crate::Topic) on top; this layer is what loom checks.
 
 use crate::sync::{AtomicU32, Ordering, fence, unless_loom_const};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// One sample's place in the ring.
 struct Slot<const W: usize> {
@@ -39,6 +39,14 @@ impl<const W: usize> Slot<W> {
     }
 }
 
+impl<const W: usize> Slot<W> {
+    #[inline]
+    fn stamp(&self) -> Instant {
+        let [low, high] = self.at.each_ref().map(|half| u64::from(half.load(Ordering::Relaxed)));
+        Instant::from_micros(low | high << 32)
+    }
+}
+
 /// A single-writer broadcast ring: `N` slots (a power of two) of `W` words.
 pub(crate) struct Ring<const N: usize, const W: usize> {
     /// Newest complete generation.
@@ -48,7 +56,7 @@ pub(crate) struct Ring<const N: usize, const W: usize> {
 
 /// A copy of a slot.
 pub(crate) struct Copied<const W: usize> {
-    pub(crate) at: Micros,
+    pub(crate) at: Instant,
     pub(crate) words: [u32; W],
 }
 
@@ -82,21 +90,35 @@ impl<const N: usize, const W: usize> Ring<N, W> {
     /// Writes the next sample. Must only ever be called by the one publisher, which hands in the generation it
     /// wrote last.
     #[inline]
-    pub(crate) fn write(&self, previous: u32, at: Micros, words: &[u32; W]) -> u32 {
+    pub(crate) fn write(&self, previous: u32, at: Instant, words: &[u32; W]) -> u32 {
         let generation = next(previous);
         let Some(slot) = self.slot(generation) else { return previous };
         let complete = generation.wrapping_mul(2);
         slot.sequence.store(complete.wrapping_sub(1), Ordering::Relaxed);
         // Readers that see any of the words below also see the odd sequence above.
         fence(Ordering::Release);
-        slot.at[0].store(at.0 as u32, Ordering::Relaxed);
-        slot.at[1].store((at.0 >> 32) as u32, Ordering::Relaxed);
+        let micros = at.as_micros();
+        slot.at[0].store(micros as u32, Ordering::Relaxed);
+        slot.at[1].store((micros >> 32) as u32, Ordering::Relaxed);
         for (place, word) in slot.words.iter().zip(words) {
             place.store(*word, Ordering::Relaxed);
         }
         slot.sequence.store(complete, Ordering::Release);
         self.head.store(generation, Ordering::Release);
         generation
+    }
+
+    /// The stamp of the sample of this generation; `None` when it is not there (any more, or yet).
+    #[inline]
+    pub(crate) fn stamp(&self, generation: u32) -> Option<Instant> {
+        let slot = self.slot(generation)?;
+        let complete = generation.wrapping_mul(2);
+        if slot.sequence.load(Ordering::Acquire) != complete {
+            return None;
+        }
+        let at = slot.stamp();
+        fence(Ordering::Acquire);
+        (slot.sequence.load(Ordering::Relaxed) == complete).then_some(at)
     }
 
     /// Copies the sample of this generation; `None` when it is not there (any more, or yet).
@@ -107,8 +129,7 @@ impl<const N: usize, const W: usize> Ring<N, W> {
         if slot.sequence.load(Ordering::Acquire) != complete {
             return None;
         }
-        let at =
-            Micros(u64::from(slot.at[0].load(Ordering::Relaxed)) | u64::from(slot.at[1].load(Ordering::Relaxed)) << 32);
+        let at = slot.stamp();
         let mut words = [0; W];
         for (word, place) in words.iter_mut().zip(&slot.words) {
             *word = place.load(Ordering::Relaxed);
@@ -125,5 +146,26 @@ pub(crate) const fn next(generation: u32) -> u32 {
     match generation.wrapping_add(1) {
         0 => 1,
         following => following,
+    }
+}
+
+/// The generation so many samples before this one. Zero is skipped when it wraps.
+#[inline]
+pub(crate) const fn before(generation: u32, samples: u16) -> u32 {
+    let earlier = generation.wrapping_sub(samples as u32);
+    if earlier > generation { earlier.wrapping_sub(1) } else { earlier }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn before_undoes_next(start in prop_oneof![1u32..100, u32::MAX - 50..=u32::MAX], samples in 0u16..100) {
+            let end = (0..samples).fold(start, |generation, _| next(generation));
+            prop_assert_eq!(before(end, samples), start);
+        }
     }
 }

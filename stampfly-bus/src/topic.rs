@@ -12,14 +12,14 @@
 use crate::ring::{Copied, Ring, next};
 use crate::sync::{AtomicU32, Ordering, spin_loop, unless_loom_const};
 use core::marker::PhantomData;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Duration, Instant, Message};
 
 /// A sample as a reader gets it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stamped<T> {
     /// The instant the data is valid for.
-    pub at: Micros,
-    /// The how-manieth sample of its topic this is, from one.
+    pub at: Instant,
+    /// Sequence number of the sample on its topic, starting at 1.
     pub generation: u32,
     /// The message.
     pub data: T,
@@ -36,7 +36,7 @@ impl<T> Stamped<T> {
 
     /// How old the data is at `now`; zero when it is stamped in the future.
     #[must_use]
-    pub fn age(&self, now: Micros) -> Micros {
+    pub fn age(&self, now: Instant) -> Duration {
         now.since(self.at)
     }
 }
@@ -92,7 +92,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     /// Makes the topic look as if it had been in use for long, `generation` being the newest sample. For tests.
     #[doc(hidden)]
     pub fn __age(&mut self, generation: u32) {
-        self.ring.write(generation.wrapping_sub(1), Micros::ZERO, &[0; W]);
+        self.ring.write(generation.wrapping_sub(1), Instant::ZERO, &[0; W]);
         for cursor in &self.cursors {
             cursor.store(generation, Ordering::Relaxed);
         }
@@ -123,7 +123,11 @@ pub trait AnyTopic: Sync {
     /// Newest generation, zero before the first.
     fn head(&self) -> u32;
     /// The instant the newest sample is valid for; `None` before the first.
-    fn newest_at(&self) -> Option<Micros>;
+    fn newest_at(&self) -> Option<Instant>;
+    /// Number of slots.
+    fn depth(&self) -> usize;
+    /// Hands the words of this sample to `take`. Returns whether the topic still holds it.
+    fn copy(&self, generation: u32, take: &mut dyn FnMut(Instant, &[u32])) -> bool;
 }
 
 impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T, P, N, W, R> {
@@ -131,13 +135,25 @@ impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T,
         self.ring.head()
     }
 
-    fn newest_at(&self) -> Option<Micros> {
-        newest(&self.ring).map(|(_, copied)| copied.at)
+    fn newest_at(&self) -> Option<Instant> {
+        retry_at_head(&self.ring, Ring::stamp).map(|(_, at)| at)
+    }
+
+    fn depth(&self) -> usize {
+        N
+    }
+
+    fn copy(&self, generation: u32, take: &mut dyn FnMut(Instant, &[u32])) -> bool {
+        let copied = if generation == 0 { None } else { self.ring.read(generation) };
+        copied.is_some_and(|copied| {
+            take(copied.at, &copied.words);
+            true
+        })
     }
 }
 
 /// The writing end of a topic. There is exactly one.
-#[must_use = "a topic nobody publishes is a wiring error"]
+#[must_use = "a topic nobody publishes is a wiring mistake"]
 pub struct Publisher<'b, T, P, const N: usize, const W: usize, const R: usize> {
     topic: &'b Topic<T, P, N, W, R>,
     newest: u32,
@@ -146,7 +162,7 @@ pub struct Publisher<'b, T, P, const N: usize, const W: usize, const R: usize> {
 
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: usize> Publisher<'_, T, P, N, W, R> {
     #[inline]
-    fn write(&mut self, at: Micros, words: &[u32; W]) -> u32 {
+    fn write(&mut self, at: Instant, words: &[u32; W]) -> u32 {
         self.newest = self.topic.ring.write(self.newest, at, words);
         if let Some((hook, index)) = self.hook {
             hook(index);
@@ -160,8 +176,24 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
         self.newest
     }
 
-    /// Publishes a sample that is already in words, as a replay does. Words of the wrong number are refused.
-    pub fn publish_words(&mut self, at: Micros, words: &[u32]) -> Option<u32> {
+    /// Publishes without asking whether a reader would lose a sample.
+    #[inline]
+    pub(crate) fn publish_unchecked(&mut self, at: Instant, data: &T) -> u32 {
+        self.write(at, &data.to_words())
+    }
+
+    /// Puts a sample back where it was: the topic's newest is this generation from now on. `None`, and nothing changes,
+    /// when these are no words of the topic's message or the generation is zero.
+    pub fn restore_words(&mut self, at: Instant, generation: u32, words: &[u32]) -> Option<()> {
+        let words: &[u32; W] = words.try_into().ok().filter(|_| generation != 0)?;
+        T::from_words(words)?;
+        self.newest = self.topic.ring.write(crate::ring::before(generation, 1), at, words);
+        Some(())
+    }
+
+    /// Publishes a sample that is already in words, as a replay does. A full queue does not refuse it. `None` when these
+    /// are no words of the topic's message.
+    pub fn publish_words(&mut self, at: Instant, words: &[u32]) -> Option<u32> {
         let words: &[u32; W] = words.try_into().ok()?;
         T::from_words(words)?;
         Some(self.write(at, words))
@@ -178,7 +210,7 @@ impl<T: Message<Words = [u32; W]>, P: Overwriting, const N: usize, const W: usiz
 {
     /// Publishes `data`, valid for the instant `at`. Returns its generation. Never waits, never fails.
     #[inline]
-    pub fn publish(&mut self, at: Micros, data: &T) -> u32 {
+    pub fn publish(&mut self, at: Instant, data: &T) -> u32 {
         self.write(at, &data.to_words())
     }
 }
@@ -188,7 +220,7 @@ impl<T: Message<Words = [u32; W]>, const N: usize, const W: usize, const R: usiz
     ///
     /// # Errors
     /// [`Full`] gives the value back.
-    pub fn publish(&mut self, at: Micros, data: T) -> Result<u32, Full<T>> {
+    pub fn publish(&mut self, at: Instant, data: T) -> Result<u32, Full<T>> {
         let full = self.topic.cursors.iter().any(|cursor| {
             // Acquire: the reader has finished copying what it says it has taken. The distance is the one between the
             // sample to be written and the one to be read next, because generations skip zero when they wrap.
@@ -208,16 +240,19 @@ pub struct Subscriber<'b, T, P, const N: usize, const W: usize> {
     kind: PhantomData<fn(T) -> P>,
 }
 
-/// The newest complete sample. Each retry means the writer has published `N` samples during one copy.
+/// What `read` finds at the newest complete sample. Each retry means the writer has published `N` samples meanwhile.
 #[inline]
-fn newest<const N: usize, const W: usize>(ring: &Ring<N, W>) -> Option<(u32, Copied<W>)> {
+fn retry_at_head<const N: usize, const W: usize, V>(
+    ring: &Ring<N, W>,
+    read: impl Fn(&Ring<N, W>, u32) -> Option<V>,
+) -> Option<(u32, V)> {
     loop {
         let head = ring.head();
         if head == 0 {
             return None;
         }
-        if let Some(copied) = ring.read(head) {
-            return Some((head, copied));
+        if let Some(value) = read(ring, head) {
+            return Some((head, value));
         }
         spin_loop();
     }
@@ -232,24 +267,50 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
 
     /// The sample of this generation, if the ring still holds it. Moves the cursor there.
     pub fn at_generation(&mut self, generation: u32) -> Option<Stamped<T>> {
-        self.copied_at(generation).and_then(Stamped::from_copied)
+        let copied = self.copied_at(generation)?;
+        Stamped::from_copied((generation, copied))
+    }
+
+    /// Newest generation of the topic, read or not; zero before the first.
+    #[inline]
+    pub(crate) fn head(&self) -> u32 {
+        self.ring.head()
+    }
+
+    /// Copies the newest sample to where it is looked at. `false` before the first.
+    #[inline]
+    pub(crate) fn latest_into(&mut self, into: &mut Stamped<T>) -> bool {
+        let newest = self.newest_copied();
+        Self::place(newest, into)
+    }
+
+    /// The same with the sample of this generation. `false` when the ring does not hold it.
+    #[inline]
+    pub(crate) fn generation_into(&mut self, generation: u32, into: &mut Stamped<T>) -> bool {
+        let copied = self.copied_at(generation).map(|copied| (generation, copied));
+        Self::place(copied, into)
     }
 
     #[inline]
-    pub(crate) fn newest_copied(&mut self) -> Option<(u32, Copied<W>)> {
-        let (generation, copied) = newest(self.ring)?;
+    fn place(copied: Option<(u32, Copied<W>)>, into: &mut Stamped<T>) -> bool {
+        copied.and_then(Stamped::from_copied).map(|sample| *into = sample).is_some()
+    }
+
+    #[inline]
+    fn newest_copied(&mut self) -> Option<(u32, Copied<W>)> {
+        let (generation, copied) = retry_at_head(self.ring, Ring::read)?;
         self.advance(generation);
         Some((generation, copied))
     }
 
-    pub(crate) fn copied_at(&mut self, generation: u32) -> Option<(u32, Copied<W>)> {
+    fn copied_at(&mut self, generation: u32) -> Option<Copied<W>> {
         // The sequence number alone could not tell a generation from the one 2³¹ later, nor 2³¹ from an empty slot.
         if generation == 0 || self.ring.head().wrapping_sub(generation) > N as u32 {
             return None;
         }
         let copied = self.ring.read(generation)?;
         self.advance(generation);
-        Some((generation, copied))
+        Some(copied)
     }
 
     /// Has anything been published since the last read?
@@ -311,7 +372,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     }
 
     #[doc(hidden)]
-    pub fn __next_words(&mut self, take: &mut dyn FnMut(Micros, u32, &[u32])) -> bool {
+    pub fn __next_words(&mut self, take: &mut dyn FnMut(Instant, u32, &[u32])) -> bool {
         match self.next_copied() {
             Some((generation, copied)) => {
                 take(copied.at, generation, &copied.words);
@@ -347,7 +408,7 @@ impl<'b, T: Message<Words = [u32; W]>, const N: usize, const W: usize> Tap<'b, T
     }
 
     /// Hands every new sample to `take`: instant, generation, words.
-    pub fn drain(&mut self, take: &mut dyn FnMut(Micros, u32, &[u32])) {
+    pub fn drain(&mut self, take: &mut dyn FnMut(Instant, u32, &[u32])) {
         while self.0.has_new() && self.0.__next_words(take) {}
     }
 

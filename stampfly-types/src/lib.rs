@@ -7,7 +7,8 @@
 //! * [`frame`]: vectors, quaternions and the conventions they follow;
 //! * [`math`]: the one door to transcendental functions;
 //! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`];
-//! * [`messages`]: the messages themselves, sensor to motor.
+//! * [`messages`]: the messages themselves, sensor to motor;
+//! * [`activation`]: the record of what a runnable read, for the log and for replay.
 //!
 //! # Conventions
 //! SI units and radians. Body frame FRD (x forward, y right, z down), world frame NED, attitude as the
@@ -27,12 +28,14 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod activation;
 pub mod frame;
 pub mod math;
 pub mod message;
 pub mod messages;
 pub mod time;
 
+pub use activation::{ActivationRecord, InputRecord};
 pub use frame::{GRAVITY, Quat, Vec3};
 pub use message::{Field, FieldInfo, FieldKind, Message};
 pub use time::{Duration, Instant};

@@ -1,0 +1,136 @@
+//! Inputs of a runnable: a reading end together with what it has read.
+//!
+//! | policy of the topic | input | what a runnable sees |
+//! |---|---|---|
+//! | `latest` | [`NewestInput`] | the newest sample, also when it is not new |
+//! | `ring(N)`, `queue(N)` | [`SamplesInput`] | every sample since its last activation, oldest first |
+//!
+//! Inputs read themselves when their runnable is activated, and keep the samples where the runnable looks at them: a
+//! sample is copied once, out of the ring, and not at all when it is the one that is there already. Outside the
+//! runnables, where nothing is activated, use a [`Subscriber`].
+
+use crate::activation::Activation;
+use crate::topic::{Latest, Sequential, Stamped, Subscriber};
+use core::ops::Deref;
+use heapless::Vec;
+use stampfly_types::{Duration, Instant, Message};
+
+/// The newest sample of a topic.
+pub struct NewestInput<'b, T, const N: usize, const W: usize> {
+    end: Subscriber<'b, T, Latest, N, W>,
+    sample: Stamped<T>,
+    is_new: bool,
+}
+
+impl<'b, T, const N: usize, const W: usize> NewestInput<'b, T, N, W>
+where
+    T: Message<Words = [u32; W]> + Default,
+{
+    #[doc(hidden)]
+    pub fn __new(end: Subscriber<'b, T, Latest, N, W>) -> Self {
+        Self { end, sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() }, is_new: false }
+    }
+
+    /// The newest message; the message's default before the first.
+    #[inline]
+    #[must_use]
+    pub const fn get(&self) -> &T {
+        &self.sample.data
+    }
+
+    /// The newest sample; `None` before the first.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self) -> Option<&Stamped<T>> {
+        (self.sample.generation != 0).then_some(&self.sample)
+    }
+
+    /// The newest message, if there is one and it is at most so old at `now`.
+    #[inline]
+    #[must_use]
+    pub fn fresh(&self, now: Instant, limit: Duration) -> Option<&T> {
+        self.sample().filter(|sample| sample.age(now) <= limit).map(|sample| &sample.data)
+    }
+
+    /// Is it another sample than at the activation before?
+    #[inline]
+    #[must_use]
+    pub const fn is_new(&self) -> bool {
+        self.is_new
+    }
+
+    /// Reads, as part of an activation.
+    #[inline]
+    pub fn read(&mut self, activation: &mut Activation) {
+        let recorded = activation.recorded();
+        let head = recorded.map_or_else(|| self.end.head(), |input| input.generation);
+        self.is_new = head != self.sample.generation;
+        if self.is_new {
+            let found = match recorded {
+                None => self.end.latest_into(&mut self.sample),
+                Some(input) => self.end.generation_into(input.generation, &mut self.sample),
+            };
+            if !found {
+                activation.misses();
+            }
+        }
+        if recorded.is_none() {
+            activation.has_read(self.sample.generation, u16::from(self.is_new));
+        }
+    }
+}
+
+/// Every sample of a topic since the last activation, oldest first. A slice of [`Stamped`].
+pub struct SamplesInput<'b, T, P, const N: usize, const W: usize> {
+    end: Subscriber<'b, T, P, N, W>,
+    samples: Vec<Stamped<T>, N>,
+}
+
+impl<'b, T, P, const N: usize, const W: usize> SamplesInput<'b, T, P, N, W>
+where
+    T: Message<Words = [u32; W]>,
+    P: Sequential,
+{
+    #[doc(hidden)]
+    pub fn __new(end: Subscriber<'b, T, P, N, W>) -> Self {
+        Self { end, samples: Vec::new() }
+    }
+
+    /// Samples this runnable has missed because they were overwritten before it was activated.
+    #[must_use]
+    pub fn lost(&self) -> u32 {
+        self.end.lost()
+    }
+
+    /// Reads, as part of an activation. More samples than the topic's depth stay for the next one.
+    #[inline]
+    pub fn read(&mut self, activation: &mut Activation) {
+        self.samples.clear();
+        let Some(input) = activation.recorded() else {
+            while !self.samples.is_full() {
+                let Some(sample) = self.end.next() else { break };
+                // There is room.
+                let _ = self.samples.push(sample);
+            }
+            activation.has_read(self.end.generation(), self.samples.len() as u16);
+            return;
+        };
+        let mut generation = crate::ring::before(input.generation, input.taken);
+        for _ in 0..input.taken {
+            generation = crate::ring::next(generation);
+            match self.end.at_generation(generation) {
+                Some(sample) if self.samples.push(sample).is_ok() => {}
+                _ => activation.misses(),
+            }
+        }
+    }
+}
+
+impl<T, P, const N: usize, const W: usize> Deref for SamplesInput<'_, T, P, N, W> {
+    type Target = [Stamped<T>];
+
+    #[inline]
+    fn deref(&self) -> &[Stamped<T>] {
+        &self.samples
+    }
+}

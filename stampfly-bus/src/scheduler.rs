@@ -1,0 +1,135 @@
+//! Which activation is due: the one decision that firmware, simulation and replay share.
+
+use crate::schedule::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
+use crate::topic::AnyTopic;
+use stampfly_types::Instant;
+
+/// What the scheduler keeps of one line of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActivationState {
+    /// Heads of its triggers when it last started.
+    seen: [u32; MAX_TRIGGERS],
+    /// The `now` of its last run.
+    last: Instant,
+    /// What the clock showed at its last run.
+    ran: Instant,
+    /// How often it has finished.
+    runs: u32,
+    /// How often the line it follows had finished when it last started.
+    followed: u32,
+}
+
+impl ActivationState {
+    /// A line that has not run since power-on at `start`.
+    #[must_use]
+    pub const fn new(start: Instant) -> Self {
+        Self { seen: [0; MAX_TRIGGERS], last: start, ran: start, runs: 0, followed: 0 }
+    }
+
+    /// When the line is due even if nothing triggers it.
+    #[inline]
+    fn tick(&self, info: &ActivationInfo) -> Option<Instant> {
+        match info.trigger {
+            Trigger::Every(period) => Some(self.last + period),
+            _ => Some(self.ran + info.at_latest?),
+        }
+    }
+}
+
+/// Decides which activation is due. Holds no clock and runs nothing: executors on a microcontroller, on a host and in a
+/// replay share it, so they agree on `now`.
+///
+/// `now` of an activation is the newest stamp of its topics for `on`, the predecessor's `now` for `after`, and the
+/// scheduled tick for `every` and `or at latest`; it never goes back.
+///
+/// `or at latest` counts from when the activation last ran, by the clock, not from its `now`: a stamp is as old as the
+/// sensor's delay, and a deadline that counted from it would pass while everything is in order.
+#[derive(Clone, Debug)]
+pub struct Scheduler<S> {
+    table: &'static [ActivationInfo],
+    states: S,
+}
+
+impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
+    /// A scheduler at power-on: one state a line of the table.
+    #[must_use]
+    pub const fn new(table: &'static [ActivationInfo], states: S) -> Self {
+        Self { table, states }
+    }
+
+    /// The first activation of this band from line `first` on that is due at `clock`: its line and its `now`. `heads` are
+    /// the topics in the topic table's order.
+    ///
+    /// An executor that goes through the table once, from each activation to the next, runs a whole chain of `after`s in
+    /// one pass, because `after` only names lines above.
+    #[inline]
+    #[must_use]
+    pub fn due(&self, band: Band, first: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<(usize, Instant)> {
+        let states = self.states.as_ref();
+        let lines = self.table.iter().zip(states).enumerate().skip(first);
+        lines
+            .filter(|(_, (info, _))| info.band == band)
+            .find_map(|(index, (info, state))| triggered(states, info, state, clock, heads).map(|now| (index, now)))
+    }
+
+    /// Notes that an activation is about to read its inputs, at `clock`.
+    #[inline]
+    pub fn started(&mut self, index: usize, now: Instant, clock: Instant, heads: &[&dyn AnyTopic]) {
+        let states = self.states.as_mut();
+        let Some(info) = self.table.get(index) else { return };
+        let runs_before = match info.trigger {
+            Trigger::After(before) => states.get(before).map(|state| state.runs),
+            _ => None,
+        };
+        let Some(state) = states.get_mut(index) else { return };
+        if let Trigger::On(topics) = info.trigger {
+            for (topic, seen) in topics.iter().zip(&mut state.seen) {
+                *seen = heads.get(*topic).map_or(0, |topic| topic.head());
+            }
+        }
+        state.followed = runs_before.unwrap_or(state.followed);
+        // A tick is on time by definition, so that ticks do not drift with an executor that is late.
+        state.ran = if state.tick(info) == Some(now) { now } else { clock };
+        state.last = now;
+    }
+
+    /// Notes that an activation has published: releases the ones that run after it.
+    #[inline]
+    pub fn finished(&mut self, index: usize) {
+        if let Some(state) = self.states.as_mut().get_mut(index) {
+            state.runs = state.runs.wrapping_add(1);
+        }
+    }
+
+    /// The next instant at which a period or a deadline makes something due.
+    #[must_use]
+    pub fn next_tick(&self) -> Option<Instant> {
+        self.table.iter().zip(self.states.as_ref()).filter_map(|(info, state)| state.tick(info)).min()
+    }
+}
+
+/// The `now` of a line that is due at `clock`.
+#[inline]
+fn triggered(
+    states: &[ActivationState],
+    info: &ActivationInfo,
+    state: &ActivationState,
+    clock: Instant,
+    heads: &[&dyn AnyTopic],
+) -> Option<Instant> {
+    let by_trigger = match info.trigger {
+        Trigger::On(topics) => {
+            let new = topics.iter().zip(&state.seen).filter_map(|(topic, seen)| {
+                let topic = heads.get(*topic)?;
+                (topic.head() != *seen).then(|| topic.newest_at()).flatten()
+            });
+            new.max()
+        }
+        Trigger::After(before) => states.get(before).filter(|before| before.runs != state.followed).map(|b| b.last),
+        Trigger::Every(_) => None,
+    };
+    // A deadline that has passed may have been later than the stamp that comes after it.
+    by_trigger
+        .map(|now| now.max(state.last))
+        .or_else(|| state.tick(info).filter(|tick| clock >= *tick).map(|tick| tick.max(state.last)))
+}

@@ -1,0 +1,129 @@
+//! What one activation of a runnable saw: the record that makes a flight repeatable.
+//!
+//! The outputs of a runnable are a function of its state, of the instant it was told and of the samples it read. The
+//! samples are in the log; this record says how far each input had been read, so that a replay hands every activation
+//! the same samples, however the threads of the flight interrupted each other. A refused publish (a full queue) is an
+//! input too, because the publisher sees it.
+//!
+//! The bus fills the record in, the log stores it, a replay hands it back to the bus. It lives here because bus and log
+//! do not depend on each other. Not a profiler: it says nothing about how long anything took.
+
+use crate::Instant;
+
+/// Most inputs of one runnable.
+pub const MAX_INPUTS: usize = 16;
+
+/// How far one input had been read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InputRecord {
+    /// Generation of the newest sample read so far, in this activation or before; zero before the first.
+    pub generation: u32,
+    /// Samples taken in this activation.
+    pub taken: u16,
+}
+
+/// One activation of one runnable.
+///
+/// ```
+/// use stampfly_types::{ActivationRecord, InputRecord, Instant};
+///
+/// let mut record = ActivationRecord::new(2, Instant::from_millis(5));
+/// record.push(InputRecord { generation: 17, taken: 1 })?;
+/// record.push(InputRecord { generation: 4, taken: 0 })?;
+/// assert_eq!(record.inputs().len(), 2);
+/// # Ok::<(), stampfly_types::activation::TooManyInputs>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct ActivationRecord {
+    /// The runnable's line in the activation table.
+    pub index: u8,
+    /// The instant it was told, which need not be the instant it ran.
+    pub now: Instant,
+    /// Bit n: its n-th publish on a queue was refused. Bit 31 stands for every one from the 32nd on.
+    pub refused: u32,
+    inputs: [InputRecord; MAX_INPUTS],
+    count: u8,
+}
+
+/// Only the inputs that are in use count.
+impl PartialEq for ActivationRecord {
+    fn eq(&self, other: &Self) -> bool {
+        (self.index, self.now, self.refused, self.inputs())
+            == (other.index, other.now, other.refused, other.inputs())
+    }
+}
+
+impl Eq for ActivationRecord {}
+
+/// The record has [`MAX_INPUTS`] inputs already. Holds the one that did not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyInputs(pub InputRecord);
+
+impl core::fmt::Display for TooManyInputs {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "an activation has at most {MAX_INPUTS} inputs")
+    }
+}
+
+impl core::error::Error for TooManyInputs {}
+
+impl ActivationRecord {
+    /// An activation that has not read anything yet.
+    #[inline]
+    #[must_use]
+    pub const fn new(index: u8, now: Instant) -> Self {
+        Self { index, now, refused: 0, inputs: [InputRecord { generation: 0, taken: 0 }; MAX_INPUTS], count: 0 }
+    }
+
+    /// Begins the record of another activation in the same memory.
+    #[inline]
+    pub const fn begin(&mut self, index: u8, now: Instant) {
+        self.index = index;
+        self.now = now;
+        self.refused = 0;
+        self.count = 0;
+    }
+
+    /// Adds the next input, in the order of the topic table.
+    ///
+    /// # Errors
+    /// When there are [`MAX_INPUTS`] already; the record is unchanged.
+    #[inline]
+    pub fn push(&mut self, input: InputRecord) -> Result<(), TooManyInputs> {
+        let place = self.inputs.get_mut(usize::from(self.count)).ok_or(TooManyInputs(input))?;
+        *place = input;
+        self.count += 1;
+        Ok(())
+    }
+
+    /// The inputs, in the order they were added.
+    #[inline]
+    #[must_use]
+    pub fn inputs(&self) -> &[InputRecord] {
+        self.inputs.get(..usize::from(self.count)).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_record_gives_the_input_back() {
+        let mut record = ActivationRecord::new(0, Instant::ZERO);
+        for generation in 1..=MAX_INPUTS as u32 {
+            assert_eq!(record.push(InputRecord { generation, taken: 1 }), Ok(()));
+        }
+        let one_more = InputRecord { generation: 99, taken: 1 };
+        assert_eq!(record.push(one_more), Err(TooManyInputs(one_more)));
+        assert_eq!(record.inputs().len(), MAX_INPUTS);
+    }
+
+    #[test]
+    fn what_an_earlier_activation_read_does_not_count() {
+        let mut record = ActivationRecord::new(1, Instant::from_micros(1));
+        record.push(InputRecord { generation: 3, taken: 3 }).expect("there is room");
+        record.begin(2, Instant::from_micros(7));
+        assert_eq!(record, ActivationRecord::new(2, Instant::from_micros(7)));
+    }
+}
