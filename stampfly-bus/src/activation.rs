@@ -10,7 +10,7 @@
 
 use crate::ring::Copied;
 use crate::topic::{Full, Lossless, Publisher, Sequential, Stamped, Subscriber};
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 
 /// Most inputs one runnable can have.
 pub const MAX_INPUTS: usize = 16;
@@ -40,7 +40,7 @@ pub trait Runnable {
 /// decides it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Activation {
-    now: Micros,
+    now: Instant,
     inputs: [InputRecord; MAX_INPUTS],
     count: usize,
     refused: u32,
@@ -52,7 +52,7 @@ pub struct Activation {
 impl Activation {
     /// An activation in flight, at the instant its trigger gives.
     #[must_use]
-    pub fn live(now: Micros) -> Self {
+    pub fn live(now: Instant) -> Self {
         Self {
             now,
             inputs: [InputRecord { generation: 0, taken: 0 }; MAX_INPUTS],
@@ -66,7 +66,7 @@ impl Activation {
 
     /// An activation to repeat: same instant, same inputs, same refusals. More than [`MAX_INPUTS`] are ignored.
     #[must_use]
-    pub fn replay(now: Micros, inputs: &[InputRecord], refused: u32) -> Self {
+    pub fn replay(now: Instant, inputs: &[InputRecord], refused: u32) -> Self {
         let mut activation = Self { replaying: true, refused, ..Self::live(now) };
         for (place, input) in activation.inputs.iter_mut().zip(inputs) {
             *place = *input;
@@ -76,7 +76,7 @@ impl Activation {
 
     /// The instant to compute for: the trigger's, never a clock's.
     #[must_use]
-    pub fn now(&self) -> Micros {
+    pub fn now(&self) -> Instant {
         self.now
     }
 

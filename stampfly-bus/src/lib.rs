@@ -46,7 +46,7 @@ pub use sync::weaken;
 #[doc(hidden)]
 pub mod __private {
     pub use crate::response::response_times;
-    pub use stampfly_types::{Message, Micros};
+    pub use stampfly_types::{Duration, Instant, Message};
 }
 
 /// The README's example, compiled and run.

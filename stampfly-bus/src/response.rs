@@ -21,7 +21,7 @@
 
 use crate::schedule::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 use crate::table::TopicInfo;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// A sample may be late by this part of its topic's period: one over this number.
 pub const JITTER: u64 = 10;
@@ -68,23 +68,24 @@ impl Arrivals {
         let mut arrivals = Self { sources: [(1, 0); MAX_TRIGGERS + 1], count: 0, deadline: u64::MAX };
         let (mut line, mut silence) = (index, u64::MAX);
         loop {
-            if let Some(Micros(late)) = table[line].at_latest
-                && late < silence
+            if let Some(late) = table[line].at_latest
+                && late.as_micros() < silence
             {
-                silence = late;
+                silence = late.as_micros();
             }
             match table[line].trigger {
                 Trigger::After(before) if before < line => line = before,
                 // The table refuses it in words of its own.
                 Trigger::After(_) => break,
-                Trigger::Every(Micros(period)) => {
-                    arrivals = arrivals.trigger(period, 0);
+                Trigger::Every(period) => {
+                    arrivals = arrivals.trigger(period.as_micros(), 0);
                     break;
                 }
                 Trigger::On(on) => {
                     let mut topic = 0;
                     while topic < on.len() {
-                        let Some(Micros(period)) = topics[on[topic]].period else { return Err(Unbounded::NoRate) };
+                        let Some(period) = topics[on[topic]].period else { return Err(Unbounded::NoRate) };
+                        let period = period.as_micros();
                         arrivals = arrivals.trigger(period, period / JITTER);
                         topic += 1;
                     }
@@ -115,8 +116,8 @@ const fn is_flight(info: &ActivationInfo) -> bool {
 const fn longest_background<const A: usize>(table: &[ActivationInfo; A], first: usize) -> u64 {
     let (mut line, mut longest) = (first, 0);
     while line < A {
-        if !is_flight(&table[line]) && table[line].budget.0 > longest {
-            longest = table[line].budget.0;
+        if !is_flight(&table[line]) && table[line].budget.as_micros() > longest {
+            longest = table[line].budget.as_micros();
         }
         line += 1;
     }
@@ -138,7 +139,7 @@ const fn longest_pass<const A: usize>(table: &[ActivationInfo; A]) -> u64 {
     let (mut line, mut sum) = (0, 0);
     while line < A {
         if is_flight(&table[line]) {
-            sum += table[line].budget.0;
+            sum += table[line].budget.as_micros();
         }
         line += 1;
     }
@@ -153,7 +154,7 @@ pub const fn response_time<const A: usize>(
     table: &[ActivationInfo; A],
     topics: &[TopicInfo],
     index: usize,
-) -> Result<Micros, Unbounded> {
+) -> Result<Duration, Unbounded> {
     let own = match Arrivals::of(table, topics, index) {
         Ok(own) => own,
         Err(error) => return Err(error),
@@ -164,7 +165,7 @@ pub const fn response_time<const A: usize>(
     let begun = longest_background(table, if flies { 0 } else { index });
     let mut response = 0;
     loop {
-        let mut next = begun + if flies { 0 } else { table[index].budget.0 };
+        let mut next = begun + if flies { 0 } else { table[index].budget.as_micros() };
         let mut line = 0;
         while line < A {
             if is_flight(&table[line]) || !flies && line < index {
@@ -181,7 +182,7 @@ pub const fn response_time<const A: usize>(
                     // What another trigger starts may have waited for the pass before.
                     arrivals.within(response + longest_pass(table))
                 };
-                next += times * table[line].budget.0;
+                next += times * table[line].budget.as_micros();
             }
             line += 1;
         }
@@ -189,7 +190,7 @@ pub const fn response_time<const A: usize>(
             return Err(Unbounded::TooLate);
         }
         if next == response {
-            return Ok(Micros(response));
+            return Ok(Duration::from_micros(response));
         }
         response = next;
     }
@@ -197,8 +198,8 @@ pub const fn response_time<const A: usize>(
 
 /// The response times of all lines, for [`schedule!`](crate::schedule!), which refuses a table where one has none.
 #[must_use]
-pub const fn response_times<const A: usize>(table: &[ActivationInfo; A], topics: &[TopicInfo]) -> [Micros; A] {
-    let (mut line, mut times) = (0, [Micros(0); A]);
+pub const fn response_times<const A: usize>(table: &[ActivationInfo; A], topics: &[TopicInfo]) -> [Duration; A] {
+    let (mut line, mut times) = (0, [Duration::ZERO; A]);
     while line < A {
         if let Ok(time) = response_time(table, topics, line) {
             times[line] = time;

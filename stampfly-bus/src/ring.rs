@@ -12,7 +12,7 @@
 //! Use the typed [`Topic`](crate::Topic) on top; this layer is what loom checks.
 
 use crate::sync::{AtomicU32, Ordering, fence, unless_loom_const};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// One sample's place in the ring.
 struct Slot<const W: usize> {
@@ -48,7 +48,7 @@ pub(crate) struct Ring<const N: usize, const W: usize> {
 
 /// A copy of a slot.
 pub(crate) struct Copied<const W: usize> {
-    pub(crate) at: Micros,
+    pub(crate) at: Instant,
     pub(crate) words: [u32; W],
 }
 
@@ -82,15 +82,15 @@ impl<const N: usize, const W: usize> Ring<N, W> {
     /// Writes the next sample. Must only ever be called by the one publisher, which hands in the generation it
     /// wrote last.
     #[inline]
-    pub(crate) fn write(&self, previous: u32, at: Micros, words: &[u32; W]) -> u32 {
+    pub(crate) fn write(&self, previous: u32, at: Instant, words: &[u32; W]) -> u32 {
         let generation = next(previous);
         let Some(slot) = self.slot(generation) else { return previous };
         let complete = generation.wrapping_mul(2);
         slot.sequence.store(complete.wrapping_sub(1), Ordering::Relaxed);
         // Readers that see any of the words below also see the odd sequence above.
         fence(Ordering::Release);
-        slot.at[0].store(at.0 as u32, Ordering::Relaxed);
-        slot.at[1].store((at.0 >> 32) as u32, Ordering::Relaxed);
+        slot.at[0].store(at.as_micros() as u32, Ordering::Relaxed);
+        slot.at[1].store((at.as_micros() >> 32) as u32, Ordering::Relaxed);
         for (place, word) in slot.words.iter().zip(words) {
             place.store(*word, Ordering::Relaxed);
         }
@@ -107,8 +107,9 @@ impl<const N: usize, const W: usize> Ring<N, W> {
         if slot.sequence.load(Ordering::Acquire) != complete {
             return None;
         }
-        let at =
-            Micros(u64::from(slot.at[0].load(Ordering::Relaxed)) | u64::from(slot.at[1].load(Ordering::Relaxed)) << 32);
+        let at = Instant::from_micros(
+            u64::from(slot.at[0].load(Ordering::Relaxed)) | u64::from(slot.at[1].load(Ordering::Relaxed)) << 32,
+        );
         let mut words = [0; W];
         for (word, place) in words.iter_mut().zip(&slot.words) {
             *word = place.load(Ordering::Relaxed);

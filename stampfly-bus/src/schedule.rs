@@ -1,7 +1,7 @@
 //! The activation table: who runs when, and in which band.
 
 use crate::topic::AnyTopic;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// What activates a runnable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,7 +10,7 @@ pub enum Trigger {
     /// Something new on any of these topics (indices into the topic table).
     On(&'static [usize]),
     /// A fixed period.
-    Every(Micros),
+    Every(Duration),
     /// The activation with this index has just finished.
     After(usize),
 }
@@ -35,11 +35,11 @@ pub struct ActivationInfo {
     /// What activates it.
     pub trigger: Trigger,
     /// Activate it this long after its last activation even if the trigger stays silent.
-    pub at_latest: Option<Micros>,
+    pub at_latest: Option<Duration>,
     /// Where it runs.
     pub band: Band,
     /// Execution time it may take on the target.
-    pub budget: Micros,
+    pub budget: Duration,
 }
 
 /// Decides which activation is due. Holds no clock and runs nothing: executors on a microcontroller, on a host and
@@ -56,9 +56,9 @@ pub struct Scheduler<const A: usize, const T: usize> {
     /// Heads seen by each activation's triggers.
     seen: [[u32; MAX_TRIGGERS]; A],
     /// The `now` of each activation's last run.
-    last: [Micros; A],
+    last: [Instant; A],
     /// What the clock showed at each activation's last run.
-    ran: [Micros; A],
+    ran: [Instant; A],
     /// How often each activation has finished.
     runs: [u32; A],
     /// How often each activation's predecessor had finished when it last started.
@@ -71,7 +71,7 @@ pub const MAX_TRIGGERS: usize = 4;
 impl<const A: usize, const T: usize> Scheduler<A, T> {
     /// A scheduler at power-on, `start` on the clock. Periods count from there.
     #[must_use]
-    pub fn new(table: &'static [ActivationInfo; A], start: Micros) -> Self {
+    pub fn new(table: &'static [ActivationInfo; A], start: Instant) -> Self {
         Self { table, seen: [[0; MAX_TRIGGERS]; A], last: [start; A], ran: [start; A], runs: [0; A], followed: [0; A] }
     }
 
@@ -81,7 +81,13 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
     /// one pass, because `after` only names lines above.
     #[inline]
     #[must_use]
-    pub fn due(&self, band: Band, first: usize, clock: Micros, heads: &[&dyn AnyTopic; T]) -> Option<(usize, Micros)> {
+    pub fn due(
+        &self,
+        band: Band,
+        first: usize,
+        clock: Instant,
+        heads: &[&dyn AnyTopic; T],
+    ) -> Option<(usize, Instant)> {
         self.table
             .iter()
             .enumerate()
@@ -94,9 +100,9 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
         &self,
         index: usize,
         info: &ActivationInfo,
-        clock: Micros,
+        clock: Instant,
         heads: &[&dyn AnyTopic; T],
-    ) -> Option<Micros> {
+    ) -> Option<Instant> {
         let by_trigger = match info.trigger {
             Trigger::On(topics) => topics
                 .iter()
@@ -120,7 +126,7 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
     }
 
     /// When this activation is due even if nothing triggers it.
-    fn tick(&self, index: usize, info: &ActivationInfo) -> Option<Micros> {
+    fn tick(&self, index: usize, info: &ActivationInfo) -> Option<Instant> {
         match info.trigger {
             Trigger::Every(period) => Some(*self.last.get(index)? + period),
             _ => Some(*self.ran.get(index)? + info.at_latest?),
@@ -129,7 +135,7 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
 
     /// Notes that an activation is about to read its inputs, at `clock`.
     #[inline]
-    pub fn started(&mut self, index: usize, now: Micros, clock: Micros, heads: &[&dyn AnyTopic; T]) {
+    pub fn started(&mut self, index: usize, now: Instant, clock: Instant, heads: &[&dyn AnyTopic; T]) {
         match self.table.get(index).map(|info| info.trigger) {
             Some(Trigger::On(topics)) => {
                 let seen = self.seen.get_mut(index).into_iter().flatten();
@@ -164,7 +170,7 @@ impl<const A: usize, const T: usize> Scheduler<A, T> {
 
     /// The next instant at which a period or a deadline makes something due.
     #[must_use]
-    pub fn next_tick(&self) -> Option<Micros> {
+    pub fn next_tick(&self) -> Option<Instant> {
         self.table.iter().enumerate().filter_map(|(index, info)| self.tick(index, info)).min()
     }
 }
@@ -239,7 +245,7 @@ macro_rules! schedule {
                 trigger: $crate::schedule!(@trigger $wiring $trigger),
                 at_latest: $crate::schedule!(@late $late),
                 band: $crate::schedule!(@band $band),
-                budget: $crate::__private::Micros($budget),
+                budget: $crate::__private::Duration::from_micros($budget),
             }),+];
 
             const _: () = {
@@ -253,7 +259,7 @@ macro_rules! schedule {
             };
 
             /// How long after its trigger each runnable has published at the latest, if everybody keeps to their budgets.
-            pub const RESPONSE_TIMES: [$crate::__private::Micros; COUNT] =
+            pub const RESPONSE_TIMES: [$crate::__private::Duration; COUNT] =
                 $crate::__private::response_times(&ACTIVATIONS, &$wiring::TOPICS);
 
             $(const _: () = match $crate::response_time(&ACTIVATIONS, &$wiring::TOPICS, Id::$name as usize) {
@@ -289,8 +295,8 @@ macro_rules! schedule {
     (@trigger $wiring:ident (every $period:literal $unit:ident)) => { $crate::Trigger::Every($crate::schedule!(@time $period $unit)) };
     (@late (never)) => { None };
     (@late (late $late:literal $unit:ident)) => { Some($crate::schedule!(@time $late $unit)) };
-    (@time $value:literal ms) => { $crate::__private::Micros::from_millis($value) };
-    (@time $value:literal us) => { $crate::__private::Micros($value) };
+    (@time $value:literal ms) => { $crate::__private::Duration::from_millis($value) };
+    (@time $value:literal us) => { $crate::__private::Duration::from_micros($value) };
     (@band flight) => { $crate::Band::Flight };
     (@band background) => { $crate::Band::Background };
 }

@@ -1,6 +1,6 @@
 //! The topic table: one line per topic, and everything that follows from it.
 
-use stampfly_types::{FieldInfo, Micros};
+use stampfly_types::{Duration, FieldInfo};
 
 /// What a line of the topic table says, for tools: the command line, the log, the documentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct TopicInfo {
     /// Nominal rate as written in the table, such as `400 Hz` or `on event`.
     pub rate: &'static str,
     /// Time between two samples at that rate; `None` when they come as they come.
-    pub period: Option<Micros>,
+    pub period: Option<Duration>,
     /// Who publishes it.
     pub publisher: &'static str,
     /// Who reads it. The log tap reads every topic and is not listed.
@@ -51,7 +51,7 @@ pub const LATEST_DEPTH: usize = 8;
 ///
 /// ```
 /// use stampfly_bus::topics;
-/// use stampfly_types::{Micros, messages::{ImuData, TofData}};
+/// use stampfly_types::{Instant, messages::{ImuData, TofData}};
 ///
 /// topics! {
 ///     /// Two sensors.
@@ -67,8 +67,8 @@ pub const LATEST_DEPTH: usize = 8;
 ///     let wiring::Split { ports, mut taps, .. } = bus.split(None);
 ///     let wiring::Ports { sensor_imu: mut imu, sensor_tof: mut tof } = ports;
 ///
-///     imu.tx.publish(Micros(2_500), &ImuData::default());
-///     tof.tx.publish(Micros(2_000), &TofData { distance: 0.4, valid: true, ..Default::default() });
+///     imu.tx.publish(Instant::from_micros(2_500), &ImuData::default());
+///     tof.tx.publish(Instant::from_micros(2_000), &TofData { distance: 0.4, valid: true, ..Default::default() });
 ///
 ///     assert_eq!(imu.estimation.next().unwrap().generation, 1);
 ///     assert_eq!(tof.landing.latest().unwrap().data.distance, 0.4);
@@ -158,7 +158,7 @@ macro_rules! topics {
 
             impl Taps<'_> {
                 /// Hands every new sample of every topic to `take`: topic, instant, generation, words.
-                pub fn drain(&mut self, take: &mut dyn FnMut(Id, bus::Micros, u32, &[u32])) {
+                pub fn drain(&mut self, take: &mut dyn FnMut(Id, bus::Instant, u32, &[u32])) {
                     $(self.$name.drain(&mut |at, generation, words| take(Id::$name, at, generation, words));)+
                 }
 
@@ -213,7 +213,7 @@ macro_rules! topics {
     (@depth ring $depth:literal) => { $depth };
     (@depth queue $depth:literal) => { $depth };
     (@period on event) => { None };
-    (@period $rate:literal Hz) => { Some(bus::Micros(1_000_000 / $rate)) };
+    (@period $rate:literal Hz) => { Some(bus::Duration::from_micros(1_000_000 / $rate)) };
     (@policy latest) => { $crate::Latest };
     (@policy ring) => { $crate::Every };
     (@policy queue) => { $crate::Lossless };

@@ -12,13 +12,13 @@
 use crate::ring::{Copied, Ring, next};
 use crate::sync::{AtomicU32, Ordering, spin_loop, unless_loom_const};
 use core::marker::PhantomData;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Duration, Instant, Message};
 
 /// A sample as a reader gets it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stamped<T> {
     /// The instant the data is valid for.
-    pub at: Micros,
+    pub at: Instant,
     /// The how-manieth sample of its topic this is, from one.
     pub generation: u32,
     /// The message.
@@ -36,7 +36,7 @@ impl<T> Stamped<T> {
 
     /// How old the data is at `now`; zero when it is stamped in the future.
     #[must_use]
-    pub fn age(&self, now: Micros) -> Micros {
+    pub fn age(&self, now: Instant) -> Duration {
         now.since(self.at)
     }
 }
@@ -92,7 +92,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     /// Makes the topic look as if it had been in use for long, `generation` being the newest sample. For tests.
     #[doc(hidden)]
     pub fn __age(&mut self, generation: u32) {
-        self.ring.write(generation.wrapping_sub(1), Micros::ZERO, &[0; W]);
+        self.ring.write(generation.wrapping_sub(1), Instant::ZERO, &[0; W]);
         for cursor in &self.cursors {
             cursor.store(generation, Ordering::Relaxed);
         }
@@ -123,7 +123,7 @@ pub trait AnyTopic: Sync {
     /// Newest generation, zero before the first.
     fn head(&self) -> u32;
     /// The instant the newest sample is valid for; `None` before the first.
-    fn newest_at(&self) -> Option<Micros>;
+    fn newest_at(&self) -> Option<Instant>;
 }
 
 impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T, P, N, W, R> {
@@ -131,7 +131,7 @@ impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T,
         self.ring.head()
     }
 
-    fn newest_at(&self) -> Option<Micros> {
+    fn newest_at(&self) -> Option<Instant> {
         newest(&self.ring).map(|(_, copied)| copied.at)
     }
 }
@@ -146,7 +146,7 @@ pub struct Publisher<'b, T, P, const N: usize, const W: usize, const R: usize> {
 
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: usize> Publisher<'_, T, P, N, W, R> {
     #[inline]
-    fn write(&mut self, at: Micros, words: &[u32; W]) -> u32 {
+    fn write(&mut self, at: Instant, words: &[u32; W]) -> u32 {
         self.newest = self.topic.ring.write(self.newest, at, words);
         if let Some((hook, index)) = self.hook {
             hook(index);
@@ -161,7 +161,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     }
 
     /// Publishes a sample that is already in words, as a replay does. Words of the wrong number are refused.
-    pub fn publish_words(&mut self, at: Micros, words: &[u32]) -> Option<u32> {
+    pub fn publish_words(&mut self, at: Instant, words: &[u32]) -> Option<u32> {
         let words: &[u32; W] = words.try_into().ok()?;
         T::from_words(words)?;
         Some(self.write(at, words))
@@ -178,7 +178,7 @@ impl<T: Message<Words = [u32; W]>, P: Overwriting, const N: usize, const W: usiz
 {
     /// Publishes `data`, valid for the instant `at`. Returns its generation. Never waits, never fails.
     #[inline]
-    pub fn publish(&mut self, at: Micros, data: &T) -> u32 {
+    pub fn publish(&mut self, at: Instant, data: &T) -> u32 {
         self.write(at, &data.to_words())
     }
 }
@@ -188,7 +188,7 @@ impl<T: Message<Words = [u32; W]>, const N: usize, const W: usize, const R: usiz
     ///
     /// # Errors
     /// [`Full`] gives the value back.
-    pub fn publish(&mut self, at: Micros, data: T) -> Result<u32, Full<T>> {
+    pub fn publish(&mut self, at: Instant, data: T) -> Result<u32, Full<T>> {
         let full = self.topic.cursors.iter().any(|cursor| {
             // Acquire: the reader has finished copying what it says it has taken. The distance is the one between the
             // sample to be written and the one to be read next, because generations skip zero when they wrap.
@@ -311,7 +311,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     }
 
     #[doc(hidden)]
-    pub fn __next_words(&mut self, take: &mut dyn FnMut(Micros, u32, &[u32])) -> bool {
+    pub fn __next_words(&mut self, take: &mut dyn FnMut(Instant, u32, &[u32])) -> bool {
         match self.next_copied() {
             Some((generation, copied)) => {
                 take(copied.at, generation, &copied.words);
@@ -347,7 +347,7 @@ impl<'b, T: Message<Words = [u32; W]>, const N: usize, const W: usize> Tap<'b, T
     }
 
     /// Hands every new sample to `take`: instant, generation, words.
-    pub fn drain(&mut self, take: &mut dyn FnMut(Micros, u32, &[u32])) {
+    pub fn drain(&mut self, take: &mut dyn FnMut(Instant, u32, &[u32])) {
         while self.0.has_new() && self.0.__next_words(take) {}
     }
 
