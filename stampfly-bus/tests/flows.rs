@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use stampfly_bus::{Activation, Band, Runnable, Runnables, Scheduler, schedule, topics};
-use stampfly_types::Micros;
 use stampfly_types::messages::{ControlOutput, GuidedCommand, GuidedKind, ImuData, StateEstimate};
+use stampfly_types::{Duration, Instant};
 
 topics! {
     /// A vehicle small enough to reason about.
@@ -61,7 +61,7 @@ pub struct Control<'b> {
     out: wiring::demand::Tx<'b>,
     commands: heapless::Vec<stampfly_bus::Stamped<GuidedCommand>, 4>,
     seen: Option<stampfly_bus::Stamped<StateEstimate>>,
-    nows: Vec<Micros>,
+    nows: Vec<Instant>,
 }
 
 impl Runnable for Control<'_> {
@@ -127,7 +127,7 @@ impl<'b> Rig<'b> {
             },
             imu: sensor_imu.tx,
             command: command.tx,
-            scheduler: Scheduler::new(&plan::ACTIVATIONS, Micros::ZERO),
+            scheduler: Scheduler::new(&plan::ACTIVATIONS, Instant::ZERO),
             heads,
             taps,
             log: Vec::new(),
@@ -135,7 +135,7 @@ impl<'b> Rig<'b> {
         }
     }
 
-    fn run_due(&mut self, clock: Micros) {
+    fn run_due(&mut self, clock: Instant) {
         for band in [Band::Flight, Band::Background] {
             while let Some((index, now)) = self.scheduler.due(band, 0, clock, &self.heads) {
                 let mut activation = Activation::live(now);
@@ -146,7 +146,8 @@ impl<'b> Rig<'b> {
                 self.trace.push((index, activation));
             }
         }
-        self.taps.drain(&mut |id, at, generation, words| self.log.push((id, at.0, generation, words.to_vec())));
+        self.taps
+            .drain(&mut |id, at, generation, words| self.log.push((id, at.as_micros(), generation, words.to_vec())));
     }
 }
 
@@ -154,13 +155,13 @@ impl<'b> Rig<'b> {
 fn a_silent_imu_still_activates_control() {
     let mut bus = wiring::Bus::new();
     let mut rig = Rig::new(&mut bus);
-    rig.imu.publish(Micros(2_500), &ImuData::default());
-    rig.run_due(Micros(2_600));
+    rig.imu.publish(Instant::from_micros(2_500), &ImuData::default());
+    rig.run_due(Instant::from_micros(2_600));
     for clock in (3_000..40_000).step_by(500) {
-        rig.run_due(Micros(clock));
+        rig.run_due(Instant::from_micros(clock));
     }
     // After the sample, then every 10 ms from when that ran, at the scheduled ticks and not at the clock's.
-    assert_eq!(rig.vehicle.control.nows, [2_500, 12_600, 22_600, 32_600].map(Micros));
+    assert_eq!(rig.vehicle.control.nows, [2_500, 12_600, 22_600, 32_600].map(Instant::from_micros));
     assert_eq!(rig.vehicle.telemetry.generations, [1], "20 ms period");
 }
 
@@ -170,16 +171,20 @@ fn a_deadline_counts_from_the_run_and_time_does_not_go_back() {
     let mut rig = Rig::new(&mut bus);
     // Samples are 6 ms old when they arrive; from stamp to arrival of the next one it is 12 ms.
     for k in 0..10u64 {
-        rig.imu.publish(Micros(k * 6_000), &ImuData::default());
-        rig.run_due(Micros(k * 6_000 + 6_000));
-        rig.run_due(Micros(k * 6_000 + 11_900));
+        rig.imu.publish(Instant::from_micros(k * 6_000), &ImuData::default());
+        rig.run_due(Instant::from_micros(k * 6_000 + 6_000));
+        rig.run_due(Instant::from_micros(k * 6_000 + 11_900));
     }
-    assert_eq!(rig.vehicle.control.nows, (0..10).map(|k| Micros(k * 6_000)).collect::<Vec<_>>(), "no deadline passed");
+    assert_eq!(
+        rig.vehicle.control.nows,
+        (0..10).map(|k| Instant::from_micros(k * 6_000)).collect::<Vec<_>>(),
+        "no deadline passed"
+    );
     // Silence, a deadline, and then a sample whose stamp lies before the deadline.
-    rig.run_due(Micros(72_000));
-    rig.imu.publish(Micros(66_000), &ImuData::default());
-    rig.run_due(Micros(72_100));
-    assert_eq!(rig.vehicle.control.nows[10..], [Micros(70_000), Micros(70_000)]);
+    rig.run_due(Instant::from_micros(72_000));
+    rig.imu.publish(Instant::from_micros(66_000), &ImuData::default());
+    rig.run_due(Instant::from_micros(72_100));
+    assert_eq!(rig.vehicle.control.nows[10..], [Instant::from_micros(70_000), Instant::from_micros(70_000)]);
 }
 
 #[test]
@@ -187,9 +192,9 @@ fn a_slow_reader_counts_what_it_missed() {
     let mut bus = wiring::Bus::new();
     let mut rig = Rig::new(&mut bus);
     for k in 1..=20u64 {
-        rig.imu.publish(Micros(k), &ImuData::default());
+        rig.imu.publish(Instant::from_micros(k), &ImuData::default());
     }
-    rig.run_due(Micros(21));
+    rig.run_due(Instant::from_micros(21));
     assert_eq!(rig.vehicle.estimation.imu.lost(), 12);
     assert_eq!(rig.trace[0].1.inputs()[0].taken, 8);
     assert_eq!(rig.taps.lost(), 12);
@@ -201,12 +206,12 @@ fn a_queue_refuses_and_gives_the_value_back() {
     let mut rig = Rig::new(&mut bus);
     let land = GuidedCommand { kind: GuidedKind::Land, ..Default::default() };
     for _ in 0..4 {
-        rig.command.publish(Micros(1), land).expect("room");
+        rig.command.publish(Instant::from_micros(1), land).expect("room");
     }
-    assert_eq!(rig.command.publish(Micros(1), land), Err(stampfly_bus::Full(land)));
-    rig.imu.publish(Micros(2), &ImuData::default());
-    rig.run_due(Micros(2));
-    rig.command.publish(Micros(3), land).expect("both readers have caught up");
+    assert_eq!(rig.command.publish(Instant::from_micros(1), land), Err(stampfly_bus::Full(land)));
+    rig.imu.publish(Instant::from_micros(2), &ImuData::default());
+    rig.run_due(Instant::from_micros(2));
+    rig.command.publish(Instant::from_micros(3), land).expect("both readers have caught up");
 }
 
 #[test]
@@ -215,7 +220,7 @@ fn the_table_says_it_all() {
     assert_eq!((imu.policy, imu.depth, imu.rate, imu.publisher), ("ring", 8, "400 Hz", "imu"));
     assert_eq!(imu.readers, ["estimation"]);
     assert_eq!(wiring::TOPICS[wiring::Id::command as usize].rate, "on event");
-    assert_eq!(plan::ACTIVATIONS[1].at_latest, Some(Micros(10_000)));
+    assert_eq!(plan::ACTIVATIONS[1].at_latest, Some(Duration::from_micros(10_000)));
 }
 
 proptest! {
@@ -227,12 +232,12 @@ proptest! {
         let mut clock = 0;
         for (kind, wait, value) in steps {
             match kind {
-                0 | 1 => { rig.imu.publish(Micros(clock), &ImuData { accel: [0.0, 0.0, value].into(), ..Default::default() }); }
-                2 => { let _ = rig.command.publish(Micros(clock), GuidedCommand { dwell: value, ..Default::default() }); }
-                _ => { clock += wait; rig.run_due(Micros(clock)); }
+                0 | 1 => { rig.imu.publish(Instant::from_micros(clock), &ImuData { accel: [0.0, 0.0, value].into(), ..Default::default() }); }
+                2 => { let _ = rig.command.publish(Instant::from_micros(clock), GuidedCommand { dwell: value, ..Default::default() }); }
+                _ => { clock += wait; rig.run_due(Instant::from_micros(clock)); }
             }
         }
-        rig.run_due(Micros(clock + 1));
+        rig.run_due(Instant::from_micros(clock + 1));
 
         let mut again = wiring::Bus::new();
         let mut copy = Rig::new(&mut again);
@@ -241,18 +246,18 @@ proptest! {
         for (index, recorded) in &rig.trace {
             if *index == plan::Id::estimation as usize {
                 while let Some((_, at, _, words)) = inputs.next_if(|l| l.2 <= recorded.inputs()[0].generation) {
-                    copy.imu.publish_words(Micros(*at), words);
+                    copy.imu.publish_words(Instant::from_micros(*at), words);
                 }
             }
             if *index != plan::Id::telemetry as usize {
                 while let Some((_, at, _, words)) = commands.next_if(|l| l.2 <= recorded.inputs()[1].generation) {
-                    copy.command.publish_words(Micros(*at), words);
+                    copy.command.publish_words(Instant::from_micros(*at), words);
                 }
             }
             let mut activation = Activation::replay(recorded.now(), recorded.inputs(), recorded.refused());
             copy.vehicle.read(*index, &mut activation);
             copy.vehicle.run(*index, &mut activation);
-            copy.taps.drain(&mut |id, at, generation, words| copy.log.push((id, at.0, generation, words.to_vec())));
+            copy.taps.drain(&mut |id, at, generation, words| copy.log.push((id, at.as_micros(), generation, words.to_vec())));
             prop_assert!(!activation.is_missing_input() || rig.taps.lost() > 0);
         }
         if rig.taps.lost() == 0 {

@@ -8,7 +8,7 @@
 use loom::thread;
 use stampfly_bus::weaken::{self, Without};
 use stampfly_bus::{Every, Hook, Latest, Lossless, Publisher, Subscriber, Tap, Topic};
-use stampfly_types::{Micros, message};
+use stampfly_types::{Instant, message};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -31,8 +31,8 @@ fn pair(number: u32) -> Pair {
 }
 
 /// What every sample that is ever read must be: whole, and in its place.
-fn check(at: Micros, generation: u32, data: Pair) {
-    assert_eq!((data, at), (pair(generation), Micros(u64::from(generation))), "torn sample {generation}");
+fn check(at: Instant, generation: u32, data: Pair) {
+    assert_eq!((data, at), (pair(generation), Instant::from_micros(u64::from(generation))), "torn sample {generation}");
 }
 
 /// Threads of a model outlive its closure, so a topic of one execution is never freed. It is a few hundred bytes.
@@ -74,7 +74,7 @@ fn publish<P: stampfly_bus::Overwriting, const READERS: usize>(
     samples: u32,
 ) {
     for number in 1..=samples {
-        assert_eq!(tx.publish(Micros(u64::from(number)), &pair(number)), number);
+        assert_eq!(tx.publish(Instant::from_micros(u64::from(number)), &pair(number)), number);
     }
 }
 
@@ -170,7 +170,7 @@ fn queue<const RESPECTED: usize>() {
     let writer = thread::spawn(move || {
         let mut refused = 0;
         for number in 1..=3 {
-            match tx.publish(Micros(u64::from(number)), pair(number)) {
+            match tx.publish(Instant::from_micros(u64::from(number)), pair(number)) {
                 Ok(generation) => assert_eq!(generation, number),
                 Err(full) => {
                     assert_eq!(full.0, pair(number), "a refused value is given back");
@@ -193,7 +193,7 @@ fn queue<const RESPECTED: usize>() {
     });
     let ((mut tx, refused), (mut rx, mut taken)) = (writer.join().unwrap(), reader.join().unwrap());
     if refused > 0 && taken > 0 {
-        tx.publish(Micros(3), pair(3)).expect("what was taken has made room");
+        tx.publish(Instant::from_micros(3), pair(3)).expect("what was taken has made room");
     }
     while let Some(sample) = rx.next() {
         taken += 1;

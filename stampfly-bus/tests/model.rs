@@ -8,7 +8,7 @@
 use proptest::prelude::*;
 use stampfly_bus::{Every, Full, Latest, Lossless, Publisher, Stamped, Subscriber, Topic};
 use stampfly_types::messages::PowerData;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 
 const DEPTH: usize = 4;
 const WORDS: usize = PowerData::WORDS;
@@ -69,7 +69,7 @@ impl Model {
 
     fn stamped(&self, number: usize) -> Option<Stamped<PowerData>> {
         let generation = generation(self.start, number);
-        (generation > 0).then_some(Stamped { at: Micros(number as u64), generation, data: data(number) })
+        (generation > 0).then_some(Stamped { at: Instant::from_micros(number as u64), generation, data: data(number) })
     }
 
     /// How many of the newest samples are held once `published` are: one for each slot, but where generations skip
@@ -120,7 +120,7 @@ type Reader<'b, P> = Subscriber<'b, PowerData, P, DEPTH, WORDS>;
 fn compare<P, const R: usize>(
     start: u32,
     steps: &[Step],
-    mut publish: impl FnMut(&mut Writer<'_, P, R>, &Model, Micros, PowerData) -> Result<u32, TestCaseError>,
+    mut publish: impl FnMut(&mut Writer<'_, P, R>, &Model, Instant, PowerData) -> Result<u32, TestCaseError>,
     next: Option<impl Fn(&mut Reader<'_, P>) -> Option<Stamped<PowerData>>>,
 ) -> Result<(), TestCaseError> {
     let mut topic: Topic<PowerData, P, DEPTH, WORDS, R> = Topic::new();
@@ -133,7 +133,7 @@ fn compare<P, const R: usize>(
         match (*step, &next) {
             (Step::Publish, _) => {
                 let number = model.published + 1;
-                let newest = publish(&mut tx, &model, Micros(number as u64), data(number))?;
+                let newest = publish(&mut tx, &model, Instant::from_micros(number as u64), data(number))?;
                 model.published += usize::from(newest == generation(start, number));
                 prop_assert_eq!(newest, generation(start, model.published));
             }

@@ -3,17 +3,17 @@
 
 use proptest::prelude::*;
 use stampfly_bus::{ActivationInfo, Band, JITTER, TopicInfo, Trigger, Unbounded, response_time};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 const LINES: usize = 6;
 type Table = [ActivationInfo; LINES];
 
 const fn line(band: Band, trigger: Trigger, budget: u64) -> ActivationInfo {
-    ActivationInfo { name: "line", doc: &[], trigger, at_latest: None, band, budget: Micros(budget) }
+    ActivationInfo { name: "line", doc: &[], trigger, at_latest: None, band, budget: Duration::from_micros(budget) }
 }
 
 const fn every(period: u64) -> Trigger {
-    Trigger::Every(Micros(period))
+    Trigger::Every(Duration::from_micros(period))
 }
 
 const fn topic(period: Option<u64>) -> TopicInfo {
@@ -25,7 +25,7 @@ const fn topic(period: Option<u64>) -> TopicInfo {
         depth: 8,
         rate: "",
         period: match period {
-            Some(period) => Some(Micros(period)),
+            Some(period) => Some(Duration::from_micros(period)),
             None => None,
         },
         publisher: "",
@@ -45,12 +45,12 @@ fn vehicle() -> Table {
         line(Band::Background, every(20_000), 30),
         line(Band::Background, every(30_000), 70),
     ];
-    table[1].at_latest = Some(Micros(5_000));
+    table[1].at_latest = Some(Duration::from_micros(5_000));
     table
 }
 
 fn responses(table: &Table, topics: &[TopicInfo]) -> [Result<u64, Unbounded>; LINES] {
-    std::array::from_fn(|index| response_time(table, topics, index).map(|time| time.0))
+    std::array::from_fn(|index| response_time(table, topics, index).map(|time| time.as_micros()))
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn the_bounds_are_those_worked_out_by_hand() {
 #[test]
 fn too_much_is_refused_and_so_is_a_topic_without_a_rate() {
     let mut table = vehicle();
-    table[2].budget = Micros(1_000);
+    table[2].budget = Duration::from_micros(1_000);
     // 70 + 300 + 2·100 + 2·1000 µs, within 2500 µs less a tenth? No.
     assert_eq!(responses(&table, &[topic(Some(2_500))])[2], Err(Unbounded::TooLate));
     assert_eq!(responses(&vehicle(), &[topic(None)]), [Err(Unbounded::NoRate); LINES]);
@@ -85,7 +85,7 @@ fn try_out(table: &Table, period: u64, phases: &[u64; LINES], late: &[f64], leng
     let mut triggers: Vec<(u64, usize)> = Vec::new();
     for (index, info) in table.iter().enumerate() {
         let (period, jitter) = match info.trigger {
-            Trigger::Every(Micros(period)) => (period, 0.0),
+            Trigger::Every(period) => (period.as_micros(), 0.0),
             Trigger::On(_) => (period, (period / JITTER) as f64),
             _ => continue,
         };
@@ -100,7 +100,7 @@ fn try_out(table: &Table, period: u64, phases: &[u64; LINES], late: &[f64], leng
     let (mut clock, mut pending, mut longest): (u64, Pending, _) = (0, [None; LINES], [0; LINES]);
     let run = |index: usize, clock: &mut u64, pending: &mut Pending, longest: &mut [u64; LINES]| {
         let since = pending[index].take().expect("is pending");
-        *clock += table[index].budget.0;
+        *clock += table[index].budget.as_micros();
         longest[index] = longest[index].max(*clock - since);
         for (after, info) in table.iter().enumerate() {
             if info.trigger == Trigger::After(index) {

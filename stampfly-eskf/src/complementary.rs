@@ -16,7 +16,7 @@ use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Gains of the [`Complementary`] filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,19 +55,19 @@ impl Default for ComplementaryConfig {
 ///
 /// ```
 /// use stampfly_eskf::{Complementary, ComplementaryConfig, Estimator};
-/// use stampfly_types::{Micros, Vec3, messages::{CalibrationResult, ImuData}};
+/// use stampfly_types::{Instant, Vec3, messages::{CalibrationResult, ImuData}};
 ///
 /// let still = Vec3::new(0.0, 0.0, -9.80665);
 /// let mut filter = Complementary::new(ComplementaryConfig::default());
-/// filter.initialize(Micros::ZERO, &CalibrationResult { specific_force: still, ..Default::default() });
-/// filter.predict(Micros(2_500), &ImuData { accel: still, ..Default::default() });
+/// filter.initialize(Instant::ZERO, &CalibrationResult { specific_force: still, ..Default::default() });
+/// filter.predict(Instant::from_micros(2_500), &ImuData { accel: still, ..Default::default() });
 /// assert!(filter.estimate().attitude.angle() < 1e-6);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Complementary {
     config: ComplementaryConfig,
     state: Nominal,
-    now: Micros,
+    now: Instant,
     initialized: bool,
     calibration: CalibrationResult,
     command: EstimatorCommand,
@@ -75,8 +75,8 @@ pub struct Complementary {
     surface: Option<f32>,
     rate: Vec3,
     force: Vec3,
-    tof_fused: Option<Micros>,
-    flow_fused: Option<Micros>,
+    tof_fused: Option<Instant>,
+    flow_fused: Option<Instant>,
     status: EstimatorStatus,
 }
 
@@ -87,7 +87,7 @@ impl Complementary {
         Self {
             config,
             state: Nominal::default(),
-            now: Micros::ZERO,
+            now: Instant::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
             command: EstimatorCommand::default(),
@@ -101,8 +101,8 @@ impl Complementary {
         }
     }
 
-    fn recent(&self, fused: Option<Micros>) -> bool {
-        fused.is_some_and(|at| self.now.since(at) < Micros::from_secs(1))
+    fn recent(&self, fused: Option<Instant>) -> bool {
+        fused.is_some_and(|at| self.now.since(at) < Duration::from_secs(1))
     }
 
     fn turn(&mut self, by: Vec3) {
@@ -113,7 +113,7 @@ impl Complementary {
 }
 
 impl Estimator for Complementary {
-    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
+    fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {
         if !calibration.gyro_bias.iter().chain(calibration.specific_force.iter()).all(|v| v.is_finite()) {
             return;
         }
@@ -129,7 +129,7 @@ impl Estimator for Complementary {
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
     }
 
-    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
+    fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.command, *command);
         if command.full_resets != previous.full_resets && self.initialized {
             let calibration = self.calibration;
@@ -151,7 +151,7 @@ impl Estimator for Complementary {
         }
     }
 
-    fn predict(&mut self, at: Micros, imu: &ImuData) {
+    fn predict(&mut self, at: Instant, imu: &ImuData) {
         let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
         let dt = at.since(self.now).seconds();
         if !self.initialized || !usable || dt <= 0.0 {
@@ -185,7 +185,7 @@ impl Estimator for Complementary {
         self.status.diverged |= self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0;
     }
 
-    fn fuse_tof(&mut self, _: Micros, tof: &TofData) -> Fusion {
+    fn fuse_tof(&mut self, _: Instant, tof: &TofData) -> Fusion {
         let cos_tilt = self.state.rotation()[2][2];
         if !self.initialized {
             return Fusion::Refused(Refusal::NotInitialized);
@@ -210,7 +210,7 @@ impl Estimator for Complementary {
         Fusion::Fused { ratio: 0.0 }
     }
 
-    fn fuse_flow(&mut self, _: Micros, flow: &FlowData) -> Fusion {
+    fn fuse_flow(&mut self, _: Instant, flow: &FlowData) -> Fusion {
         if !self.initialized {
             return Fusion::Refused(Refusal::NotInitialized);
         }
@@ -235,15 +235,15 @@ impl Estimator for Complementary {
         Fusion::Fused { ratio: 0.0 }
     }
 
-    fn fuse_baro(&mut self, _: Micros, _: &BaroData) -> Fusion {
+    fn fuse_baro(&mut self, _: Instant, _: &BaroData) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 
-    fn fuse_mag(&mut self, _: Micros, _: &MagData) -> Fusion {
+    fn fuse_mag(&mut self, _: Instant, _: &MagData) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 
-    fn fuse_velocity(&mut self, _: Micros, velocity: &Vec3, _: f32) -> Fusion {
+    fn fuse_velocity(&mut self, _: Instant, velocity: &Vec3, _: f32) -> Fusion {
         if !velocity.iter().all(|v| v.is_finite()) {
             return Fusion::Refused(Refusal::NotFinite);
         }

@@ -35,7 +35,7 @@ use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
 /// Measurements from farther ahead than this are refused, s.
 const AHEAD: f32 = 0.02;
@@ -76,13 +76,13 @@ impl Mean {
 ///
 /// ```
 /// use stampfly_eskf::{Eskf, EskfConfig, Estimator};
-/// use stampfly_types::{Micros, Vec3, messages::{CalibrationResult, ImuData, TofData, Validity}};
+/// use stampfly_types::{Instant, Vec3, messages::{CalibrationResult, ImuData, TofData, Validity}};
 ///
 /// let still = Vec3::new(0.0, 0.0, -9.80665);
 /// let mut eskf = Eskf::new(EskfConfig::default());
-/// eskf.initialize(Micros::ZERO, &CalibrationResult { specific_force: still, complete: true, ..Default::default() });
+/// eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: still, complete: true, ..Default::default() });
 /// for k in 1..=400u64 {
-///     let at = Micros(k * 2_500);
+///     let at = Instant::from_micros(k * 2_500);
 ///     eskf.predict(at, &ImuData { accel: still, ..Default::default() });
 ///     if k % 13 == 0 {
 ///         eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
@@ -104,7 +104,7 @@ pub struct Eskf {
     history: History,
     /// Of the specific force and of the rate.
     roughness: [Roughness; 2],
-    now: Micros,
+    now: Instant,
     initialized: bool,
     calibration: CalibrationResult,
     command: EstimatorCommand,
@@ -113,7 +113,7 @@ pub struct Eskf {
     /// World down coordinate of the surface below.
     surface: Option<f32>,
     baro_offset: Option<Offset>,
-    baro_seen: Micros,
+    baro_seen: Instant,
     /// Direction of the magnetic field, world.
     field: Option<Vec3>,
     acceleration: Acceleration,
@@ -161,14 +161,14 @@ impl Eskf {
             start: Nominal::default().rotation(),
             history: History::default(),
             roughness: [Roughness::default(); 2],
-            now: Micros::ZERO,
+            now: Instant::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
             command: EstimatorCommand::default(),
             anchor: None,
             surface: None,
             baro_offset: None,
-            baro_seen: Micros::ZERO,
+            baro_seen: Instant::ZERO,
             field: None,
             acceleration: Acceleration::default(),
             steps: 0,
@@ -201,7 +201,7 @@ impl Eskf {
 
     /// Checks every measurement passes: initialised, finite, new, neither too old nor from the future. Gives the state
     /// it is to be compared with.
-    fn admit(&mut self, sensor: Sensor, at: Micros, values: &[f32]) -> Result<Then, Refusal> {
+    fn admit(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<Then, Refusal> {
         if !self.initialized {
             return Err(Refusal::NotInitialized);
         }

@@ -3,7 +3,7 @@
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, StateEstimate, TofData,
 };
-use stampfly_types::{Micros, Quat, Vec3};
+use stampfly_types::{Instant, Quat, Vec3};
 
 /// What became of a measurement.
 ///
@@ -74,38 +74,38 @@ impl Fusion {
 /// state.
 pub trait Estimator {
     /// Starts, or starts again, from a still-calibration. Position and velocity become zero.
-    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult);
+    fn initialize(&mut self, at: Instant, calibration: &CalibrationResult);
 
     /// Obeys the mode machine.
-    fn command(&mut self, at: Micros, command: &EstimatorCommand);
+    fn command(&mut self, at: Instant, command: &EstimatorCommand);
 
     /// Moves the estimate to `at` with an inertial sample.
-    fn predict(&mut self, at: Micros, imu: &ImuData);
+    fn predict(&mut self, at: Instant, imu: &ImuData);
 
     /// Uses a range to the ground.
-    fn fuse_tof(&mut self, at: Micros, tof: &TofData) -> Fusion;
+    fn fuse_tof(&mut self, at: Instant, tof: &TofData) -> Fusion;
 
     /// Uses optical flow.
-    fn fuse_flow(&mut self, at: Micros, flow: &FlowData) -> Fusion;
+    fn fuse_flow(&mut self, at: Instant, flow: &FlowData) -> Fusion;
 
     /// Uses a barometric altitude.
-    fn fuse_baro(&mut self, at: Micros, baro: &BaroData) -> Fusion;
+    fn fuse_baro(&mut self, at: Instant, baro: &BaroData) -> Fusion;
 
     /// Uses a magnetic field.
-    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion;
+    fn fuse_mag(&mut self, at: Instant, mag: &MagData) -> Fusion;
 
     /// Uses a velocity measured from outside, world NED, with one standard deviation per axis in m/s.
-    fn fuse_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Fusion;
+    fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Fusion;
 
     /// Uses a position measured from outside, world NED, m, with one standard deviation for all axes. An estimator without
     /// a use for it refuses.
-    fn fuse_position(&mut self, _at: Micros, _position: &Vec3, _sigma: f32) -> Fusion {
+    fn fuse_position(&mut self, _at: Instant, _position: &Vec3, _sigma: f32) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 
     /// Uses an attitude measured from outside, body → world, with one standard deviation for all axes, rad. An estimator
     /// without a use for it refuses.
-    fn fuse_attitude(&mut self, _at: Micros, _attitude: &Quat, _sigma: f32) -> Fusion {
+    fn fuse_attitude(&mut self, _at: Instant, _attitude: &Quat, _sigma: f32) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 

@@ -9,7 +9,7 @@ use stampfly_eskf::{Estimator, Fusion, Refusal};
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, SensorMask, TofData, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, frame, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, frame, math};
 
 const DT: f32 = 0.005;
 /// The earth's field in central Europe, NED.
@@ -206,12 +206,12 @@ fn as_an_estimator_it_is_honest() {
     let mut filter = AttitudeFilter::new(AttitudeConfig::default());
     let imu = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };
     let mag = MagData { field: EARTH };
-    assert_eq!(filter.fuse_mag(Micros(1), &mag), Fusion::Refused(Refusal::NotInitialized));
+    assert_eq!(filter.fuse_mag(Instant::from_micros(1), &mag), Fusion::Refused(Refusal::NotInitialized));
     assert_eq!(filter.estimate().valid, Validity::NONE);
-    filter.initialize(Micros(1_000), &calibration());
-    let mut at = Micros(1_000);
+    filter.initialize(Instant::from_micros(1_000), &calibration());
+    let mut at = Instant::from_micros(1_000);
     for _ in 0..800 {
-        at += Micros(5_000);
+        at += Duration::from_micros(5_000);
         filter.predict(at, &imu);
         assert!(!matches!(filter.fuse_mag(at, &mag), Fusion::Refused(_)));
     }
@@ -229,10 +229,10 @@ fn as_an_estimator_it_is_honest() {
     // Sent twice, too late, from the far future, not a number.
     let stale = Fusion::Refused(Refusal::Stale);
     assert_eq!(filter.fuse_mag(at, &mag), Fusion::Refused(Refusal::Repeated));
-    assert_eq!(filter.fuse_mag(at + Micros::from_secs(5), &mag), Fusion::Refused(Refusal::Future));
-    let later = at + Micros::from_secs(1);
+    assert_eq!(filter.fuse_mag(at + Duration::from_secs(5), &mag), Fusion::Refused(Refusal::Future));
+    let later = at + Duration::from_secs(1);
     filter.predict(later, &imu);
-    assert_eq!(filter.fuse_mag(Micros(later.0 - 200_000), &mag), stale);
+    assert_eq!(filter.fuse_mag(later - Duration::from_micros(200_000), &mag), stale);
     let broken = MagData { field: Vec3::new(f32::NAN, 0.0, 0.0) };
     assert_eq!(filter.fuse_mag(later, &broken), Fusion::Refused(Refusal::NotFinite));
     assert_eq!(filter.fuse_mag(later, &MagData { field: Vec3::new(1e9, 0.0, 0.0) }), Fusion::Refused(Refusal::Range));
@@ -240,7 +240,7 @@ fn as_an_estimator_it_is_honest() {
 
     let before = filter.clone();
     filter.predict(later, &imu);
-    filter.predict(Micros(7), &imu);
+    filter.predict(Instant::from_micros(7), &imu);
     assert_eq!(before, filter, "an inertial sample that was there already");
     filter.command(later, &EstimatorCommand { full_resets: 1, ..Default::default() });
     assert_eq!(filter.status().offered, [0; 5]);
@@ -250,11 +250,11 @@ fn as_an_estimator_it_is_honest() {
 fn a_magnetometer_that_falls_silent_costs_no_tilt_and_as_much_heading_as_it_says() {
     let mut filter = AttitudeFilter::new(AttitudeConfig::default());
     let mut hand = Hand::new();
-    filter.initialize(Micros(0), &CalibrationResult { complete: false, field: Vec3::zeros(), ..calibration() });
-    let mut at = Micros(0);
+    filter.initialize(Instant::ZERO, &CalibrationResult { complete: false, field: Vec3::zeros(), ..calibration() });
+    let mut at = Instant::ZERO;
     for step in 0..200 * 300 {
         let (gyro, accel) = hand.step(true);
-        at += Micros(5_000);
+        at += Duration::from_micros(5_000);
         filter.predict(at, &ImuData { accel, gyro, temperature: 25.0 });
         if step < 4_000 {
             let field = hand.field(EARTH);
@@ -334,11 +334,11 @@ proptest! {
     #[test]
     fn any_stamps_are_harmless(stamps in prop::collection::vec((any::<u64>(), any::<u64>(), any::<bool>()), 1..60)) {
         let mut filter = AttitudeFilter::new(AttitudeConfig::default());
-        filter.initialize(Micros(0), &calibration());
+        filter.initialize(Instant::ZERO, &calibration());
         let imu = ImuData { accel: Vec3::new(0.0, 0.5, -GRAVITY), gyro: Vec3::new(0.1, 0.0, 1.0), temperature: 25.0 };
         for (imu_at, mag_at, near) in stamps {
             // Half of them close together, the others anywhere.
-            let [imu_at, mag_at] = [imu_at, mag_at].map(|at| Micros(if near { at % 1_000_000 } else { at }));
+            let [imu_at, mag_at] = [imu_at, mag_at].map(|at| Instant::from_micros(if near { at % 1_000_000 } else { at }));
             filter.predict(imu_at, &imu);
             filter.fuse_mag(mag_at, &MagData { field: EARTH });
             prop_assert!(is_unit(&filter.estimate().attitude));

@@ -2,17 +2,17 @@
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
 use stampfly_types::messages::{CalibrationResult, FlowData, ImuData, MagData, TofData};
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
 /// Time between inertial samples, and the same in seconds.
-const STEP: Micros = Micros(2_500);
+const STEP: Duration = Duration::from_micros(2_500);
 const DT: f32 = 0.0025;
 
 fn started(config: EskfConfig) -> Eskf {
     let mut eskf = Eskf::new(config);
     let specific_force = Vec3::new(0.0, 0.0, -GRAVITY);
     let field = Vec3::new(20.0, 0.0, 40.0);
-    eskf.initialize(Micros::ZERO, &CalibrationResult { specific_force, field, complete: true, ..Default::default() });
+    eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force, field, complete: true, ..Default::default() });
     eskf
 }
 
@@ -35,7 +35,7 @@ fn without_any_aid_a_biased_accelerometer_is_not_integrated_for_ever() {
     for step in 1..=400 * 300 {
         // 0.15 m/s² of bias along two axes: 6 km in five minutes.
         let accel = Vec3::new(0.15, 0.0, 0.15 - GRAVITY);
-        eskf.predict(Micros(step * STEP.0), &ImuData { accel, ..Default::default() });
+        eskf.predict(Instant::ZERO + STEP * step, &ImuData { accel, ..Default::default() });
     }
     let estimate = eskf.estimate();
     assert!(estimate.velocity.amax() < 1.0, "{:?}", estimate.velocity);
@@ -45,7 +45,7 @@ fn without_any_aid_a_biased_accelerometer_is_not_integrated_for_ever() {
 #[test]
 fn tilted_out_of_sight_the_velocity_fades() {
     let mut eskf = started(EskfConfig::default());
-    let mut at = Micros::ZERO;
+    let mut at = Instant::ZERO;
     let mut fly = |eskf: &mut Eskf, seconds: f32, attitude: Quat, rate: Vec3| {
         for step in 0..(seconds / DT) as u32 {
             at += STEP;
@@ -79,7 +79,7 @@ fn rotation_is_taken_out_of_late_flow_at_the_time_it_was_seen() {
         let roll = |time: f32| (1.0 - math::cos(4.0 * math::PI * (time - 0.5).max(0.0))) * 3.0 / (4.0 * math::PI);
         let mut worst = 0.0f32;
         for step in 1..=800u64 {
-            let (at, time) = (Micros(step * STEP.0), step as f32 * DT);
+            let (at, time) = (Instant::ZERO + STEP * step, step as f32 * DT);
             let attitude = Quat::from_euler_angles(roll(time), 0.0, 0.0);
             let gyro = Vec3::new(rate(time - 0.5 * DT), 0.0, 0.0);
             eskf.predict(at, &ImuData { accel: force(&attitude), gyro, temperature: 25.0 });
@@ -101,7 +101,7 @@ fn a_field_that_turned_for_good_does_not_cost_the_tilt() {
     let field = Quat::from_euler_angles(0.0, 0.0, 2.0) * Vec3::new(20.0, 0.0, 40.0);
     let mut gated = 0;
     for step in 1..=400 * 10u64 {
-        let at = Micros(step * STEP.0);
+        let at = Instant::ZERO + STEP * step;
         eskf.predict(at, &ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() });
         if step % 4 == 0 {
             gated += u32::from(matches!(eskf.fuse_mag(at, &MagData { field }), Fusion::Gated { .. }));

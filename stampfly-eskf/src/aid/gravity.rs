@@ -10,7 +10,7 @@
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
 use crate::filter::{ACCEL_BIAS, ATTITUDE, Nominal};
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Predicted specific force along body x, y and z of a body that accelerates by `acceleration` (world, m/s²).
 #[inline]
@@ -32,31 +32,31 @@ const DAMPING: f32 = 0.7;
 /// No acceleration beyond this is believed, m/s².
 const LARGEST: f32 = 5.0;
 /// A velocity older than this says nothing about the acceleration.
-const FORGET: Micros = Micros(200_000);
+const FORGET: Duration = Duration::from_micros(200_000);
 
 /// The acceleration of the body as a sensor of velocity shows it: an α-β tracker (Kalata, "The Tracking Index", IEEE TAES
 /// 20(2), 1984).
 ///
 /// ```
 /// use stampfly_eskf::aid::gravity::Acceleration;
-/// use stampfly_types::{Micros, Vec3};
+/// use stampfly_types::{Instant, Vec3};
 /// let mut acceleration = Acceleration::default();
 /// for step in 0..100u64 {
-///     acceleration.see(Micros(step * 10_000), Vec3::x() * (step as f32 * 0.02));
+///     acceleration.see(Instant::from_micros(step * 10_000), Vec3::x() * (step as f32 * 0.02));
 /// }
-/// assert!((acceleration.at(Micros(990_000)) - 2.0 * Vec3::x()).amax() < 0.05);
-/// assert_eq!(acceleration.at(Micros(2_000_000)), Vec3::zeros());
+/// assert!((acceleration.at(Instant::from_micros(990_000)) - 2.0 * Vec3::x()).amax() < 0.05);
+/// assert_eq!(acceleration.at(Instant::from_micros(2_000_000)), Vec3::zeros());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Acceleration {
-    seen: Option<Micros>,
+    seen: Option<Instant>,
     velocity: Vec3,
     acceleration: Vec3,
 }
 
 impl Acceleration {
     /// Takes a measured velocity, world, m/s. A gap starts it again.
-    pub fn see(&mut self, at: Micros, velocity: Vec3) {
+    pub fn see(&mut self, at: Instant, velocity: Vec3) {
         match self.seen {
             Some(seen) if at <= seen => return,
             Some(seen) if at.since(seen) <= FORGET => {
@@ -76,7 +76,7 @@ impl Acceleration {
 
     /// The acceleration, world, m/s²; zero when nothing was seen lately.
     #[must_use]
-    pub fn at(&self, now: Micros) -> Vec3 {
+    pub fn at(&self, now: Instant) -> Vec3 {
         if self.seen.is_some_and(|seen| now.since(seen) <= FORGET) { self.acceleration } else { Vec3::zeros() }
     }
 }

@@ -9,33 +9,33 @@ use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
 };
-use stampfly_types::{Micros, Vec3, math};
+use stampfly_types::{Duration, Instant, Vec3, math};
 
 /// Place of the magnetometer in the counters of the status.
 const MAG: usize = 3;
 /// Period of a magnetometer whose first sample this is, s.
 const FIRST_PERIOD: f32 = 0.01;
 /// A field from farther in the future has a wrong stamp.
-const FUTURE: Micros = Micros::from_millis(100);
+const FUTURE: Duration = Duration::from_millis(100);
 /// A sensor took part if it did within this time.
-const RECENT: Micros = Micros::from_secs(1);
+const RECENT: Duration = Duration::from_secs(1);
 /// A heading that is known worse than this, rad, is not.
 const HEADING_SIGMA: f32 = 0.35;
 
 /// What the trait needs and the filter does not: time, and a record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Bookkeeping {
-    now: Micros,
+    now: Instant,
     initialized: bool,
     calibration: CalibrationResult,
     command: EstimatorCommand,
-    mag_at: Option<Micros>,
-    mag_fused: Option<Micros>,
+    mag_at: Option<Instant>,
+    mag_fused: Option<Instant>,
     status: EstimatorStatus,
 }
 
 impl Estimator for AttitudeFilter {
-    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
+    fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {
         if !calibration.gyro_bias.iter().chain(calibration.specific_force.iter()).all(|v| v.is_finite()) {
             return;
         }
@@ -46,7 +46,7 @@ impl Estimator for AttitudeFilter {
     }
 
     /// Only a full reset concerns an attitude: standing still is seen, and there is no position to be set.
-    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
+    fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.book.command, *command);
         if command.full_resets != previous.full_resets && self.book.initialized {
             let calibration = self.book.calibration;
@@ -54,7 +54,7 @@ impl Estimator for AttitudeFilter {
         }
     }
 
-    fn predict(&mut self, at: Micros, imu: &ImuData) {
+    fn predict(&mut self, at: Instant, imu: &ImuData) {
         if self.book.initialized && at > self.book.now {
             let dt = at.since(self.book.now).seconds();
             self.book.now = at;
@@ -62,19 +62,19 @@ impl Estimator for AttitudeFilter {
         }
     }
 
-    fn fuse_tof(&mut self, _: Micros, _: &TofData) -> Fusion {
+    fn fuse_tof(&mut self, _: Instant, _: &TofData) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 
-    fn fuse_flow(&mut self, _: Micros, _: &FlowData) -> Fusion {
+    fn fuse_flow(&mut self, _: Instant, _: &FlowData) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 
-    fn fuse_baro(&mut self, _: Micros, _: &BaroData) -> Fusion {
+    fn fuse_baro(&mut self, _: Instant, _: &BaroData) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 
-    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion {
+    fn fuse_mag(&mut self, at: Instant, mag: &MagData) -> Fusion {
         let book = &self.book;
         if !book.initialized {
             return Fusion::Refused(Refusal::NotInitialized);
@@ -112,7 +112,7 @@ impl Estimator for AttitudeFilter {
         fusion
     }
 
-    fn fuse_velocity(&mut self, _: Micros, _: &Vec3, _: f32) -> Fusion {
+    fn fuse_velocity(&mut self, _: Instant, _: &Vec3, _: f32) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 

@@ -12,7 +12,7 @@ use super::{NotStill, StillAverage, StillnessConfig};
 use crate::filter::state::{rotate, rotation_matrix};
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
 /// Why there is no trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,11 +79,11 @@ impl Trim {
 ///
 /// ```
 /// use stampfly_eskf::calibration::LevelTrim;
-/// use stampfly_types::{GRAVITY, Micros, Vec3, math, messages::ImuData};
+/// use stampfly_types::{GRAVITY, Instant, Vec3, math, messages::ImuData};
 /// let (sin, cos) = math::sin_cos(0.02);
 /// let felt = ImuData { accel: Vec3::new(0.0, -sin, -cos) * GRAVITY, ..Default::default() };
 /// let mut level = LevelTrim::default();
-/// let (trim, quality) = (0..).find_map(|k| level.step(Micros(2_500 * k), &felt).unwrap()).unwrap();
+/// let (trim, quality) = (0..).find_map(|k| level.step(Instant::from_micros(2_500 * k), &felt).unwrap()).unwrap();
 /// assert!((trim.roll - 0.02).abs() < 1e-5 && trim.pitch.abs() < 1e-5);
 /// assert!(trim.correct(felt.accel).xy().norm() < 1e-4 && quality.force_error.abs() < 1e-3);
 /// ```
@@ -119,7 +119,7 @@ impl LevelTrim {
     ///
     /// # Errors
     /// Why the sample, or with its last sample the stretch, does not count.
-    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<Option<(Trim, LevelTrimQuality)>, LevelTrimRefusal> {
+    pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<(Trim, LevelTrimQuality)>, LevelTrimRefusal> {
         let Some(mean) = self.average.step(now, imu).map_err(LevelTrimRefusal::Moving)? else { return Ok(None) };
         let tilt = math::atan2(mean.accel.xy().norm(), -mean.accel.z);
         if tilt > self.tilt_max {
@@ -143,7 +143,7 @@ mod tests {
         for (felt, tilt) in [(Vec3::new(1.7, 0.0, -9.66), 0.174), (Vec3::new(0.0, 0.0, 9.81), math::PI)] {
             let mut level = LevelTrim::default();
             let imu = ImuData { accel: felt, ..Default::default() };
-            let refusal = (0..2_000).find_map(|k| level.step(Micros(2_500 * k), &imu).err()).unwrap();
+            let refusal = (0..2_000).find_map(|k| level.step(Instant::from_micros(2_500 * k), &imu).err()).unwrap();
             assert!(
                 matches!(refusal, LevelTrimRefusal::Tilted { tilt: found } if (found - tilt).abs() < 1e-3),
                 "{refusal:?}"

@@ -13,7 +13,7 @@
 use super::triangle::Triangle;
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
 /// The side of the vehicle that is down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,14 +122,14 @@ const CREEP: f32 = 0.25;
 ///
 /// ```
 /// use stampfly_eskf::calibration::SixPosition;
-/// use stampfly_types::{GRAVITY, Micros, Vec3, messages::ImuData};
+/// use stampfly_types::{GRAVITY, Duration, Instant, Vec3, messages::ImuData};
 /// let mut calibration = SixPosition::default();
-/// let mut now = Micros::ZERO;
+/// let mut now = Instant::ZERO;
 /// for axis in [Vec3::x(), Vec3::y(), Vec3::z()] {
 ///     for force in [axis * GRAVITY, axis * -GRAVITY] {
 ///         let measured = force * 1.01 + Vec3::new(0.1, -0.2, 0.3);
 ///         for k in 0..1200 {
-///             now += Micros(2_500);
+///             now += Duration::from_micros(2_500);
 ///             // It is picked up and turned, then left alone.
 ///             let gyro = if k < 100 { Vec3::new(3.0, 0.0, 0.0) } else { Vec3::zeros() };
 ///             let _ = calibration.step(now, &ImuData { accel: measured, gyro, temperature: 25.0 });
@@ -168,7 +168,7 @@ impl SixPosition {
     ///
     /// # Errors
     /// Why the sample, or with its last sample the hold, does not count. The holds taken before stay.
-    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<Option<Face>, SixPositionRefusal> {
+    pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<Face>, SixPositionRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
                 self.taken &= reason == NotStill::NotFinite;

@@ -7,7 +7,7 @@
 
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::{BaroData, CalibrationResult, ImuData, MagData};
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{GRAVITY, Instant, Vec3};
 
 /// How good a finished still-calibration is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,11 +26,11 @@ pub struct StillQuality {
 ///
 /// ```
 /// use stampfly_eskf::calibration::StillCalibration;
-/// use stampfly_types::{Micros, Vec3, messages::ImuData};
+/// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut calibration = StillCalibration::default();
 /// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0 };
 /// for k in 0..1500 {
-///     calibration.step(Micros(2_500 * k), &still).unwrap();
+///     calibration.step(Instant::from_micros(2_500 * k), &still).unwrap();
 /// }
 /// let result = calibration.result();
 /// assert!(result.complete && (result.gyro_bias.x - 0.01).abs() < 1e-5);
@@ -56,7 +56,7 @@ impl StillCalibration {
     ///
     /// # Errors
     /// Why the sample does not count: the collection begins again, unless the sample was not finite.
-    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<(), NotStill> {
+    pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<(), NotStill> {
         if self.result.complete {
             return Ok(());
         }
@@ -123,17 +123,17 @@ mod tests {
     fn motion_starts_the_average_again() {
         let mut calibration = StillCalibration::default();
         for k in 0..1000u64 {
-            calibration.step(Micros(2_500 * k), &still()).unwrap();
+            calibration.step(Instant::from_micros(2_500 * k), &still()).unwrap();
         }
         assert!(calibration.result().progress > 0.5);
         for k in 1000..1020u64 {
             let turning = ImuData { gyro: Vec3::new(1.0, 0.0, 0.0), ..still() };
-            assert!(calibration.step(Micros(2_500 * k), &turning).is_err());
+            assert!(calibration.step(Instant::from_micros(2_500 * k), &turning).is_err());
         }
         assert_eq!((calibration.result().progress, calibration.result().restarts), (0.0, 1));
         for k in 1020..4000u64 {
             // The running means forget within a few tenths of a second.
-            let _ = calibration.step(Micros(2_500 * k), &still());
+            let _ = calibration.step(Instant::from_micros(2_500 * k), &still());
         }
         let result = calibration.result();
         assert!(result.complete && (result.gyro_bias - still().gyro).norm() < 1e-5, "the motion left no trace");
@@ -144,7 +144,8 @@ mod tests {
         let mut calibration = StillCalibration::default();
         for k in 0..8000u64 {
             let swing = stampfly_types::math::sin(k as f32 * 0.03) * 0.2;
-            let _ = calibration.step(Micros(2_500 * k), &ImuData { gyro: Vec3::new(swing, 0.0, 0.0), ..still() });
+            let _ = calibration
+                .step(Instant::from_micros(2_500 * k), &ImuData { gyro: Vec3::new(swing, 0.0, 0.0), ..still() });
         }
         assert!(!calibration.result().complete && calibration.quality().is_none());
     }
@@ -153,9 +154,9 @@ mod tests {
     fn a_sample_that_is_not_finite_is_left_out_and_ends_nothing() {
         let mut calibration = StillCalibration::default();
         for k in 0..1600u64 {
-            calibration.step(Micros(2_500 * k), &still()).unwrap();
+            calibration.step(Instant::from_micros(2_500 * k), &still()).unwrap();
             let broken = ImuData { accel: Vec3::new([f32::NAN, 1e30][k as usize % 2], 0.0, 0.0), ..still() };
-            assert!(k > 1300 || calibration.step(Micros(2_500 * k), &broken) == Err(NotStill::NotFinite));
+            assert!(k > 1300 || calibration.step(Instant::from_micros(2_500 * k), &broken) == Err(NotStill::NotFinite));
         }
         let quality = calibration.quality().unwrap();
         assert!(calibration.result().complete && calibration.result().restarts == 0);

@@ -8,7 +8,7 @@
 //! in calm air is as quiet as a table.
 
 use stampfly_types::messages::ImuData;
-use stampfly_types::{Micros, Vec3, math};
+use stampfly_types::{Instant, Vec3, math};
 
 /// What counts as still.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,20 +124,20 @@ impl Sums {
 ///
 /// ```
 /// use stampfly_eskf::calibration::{NotStill, StillAverage, StillnessConfig};
-/// use stampfly_types::{Micros, Vec3, messages::ImuData};
+/// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut average = StillAverage::new(StillnessConfig { samples: 100, settle: 0.5, ..Default::default() });
 /// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0 };
-/// let first = (0..).find_map(|k| average.step(Micros(2_500 * k), &still).unwrap()).unwrap();
+/// let first = (0..).find_map(|k| average.step(Instant::from_micros(2_500 * k), &still).unwrap()).unwrap();
 /// assert!((first.gyro.x - 0.01).abs() < 1e-6 && first.samples == 100);
 /// let turning = ImuData { gyro: Vec3::new(5.0, 0.0, 0.0), ..still };
-/// assert_eq!(average.step(Micros::from_secs(1), &turning), Err(NotStill::Turning));
+/// assert_eq!(average.step(Instant::from_secs(1), &turning), Err(NotStill::Turning));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StillAverage {
     config: StillnessConfig,
     rate: Spread,
     force: Spread,
-    since: Option<Micros>,
+    since: Option<Instant>,
     count: u32,
     gyro: Sums,
     accel: Sums,
@@ -199,7 +199,7 @@ impl StillAverage {
     ///
     /// # Errors
     /// What kind of motion it is. Unless the sample was not finite, the stretch begins again.
-    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<Option<StillMean>, NotStill> {
+    pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<StillMean>, NotStill> {
         if !imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.abs() <= LARGEST) {
             return Err(NotStill::NotFinite);
         }

@@ -10,7 +10,7 @@
 
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::ImuData;
-use stampfly_types::{Micros, Vec3, math};
+use stampfly_types::{Instant, Vec3, math};
 
 /// Coldest temperature of the table, °C.
 const COLDEST: f32 = -10.0;
@@ -106,13 +106,13 @@ impl Bin {
 ///
 /// ```
 /// use stampfly_eskf::calibration::{Reach, TemperatureTable};
-/// use stampfly_types::{Micros, Vec3, messages::ImuData};
+/// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut table = TemperatureTable::default();
 /// for k in 0..60_000 {
 ///     // Warms up from 20 °C to 50 °C in two and a half minutes.
 ///     let temperature = 20.0 + 0.0005 * k as f32;
 ///     let gyro = Vec3::new(0.0002 * (temperature - 20.0), 0.0, 0.0);
-///     table.step(Micros(2_500 * k), &ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro, temperature }).unwrap();
+///     table.step(Instant::from_micros(2_500 * k), &ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro, temperature }).unwrap();
 /// }
 /// let bias = table.bias(33.0).unwrap();
 /// assert!((bias.gyro.x - 0.0026).abs() < 2e-5 && bias.reach == Reach::Inside);
@@ -146,7 +146,7 @@ impl TemperatureTable {
     ///
     /// # Errors
     /// Why the sample, or with its last sample the stretch, does not count.
-    pub fn step(&mut self, now: Micros, imu: &ImuData) -> Result<bool, TemperatureRefusal> {
+    pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<bool, TemperatureRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
                 if reason != NotStill::NotFinite {

@@ -5,13 +5,13 @@
 //! right. So a sensor that keeps disagreeing for [`lockout`](crate::EskfConfig::lockout) seconds is believed, and
 //! a filter that has to be put right again and again says that it is lost.
 
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// A sensor counts as taking part this long after its last accepted sample.
-const AIDING_TIMEOUT: Micros = Micros(1_000_000);
+const AIDING_TIMEOUT: Duration = Duration::from_micros(1_000_000);
 /// So many resets, each within [`CALM`] of the one before, and the estimate is lost.
 const TOO_MANY_RESETS: u32 = 8;
-const CALM: Micros = Micros(1_500_000);
+const CALM: Duration = Duration::from_micros(1_500_000);
 
 /// The measurements, by what they are kept apart for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,11 +33,11 @@ const SENSORS: usize = Sensor::Attitude as usize + 1;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Record {
     /// Stamp of its newest measurement.
-    stamp: Option<Micros>,
+    stamp: Option<Instant>,
     /// When one was accepted last.
-    fused: Option<Micros>,
+    fused: Option<Instant>,
     /// Since when it has been refused without a break.
-    gated_since: Option<Micros>,
+    gated_since: Option<Instant>,
 }
 
 /// What to do with a measurement.
@@ -55,7 +55,7 @@ pub(super) enum Verdict {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Gates {
     records: [Record; SENSORS],
-    last_reset: Micros,
+    last_reset: Instant,
     /// Resets since things were last calm.
     resets: u32,
 }
@@ -68,7 +68,7 @@ impl Gates {
 
     /// Is this stamp newer than the sensor's last one? Remembers it.
     #[inline]
-    pub(super) fn is_new(&mut self, sensor: Sensor, stamp: Micros) -> bool {
+    pub(super) fn is_new(&mut self, sensor: Sensor, stamp: Instant) -> bool {
         let record = self.record(sensor);
         let new = record.stamp.is_none_or(|last| stamp > last);
         if new {
@@ -79,13 +79,13 @@ impl Gates {
 
     /// Has one of its measurements been accepted within the last second?
     #[inline]
-    pub(super) fn is_recent(&self, sensor: Sensor, now: Micros) -> bool {
+    pub(super) fn is_recent(&self, sensor: Sensor, now: Instant) -> bool {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
     }
 
     /// Judges a measurement by its test ratio.
     #[inline]
-    pub(super) fn judge(&mut self, sensor: Sensor, now: Micros, ratio: f32, lockout: f32) -> Verdict {
+    pub(super) fn judge(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32) -> Verdict {
         let record = self.record(sensor);
         if ratio <= 1.0 {
             self.accept(sensor, now);
@@ -97,25 +97,25 @@ impl Gates {
 
     /// Notes that a measurement went in.
     #[inline]
-    pub(super) fn accept(&mut self, sensor: Sensor, now: Micros) {
+    pub(super) fn accept(&mut self, sensor: Sensor, now: Instant) {
         let record = self.record(sensor);
         record.fused = Some(now);
         record.gated_since = None;
     }
 
     /// Gives a sensor that was locked out another [`lockout`](crate::EskfConfig::lockout) to fit in by itself.
-    pub(super) fn wait(&mut self, sensor: Sensor, now: Micros) {
+    pub(super) fn wait(&mut self, sensor: Sensor, now: Instant) {
         self.record(sensor).gated_since = Some(now);
     }
 
     /// Notes that the state was moved to a sensor. True when that has happened too often: the estimate is lost.
-    pub(super) fn reset(&mut self, sensor: Sensor, now: Micros) -> bool {
+    pub(super) fn reset(&mut self, sensor: Sensor, now: Instant) -> bool {
         self.accept(sensor, now);
         self.doubt(now)
     }
 
     /// Notes that the estimate could not be right as it was. True when that has happened too often: it is lost.
-    pub(super) fn doubt(&mut self, now: Micros) -> bool {
+    pub(super) fn doubt(&mut self, now: Instant) -> bool {
         self.resets = if now.since(self.last_reset) > CALM { 1 } else { self.resets.saturating_add(1) };
         self.last_reset = now;
         self.resets >= TOO_MANY_RESETS
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_lockout_ends_in_belief() {
         let mut gates = Gates::default();
-        let at = |millis: u64| Micros::from_millis(millis);
+        let at = |millis: u64| Instant::from_millis(millis);
         assert_eq!(gates.judge(Sensor::Tof, at(0), 0.5, 0.2), Verdict::Fuse);
         assert!(gates.is_recent(Sensor::Tof, at(900)) && !gates.is_recent(Sensor::Tof, at(1_100)));
         for millis in [1_100, 1_200, 1_300] {
@@ -145,7 +145,7 @@ mod tests {
     fn resets_in_a_row_are_a_lost_estimate_and_rare_ones_are_not() {
         let lost = |period: u64| {
             let mut gates = Gates::default();
-            (1..20u64).any(|n| gates.reset(Sensor::Flow, Micros::from_millis(10_000 + n * period)))
+            (1..20u64).any(|n| gates.reset(Sensor::Flow, Instant::from_millis(10_000 + n * period)))
         };
         assert!(lost(220) && lost(1_000) && !lost(2_000));
     }
@@ -153,8 +153,14 @@ mod tests {
     #[test]
     fn a_stamp_counts_once() {
         let mut gates = Gates::default();
-        assert!(gates.is_new(Sensor::Baro, Micros(10)) && !gates.is_new(Sensor::Baro, Micros(10)));
-        assert!(!gates.is_new(Sensor::Baro, Micros(9)) && gates.is_new(Sensor::Baro, Micros(11)));
-        assert!(gates.is_new(Sensor::Tof, Micros(0)), "every sensor has its own");
+        assert!(
+            gates.is_new(Sensor::Baro, Instant::from_micros(10))
+                && !gates.is_new(Sensor::Baro, Instant::from_micros(10))
+        );
+        assert!(
+            !gates.is_new(Sensor::Baro, Instant::from_micros(9))
+                && gates.is_new(Sensor::Baro, Instant::from_micros(11))
+        );
+        assert!(gates.is_new(Sensor::Tof, Instant::ZERO), "every sensor has its own");
     }
 }

@@ -4,7 +4,7 @@ use super::gate::Sensor;
 use super::*;
 
 impl Estimator for Eskf {
-    fn initialize(&mut self, at: Micros, calibration: &CalibrationResult) {
+    fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {
         let finite = |v: &Vec3| v.iter().all(|x| x.is_finite());
         if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
             return;
@@ -25,7 +25,7 @@ impl Estimator for Eskf {
         self.know_heading();
     }
 
-    fn command(&mut self, at: Micros, command: &EstimatorCommand) {
+    fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.command, *command);
         if command.full_resets != previous.full_resets && self.initialized {
             let calibration = self.calibration;
@@ -57,7 +57,7 @@ impl Estimator for Eskf {
         }
     }
 
-    fn predict(&mut self, at: Micros, imu: &ImuData) {
+    fn predict(&mut self, at: Instant, imu: &ImuData) {
         let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
         let dt = at.since(self.now).seconds();
         if !self.initialized || !usable || dt <= 0.0 {
@@ -105,35 +105,35 @@ impl Estimator for Eskf {
         self.watch();
     }
 
-    fn fuse_tof(&mut self, at: Micros, tof: &TofData) -> Fusion {
+    fn fuse_tof(&mut self, at: Instant, tof: &TofData) -> Fusion {
         let fusion = self.try_tof(at, tof).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Tof, fusion)
     }
 
-    fn fuse_flow(&mut self, at: Micros, flow: &FlowData) -> Fusion {
+    fn fuse_flow(&mut self, at: Instant, flow: &FlowData) -> Fusion {
         let fusion = self.try_flow(at, flow).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Flow, fusion)
     }
 
-    fn fuse_baro(&mut self, at: Micros, baro: &BaroData) -> Fusion {
+    fn fuse_baro(&mut self, at: Instant, baro: &BaroData) -> Fusion {
         let fusion = self.try_baro(at, baro).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Baro, fusion)
     }
 
-    fn fuse_mag(&mut self, at: Micros, mag: &MagData) -> Fusion {
+    fn fuse_mag(&mut self, at: Instant, mag: &MagData) -> Fusion {
         let fusion = self.try_mag(at, mag).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Mag, fusion)
     }
 
-    fn fuse_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Fusion {
+    fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Fusion {
         self.try_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
     }
 
-    fn fuse_position(&mut self, at: Micros, position: &Vec3, sigma: f32) -> Fusion {
+    fn fuse_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Fusion {
         self.try_position(at, position, sigma).unwrap_or_else(Fusion::Refused)
     }
 
-    fn fuse_attitude(&mut self, at: Micros, attitude: &Quat, sigma: f32) -> Fusion {
+    fn fuse_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Fusion {
         self.try_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused)
     }
 

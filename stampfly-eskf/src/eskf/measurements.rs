@@ -6,7 +6,7 @@ use super::*;
 use crate::config::MagModel;
 
 impl Eskf {
-    pub(super) fn try_tof(&mut self, at: Micros, tof: &TofData) -> Result<Fusion, Refusal> {
+    pub(super) fn try_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
         let then = self.admit(Sensor::Tof, at, &[tof.distance])?;
         if !tof.valid {
             return Err(Refusal::Quality);
@@ -51,7 +51,7 @@ impl Eskf {
         }
     }
 
-    pub(super) fn try_flow(&mut self, at: Micros, flow: &FlowData) -> Result<Fusion, Refusal> {
+    pub(super) fn try_flow(&mut self, at: Instant, flow: &FlowData) -> Result<Fusion, Refusal> {
         if !flow.valid || flow.quality < self.config.flow_min_quality {
             return Err(Refusal::Quality);
         }
@@ -60,7 +60,7 @@ impl Eskf {
         }
         // What is compared is the velocity in the middle of the stretch of time that was seen.
         let late = self.config.flow_delay + 0.5 * flow.interval;
-        let seen = Micros(at.0.saturating_sub((late * 1e6) as u64));
+        let seen = at - Duration::from_micros((late * 1e6) as u64);
         let then = self.admit(Sensor::Flow, seen, &[flow.delta_x, flow.delta_y])?;
         if then.rotation[2][2] < self.config.min_cos_tilt {
             return Err(Refusal::Tilt);
@@ -116,7 +116,7 @@ impl Eskf {
         }
     }
 
-    pub(super) fn try_baro(&mut self, at: Micros, baro: &BaroData) -> Result<Fusion, Refusal> {
+    pub(super) fn try_baro(&mut self, at: Instant, baro: &BaroData) -> Result<Fusion, Refusal> {
         if !self.config.baro_enable {
             return Err(Refusal::NotUsed);
         }
@@ -151,7 +151,7 @@ impl Eskf {
         }
     }
 
-    pub(super) fn try_mag(&mut self, at: Micros, mag: &MagData) -> Result<Fusion, Refusal> {
+    pub(super) fn try_mag(&mut self, at: Instant, mag: &MagData) -> Result<Fusion, Refusal> {
         if !self.config.mag_enable {
             return Err(Refusal::NotUsed);
         }
@@ -199,7 +199,7 @@ impl Eskf {
         Fusion::Gated { ratio }
     }
 
-    pub(super) fn try_velocity(&mut self, at: Micros, velocity: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
+    pub(super) fn try_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
         let then = self.admit(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
         let variance = (sigma * sigma).max(1e-6);
         let rows = aid::velocity::world(&then.state);
@@ -220,7 +220,7 @@ impl Eskf {
         }
     }
 
-    pub(super) fn try_position(&mut self, at: Micros, position: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
+    pub(super) fn try_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
         let then = self.admit(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
         let variance = (sigma * sigma).max(1e-8);
         let rows = aid::position::world(&then.state);
@@ -244,7 +244,7 @@ impl Eskf {
         }
     }
 
-    pub(super) fn try_attitude(&mut self, at: Micros, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
+    pub(super) fn try_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
         let [x, y, z, w]: [f32; 4] = attitude.coords.into();
         let then = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
         let variance = (sigma * sigma).max(1e-8);

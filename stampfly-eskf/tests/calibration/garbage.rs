@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use stampfly_eskf::calibration::{EllipsoidFit, LevelTrim, SixPosition, StillCalibration, TemperatureTable};
 use stampfly_types::messages::{BaroData, ImuData, MagData};
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Instant, Vec3};
 
 /// Numbers a broken sensor sends, mixed with those of a working one.
 fn number(usual: f32) -> impl Strategy<Value = f32> {
@@ -38,11 +38,11 @@ proptest! {
     ) {
         let (mut calibration, mut six) = (StillCalibration::default(), SixPosition::default());
         let (mut level, mut table) = (LevelTrim::default(), TemperatureTable::default());
-        let mut now = Micros::ZERO;
+        let mut now = Instant::ZERO;
         for (accel, gyro, temperature, repeats, jump) in samples {
-            now += Micros(u64::from(jump));
+            now += Duration::from_micros(u64::from(jump));
             for _ in 0..repeats {
-                now += Micros(2_500);
+                now += Duration::from_micros(2_500);
                 let imu = ImuData { accel, gyro, temperature };
                 let _ = (calibration.step(now, &imu), six.step(now, &imu), table.step(now, &imu));
                 calibration.add_mag(&MagData { field: accel });

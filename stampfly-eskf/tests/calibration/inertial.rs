@@ -4,7 +4,7 @@ use super::{ACCEL_NOISE, CASES, Errors, GYRO_NOISE, Random, still};
 use stampfly_eskf::calibration::{
     Face, LevelTrim, SixPosition, SixPositionFailure, SixPositionRefusal, StillCalibration,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3};
 
 #[test]
 fn the_gyro_bias_of_a_still_vehicle_is_found() {
@@ -14,7 +14,7 @@ fn the_gyro_bias_of_a_still_vehicle_is_found() {
         let (gyro, accel) = (random.vector(0.03), Vec3::new(0.0, 0.0, -GRAVITY) + random.vector(0.3));
         let mut calibration = StillCalibration::default();
         for step in 0..1_500 {
-            calibration.step(Micros(2_500 * step), &still(random, &gyro, &accel, 25.0)).unwrap();
+            calibration.step(Instant::from_micros(2_500 * step), &still(random, &gyro, &accel, 25.0)).unwrap();
         }
         assert!(calibration.result().complete);
         let quality = calibration.quality().unwrap();
@@ -32,14 +32,14 @@ struct Placed {
     random: Random,
     bias: Vec3,
     gain: Vec3,
-    now: Micros,
+    now: Instant,
 }
 
 impl Placed {
     fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         let (bias, gain) = (random.vector(1.0), Vec3::repeat(1.0) + random.vector(0.04));
-        Self { calibration: SixPosition::default(), random, bias, gain, now: Micros::ZERO }
+        Self { calibration: SixPosition::default(), random, bias, gain, now: Instant::ZERO }
     }
 
     fn measured(&self, force: &Vec3) -> Vec3 {
@@ -50,7 +50,7 @@ impl Placed {
     fn hold(&mut self, force: &Vec3) -> Result<Face, SixPositionRefusal> {
         let measured = self.measured(force);
         for step in 0..1_200 {
-            self.now += Micros(2_500);
+            self.now += Duration::from_micros(2_500);
             let turn = if step < 80 { Vec3::repeat(2.0) } else { Vec3::zeros() };
             match self.calibration.step(self.now, &still(&mut self.random, &turn, &measured, 25.0)) {
                 Ok(Some(face)) => return Ok(face),
@@ -133,8 +133,9 @@ fn a_crooked_sensor_is_straightened() {
         let mount = Quat::from_euler_angles(roll, pitch, 0.0);
         let felt = mount.inverse() * Vec3::new(0.0, 0.0, -GRAVITY);
         let mut level = LevelTrim::default();
-        let found = (0..2_000)
-            .find_map(|step| level.step(Micros(2_500 * step), &still(random, &Vec3::zeros(), &felt, 25.0)).unwrap());
+        let found = (0..2_000).find_map(|step| {
+            level.step(Instant::from_micros(2_500 * step), &still(random, &Vec3::zeros(), &felt, 25.0)).unwrap()
+        });
         let (trim, quality) = found.unwrap();
         trims.0.push((trim.roll - roll).abs().max((trim.pitch - pitch).abs()));
         // Any vector of the airframe comes out as it was, heading aside.

@@ -3,7 +3,7 @@
 use super::{Errors, Random, still};
 use stampfly_eskf::calibration::{Reach, TemperatureRefusal, TemperatureTable};
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// A bias that bends with temperature.
 fn bias(curve: &[Vec3; 3], temperature: f32) -> Vec3 {
@@ -21,11 +21,11 @@ fn a_bias_that_moves_with_temperature_is_tabulated() {
         let accel = [Vec3::zeros(), random.vector(0.1), random.vector(0.03)];
         let mut table = TemperatureTable::default();
         let attitudes = [Vec3::new(0.0, 0.0, -GRAVITY), Vec3::new(0.5, -0.3, -9.78)];
-        let mut now = Micros::ZERO;
+        let mut now = Instant::ZERO;
         for (attitude, from) in attitudes.iter().zip([15.0, 30.0]) {
             table.begin();
             for step in 0..48_000u16 {
-                now += Micros(2_500);
+                now += Duration::from_micros(2_500);
                 let temperature = from + f32::from(step) / 48_000.0 * 25.0;
                 let felt = attitude + bias(&accel, temperature);
                 table.step(now, &still(random, &bias(&gyro, temperature), &felt, temperature)).unwrap();
@@ -60,10 +60,10 @@ fn a_bias_that_moves_with_temperature_is_tabulated() {
 #[test]
 fn a_table_refuses_what_it_cannot_place() {
     let mut table = TemperatureTable::default();
-    let mut now = Micros::ZERO;
+    let mut now = Instant::ZERO;
     let mut lie = |table: &mut TemperatureTable, temperature: f32| {
         (0..900).find_map(|_| {
-            now += Micros(2_500);
+            now += Duration::from_micros(2_500);
             let imu = ImuData { accel: Vec3::new(0.0, 0.0, -9.8), temperature, ..Default::default() };
             table.step(now, &imu).map_or_else(|refusal| Some(Err(refusal)), |taken| taken.then_some(Ok(())))
         })

@@ -7,10 +7,10 @@ use rand_distr::{Distribution, StandardNormal};
 use stampfly_eskf::filter::N;
 use stampfly_eskf::{Eskf, Estimator};
 use stampfly_types::messages::{BaroData, CalibrationResult, FlowData, ImuData, MagData, TofData};
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Between inertial samples, µs.
-pub const STEP: u64 = 2_500;
+pub const STEP: Duration = Duration::from_micros(2_500);
 /// How much older than its stamp the end of a flow reading is, and how long it is, s.
 const FLOW_DELAY: f64 = 0.004;
 const FLOW_INTERVAL: f64 = 0.01;
@@ -30,7 +30,7 @@ pub struct Pose {
 #[derive(Clone, Debug)]
 pub struct Flight {
     /// What the clock shows at its beginning.
-    pub start: Micros,
+    pub start: Instant,
     /// Velocity on top of the path's, world; it dies out within a second.
     pub extra: Vector3<f64>,
     pub gyro_bias: Vec3,
@@ -39,7 +39,7 @@ pub struct Flight {
 }
 
 impl Flight {
-    pub fn new(start: Micros, seed: u64) -> Self {
+    pub fn new(start: Instant, seed: u64) -> Self {
         Self {
             start,
             extra: Vector3::zeros(),
@@ -50,16 +50,16 @@ impl Flight {
     }
 
     /// The instant `steps` inertial samples after the beginning.
-    pub fn at(&self, steps: u64) -> Micros {
-        self.start + Micros(steps * STEP)
+    pub fn at(&self, steps: u64) -> Instant {
+        self.start + STEP * steps
     }
 
-    fn seconds(&self, at: Micros) -> f64 {
-        at.0.wrapping_sub(self.start.0).cast_signed() as f64 * 1e-6
+    fn seconds(&self, at: Instant) -> f64 {
+        at.as_micros().wrapping_sub(self.start.as_micros()).cast_signed() as f64 * 1e-6
     }
 
     /// Two metres above the floor, to and fro by half a metre, leaning by a few degrees, looking about.
-    pub fn pose(&self, at: Micros) -> Pose {
+    pub fn pose(&self, at: Instant) -> Pose {
         const SWINGS: [(f64, f64, f64); 3] = [(0.5, 0.9, 0.0), (0.4, 1.1, 1.0), (0.1, 0.6, 2.0)];
         const DYING: f64 = 0.3;
         let t = self.seconds(at);
@@ -89,9 +89,9 @@ impl Flight {
         }
     }
 
-    fn rate(&self, from: Micros, to: Micros) -> Vector3<f64> {
+    fn rate(&self, from: Instant, to: Instant) -> Vector3<f64> {
         let turn = self.pose(from).attitude.inverse() * self.pose(to).attitude;
-        turn.scaled_axis() / ((to.0 - from.0) as f64 * 1e-6)
+        turn.scaled_axis() / to.since(from).seconds_f64()
     }
 
     fn noise(&mut self, sigma: f32) -> f32 {
@@ -104,9 +104,9 @@ impl Flight {
     }
 
     /// The inertial sample that ends at this instant.
-    pub fn imu(&mut self, at: Micros) -> ImuData {
-        let before = Micros(at.0 - STEP.min(at.0));
-        let middle = self.pose(Micros(at.0 - STEP / 2));
+    pub fn imu(&mut self, at: Instant) -> ImuData {
+        let before = at - STEP;
+        let middle = self.pose(at - Duration::from_micros(STEP.as_micros() / 2));
         let gravity = Vector3::new(0.0, 0.0, f64::from(GRAVITY));
         let force = middle.attitude.inverse() * (middle.acceleration - gravity);
         ImuData {
@@ -116,14 +116,14 @@ impl Flight {
         }
     }
 
-    pub fn tof(&mut self, at: Micros) -> TofData {
+    pub fn tof(&mut self, at: Instant) -> TofData {
         let pose = self.pose(at);
         let distance = -pose.position.z / (pose.attitude * Vector3::z()).z;
         TofData { distance: distance as f32 + self.noise(0.004), valid: true, ..TofData::default() }
     }
 
-    pub fn flow(&mut self, at: Micros) -> FlowData {
-        let ago = |seconds: f64| Micros(at.0.saturating_sub((seconds * 1e6) as u64));
+    pub fn flow(&mut self, at: Instant) -> FlowData {
+        let ago = |seconds: f64| at - Duration::from_micros((seconds * 1e6) as u64);
         let (begin, end) = (ago(FLOW_DELAY + FLOW_INTERVAL), ago(FLOW_DELAY));
         let middle = self.pose(ago(FLOW_DELAY + 0.5 * FLOW_INTERVAL));
         let velocity = middle.attitude.inverse() * middle.velocity;
@@ -139,12 +139,12 @@ impl Flight {
         }
     }
 
-    pub fn baro(&mut self, at: Micros) -> BaroData {
+    pub fn baro(&mut self, at: Instant) -> BaroData {
         let altitude = 100.0 - self.pose(at).position.z as f32 + self.noise(0.06);
         BaroData { altitude, ..BaroData::default() }
     }
 
-    pub fn mag(&mut self, at: Micros) -> MagData {
+    pub fn mag(&mut self, at: Instant) -> MagData {
         let field = self.pose(at).attitude.inverse() * FIELD.map(f64::from);
         MagData { field: field.map(|v| v as f32) + self.noise3(0.5) }
     }
@@ -182,7 +182,7 @@ impl Flight {
     }
 
     /// How far off the estimate is: tilt (rad), velocity (m/s), height (m).
-    pub fn errors(&self, eskf: &Eskf, at: Micros) -> [f64; 3] {
+    pub fn errors(&self, eskf: &Eskf, at: Instant) -> [f64; 3] {
         let (pose, estimate) = (self.pose(at), eskf.estimate());
         let down = (estimate.attitude.inverse() * Vec3::z()).map(f64::from);
         let tilt = down.angle(&(pose.attitude.inverse() * Vector3::z()));

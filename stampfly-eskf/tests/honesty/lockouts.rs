@@ -20,7 +20,7 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::TofData;
-use stampfly_types::{Micros, Vec3, math};
+use stampfly_types::{Instant, Vec3, math};
 
 /// Tilt, velocity, height: rad, m/s, m. Of the tilt 0.07 rad are what the box's accelerometer bias looks like.
 const LIMITS: [f64; 3] = [0.1, 0.3, 0.1];
@@ -43,7 +43,7 @@ struct Wrong {
 
 /// Seconds until the estimate was right for good, and until it said that it was lost.
 fn recovery(wrong: &Wrong, seed: u64) -> (f64, Option<f64>) {
-    let mut flight = Flight::new(Micros::from_secs(100), seed);
+    let mut flight = Flight::new(Instant::from_secs(100), seed);
     flight.extra = wrong.velocity.into();
     let mut calibration = flight.calibration();
     let (sin, cos) = math::sin_cos(wrong.direction);

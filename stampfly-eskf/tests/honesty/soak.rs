@@ -2,11 +2,11 @@
 
 use super::flight::{Flight, is_sound};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 #[test]
 fn two_hours_leave_it_as_sound_as_the_first_minute() {
-    let mut flight = Flight::new(Micros((1 << 32) - 1_800_000_000), 3);
+    let mut flight = Flight::new(Instant::from_micros((1 << 32) - 1_800_000_000), 3);
     let config = EskfConfig { mag_enable: true, ..EskfConfig::default() };
     let mut eskf = Eskf::new(config);
     eskf.initialize(flight.start, &flight.calibration());

@@ -3,7 +3,7 @@
 use super::flight::{Flight, is_sound};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
 use stampfly_types::messages::{FlowData, ImuData, MagData, TofData, Validity};
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Instant, Vec3};
 
 /// What a broken sensor makes of a sample.
 #[derive(Clone, Copy)]
@@ -17,7 +17,7 @@ const SOUND: Broken = Broken { imu: |v| v, tof: |v| v, flow: |v| v };
 
 /// Eight seconds of flight, then `seconds` more with these sensors: the filter, and its errors at the end.
 fn fly(broken: Broken, seconds: u64, mut told: impl FnMut(Fusion)) -> (Eskf, [f64; 3]) {
-    let mut flight = Flight::new(Micros::from_secs(10), 9);
+    let mut flight = Flight::new(Instant::from_secs(10), 9);
     let mut eskf = Eskf::new(EskfConfig::default());
     eskf.initialize(flight.start, &flight.calibration());
     for step in 1..=3_200 {
@@ -55,7 +55,7 @@ fn a_range_that_is_said_to_be_none_is_no_range() {
     for (distance, valid, reason) in
         [(0.0, true, Refusal::Range), (9.0, true, Refusal::Range), (2.0, false, Refusal::Quality)]
     {
-        let mut flight = Flight::new(Micros::from_secs(10), 9);
+        let mut flight = Flight::new(Instant::from_secs(10), 9);
         let mut eskf = Eskf::new(EskfConfig::default());
         eskf.initialize(flight.start, &flight.calibration());
         for step in 1..=400 {
@@ -109,7 +109,7 @@ fn a_clipping_accelerometer_does_not_carry_the_height_away() {
 
 #[test]
 fn a_bent_field_costs_little_tilt() {
-    let mut flight = Flight::new(Micros::from_secs(10), 9);
+    let mut flight = Flight::new(Instant::from_secs(10), 9);
     let mut eskf = Eskf::new(EskfConfig { mag_enable: true, ..EskfConfig::default() });
     eskf.initialize(flight.start, &flight.calibration());
     let (mut gated, mut worst) = (0, 0.0f64);

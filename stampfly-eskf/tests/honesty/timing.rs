@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Uniform};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
 use stampfly_types::messages::{FlowData, ImuData, MagData, TofData};
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 fn started(flight: &Flight) -> Eskf {
     let mut eskf = Eskf::new(EskfConfig { mag_enable: true, ..EskfConfig::default() });
@@ -16,7 +16,7 @@ fn started(flight: &Flight) -> Eskf {
 }
 
 /// Ten seconds of flight at a start of the clock; the estimate must be good at the end.
-fn fly(start: Micros) -> Eskf {
+fn fly(start: Instant) -> Eskf {
     let mut flight = Flight::new(start, 5);
     let mut eskf = started(&flight);
     for step in 1..=4_000 {
@@ -30,10 +30,10 @@ fn fly(start: Micros) -> Eskf {
 
 #[test]
 fn the_clock_may_begin_anywhere() {
-    let usual = fly(Micros::from_secs(10));
+    let usual = fly(Instant::from_secs(10));
     // Two seconds below what 32 bits of microseconds hold, and where 53 bits of a double would no longer do.
     for start in [(1 << 32) - 2_000_000, (1 << 53) + 1, u64::MAX - 3_600_000_000] {
-        let other = fly(Micros(start));
+        let other = fly(Instant::from_micros(start));
         assert_eq!(usual.nominal(), other.nominal(), "{start}");
         assert_eq!(usual.covariance(), other.covariance(), "{start}");
     }
@@ -43,13 +43,13 @@ fn the_clock_may_begin_anywhere() {
 fn late_measurements_do_as_well_as_those_on_time() {
     // Every measurement on time, and every one up to 80 ms late but rightly stamped: flow is 9 ms old by itself.
     let run = |most: u64| {
-        let mut flight = Flight::new(Micros::from_secs(10), 7);
+        let mut flight = Flight::new(Instant::from_secs(10), 7);
         let mut eskf = started(&flight);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let delays = Uniform::new_inclusive(0, most).expect("a range");
         // Due step, then in the order of stamps: a sensor's samples arrive in order.
-        let mut tofs: Vec<(u64, Micros, TofData)> = Vec::new();
-        let mut flows: Vec<(u64, Micros, FlowData)> = Vec::new();
+        let mut tofs: Vec<(u64, Instant, TofData)> = Vec::new();
+        let mut flows: Vec<(u64, Instant, FlowData)> = Vec::new();
         let (mut refused, mut squares) = (0, [0.0; 3]);
         for step in 1..=8_000u64 {
             let at = flight.at(step);
@@ -93,7 +93,7 @@ fn late_measurements_do_as_well_as_those_on_time() {
 
 #[test]
 fn what_cannot_be_placed_is_refused_with_a_reason() {
-    let mut flight = Flight::new(Micros::from_secs(10), 7);
+    let mut flight = Flight::new(Instant::from_secs(10), 7);
     let mut eskf = started(&flight);
     for step in 1..=400 {
         flight.feed(&mut eskf, step);
@@ -101,19 +101,19 @@ fn what_cannot_be_placed_is_refused_with_a_reason() {
     let now = flight.at(401);
     eskf.predict(now, &flight.imu(now));
     let before = (*eskf.nominal(), *eskf.covariance());
-    let mut tof = |at: Micros| {
+    let mut tof = |at: Instant| {
         let range = flight.tof(at);
         eskf.fuse_tof(at, &range)
     };
-    let millis = Micros::from_millis;
-    assert_eq!(tof(Micros(now.0 - millis(101).0)), Fusion::Refused(Refusal::Stale));
+    let millis = Duration::from_millis;
+    assert_eq!(tof(now - millis(101)), Fusion::Refused(Refusal::Stale));
     assert_eq!(tof(now + millis(21)), Fusion::Refused(Refusal::Future));
-    assert_eq!(tof(Micros(u64::MAX)), Fusion::Refused(Refusal::Future));
-    assert_eq!(tof(Micros::ZERO), Fusion::Refused(Refusal::Stale));
+    assert_eq!(tof(Instant::MAX), Fusion::Refused(Refusal::Future));
+    assert_eq!(tof(Instant::ZERO), Fusion::Refused(Refusal::Stale));
     // Step 390 brought the last one: that stamp and older ones are no news.
-    let last = Micros(now.0 - 11 * STEP);
+    let last = now - STEP * 11;
     assert_eq!(tof(last), Fusion::Refused(Refusal::Repeated));
-    assert_eq!(tof(Micros(last.0 - 1)), Fusion::Refused(Refusal::Repeated));
+    assert_eq!(tof(last - Duration::from_micros(1)), Fusion::Refused(Refusal::Repeated));
     assert_eq!((*eskf.nominal(), *eskf.covariance()), before, "a refusal changes nothing");
     let range = flight.tof(now);
     assert!(eskf.fuse_tof(now, &range).is_fused());
@@ -124,13 +124,13 @@ proptest! {
     /// Stamps of −1 to +20 ms against the inertial sensor, in any order between the sensors.
     #[test]
     fn stamps_around_the_present_are_harmless(seed: u64) {
-        let mut flight = Flight::new(Micros::from_secs(10), seed);
+        let mut flight = Flight::new(Instant::from_secs(10), seed);
         let mut eskf = started(&flight);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let offsets = Uniform::new_inclusive(0u64, 21_000).expect("a range");
         for step in 1..=2_000u64 {
             let now = flight.at(step);
-            let mut stamp = || Micros(now.0 + offsets.sample(&mut random) - 1_000);
+            let mut stamp = || Instant::from_micros(now.as_micros() + offsets.sample(&mut random) - 1_000);
             let (a, b, c) = (stamp(), stamp(), stamp());
             if step % 4 == 0 {
                 let flow = flight.flow(a);
@@ -172,10 +172,10 @@ proptest! {
             complete: true,
             ..Default::default()
         };
-        let mut at = Micros(start);
+        let mut at = Instant::from_micros(start);
         eskf.initialize(at, &calibration);
         for step in steps {
-            at = Micros(at.0.saturating_add_signed(step));
+            at = Instant::from_micros(at.as_micros().saturating_add_signed(step));
             eskf.predict(at, &ImuData { accel: force, gyro: Vec3::new(0.1, -0.2, 0.1), temperature: 25.0 });
             eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
             let flow = FlowData { interval: 0.01, quality: 100, valid: true, ..Default::default() };
