@@ -130,7 +130,10 @@ fn trigger(input: &mut Input, above: &[Row]) -> Result<Trigger> {
     if input.take_word("after") {
         let before = input.name("a runnable's name")?;
         if !above.iter().any(|row| row.name == before) {
-            return Err(Error::new(before.span(), "`after` names a line above: the flight band runs in the table's order"));
+            return Err(Error::new(
+                before.span(),
+                "`after` names a line above: the flight band runs in the table's order",
+            ));
         }
         return Ok(Trigger::After(before));
     }
@@ -199,18 +202,10 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
         let (name, runnable) = (&row.name, &row.runnable);
         quote_spanned!(name.span() => #name: <#runnable>::new(config))
     });
-    // At the line's own name, so that a runnable with the ends of another is reported there.
-    let at = |name: &Ident, code: TokenStream| -> TokenStream {
-        let span: Span = name.span();
-        code.into_iter()
-            .map(|mut token| {
-                token.set_span(span.located_at(span));
-                token
-            })
-            .collect()
-    };
     let places: Vec<_> = names.iter().map(|name| quote!(index if index == Id::#name as usize)).collect();
-    let reads = names.iter().map(|name| at(name, quote!(::stampfly_bus::ReadInputs::read(&mut ends.#name, activation))));
+    let reads =
+        // At the line's own name, so that a runnable with the ends of another is reported there.
+        names.iter().map(|name| quote_spanned!(name.span() => ::stampfly_bus::ReadInputs::read(&mut ends.#name, activation)));
     let runs = rows.iter().map(|row| {
         let (name, runnable) = (&row.name, &row.runnable);
         quote_spanned!(name.span() =>
@@ -220,6 +215,7 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
         let runnable = &row.runnable;
         quote!(<<#runnable as ::stampfly_bus::Runnable>::Ends<'static> as ::stampfly_bus::ReadInputs>::INPUTS)
     });
+    let all_lines = all_lines(topics, &names);
     quote! {
         /// A runnable, by its line in the table.
         #[allow(non_camel_case_types, reason = "a runnable has one spelling everywhere")]
@@ -310,9 +306,14 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
             }
         }
 
-        // Everybody in the topic table who is not outside has a line here.
-        const _: fn(#topics::Ends<'_>) = |ends| {
-            let #topics::Ends { #(#names: _),* } = ends;
-        };
+        #all_lines
     }
+}
+
+/// Fails to compile, at the name of the topic table, when a participant that is not outside has no line.
+fn all_lines(topics: &TokenStream, names: &[&Ident]) -> TokenStream {
+    let at = topics.clone().into_iter().last().map_or_else(Span::call_site, |token| token.span());
+    quote_spanned!(at => const _: fn(#topics::Ends<'_>) = |ends| {
+        let #topics::Ends { #(#names: _),* } = ends;
+    };)
 }

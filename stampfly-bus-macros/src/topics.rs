@@ -90,7 +90,9 @@ fn policy(input: &mut Input) -> Result<Policy> {
     let depth = input.group(Delimiter::Parenthesis);
     match (policy.to_string().as_str(), depth) {
         ("latest", None) => Ok(Policy::Latest),
-        ("latest", Some(depth)) => Err(Error::new(depth.span(), "`latest` has no depth: use `ring(N)` to keep samples")),
+        ("latest", Some(depth)) => {
+            Err(Error::new(depth.span(), "`latest` has no depth: use `ring(N)` to keep samples"))
+        }
         ("ring", Some(depth)) => Ok(Policy::Ring(depth.stream())),
         ("queue", Some(depth)) => Ok(Policy::Queue(depth.stream())),
         ("ring" | "queue", None) => Err(Error::new(policy.span(), format!("`{policy}` needs a depth: `{policy}(8)`"))),
@@ -226,9 +228,23 @@ fn generate(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
     let bus = bus(topics, participants);
     let ends = participants.iter().map(|participant| ends(participant));
     let aliases = topics.iter().map(aliases);
+    let depths = topics.iter().filter_map(depth_limits);
     let runnables = group("Ends", "The ends of every runnable.", participants, false);
     let outside = group("Outside", "The ends of everybody outside: drivers, links, motors.", participants, true);
-    quote!(#table #bus #(#ends)* #runnables #outside #(#aliases)*)
+    quote!(#table #bus #(#ends)* #runnables #outside #(#aliases)* #(#depths)*)
+}
+
+/// Fails to compile, at the depth, when a ring cannot have it.
+fn depth_limits(topic: &Topic) -> Option<TokenStream> {
+    let (Policy::Ring(depth) | Policy::Queue(depth)) = &topic.policy else { return None };
+    let at = depth.clone().into_iter().next()?.span();
+    Some(quote_spanned!(at => const _: () = {
+        let depth: usize = #depth;
+        assert!(
+            depth.is_power_of_two() && depth >= 2 && depth <= 1 << 16,
+            "the depth of a topic is a power of two from 2 to 65536"
+        );
+    };))
 }
 
 /// Names, numbers and schemas.

@@ -3,131 +3,133 @@
 #![cfg(not(loom))]
 
 use proptest::prelude::*;
-use stampfly_bus::{Activation, Band, Runnable, Runnables, Scheduler, schedule, topics};
+use stampfly_bus::{
+    Activation, AnyTopic, Band, PublishWords, Runnable, Schedule, Scheduler, Split, Stamped, Taps, TopicTable, schedule,
+};
 use stampfly_types::messages::{ControlOutput, GuidedCommand, GuidedKind, ImuData, StateEstimate};
 use stampfly_types::{Duration, Instant};
 
-topics! {
-    /// A vehicle small enough to reason about.
-    pub mod wiring;
-    /// Inertial sample.
-    sensor_imu: ImuData = ring(8) @ 400 Hz from imu => [estimation];
-    /// A command.
-    command: GuidedCommand = queue(4) @ on event from link => [estimation, control];
-    /// State.
-    estimate: StateEstimate = latest @ 400 Hz from estimation => [control, telemetry];
-    /// Demand.
-    demand: ControlOutput = latest @ 400 Hz from control => [];
+/// A vehicle small enough to reason about.
+mod topics {
+    use super::*;
+    const COMMANDS: usize = 4;
+
+    stampfly_bus::topics! {
+        outside imu, link;
+
+        /// Inertial sample.
+        sensor_imu: ImuData = ring(8) @ 0.4 kHz from imu => [estimation];
+        /// A command.
+        command: GuidedCommand = queue(COMMANDS) @ on event from link => [estimation, control];
+        /// State.
+        estimate: StateEstimate = latest @ 400 Hz from estimation => [control, telemetry];
+        /// Demand.
+        demand: ControlOutput = latest @ 400 Hz from control => [];
+    }
 }
 
 schedule! {
-    /// Its activations.
-    pub mod plan on wiring;
+    /// Its runnables.
+    #[derive(Clone, Debug)]
+    struct Runnables on topics from ();
+
     /// Counts samples.
     estimation = Estimation: on sensor_imu, flight, 10 us;
     /// Follows.
     control = Control: after estimation or at latest 10 ms, flight, 10 us;
     /// Watches.
-    telemetry = Telemetry: every 20 ms, background, 10 us;
+    telemetry = Telemetry: every 20 ms, background, 0.01 ms;
 }
 
 /// Sums its inputs.
-pub struct Estimation<'b> {
-    imu: wiring::sensor_imu::Rx<'b>,
-    command: wiring::command::Rx<'b>,
-    out: wiring::estimate::Tx<'b>,
-    samples: heapless::Vec<stampfly_bus::Stamped<ImuData>, 8>,
-    commands: heapless::Vec<stampfly_bus::Stamped<GuidedCommand>, 4>,
+#[derive(Clone, Debug, Default)]
+pub struct Estimation {
     height: f32,
 }
 
-impl Runnable for Estimation<'_> {
-    fn read(&mut self, activation: &mut Activation) {
-        activation.drain(&mut self.imu, &mut self.samples);
-        activation.drain(&mut self.command, &mut self.commands);
+impl Estimation {
+    fn new(_: &()) -> Self {
+        Self::default()
     }
-    fn run(&mut self, activation: &mut Activation) {
-        self.height += self.samples.iter().map(|s| s.data.accel.z).sum::<f32>();
-        self.height += self.commands.iter().map(|c| c.data.dwell).sum::<f32>();
+}
+
+impl Runnable for Estimation {
+    type Ends<'b> = topics::EstimationEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut Self::Ends<'_>) {
+        self.height += ends.sensor_imu.iter().map(|s| s.data.accel.z).sum::<f32>();
+        self.height += ends.command.iter().map(|c| c.data.dwell).sum::<f32>();
         let estimate = StateEstimate { height: self.height, ..Default::default() };
-        self.out.publish(activation.now(), &estimate);
+        ends.estimate.publish(activation.now(), &estimate);
     }
 }
 
 /// Doubles the height.
-pub struct Control<'b> {
-    estimate: wiring::estimate::Rx<'b>,
-    command: wiring::command::Rx<'b>,
-    out: wiring::demand::Tx<'b>,
-    commands: heapless::Vec<stampfly_bus::Stamped<GuidedCommand>, 4>,
-    seen: Option<stampfly_bus::Stamped<StateEstimate>>,
+#[derive(Clone, Debug, Default)]
+pub struct Control {
     nows: Vec<Instant>,
+    news: Vec<bool>,
 }
 
-impl Runnable for Control<'_> {
-    fn read(&mut self, activation: &mut Activation) {
-        self.seen = activation.latest(&mut self.estimate);
-        activation.drain(&mut self.command, &mut self.commands);
+impl Control {
+    fn new(_: &()) -> Self {
+        Self::default()
     }
-    fn run(&mut self, activation: &mut Activation) {
+}
+
+impl Runnable for Control {
+    type Ends<'b> = topics::ControlEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut Self::Ends<'_>) {
         self.nows.push(activation.now());
-        let thrust = self.seen.map_or(-1.0, |s| s.data.height * 2.0);
-        self.out.publish(activation.now(), &ControlOutput { thrust, ..Default::default() });
+        self.news.push(ends.estimate.is_new());
+        let thrust = ends.estimate.sample().map_or(-1.0, |sample| sample.data.height * 2.0);
+        ends.demand.publish(activation.now(), &ControlOutput { thrust, ..Default::default() });
     }
 }
 
 /// Remembers generations.
-pub struct Telemetry<'b> {
-    estimate: wiring::estimate::Rx<'b>,
+#[derive(Clone, Debug, Default)]
+pub struct Telemetry {
     generations: Vec<u32>,
 }
 
-impl Runnable for Telemetry<'_> {
-    fn read(&mut self, activation: &mut Activation) {
-        self.generations.push(activation.latest(&mut self.estimate).map_or(0, |s| s.generation));
+impl Telemetry {
+    fn new(_: &()) -> Self {
+        Self::default()
     }
-    fn run(&mut self, _: &mut Activation) {}
+}
+
+impl Runnable for Telemetry {
+    type Ends<'b> = topics::TelemetryEnds<'b>;
+
+    fn run(&mut self, _: &mut Activation, ends: &mut Self::Ends<'_>) {
+        self.generations.push(ends.estimate.sample().map_or(0, |sample| sample.generation));
+    }
 }
 
 struct Rig<'b> {
-    vehicle: plan::Vehicle<'b>,
-    imu: wiring::sensor_imu::Tx<'b>,
-    command: wiring::command::Tx<'b>,
-    scheduler: Scheduler<{ plan::COUNT }, { wiring::COUNT }>,
-    heads: [&'b dyn stampfly_bus::AnyTopic; wiring::COUNT],
-    taps: wiring::Taps<'b>,
-    log: Vec<(wiring::Id, u64, u32, Vec<u32>)>,
-    trace: Vec<(usize, Activation)>,
+    runnables: Runnables,
+    ends: topics::Ends<'b>,
+    imu: topics::SensorImuTx<'b>,
+    command: topics::CommandTx<'b>,
+    scheduler: Scheduler<[stampfly_bus::ActivationState; COUNT]>,
+    heads: [&'b dyn AnyTopic; topics::COUNT],
+    taps: topics::Taps<'b>,
+    log: Vec<(usize, Instant, u32, Vec<u32>)>,
+    trace: Vec<Activation>,
 }
 
 impl<'b> Rig<'b> {
-    fn new(bus: &'b mut wiring::Bus) -> Self {
-        let wiring::Split { ports, taps, heads } = bus.split(None);
-        let wiring::Ports { sensor_imu, command, estimate, demand } = ports;
-        let wiring::demand::Ends { tx: demand } = demand;
+    fn new(bus: &'b mut topics::Bus) -> Self {
+        let Split { runnables: ends, outside, taps, heads } = bus.split(None);
+        let topics::Outside { imu, link } = outside;
         Self {
-            vehicle: plan::Vehicle {
-                estimation: Estimation {
-                    imu: sensor_imu.estimation,
-                    command: command.estimation,
-                    out: estimate.tx,
-                    samples: heapless::Vec::new(),
-                    commands: heapless::Vec::new(),
-                    height: 0.0,
-                },
-                control: Control {
-                    estimate: estimate.control,
-                    command: command.control,
-                    out: demand,
-                    commands: heapless::Vec::new(),
-                    seen: None,
-                    nows: Vec::new(),
-                },
-                telemetry: Telemetry { estimate: estimate.telemetry, generations: Vec::new() },
-            },
-            imu: sensor_imu.tx,
-            command: command.tx,
-            scheduler: Scheduler::new(&plan::ACTIVATIONS, Instant::ZERO),
+            runnables: Runnables::new(&()),
+            ends,
+            imu: imu.sensor_imu,
+            command: link.command,
+            scheduler: Scheduler::new(&ACTIVATIONS, Runnables::states(Instant::ZERO)),
             heads,
             taps,
             log: Vec::new(),
@@ -135,25 +137,28 @@ impl<'b> Rig<'b> {
         }
     }
 
+    fn activate(&mut self, index: usize, activation: &mut Activation) {
+        Runnables::read(&mut self.ends, index, activation);
+        self.runnables.run(&mut self.ends, index, activation);
+    }
+
     fn run_due(&mut self, clock: Instant) {
         for band in [Band::Flight, Band::Background] {
             while let Some((index, now)) = self.scheduler.due(band, 0, clock, &self.heads) {
-                let mut activation = Activation::live(now);
+                let mut activation = Activation::live(index as u8, now);
                 self.scheduler.started(index, now, clock, &self.heads);
-                self.vehicle.read(index, &mut activation);
-                self.vehicle.run(index, &mut activation);
+                self.activate(index, &mut activation);
                 self.scheduler.finished(index);
-                self.trace.push((index, activation));
+                self.trace.push(activation);
             }
         }
-        self.taps
-            .drain(&mut |id, at, generation, words| self.log.push((id, at.as_micros(), generation, words.to_vec())));
+        self.taps.drain(&mut |topic, at, generation, words| self.log.push((topic, at, generation, words.to_vec())));
     }
 }
 
 #[test]
 fn a_silent_imu_still_activates_control() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut rig = Rig::new(&mut bus);
     rig.imu.publish(Instant::from_micros(2_500), &ImuData::default());
     rig.run_due(Instant::from_micros(2_600));
@@ -161,13 +166,13 @@ fn a_silent_imu_still_activates_control() {
         rig.run_due(Instant::from_micros(clock));
     }
     // After the sample, then every 10 ms from when that ran, at the scheduled ticks and not at the clock's.
-    assert_eq!(rig.vehicle.control.nows, [2_500, 12_600, 22_600, 32_600].map(Instant::from_micros));
-    assert_eq!(rig.vehicle.telemetry.generations, [1], "20 ms period");
+    assert_eq!(rig.runnables.control.nows, [2_500, 12_600, 22_600, 32_600].map(Instant::from_micros));
+    assert_eq!(rig.runnables.telemetry.generations, [1], "20 ms period");
 }
 
 #[test]
 fn a_deadline_counts_from_the_run_and_time_does_not_go_back() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut rig = Rig::new(&mut bus);
     // Samples are 6 ms old when they arrive; from stamp to arrival of the next one it is 12 ms.
     for k in 0..10u64 {
@@ -176,7 +181,7 @@ fn a_deadline_counts_from_the_run_and_time_does_not_go_back() {
         rig.run_due(Instant::from_micros(k * 6_000 + 11_900));
     }
     assert_eq!(
-        rig.vehicle.control.nows,
+        rig.runnables.control.nows,
         (0..10).map(|k| Instant::from_micros(k * 6_000)).collect::<Vec<_>>(),
         "no deadline passed"
     );
@@ -184,25 +189,25 @@ fn a_deadline_counts_from_the_run_and_time_does_not_go_back() {
     rig.run_due(Instant::from_micros(72_000));
     rig.imu.publish(Instant::from_micros(66_000), &ImuData::default());
     rig.run_due(Instant::from_micros(72_100));
-    assert_eq!(rig.vehicle.control.nows[10..], [Instant::from_micros(70_000), Instant::from_micros(70_000)]);
+    assert_eq!(rig.runnables.control.nows[10..], [Instant::from_micros(70_000), Instant::from_micros(70_000)]);
 }
 
 #[test]
 fn a_slow_reader_counts_what_it_missed() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut rig = Rig::new(&mut bus);
     for k in 1..=20u64 {
         rig.imu.publish(Instant::from_micros(k), &ImuData::default());
     }
     rig.run_due(Instant::from_micros(21));
-    assert_eq!(rig.vehicle.estimation.imu.lost(), 12);
-    assert_eq!(rig.trace[0].1.inputs()[0].taken, 8);
+    assert_eq!(rig.ends.estimation.sensor_imu.lost(), 12);
+    assert_eq!(rig.trace[0].record().inputs()[0].taken, 8);
     assert_eq!(rig.taps.lost(), 12);
 }
 
 #[test]
 fn a_queue_refuses_and_gives_the_value_back() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut rig = Rig::new(&mut bus);
     let land = GuidedCommand { kind: GuidedKind::Land, ..Default::default() };
     for _ in 0..4 {
@@ -216,54 +221,103 @@ fn a_queue_refuses_and_gives_the_value_back() {
 
 #[test]
 fn the_table_says_it_all() {
-    let imu = &wiring::TOPICS[wiring::Id::sensor_imu as usize];
-    assert_eq!((imu.policy, imu.depth, imu.rate, imu.publisher), ("ring", 8, "400 Hz", "imu"));
+    let imu = topics::Id::sensor_imu.info();
+    assert_eq!((imu.policy, imu.depth, imu.rate, imu.publisher), ("ring", 8, "0.4 kHz", "imu"));
+    assert_eq!((imu.period, imu.is_outside), (Some(Duration::from_micros(2_500)), true));
     assert_eq!(imu.readers, ["estimation"]);
-    assert_eq!(wiring::TOPICS[wiring::Id::command as usize].rate, "on event");
-    assert_eq!(plan::ACTIVATIONS[1].at_latest, Some(Duration::from_micros(10_000)));
+    let command = topics::Id::command.info();
+    assert_eq!((command.rate, command.period, command.depth), ("on event", None, 4));
+    assert!(!topics::Id::estimate.info().is_outside);
+    assert_eq!(<topics::Bus as TopicTable>::TOPICS.len(), topics::COUNT);
+    assert_eq!(ACTIVATIONS[Id::control as usize].at_latest, Some(Duration::from_millis(10)));
+    assert_eq!(ACTIVATIONS[2].budget, Duration::from_micros(10));
+    assert_eq!(Runnables::INPUTS, [2, 2, 1]);
+}
+
+#[test]
+fn what_has_been_read_is_not_copied_again() {
+    let mut bus = topics::Bus::new();
+    let mut rig = Rig::new(&mut bus);
+    rig.imu.publish(Instant::ZERO, &ImuData::default());
+    rig.run_due(Instant::from_micros(1));
+    rig.run_due(Instant::from_millis(11));
+    assert_eq!(rig.runnables.control.news, [true, false], "the second time on its deadline");
+    let inputs = rig.trace.last().expect("two activations").record().inputs();
+    assert_eq!((inputs[1].generation, inputs[1].taken), (1, 0), "held, not taken again");
+}
+
+/// A sample as a reader gets it, for a topic's own type.
+fn stamped<T>(at: Instant, generation: u32, data: T) -> Stamped<T> {
+    Stamped { at, generation, data }
+}
+
+#[test]
+fn a_restored_topic_goes_on_where_it_was() {
+    use stampfly_types::Message;
+    let mut bus = topics::Bus::new();
+    let Split { mut outside, mut taps, .. } = bus.split(None);
+    let sample = ImuData { temperature: 21.0, ..Default::default() };
+    let place = topics::Id::sensor_imu as usize;
+    assert_eq!(
+        outside.restore_words(place, Instant::from_micros(7), 0, &sample.to_words()),
+        None,
+        "no such generation"
+    );
+    assert_eq!(outside.restore_words(place, Instant::from_micros(7), 41, &[1, 2]), None, "no such words");
+    assert_eq!(outside.restore_words(topics::Id::estimate as usize, Instant::ZERO, 1, &[]), None, "not outside");
+    outside.restore_words(place, Instant::from_micros(7), 41, &sample.to_words()).expect("restored");
+    assert_eq!(outside.imu.sensor_imu.publish(Instant::from_micros(9), &sample), 42);
+    let mut seen = Vec::new();
+    taps.drain(&mut |_, at, generation, words| {
+        let data = ImuData::from_words(words.try_into().expect("its size")).expect("a sample");
+        seen.push(stamped(at, generation, data));
+    });
+    assert_eq!(seen.last(), Some(&stamped(Instant::from_micros(9), 42, sample)));
 }
 
 proptest! {
     /// Record a run with random traffic and random slowness, then repeat it from inputs and trace alone.
     #[test]
     fn a_trace_replays_bit_for_bit(steps in prop::collection::vec((0u8..4, 0u64..30_000, any::<f32>()), 1..200)) {
-        let mut bus = wiring::Bus::new();
+        let mut bus = topics::Bus::new();
         let mut rig = Rig::new(&mut bus);
-        let mut clock = 0;
+        let mut clock = Instant::ZERO;
         for (kind, wait, value) in steps {
             match kind {
-                0 | 1 => { rig.imu.publish(Instant::from_micros(clock), &ImuData { accel: [0.0, 0.0, value].into(), ..Default::default() }); }
-                2 => { let _ = rig.command.publish(Instant::from_micros(clock), GuidedCommand { dwell: value, ..Default::default() }); }
-                _ => { clock += wait; rig.run_due(Instant::from_micros(clock)); }
+                0 | 1 => { rig.imu.publish(clock, &ImuData { accel: [0.0, 0.0, value].into(), ..Default::default() }); }
+                2 => { let _ = rig.command.publish(clock, GuidedCommand { dwell: value, ..Default::default() }); }
+                _ => { clock += Duration::from_micros(wait); rig.run_due(clock); }
             }
         }
-        rig.run_due(Instant::from_micros(clock + 1));
+        rig.run_due(clock + Duration::from_micros(1));
 
-        let mut again = wiring::Bus::new();
+        let mut again = topics::Bus::new();
         let mut copy = Rig::new(&mut again);
-        let mut inputs = rig.log.iter().filter(|l| l.0 == wiring::Id::sensor_imu).peekable();
-        let mut commands = rig.log.iter().filter(|l| l.0 == wiring::Id::command).peekable();
-        for (index, recorded) in &rig.trace {
-            if *index == plan::Id::estimation as usize {
-                while let Some((_, at, _, words)) = inputs.next_if(|l| l.2 <= recorded.inputs()[0].generation) {
-                    copy.imu.publish_words(Instant::from_micros(*at), words);
-                }
+        let outside = [topics::Id::sensor_imu, topics::Id::command];
+        let mut inputs = outside.map(|id| rig.log.iter().filter(move |line| line.0 == id as usize).peekable());
+        for recorded in &rig.trace {
+            // Both are read by `estimation`, the second one also by `control`, where it comes first.
+            let read = recorded.record().inputs();
+            let upto = match recorded.record().index {
+                0 => [read[0].generation, read[1].generation],
+                1 => [0, read[0].generation],
+                _ => [0, 0],
+            };
+            while let Some((_, at, _, words)) = inputs[0].next_if(|line| line.2 <= upto[0]) {
+                copy.imu.publish_words(*at, words);
             }
-            if *index != plan::Id::telemetry as usize {
-                while let Some((_, at, _, words)) = commands.next_if(|l| l.2 <= recorded.inputs()[1].generation) {
-                    copy.command.publish_words(Instant::from_micros(*at), words);
-                }
+            while let Some((_, at, _, words)) = inputs[1].next_if(|line| line.2 <= upto[1]) {
+                copy.command.publish_words(*at, words);
             }
-            let mut activation = Activation::replay(recorded.now(), recorded.inputs(), recorded.refused());
-            copy.vehicle.read(*index, &mut activation);
-            copy.vehicle.run(*index, &mut activation);
-            copy.taps.drain(&mut |id, at, generation, words| copy.log.push((id, at.as_micros(), generation, words.to_vec())));
+            let mut activation = Activation::replay(*recorded.record());
+            copy.activate(usize::from(recorded.record().index), &mut activation);
+            copy.taps.drain(&mut |topic, at, generation, words| copy.log.push((topic, at, generation, words.to_vec())));
             prop_assert!(!activation.is_missing_input() || rig.taps.lost() > 0);
         }
         if rig.taps.lost() == 0 {
-            for id in [wiring::Id::estimate, wiring::Id::demand] {
-                let recorded: Vec<_> = rig.log.iter().filter(|l| l.0 == id).collect();
-                let replayed: Vec<_> = copy.log.iter().filter(|l| l.0 == id).collect();
+            for id in [topics::Id::estimate, topics::Id::demand] {
+                let recorded: Vec<_> = rig.log.iter().filter(|line| line.0 == id as usize).collect();
+                let replayed: Vec<_> = copy.log.iter().filter(|line| line.0 == id as usize).collect();
                 prop_assert_eq!(recorded, replayed);
             }
         }

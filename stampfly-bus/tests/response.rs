@@ -29,6 +29,7 @@ const fn topic(period: Option<u64>) -> TopicInfo {
             None => None,
         },
         publisher: "",
+        is_outside: true,
         readers: &[],
         words: 0,
         fields: &[],

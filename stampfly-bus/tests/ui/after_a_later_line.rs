@@ -1,28 +1,36 @@
-//! The flight band runs in table order: nothing can run after what comes later.
-use stampfly_bus::{Activation, Runnable, schedule, topics};
-use stampfly_types::messages::TofData;
+//! The flight band runs in the order of the table: nothing can run after what comes later.
+use stampfly_bus::{Activation, Runnable};
 
-topics! {
-    /// One topic.
-    pub mod wiring;
-    /// Range to the ground.
-    range: TofData = latest @ 30 Hz from tof => [landing];
+mod topics {
+    use stampfly_types::messages::TofData;
+
+    stampfly_bus::topics! {
+        outside tof;
+        /// Range to the ground.
+        range: TofData = latest @ 30 Hz from tof => [landing];
+    }
 }
 
-pub struct Step<'b>(wiring::range::Rx<'b>);
+pub struct Step;
 
-impl Runnable for Step<'_> {
-    fn read(&mut self, _: &mut Activation) {}
-    fn run(&mut self, _: &mut Activation) {}
+impl Step {
+    fn new(_: &()) -> Self {
+        Self
+    }
 }
 
-schedule! {
-    /// The activations.
-    pub mod plan on wiring;
+impl Runnable for Step {
+    type Ends<'b> = topics::LandingEnds<'b>;
+    fn run(&mut self, _: &mut Activation, _: &mut Self::Ends<'_>) {}
+}
+
+stampfly_bus::schedule! {
+    /// The runnables.
+    pub struct Runnables on crate::topics from ();
     /// Too early.
-    early = Step: after late, flight, 10 us;
+    early = Step: after landing, flight, 10 us;
     /// Too late.
-    late = Step: on range, flight, 10 us;
+    landing = Step: on range, flight, 10 us;
 }
 
 fn main() {}

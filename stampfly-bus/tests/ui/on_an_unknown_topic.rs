@@ -1,25 +1,33 @@
-//! An activation can only wait for a topic that exists.
-use stampfly_bus::{Activation, Runnable, schedule, topics};
-use stampfly_types::messages::TofData;
+//! An activation waits for a topic that exists.
+use stampfly_bus::{Activation, Runnable};
 
-topics! {
-    /// One topic.
-    pub mod wiring;
-    /// Range to the ground.
-    range: TofData = latest @ 30 Hz from tof => [landing];
+mod topics {
+    use stampfly_types::messages::TofData;
+
+    stampfly_bus::topics! {
+        outside tof;
+        /// Range to the ground.
+        range: TofData = latest @ 30 Hz from tof => [landing];
+    }
 }
 
-pub struct Step<'b>(wiring::range::Rx<'b>);
+pub struct Step;
 
-impl Runnable for Step<'_> {
-    fn read(&mut self, _: &mut Activation) {}
-    fn run(&mut self, _: &mut Activation) {}
+impl Step {
+    fn new(_: &()) -> Self {
+        Self
+    }
 }
 
-schedule! {
-    /// The activations.
-    pub mod plan on wiring;
-    /// Waits for ever.
+impl Runnable for Step {
+    type Ends<'b> = topics::LandingEnds<'b>;
+    fn run(&mut self, _: &mut Activation, _: &mut Self::Ends<'_>) {}
+}
+
+stampfly_bus::schedule! {
+    /// The runnables.
+    pub struct Runnables on crate::topics from ();
+    /// Waits.
     landing = Step: on altitude, flight, 10 us;
 }
 

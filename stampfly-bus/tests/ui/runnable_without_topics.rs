@@ -1,0 +1,36 @@
+//! A line is named like a participant of the topic table.
+use stampfly_bus::{Activation, Runnable};
+
+mod topics {
+    use stampfly_types::messages::TofData;
+
+    stampfly_bus::topics! {
+        outside tof;
+        /// Range to the ground.
+        range: TofData = latest @ 30 Hz from tof => [landing];
+    }
+}
+
+pub struct Step;
+
+impl Step {
+    fn new(_: &()) -> Self {
+        Self
+    }
+}
+
+impl Runnable for Step {
+    type Ends<'b> = topics::LandingEnds<'b>;
+    fn run(&mut self, _: &mut Activation, _: &mut Self::Ends<'_>) {}
+}
+
+stampfly_bus::schedule! {
+    /// The runnables.
+    pub struct Runnables on crate::topics from ();
+    /// Waits.
+    landing = Step: on range, flight, 10 us;
+    /// Has no topics.
+    idle = Step: every 1 s, background, 10 us;
+}
+
+fn main() {}
