@@ -1,0 +1,179 @@
+//! The flight loop: runs what is due, in table order, and reports it to an observer.
+//!
+//! One loop for every executor. On a microcontroller the task that the bus's hook wakes calls it; on a host the virtual
+//! clock does; a replay and the golden flight call it with what was recorded. It reads no clock: the caller says what
+//! time it is.
+
+use stampfly_bus::{
+    Activation, AnyTopic, Band, PublishWords, Schedule, Scheduler, Split, TopicTable,
+};
+use stampfly_types::{ActivationRecord, Instant};
+
+/// Is told of activations: a log, a profiler.
+pub trait Observer {
+    /// A runnable is about to read its inputs.
+    fn starts(&mut self, _index: usize) {}
+
+    /// A runnable has read its inputs. A replay repeats activations in the order of these calls.
+    fn has_read(&mut self, _activation: &Activation) {}
+
+    /// A runnable has published. Only now it is known what a full queue has refused.
+    fn finished(&mut self, _activation: &Activation) {}
+}
+
+/// Nothing to report to.
+impl Observer for () {}
+
+/// Two observers.
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    fn starts(&mut self, index: usize) {
+        self.0.starts(index);
+        self.1.starts(index);
+    }
+
+    fn has_read(&mut self, activation: &Activation) {
+        self.0.has_read(activation);
+        self.1.has_read(activation);
+    }
+
+    fn finished(&mut self, activation: &Activation) {
+        // The other way round, so that the inner one of two profilers does not time the outer one.
+        self.1.finished(activation);
+        self.0.finished(activation);
+    }
+}
+
+impl<O: Observer> Observer for &mut O {
+    fn starts(&mut self, index: usize) {
+        (**self).starts(index);
+    }
+
+    fn has_read(&mut self, activation: &Activation) {
+        (**self).has_read(activation);
+    }
+
+    fn finished(&mut self, activation: &Activation) {
+        (**self).finished(activation);
+    }
+}
+
+/// A background activation that has read its inputs and not yet run.
+#[derive(Debug)]
+pub struct Pending(Activation);
+
+/// A vehicle's runnables with their ends and the scheduler that drives them.
+///
+/// Large: borrow it where the stack is small.
+pub struct FlightLoop<'b, R: Schedule> {
+    runnables: R,
+    ends: <R::Topics as TopicTable>::Ends<'b>,
+    scheduler: Scheduler<R::States>,
+    heads: <R::Topics as TopicTable>::Heads<'b>,
+}
+
+/// A vehicle at power-on.
+pub struct Assembled<'b, R: Schedule> {
+    /// Every runnable, with the scheduler.
+    pub flight_loop: FlightLoop<'b, R>,
+    /// The ends of everybody outside.
+    pub outside: <R::Topics as TopicTable>::Outside<'b>,
+    /// The log's cursors.
+    pub taps: <R::Topics as TopicTable>::Taps<'b>,
+}
+
+impl<'b, R: Schedule> Assembled<'b, R> {
+    /// Connects runnables to a fresh bus. The scheduler counts from `start`.
+    #[must_use]
+    pub fn new(split: Split<'b, R::Topics>, config: &R::Config, start: Instant) -> Self {
+        let Split { runnables: ends, outside, taps, heads } = split;
+        let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
+        Self { flight_loop: FlightLoop { runnables: R::new(config), ends, scheduler, heads }, outside, taps }
+    }
+}
+
+impl<'b, R: Schedule> FlightLoop<'b, R> {
+    /// The runnables: the state of the vehicle.
+    #[must_use]
+    pub const fn runnables(&self) -> &R {
+        &self.runnables
+    }
+
+    /// Puts another state in the place of the present one, as a key frame does.
+    pub fn set_runnables(&mut self, runnables: R) {
+        self.runnables = runnables;
+    }
+
+    /// Every topic without its type, in the table's order.
+    #[must_use]
+    pub fn heads(&self) -> &[&'b dyn AnyTopic] {
+        self.heads.as_ref()
+    }
+
+    /// Is anything due in this band?
+    #[must_use]
+    pub fn is_due(&self, band: Band, clock: Instant) -> bool {
+        self.scheduler.due(band, 0, clock, self.heads.as_ref()).is_some()
+    }
+
+    /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
+    pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut impl Observer) -> bool {
+        let mut next = 0;
+        while let Some((index, now)) = self.scheduler.due(band, next, clock, self.heads.as_ref()) {
+            let mut activation = Activation::live(index as u8, now);
+            self.start(index, &mut activation, clock, observer);
+            self.complete(index, &mut activation, observer);
+            next = index + 1;
+        }
+        next > 0
+    }
+
+    #[inline]
+    fn start(&mut self, index: usize, activation: &mut Activation, clock: Instant, observer: &mut impl Observer) {
+        observer.starts(index);
+        self.scheduler.started(index, activation.now(), clock, self.heads.as_ref());
+        R::read(&mut self.ends, index, activation);
+        observer.has_read(activation);
+    }
+
+    #[inline]
+    fn complete(&mut self, index: usize, activation: &mut Activation, observer: &mut impl Observer) {
+        self.runnables.run(&mut self.ends, index, activation);
+        self.scheduler.finished(index);
+        observer.finished(activation);
+    }
+
+    /// Lets the next due activation of this band read its inputs. What is published before [`finish`](Self::finish)
+    /// belongs to its next activation, as if it had been interrupted.
+    pub fn start_next(&mut self, band: Band, clock: Instant, observer: &mut impl Observer) -> Option<Pending> {
+        let (index, now) = self.scheduler.due(band, 0, clock, self.heads.as_ref())?;
+        let mut activation = Activation::live(index as u8, now);
+        self.start(index, &mut activation, clock, observer);
+        Some(Pending(activation))
+    }
+
+    /// Runs what has read its inputs.
+    pub fn finish(&mut self, Pending(mut activation): Pending, observer: &mut impl Observer) {
+        self.complete(usize::from(activation.record().index), &mut activation, observer);
+    }
+
+    /// Repeats a recorded activation. Returns it as it went this time.
+    pub fn replay(&mut self, record: ActivationRecord) -> Activation {
+        let index = usize::from(record.index);
+        let mut activation = Activation::replay(record);
+        R::read(&mut self.ends, index, &mut activation);
+        self.runnables.run(&mut self.ends, index, &mut activation);
+        activation
+    }
+
+    /// Puts a sample that a runnable published back on the bus, as
+    /// [`restore_words`](PublishWords::restore_words) does.
+    pub fn restore_words(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) -> Option<()> {
+        self.ends.restore_words(topic, at, generation, words)
+    }
+
+    /// The next instant at which a period or a deadline makes something due.
+    #[must_use]
+    pub fn next_tick(&self) -> Option<Instant> {
+        self.scheduler.next_tick()
+    }
+}
