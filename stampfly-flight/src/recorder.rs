@@ -1,0 +1,85 @@
+//! Records a flight as a log that can be flown again.
+//!
+//! Feed it every sample from the log's taps and make it an observer of the flight loop. The order of the log is the order
+//! in which things became visible: drain the taps before the flight loop runs, so that a sample is in the log before the
+//! activation that reads it.
+//!
+//! | in the log | when |
+//! |---|---|
+//! | one sample | published, by anybody |
+//! | one activation | has read its inputs |
+//! | the same activation again, with what was refused | has finished, and a queue was full |
+//! | a key frame | the caller asks for one |
+//! | a dropout mark | the sink, or a tap, has lost something before |
+//!
+//! For a log of the last seconds in memory, see the black box.
+
+use crate::flight_loop::Observer;
+use crate::log_schema::LogSchema;
+use stampfly_bus::{Activation, Schedule};
+use stampfly_log::ulog::{Sample, Sink, WriteError, Writer};
+use stampfly_types::Instant;
+
+/// The key under which a log holds key frames.
+pub const KEY_FRAME: &str = "key_frame";
+
+/// Records one flight into a sink. What the sink refuses is counted and marked, never retried.
+pub struct Recorder<R: Schedule, S> {
+    log: Writer<S, LogSchema<R>>,
+    taps_lost: u32,
+}
+
+impl<R: Schedule, S: Sink> Recorder<R, S> {
+    /// Goes on with a log whose head is written: `Definitions::data(LogSchema::new(…))`.
+    pub const fn new(log: Writer<S, LogSchema<R>>) -> Self {
+        Self { log, taps_lost: 0 }
+    }
+
+    /// Records one sample of the topic in this line of the table, or of a topic beside the bus.
+    pub fn sample(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
+        // The writer counts what the sink refuses, and marks it.
+        let _ = self.log.sample(topic, &Sample { at, generation, words });
+    }
+
+    /// Notes how many samples the taps have lost so far. A loss is marked in the log: a replay goes on after it only from
+    /// a key frame.
+    pub fn taps_lost(&mut self, now: Instant, lost: u32) {
+        if lost != self.taps_lost {
+            self.taps_lost = lost;
+            self.log.mark_loss(now);
+        }
+    }
+
+    /// Records a key frame, as [`encode`](crate::key_frame::encode) makes it. Ask for it between two passes of the flight
+    /// loop, with the taps drained and no activation pending.
+    ///
+    /// # Errors
+    /// When the sink refuses. The writer has counted it.
+    pub fn key_frame(&mut self, now: Instant, frame: &[u8]) -> Result<(), WriteError<S::Error>> {
+        self.log.blob(now, KEY_FRAME, frame)
+    }
+
+    /// Messages the sink has refused so far.
+    #[must_use]
+    pub const fn lost(&self) -> u32 {
+        self.log.lost()
+    }
+
+    /// Ends the log. It is complete at every moment; nothing is written here.
+    #[must_use]
+    pub fn into_sink(self) -> S {
+        self.log.into_sink()
+    }
+}
+
+impl<R: Schedule, S: Sink> Observer for Recorder<R, S> {
+    fn has_read(&mut self, activation: &Activation) {
+        let _ = self.log.activation(activation.record());
+    }
+
+    fn finished(&mut self, activation: &Activation) {
+        if activation.record().refused != 0 {
+            let _ = self.log.activation(activation.record());
+        }
+    }
+}
