@@ -14,7 +14,7 @@ const TOF: usize = 1;
 fn write(memory: &mut [u8]) -> Result<usize, Box<dyn std::error::Error>> {
     let mut log = Definitions::start(Ram::new(memory), Micros::ZERO)?;
     log.info("sys_name", "StampFly")?;
-    let mut log = log.data(TOPICS, &[])?;
+    let mut log = log.data(TOPICS)?;
     let mut hash = FlightHash::new();
     for k in 1..=5u32 {
         let at = Micros(u64::from(k) * 100_000);

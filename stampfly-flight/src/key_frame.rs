@@ -69,7 +69,8 @@ struct Put<'a> {
 
 impl Put<'_> {
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), KeyFrameError> {
-        let (place, rest) = core::mem::take(&mut self.rest).split_at_mut_checked(bytes.len()).ok_or(KeyFrameError::NoRoom)?;
+        let (place, rest) =
+            core::mem::take(&mut self.rest).split_at_mut_checked(bytes.len()).ok_or(KeyFrameError::NoRoom)?;
         place.copy_from_slice(bytes);
         self.rest = rest;
         self.written += bytes.len();

@@ -49,7 +49,7 @@ fn main() {
     black_box(hash.finish());
 
     let mut log = Definitions::start(Nowhere, Instant::ZERO)
-        .and_then(|log| log.data(TOPICS, &[]))
+        .and_then(|log| log.data(TOPICS))
         .expect("these sinks take everything");
     for (name, topic, words) in [("write/sensor_imu", 0, &imu[..]), ("write/estimate_state", 1, &state[..])] {
         let sample = Sample { at: Instant::from_micros(2_500), generation: 1, words };
@@ -57,7 +57,7 @@ fn main() {
     }
 
     let mut log = Definitions::start(Bytes(Vec::new()), Instant::ZERO)
-        .and_then(|log| log.data(TOPICS, &[]))
+        .and_then(|log| log.data(TOPICS))
         .expect("these sinks take everything");
     for generation in 0..10_000 {
         for (topic, words) in [(0, &imu[..]), (1, &state[..])] {

@@ -7,9 +7,9 @@
 //! ```
 
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic};
-use stampfly_log::{Activation, ActivationTopic, FlightHash, Input};
+use stampfly_log::{ActivationTopic, FlightHash};
 use stampfly_types::messages::{FlightState, ImuData, PowerData, SystemMode};
-use stampfly_types::{GRAVITY, Instant, Message, Vec3, math};
+use stampfly_types::{ActivationRecord, GRAVITY, InputRecord, Instant, Message, Vec3, math};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
@@ -41,9 +41,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     log.parameter("loop_rate", 400.into())?;
     log.parameter("rate_roll_p", 0.65.into())?;
 
-    let mut log = log.data(TOPICS, ACTIVATIONS)?;
+    let mut log = log.data((TOPICS, ACTIVATIONS))?;
     let mut hash = FlightHash::new();
-    let mut publish = |log: &mut stampfly_log::ulog::Writer<'_, Disk>, topic: usize, sample: Sample<'_>| {
+    let mut publish = |log: &mut stampfly_log::ulog::Writer<Disk, (&[Topic], &[ActivationTopic])>,
+                       topic: usize,
+                       sample: Sample<'_>| {
         hash.publish(topic as u16, sample.generation, sample.at, sample.words);
         log.sample(topic, &sample)
     };
@@ -52,8 +54,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (sin, cos) = math::sin_cos(math::TAU * at.since(Instant::ZERO).seconds());
         let imu = ImuData { accel: Vec3::new(sin, cos, -GRAVITY), gyro: Vec3::new(0.0, 0.0, sin), temperature: 31.5 };
         publish(&mut log, IMU, Sample { at, generation: step + 1, words: &imu.to_words() })?;
-        let mut record = Activation::new(0, at);
-        record.read(Input { generation: step + 1, taken: 1 })?;
+        let mut record = ActivationRecord::new(0, at);
+        record.push(InputRecord { generation: step + 1, taken: 1 })?;
         log.activation(&record)?;
         if step % 40 == 0 {
             let power = PowerData { voltage: 4.1 - 0.1 * at.since(Instant::ZERO).seconds(), current: 2.0, power: 8.0 };

@@ -19,7 +19,7 @@
 //!
 //! const TOPICS: &[Topic] = &[Topic { name: "sensor_power", fields: PowerData::FIELDS }];
 //! let mut memory = [0; 4096];
-//! let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(TOPICS, &[])?;
+//! let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(TOPICS)?;
 //! let words = PowerData { voltage: 3.9, current: 2.0, power: 7.8 }.to_words();
 //! log.sample(0, &Sample { at: Instant::from_micros(2_500), generation: 1, words: &words })?;
 //!
@@ -43,4 +43,4 @@ pub mod trace;
 pub mod ulog;
 
 pub use hash::FlightHash;
-pub use trace::{Activation, ActivationTopic, Input};
+pub use trace::ActivationTopic;

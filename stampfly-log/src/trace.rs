@@ -15,98 +15,14 @@
 //! | `uint32_t[n] generation` | per input: number of the newest sample it has read, of now or of before |
 //! | `uint16_t[n] taken` | per input: how many samples it took this time |
 //!
-//! Activations appear in the order they ran. Not a profiler: nothing here says how long anything took.
+//! A record is written when the runnable has read its inputs, in the order in which runnables read. When the runnable was
+//! refused something, the same record follows once more when it has finished, with `refused` filled in: it takes the place
+//! of the first.
 
 use crate::ulog::{Format, Take};
 use core::fmt::{self, Write};
-use stampfly_types::Instant;
-
-/// The largest number of inputs of one activation.
-pub const MAX_INPUTS: usize = 16;
-
-/// How far one input had been read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Input {
-    /// Generation of the newest sample read so far; zero before the first.
-    pub generation: u32,
-    /// Samples taken in this activation.
-    pub taken: u16,
-}
-
-/// One activation of one runnable.
-///
-/// ```
-/// use stampfly_log::{Activation, Input};
-/// use stampfly_types::Instant;
-///
-/// let mut record = Activation::new(2, Instant::from_micros(5_000));
-/// record.read(Input { generation: 17, taken: 1 })?;
-/// record.read(Input { generation: 4, taken: 0 })?;
-/// record.refuse(0);
-/// assert_eq!((record.inputs().len(), record.refused), (2, 0b1));
-/// # Ok::<(), stampfly_log::trace::TooManyInputs>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Activation {
-    /// The runnable's place in the schedule.
-    pub index: u8,
-    /// The time it was told.
-    pub now: Instant,
-    /// Bit n: its n-th publish was refused. Bit 31 stands for every publish from the 32nd on.
-    pub refused: u32,
-    inputs: [Input; MAX_INPUTS],
-    count: usize,
-}
-
-/// An activation has more than [`MAX_INPUTS`] inputs. Holds the one that did not fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TooManyInputs(pub Input);
-
-impl fmt::Display for TooManyInputs {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "an activation has at most {MAX_INPUTS} inputs")
-    }
-}
-
-impl core::error::Error for TooManyInputs {}
-
-impl Activation {
-    /// An activation that has not read anything yet.
-    #[must_use]
-    pub const fn new(index: u8, now: Instant) -> Self {
-        Self { index, now, refused: 0, inputs: [Input { generation: 0, taken: 0 }; MAX_INPUTS], count: 0 }
-    }
-
-    /// Adds the next input, in the order of the schedule.
-    ///
-    /// # Errors
-    /// When there are [`MAX_INPUTS`] already; the record is unchanged.
-    pub fn read(&mut self, input: Input) -> Result<(), TooManyInputs> {
-        let room = self.inputs.get_mut(self.count).ok_or(TooManyInputs(input))?;
-        *room = input;
-        self.count += 1;
-        Ok(())
-    }
-
-    /// Notes that the publish with this number, counted from zero within the activation, was refused.
-    pub const fn refuse(&mut self, publish: u32) {
-        self.refused |= 1 << if publish < 31 { publish } else { 31 };
-    }
-
-    /// The inputs, in the order they were added.
-    #[must_use]
-    pub fn inputs(&self) -> &[Input] {
-        self.inputs.get(..self.count).unwrap_or_default()
-    }
-
-    pub(crate) fn encode(&self, out: &mut impl FnMut(&[u8])) {
-        out(&self.now.as_micros().to_le_bytes());
-        out(&u32::from(self.index).to_le_bytes());
-        out(&self.refused.to_le_bytes());
-        self.inputs().iter().for_each(|input| out(&input.generation.to_le_bytes()));
-        self.inputs().iter().for_each(|input| out(&input.taken.to_le_bytes()));
-    }
-}
+use stampfly_types::activation::MAX_INPUTS;
+use stampfly_types::{ActivationRecord, InputRecord, Instant};
 
 /// The topic that holds the activations of one runnable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,12 +31,21 @@ pub struct ActivationTopic {
     pub name: &'static str,
     /// Its place in the schedule.
     pub index: u8,
-    /// How many inputs it has, at most [`MAX_INPUTS`].
+    /// How many inputs it has, at most [`MAX_INPUTS`](stampfly_types::activation::MAX_INPUTS).
     pub inputs: usize,
 }
 
 /// Topics of activations begin with this.
 pub const TOPIC_PREFIX: &str = "activation_";
+
+/// The bytes of a record behind the number of its topic.
+pub(crate) fn encode(record: &ActivationRecord, out: &mut impl FnMut(&[u8])) {
+    out(&record.now.as_micros().to_le_bytes());
+    out(&u32::from(record.index).to_le_bytes());
+    out(&record.refused.to_le_bytes());
+    record.inputs().iter().for_each(|input| out(&input.generation.to_le_bytes()));
+    record.inputs().iter().for_each(|input| out(&input.taken.to_le_bytes()));
+}
 
 impl ActivationTopic {
     /// Number of bytes of a record in the log.
@@ -157,14 +82,14 @@ impl ActivationTopic {
 
     /// Reads a record of `inputs` inputs from its payload; `None` when it has another size.
     #[must_use]
-    pub fn decode(payload: &[u8], inputs: usize) -> Option<Activation> {
+    pub fn decode(payload: &[u8], inputs: usize) -> Option<ActivationRecord> {
         let mut take = Take(payload);
         let now = Instant::from_micros(take.u64()?);
-        let mut record = Activation::new(u8::try_from(take.u32()?).ok()?, now);
+        let mut record = ActivationRecord::new(u8::try_from(take.u32()?).ok()?, now);
         record.refused = take.u32()?;
         let mut taken = Take(take.0.get(inputs.checked_mul(4)?..)?);
         for _ in 0..inputs {
-            record.read(Input { generation: take.u32()?, taken: taken.u16()? }).ok()?;
+            record.push(InputRecord { generation: take.u32()?, taken: taken.u16()? }).ok()?;
         }
         taken.0.is_empty().then_some(record)
     }

@@ -4,9 +4,10 @@ mod common;
 
 use common::{ACTIVATIONS, Bytes, Odd, TOPICS, small_log, start};
 use proptest::prelude::*;
+use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Full, Message, Ram, Reader, Sample, Sink, Stamp, Topic, WriteError};
-use stampfly_log::{Activation, ActivationTopic, Input};
 use stampfly_types::messages::SystemMode;
+use stampfly_types::{ActivationRecord, InputRecord};
 use stampfly_types::{FieldKind, Instant, Message as _};
 
 /// Words a message of this topic can have: any bits where any bits are allowed, small numbers where not.
@@ -64,10 +65,10 @@ proptest! {
         now: u64, refused: u32, kind in 0..ACTIVATIONS.len(), inputs: [(u32, u16); 3],
     ) {
         let topic = ACTIVATIONS[kind];
-        let mut record = Activation::new(topic.index, Instant::from_micros(now));
+        let mut record = ActivationRecord::new(topic.index, Instant::from_micros(now));
         record.refused = refused;
         for (generation, taken) in &inputs[..topic.inputs] {
-            record.read(Input { generation: *generation, taken: *taken }).unwrap();
+            record.push(InputRecord { generation: *generation, taken: *taken }).unwrap();
         }
         let mut log = start();
         log.activation(&record).unwrap();
@@ -135,8 +136,8 @@ fn wrong_samples_are_refused_and_leave_no_trace() {
     let long = Sample { at: Instant::ZERO, generation: 0, words: &[0; 8] };
     assert_eq!(log.sample(0, &long), Err(WriteError::WordCount));
     assert_eq!(log.sample(99, &short), Err(WriteError::UnknownTopic));
-    assert_eq!(log.activation(&Activation::new(1, Instant::ZERO)), Err(WriteError::UnknownTopic));
-    assert_eq!(log.activation(&Activation::new(3, Instant::ZERO)), Err(WriteError::WordCount));
+    assert_eq!(log.activation(&ActivationRecord::new(1, Instant::ZERO)), Err(WriteError::UnknownTopic));
+    assert_eq!(log.activation(&ActivationRecord::new(3, Instant::ZERO)), Err(WriteError::WordCount));
     assert_eq!(log.text(stampfly_log::ulog::Level::Info, Instant::ZERO, &"x".repeat(5_000)), Err(WriteError::TooLong));
     assert_eq!((log.sink().0.len(), log.lost()), (before, 0));
 }
@@ -176,7 +177,7 @@ impl Sink for Shared<'_> {
 #[test]
 fn a_dropout_is_counted_and_marked_once() {
     let gate = std::cell::RefCell::new(Gate { bytes: Vec::new(), closed: false });
-    let mut log = Definitions::start(Shared(&gate), Instant::ZERO).unwrap().data(TOPICS, &[]).unwrap();
+    let mut log = Definitions::start(Shared(&gate), Instant::ZERO).unwrap().data(TOPICS).unwrap();
     let words = stampfly_types::messages::PowerData::default().to_words();
     for (millis, closed) in [(0, false), (10, true), (15, true), (40, false), (50, false)] {
         gate.borrow_mut().closed = closed;
@@ -199,7 +200,7 @@ fn a_dropout_is_counted_and_marked_once() {
 #[test]
 fn a_full_memory_keeps_a_readable_log() {
     let mut memory = [0; 3_000];
-    let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO).unwrap().data(&TOPICS[..2], &[]).unwrap();
+    let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO).unwrap().data(&TOPICS[..2]).unwrap();
     let words = [0; 7];
     let result =
         (0..).find_map(|n| log.sample(0, &Sample { at: Instant::from_micros(n), generation: 0, words: &words }).err());

@@ -8,7 +8,7 @@ const TOPICS: &[Topic] = &[Topic { name: "sensor_power", fields: PowerData::FIEL
 fn main() {
     let mut memory = [0; 4096];
     let definitions = Definitions::start(Ram::new(&mut memory), Micros(0)).expect("room");
-    let mut log = definitions.data(TOPICS, &[]).expect("room");
+    let mut log = definitions.data(TOPICS).expect("room");
     let words = PowerData { voltage: 3.9, current: 2.0, power: 7.8 }.to_words();
     log.sample(0, &Sample { at: Micros(2_500), generation: 1, words: &words }).expect("room");
     let messages = Reader::new(log.sink().written()).expect("a ULog");

@@ -6,7 +6,7 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use core::fmt;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
-use stampfly_types::{ActivationRecord, Instant};
+use stampfly_types::{ActivationRecord, FieldKind, Instant};
 
 /// Where a replay and its log part.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,7 +74,14 @@ impl Comparison {
     }
 
     /// The replay has published a sample.
-    pub(super) fn published(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32], by: &ActivationRecord) {
+    pub(super) fn published(
+        &mut self,
+        topic: usize,
+        at: Instant,
+        generation: u32,
+        words: &[u32],
+        by: &ActivationRecord,
+    ) {
         let sample = Published { at, words: words.to_vec(), activation: by.index, now: by.now };
         self.published.insert((topic, generation), sample);
     }
@@ -135,17 +142,35 @@ fn first_difference(info: &TopicInfo, recorded: &[u32], replayed: &[u32]) -> Opt
     if recorded == replayed {
         return None;
     }
-    for leaf in stampfly_types::message::leaves(info.fields) {
-        let each = leaf.words / leaf.count.max(1);
-        for element in 0..leaf.count {
-            let range = leaf.offset + element * each..leaf.offset + (element + 1) * each;
+    let mut first = 0;
+    for field in info.fields {
+        let each = field.words / field.count.max(1);
+        for element in 0..field.count {
+            let range = first + element * each..first + (element + 1) * each;
             let (was, is) = (recorded.get(range.clone()), replayed.get(range));
             if was != is {
-                let name = if leaf.count > 1 { format!("{leaf}[{element}]") } else { leaf.to_string() };
-                let show = |words: Option<&[u32]>| leaf.kind.show(words.unwrap_or_default()).to_string();
-                return Some((name, show(was), show(is)));
+                let name = if field.count > 1 { format!("{}[{element}]", field.name) } else { field.name.into() };
+                return Some((name, show(field.kind, was), show(field.kind, is)));
             }
         }
+        first += field.words;
     }
     Some(("(number of words)".into(), recorded.len().to_string(), replayed.len().to_string()))
+}
+
+fn show(kind: FieldKind, words: Option<&[u32]>) -> String {
+    let word = words.and_then(|words| words.first()).copied().unwrap_or_default();
+    match kind {
+        FieldKind::F32 => format!("{:?}", f32::from_bits(word)),
+        FieldKind::I32 | FieldKind::I16 => word.cast_signed().to_string(),
+        FieldKind::U64 => {
+            let high = words.and_then(|words| words.get(1)).copied().unwrap_or_default();
+            (u64::from(word) | u64::from(high) << 32).to_string()
+        }
+        FieldKind::Enum(names) => names
+            .iter()
+            .find(|(_, number)| *number == word)
+            .map_or_else(|| word.to_string(), |(name, _)| (*name).into()),
+        _ => word.to_string(),
+    }
 }

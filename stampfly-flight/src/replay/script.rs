@@ -65,7 +65,9 @@ impl fmt::Display for ReplayError {
             Self::Gap { activation, now } => {
                 write!(f, "the log has a gap: activation {activation} at {now} read a sample that is not in it")
             }
-            Self::LostSample { topic, at } => write!(f, "the log has a gap: a sample of {topic} before {at} is not in it"),
+            Self::LostSample { topic, at } => {
+                write!(f, "the log has a gap: a sample of {topic} before {at} is not in it")
+            }
             Self::Dropout { at } => write!(f, "the log has a gap: a dropout after {at}"),
         }
     }
@@ -169,7 +171,11 @@ impl Script {
                         let record = record.ok_or_else(|| ReplayError::Schema(name()))?;
                         last = record.now;
                         has_activations = true;
-                        entries.push(if record.refused == 0 { Entry::Activation(record) } else { Entry::Refusals(record) });
+                        entries.push(if record.refused == 0 {
+                            Entry::Activation(record)
+                        } else {
+                            Entry::Refusals(record)
+                        });
                     }
                     None => {}
                 },

@@ -62,7 +62,7 @@ impl core::error::Error for ReadError {}
 /// let mut memory = [0; 256];
 /// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?;
 /// log.info("sys_name", "StampFly")?;
-/// let log = log.data(&[], &[])?;
+/// let log = log.data(&[][..])?;
 /// let infos = Reader::new(log.sink().written()).expect("a ULog").filter_map(|message| match message {
 ///     Ok(Message::Info { key, value }) => Some((key.name, value)),
 ///     _ => None,

@@ -7,18 +7,22 @@
 //! writer counts it and puts a dropout mark before the next message that gets through, so a reader knows that and
 //! for how long data is missing. For a sink that must never lose anything, stop at the first error instead.
 
+use super::Schema;
 use super::cursor::Cursor;
 use super::topic::WordsError;
 use super::{
-    FlagBits, HEADER, Level, MAGIC, MAX_MESSAGE, NAMES_PREFIX, ParameterValue, SYNC_MAGIC, Sample, Sink, Topic,
-    UNITS_PREFIX, VERSION, WriteError, put_u16,
+    FlagBits, HEADER, Level, MAGIC, MAX_MESSAGE, NAMES_PREFIX, ParameterValue, SYNC_MAGIC, Sample, Sink, UNITS_PREFIX,
+    VERSION, WriteError, put_u16,
 };
-use crate::trace::{Activation, ActivationTopic, TOPIC_PREFIX};
+use crate::trace::{self, TOPIC_PREFIX};
 use core::fmt::{self, Write};
-use stampfly_types::{FieldInfo, FieldKind, Instant};
+use stampfly_types::{ActivationRecord, FieldInfo, FieldKind, Instant};
 
 /// Size and type in front of each payload.
 const MESSAGE_HEAD: usize = 3;
+
+/// Bytes of a blob in one message; the rest of [`MAX_MESSAGE`] is for its key.
+const BLOB_PART: usize = MAX_MESSAGE - 256;
 
 /// Makes messages in its buffer and hands them to the sink.
 struct Output<S> {
@@ -98,7 +102,7 @@ impl<S: Sink> Output<S> {
 /// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?;
 /// log.info("sys_name", "StampFly")?;
 /// log.parameter("rate_roll_p", 0.6.into())?;
-/// let log = log.data(TOPICS, &[])?;
+/// let log = log.data(TOPICS)?;
 /// assert_eq!(log.sink().written()[..4], *b"ULog");
 /// # Ok::<(), stampfly_log::ulog::WriteError<stampfly_log::ulog::Full>>(())
 /// ```
@@ -144,18 +148,16 @@ impl<S: Sink> Definitions<S> {
 
     /// Writes what explains these topics and starts the data.
     ///
-    /// A topic's number, for [`Writer::sample`], is its place in `topics`.
+    /// A topic's number, for [`Writer::sample`], is its place in the schema.
     ///
     /// # Errors
     /// When the sink refuses, a topic has a sample or a description longer than [`MAX_MESSAGE`], or there are more
     /// than 65 536 topics.
-    pub fn data<'t>(
-        mut self,
-        topics: &'t [Topic],
-        activations: &'t [ActivationTopic],
-    ) -> Result<Writer<'t, S>, WriteError<S::Error>> {
+    pub fn data<T: Schema>(mut self, schema: T) -> Result<Writer<S, T>, WriteError<S::Error>> {
         let output = &mut self.0;
-        for topic in topics {
+        let topics = || (0..).map_while(|index| schema.topic(index));
+        let activations = || (0..).map_while(|index| schema.activation(index));
+        for topic in topics() {
             if topic.size() + MESSAGE_HEAD + 2 > MAX_MESSAGE {
                 return Err(WriteError::TooLong);
             }
@@ -173,14 +175,14 @@ impl<S: Sink> Definitions<S> {
                 }
             }
         }
-        for activation in activations {
+        for activation in activations() {
             output.message(b'F', |out| {
                 let _ = write!(out, "{TOPIC_PREFIX}{}:", activation.name);
                 let _ = activation.write_fields(out);
             })?;
         }
-        let names = topics.iter().map(|topic| ("", topic.name));
-        let names = names.chain(activations.iter().map(|activation| (TOPIC_PREFIX, activation.name)));
+        let names = topics().map(|topic| ("", topic.name));
+        let names = names.chain(activations().map(|activation| (TOPIC_PREFIX, activation.name)));
         for (id, (prefix, name)) in names.enumerate() {
             let id = u16::try_from(id).map_err(|_| WriteError::TooManyTopics)?;
             output.message(b'A', |out| {
@@ -189,28 +191,30 @@ impl<S: Sink> Definitions<S> {
                 let _ = write!(out, "{prefix}{name}");
             })?;
         }
-        Ok(Writer { output: self.0, topics, activations, losing_since: None, lost: 0 })
+        let count = topics().count();
+        Ok(Writer { output: self.0, schema, topics: count, losing_since: None, lost: 0 })
     }
 }
 
 /// The second part of a log: what happened.
 ///
 /// See [`Definitions`] for how to get one and the [crate documentation](crate) for an example.
-pub struct Writer<'t, S> {
+pub struct Writer<S, T> {
     output: Output<S>,
-    topics: &'t [Topic],
-    activations: &'t [ActivationTopic],
+    schema: T,
+    /// Number of topics: activations are numbered behind them.
+    topics: usize,
     losing_since: Option<Instant>,
     lost: u32,
 }
 
-impl<S: Sink> Writer<'_, S> {
+impl<S: Sink, T: Schema> Writer<S, T> {
     /// Writes one sample of the topic with this place in the table.
     ///
     /// # Errors
     /// When the sink refuses (counted as lost), there is no such topic, or the words are none of its samples.
     pub fn sample(&mut self, topic: usize, sample: &Sample<'_>) -> Result<(), WriteError<S::Error>> {
-        let schema = *self.topics.get(topic).ok_or(WriteError::UnknownTopic)?;
+        let schema = self.schema.topic(topic).ok_or(WriteError::UnknownTopic)?;
         self.record(sample.at, b'D', |out| {
             out.put(&(topic as u16).to_le_bytes());
             schema.encode(sample, out)
@@ -221,16 +225,16 @@ impl<S: Sink> Writer<'_, S> {
     ///
     /// # Errors
     /// When the sink refuses (counted as lost), no activation topic has this index, or the number of inputs differs.
-    pub fn activation(&mut self, record: &Activation) -> Result<(), WriteError<S::Error>> {
-        let mut topics = self.activations.iter().enumerate();
+    pub fn activation(&mut self, record: &ActivationRecord) -> Result<(), WriteError<S::Error>> {
+        let mut topics = (0..).map_while(|index| self.schema.activation(index)).enumerate();
         let (place, topic) = topics.find(|(_, topic)| topic.index == record.index).ok_or(WriteError::UnknownTopic)?;
         if topic.inputs != record.inputs().len() {
             return Err(WriteError::WordCount);
         }
-        let id = (self.topics.len() + place) as u16;
+        let id = (self.topics + place) as u16;
         self.record(record.now, b'D', |out| {
             out.put(&id.to_le_bytes());
-            record.encode(&mut |bytes| out.put(bytes));
+            trace::encode(record, &mut |bytes| out.put(bytes));
             Ok(())
         })
     }
@@ -254,6 +258,30 @@ impl<S: Sink> Writer<'_, S> {
     /// When the sink refuses, or the name is longer than about 245 bytes.
     pub fn parameter(&mut self, name: &str, value: ParameterValue) -> Result<(), WriteError<S::Error>> {
         self.output.parameter(name, value)
+    }
+
+    /// Writes bytes of any length under a key, in parts: a picture, a state. Other programs skip them.
+    ///
+    /// # Errors
+    /// When the sink refuses (counted as lost) or the key is longer than about 200 bytes. The parts before are written.
+    pub fn blob(&mut self, at: Instant, key: &str, bytes: &[u8]) -> Result<(), WriteError<S::Error>> {
+        for (index, part) in bytes.chunks(BLOB_PART).enumerate() {
+            let mut length = Count(0);
+            let _ = write!(length, "uint8_t[{}] {key}", part.len());
+            let key_length = u8::try_from(length.0).map_err(|_| WriteError::TooLong)?;
+            self.record(at, b'M', |out| {
+                out.put(&[u8::from(index > 0), key_length]);
+                let _ = write!(out, "uint8_t[{}] {key}", part.len());
+                out.put(part);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Notes that something was lost before it reached this writer. A dropout mark comes before the next message.
+    pub fn mark_loss(&mut self, at: Instant) {
+        self.losing_since.get_or_insert(at);
     }
 
     /// Writes a mark at which a reader of a damaged log can find its way back. Once a second is plenty.
@@ -366,7 +394,7 @@ mod tests {
         log.parameter("RATE_P", 0.2.into()).unwrap();
         log.parameter("CTL_FREQ", 4_000.into()).unwrap();
         log.0.message(b'A', |out| out.put(b"\0\0\0attitude")).unwrap();
-        let mut log = log.data(&[], &[]).unwrap();
+        let mut log = log.data(&[][..]).unwrap();
         for (at, roll) in [(1_000u64, 0.0f32), (3_500, 0.1), (6_000, 0.2)] {
             if at == 3_500 {
                 log.sync().unwrap();

@@ -1,11 +1,12 @@
 //! What the tests share: a growing sink, topics of every kind, a small log.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic, Writer};
-use stampfly_log::{Activation, ActivationTopic, Input};
 use stampfly_types::messages::{
     EstimatorStatus, ImuData, PowerData, Signal, StateEstimate, SystemAlert, SystemMode, TofData,
 };
+use stampfly_types::{ActivationRecord, InputRecord};
 use stampfly_types::{Instant, Message, message};
 
 /// Bytes in memory, without limit.
@@ -58,12 +59,12 @@ pub const ACTIVATIONS: &[ActivationTopic] = &[
     ActivationTopic { name: "heartbeat", index: 9, inputs: 0 },
 ];
 
-pub fn start() -> Writer<'static, Bytes> {
+pub fn start() -> Writer<Bytes, (&'static [Topic], &'static [ActivationTopic])> {
     let mut log = Definitions::start(Bytes::default(), Instant::from_micros(1_000)).unwrap();
     log.info("sys_name", "StampFly").unwrap();
     log.parameter("rate_roll_p", 0.6.into()).unwrap();
     log.parameter("loop_rate", 400.into()).unwrap();
-    log.data(TOPICS, ACTIVATIONS).unwrap()
+    log.data((TOPICS, ACTIVATIONS)).unwrap()
 }
 
 /// A log with at least one message of every type the writer knows.
@@ -75,8 +76,8 @@ pub fn small_log() -> Vec<u8> {
         log.sample(0, &Sample { at, generation: step, words: &imu.to_words() }).unwrap();
         let estimate = StateEstimate { height: step as f32, ..Default::default() };
         log.sample(3, &Sample { at, generation: step, words: &estimate.to_words() }).unwrap();
-        let mut record = Activation::new(3, at);
-        record.read(Input { generation: step, taken: 1 }).unwrap();
+        let mut record = ActivationRecord::new(3, at);
+        record.push(InputRecord { generation: step, taken: 1 }).unwrap();
         log.activation(&record).unwrap();
         if step % 5 == 0 {
             log.sync().unwrap();
