@@ -54,7 +54,7 @@ struct Task<'a> {
 ///     tasks.spawn(async move {
 ///         for tick in 1..=2 {
 ///             watch.sleep_until(Instant::from_millis(tick * period)).await;
-///             log.borrow_mut().push((watch.now().0 / 1000, name));
+///             log.borrow_mut().push((watch.now().as_micros() / 1000, name));
 ///         }
 ///     });
 /// }
