@@ -6,11 +6,12 @@
 //!
 //! Counts wall-clock time from the first input to the last output, as budgets do: interrupts in between are included.
 
-use crate::{Observer, plan};
+use crate::schedule;
 use core::fmt;
 use core::sync::atomic::{AtomicU32, Ordering};
 use stampfly_bus::Activation;
 use stampfly_drivers::Timebase;
+use stampfly_flight::Observer;
 use stampfly_types::{Duration, Instant};
 
 /// Upper ends of the classes, in eighths of the budget. What is longer than the last one belongs to one more class.
@@ -29,7 +30,7 @@ struct Times {
 /// Execution times of every runnable since power-on. Written by one [`Stopwatch`], read by anybody.
 #[derive(Debug)]
 pub struct Profile {
-    times: [Times; plan::COUNT],
+    times: [Times; schedule::COUNT],
 }
 
 /// What is known about one runnable.
@@ -71,13 +72,13 @@ impl Profile {
     pub const fn new() -> Self {
         Self {
             times: [const { Times { classes: [const { AtomicU32::new(0) }; CLASSES], longest: AtomicU32::new(0) } };
-                plan::COUNT],
+                schedule::COUNT],
         }
     }
 
     /// One row a runnable, in the order of the activation table.
     pub fn rows(&self) -> impl Iterator<Item = Row> {
-        self.times.iter().zip(&plan::ACTIVATIONS).map(|(times, info)| Row {
+        self.times.iter().zip(&schedule::ACTIVATIONS).map(|(times, info)| Row {
             name: info.name,
             budget: info.budget,
             classes: times.classes.each_ref().map(|count| count.load(Ordering::Relaxed)),
@@ -86,7 +87,7 @@ impl Profile {
     }
 
     fn note(&self, index: usize, took: Duration) {
-        let (Some(times), Some(info)) = (self.times.get(index), plan::ACTIVATIONS.get(index)) else { return };
+        let (Some(times), Some(info)) = (self.times.get(index), schedule::ACTIVATIONS.get(index)) else { return };
         let class =
             ENDS.iter().position(|end| took.as_micros() * 8 <= info.budget.as_micros() * end).unwrap_or(ENDS.len());
         let Some(count) = times.classes.get(class) else { return };
@@ -109,7 +110,7 @@ impl Default for Profile {
 ///
 /// ```
 /// use stampfly_board::profile::{Profile, Stopwatch};
-/// use stampfly_board::{Observer, plan};
+/// use stampfly_board::schedule;
 /// use stampfly_bus::Activation;
 /// use stampfly_drivers::blocking::BlockingClock;
 /// use stampfly_types::{Duration, Instant};
@@ -120,10 +121,11 @@ impl Default for Profile {
 /// # let clock = BlockingClock::new(Delay, || Instant::from_micros(time.get()));
 /// let profile = Profile::new();
 /// let mut stopwatch = Stopwatch::new(&profile, clock);
-/// let (control, activation) = (plan::Id::control as usize, Activation::live(Instant::ZERO));
+/// let control = schedule::Id::control as usize;
+/// let activation = Activation::live(control as u8, Instant::ZERO);
 /// stopwatch.starts(control);
 /// # time.set(60);
-/// stopwatch.finished(control, &activation);
+/// stopwatch.finished(&activation);
 ///
 /// let row = profile.rows().nth(control).unwrap();
 /// assert_eq!((row.name, row.longest, row.over_budget()), ("control", Duration::from_micros(60), 0));
@@ -143,14 +145,12 @@ impl<'p, T: Timebase> Stopwatch<'p, T> {
 }
 
 impl<T: Timebase> Observer for Stopwatch<'_, T> {
-    fn has_read(&mut self, _: usize, _: &Activation) {}
-
     fn starts(&mut self, _: usize) {
         self.started = self.clock.now();
     }
 
-    fn finished(&mut self, index: usize, _: &Activation) {
-        self.profile.note(index, self.clock.now().since(self.started));
+    fn finished(&mut self, activation: &Activation) {
+        self.profile.note(usize::from(activation.record().index), self.clock.now().since(self.started));
     }
 }
 
@@ -162,8 +162,8 @@ mod tests {
     #[test]
     fn every_time_has_a_class() {
         let profile = Profile::new();
-        let control = plan::Id::control as usize;
-        let budget = plan::ACTIVATIONS[control].budget;
+        let control = schedule::Id::control as usize;
+        let budget = schedule::ACTIVATIONS[control].budget;
         assert_eq!(budget, Duration::from_micros(100), "the times below are written for this budget");
         // Two a class, at its ends: (0, 1/8], (1/8, 1/4], (1/4, 1/2], (1/2, 3/4], (3/4, 1], (1, 2], longer.
         let times = [0, 12, 13, 25, 26, 50, 51, 75, 76, 100, 101, 200, 201, u64::MAX / 8];

@@ -10,10 +10,10 @@
 //! runnables, where nothing is activated, use a [`Subscriber`].
 
 use crate::activation::Activation;
-use crate::topic::{Latest, Sequential, Stamped, Subscriber};
+use crate::topic::{Latest, Sequential, Subscriber};
 use core::ops::Deref;
 use heapless::Vec;
-use stampfly_types::{Duration, Instant, Message};
+use stampfly_types::{Duration, Instant, Message, Stamped};
 
 /// The newest sample of a topic.
 pub struct NewestInput<'b, T, const N: usize, const W: usize> {

@@ -12,33 +12,12 @@
 use crate::ring::{Copied, Ring, next};
 use crate::sync::{AtomicU32, Ordering, spin_loop, unless_loom_const};
 use core::marker::PhantomData;
-use stampfly_types::{Duration, Instant, Message};
+use stampfly_types::{Instant, Message, Stamped};
 
-/// A sample as a reader gets it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stamped<T> {
-    /// The instant the data is valid for.
-    pub at: Instant,
-    /// Sequence number of the sample on its topic, starting at 1.
-    pub generation: u32,
-    /// The message.
-    pub data: T,
-}
-
-impl<T> Stamped<T> {
-    #[inline]
-    pub(crate) fn from_copied<const W: usize>((generation, copied): (u32, Copied<W>)) -> Option<Self>
-    where
-        T: Message<Words = [u32; W]>,
-    {
-        Some(Self { at: copied.at, generation, data: T::from_words(&copied.words)? })
-    }
-
-    /// How old the data is at `now`; zero when it is stamped in the future.
-    #[must_use]
-    pub fn age(&self, now: Instant) -> Duration {
-        now.since(self.at)
-    }
+/// A sample from its words; `None` when they are none of the message.
+#[inline]
+fn stamped<T: Message<Words = [u32; W]>, const W: usize>((generation, copied): (u32, Copied<W>)) -> Option<Stamped<T>> {
+    Some(Stamped { at: copied.at, generation, data: T::from_words(&copied.words)? })
 }
 
 /// Policy `latest`: only the newest value matters.
@@ -262,13 +241,13 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     /// The newest sample, read or not; `None` before the first.
     #[inline]
     pub fn latest(&mut self) -> Option<Stamped<T>> {
-        self.newest_copied().and_then(Stamped::from_copied)
+        self.newest_copied().and_then(stamped)
     }
 
     /// The sample of this generation, if the ring still holds it. Moves the cursor there.
     pub fn at_generation(&mut self, generation: u32) -> Option<Stamped<T>> {
         let copied = self.copied_at(generation)?;
-        Stamped::from_copied((generation, copied))
+        stamped((generation, copied))
     }
 
     /// Newest generation of the topic, read or not; zero before the first.
@@ -293,7 +272,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
 
     #[inline]
     fn place(copied: Option<(u32, Copied<W>)>, into: &mut Stamped<T>) -> bool {
-        copied.and_then(Stamped::from_copied).map(|sample| *into = sample).is_some()
+        copied.and_then(stamped).map(|sample| *into = sample).is_some()
     }
 
     #[inline]
@@ -394,7 +373,7 @@ impl<T: Message<Words = [u32; W]>, P: Sequential, const N: usize, const W: usize
     #[inline]
     #[allow(clippy::should_implement_trait, reason = "a cursor, not an iterator: more may come after `None`")]
     pub fn next(&mut self) -> Option<Stamped<T>> {
-        self.next_copied().and_then(Stamped::from_copied)
+        self.next_copied().and_then(stamped)
     }
 }
 

@@ -27,9 +27,11 @@ mod eskf;
 mod estimator;
 pub mod filter;
 mod level;
+mod measurements;
 
 pub use complementary::{Complementary, ComplementaryConfig};
 pub use config::{EskfConfig, GravityUse, MagModel};
 pub use eskf::Eskf;
 pub use estimator::{Estimator, Fusion, Refusal};
 pub use level::attitude_from_specific_force;
+pub use measurements::{Aiding, Measurements, feed};

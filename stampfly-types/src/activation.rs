@@ -48,8 +48,7 @@ pub struct ActivationRecord {
 /// Only the inputs that are in use count.
 impl PartialEq for ActivationRecord {
     fn eq(&self, other: &Self) -> bool {
-        (self.index, self.now, self.refused, self.inputs())
-            == (other.index, other.now, other.refused, other.inputs())
+        (self.index, self.now, self.refused, self.inputs()) == (other.index, other.now, other.refused, other.inputs())
     }
 }
 

@@ -33,9 +33,11 @@ pub mod frame;
 pub mod math;
 pub mod message;
 pub mod messages;
+pub mod stamped;
 pub mod time;
 
 pub use activation::{ActivationRecord, InputRecord};
 pub use frame::{GRAVITY, Quat, Vec3};
 pub use message::{Field, FieldInfo, FieldKind, Message};
+pub use stamped::Stamped;
 pub use time::{Duration, Instant};

@@ -3,7 +3,7 @@
 //! Motion, motors and what was asked of them at twenty samples a second and more, because an accident is over in a tenth
 //! of one; decisions when they change; what the others can be computed from, or what ended before the flight, not at all.
 
-use crate::wiring::Id;
+use crate::topics::Id;
 use stampfly_types::Duration;
 
 /// Which samples of a topic are kept.

@@ -1,19 +1,10 @@
 //! The log file that remembered samples go into.
 
-use crate::{VehicleConfig, parameters, wiring};
-use stampfly_log::ulog::{Definitions, ParameterValue, Sink, Topic, WriteError, Writer};
+use crate::schedule::Runnables;
+use crate::{VehicleConfig, parameters};
+use stampfly_flight::LogSchema;
+use stampfly_log::ulog::{Definitions, ParameterValue, Sink, WriteError, Writer};
 use stampfly_types::Instant;
-
-/// Every topic, as the log wants them.
-static TOPICS: [Topic; wiring::COUNT] = {
-    let mut topics = [Topic { name: "", fields: &[] }; wiring::COUNT];
-    let mut index = 0;
-    while index < wiring::COUNT {
-        topics[index] = Topic { name: wiring::TOPICS[index].name, fields: wiring::TOPICS[index].fields };
-        index += 1;
-    }
-    topics
-};
 
 /// Starts a log that explains itself: every topic, every parameter.
 ///
@@ -29,8 +20,12 @@ static TOPICS: [Topic; wiring::COUNT] = {
 ///
 /// # Errors
 /// When the sink refuses.
-pub fn open<S: Sink>(sink: S, at: Instant, config: &VehicleConfig) -> Result<Writer<'static, S>, WriteError<S::Error>> {
-    head(sink, at, config)?.data(&TOPICS, &[])
+pub fn open<S: Sink>(
+    sink: S,
+    at: Instant,
+    config: &VehicleConfig,
+) -> Result<Writer<S, LogSchema<Runnables>>, WriteError<S::Error>> {
+    head(sink, at, config)?.data(LogSchema::new(&[]))
 }
 
 /// The beginning of every log of this vehicle: its name and every parameter, so that a replay flies with them.

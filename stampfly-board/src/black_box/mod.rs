@@ -19,7 +19,7 @@ pub use dump::{DumpError, Dumped, Refused, dump};
 pub use keep::{HASTE, Keep, REMINDER, keep};
 pub use log::{head, open};
 
-use crate::wiring;
+use crate::topics;
 use stampfly_types::messages::SystemMode;
 use stampfly_types::{Duration, Instant, Message};
 
@@ -34,9 +34,9 @@ const HEAD: usize = 2;
 /// Words of the longest message.
 pub(crate) const LONGEST: usize = {
     let (mut longest, mut index) = (0, 0);
-    while index < wiring::COUNT {
-        if wiring::TOPICS[index].words > longest {
-            longest = wiring::TOPICS[index].words;
+    while index < topics::COUNT {
+        if topics::TOPICS[index].words > longest {
+            longest = topics::TOPICS[index].words;
         }
         index += 1;
     }
@@ -89,10 +89,10 @@ pub struct Changed;
 /// for millis in 0..400 {
 ///     let range = TofData { distance: 0.001 * millis as f32, valid: true, ..Default::default() };
 ///     let at = Instant::from_millis(millis);
-///     black_box.note(wiring::Id::system_mode, at, millis as u32, &armed.to_words());
-///     black_box.note(wiring::Id::sensor_tof, at, millis as u32, &range.to_words());
+///     black_box.note(topics::Id::system_mode, at, millis as u32, &armed.to_words());
+///     black_box.note(topics::Id::sensor_tof, at, millis as u32, &range.to_words());
 /// }
-/// let ranges = black_box.records().filter(|record| record.topic == wiring::Id::sensor_tof as usize);
+/// let ranges = black_box.records().filter(|record| record.topic == topics::Id::sensor_tof as usize);
 /// let kept: Vec<u64> = ranges.map(|record| record.at.as_micros() / 1_000).collect();
 /// assert_eq!(kept, [0, 100, 200, 300]);
 /// ```
@@ -110,9 +110,9 @@ pub struct BlackBox<const WORDS: usize> {
     /// Until when the flight is worth remembering.
     until: Instant,
     /// When the last sample of each topic was kept.
-    kept: [Option<Instant>; wiring::COUNT],
+    kept: [Option<Instant>; topics::COUNT],
     /// The fingerprint of it.
-    last: [u32; wiring::COUNT],
+    last: [u32; topics::COUNT],
 }
 
 impl<const WORDS: usize> BlackBox<WORDS> {
@@ -128,16 +128,16 @@ impl<const WORDS: usize> BlackBox<WORDS> {
             newest: Instant::ZERO,
             changes: 0,
             until: Instant::ZERO,
-            kept: [None; wiring::COUNT],
-            last: [0; wiring::COUNT],
+            kept: [None; topics::COUNT],
+            last: [0; topics::COUNT],
         }
     }
 
     /// Takes a sample, and remembers it if the vehicle flies and [`keep`] says so.
-    pub fn note(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
-        if topic == wiring::Id::system_mode && is_armed(words) {
+    pub fn note(&mut self, topic: topics::Id, at: Instant, generation: u32, words: &[u32]) {
+        if topic == topics::Id::system_mode && is_armed(words) {
             if at >= self.until {
-                (self.oldest, self.used, self.kept) = (0, 0, [None; wiring::COUNT]);
+                (self.oldest, self.used, self.kept) = (0, 0, [None; topics::COUNT]);
                 self.changes = self.changes.wrapping_add(1);
             }
             self.until = at + AFTERMATH;
@@ -147,7 +147,7 @@ impl<const WORDS: usize> BlackBox<WORDS> {
         }
     }
 
-    fn wants(&self, topic: wiring::Id, at: Instant, words: &[u32]) -> bool {
+    fn wants(&self, topic: topics::Id, at: Instant, words: &[u32]) -> bool {
         let Some(kept) = self.kept.get(topic as usize).copied().flatten() else { return keep(topic) != Keep::Never };
         match keep(topic) {
             Keep::Never => false,
@@ -160,9 +160,9 @@ impl<const WORDS: usize> BlackBox<WORDS> {
         }
     }
 
-    fn remember(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
+    fn remember(&mut self, topic: topics::Id, at: Instant, generation: u32, words: &[u32]) {
         let place = topic as usize;
-        if wiring::TOPICS.get(place).is_none_or(|info| info.words != words.len()) {
+        if topics::TOPICS.get(place).is_none_or(|info| info.words != words.len()) {
             return;
         }
         if let Some(kept) = self.kept.get_mut(place) {
@@ -204,7 +204,7 @@ impl<const WORDS: usize> BlackBox<WORDS> {
             at: Instant::from_micros(self.newest.as_micros().saturating_add_signed(later)),
             generation: word(0) >> 8,
             words: [0; LONGEST],
-            length: wiring::TOPICS.get(topic)?.words,
+            length: topics::TOPICS.get(topic)?.words,
         };
         for (index, place) in record.words.iter_mut().take(record.length).enumerate() {
             *place = word(HEAD + index);
@@ -252,7 +252,7 @@ fn fingerprint(words: &[u32]) -> u32 {
     words.iter().fold(0x811C_9DC5, |hash, word| (hash ^ word).wrapping_mul(0x0100_0193))
 }
 
-const _: () = assert!(wiring::COUNT <= 0xFF, "a record has eight bits for its topic");
+const _: () = assert!(topics::COUNT <= 0xFF, "a record has eight bits for its topic");
 
 #[cfg(test)]
 mod tests {
@@ -260,15 +260,15 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    const EVENTS: [wiring::Id; 4] =
-        [wiring::Id::self_test, wiring::Id::command_guided, wiring::Id::button_event, wiring::Id::estimator_command];
+    const EVENTS: [topics::Id; 4] =
+        [topics::Id::self_test, topics::Id::command_guided, topics::Id::button_event, topics::Id::estimator_command];
 
     fn mode(armed: bool) -> impl AsRef<[u32]> {
         SystemMode { armed, ..Default::default() }.to_words()
     }
 
     fn arm<const WORDS: usize>(black_box: &mut BlackBox<WORDS>, at: Instant) {
-        black_box.note(wiring::Id::system_mode, at, 1, mode(true).as_ref());
+        black_box.note(topics::Id::system_mode, at, 1, mode(true).as_ref());
     }
 
     proptest! {
@@ -280,13 +280,13 @@ mod tests {
         ) {
             let mut black_box = BlackBox::<257>::new();
             arm(&mut black_box, start);
-            let mut all = std::vec![(wiring::Id::system_mode as usize, start, 1, mode(true).as_ref().to_vec())];
+            let mut all = std::vec![(topics::Id::system_mode as usize, start, 1, mode(true).as_ref().to_vec())];
             let mut at = start;
             for (pick, later, seed) in picks {
                 at += Duration::from_micros(later);
                 let topic = EVENTS[pick];
                 let words: Vec<u32> =
-                    (0..wiring::TOPICS[topic as usize].words as u32).map(|index| seed.wrapping_add(index)).collect();
+                    (0..topics::TOPICS[topic as usize].words as u32).map(|index| seed.wrapping_add(index)).collect();
                 black_box.note(topic, at, seed, &words);
                 all.push((topic as usize, at, seed & 0xFF_FFFF, words));
             }
@@ -303,16 +303,16 @@ mod tests {
     #[test]
     fn a_flight_begins_when_the_vehicle_is_armed_and_ends_a_moment_after() {
         let mut black_box = BlackBox::<256>::new();
-        let event = |black_box: &mut BlackBox<256>, at| black_box.note(wiring::Id::self_test, at, 0, &[0, 0]);
+        let event = |black_box: &mut BlackBox<256>, at| black_box.note(topics::Id::self_test, at, 0, &[0, 0]);
         let events = |black_box: &BlackBox<256>| {
-            let events = black_box.records().filter(|record| record.topic == wiring::Id::self_test as usize);
+            let events = black_box.records().filter(|record| record.topic == topics::Id::self_test as usize);
             events.map(|record| record.at.as_micros() / 1_000).collect::<Vec<_>>()
         };
         event(&mut black_box, Instant::from_millis(1));
         assert_eq!(black_box.records().count(), 0, "standing about");
         arm(&mut black_box, Instant::from_millis(10));
         event(&mut black_box, Instant::from_millis(11));
-        black_box.note(wiring::Id::system_mode, Instant::from_millis(100), 2, mode(false).as_ref());
+        black_box.note(topics::Id::system_mode, Instant::from_millis(100), 2, mode(false).as_ref());
         event(&mut black_box, Instant::from_millis(259));
         event(&mut black_box, Instant::from_millis(260));
         assert_eq!(events(&black_box), [11, 259]);
@@ -329,7 +329,7 @@ mod tests {
         for millis in 0..3_000u32 {
             let decided = SystemMode { armed: true, transitions: (millis / 1_500) * 2, ..Default::default() };
             black_box.note(
-                wiring::Id::system_mode,
+                topics::Id::system_mode,
                 Instant::from_millis(millis.into()),
                 millis,
                 decided.to_words().as_ref(),
@@ -340,7 +340,7 @@ mod tests {
         for millis in 3_000..4_000u32 {
             let decided = SystemMode { armed: true, transitions: millis, ..Default::default() };
             black_box.note(
-                wiring::Id::system_mode,
+                topics::Id::system_mode,
                 Instant::from_millis(millis.into()),
                 millis,
                 decided.to_words().as_ref(),

@@ -5,7 +5,7 @@ use super::command::{COMMANDS, Command};
 use crate::parameters::{self, PARAMETERS, Parameter};
 use crate::profile::{HEADING, Profile};
 use crate::tasks::Health;
-use crate::{VehicleConfig, wiring};
+use crate::{VehicleConfig, topics};
 use core::fmt::{self, Write};
 use stampfly_types::Instant;
 use stampfly_types::messages::{PilotInput, PowerData, StateEstimate, SystemAlert, SystemMode};
@@ -143,7 +143,7 @@ fn say(reply: &mut impl Write, what: &impl fmt::Display) -> Result<Request, fmt:
 
 /// A vehicle nobody knows to be disarmed counts as armed.
 fn if_disarmed(request: Request, context: &Context<'_>, reply: &mut impl Write) -> Result<Request, fmt::Error> {
-    match context.newest.get::<SystemMode>(wiring::Id::system_mode) {
+    match context.newest.get::<SystemMode>(topics::Id::system_mode) {
         Some((_, mode)) if !mode.armed => Ok(request),
         Some(_) => say(reply, &"the vehicle is armed"),
         None => say(reply, &"nobody knows yet whether the vehicle is armed"),
@@ -160,19 +160,19 @@ fn show(parameter: &Parameter, config: &VehicleConfig, reply: &mut impl Write) -
 }
 
 fn status(context: &Context<'_>, reply: &mut impl Write) -> Result<Request, fmt::Error> {
-    let mode = context.newest.get::<SystemMode>(wiring::Id::system_mode).map(|(_, mode)| mode).unwrap_or_default();
-    let alert = context.newest.get::<SystemAlert>(wiring::Id::system_alert).map(|(_, alert)| alert).unwrap_or_default();
+    let mode = context.newest.get::<SystemMode>(topics::Id::system_mode).map(|(_, mode)| mode).unwrap_or_default();
+    let alert = context.newest.get::<SystemAlert>(topics::Id::system_alert).map(|(_, alert)| alert).unwrap_or_default();
     write!(reply, "state    {}, {}\r\n", mode.state.name(), if mode.armed { "ARMED" } else { "disarmed" })?;
     write!(reply, "mode     {}\r\n", mode.mode.name())?;
     list(reply, "blocks", mode.blocks.names())?;
     list(reply, "alerts", alert.active.names())?;
-    if let Some((_, power)) = context.newest.get::<PowerData>(wiring::Id::sensor_power) {
+    if let Some((_, power)) = context.newest.get::<PowerData>(topics::Id::sensor_power) {
         write!(reply, "battery  {:.2} V, {:.2} A\r\n", power.voltage, power.current)?;
     }
-    if let Some((_, estimate)) = context.newest.get::<StateEstimate>(wiring::Id::estimate_state) {
+    if let Some((_, estimate)) = context.newest.get::<StateEstimate>(topics::Id::estimate_state) {
         write!(reply, "height   {:.2} m\r\n", estimate.height)?;
     }
-    match context.newest.get::<PilotInput>(wiring::Id::command_pilot) {
+    match context.newest.get::<PilotInput>(topics::Id::command_pilot) {
         Some((at, _)) => write!(reply, "pilot    heard {} ms ago\r\n", context.now.since(at).as_micros() / 1_000)?,
         None => reply.write_str("pilot    never heard\r\n")?,
     }
@@ -199,7 +199,7 @@ fn sensors(context: &Context<'_>, reply: &mut impl Write) -> Result<Request, fmt
 }
 
 fn topic(context: &Context<'_>, prefix: &str, name: &str, reply: &mut impl Write) -> Result<Request, fmt::Error> {
-    let found = wiring::TOPICS.iter().position(|info| info.name.strip_prefix(prefix) == Some(name));
+    let found = topics::TOPICS.iter().position(|info| info.name.strip_prefix(prefix) == Some(name));
     match found.map(|topic| context.newest.show(topic, context.now)) {
         Some(Some(shown)) => say(reply, &shown),
         Some(None) => say(reply, &"nothing yet"),

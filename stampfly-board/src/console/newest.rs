@@ -1,7 +1,7 @@
 //! The newest sample of every topic, as words, and how to read them without their types.
 
 use crate::black_box::LONGEST;
-use crate::wiring;
+use crate::topics;
 use core::fmt;
 use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Message};
 
@@ -14,25 +14,25 @@ use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Message};
 /// use stampfly_types::{Instant, Message, messages::TofData};
 /// let mut newest = Newest::new();
 /// let range = TofData { distance: 0.31, valid: true, ..Default::default() };
-/// newest.note(wiring::Id::sensor_tof, Instant::from_micros(1_000), &range.to_words());
-/// assert_eq!(newest.get(wiring::Id::sensor_tof), Some((Instant::from_micros(1_000), range)));
-/// let text = newest.show(wiring::Id::sensor_tof as usize, Instant::from_micros(3_000)).unwrap().to_string();
+/// newest.note(topics::Id::sensor_tof, Instant::from_micros(1_000), &range.to_words());
+/// assert_eq!(newest.get(topics::Id::sensor_tof), Some((Instant::from_micros(1_000), range)));
+/// let text = newest.show(topics::Id::sensor_tof as usize, Instant::from_micros(3_000)).unwrap().to_string();
 /// assert!(text.contains("distance 0.31 m") && text.contains("valid true"), "{text}");
 /// ```
 #[derive(Clone, Debug)]
 pub struct Newest {
-    samples: [Option<(Instant, [u32; LONGEST])>; wiring::COUNT],
+    samples: [Option<(Instant, [u32; LONGEST])>; topics::COUNT],
 }
 
 impl Newest {
     /// Nothing seen yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { samples: [None; wiring::COUNT] }
+        Self { samples: [None; topics::COUNT] }
     }
 
     /// Takes a sample.
-    pub fn note(&mut self, topic: wiring::Id, at: Instant, words: &[u32]) {
+    pub fn note(&mut self, topic: topics::Id, at: Instant, words: &[u32]) {
         let Some(place) = self.samples.get_mut(topic as usize) else { return };
         let mut copy = [0; LONGEST];
         for (to, from) in copy.iter_mut().zip(words) {
@@ -43,7 +43,7 @@ impl Newest {
 
     /// The newest sample of a topic of this message, and its instant; `None` before the first.
     #[must_use]
-    pub fn get<M: Message>(&self, topic: wiring::Id) -> Option<(Instant, M)> {
+    pub fn get<M: Message>(&self, topic: topics::Id) -> Option<(Instant, M)> {
         let (at, words) = self.samples.get(topic as usize)?.as_ref()?;
         let mut copy = M::ZERO;
         for (to, from) in copy.as_mut().iter_mut().zip(words) {
@@ -56,7 +56,7 @@ impl Newest {
     #[must_use]
     pub fn show(&self, topic: usize, now: Instant) -> Option<impl fmt::Display> {
         let (at, words) = self.samples.get(topic)?.as_ref()?;
-        let fields = wiring::TOPICS.get(topic)?.fields;
+        let fields = topics::TOPICS.get(topic)?.fields;
         Some(Shown { age: now.since(*at), fields, words })
     }
 }

@@ -18,7 +18,7 @@
 //! | hash | 8 | over everything published |
 
 use super::GoldenError;
-use crate::{plan, wiring};
+use crate::{schedule, topics};
 use heapless::Vec;
 use stampfly_log::FlightHash;
 use stampfly_types::Instant;
@@ -34,13 +34,13 @@ const DUTY: u8 = 0xf1;
 /// Words of the largest message.
 const MAX_WORDS: usize = {
     let (mut index, mut most) = (0, 0);
-    while index < wiring::COUNT {
-        if wiring::TOPICS[index].words > most {
-            most = wiring::TOPICS[index].words;
+    while index < topics::COUNT {
+        if topics::TOPICS[index].words > most {
+            most = topics::TOPICS[index].words;
         }
         index += 1;
     }
-    assert!(wiring::COUNT < TURN as usize, "a topic's place is one byte below those of the other entries");
+    assert!(topics::COUNT < TURN as usize, "a topic's place is one byte below those of the other entries");
     most
 };
 
@@ -48,8 +48,8 @@ const MAX_WORDS: usize = {
 #[must_use]
 pub fn tables() -> u64 {
     let mut hash = FlightHash::new();
-    let topics = wiring::TOPICS.iter().map(|topic| (topic.name, topic.words));
-    let activations = plan::ACTIVATIONS.iter().map(|activation| (activation.name, 0));
+    let topics = topics::TOPICS.iter().map(|topic| (topic.name, topic.words));
+    let activations = schedule::ACTIVATIONS.iter().map(|activation| (activation.name, 0));
     for (place, (name, size)) in topics.chain(activations).enumerate() {
         for letter in name.bytes() {
             hash.publish(place as u16, size as u32, Instant::ZERO, &[u32::from(letter)]);
@@ -138,7 +138,7 @@ impl Reader<'_> {
                 let topic = usize::from(topic);
                 let at = self.instant()?;
                 let mut words = Vec::new();
-                for _ in 0..wiring::TOPICS.get(topic)?.words {
+                for _ in 0..topics::TOPICS.get(topic)?.words {
                     words.push(u32::from_le_bytes(self.array()?)).ok()?;
                 }
                 Entry::Sample { topic, at, words }
@@ -231,10 +231,10 @@ mod tests {
 
     /// Entries as they can follow each other, at instants before and after the clock.
     fn entries() -> impl Strategy<Value = std::vec::Vec<Entry>> {
-        let sample = (0..wiring::COUNT, any::<u32>(), any::<u32>()).prop_map(|(topic, at, seed)| Entry::Sample {
+        let sample = (0..topics::COUNT, any::<u32>(), any::<u32>()).prop_map(|(topic, at, seed)| Entry::Sample {
             topic,
             at: Instant::from_micros(u64::from(at)),
-            words: (0..wiring::TOPICS[topic].words as u32).map(|word| seed.wrapping_mul(word + 1)).collect(),
+            words: (0..topics::TOPICS[topic].words as u32).map(|word| seed.wrapping_mul(word + 1)).collect(),
         });
         let turn = any::<u32>().prop_map(|at| Entry::Turn(Instant::from_micros(u64::from(at))));
         let duty = any::<[u16; MOTORS]>().prop_map(|duty| Entry::Duty(duty.map(f32::from)));

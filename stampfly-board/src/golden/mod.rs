@@ -17,11 +17,13 @@ mod format;
 
 pub use format::{MOTORS, Writer, tables};
 
-use crate::vehicle::{Assembled, assemble};
-use crate::{FlightLoop, Observer, VehicleConfig, plan, wiring};
+use crate::schedule::Runnables;
+use crate::{VehicleConfig, topics};
 use core::fmt;
 use format::Entry;
 use stampfly_bus::Band;
+use stampfly_bus::{PublishWords, Taps};
+use stampfly_flight::{Assembled, FlightLoop, Observer};
 use stampfly_log::FlightHash;
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
@@ -36,7 +38,7 @@ pub const FLIGHT: &[u8] = include_bytes!("../../golden/flight.bin");
 pub const TOLERANCE: f32 = 0.01;
 
 /// What [`play`] puts on the call stack: a bus and a vehicle, bytes.
-pub const STACK: usize = size_of::<wiring::Bus>() + size_of::<plan::Vehicle<'_>>() + size_of::<FlightLoop<'_>>();
+pub const STACK: usize = size_of::<topics::Bus>() + size_of::<FlightLoop<'_, Runnables>>();
 
 /// What a machine made of a golden flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +105,7 @@ pub trait Witness: Observer {
     fn band_ended(&mut self, _band: Band) {}
 
     /// Somebody has published.
-    fn published(&mut self, _topic: wiring::Id, _at: Instant, _generation: u32, _words: &[u32]) {}
+    fn published(&mut self, _topic: topics::Id, _at: Instant, _generation: u32, _words: &[u32]) {}
 }
 
 /// Nobody watches.
@@ -122,13 +124,12 @@ impl Witness for () {}
 /// When the record is none, is damaged, or belongs to another version.
 pub fn play(record: &[u8], witness: &mut impl Witness) -> Result<Report, GoldenError> {
     let (header, entries) = format::open(record)?;
-    let mut bus = wiring::Bus::new();
-    let wiring::Split { ports, mut taps, heads } = bus.split(None);
+    let mut bus = topics::Bus::new();
     // Not taken apart by value: a second copy of a vehicle is more than some stacks can spare.
-    let mut assembled = assemble(ports, heads, &VehicleConfig::default(), header.start);
-    let Assembled { flight_loop, outside } = &mut assembled;
+    let mut assembled = Assembled::<Runnables>::new(bus.split(None), &VehicleConfig::default(), header.start);
+    let Assembled { flight_loop, outside, taps } = &mut assembled;
     let mut hash = FlightHash::new();
-    let mut drain = |hash: &mut FlightHash, witness: &mut _| drain(&mut taps, hash, witness);
+    let mut drain = |hash: &mut FlightHash, witness: &mut _| drain(taps, hash, witness);
     let (mut clock, mut deviation) = (header.start, Deviation::default());
     for entry in entries {
         match entry? {
@@ -147,7 +148,11 @@ pub fn play(record: &[u8], witness: &mut impl Witness) -> Result<Report, GoldenE
                 drain(&mut hash, witness);
             }
             Entry::Duty(expected) => {
-                let told = outside.motors.latest().map_or(MotorOutput::default().duty, |output| output.data.duty);
+                let told = outside
+                    .motors
+                    .actuator_motor
+                    .latest()
+                    .map_or(MotorOutput::default().duty, |output| output.data.duty);
                 deviation.add(clock, &expected, &told);
             }
         }
@@ -161,10 +166,10 @@ pub fn play(record: &[u8], witness: &mut impl Witness) -> Result<Report, GoldenE
     Ok(Report { verdict, hash: hash.finish(), messages: hash.messages(), duration })
 }
 
-fn drain(taps: &mut wiring::Taps<'_>, hash: &mut FlightHash, witness: &mut impl Witness) {
+fn drain(taps: &mut topics::Taps<'_>, hash: &mut FlightHash, witness: &mut impl Witness) {
     taps.drain(&mut |topic, at, generation, words| {
         hash.publish(topic as u16, generation, at, words);
-        witness.published(topic, at, generation, words);
+        witness.published(topics::Id::ALL[topic], at, generation, words);
     });
 }
 

@@ -1,71 +1,45 @@
 //! Calibration: still samples in, biases and the first attitude out. Done once after power-on.
 
-use crate::wiring;
-use heapless::Vec;
-use stampfly_bus::{Activation, Runnable, Stamped};
+use crate::config::VehicleConfig;
+use crate::topics::CalibrationEnds;
+use stampfly_bus::{Activation, Runnable};
 use stampfly_eskf::calibration::StillCalibration;
-use stampfly_types::messages::*;
+use stampfly_types::messages::CalibrationResult;
 
 /// Calibration: still samples in, biases and the first attitude out.
-pub struct Calibration<'b> {
-    ports: CalibrationPorts<'b>,
+#[derive(Clone, Debug, Default)]
+pub struct Calibration {
     calibration: StillCalibration,
-    imu_samples: Vec<Stamped<ImuData>, 16>,
-    mag_samples: Vec<Stamped<MagData>, 8>,
-    baro_samples: Vec<Stamped<BaroData>, 8>,
     published: CalibrationResult,
 }
 
-/// The ends it owns.
-pub struct CalibrationPorts<'b> {
-    /// Inertial samples.
-    pub imu: wiring::sensor_imu::Rx<'b>,
-    /// Magnetic field.
-    pub mag: wiring::sensor_mag::Rx<'b>,
-    /// Air pressure.
-    pub baro: wiring::sensor_baro::Rx<'b>,
-    /// What was found.
-    pub result: wiring::calibration::Tx<'b>,
-}
-
-impl<'b> Calibration<'b> {
-    /// Nothing collected yet.
+impl Calibration {
+    /// A calibration that begins with the next sample.
     #[must_use]
-    pub fn new(ports: CalibrationPorts<'b>) -> Self {
-        Self {
-            ports,
-            calibration: StillCalibration::default(),
-            imu_samples: Vec::new(),
-            mag_samples: Vec::new(),
-            baro_samples: Vec::new(),
-            published: CalibrationResult::default(),
-        }
+    pub fn new(_: &VehicleConfig) -> Self {
+        Self::default()
     }
 }
 
-impl Runnable for Calibration<'_> {
-    fn read(&mut self, activation: &mut Activation) {
-        activation.drain(&mut self.ports.imu, &mut self.imu_samples);
-        activation.drain(&mut self.ports.mag, &mut self.mag_samples);
-        activation.drain(&mut self.ports.baro, &mut self.baro_samples);
-    }
+impl Runnable for Calibration {
+    type Ends<'b> = CalibrationEnds<'b>;
 
-    fn run(&mut self, activation: &mut Activation) {
-        for sample in &self.mag_samples {
+    fn run(&mut self, activation: &mut Activation, ends: &mut CalibrationEnds<'_>) {
+        for sample in ends.sensor_mag.iter() {
             self.calibration.add_mag(&sample.data);
         }
-        for sample in &self.baro_samples {
+        for sample in ends.sensor_baro.iter() {
             self.calibration.add_baro(&sample.data);
         }
-        for sample in &self.imu_samples {
-            // Motion shows in the result as progress that began again; what kind of motion it was is not published.
+        for sample in ends.sensor_imu.iter() {
+            // Motion shows in the result as progress that began again; the kind of motion is not published.
             let _ = self.calibration.step(sample.at, &sample.data);
         }
-        // A result that does not change any more is not news.
+        // Only a change is published.
         let result = self.calibration.result();
         if result != self.published {
             self.published = result;
-            self.ports.result.publish(activation.now(), &result);
+            ends.calibration.publish(activation.now(), &result);
         }
     }
 }

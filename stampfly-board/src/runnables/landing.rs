@@ -1,64 +1,35 @@
 //! Take-off and landing manager: the estimate in, contact with the ground out.
 
-use crate::wiring;
+use crate::config::VehicleConfig;
+use crate::topics::LandingEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::{LandingInput, TakeoffLanding};
-use stampfly_types::messages::*;
 
 /// Take-off and landing manager: the estimate in, contact with the ground out.
-pub struct LandingManager<'b> {
-    ports: LandingPorts<'b>,
+#[derive(Clone, Debug)]
+pub struct Landing {
     manager: TakeoffLanding,
-    estimate: StateEstimate,
-    mode: SystemMode,
-    setpoint: Setpoint,
-    demand: ControlOutput,
 }
 
-/// The ends it owns.
-pub struct LandingPorts<'b> {
-    /// The state.
-    pub estimate: wiring::estimate_state::Rx<'b>,
-    /// State and mode one step ago.
-    pub mode: wiring::system_mode::Rx<'b>,
-    /// The path one step ago.
-    pub setpoint: wiring::setpoint::Rx<'b>,
-    /// The demand one step ago.
-    pub demand: wiring::control_output::Rx<'b>,
-    /// What was found.
-    pub status: wiring::vehicle_status::Tx<'b>,
-}
-
-impl<'b> LandingManager<'b> {
-    /// A manager of a vehicle that stands.
+impl Landing {
+    /// Standing.
     #[must_use]
-    pub fn new(ports: LandingPorts<'b>) -> Self {
-        Self {
-            ports,
-            manager: TakeoffLanding::default(),
-            estimate: StateEstimate::default(),
-            mode: SystemMode::default(),
-            setpoint: Setpoint::default(),
-            demand: ControlOutput::default(),
-        }
+    pub fn new(_: &VehicleConfig) -> Self {
+        Self { manager: TakeoffLanding::default() }
     }
 }
 
-impl Runnable for LandingManager<'_> {
-    fn read(&mut self, activation: &mut Activation) {
-        activation.update(&mut self.ports.estimate, &mut self.estimate);
-        activation.update(&mut self.ports.mode, &mut self.mode);
-        activation.update(&mut self.ports.setpoint, &mut self.setpoint);
-        activation.update(&mut self.ports.demand, &mut self.demand);
-    }
+impl Runnable for Landing {
+    type Ends<'b> = LandingEnds<'b>;
 
-    fn run(&mut self, activation: &mut Activation) {
+    fn run(&mut self, activation: &mut Activation, ends: &mut LandingEnds<'_>) {
         let input = LandingInput {
-            estimate: &self.estimate,
-            state: self.mode.state,
-            setpoint: &self.setpoint,
-            demand: &self.demand,
+            estimate: ends.estimate_state.get(),
+            state: ends.system_mode.get().state,
+            setpoint: ends.setpoint.get(),
+            demand: ends.control_output.get(),
         };
-        self.ports.status.publish(activation.now(), &self.manager.step(activation.now(), &input));
+        let status = self.manager.step(activation.now(), &input);
+        ends.vehicle_status.publish(activation.now(), &status);
     }
 }

@@ -1,4 +1,4 @@
-//! The runnables: one a file, each reads its topics, steps one component and publishes.
+//! The runnables: one a file, each steps one component on its topics.
 
 mod actuation;
 mod button;
@@ -13,15 +13,15 @@ mod navigation;
 mod notification;
 mod telemetry;
 
-pub use actuation::{Actuation, ActuationPorts};
-pub use button::{ButtonPorts, ButtonReader};
-pub use calibration::{Calibration, CalibrationPorts};
-pub use command::{Command, CommandPorts};
-pub use control::{Control, ControlPorts};
-pub use estimation::{Estimation, EstimationPorts};
-pub use failsafe::{FailsafeMonitor, FailsafePorts};
-pub use landing::{LandingManager, LandingPorts};
-pub use mode::{ModeManager, ModePorts};
-pub use navigation::{Navigation, NavigationPorts};
-pub use notification::{Notification, NotificationPorts};
-pub use telemetry::{Telemetry, TelemetryPorts};
+pub use actuation::Actuation;
+pub use button::Button;
+pub use calibration::Calibration;
+pub use command::Command;
+pub use control::Control;
+pub use estimation::Estimation;
+pub use failsafe::Failsafe;
+pub use landing::Landing;
+pub use mode::Mode;
+pub use navigation::Navigation;
+pub use notification::Notification;
+pub use telemetry::Telemetry;

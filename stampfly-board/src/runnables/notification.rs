@@ -1,44 +1,30 @@
 //! Notification: state and alerts in, lights and sound out.
 
-use crate::wiring;
+use crate::config::VehicleConfig;
+use crate::topics::NotificationEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::Signaller;
-use stampfly_types::messages::*;
 
 /// Notification: state and alerts in, lights and sound out.
-pub struct Notification<'b> {
-    ports: NotificationPorts<'b>,
+#[derive(Clone, Debug, Default)]
+pub struct Notification {
     signaller: Signaller,
-    mode: SystemMode,
-    alerts: Alerts,
 }
 
-/// The ends it owns.
-pub struct NotificationPorts<'b> {
-    /// State and mode.
-    pub mode: wiring::system_mode::Rx<'b>,
-    /// The failsafe's findings.
-    pub alert: wiring::system_alert::Rx<'b>,
-    /// What to show.
-    pub signal: wiring::signal::Tx<'b>,
-}
-
-impl<'b> Notification<'b> {
-    /// Nothing shown yet.
+impl Notification {
+    /// Lights and sound of a vehicle that has just been switched on.
     #[must_use]
-    pub fn new(ports: NotificationPorts<'b>) -> Self {
-        Self { ports, signaller: Signaller::default(), mode: SystemMode::default(), alerts: Alerts::NONE }
+    pub fn new(_: &VehicleConfig) -> Self {
+        Self::default()
     }
 }
 
-impl Runnable for Notification<'_> {
-    fn read(&mut self, activation: &mut Activation) {
-        activation.update(&mut self.ports.mode, &mut self.mode);
-        self.alerts = activation.latest(&mut self.ports.alert).map(|s| s.data.active).unwrap_or_default();
-    }
+impl Runnable for Notification {
+    type Ends<'b> = NotificationEnds<'b>;
 
-    fn run(&mut self, activation: &mut Activation) {
-        let signal = self.signaller.step(activation.now(), &self.mode, self.alerts);
-        self.ports.signal.publish(activation.now(), &signal);
+    fn run(&mut self, activation: &mut Activation, ends: &mut NotificationEnds<'_>) {
+        let alerts = ends.system_alert.get().active;
+        let signal = self.signaller.step(activation.now(), ends.system_mode.get(), alerts);
+        ends.signal.publish(activation.now(), &signal);
     }
 }

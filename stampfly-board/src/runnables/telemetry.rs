@@ -1,63 +1,41 @@
 //! Telemetry: the newest of everything a ground station wants, at a rate a radio can carry.
 
+use crate::config::VehicleConfig;
 use crate::messages::TelemetryFrame;
-use crate::wiring;
+use crate::topics::TelemetryEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_types::frame::roll_pitch_yaw;
 
 /// Telemetry: the newest of everything a ground station wants, at a rate a radio can carry.
-pub struct Telemetry<'b> {
-    ports: TelemetryPorts<'b>,
+#[derive(Clone, Debug, Default)]
+pub struct Telemetry {
     frame: TelemetryFrame,
 }
 
-/// The ends it owns.
-pub struct TelemetryPorts<'b> {
-    /// State and mode.
-    pub mode: wiring::system_mode::Rx<'b>,
-    /// The failsafe's findings.
-    pub alert: wiring::system_alert::Rx<'b>,
-    /// The state.
-    pub estimate: wiring::estimate_state::Rx<'b>,
-    /// The path.
-    pub setpoint: wiring::setpoint::Rx<'b>,
-    /// Battery.
-    pub power: wiring::sensor_power::Rx<'b>,
-    /// The frame.
-    pub frame: wiring::telemetry::Tx<'b>,
-}
-
-impl<'b> Telemetry<'b> {
-    /// Nothing sent yet.
+impl Telemetry {
+    /// An empty frame.
     #[must_use]
-    pub fn new(ports: TelemetryPorts<'b>) -> Self {
-        Self { ports, frame: TelemetryFrame::default() }
+    pub fn new(_: &VehicleConfig) -> Self {
+        Self::default()
     }
 }
 
-impl Runnable for Telemetry<'_> {
-    fn read(&mut self, activation: &mut Activation) {
+impl Runnable for Telemetry {
+    type Ends<'b> = TelemetryEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut TelemetryEnds<'_>) {
         let frame = &mut self.frame;
-        if let Some(mode) = activation.latest(&mut self.ports.mode) {
-            (frame.state, frame.mode, frame.armed) = (mode.data.state, mode.data.mode, mode.data.armed);
-            frame.blocks = mode.data.blocks;
-        }
-        if let Some(alert) = activation.latest(&mut self.ports.alert) {
-            frame.alerts = alert.data.active;
-        }
-        if let Some(estimate) = activation.latest(&mut self.ports.estimate) {
+        let mode = ends.system_mode.get();
+        (frame.state, frame.mode, frame.armed, frame.blocks) = (mode.state, mode.mode, mode.armed, mode.blocks);
+        frame.alerts = ends.system_alert.get().active;
+        // The default of an estimate is an attitude: level. Nothing has been estimated before the first sample.
+        if let Some(estimate) = ends.estimate_state.sample() {
             (frame.position, frame.velocity) = (estimate.data.position, estimate.data.velocity);
             frame.attitude = roll_pitch_yaw(&estimate.data.attitude).into();
         }
-        if let Some(setpoint) = activation.latest(&mut self.ports.setpoint) {
-            (frame.remaining, frame.arrived) = (setpoint.data.remaining, setpoint.data.arrived);
-        }
-        if let Some(power) = activation.latest(&mut self.ports.power) {
-            frame.battery = power.data.voltage;
-        }
-    }
-
-    fn run(&mut self, activation: &mut Activation) {
-        self.ports.frame.publish(activation.now(), &self.frame);
+        let setpoint = ends.setpoint.get();
+        (frame.remaining, frame.arrived) = (setpoint.remaining, setpoint.arrived);
+        frame.battery = ends.sensor_power.get().voltage;
+        ends.telemetry.publish(activation.now(), frame);
     }
 }

@@ -5,7 +5,8 @@
 //! and only while the flight band has nothing to do: what is due waits at most for the longest of them, which is what
 //! the response times of the activation table count with.
 
-use crate::{FlightLoop, Observer, wiring};
+use crate::schedule::Runnables;
+use crate::topics;
 use core::convert::Infallible;
 use core::future::{Future, poll_fn};
 use core::pin::pin;
@@ -13,6 +14,7 @@ use core::task::Poll;
 use stampfly_bus::Band;
 use stampfly_drivers::time::sleep_until;
 use stampfly_drivers::{MotorOutputs, Timebase};
+use stampfly_flight::{FlightLoop, Observer};
 use stampfly_types::Duration;
 
 /// With nothing scheduled, which no vehicle has, the task looks again after this long.
@@ -31,8 +33,8 @@ const IDLE: Duration = Duration::from_millis(10);
 /// executor that wakes this one.
 pub async fn fly<M: MotorOutputs>(
     sensing: impl Future<Output = Infallible>,
-    flight_loop: &mut FlightLoop<'_>,
-    mut duties: wiring::actuator_motor::Rx<'_>,
+    flight_loop: &mut FlightLoop<'_, Runnables>,
+    mut duties: topics::ActuatorMotorRx<'_>,
     mut motors: M,
     clock: impl Timebase,
     observer: &mut impl Observer,

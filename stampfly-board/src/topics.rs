@@ -5,12 +5,10 @@
 //! `docs/topics.md` and `stampfly topics` are printed from this table.
 
 use crate::messages::{ButtonContact, TelemetryFrame};
-use stampfly_bus::topics;
 use stampfly_types::messages::*;
 
-topics! {
-    /// The StampFly's topics.
-    pub mod wiring;
+stampfly_bus::topics! {
+    outside imu, tof, tof_front, flow, mag, baro, cameras, power, self_test, link, button_pin, motors, indicator;
 
     // Sensing.
     /// Inertial sample, body FRD, specific force; every sample.
@@ -28,7 +26,7 @@ topics! {
     /// Where cameras see the vehicle.
     external_pose: ExternalPose = ring(8) @ 100 Hz from cameras => [estimation];
     /// Battery.
-    sensor_power: PowerData = ring(8) @ 14 Hz from power => [failsafe, actuation, telemetry];
+    sensor_power: PowerData = latest @ 14 Hz from power => [failsafe, actuation, telemetry];
 
     /// What the self test at power-on found.
     self_test: SelfTest = latest @ on event from self_test => [failsafe];

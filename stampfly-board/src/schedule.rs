@@ -1,25 +1,25 @@
-//! Who runs when: the vehicle's activations, one line each.
+//! What runs when: the vehicle's activations, one line each.
 //!
 //! The flight band runs in the order shown, as one task, so a silent inertial sensor still activates failsafe and
 //! control. Budgets are for the ESP32-S3 at 240 MHz: at least twice the most instructions that `cargo xtask qemu` counts
-//! on any emulated core, at one a cycle. From them follow [`plan::RESPONSE_TIMES`], while compiling.
+//! on any emulated core, at one a cycle. From them follow [`RESPONSE_TIMES`], while compiling.
 
+use crate::config::VehicleConfig;
 use crate::runnables::*;
-use crate::wiring;
-use stampfly_bus::schedule;
 
-schedule! {
-    /// The StampFly's activations.
-    pub mod plan on wiring;
+stampfly_bus::schedule! {
+    /// The StampFly's runnables: the state of the vehicle.
+    #[derive(Clone)]
+    pub struct Runnables on crate::topics from VehicleConfig;
 
     /// State estimation.
     estimation = Estimation: on sensor_imu, flight, 320 us;
     /// Anomaly detection.
-    failsafe = FailsafeMonitor: after estimation or at latest 5 ms, flight, 40 us;
+    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 40 us;
     /// Take-off and landing manager.
-    landing = LandingManager: after failsafe, flight, 20 us;
+    landing = Landing: after failsafe, flight, 20 us;
     /// State management: the only place where the vehicle changes state.
-    mode = ModeManager: after landing, flight, 60 us;
+    mode = Mode: after landing, flight, 60 us;
     /// Navigator: every set-point there is.
     navigation = Navigation: after mode, flight, 240 us;
     /// Control.
@@ -32,7 +32,7 @@ schedule! {
     /// Command arbitration.
     command = Command: every 20 ms, background, 30 us;
     /// Button gestures.
-    button = ButtonReader: every 20 ms, background, 10 us;
+    button = Button: every 20 ms, background, 10 us;
     /// Lights and sound.
     notification = Notification: every 33 ms, background, 20 us;
     /// Downlink.
