@@ -5,7 +5,7 @@
 #![no_std]
 #![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "simulation"))]
 extern crate std;
 
 pub mod black_box;
@@ -18,6 +18,8 @@ pub mod parameters;
 pub mod profile;
 pub mod runnables;
 pub mod schedule;
+#[cfg(feature = "simulation")]
+pub mod simulation;
 pub mod tasks;
 pub mod topics;
 

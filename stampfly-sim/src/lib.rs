@@ -4,6 +4,7 @@
 //! * [`plant`]: the vehicle as a body with motors, a battery, a floor and the air;
 //! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
 //! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
+//! * [`vehicle`]: a whole vehicle with its flight stack, on virtual time;
 //! * [`Simulation`]: all of it from one [`SimulationConfig`].
 //!
 //! Everything is a value: no global, no wall clock, no thread. A process can hold as many vehicles as memory allows,
@@ -18,6 +19,7 @@ pub mod plant;
 pub mod sensors;
 mod simulation;
 pub mod time;
+pub mod vehicle;
 mod vibration;
 mod world;
 

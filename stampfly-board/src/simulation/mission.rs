@@ -15,6 +15,9 @@
 
 use stampfly_sim::Noise;
 use std::fmt;
+use std::string::String;
+use std::vec::Vec;
+use std::{format, vec};
 
 /// One step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,9 +77,9 @@ impl fmt::Display for MissionError {
 impl std::error::Error for MissionError {}
 
 /// The mission `stampfly fly` flies when none is given.
-pub const REFERENCE: &str = include_str!("../missions/square.mission");
+pub const REFERENCE: &str = include_str!("../../missions/square.mission");
 /// Take-off, a minute of hovering, landing.
-pub const HOVER: &str = include_str!("../missions/hover.mission");
+pub const HOVER: &str = include_str!("../../missions/hover.mission");
 
 /// Random number stream of random missions; the vehicle's own are below a thousand.
 const STREAM: u64 = 1_000;
@@ -86,7 +89,7 @@ impl Mission {
     /// high, in any heading, at 0.3 to 1.2 m/s, with up to two seconds at each, and landing.
     ///
     /// ```
-    /// use stampfly_host::mission::{Mission, Step};
+    /// use stampfly_board::simulation::mission::{Mission, Step};
     /// let mission = Mission::random(1);
     /// assert!(mission.steps.len() >= 7 && mission.steps.last() == Some(&Step::Land));
     /// assert_ne!(mission, Mission::random(2));
@@ -111,11 +114,11 @@ impl Mission {
     /// Reads a mission.
     ///
     /// ```
-    /// use stampfly_host::mission::{Mission, Step};
+    /// use stampfly_board::simulation::mission::{Mission, Step};
     /// let mission: Mission = Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.5 yaw 90\nland\n")?;
     /// assert_eq!(mission.steps[1], Step::TakeOff { height: 0.5 });
     /// assert_eq!(Mission::parse("arm\ntakeoff high").unwrap_err().line, 2);
-    /// # Ok::<(), stampfly_host::mission::MissionError>(())
+    /// # Ok::<(), stampfly_board::simulation::mission::MissionError>(())
     /// ```
     ///
     /// # Errors

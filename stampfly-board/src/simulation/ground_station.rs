@@ -3,9 +3,9 @@
 //! It knows nothing but what the vehicle tells it, and sends a sign of life ten times a second so that the vehicle
 //! knows the link is there.
 
-use crate::mission::{Mission, Step};
-use stampfly_board::messages::TelemetryFrame;
-use stampfly_board::wiring;
+use super::mission::{Mission, Step};
+use crate::messages::TelemetryFrame;
+use crate::topics;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::{FlightState, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Vec3};
@@ -30,8 +30,8 @@ pub struct Progress {
 
 struct Link<'b> {
     clock: Clock,
-    commands: wiring::command_guided::Tx<'b>,
-    telemetry: wiring::telemetry::Rx<'b>,
+    commands: topics::CommandGuidedTx<'b>,
+    telemetry: topics::TelemetryRx<'b>,
     frame: TelemetryFrame,
     looks: u32,
 }
@@ -67,8 +67,8 @@ impl Link<'_> {
 pub async fn fly(
     clock: Clock,
     mission: &Mission,
-    commands: wiring::command_guided::Tx<'_>,
-    telemetry: wiring::telemetry::Rx<'_>,
+    commands: topics::CommandGuidedTx<'_>,
+    telemetry: topics::TelemetryRx<'_>,
     progress: &Progress,
 ) {
     let mut link = Link { clock, commands, telemetry, frame: TelemetryFrame::default(), looks: 0 };

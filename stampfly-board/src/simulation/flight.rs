@@ -1,0 +1,374 @@
+//! One flight of the StampFly: what is started around it, what is watched, and what came of it.
+
+use super::ground_station::{self, Progress};
+use super::metrics::{Collector, FIGURES, Metrics, Snapshot};
+use super::mission::{self, Mission};
+use super::sensing::{self, Healths, Sensing, SensorEnds, Shared};
+use crate::config::VehicleConfig;
+use crate::messages::ButtonContact;
+use crate::schedule::Runnables;
+use crate::topics::{self, Id};
+use stampfly_drivers::{Button, Indicator, MotorOutputs};
+use stampfly_sim::chips;
+use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
+use stampfly_sim::time::{Clock, Tasks};
+use stampfly_sim::vehicle::{self, Figure, FlightOptions, Verdict};
+use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
+use stampfly_types::messages::{FlightMode, FlightState, MotorOutput, Setpoint, StateEstimate, SystemMode};
+use stampfly_types::{Duration, Instant, Message, Quat, Vec3, frame};
+use std::string::String;
+use std::vec::Vec;
+use std::{format, vec};
+
+/// All that decides a flight.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The vehicle in its surroundings.
+    pub simulation: SimulationConfig,
+    /// The flight stack.
+    pub vehicle: VehicleConfig,
+    /// What to fly.
+    pub mission: Mission,
+    /// What the sensor tasks read.
+    pub sensing: Sensing,
+    /// Is the vehicle watched by a motion capture system?
+    pub cameras: bool,
+    /// How the executor flies it.
+    pub flight: FlightOptions,
+}
+
+impl Setup {
+    /// The reference mission with this seed.
+    #[must_use]
+    pub fn reference(seed: u64) -> Self {
+        let simulation = SimulationConfig { seed, ..SimulationConfig::default() };
+        Self {
+            vehicle: VehicleConfig::default(),
+            mission: Mission::parse(mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
+            sensing: Sensing::Models,
+            cameras: false,
+            flight: FlightOptions { start: simulation.start, limit: Duration::from_secs(180), jitter: None },
+            simulation,
+        }
+    }
+}
+
+/// A change of state or mode, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phase {
+    /// When it began.
+    pub since: Instant,
+    /// State.
+    pub state: FlightState,
+    /// Mode.
+    pub mode: FlightMode,
+}
+
+/// How a flight went.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The figures.
+    pub metrics: Metrics,
+    /// States and modes, in order.
+    pub phases: Vec<Phase>,
+    /// Was the mission flown to its end?
+    pub finished: bool,
+    /// Largest true tilt, degrees.
+    pub worst_tilt_deg: f64,
+    /// Battery voltage at the start and at the end, V.
+    pub battery: [f32; 2],
+    /// Was every duty a number from 0 to 1, and 0 while the vehicle was not armed?
+    pub motors_sane: bool,
+}
+
+impl Verdict for Outcome {
+    fn succeeded(&self) -> bool {
+        self.metrics.landed && self.metrics.disarmed && self.finished && self.motors_sane
+    }
+
+    fn facts(&self) -> Vec<(&'static str, bool)> {
+        vec![
+            ("landed", self.metrics.landed),
+            ("disarmed", self.metrics.disarmed),
+            ("finished", self.finished),
+            ("motors_sane", self.motors_sane),
+        ]
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        let figures = FIGURES.iter().map(|(name, unit, value)| Figure { name, unit, value: value(&self.metrics) });
+        figures.collect()
+    }
+
+    fn story(&self) -> Vec<String> {
+        let phases = self.phases.iter().map(|phase| {
+            let mode = if phase.state == FlightState::Flying { format!(" {:?}", phase.mode) } else { String::new() };
+            format!("{:>9.3} s  {}{mode}", phase.since.seconds_f64(), phase.state.name())
+        });
+        let [first, last] = self.battery;
+        let extremes = [
+            format!("largest tilt {:.3} deg", self.worst_tilt_deg),
+            format!("battery {first:.2} V at the start, {last:.2} V at the end"),
+        ];
+        phases.chain(extremes).collect()
+    }
+
+    fn sentence(&self) -> String {
+        let sentence = match (self.metrics.landed, self.metrics.disarmed) {
+            (true, true) => "landed and disarmed",
+            (true, false) => "landed, still armed",
+            (false, _) => "DID NOT LAND",
+        };
+        sentence.into()
+    }
+}
+
+/// After the mission the vehicle is watched for this long.
+const TAIL: Duration = Duration::from_secs(1);
+
+/// What is around the vehicle for one flight.
+pub struct Surroundings {
+    setup: Setup,
+    clock: Clock,
+    world: World,
+    sensors: Option<Sensors>,
+    shared: Shared,
+    board: Option<chips::Board>,
+    progress: Progress,
+    health: Healths,
+}
+
+impl Surroundings {
+    /// A world with a vehicle at the start.
+    #[must_use]
+    pub fn new(setup: &Setup) -> Self {
+        let Simulation { clock, world, sensors } = Simulation::new(&setup.simulation);
+        let board = chips::Board::new(&world, &clock, &setup.simulation, &sensing::IMAGE);
+        Self {
+            shared: Shared::new(&clock, &board.i2c),
+            setup: setup.clone(),
+            clock,
+            world,
+            sensors: Some(sensors),
+            board: Some(board),
+            progress: Progress::default(),
+            health: Healths::default(),
+        }
+    }
+}
+
+impl vehicle::Surroundings for Surroundings {
+    type Runnables = Runnables;
+    type Outcome = Outcome;
+    type Around<'a> = Around<'a>;
+
+    fn clock(&self) -> Clock {
+        self.clock.clone()
+    }
+
+    fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
+        let Self { setup, clock, world, sensors, shared, board, progress, health } = self;
+        let topics::Outside {
+            imu,
+            tof,
+            tof_front,
+            flow,
+            mag,
+            baro,
+            cameras,
+            power,
+            self_test: _,
+            link,
+            button_pin,
+            motors,
+            indicator,
+        } = outside;
+        let cameras = Some(cameras).filter(|_| setup.cameras);
+        let ends = SensorEnds { imu, tof, tof_front, flow, mag, baro, power, cameras };
+        let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
+        let actuators = match setup.sensing {
+            Sensing::Models => sensing::start_models(tasks, clock, sensors, ends, health),
+            Sensing::Chips => sensing::start_drivers(tasks, clock, board, shared, sensors, ends, health),
+        };
+        tasks.spawn(watch_button(clock.clone(), actuators.button, button_pin.button_contact));
+        let station = ground_station::fly(clock.clone(), &setup.mission, link.command_guided, link.telemetry, progress);
+        tasks.spawn(station);
+        Around {
+            world: world.clone(),
+            steps: setup.mission.steps.len(),
+            progress,
+            watch: Watch::new(&world.truth_at(setup.flight.start)),
+            duties: motors.actuator_motor,
+            motors: actuators.motors,
+            signals: indicator.signal,
+            indicator: actuators.indicator,
+            finished_at: None,
+        }
+    }
+}
+/// What is watched beside the bus: truth, and the newest of what it is compared with.
+struct Watch {
+    collector: Collector,
+    setpoint: Setpoint,
+    estimate: StateEstimate,
+    mode: SystemMode,
+    phases: Vec<Phase>,
+    worst_tilt: f32,
+    battery: Option<[f32; 2]>,
+    motors_sane: bool,
+    origin: Vec3,
+    turn: Quat,
+    truths: u32,
+    /// The instant of a set-point that has not been compared with the truth yet.
+    due: Option<Instant>,
+}
+
+impl Watch {
+    /// Watches a vehicle that stands like this at the start.
+    fn new(start: &Truth) -> Self {
+        Self {
+            collector: Collector::default(),
+            setpoint: Setpoint::default(),
+            estimate: StateEstimate::default(),
+            mode: SystemMode::default(),
+            phases: Vec::new(),
+            worst_tilt: 0.0,
+            battery: None,
+            motors_sane: true,
+            origin: start.position,
+            turn: frame::from_yaw(-frame::yaw(&start.attitude)),
+            truths: 0,
+            due: None,
+        }
+    }
+
+    /// Notes what a topic published. At the instant of a new set-point the truth is due.
+    fn note(&mut self, id: Id, at: Instant, words: &[u32]) {
+        fn read<M: Message>(words: &[u32], into: &mut M)
+        where
+            M::Words: for<'w> TryFrom<&'w [u32]>,
+        {
+            if let Ok(words) = M::Words::try_from(words)
+                && let Some(message) = M::from_words(&words)
+            {
+                *into = message;
+            }
+        }
+        match id {
+            Id::setpoint => {
+                read(words, &mut self.setpoint);
+                self.due = Some(at);
+            }
+            Id::estimate_state => read(words, &mut self.estimate),
+            Id::system_mode => {
+                read(words, &mut self.mode);
+                let (state, mode) = (self.mode.state, self.mode.mode);
+                if self.phases.last().is_none_or(|last| (last.state, last.mode) != (state, mode)) {
+                    self.phases.push(Phase { since: at, state, mode });
+                }
+            }
+            Id::actuator_motor => {
+                let mut output = MotorOutput::default();
+                read(words, &mut output);
+                let highest = if self.mode.armed { 1.0 } else { 0.0 };
+                self.motors_sane &= output.duty.iter().all(|duty| (0.0..=highest).contains(duty));
+            }
+            _ => {}
+        }
+    }
+
+    /// Compares with the truth at the instant of a set-point.
+    ///
+    /// Nothing on board knows north: the vehicle's world begins where it stood and ahead of it, so the truth is turned
+    /// and moved into that world first.
+    fn compare(&mut self, at: Instant, truth: &mut Truth, record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {
+        truth.position = self.turn * (truth.position - self.origin);
+        truth.velocity = self.turn * truth.velocity;
+        truth.wind = self.turn * truth.wind;
+        truth.attitude = self.turn * truth.attitude;
+        self.truths += 1;
+        record(0, at, self.truths, truth.to_words().as_ref());
+        self.worst_tilt = self.worst_tilt.max(frame::tilt(&truth.attitude));
+        let first = self.battery.map_or(truth.battery_voltage, |[first, _]| first);
+        self.battery = Some([first, truth.battery_voltage]);
+        let (setpoint, estimate, mode) = (self.setpoint, self.estimate, self.mode);
+        self.collector.add(&Snapshot { at, truth, setpoint: &setpoint, estimate: &estimate, mode: &mode });
+    }
+}
+
+/// The world during a flight, and what is watched of it.
+pub struct Around<'a> {
+    world: World,
+    /// Of the mission.
+    steps: usize,
+    progress: &'a Progress,
+    watch: Watch,
+    duties: topics::ActuatorMotorRx<'a>,
+    motors: MotorModel,
+    signals: topics::SignalRx<'a>,
+    indicator: IndicatorRecorder,
+    finished_at: Option<Instant>,
+}
+
+impl vehicle::Around for Around<'_> {
+    type Outcome = Outcome;
+
+    fn drive(&mut self, _: Instant) {
+        if self.duties.has_new()
+            && let Some(output) = self.duties.latest()
+        {
+            let Ok(()) = self.motors.write(&output.data);
+        }
+    }
+
+    fn show(&mut self, _: Instant) {
+        if let Some(signal) = self.signals.has_new().then(|| self.signals.latest()).flatten() {
+            self.indicator.show(&signal.data);
+        }
+    }
+
+    fn published(&mut self, topic: usize, at: Instant, words: &[u32]) {
+        if let Some(id) = Id::ALL.get(topic) {
+            self.watch.note(*id, at, words);
+        }
+    }
+
+    fn beside(&mut self, record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {
+        if let Some(at) = self.watch.due.take() {
+            self.watch.compare(at, &mut self.world.truth_at(at), record);
+        }
+    }
+
+    fn progress(&self) -> (f32, &'static str) {
+        let share = self.progress.done.get() as f32 / self.steps.max(1) as f32;
+        (share, self.watch.mode.state.name())
+    }
+
+    fn is_over(&mut self, now: Instant) -> bool {
+        if !self.progress.finished.get() {
+            return false;
+        }
+        let since = *self.finished_at.get_or_insert(now);
+        now.since(since) >= TAIL
+    }
+
+    fn finish(self) -> Outcome {
+        let watch = self.watch;
+        Outcome {
+            metrics: watch.collector.finish(),
+            phases: watch.phases,
+            finished: self.progress.finished.get(),
+            worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
+            battery: watch.battery.unwrap_or_default(),
+            motors_sane: watch.motors_sane,
+        }
+    }
+}
+
+/// Looks at the button fifty times a second.
+async fn watch_button(clock: Clock, mut button: impl Button, mut publisher: topics::ButtonContactTx<'_>) {
+    loop {
+        publisher.publish(clock.now(), &ButtonContact { pressed: button.is_pressed() });
+        clock.sleep_until(clock.now() + Duration::from_millis(20)).await;
+    }
+}

@@ -1,0 +1,132 @@
+//! The StampFly in simulation: its world, its drivers, who asks it for something, and how well it did.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`sensing`] | what feeds the bus: models of the sensors, or the drivers over emulated chips |
+//! | [`mission`], [`ground_station`] | what to fly, and the program that asks the vehicle for it |
+//! | [`metrics`] | how good a flight was |
+//! | [`flight`] | one flight: what is started, what is watched, what came of it |
+//!
+//! For programs on a PC (feature `simulation`); nothing of it is in the firmware.
+
+pub mod flight;
+pub mod ground_station;
+pub mod metrics;
+pub mod mission;
+pub mod sensing;
+
+pub use flight::{Outcome, Phase, Setup};
+
+use crate::config::VehicleConfig;
+use crate::parameters;
+use crate::schedule::Runnables;
+use mission::Mission;
+use sensing::Sensing;
+use stampfly_log::ulog::{ParameterValue, Topic};
+use stampfly_sim::Truth;
+use stampfly_sim::vehicle::{FlightOptions, Options, Setting, SetupError, Vehicle};
+use stampfly_types::Message;
+use std::fmt::Display;
+use std::format;
+use std::vec::Vec;
+
+/// The StampFly, for programs that fly vehicles.
+#[derive(Clone, Copy, Debug)]
+pub struct StampFly;
+
+impl Vehicle for StampFly {
+    const NAME: &'static str = "stampfly";
+    const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
+    type Runnables = Runnables;
+    type Setup = Setup;
+    type Surroundings = flight::Surroundings;
+    type Outcome = Outcome;
+
+    fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
+        let mut setup = Setup::reference(seed);
+        setup.mission = match options.mission.as_deref().unwrap_or("square") {
+            "square" => Mission::parse(mission::REFERENCE),
+            "hover" => Mission::parse(mission::HOVER),
+            "random" => Ok(Mission::random(seed)),
+            path => {
+                let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
+                Mission::parse(&text)
+            }
+        }
+        .map_err(|error| format!("mission {}: {error}", options.mission.as_deref().unwrap_or_default()))?;
+        if let Some(vibration) = options.vibration {
+            setup.simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
+        }
+        if let Some(gust) = options.gust {
+            setup.simulation.wind.gust = within("--gust", gust, 0.0, 20.0)?;
+        }
+        if let Some([north, east]) = options.wind {
+            within("--wind north", north, -20.0, 20.0)?;
+            within("--wind east", east, -20.0, 20.0)?;
+            setup.simulation.wind.mean = [north, east, 0.0].into();
+        }
+        for text in &options.plant {
+            let (name, value) = assignment(text)?;
+            setup.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+        }
+        for text in &options.param {
+            let (name, value) = assignment(text)?;
+            parameters::set(&mut setup.vehicle, name, value as f32)
+                .map_err(|error| format!("--param {text}: {error}"))?;
+        }
+        setup.sensing = if options.chips { Sensing::Chips } else { Sensing::Models };
+        setup.cameras = options.cameras;
+        setup.flight.jitter = options.jitter;
+        Ok(setup)
+    }
+
+    fn options(setup: &Setup) -> FlightOptions {
+        setup.flight
+    }
+
+    fn config(setup: &Setup) -> &VehicleConfig {
+        &setup.vehicle
+    }
+
+    fn surroundings(setup: &Setup) -> flight::Surroundings {
+        flight::Surroundings::new(setup)
+    }
+
+    fn default_config() -> VehicleConfig {
+        VehicleConfig::default()
+    }
+
+    fn parameters(config: &VehicleConfig) -> Vec<Setting> {
+        let settings = parameters::PARAMETERS.iter().map(|parameter| Setting {
+            name: parameter.name,
+            value: f64::from(parameter.get(config)),
+            unit: parameter.unit,
+            meaning: parameter.meaning,
+        });
+        settings.collect()
+    }
+
+    fn set_parameter(config: &mut VehicleConfig, name: &str, value: ParameterValue) -> Result<(), SetupError> {
+        let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
+        parameters::set(config, name, value).map_err(|error| format!("{name}: {error}"))
+    }
+
+    fn plant(setup: &Setup) -> Vec<Setting> {
+        let rows = setup.simulation.plant.iter();
+        let settings =
+            rows.map(|row| Setting { name: row.name, value: row.value, unit: row.unit, meaning: row.description });
+        settings.collect()
+    }
+}
+
+/// The value, if it is a number in its range.
+fn within<T: PartialOrd + Display>(name: &str, value: T, low: T, high: T) -> Result<T, SetupError> {
+    if low <= value && value <= high { Ok(value) } else { Err(format!("{name} {value} is not from {low} to {high}")) }
+}
+
+/// Splits `name=value`.
+fn assignment(text: &str) -> Result<(&str, f64), SetupError> {
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
+    let value = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
+    Ok((name.trim(), value))
+}

@@ -1,0 +1,190 @@
+//! A whole vehicle in simulation: its flight stack, and what is around it.
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
+//! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
+//! | [`fly`] | one flight on virtual time |
+//! | [`Witness`] | is told everything that happens: a log, a hash, a test |
+//!
+//! A program that flies vehicles (missions, campaigns, replay, report) knows them through [`Vehicle`] alone, so a new
+//! vehicle is a type that implements it.
+
+mod executor;
+mod jitter;
+mod witness;
+
+pub use executor::{Ended, FlightOptions, fly};
+pub use witness::Witness;
+
+use crate::time::{Clock, Tasks};
+use stampfly_bus::{Schedule, TopicTable};
+use stampfly_log::ulog::{ParameterValue, Topic};
+use stampfly_types::Instant;
+
+/// The ends of everybody outside a vehicle's runnables.
+pub type Outside<'b, R> = <<R as Schedule>::Topics as TopicTable>::Outside<'b>;
+
+/// What is around a vehicle: everything that lives for one flight and that tasks may borrow.
+pub trait Surroundings {
+    /// The vehicle's runnables.
+    type Runnables: Schedule;
+    /// How a flight went.
+    type Outcome;
+    /// What the executor calls while it flies.
+    type Around<'a>: Around<Outcome = Self::Outcome>
+    where
+        Self: 'a;
+
+    /// The clock that everything here shares.
+    fn clock(&self) -> Clock;
+
+    /// Starts the tasks of drivers, links and pilots, and hands each the ends it owns.
+    fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: Outside<'a, Self::Runnables>) -> Self::Around<'a>;
+}
+
+/// What is around a vehicle, as the executor sees it during a flight.
+pub trait Around {
+    /// How the flight went.
+    type Outcome;
+
+    /// The flight band has run: hands its outputs to the actuators.
+    fn drive(&mut self, now: Instant);
+
+    /// A turn of the executor has ended: hands slower outputs on (lights, sound). Nothing by default.
+    fn show(&mut self, _now: Instant) {}
+
+    /// A sample was published, by whomever.
+    fn published(&mut self, _topic: usize, _at: Instant, _words: &[u32]) {}
+
+    /// Everything published so far has been passed on. Hands samples that belong into the log but are on no topic (the
+    /// truth) to `record`: place in [`Vehicle::BESIDE`], instant, generation, words.
+    fn beside(&mut self, _record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {}
+
+    /// What is going on, for a progress bar: the share that is done, and a word.
+    fn progress(&self) -> (f32, &'static str);
+
+    /// Is there nothing more to fly?
+    fn is_over(&mut self, now: Instant) -> bool;
+
+    /// How the flight went.
+    fn finish(self) -> Self::Outcome;
+}
+
+/// One figure of a flight: name, unit, value; `None` where the flight had no such phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figure {
+    /// Name with its unit, as scripts use it: `pos_rms_m`.
+    pub name: &'static str,
+    /// Unit, for people.
+    pub unit: &'static str,
+    /// The value.
+    pub value: Option<f64>,
+}
+
+/// How a flight of a vehicle went, as programs report it.
+pub trait Verdict {
+    /// Did the vehicle do what it was to do, without ever doing what it must not?
+    fn succeeded(&self) -> bool;
+
+    /// Yes-or-no results by name, for scripts: `landed`, `disarmed`.
+    fn facts(&self) -> Vec<(&'static str, bool)>;
+
+    /// The figures, the same names in the same order for every flight of the vehicle.
+    fn figures(&self) -> Vec<Figure>;
+
+    /// What else people want to read after a flight, one line each: phases, extremes.
+    fn story(&self) -> Vec<String>;
+
+    /// One sentence.
+    fn sentence(&self) -> String;
+}
+
+/// Why a flight cannot be set up: a sentence for whoever typed the options.
+pub type SetupError = String;
+
+/// Options of a flight as they are typed. A vehicle refuses what it has no use for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// A mission: a built-in name or a file.
+    pub mission: Option<String>,
+    /// `NAME=VALUE` of the simulated vehicle or its surroundings.
+    pub plant: Vec<String>,
+    /// `NAME=VALUE` of the flight stack's parameters.
+    pub param: Vec<String>,
+    /// Strength of vibration; 1 is what was recorded.
+    pub vibration: Option<f64>,
+    /// Standard deviation of gusts, m/s.
+    pub gust: Option<f32>,
+    /// Mean wind towards north and east, m/s.
+    pub wind: Option<[f32; 2]>,
+    /// Run the real drivers over emulated chips.
+    pub chips: bool,
+    /// Let a motion capture system watch.
+    pub cameras: bool,
+    /// Seed of the executor's delays.
+    pub jitter: Option<u64>,
+}
+
+/// One number that options can change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// Name, as `--plant` or `--param` takes it.
+    pub name: &'static str,
+    /// Value now.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+}
+
+/// A vehicle that programs can fly.
+pub trait Vehicle: 'static {
+    /// Its name on the command line, and as `sys_name` in its logs.
+    const NAME: &'static str;
+    /// Topics that its surroundings add to the log.
+    const BESIDE: &'static [Topic];
+    /// Its runnables.
+    type Runnables: Schedule;
+    /// All that decides a flight.
+    type Setup: Clone + Send + Sync;
+    /// What is around it.
+    type Surroundings: Surroundings<Runnables = Self::Runnables, Outcome = Self::Outcome>;
+    /// How a flight went.
+    type Outcome: Verdict + Send;
+
+    /// The flight that options and a seed describe.
+    ///
+    /// # Errors
+    /// When an option is wrong, or of no use to this vehicle.
+    fn setup(options: &Options, seed: u64) -> Result<Self::Setup, SetupError>;
+
+    /// How the executor flies it.
+    fn options(setup: &Self::Setup) -> FlightOptions;
+
+    /// The configuration of its flight stack.
+    fn config(setup: &Self::Setup) -> &<Self::Runnables as Schedule>::Config;
+
+    /// A world for one flight.
+    fn surroundings(setup: &Self::Setup) -> Self::Surroundings;
+
+    /// The flight stack's configuration when nothing is changed.
+    fn default_config() -> <Self::Runnables as Schedule>::Config;
+
+    /// Every parameter of a configuration.
+    fn parameters(config: &<Self::Runnables as Schedule>::Config) -> Vec<Setting>;
+
+    /// Changes a parameter, as a log or an option says.
+    ///
+    /// # Errors
+    /// When there is no such parameter, or the value is out of range.
+    fn set_parameter(
+        config: &mut <Self::Runnables as Schedule>::Config,
+        name: &str,
+        value: ParameterValue,
+    ) -> Result<(), SetupError>;
+
+    /// Every number of the simulated vehicle and its surroundings that options can change.
+    fn plant(setup: &Self::Setup) -> Vec<Setting>;
+}
