@@ -1,0 +1,302 @@
+//! The command line.
+
+use crate::Failure;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use stampfly_board::{VehicleConfig, parameters};
+use stampfly_lab::dataset::Kind;
+use stampfly_lab::estimate::{ATTITUDE, suite};
+use stampfly_host::mission::Mission;
+use stampfly_host::sensing::Sensing;
+use stampfly_host::simulate::FlightConfig;
+use std::fmt::Display;
+use std::path::PathBuf;
+
+/// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
+#[derive(Debug, Parser)]
+#[command(
+    name = "stampfly",
+    version,
+    after_help = "Exit code: 0 when all went well, 1 when a flight or a comparison did not, 2 when the command line was wrong."
+)]
+pub struct Arguments {
+    /// What to do; without it, a mission is flown.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What the program can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Fly a mission in simulation and write its log and report.
+    Fly(FlyOptions),
+    /// Fly a log again, bit for bit, from what came from outside.
+    Replay(ReplayOptions),
+    /// List the topics: type, policy, rate, publisher, readers.
+    Topics(TopicsOptions),
+    /// List the runnables: what activates them, budget, response time.
+    Schedule(TopicsOptions),
+    /// Fly many missions with different seeds and summarise them.
+    Campaign(CampaignOptions),
+    /// Run the estimator over recorded sensor data and say how good it is.
+    Estimate(EstimateOptions),
+    /// Play the golden flight: does this machine compute what it should?
+    Golden(GoldenOptions),
+}
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Fly(FlyOptions::default())
+    }
+}
+
+/// What decides a simulated flight.
+#[derive(Clone, Debug, Args)]
+pub struct SceneOptions {
+    /// Mission to fly: a file, one of the built-in `square` and `hover`, or `random`, drawn from the seed.
+    #[arg(long, value_name = "FILE", default_value = "square")]
+    pub mission: String,
+    /// Change a number of the simulated vehicle or its surroundings (see `--list`).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub plant: Vec<String>,
+    /// Change a parameter of the flight stack (see `--list`).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub param: Vec<String>,
+    /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
+    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    pub vibration: f64,
+    /// Standard deviation of gusts, m/s.
+    #[arg(long, value_name = "M/S")]
+    pub gust: Option<f32>,
+    /// Mean wind towards north and east, m/s.
+    #[arg(long, value_name = "N,E", value_parser = north_and_east, allow_hyphen_values = true)]
+    pub wind: Option<[f32; 2]>,
+    /// Run the real drivers over emulated chips instead of sensor models.
+    #[arg(long)]
+    pub chips: bool,
+    /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
+    #[arg(long)]
+    pub cameras: bool,
+    /// Delay and interrupt the executor, by this seed.
+    #[arg(long, value_name = "SEED")]
+    pub jitter: Option<u64>,
+    /// Show what `--plant` and `--param` can change, and their values.
+    #[arg(long)]
+    pub list: bool,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self {
+            mission: "square".into(),
+            plant: Vec::new(),
+            param: Vec::new(),
+            vibration: 1.0,
+            gust: None,
+            wind: None,
+            chips: false,
+            cameras: false,
+            jitter: None,
+            list: false,
+            json: false,
+        }
+    }
+}
+
+/// Options of `fly`.
+#[derive(Clone, Debug, Args)]
+pub struct FlyOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for `flight.ulg` and `flight.html`.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+}
+
+impl Default for FlyOptions {
+    fn default() -> Self {
+        Self { scene: SceneOptions::default(), seed: 1, out: ".".into() }
+    }
+}
+
+/// Options of `golden`.
+#[derive(Clone, Debug, Args)]
+pub struct GoldenOptions {
+    /// Fly and record it again, into this file.
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `campaign`.
+#[derive(Clone, Debug, Args)]
+pub struct CampaignOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// Compare the estimator's errors and innovations with its covariance (NEES, NIS), and judge by that. Meant for
+    /// `--mission random --flights 500`.
+    #[arg(long)]
+    pub consistency: bool,
+    /// How many flights.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub flights: u64,
+    /// Seed of the first flight; the others count up from there.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Options of `replay`.
+#[derive(Clone, Debug, Args)]
+pub struct ReplayOptions {
+    /// The log.
+    pub file: PathBuf,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `topics`.
+#[derive(Clone, Debug, Args)]
+pub struct TopicsOptions {
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// Print Markdown, as in `docs/topics.md`.
+    #[arg(long, conflicts_with = "json")]
+    pub markdown: bool,
+}
+
+/// The estimators of the family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EstimatorChoice {
+    /// Error-state Kalman filter.
+    Eskf,
+    /// Complementary filter.
+    Complementary,
+    /// Attitude filter: neither position nor velocity.
+    Attitude,
+}
+
+/// Options of `estimate`.
+#[derive(Clone, Debug, Args)]
+pub struct EstimateOptions {
+    /// StampFly logs and captures (CSV), NanoBench and BROAD (NPZ), PX4 replays (CSV).
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Which estimator. Without this: the attitude filter where nothing measures a position (BROAD), elsewhere the
+    /// error-state Kalman filter.
+    #[arg(long, value_enum)]
+    pub estimator: Option<EstimatorChoice>,
+    /// Change a parameter of the flight stack (`stampfly fly --list` shows them).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub param: Vec<String>,
+    /// Folder for a report per recording, `estimate_NAME.html`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl EstimateOptions {
+    /// The tuning for one kind of recording, with what the options change.
+    pub fn config(&self, kind: Kind) -> Result<VehicleConfig, Failure> {
+        let mut config = suite(kind);
+        match self.estimator {
+            Some(EstimatorChoice::Eskf) => config.estimator = 0.0,
+            Some(EstimatorChoice::Complementary) => config.estimator = 1.0,
+            Some(EstimatorChoice::Attitude) => config.estimator = ATTITUDE,
+            None => {}
+        }
+        set_parameters(&mut config, &self.param)?;
+        Ok(config)
+    }
+}
+
+/// Applies `--param`.
+fn set_parameters(config: &mut VehicleConfig, texts: &[String]) -> Result<(), Failure> {
+    for text in texts {
+        let (name, value) = assignment(text)?;
+        parameters::set(config, name, value as f32).map_err(|error| format!("--param {text}: {error}"))?;
+    }
+    Ok(())
+}
+
+/// The value, if it is a number in its range.
+fn within<T: PartialOrd + Display>(name: &str, value: T, low: T, high: T) -> Result<T, Failure> {
+    if low <= value && value <= high {
+        Ok(value)
+    } else {
+        Err(format!("{name} {value} is not from {low} to {high}").into())
+    }
+}
+
+/// Reads `N,E`.
+fn north_and_east(text: &str) -> Result<[f32; 2], String> {
+    let parse = |part: &str| part.trim().parse().map_err(|_| format!("'{part}' is no number"));
+    let (north, east) = text.split_once(',').ok_or("a wind has a part towards north and one towards east")?;
+    Ok([parse(north)?, parse(east)?])
+}
+
+/// Splits `name=value`.
+fn assignment(text: &str) -> Result<(&str, f64), Failure> {
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
+    let value = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
+    Ok((name.trim(), value))
+}
+
+impl SceneOptions {
+    /// The flight these options describe.
+    pub fn config(&self, seed: u64) -> Result<FlightConfig, Failure> {
+        let mut config = FlightConfig::reference(seed);
+        config.mission = match self.mission.as_str() {
+            "square" => Mission::parse(stampfly_host::mission::REFERENCE)?,
+            "hover" => Mission::parse(stampfly_host::mission::HOVER)?,
+            "random" => Mission::random(seed),
+            path => {
+                let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
+                Mission::parse(&text).map_err(|error| format!("mission {path}: {error}"))?
+            }
+        };
+        config.simulation.vibration = within("--vibration", self.vibration, 0.0, 20.0)?;
+        if let Some(gust) = self.gust {
+            config.simulation.wind.gust = within("--gust", gust, 0.0, 20.0)?;
+        }
+        if let Some([north, east]) = self.wind {
+            within("--wind north", north, -20.0, 20.0)?;
+            within("--wind east", east, -20.0, 20.0)?;
+            config.simulation.wind.mean = [north, east, 0.0].into();
+        }
+        for text in &self.plant {
+            let (name, value) = assignment(text)?;
+            config.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+        }
+        set_parameters(&mut config.vehicle, &self.param)?;
+        config.sensing = if self.chips { Sensing::Chips } else { Sensing::Models };
+        config.cameras = self.cameras;
+        config.jitter = self.jitter;
+        Ok(config)
+    }
+
+    /// Prints what can be changed.
+    pub fn print_list(&self, seed: u64) -> Result<(), Failure> {
+        let config = self.config(seed)?;
+        outln!("--param");
+        for parameter in parameters::PARAMETERS {
+            let value = parameter.get(&config.vehicle);
+            outln!("  {:<30} {value:>12} {:<18} {}", parameter.name, parameter.unit, parameter.meaning);
+        }
+        outln!("\n--plant");
+        for row in config.simulation.plant.iter() {
+            outln!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.description);
+        }
+        Ok(())
+    }
+}

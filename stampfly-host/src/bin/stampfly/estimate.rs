@@ -1,0 +1,132 @@
+//! `stampfly estimate`: the estimator over recorded data. Exit code 1 when a file could not be used.
+
+use crate::Failure;
+use crate::arguments::EstimateOptions;
+use crate::terminal;
+use serde::Serialize;
+use stampfly_lab::dataset::{self, Kind};
+use stampfly_lab::estimate::{self, Estimated, Figures};
+use stampfly_host::report::Metric;
+use stampfly_host::{Recording, Report};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What is printed for one file.
+#[derive(Serialize)]
+struct Row {
+    file: String,
+    #[serde(flatten)]
+    figures: Figures,
+}
+
+pub fn run(options: &EstimateOptions) -> Result<ExitCode, Failure> {
+    // A wrong option is wrong for every file: say so once, before any work.
+    options.config(Kind::StampFlyLog)?;
+    if let Some(folder) = &options.out {
+        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    }
+    let bar = terminal::bar(options.files.len() as u64, "{wide_bar:.cyan} {pos}/{len} recordings");
+    let mut rows = Vec::new();
+    let mut failed = false;
+    for file in &options.files {
+        match one(file, options) {
+            Ok(figures) => rows.push(Row { file: file.display().to_string(), figures }),
+            Err(failure) => {
+                failed = true;
+                bar.suspend(|| eprintln!("stampfly: {failure}"));
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if options.json {
+        println!("{}", serde_json::json!({ "files": rows }));
+    } else {
+        print_table(&rows);
+    }
+    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {
+    let recording = dataset::load(file)?;
+    let estimated = estimate::run(&recording, &options.config(recording.kind)?);
+    if let Some(folder) = &options.out {
+        let page = folder.join(format!("estimate_{}.html", recording.name));
+        let flight = estimated.to_flight(&recording);
+        let report = Report {
+            title: recording.name.clone(),
+            subtitle: format!("estimate over a recording: {}", recording.kind),
+            metrics: metrics(&recording, &estimated),
+            flight: &flight,
+        };
+        report.write(&page).map_err(|error| format!("{}: {error}", page.display()))?;
+    }
+    Ok(estimated.figures)
+}
+
+/// A figure, if there is one.
+type Value = fn(&Figures) -> Option<f64>;
+
+/// Name, unit, decimals and value of every figure that may be missing.
+const COLUMNS: [(&str, &str, usize, Value); 9] = [
+    ("end", "m", 4, |f| f.end_xy_m),
+    ("max", "m", 3, |f| f.max_xy_m),
+    ("flow end", "m", 3, |f| f.flow_dead_reckoning_end_xy_m),
+    ("flow max", "m", 3, |f| f.flow_dead_reckoning_max_xy_m),
+    ("position", "m", 3, |f| f.position_rmse_m),
+    ("tilt", "deg", 2, |f| f.tilt_rmse_deg),
+    ("aligned", "deg", 2, |f| f.tilt_rmse_aligned_deg),
+    ("heading", "deg", 2, |f| f.heading_rmse_deg),
+    ("total", "deg", 2, |f| f.total_rmse_deg),
+];
+
+fn print_table(rows: &[Row]) {
+    if rows.is_empty() {
+        return;
+    }
+    let name = |row: &Row| Path::new(&row.file).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let width = rows.iter().map(|row| name(row).len()).max().unwrap_or(0).max(4);
+    print!("{:<width$} {:<15} {:>7}", "file", "kind", "s");
+    COLUMNS.iter().for_each(|(column, ..)| print!(" {column:>9}"));
+    println!(" {:>9}  rejected", "updates/s");
+    for row in rows {
+        let figures = &row.figures;
+        print!("{:<width$} {:<15} {:>7.1}", name(row), figures.kind, figures.duration_s);
+        for (_, _, decimals, value) in COLUMNS {
+            match value(figures) {
+                Some(value) => print!(" {value:>9.decimals$}"),
+                None => print!(" {:>9}", "–"),
+            }
+        }
+        print!(" {:>8.2}M ", figures.updates_per_s / 1e6);
+        for (sensor, share) in &figures.rejected {
+            print!(" {sensor} {:.1} %", share * 100.0);
+        }
+        if figures.truth_gaps > 0 {
+            print!("  {} gaps in the reference", figures.truth_gaps);
+        }
+        println!("{}", if figures.diverged { "  DIVERGED" } else { "" });
+    }
+    println!(
+        "\nend, max: horizontal distance from the start; flow: the same by flow alone; RMS errors against the reference"
+    );
+}
+
+/// The summary of the page.
+fn metrics(recording: &Recording, estimated: &Estimated) -> Vec<Metric> {
+    let figures = &estimated.figures;
+    let mut metrics = vec![
+        Metric::new("Recording", recording.kind, ""),
+        Metric::new("Duration", format!("{:.1}", figures.duration_s), "s"),
+        Metric::new("Diverged", if figures.diverged { "yes" } else { "no" }, "").judged(!figures.diverged),
+    ];
+    for (name, unit, decimals, value) in COLUMNS {
+        if let Some(value) = value(figures) {
+            metrics.push(Metric::new(name, format!("{value:.decimals$}"), unit));
+        }
+    }
+    for (sensor, share) in &figures.rejected {
+        metrics.push(Metric::new(format!("Rejected, {sensor}"), format!("{:.1}", share * 100.0), "%"));
+    }
+    metrics
+}
