@@ -4,9 +4,7 @@
 //! clock does; a replay and the golden flight call it with what was recorded. It reads no clock: the caller says what
 //! time it is.
 
-use stampfly_bus::{
-    Activation, AnyTopic, Band, PublishWords, Schedule, Scheduler, Split, TopicTable,
-};
+use stampfly_bus::{Activation, AnyTopic, Band, PublishWords, Schedule, Scheduler, Split, TopicTable};
 use stampfly_types::{ActivationRecord, Instant};
 
 /// Is told of activations: a log, a profiler.

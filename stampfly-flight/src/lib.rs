@@ -7,11 +7,28 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
+//! | [`newest`] | the newest sample of every topic, shown without its type |
+//! | [`profile`] | execution times against their budgets |
+//! | [`watchdog`] | cuts off motors that are not confirmed in time |
 #![no_std]
 
 #[cfg(any(test, feature = "alloc"))]
 extern crate alloc;
+#[cfg(test)]
+extern crate std;
 
 pub mod flight_loop;
+pub mod newest;
+pub mod profile;
+pub mod watchdog;
 
 pub use flight_loop::{Assembled, FlightLoop, Observer, Pending};
+pub use newest::{NewestSamples, longest_message};
+pub use profile::{Profile, Stopwatch};
+pub use watchdog::Watchdog;
+
+/// The vehicle that the tests run.
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+#[allow(dead_code, reason = "each test uses a part")]
+mod rover;
