@@ -7,6 +7,7 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
+//! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
 //! | [`newest`] | the newest sample of every topic, shown without its type |
 //! | [`profile`] | execution times against their budgets |
 //! | [`watchdog`] | cuts off motors that are not confirmed in time |
@@ -17,11 +18,13 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+pub mod black_box;
 pub mod flight_loop;
 pub mod newest;
 pub mod profile;
 pub mod watchdog;
 
+pub use black_box::BlackBox;
 pub use flight_loop::{Assembled, FlightLoop, Observer, Pending};
 pub use newest::{NewestSamples, longest_message};
 pub use profile::{Profile, Stopwatch};

@@ -7,6 +7,9 @@ use core::fmt;
 use stampfly_bus::TopicInfo;
 use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Message};
 
+/// Most words of a message that the black box and the golden flight take.
+pub const MAX_MESSAGE: usize = 64;
+
 /// Words of the longest message in a topic table.
 #[must_use]
 pub const fn longest_message(topics: &[TopicInfo]) -> usize {
