@@ -6,9 +6,11 @@
 //!
 //! | module | what it is |
 //! |---|---|
+//! | [`console`] | a command line over a serial port |
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
 //! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
 //! | [`newest`] | the newest sample of every topic, shown without its type |
+//! | [`parameters`] | parameters by name |
 //! | [`profile`] | execution times against their budgets |
 //! | [`watchdog`] | cuts off motors that are not confirmed in time |
 #![no_std]
@@ -19,8 +21,10 @@ extern crate alloc;
 extern crate std;
 
 pub mod black_box;
+pub mod console;
 pub mod flight_loop;
 pub mod newest;
+pub mod parameters;
 pub mod profile;
 pub mod watchdog;
 
