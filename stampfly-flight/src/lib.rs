@@ -9,6 +9,7 @@
 //! | [`console`] | a command line over a serial port |
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
 //! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
+//! | [`golden`] | a recorded flight that every machine must compute alike |
 //! | [`newest`] | the newest sample of every topic, shown without its type |
 //! | [`parameters`] | parameters by name |
 //! | [`profile`] | execution times against their budgets |
@@ -23,6 +24,7 @@ extern crate std;
 pub mod black_box;
 pub mod console;
 pub mod flight_loop;
+pub mod golden;
 pub mod newest;
 pub mod parameters;
 pub mod profile;
