@@ -13,6 +13,7 @@
 //! | [`newest`] | the newest sample of every topic, shown without its type |
 //! | [`parameters`] | parameters by name |
 //! | [`profile`] | execution times against their budgets |
+//! | [`task`] | the `async` task that flies |
 //! | [`watchdog`] | cuts off motors that are not confirmed in time |
 #![no_std]
 
@@ -28,6 +29,7 @@ pub mod golden;
 pub mod newest;
 pub mod parameters;
 pub mod profile;
+pub mod task;
 pub mod watchdog;
 
 pub use black_box::BlackBox;
