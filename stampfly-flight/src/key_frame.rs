@@ -7,7 +7,7 @@
 //! | part | bytes |
 //! |---|---|
 //! | magic | 4, `SFK1` |
-//! | tables | 8, [`fingerprint`] of the program that made it |
+//! | tables | 8, [`tables`] of the program that made it |
 //! | clock | 8, µs |
 //! | per topic | newest generation 4, number of samples 2, then each: generation 4, instant 8, words |
 //! | runnables | [postcard](https://postcard.jamesmunns.com) of the struct that `schedule!` generates |
@@ -16,9 +16,9 @@
 //! interface between versions: another program's key frame is refused.
 
 use crate::flight_loop::FlightLoop;
+use crate::golden::tables;
 use serde::{Serialize, de::DeserializeOwned};
 use stampfly_bus::{PublishWords, Schedule, TopicTable};
-use stampfly_log::FlightHash;
 use stampfly_types::Instant;
 
 const MAGIC: [u8; 4] = *b"SFK1";
@@ -46,20 +46,6 @@ impl core::fmt::Display for KeyFrameError {
 }
 
 impl core::error::Error for KeyFrameError {}
-
-/// One number for the tables a vehicle is made of: names and sizes of topics, names of runnables.
-#[must_use]
-pub fn fingerprint<R: Schedule>() -> u64 {
-    let mut hash = FlightHash::new();
-    let topics = <R::Topics as TopicTable>::TOPICS.iter().map(|topic| (topic.name, topic.words));
-    let activations = R::ACTIVATIONS.iter().map(|activation| (activation.name, 0));
-    for (place, (name, size)) in topics.chain(activations).enumerate() {
-        for letter in name.bytes() {
-            hash.publish(place as u16, size as u32, Instant::ZERO, &[u32::from(letter)]);
-        }
-    }
-    hash.finish()
-}
 
 /// Writes from the front of a buffer.
 struct Put<'a> {
@@ -89,7 +75,7 @@ pub fn encode<R: Schedule + Serialize>(
 ) -> Result<usize, KeyFrameError> {
     let mut put = Put { rest: buffer, written: 0 };
     put.bytes(&MAGIC)?;
-    put.bytes(&fingerprint::<R>().to_le_bytes())?;
+    put.bytes(&tables::<R>().to_le_bytes())?;
     put.bytes(&clock.as_micros().to_le_bytes())?;
     for topic in flight_loop.heads() {
         let head = topic.head();
@@ -136,7 +122,7 @@ fn begin<R: Schedule>(take: &mut Take<'_>) -> Result<Instant, KeyFrameError> {
     if take.array()? != MAGIC {
         return Err(KeyFrameError::NotAKeyFrame);
     }
-    if u64::from_le_bytes(take.array()?) != fingerprint::<R>() {
+    if u64::from_le_bytes(take.array()?) != tables::<R>() {
         return Err(KeyFrameError::OtherTables);
     }
     Ok(Instant::from_micros(u64::from_le_bytes(take.array()?)))

@@ -6,25 +6,53 @@
 //!
 //! | module | what it is |
 //! |---|---|
+//! | [`console`] | a command line over a serial port |
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
 //! | [`recorder`] | writes a flight as a log that can be flown again |
 //! | [`key_frame`] | the whole state of a vehicle as bytes (feature `key-frame`) |
 //! | [`replay`](mod@replay) | the flight again, compared bit for bit (feature `replay`) |
+//! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
+//! | [`golden`] | a recorded flight that every machine must compute alike |
+//! | [`newest`] | the newest sample of every topic, shown without its type |
+//! | [`parameters`] | parameters by name |
+//! | [`profile`] | execution times against their budgets |
+//! | [`task`] | the `async` task that flies |
+//! | [`watchdog`] | cuts off motors that are not confirmed in time |
 #![no_std]
 
 #[cfg(any(test, feature = "replay"))]
 extern crate alloc;
+#[cfg(test)]
+extern crate std;
 
+pub mod black_box;
+pub mod console;
 pub mod flight_loop;
+pub mod golden;
 #[cfg(feature = "key-frame")]
 pub mod key_frame;
 pub mod log_schema;
+pub mod newest;
+pub mod parameters;
+pub mod profile;
 pub mod recorder;
 #[cfg(feature = "replay")]
 pub mod replay;
+pub mod task;
+pub mod watchdog;
 
+pub use black_box::BlackBox;
 pub use flight_loop::{Assembled, FlightLoop, Observer, Pending};
 pub use log_schema::LogSchema;
+pub use newest::{NewestSamples, longest_message};
+pub use profile::{Profile, Stopwatch};
 pub use recorder::Recorder;
 #[cfg(feature = "replay")]
 pub use replay::{Replay, ReplayError, ReplayOptions, replay};
+pub use watchdog::Watchdog;
+
+/// The vehicle that the tests run.
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+#[allow(dead_code, reason = "each test uses a part")]
+mod rover;

@@ -1,0 +1,353 @@
+//! The black box: the last seconds of a flight, in memory, at a rate per topic.
+//!
+//! | part | what it does |
+//! |---|---|
+//! | [`BlackBox`] | records samples while the vehicle is armed and for [`TAIL`] after |
+//! | [`Retention`] | which samples: a [`LogRate`] per topic |
+//! | [`dump`] | the recording as a log in text, for a terminal |
+//!
+//! For vehicles that cannot write a log in flight (flash writes stall a microcontroller) and read the recording out after
+//! landing. Samples are kept as the words that the bus moves; the oldest go when memory is full. Not for the analysis of a
+//! whole flight: stream a log, or record on a host.
+
+mod dump;
+mod retention;
+
+pub use dump::{DumpError, DumpSink, Dumped, Refused, dump};
+pub use retention::{KEEP_ALIVE, LogRate, MIN_INTERVAL, Retention, TAIL};
+
+use crate::newest::{MAX_MESSAGE, longest_message};
+use heapless::Vec;
+use stampfly_types::Instant;
+
+/// Words before those of a sample: topic and generation, instant.
+const HEAD: usize = 2;
+
+/// A recorded sample.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// The topic's place in the table.
+    pub topic: usize,
+    /// The instant the data is valid for.
+    pub at: Instant,
+    /// The lowest 24 bits of the sample's generation.
+    pub generation: u32,
+    /// The sample.
+    pub words: Vec<u32, MAX_MESSAGE>,
+}
+
+/// A place in the recording. Valid until the recording changes.
+#[derive(Clone, Copy, Debug)]
+pub struct Cursor {
+    offset: usize,
+    changes: u32,
+}
+
+/// The recording has changed since the reading began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Changed;
+
+/// The last seconds of a flight, in `WORDS` words of memory, for a vehicle of `TOPICS` topics.
+///
+/// Give it every sample of every topic. It starts afresh when the vehicle is armed, and ignores what a vehicle publishes
+/// that has been disarmed for longer than [`TAIL`].
+///
+/// ```
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
+/// use rover::topics::{self, Id}; // the rover of `tests/common`
+/// use stampfly_flight::black_box::{BlackBox, LogRate, Retention};
+/// use stampfly_flight::newest::message;
+/// use stampfly_types::messages::{SystemMode, TofData};
+/// use stampfly_types::{Instant, Message};
+///
+/// const RETENTION: Retention = Retention {
+///     topics: &topics::TOPICS,
+///     rate: |topic| if topic == Id::sensor_range as usize { LogRate::hertz(10) } else { LogRate::OnChange },
+///     armed: |topic, words| {
+///         (topic == Id::system_mode as usize).then(|| message::<SystemMode>(words).is_some_and(|mode| mode.armed))
+///     },
+/// };
+///
+/// # fn main() {
+/// let mut black_box = BlackBox::<256, { topics::COUNT }>::new(RETENTION);
+/// let armed = SystemMode { armed: true, ..Default::default() };
+/// for millis in 0..400 {
+///     let range = TofData { distance: 0.001 * millis as f32, valid: true, ..Default::default() };
+///     let at = Instant::from_millis(millis);
+///     black_box.note(Id::system_mode as usize, at, millis as u32, &armed.to_words());
+///     black_box.note(Id::sensor_range as usize, at, millis as u32, &range.to_words());
+/// }
+/// let ranges = black_box.records().filter(|record| record.topic == Id::sensor_range as usize);
+/// let kept: Vec<u64> = ranges.map(|record| record.at.as_micros() / 1_000).collect();
+/// assert_eq!(kept, [0, 100, 200, 300]);
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct BlackBox<const WORDS: usize, const TOPICS: usize> {
+    retention: Retention,
+    memory: [u32; WORDS],
+    /// Where the oldest record begins.
+    oldest: usize,
+    /// Words in use, from there on and round the end.
+    used: usize,
+    /// The instant of the newest record. Records hold the low half of theirs, which means the one within half an hour of
+    /// this.
+    newest: Instant,
+    /// How often a sample was recorded or the recording started afresh.
+    changes: u32,
+    /// When the recording ends, unless the vehicle is armed then.
+    until: Instant,
+    /// When the last sample of each topic was kept, and its fingerprint.
+    kept: [Option<(Instant, u32)>; TOPICS],
+}
+
+impl<const WORDS: usize, const TOPICS: usize> BlackBox<WORDS, TOPICS> {
+    /// Nothing recorded.
+    ///
+    /// # Panics
+    /// When the topic table has another length than `TOPICS`, or a message longer than [`MAX_MESSAGE`] or `WORDS`. In a
+    /// `static` or `const`, that is a compile error.
+    #[must_use]
+    pub const fn new(retention: Retention) -> Self {
+        const { assert!(TOPICS <= 0xFF, "a record has eight bits for its topic") }
+        let longest = longest_message(retention.topics);
+        assert!(retention.topics.len() == TOPICS, "another topic table");
+        assert!(longest <= MAX_MESSAGE && longest + HEAD < WORDS, "no room for the longest message");
+        Self {
+            retention,
+            memory: [0; WORDS],
+            oldest: 0,
+            used: 0,
+            newest: Instant::ZERO,
+            changes: 0,
+            until: Instant::ZERO,
+            kept: [None; TOPICS],
+        }
+    }
+
+    /// Takes a sample of the topic at this place in the table, and records it when the vehicle is armed and the topic's
+    /// rate allows.
+    pub fn note(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
+        if self.retention.topics.get(topic).is_none_or(|info| info.words != words.len()) {
+            return;
+        }
+        if (self.retention.armed)(topic, words) == Some(true) {
+            if at >= self.until {
+                (self.oldest, self.used, self.kept) = (0, 0, [None; TOPICS]);
+                self.changes = self.changes.wrapping_add(1);
+            }
+            self.until = at + TAIL;
+        }
+        let Some(last) = self.kept.get_mut(topic) else { return };
+        let rate = (self.retention.rate)(topic);
+        if at >= self.until || rate == LogRate::Never {
+            return;
+        }
+        let print = fingerprint(words);
+        let mut phase = at;
+        if let Some((kept, last_print)) = *last {
+            let interval = match rate {
+                LogRate::AtMost(interval) => interval,
+                LogRate::OnChange if print == last_print => KEEP_ALIVE,
+                LogRate::OnChange => MIN_INTERVAL,
+                LogRate::Never | LogRate::EverySample => stampfly_types::Duration::ZERO,
+            };
+            if at < kept + interval && rate != LogRate::EverySample {
+                return;
+            }
+            // One sample in 40 ms is exactly that on average, whatever the topic's own period.
+            if matches!(rate, LogRate::AtMost(_)) && at < kept + interval * 2 {
+                phase = kept + interval;
+            }
+        }
+        *last = Some((phase, print));
+        self.record(topic, at, generation, words);
+    }
+
+    fn record(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
+        let length = HEAD + words.len();
+        while self.used + length > WORDS {
+            let Some(gone) = self.get(0).map(|oldest| HEAD + oldest.words.len()) else { return };
+            (self.oldest, self.used) = (self.place(gone), self.used - gone);
+        }
+        let head = [topic as u32 | generation << 8, at.as_micros() as u32];
+        for word in head.iter().chain(words) {
+            let place = self.place(self.used);
+            if let Some(place) = self.memory.get_mut(place) {
+                *place = *word;
+            }
+            self.used += 1;
+        }
+        (self.newest, self.changes) = (at, self.changes.wrapping_add(1));
+    }
+
+    /// The place in memory so many words after the oldest.
+    const fn place(&self, offset: usize) -> usize {
+        let place = self.oldest + offset;
+        if place < WORDS { place } else { place - WORDS }
+    }
+
+    /// The record that begins so many words after the oldest.
+    fn get(&self, offset: usize) -> Option<Record> {
+        if offset >= self.used {
+            return None;
+        }
+        let word = |index: usize| self.memory.get(self.place(offset + index)).copied().unwrap_or_default();
+        let topic = (word(0) & 0xFF) as usize;
+        let later = i64::from(word(1).wrapping_sub(self.newest.as_micros() as u32).cast_signed());
+        let length = self.retention.topics.get(topic)?.words;
+        Some(Record {
+            topic,
+            at: Instant::from_micros(self.newest.as_micros().saturating_add_signed(later)),
+            generation: word(0) >> 8,
+            words: (HEAD..HEAD + length).take(MAX_MESSAGE).map(word).collect(),
+        })
+    }
+
+    /// The place of the oldest record.
+    #[must_use]
+    pub const fn begin(&self) -> Cursor {
+        Cursor { offset: 0, changes: self.changes }
+    }
+
+    /// The record at this place, which moves on to the next; `None` behind the newest. For a task that cannot keep
+    /// [`records`](Self::records) borrowed.
+    ///
+    /// # Errors
+    /// When the recording has changed since [`begin`](Self::begin).
+    pub fn next(&self, cursor: &mut Cursor) -> Result<Option<Record>, Changed> {
+        if cursor.changes != self.changes {
+            return Err(Changed);
+        }
+        let record = self.get(cursor.offset);
+        cursor.offset += record.as_ref().map_or(0, |record| HEAD + record.words.len());
+        Ok(record)
+    }
+
+    /// The recording, oldest first.
+    pub fn records(&self) -> impl Iterator<Item = Record> {
+        let mut cursor = self.begin();
+        core::iter::from_fn(move || self.next(&mut cursor).ok().flatten())
+    }
+}
+
+/// 32-bit FNV-1a over words: samples that differ in one word have different ones, others nearly always.
+fn fingerprint(words: &[u32]) -> u32 {
+    words.iter().fold(0x811C_9DC5, |hash, word| (hash ^ word).wrapping_mul(0x0100_0193))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::newest::message;
+    use crate::rover::topics::{COUNT, Id, TOPICS};
+    use proptest::prelude::*;
+    use stampfly_types::messages::SystemMode;
+    use stampfly_types::{Duration, Message};
+    use std::vec::Vec;
+
+    const RETENTION: Retention = Retention {
+        topics: &TOPICS,
+        rate: |topic| if topic == Id::system_mode as usize { LogRate::OnChange } else { LogRate::EverySample },
+        armed: |topic, words| {
+            let mode = (topic == Id::system_mode as usize).then(|| message::<SystemMode>(words));
+            mode.map(|mode| mode.is_some_and(|mode| mode.armed))
+        },
+    };
+    const RANGE: usize = Id::sensor_range as usize;
+    const MODE: usize = Id::system_mode as usize;
+
+    type Small = BlackBox<257, COUNT>;
+
+    fn mode(armed: bool) -> impl AsRef<[u32]> {
+        SystemMode { armed, ..Default::default() }.to_words()
+    }
+
+    fn arm<const WORDS: usize>(black_box: &mut BlackBox<WORDS, COUNT>, at: Instant) {
+        black_box.note(MODE, at, 1, mode(true).as_ref());
+    }
+
+    proptest! {
+        /// What is recorded is the newest, in order and unchanged, and no memory is left unused.
+        #[test]
+        fn the_newest_is_kept(
+            start in any::<u32>().prop_map(|start| Instant::from_micros(u64::from(start) << 8)),
+            picks in prop::collection::vec((0..2usize, 0u64..1_000, any::<u32>()), 1..200),
+        ) {
+            let mut black_box = Small::new(RETENTION);
+            arm(&mut black_box, start);
+            let mut all = std::vec![(MODE, start, 1, mode(true).as_ref().to_vec())];
+            let mut at = start;
+            for (topic, later, seed) in picks {
+                at += Duration::from_micros(later);
+                let words: Vec<u32> = (0..TOPICS[topic].words as u32).map(|index| seed.wrapping_add(index)).collect();
+                black_box.note(topic, at, seed, &words);
+                all.push((topic, at, seed & 0xFF_FFFF, words));
+            }
+            let kept: Vec<_> =
+                black_box.records().map(|r| (r.topic, r.at, r.generation, r.words.to_vec())).collect();
+            prop_assert!(!kept.is_empty());
+            prop_assert_eq!(&kept[..], &all[all.len() - kept.len()..]);
+            let size: usize = kept.iter().map(|(.., words)| HEAD + words.len()).sum();
+            if let Some((.., words)) = all.len().checked_sub(kept.len() + 1).and_then(|gone| all.get(gone)) {
+                // The one that went last had to go for a later one, the longest at most.
+                prop_assert!(size + HEAD + words.len() + HEAD + longest_message(&TOPICS) > 257, "{} used", size);
+            }
+        }
+    }
+
+    #[test]
+    fn a_recording_begins_when_the_vehicle_is_armed_and_ends_a_tail_after() {
+        let mut black_box = Small::new(RETENTION);
+        let sample = |black_box: &mut Small, millis| black_box.note(RANGE, Instant::from_millis(millis), 0, &[0; 4]);
+        let samples = |black_box: &Small| {
+            let samples = black_box.records().filter(|record| record.topic == RANGE);
+            samples.map(|record| record.at.as_micros() / 1_000).collect::<Vec<_>>()
+        };
+        sample(&mut black_box, 1);
+        assert_eq!(black_box.records().count(), 0, "disarmed");
+        arm(&mut black_box, Instant::from_millis(10));
+        sample(&mut black_box, 11);
+        black_box.note(RANGE, Instant::from_millis(12), 0, &[0; 3]);
+        black_box.note(COUNT, Instant::from_millis(12), 0, &[0; 4]);
+        black_box.note(MODE, Instant::from_millis(100), 2, mode(false).as_ref());
+        sample(&mut black_box, 259);
+        sample(&mut black_box, 260);
+        assert_eq!(samples(&black_box), [11, 259]);
+        let mut cursor = black_box.begin();
+        assert!(black_box.next(&mut cursor).is_ok_and(|record| record.is_some()));
+        arm(&mut black_box, Instant::from_millis(500));
+        assert_eq!(samples(&black_box), [], "the next flight");
+        assert_eq!(black_box.next(&mut cursor), Err(Changed));
+    }
+
+    #[test]
+    fn states_are_kept_on_change_and_once_a_second() {
+        let mut black_box = BlackBox::<1024, COUNT>::new(RETENTION);
+        let mut note = |millis: u32, transitions| {
+            let mode = SystemMode { armed: true, transitions, ..Default::default() };
+            black_box.note(MODE, Instant::from_millis(millis.into()), millis, &mode.to_words());
+            black_box.records().map(|record| record.generation).collect::<Vec<_>>()
+        };
+        (0..2_999).for_each(|millis| drop(note(millis, millis / 1_500)));
+        assert_eq!(note(2_999, 1), [0, 1_000, 1_500, 2_500]);
+        // One that changes all the time is kept fifty times a second.
+        (3_000..3_999).for_each(|millis| drop(note(millis, millis)));
+        assert_eq!(note(3_999, 3_999).len(), 4 + 50);
+    }
+
+    #[test]
+    fn a_rate_is_kept_on_average() {
+        let retention = Retention { rate: |_| LogRate::hertz(25), ..RETENTION };
+        let mut black_box = BlackBox::<1024, COUNT>::new(retention);
+        // Every 15 ms: 40 ms are no multiple.
+        for at in (0..3_000).step_by(15).map(Instant::from_millis) {
+            arm(&mut black_box, at);
+            black_box.note(RANGE, at, 0, &[0; 4]);
+        }
+        let kept: Vec<_> = black_box.records().filter(|record| record.topic == RANGE).map(|record| record.at).collect();
+        let span = kept.last().expect("kept").since(kept[0]);
+        assert!((span.as_millis() / (kept.len() as u64 - 1)).abs_diff(40) <= 1, "{} in {span}", kept.len());
+        assert_eq!(LogRate::hertz(0), LogRate::Never);
+    }
+}

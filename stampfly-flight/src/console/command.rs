@@ -1,0 +1,129 @@
+//! A line → a command. Pure text: nothing here depends on the vehicle's state.
+
+use super::Vehicle;
+use core::fmt;
+use heapless::Vec;
+
+/// Most words of a line.
+pub const MAX_WORDS: usize = 8;
+
+/// What a line asks for, with names as they were typed. `C` are the vehicle's own commands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Command<'l, C> {
+    /// An empty line.
+    Nothing,
+    /// List the commands.
+    Help,
+    /// State of the vehicle.
+    Status,
+    /// Samples and errors of every sensor, or the newest sample of one.
+    Sensor(Option<&'l str>),
+    /// The newest sample of a topic.
+    Topic(&'l str),
+    /// Every parameter whose name begins so.
+    ParameterList(&'l str),
+    /// One parameter.
+    ParameterGet(&'l str),
+    /// Change one parameter.
+    ParameterSet(&'l str, f32),
+    /// Save all parameters.
+    ParameterSave,
+    /// Erase the saved ones.
+    ParameterReset,
+    /// Execution times.
+    Profile,
+    /// Send the log.
+    LogDump,
+    /// Restart.
+    Reboot,
+    /// Version of the firmware.
+    Version,
+    /// One of the vehicle's own.
+    Vehicle(C),
+}
+
+/// Why a line is no command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CommandError {
+    /// There is no such command.
+    Unknown,
+    /// The command exists and is written like this.
+    Usage(&'static str),
+    /// More than [`MAX_WORDS`] words.
+    TooManyWords,
+}
+
+impl fmt::Display for CommandError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown => f.write_str("there is no such command; try help"),
+            Self::Usage(usage) => write!(f, "usage: {usage}"),
+            Self::TooManyWords => write!(f, "at most {MAX_WORDS} words"),
+        }
+    }
+}
+
+impl core::error::Error for CommandError {}
+
+/// The commands of every vehicle: how they are written, and what they do.
+pub const COMMANDS: &[(&str, &str)] = &[
+    ("help", "this list"),
+    ("status", "state of the vehicle"),
+    (SENSOR, "samples and errors of every sensor, or the newest sample of one"),
+    (TOPIC, "the newest sample of any topic"),
+    ("param list [PREFIX]", "parameters"),
+    ("param get NAME", "one parameter and what it does"),
+    ("param set NAME VALUE", "change it; takes effect after save and reboot"),
+    ("param save", "save all parameters"),
+    ("param reset", "erase the saved ones"),
+    ("profile", "execution times against their budgets"),
+    (LOG, "send the log of the last flight"),
+    ("reboot", "restart"),
+    ("version", "version of the firmware"),
+];
+
+const SENSOR: &str = "sensor [NAME]";
+const TOPIC: &str = "topic NAME";
+const PARAM: &str = "param list [PREFIX] | get NAME | set NAME VALUE | save | reset";
+const LOG: &str = "log dump";
+
+impl<'l, C> Command<'l, C> {
+    /// Reads a line. Words are separated by spaces; there is no quoting. What is no command of every vehicle is given to
+    /// [`Vehicle::parse`].
+    ///
+    /// # Errors
+    /// When there is no such command, or it is written differently.
+    pub fn parse<V: Vehicle<Command = C>>(line: &'l str) -> Result<Self, CommandError> {
+        let mut words = Vec::<&str, MAX_WORDS>::new();
+        for word in line.split_ascii_whitespace() {
+            words.push(word).map_err(|_| CommandError::TooManyWords)?;
+        }
+        Ok(match words.as_slice() {
+            [] => Self::Nothing,
+            ["help" | "?"] => Self::Help,
+            ["status"] => Self::Status,
+            ["sensor"] => Self::Sensor(None),
+            ["sensor", name] => Self::Sensor(Some(name)),
+            ["sensor", ..] => return Err(CommandError::Usage(SENSOR)),
+            ["topic", name] => Self::Topic(name),
+            ["topic", ..] => return Err(CommandError::Usage(TOPIC)),
+            ["param", "list"] => Self::ParameterList(""),
+            ["param", "list", prefix] => Self::ParameterList(prefix),
+            ["param", "get", name] => Self::ParameterGet(name),
+            ["param", "set", name, value] => {
+                Self::ParameterSet(name, value.parse().map_err(|_| CommandError::Usage(PARAM))?)
+            }
+            ["param", "save"] => Self::ParameterSave,
+            ["param", "reset"] => Self::ParameterReset,
+            ["param", ..] => return Err(CommandError::Usage(PARAM)),
+            ["profile"] => Self::Profile,
+            ["log", "dump"] => Self::LogDump,
+            ["log", ..] => return Err(CommandError::Usage(LOG)),
+            ["reboot"] => Self::Reboot,
+            ["version"] => Self::Version,
+            words => Self::Vehicle(V::parse(words)?),
+        })
+    }
+}
