@@ -4,7 +4,7 @@ use super::{Changed, Record};
 use core::cell::RefCell;
 use core::fmt::{self, Write};
 use heapless::{String, Vec};
-use stampfly_log::ulog::{Full, Sample, Sink, WriteError, Writer};
+use stampfly_log::ulog::{Full, Sample, Schema, Sink, WriteError, Writer};
 use stampfly_types::Instant;
 
 /// Bytes of the log in a line.
@@ -87,7 +87,7 @@ impl core::error::Error for DumpError {}
 /// let (mut cursor, mut text) = (black_box.begin(), String::new());
 /// let finished = dump(
 ///     || black_box.next(&mut cursor),
-///     |sink, at| Definitions::start(sink, at)?.data(&log_topics, &[]),
+///     |sink, at| Definitions::start(sink, at)?.data(&log_topics[..]),
 ///     async |line| Ok(text.push_str(line)),
 /// );
 /// # use std::{future::Future, pin::pin, task::{Context, Poll, Waker}};
@@ -105,9 +105,9 @@ impl core::error::Error for DumpError {}
 ///
 /// # Cancellation
 /// Dropping the future leaves the terminal with the beginning of a log and no last line. Nothing else is affected.
-pub async fn dump<'t>(
+pub async fn dump<T: Schema>(
     mut next: impl FnMut() -> Result<Option<Record>, Changed>,
-    mut open: impl for<'b> FnMut(DumpSink<'b>, Instant) -> Result<Writer<'t, DumpSink<'b>>, WriteError<Full>>,
+    mut open: impl for<'b> FnMut(DumpSink<'b>, Instant) -> Result<Writer<DumpSink<'b>, T>, WriteError<Full>>,
     show: impl AsyncFnMut(&str) -> Result<(), Refused>,
 ) -> Result<(), DumpError> {
     let mut lines = Lines { show, pending: Vec::new(), dumped: Dumped::default() };
