@@ -34,7 +34,7 @@ fn dumped(black_box: &BlackBox<1024, COUNT>, lines: usize) -> (Vec<String>, Resu
             for n in 0..100 {
                 head.parameter(&format!("parameter.{n}"), ParameterValue::Float(n as f32))?;
             }
-            head.data(&topics, &[])
+            head.data(&topics[..])
         },
         async |line: &str| {
             if text.len() == lines {
