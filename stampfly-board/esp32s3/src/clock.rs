@@ -2,7 +2,6 @@
 
 use embassy_time::Timer;
 use embedded_hal_async::delay::DelayNs;
-use esp_hal::time::Instant;
 use stampfly_drivers::Timebase;
 use stampfly_types::{Duration, Instant};
 
@@ -15,15 +14,15 @@ pub struct Clock;
 
 impl Timebase for Clock {
     fn now(&self) -> Instant {
-        Instant::from_micros(Instant::now().duration_since_epoch().as_micros())
+        Instant::from_micros(esp_hal::time::Instant::now().duration_since_epoch().as_micros())
     }
 }
 
 impl DelayNs for Clock {
     async fn delay_ns(&mut self, ns: u32) {
-        let span = Instant::from_micros(u64::from(ns.div_ceil(1_000)));
+        let span = Duration::from_micros(u64::from(ns.div_ceil(1_000)));
         if span >= SHORT {
-            return Timer::after_micros(span.0).await;
+            return Timer::after_micros(span.as_micros()).await;
         }
         // One more, because the present microsecond has already begun.
         let end = self.now() + span + Duration::from_micros(1);

@@ -3,20 +3,20 @@
 use crate::clock::Clock;
 use crate::motors;
 use core::cell::RefCell;
-use embassy_time::{Duration, Ticker};
+use embassy_time::Ticker;
 use esp_hal::system::software_reset;
 use stampfly_board::black_box::{BlackBox, ROOM};
 use stampfly_board::console::Newest;
 use stampfly_board::wiring;
 use stampfly_drivers::Timebase;
-use stampfly_types::{Duration, Instant};
 use stampfly_types::messages::{ButtonEvent, ButtonGesture, SystemMode};
+use stampfly_types::{Duration, Instant};
 use static_cell::ConstStaticCell;
 
 /// A gesture on the button that is older was meant for something else.
 const FRESH: Duration = Duration::from_millis(100);
 /// Two periods of the fastest topic: none has room for fewer samples than that.
-const ROUND: Duration = Duration::from_millis(5);
+const ROUND: embassy_time::Duration = embassy_time::Duration::from_millis(5);
 
 /// What the vehicle remembers.
 pub struct Memory {

@@ -21,7 +21,7 @@ use stampfly_bus::Band;
 use stampfly_drivers::Decimator;
 use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
 use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
-use stampfly_types::{Duration, Instant};
+use stampfly_types::Instant;
 
 unsafe extern "C" {
     fn a_panic_can_be_reached() -> !;

@@ -1,7 +1,7 @@
 //! The memory a flight record is written into, and one number for what is in it.
 
 use stampfly_log::FlightHash;
-use stampfly_types::{Duration, Instant};
+use stampfly_types::Instant;
 
 /// Room for the whole record, bytes.
 pub const SIZE: usize = 3 << 20;

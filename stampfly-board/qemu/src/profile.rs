@@ -10,7 +10,7 @@ use stampfly_board::golden::Witness;
 use stampfly_board::{Observer, plan, wiring};
 use stampfly_bus::{Activation, Band};
 use stampfly_types::messages::SystemMode;
-use stampfly_types::{Message, Duration, Instant};
+use stampfly_types::{Instant, Message};
 
 /// Inputs of the estimation that are sensors of the vehicle: inertial, range, flow, field, pressure.
 const SENSORS: usize = 5;

@@ -5,7 +5,7 @@ use stampfly_board::{VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
 use stampfly_log::ulog::{Definitions, Ram, Sample, Topic, Writer};
 use stampfly_log::{ActivationTopic, Input};
-use stampfly_types::{Duration, Instant};
+use stampfly_types::Instant;
 
 /// The record's topics are the bus's.
 static TOPICS: [Topic; wiring::COUNT] = {
