@@ -1,13 +1,11 @@
 //! A campaign: many missions in parallel, each with its own seed, and what they say together.
 
-use crate::consistency::FlightConsistency;
-use crate::metrics::{FIGURES, Metrics};
-use crate::recorder::Recorder;
-use crate::simulate::{FlightConfig, Outcome, fly};
+use crate::flown::{Flown, fly};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 
 /// Median, 95th percentile and worst of a figure over the flights that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -40,29 +38,21 @@ impl Spread {
 }
 
 /// One flight of a campaign.
-#[derive(Clone, Debug)]
-pub struct Flight {
+pub struct Flight<V: Vehicle, W> {
     /// Its seed.
     pub seed: u64,
     /// How it went.
-    pub outcome: Outcome,
-    /// How the estimate's errors compared with its covariance, if that was asked for.
-    pub consistency: Option<FlightConsistency>,
+    pub flown: Flown<V::Outcome>,
+    /// What its witness has seen.
+    pub witness: W,
 }
 
-impl Flight {
-    /// Did it fly its mission, land and disarm, without ever sending nonsense to a motor?
+impl<V: Vehicle, W> Flight<V, W> {
+    /// Did the vehicle do what it was to do?
     #[must_use]
     pub fn succeeded(&self) -> bool {
-        let Metrics { landed, disarmed, .. } = self.outcome.metrics;
-        landed && disarmed && self.outcome.finished && self.outcome.motors_sane
+        self.flown.outcome.succeeded()
     }
-}
-
-/// Flies `configs` on as many threads as there are cores. Flights come back in the order of the configurations.
-/// `done` is called after each.
-pub fn run(configs: &[FlightConfig], done: &(dyn Fn(&Flight) + Sync)) -> Vec<Flight> {
-    run_recorded(configs, &|_| Recorder::hash_only(), done)
 }
 
 /// On how many cores that many flights are flown at once: all there are.
@@ -71,26 +61,25 @@ pub fn workers(flights: usize) -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).min(flights.max(1))
 }
 
-/// The same with a recorder of one's own for each flight.
-pub fn run_recorded(
-    configs: &[FlightConfig],
-    recorder: &(dyn Fn(&FlightConfig) -> Recorder + Sync),
-    done: &(dyn Fn(&Flight) + Sync),
-) -> Vec<Flight> {
+/// Flies these setups, each with its seed, on as many threads as there are cores. Flights come back in the order of the
+/// setups. Each has a witness of its own; `done` is called after each.
+pub fn run<V: Vehicle, W: Witness<V::Runnables> + Send>(
+    setups: &[(u64, V::Setup)],
+    witness: &(dyn Fn(u64, &V::Setup) -> W + Sync),
+    done: &(dyn Fn(&Flight<V, W>) + Sync),
+) -> Vec<Flight<V, W>> {
     let next = AtomicUsize::new(0);
     let flights = Mutex::new(BTreeMap::new());
-    let workers = workers(configs.len());
     std::thread::scope(|scope| {
-        for _ in 0..workers {
+        for _ in 0..workers(setups.len()) {
             scope.spawn(|| {
-                while let Some((index, config)) = {
+                while let Some((index, (seed, setup))) = {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    configs.get(index).map(|config| (index, config))
+                    setups.get(index).map(|setup| (index, setup))
                 } {
-                    let mut recorder = recorder(config);
-                    let outcome = fly(config, &mut recorder, &mut |_, _| {});
-                    let (seed, consistency) = (config.simulation.seed, recorder.into_consistency());
-                    let flight = Flight { seed, outcome, consistency };
+                    let mut witness = witness(*seed, setup);
+                    let flown = fly::<V>(setup, &mut witness, &mut |_, _| {});
+                    let flight = Flight { seed: *seed, flown, witness };
                     done(&flight);
                     if let Ok(mut flights) = flights.lock() {
                         flights.insert(index, flight);
@@ -102,14 +91,11 @@ pub fn run_recorded(
     flights.into_inner().unwrap_or_default().into_values().collect()
 }
 
-/// Figures over all flights, by name.
+/// Figures over all flights: name, unit, spread.
 #[must_use]
-pub fn spreads(flights: &[Flight]) -> Vec<(&'static str, &'static str, Option<Spread>)> {
-    FIGURES
-        .iter()
-        .map(|(name, unit, figure)| {
-            let values = flights.iter().filter_map(|flight| figure(&flight.outcome.metrics)).collect();
-            (*name, *unit, Spread::of(values))
-        })
-        .collect()
+pub fn spreads<V: Vehicle, W>(flights: &[Flight<V, W>]) -> Vec<(&'static str, &'static str, Option<Spread>)> {
+    let figures: Vec<_> = flights.iter().map(|flight| flight.flown.outcome.figures()).collect();
+    let Some(first) = figures.first() else { return Vec::new() };
+    let spread = |place: usize| Spread::of(figures.iter().filter_map(|figures| figures.get(place)?.value).collect());
+    first.iter().enumerate().map(|(place, figure)| (figure.name, figure.unit, spread(place))).collect()
 }

@@ -1,38 +1,27 @@
-//! Records the golden flight: a hop in simulation, as what came from outside and what the motors were told.
+//! Records the golden flight: a hop in simulation, as what came from outside and what the vehicle's output was.
 //!
 //! Two things are done to the flight before it is written. It ends when the motors have stood still for a moment. And
 //! twice a second, where all other sensors' samples come closest together, they are held back by those few milliseconds
 //! until they are new in one activation: by chance that happens once in minutes, and it is what a step costs most. Their
-//! stamps stay, so the estimator sees late samples, as it does of a busy bus. What the motors are to be told is what they
-//! are told when this record is played here.
+//! stamps stay, so the estimator sees late samples, as it does of a busy bus. The output is what this program computes
+//! when it plays the record.
 
-use crate::mission::Mission;
+use crate::flown::fly;
 use crate::recorder::Recorder;
-use crate::replay::is_outside;
-use crate::simulate::{FlightConfig, fly};
-use stampfly_board::golden::{GoldenError, MOTORS, Report, Witness, Writer, play};
-use stampfly_board::{Observer, wiring};
-use stampfly_bus::{Activation, Band};
-use stampfly_types::{Duration, Instant, Message, messages::MotorOutput};
 use std::collections::BTreeMap;
 use std::fmt;
+use stampfly_bus::{Band, Schedule, TopicTable};
+use stampfly_flight::Observer;
+use stampfly_flight::golden::{GoldenError, PlayObserver, Report, Writer, play, tables};
+use stampfly_sim::vehicle::{Golden, Vehicle, Verdict};
+use stampfly_types::{Duration, Instant};
 
-/// The shortest flight that has everything: calibration, standing, arming, take-off, hovering, landing.
-const MISSION: &str = "arm\ntakeoff 0.2\nhover 0.3\nland\n";
 /// The record goes on for this long after the last change of state.
 const TAIL: Duration = Duration::from_millis(100);
-/// The duties are written down so often.
-const DUTY_PERIOD: Duration = Duration::from_millis(20);
+/// The output is written down so often.
+const OUTPUT_PERIOD: Duration = Duration::from_millis(20);
 /// Time between the activations in which every sensor has something new.
 const GATHERING: Duration = Duration::from_millis(500);
-/// The sensors that are gathered.
-const GATHERED: [wiring::Id; 5] = [
-    wiring::Id::sensor_tof,
-    wiring::Id::sensor_flow,
-    wiring::Id::sensor_mag,
-    wiring::Id::sensor_baro,
-    wiring::Id::sensor_power,
-];
 
 /// What a vehicle was given.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +29,7 @@ pub enum Event {
     /// Somebody outside published.
     Sample {
         /// The topic.
-        topic: wiring::Id,
+        topic: usize,
         /// The sample's instant.
         at: Instant,
         /// The message.
@@ -68,8 +57,8 @@ impl Inputs {
         self.collected.extend(self.turn.take().map(Event::Turn));
     }
 
-    pub(crate) fn sample(&mut self, topic: wiring::Id, at: Instant, words: &[u32]) {
-        if is_outside(topic as usize) {
+    pub(crate) fn sample<R: Schedule>(&mut self, topic: usize, at: Instant, words: &[u32]) {
+        if <R::Topics as TopicTable>::TOPICS.get(topic).is_some_and(|info| info.is_outside) {
             self.collected.push(Event::Sample { topic, at, words: words.to_vec() });
         }
     }
@@ -108,23 +97,19 @@ impl From<GoldenError> for RecordError {
     }
 }
 
-/// Flies and records the golden flight.
+/// Flies and records a vehicle's golden flight.
 ///
 /// # Errors
 /// When it was not flown to its end, or its record cannot be played.
-pub fn record() -> Result<Vec<u8>, RecordError> {
-    let config = configuration().ok_or(RecordError::Flight)?;
-    let mut recorder = Recorder::hash_only().with_inputs();
-    let outcome = fly(&config, &mut recorder, &mut |_, _| {});
-    let end = outcome.phases.last().map(|phase| phase.since + TAIL).filter(|_| outcome.finished);
+pub fn record<V: Vehicle>(golden: &Golden<V>) -> Result<Vec<u8>, RecordError> {
+    let mut recorder = Recorder::<V>::hash_only().with_inputs();
+    let flown = fly::<V>(&golden.setup, &mut recorder, &mut |_, _| {});
+    let end = (golden.settled)(&flown.outcome).filter(|_| flown.outcome.succeeded());
     let mut inputs = recorder.into_inputs();
-    shorten(&mut inputs, end.ok_or(RecordError::Flight)?);
-    gather(&mut inputs, config.simulation.start);
-    Ok(write(&inputs, config.simulation.start)?.0)
-}
-
-fn configuration() -> Option<FlightConfig> {
-    Some(FlightConfig { mission: Mission::parse(MISSION).ok()?, ..FlightConfig::reference(1) })
+    shorten(&mut inputs, end.ok_or(RecordError::Flight)? + TAIL);
+    let start = V::options(&golden.setup).start;
+    gather(&mut inputs, start, golden);
+    Ok(write(golden, &inputs, start)?.0)
 }
 
 /// Leaves out what happened after `end`.
@@ -135,31 +120,25 @@ fn shorten(inputs: &mut Vec<Event>, end: Instant) {
     }
 }
 
-/// Now and then, when the samples of all other sensors are youngest, holds them back until the next inertial sample comes.
-fn gather(inputs: &mut Vec<Event>, start: Instant) {
-    let mut newest = [None; GATHERED.len()];
-    // Of each stretch of time, the inertial sample that the others are closest to: age of the oldest, and places.
-    let mut closest: BTreeMap<u64, (Duration, usize, [usize; GATHERED.len()])> = BTreeMap::new();
+/// Now and then, when the samples of all other sensors are youngest, holds them back until the leading sensor's next
+/// sample comes.
+fn gather<V: Vehicle>(inputs: &mut Vec<Event>, start: Instant, golden: &Golden<V>) {
+    let mut newest: Vec<Option<(Instant, usize)>> = vec![None; golden.gathered.len()];
+    // Of each stretch of time, the leading sample that the others are closest to: age of the oldest, and places.
+    let mut closest: BTreeMap<u64, (Duration, usize, Vec<usize>)> = BTreeMap::new();
     for (place, input) in inputs.iter().enumerate() {
-        match input {
-            Event::Sample { topic: wiring::Id::sensor_imu, at, .. } => {
-                let [Some(tof), Some(flow), Some(mag), Some(baro), Some(power)] = newest else { continue };
-                // The battery's slow monitor would decide alone; nobody asks it for its age.
-                let age = [tof, flow, mag, baro].map(|(seen, _): (Instant, _)| at.since(seen));
-                let oldest = age.into_iter().max().unwrap_or_default();
-                let stretch = at.since(start).as_micros() / GATHERING.as_micros();
-                let best = closest.get(&stretch).is_some_and(|(best, ..)| *best <= oldest);
-                if !best {
-                    closest.insert(stretch, (oldest, place, [tof, flow, mag, baro, power].map(|(_, place)| place)));
-                }
+        let Event::Sample { topic, at, .. } = input else { continue };
+        if *topic == golden.leading {
+            let Some(seen) = newest.iter().copied().collect::<Option<Vec<_>>>() else { continue };
+            // The last of them is slow and would decide alone: its age does not count.
+            let ages = seen.iter().take(seen.len().saturating_sub(1)).map(|(seen, _)| at.since(*seen));
+            let oldest = ages.max().unwrap_or_default();
+            let stretch = at.since(start).as_micros() / GATHERING.as_micros();
+            if closest.get(&stretch).is_none_or(|(best, ..)| *best > oldest) {
+                closest.insert(stretch, (oldest, place, seen.into_iter().map(|(_, place)| place).collect()));
             }
-            Event::Sample { topic, at, .. } => {
-                let sensor = GATHERED.iter().position(|id| id == topic);
-                if let Some(newest) = sensor.and_then(|sensor| newest.get_mut(sensor)) {
-                    *newest = Some((*at, place));
-                }
-            }
-            Event::Turn(_) => {}
+        } else if let Some(sensor) = golden.gathered.iter().position(|id| id == topic) {
+            newest[sensor] = Some((*at, place));
         }
     }
     // From the back, so that the places in front stay.
@@ -172,29 +151,41 @@ fn gather(inputs: &mut Vec<Event>, start: Instant) {
 }
 
 /// Writes a record of these inputs, with what comes of them here.
-fn write(inputs: &[Event], start: Instant) -> Result<(Vec<u8>, Report), GoldenError> {
+fn write<V: Vehicle>(
+    golden: &Golden<V>,
+    inputs: &[Event],
+    start: Instant,
+) -> Result<(Vec<u8>, Report), GoldenError> {
     // Played once without expecting anything, to find out what to expect.
-    let mut duties = Duties::default();
-    let first = play(&encode(inputs, start, &[], 0), &mut duties)?;
-    let record = encode(inputs, start, &duties.of_turns, first.hash);
-    let report = play(&record, &mut ())?;
+    let (config, tolerance) = (V::config(&golden.setup), golden.tolerance);
+    let mut outputs = Outputs { topic: golden.output, ..Outputs::default() };
+    let first = play::<V::Runnables>(&encode(golden, inputs, start, &[], 0), config, tolerance, &mut outputs)?;
+    let record = encode(golden, inputs, start, &outputs.of_turns, first.hash);
+    let report = play::<V::Runnables>(&record, config, tolerance, &mut ())?;
     Ok((record, report))
 }
 
-/// The bytes of a record: inputs, the duties after each of its turns, and the hash.
-fn encode(inputs: &[Event], start: Instant, duties: &[[f32; MOTORS]], hash: u64) -> Vec<u8> {
+/// The bytes of a record: inputs, the output after each of its turns, and the hash.
+fn encode<V: Vehicle>(
+    golden: &Golden<V>,
+    inputs: &[Event],
+    start: Instant,
+    outputs: &[Vec<u32>],
+    hash: u64,
+) -> Vec<u8> {
     let mut entries = Vec::new();
-    let mut writer = Writer::new(start, |bytes: &[u8]| entries.extend_from_slice(bytes));
-    let (mut duties, mut due) = (duties.iter(), start);
+    let out = |bytes: &[u8]| entries.extend_from_slice(bytes);
+    let mut writer = Writer::new(tables::<V::Runnables>(), start, golden.output, out);
+    let (mut outputs, mut due) = (outputs.iter(), start);
     for input in inputs {
         match input {
-            Event::Sample { topic, at, words } => writer.sample(*topic as u8, *at, words),
+            Event::Sample { topic, at, words } => writer.sample(*topic, *at, words),
             Event::Turn(clock) => {
                 writer.turn(*clock);
-                let duty = duties.next();
-                if let Some(duty) = duty.filter(|_| *clock >= due) {
-                    due = *clock + DUTY_PERIOD;
-                    writer.duty(duty);
+                let output = outputs.next();
+                if let Some(output) = output.filter(|output| *clock >= due && !output.is_empty()) {
+                    due = *clock + OUTPUT_PERIOD;
+                    writer.output(output);
                 }
             }
         }
@@ -204,31 +195,29 @@ fn encode(inputs: &[Event], start: Instant, duties: &[[f32; MOTORS]], hash: u64)
     record
 }
 
-/// What the motors were told after each turn.
+/// The newest sample of the output after each turn.
 #[derive(Default)]
-struct Duties {
-    now: [f32; MOTORS],
-    of_turns: Vec<[f32; MOTORS]>,
+struct Outputs {
+    topic: usize,
+    now: Vec<u32>,
+    of_turns: Vec<Vec<u32>>,
 }
 
-impl Observer for Duties {
-    fn has_read(&mut self, _: usize, _: &Activation) {}
-}
+impl Observer for Outputs {}
 
-impl Witness for Duties {
-    fn published(&mut self, topic: wiring::Id, _: Instant, _: u32, words: &[u32]) {
-        let output = words.try_into().ok().and_then(|words| MotorOutput::from_words(&words));
-        if let (wiring::Id::actuator_motor, Some(output)) = (topic, output) {
-            self.now = std::array::from_fn(|motor| output.duty[motor]);
+impl PlayObserver for Outputs {
+    fn published(&mut self, topic: usize, _: Instant, _: u32, words: &[u32]) {
+        if topic == self.topic {
+            self.now = words.to_vec();
             if let Some(last) = self.of_turns.last_mut() {
-                *last = self.now;
+                last.clone_from(&self.now);
             }
         }
     }
 
-    fn band_begins(&mut self, band: Band, _: Instant) {
+    fn band_starts(&mut self, band: Band, _: Instant) {
         if band == Band::Flight {
-            self.of_turns.push(self.now);
+            self.of_turns.push(self.now.clone());
         }
     }
 }
@@ -237,37 +226,54 @@ impl Witness for Duties {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use stampfly_board::golden::{FLIGHT, TOLERANCE, Verdict};
-    use stampfly_types::messages::ImuData;
+    use stampfly_board::golden::{FLIGHT, TOLERANCE};
+    use stampfly_board::simulation::StampFly;
+    use stampfly_board::topics::Id;
+    use stampfly_board::{VehicleConfig, schedule::Runnables};
+    use stampfly_bus::Activation;
+    use stampfly_flight::golden::Verdict;
+    use stampfly_types::{Message, messages::ImuData};
+
+    fn golden() -> Golden<StampFly> {
+        StampFly::golden().expect("it has one")
+    }
+
+    fn played(record: &[u8], observer: &mut impl PlayObserver) -> Result<Report, GoldenError> {
+        play::<Runnables>(record, &VehicleConfig::default(), TOLERANCE, observer)
+    }
 
     /// The golden flight as it was flown, with its hash.
     fn flown() -> (Vec<Event>, Instant, u64) {
-        let config = configuration().expect("a mission");
-        let mut recorder = Recorder::hash_only().with_inputs();
-        let outcome = fly(&config, &mut recorder, &mut |_, _| {});
-        (recorder.into_inputs(), config.simulation.start, outcome.log_hash)
+        let golden = golden();
+        let mut recorder = Recorder::<StampFly>::hash_only().with_inputs();
+        let _ = fly::<StampFly>(&golden.setup, &mut recorder, &mut |_, _| {});
+        let hash = recorder.hash();
+        (recorder.into_inputs(), golden.setup.simulation.start, hash)
     }
 
     /// The verdict on a machine that sees the inertial samples a little differently.
     fn verdict_when(change: impl Fn(&mut ImuData)) -> Verdict {
         let (mut inputs, start, _) = flown();
-        let mut duties = Duties::default();
-        let report = play(&encode(&inputs, start, &[], 0), &mut duties).expect("plays");
+        let golden = golden();
+        let mut outputs = Outputs { topic: golden.output, ..Outputs::default() };
+        let report = played(&encode(&golden, &inputs, start, &[], 0), &mut outputs).expect("plays");
         for input in &mut inputs {
-            if let Event::Sample { topic: wiring::Id::sensor_imu, words, .. } = input {
+            if let Event::Sample { topic, words, .. } = input
+                && *topic == Id::sensor_imu as usize
+            {
                 let mut sample = ImuData::from_words(&words.as_slice().try_into().expect("its size")).expect("any");
                 change(&mut sample);
                 *words = sample.to_words().to_vec();
             }
         }
-        let changed = encode(&inputs, start, &duties.of_turns, report.hash);
-        play(&changed, &mut ()).expect("plays").verdict
+        let changed = encode(&golden, &inputs, start, &outputs.of_turns, report.hash);
+        played(&changed, &mut ()).expect("plays").verdict
     }
 
     #[test]
     fn what_is_played_is_what_was_flown() {
         let (inputs, start, hash) = flown();
-        let (_, report) = write(&inputs, start).expect("plays");
+        let (_, report) = write(&golden(), &inputs, start).expect("plays");
         assert_eq!((report.verdict, report.hash), (Verdict::Identical, hash));
     }
 
@@ -276,15 +282,15 @@ mod tests {
         #[derive(Default)]
         struct Gatherings(usize);
         impl Observer for Gatherings {
-            fn has_read(&mut self, index: usize, activation: &Activation) {
+            fn has_read(&mut self, activation: &Activation) {
                 // Inertial sample, range, flow, field, pressure.
-                let all = activation.inputs().get(..5).is_some_and(|inputs| inputs.iter().all(|input| input.taken > 0));
-                self.0 += usize::from(index == 0 && all);
+                let all = activation.record().inputs().get(..5).is_some_and(|inputs| inputs.iter().all(|input| input.taken > 0));
+                self.0 += usize::from(activation.record().index == 0 && all);
             }
         }
-        impl Witness for Gatherings {}
+        impl PlayObserver for Gatherings {}
         let mut gatherings = Gatherings::default();
-        let report = play(FLIGHT, &mut gatherings).expect("plays");
+        let report = played(FLIGHT, &mut gatherings).expect("plays");
         let expected = (report.duration.as_micros() / GATHERING.as_micros()) as usize;
         assert!(gatherings.0 >= expected, "{} of {expected}", gatherings.0);
     }
@@ -305,11 +311,11 @@ mod tests {
         let changed = |place: usize| {
             let mut record = FLIGHT.to_vec();
             record[place] ^= 1;
-            play(&record, &mut ()).expect_err("refused")
+            played(&record, &mut ()).expect_err("refused")
         };
         assert_eq!([0, 4, 8].map(changed), [GoldenError::NotGolden, GoldenError::Damaged, GoldenError::OtherTables]);
         for length in [0, 3, 31, 32, FLIGHT.len() - 1] {
-            assert!(play(&FLIGHT[..length], &mut ()).is_err(), "{length}");
+            assert!(played(&FLIGHT[..length], &mut ()).is_err(), "{length}");
         }
     }
 
@@ -320,7 +326,7 @@ mod tests {
         fn a_damaged_record_is_noticed(place in 16..FLIGHT.len(), flip in 1u8..) {
             let mut record = FLIGHT.to_vec();
             record[place] ^= flip;
-            let outcome = play(&record, &mut ());
+            let outcome = played(&record, &mut ());
             prop_assert!(outcome.is_err() || outcome.is_ok_and(|report| report.verdict != Verdict::Identical));
         }
     }

@@ -139,6 +139,24 @@ pub struct Setting {
     pub meaning: &'static str,
 }
 
+/// A vehicle's golden flight: how it is flown, and how its record is judged.
+pub struct Golden<V: Vehicle + ?Sized> {
+    /// The flight, as short as can be.
+    pub setup: V::Setup,
+    /// The record that the program carries.
+    pub record: &'static [u8],
+    /// The topic whose numbers are compared.
+    pub output: usize,
+    /// Largest deviation of a number that may still be rounding.
+    pub tolerance: f32,
+    /// The sensor that activates the flight band.
+    pub leading: usize,
+    /// The others: now and then all of them are new at once, which is what a step costs most. The slowest comes last.
+    pub gathered: &'static [usize],
+    /// When the vehicle last changed its state.
+    pub settled: fn(&V::Outcome) -> Option<Instant>,
+}
+
 /// A vehicle that programs can fly.
 pub trait Vehicle: 'static {
     /// Its name on the command line, and as `sys_name` in its logs.
@@ -184,6 +202,11 @@ pub trait Vehicle: 'static {
         name: &str,
         value: ParameterValue,
     ) -> Result<(), SetupError>;
+
+    /// Its golden flight, if it has one.
+    fn golden() -> Option<Golden<Self>> {
+        None
+    }
 
     /// Every number of the simulated vehicle and its surroundings that options can change.
     fn plant(setup: &Self::Setup) -> Vec<Setting>;
