@@ -17,6 +17,7 @@
 //! | [`slot`] | two devices on one SPI bus without a lock |
 //! | [`recover_i2c`] | frees a bus whose data line is held |
 //! | [`shared`] | one I2C bus for several drivers, freed when a device hangs |
+//! | [`task`] | the task of a sensor, with backoff after errors and counters |
 //! | [`Decimator`] | from 1600 to 400 samples per second without folding |
 //!
 //! Reading a sensor is input and output and therefore `async`: a driver may wait for an interrupt, a bus or a
@@ -52,6 +53,7 @@ mod recovery;
 pub mod sensor;
 pub mod shared;
 pub mod slot;
+pub mod task;
 pub mod time;
 
 pub use actuator::{MotorError, MotorOutputs, PwmMotors};

@@ -56,3 +56,8 @@ pub use watchdog::Watchdog;
 #[path = "../tests/common/mod.rs"]
 #[allow(dead_code, reason = "each test uses a part")]
 mod rover;
+
+/// The README's example, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -54,11 +54,10 @@ const IDLE: Duration = Duration::from_millis(10);
 /// };
 /// let mut duty = 0.0;
 /// let write_motors = |_| if let Some(output) = motors.actuator_motor.latest() { duty = output.data.duty[0] };
-/// let flying = fly(sensing, &mut flight_loop, clock, Delay, &mut (), write_motors);
+/// let flying = fly(sensing, &mut flight_loop, clock, Delay, (), write_motors);
+/// // On an executor: `flying.await`.
 /// # use std::{pin::pin, task::{Context, Waker}};
-/// # assert!(pin!(flying).poll(&mut Context::from_waker(Waker::noop())).is_pending()); /*
-/// spawner.spawn(flying);
-/// # */
+/// # assert!(pin!(flying).poll(&mut Context::from_waker(Waker::noop())).is_pending());
 /// assert_eq!(duty, 0.75);
 /// # }
 /// ```
@@ -71,7 +70,7 @@ pub async fn fly<R: Schedule>(
     flight_loop: &mut FlightLoop<'_, R>,
     clock: impl Fn() -> Instant,
     mut delay: impl DelayNs,
-    observer: &mut impl Observer,
+    mut observer: impl Observer,
     mut after_flight_band: impl FnMut(Instant),
 ) -> Infallible {
     let mut sensing = pin!(sensing);
@@ -94,10 +93,10 @@ pub async fn fly<R: Schedule>(
             .await;
         }
         let now = clock();
-        if flight_loop.run_band(Band::Flight, now, observer) {
+        if flight_loop.run_band(Band::Flight, now, &mut observer) {
             after_flight_band(now);
-        } else if let Some(pending) = flight_loop.start_next(Band::Background, now, observer) {
-            flight_loop.finish(pending, observer);
+        } else if let Some(pending) = flight_loop.start_next(Band::Background, now, &mut observer) {
+            flight_loop.finish(pending, &mut observer);
             yield_now().await;
         }
     }

@@ -74,8 +74,7 @@ fn samples_and_deadlines_reach_the_motors_at_once() {
         let output = motors.actuator_motor.latest().expect("the flight band has just published");
         duties.borrow_mut().push((now, output.data.duty[0]));
     };
-    let mut observer = Ran(&ran);
-    let task = fly(sensing, &mut flight_loop, || clock.now(), Delay(&clock), &mut observer, write);
+    let task = fly(sensing, &mut flight_loop, || clock.now(), Delay(&clock), Ran(&ran), write);
     clock.run(pin!(task), Instant::from_millis(150));
 
     let at = Instant::from_micros;
@@ -98,8 +97,7 @@ fn a_task_that_was_dropped_can_be_started_again() {
     let mut bus = topics::Bus::new();
     let Assembled { mut flight_loop, .. } = Assembled::<Rover>::new(bus.split(None), &0.5, Instant::ZERO);
     for until in [75, 120].map(Instant::from_millis) {
-        let mut observer = Ran(&ran);
-        let task = fly(pending(), &mut flight_loop, || clock.now(), Delay(&clock), &mut observer, |_| {});
+        let task = fly(pending(), &mut flight_loop, || clock.now(), Delay(&clock), Ran(&ran), |_| {});
         clock.run(pin!(task), until);
     }
     let at = Instant::from_millis;
