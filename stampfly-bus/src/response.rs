@@ -60,11 +60,7 @@ impl Arrivals {
     }
 
     /// Of the line `index`, or of the line that activates it.
-    const fn of<const A: usize>(
-        table: &[ActivationInfo; A],
-        topics: &[TopicInfo],
-        index: usize,
-    ) -> Result<Self, Unbounded> {
+    const fn of(table: &[ActivationInfo], topics: &[TopicInfo], index: usize) -> Result<Self, Unbounded> {
         let mut arrivals = Self { sources: [(1, 0); MAX_TRIGGERS + 1], count: 0, deadline: u64::MAX };
         let (mut line, mut silence) = (index, u64::MAX);
         loop {
@@ -113,9 +109,9 @@ const fn is_flight(info: &ActivationInfo) -> bool {
 }
 
 /// The longest budget of the background from the line `first` on, µs.
-const fn longest_background<const A: usize>(table: &[ActivationInfo; A], first: usize) -> u64 {
+const fn longest_background(table: &[ActivationInfo], first: usize) -> u64 {
     let (mut line, mut longest) = (first, 0);
-    while line < A {
+    while line < table.len() {
         if !is_flight(&table[line]) && table[line].budget.as_micros() > longest {
             longest = table[line].budget.as_micros();
         }
@@ -125,7 +121,7 @@ const fn longest_background<const A: usize>(table: &[ActivationInfo; A], first: 
 }
 
 /// The line whose trigger starts the chain of `after`s that this one belongs to.
-const fn first_of_chain<const A: usize>(table: &[ActivationInfo; A], mut line: usize) -> usize {
+const fn first_of_chain(table: &[ActivationInfo], mut line: usize) -> usize {
     while let Trigger::After(before) = table[line].trigger
         && before < line
     {
@@ -135,9 +131,9 @@ const fn first_of_chain<const A: usize>(table: &[ActivationInfo; A], mut line: u
 }
 
 /// What one pass through the whole flight band takes, µs.
-const fn longest_pass<const A: usize>(table: &[ActivationInfo; A]) -> u64 {
+const fn longest_pass(table: &[ActivationInfo]) -> u64 {
     let (mut line, mut sum) = (0, 0);
-    while line < A {
+    while line < table.len() {
         if is_flight(&table[line]) {
             sum += table[line].budget.as_micros();
         }
@@ -150,8 +146,8 @@ const fn longest_pass<const A: usize>(table: &[ActivationInfo; A]) -> u64 {
 ///
 /// # Errors
 /// When nothing can be promised: see [`Unbounded`].
-pub const fn response_time<const A: usize>(
-    table: &[ActivationInfo; A],
+pub const fn response_time(
+    table: &[ActivationInfo],
     topics: &[TopicInfo],
     index: usize,
 ) -> Result<Duration, Unbounded> {
@@ -167,7 +163,7 @@ pub const fn response_time<const A: usize>(
     loop {
         let mut next = begun + if flies { 0 } else { table[index].budget.as_micros() };
         let mut line = 0;
-        while line < A {
+        while line < table.len() {
             if is_flight(&table[line]) || !flies && line < index {
                 let arrivals = match Arrivals::of(table, topics, line) {
                     Ok(arrivals) => arrivals,

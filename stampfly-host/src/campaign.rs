@@ -2,10 +2,10 @@
 
 use crate::flown::{Flown, fly};
 use serde::Serialize;
+use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 
 /// Median, 95th percentile and worst of a figure over the flights that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

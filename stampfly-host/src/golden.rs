@@ -8,13 +8,13 @@
 
 use crate::flown::fly;
 use crate::recorder::Recorder;
-use std::collections::BTreeMap;
-use std::fmt;
 use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_flight::Observer;
 use stampfly_flight::golden::{GoldenError, PlayObserver, Report, Writer, play, tables};
 use stampfly_sim::vehicle::{Golden, Vehicle, Verdict};
 use stampfly_types::{Duration, Instant};
+use std::collections::BTreeMap;
+use std::fmt;
 
 /// The record goes on for this long after the last change of state.
 const TAIL: Duration = Duration::from_millis(100);
@@ -151,11 +151,7 @@ fn gather<V: Vehicle>(inputs: &mut Vec<Event>, start: Instant, golden: &Golden<V
 }
 
 /// Writes a record of these inputs, with what comes of them here.
-fn write<V: Vehicle>(
-    golden: &Golden<V>,
-    inputs: &[Event],
-    start: Instant,
-) -> Result<(Vec<u8>, Report), GoldenError> {
+fn write<V: Vehicle>(golden: &Golden<V>, inputs: &[Event], start: Instant) -> Result<(Vec<u8>, Report), GoldenError> {
     // Played once without expecting anything, to find out what to expect.
     let (config, tolerance) = (V::config(&golden.setup), golden.tolerance);
     let mut outputs = Outputs { topic: golden.output, ..Outputs::default() };
@@ -284,7 +280,11 @@ mod tests {
         impl Observer for Gatherings {
             fn has_read(&mut self, activation: &Activation) {
                 // Inertial sample, range, flow, field, pressure.
-                let all = activation.record().inputs().get(..5).is_some_and(|inputs| inputs.iter().all(|input| input.taken > 0));
+                let all = activation
+                    .record()
+                    .inputs()
+                    .get(..5)
+                    .is_some_and(|inputs| inputs.iter().all(|input| input.taken > 0));
                 self.0 += usize::from(activation.record().index == 0 && all);
             }
         }

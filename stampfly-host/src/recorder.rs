@@ -2,12 +2,16 @@
 
 use crate::golden::{Event, Inputs};
 use stampfly_bus::{Activation, Schedule};
+use stampfly_flight::key_frame::{self, KeyFrameError};
 use stampfly_flight::{FlightLoop, LogSchema, Observer};
 use stampfly_log::FlightHash;
 use stampfly_log::ulog::{Definitions, ParameterValue, Sink, WriteError};
 use stampfly_sim::vehicle::{Vehicle, Witness};
-use stampfly_types::Instant;
+use stampfly_types::{Duration, Instant};
 use std::convert::Infallible;
+
+/// Time between two key frames in a log: a replay that starts anywhere begins at most this much later.
+const KEY_FRAME_PERIOD: Duration = Duration::from_secs(1);
 
 /// A log in memory.
 #[derive(Debug, Default)]
@@ -61,6 +65,8 @@ pub struct Recorder<V: Vehicle> {
     timing: Option<Vec<Timing>>,
     started: Option<std::time::Instant>,
     inputs: Option<Inputs>,
+    key_frame_due: Instant,
+    frame: Vec<u8>,
 }
 
 impl<V: Vehicle> Default for Recorder<V> {
@@ -73,7 +79,16 @@ impl<V: Vehicle> Recorder<V> {
     /// Only the hash.
     #[must_use]
     pub fn hash_only() -> Self {
-        Self { hash: FlightHash::new(), log: None, bytes: Vec::new(), timing: None, started: None, inputs: None }
+        Self {
+            hash: FlightHash::new(),
+            log: None,
+            bytes: Vec::new(),
+            timing: None,
+            started: None,
+            inputs: None,
+            key_frame_due: Instant::ZERO,
+            frame: Vec::new(),
+        }
     }
 
     /// The hash and a ULog in memory. `facts` are written into its head.
@@ -174,7 +189,21 @@ impl<V: Vehicle> Witness<V::Runnables> for Recorder<V> {
         }
     }
 
-    fn at_rest(&mut self, _clock: Instant, _flight_loop: &FlightLoop<'_, V::Runnables>) {}
+    fn at_rest(&mut self, clock: Instant, flight_loop: &FlightLoop<'_, V::Runnables>) {
+        let Some(log) = self.log.as_mut().filter(|_| clock >= self.key_frame_due) else { return };
+        self.key_frame_due = clock + KEY_FRAME_PERIOD;
+        loop {
+            match key_frame::encode(flight_loop, clock, &mut self.frame) {
+                Ok(length) => {
+                    // The sink is memory.
+                    let _ = log.key_frame(clock, self.frame.get(..length).unwrap_or_default());
+                    return;
+                }
+                Err(KeyFrameError::NoRoom) => self.frame.resize(2 * self.frame.len().max(4096), 0),
+                Err(_) => return,
+            }
+        }
+    }
 
     fn lost(&mut self, clock: Instant, samples: u32) {
         if let Some(log) = &mut self.log {

@@ -2,11 +2,11 @@
 //!
 //! Works on the columns a plot would show: `truth`, `setpoint`, `estimate_state` and `system_mode` of the parsed ULog.
 
-use stampfly_lab::flight_log;
 use stampfly_host::mission::{HOVER, Mission, REFERENCE};
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_host::{Flight, flight::Series};
+use stampfly_lab::flight_log;
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 

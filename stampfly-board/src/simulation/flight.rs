@@ -12,7 +12,7 @@ use stampfly_drivers::{Button, Indicator, MotorOutputs};
 use stampfly_sim::chips;
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_sim::vehicle::{self, Figure, FlightOptions, Verdict};
+use stampfly_sim::vehicle::{self, Figure, Verdict};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{FlightMode, FlightState, MotorOutput, Setpoint, StateEstimate, SystemMode};
 use stampfly_types::{Duration, Instant, Message, Quat, Vec3, frame};
@@ -33,8 +33,10 @@ pub struct Setup {
     pub sensing: Sensing,
     /// Is the vehicle watched by a motion capture system?
     pub cameras: bool,
-    /// How the executor flies it.
-    pub flight: FlightOptions,
+    /// Seed of the executor's delays; `None` for an executor that is never late.
+    pub jitter: Option<u64>,
+    /// The flight is broken off after this long.
+    pub limit: Duration,
 }
 
 impl Setup {
@@ -47,7 +49,8 @@ impl Setup {
             mission: Mission::parse(mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
             sensing: Sensing::Models,
             cameras: false,
-            flight: FlightOptions { start: simulation.start, limit: Duration::from_secs(180), jitter: None },
+            jitter: None,
+            limit: Duration::from_secs(180),
             simulation,
         }
     }
@@ -197,7 +200,7 @@ impl vehicle::Surroundings for Surroundings {
             world: world.clone(),
             steps: setup.mission.steps.len(),
             progress,
-            watch: Watch::new(&world.truth_at(setup.flight.start)),
+            watch: Watch::new(&world.truth_at(setup.simulation.start)),
             duties: motors.actuator_motor,
             motors: actuators.motors,
             signals: indicator.signal,

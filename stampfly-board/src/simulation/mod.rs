@@ -76,12 +76,12 @@ impl Vehicle for StampFly {
         }
         setup.sensing = if options.chips { Sensing::Chips } else { Sensing::Models };
         setup.cameras = options.cameras;
-        setup.flight.jitter = options.jitter;
+        setup.jitter = options.jitter;
         Ok(setup)
     }
 
     fn options(setup: &Setup) -> FlightOptions {
-        setup.flight
+        FlightOptions { start: setup.simulation.start, limit: setup.limit, jitter: setup.jitter }
     }
 
     fn config(setup: &Setup) -> &VehicleConfig {

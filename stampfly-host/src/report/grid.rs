@@ -1,6 +1,6 @@
 //! One time axis for everything on the page, and numbers small enough to send.
 
-use crate::flight::Series;
+use stampfly_lab::flight::Series;
 use serde::Serialize;
 use stampfly_types::{Duration, Instant};
 

@@ -10,7 +10,7 @@ mod grid;
 mod page;
 mod panels;
 
-use crate::flight::Flight;
+use stampfly_lab::Flight;
 use std::io;
 use std::path::Path;
 
@@ -43,7 +43,8 @@ impl Metric {
 /// What goes into a page.
 ///
 /// ```
-/// use stampfly_host::{Flight, Report, report::Metric};
+/// use stampfly_host::{Report, report::Metric};
+/// use stampfly_lab::Flight;
 /// use stampfly_types::{Instant, messages::StateEstimate};
 ///
 /// let mut flight = Flight::default();

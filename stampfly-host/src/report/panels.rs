@@ -3,8 +3,8 @@
 //! Everything that depends on the flight is decided here; the script of the page only draws.
 
 use super::grid::{Channel, Grid, Pick};
-use crate::flight::{Flight, Series};
 use serde::Serialize;
+use stampfly_lab::flight::{Flight, Series};
 use stampfly_types::messages::SetpointAxes;
 use stampfly_types::{Quat, frame};
 

@@ -18,6 +18,7 @@ pub use executor::{Ended, FlightOptions, fly};
 pub use witness::Witness;
 
 use crate::time::{Clock, Tasks};
+use serde::{Serialize, de::DeserializeOwned};
 use stampfly_bus::{Schedule, TopicTable};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_types::Instant;
@@ -163,8 +164,8 @@ pub trait Vehicle: 'static {
     const NAME: &'static str;
     /// Topics that its surroundings add to the log.
     const BESIDE: &'static [Topic];
-    /// Its runnables.
-    type Runnables: Schedule;
+    /// Its runnables. Serialisable, so that a log can hold key frames.
+    type Runnables: Schedule + Serialize + DeserializeOwned;
     /// All that decides a flight.
     type Setup: Clone + Send + Sync;
     /// What is around it.

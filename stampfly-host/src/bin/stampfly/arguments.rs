@@ -2,13 +2,12 @@
 
 use crate::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use stampfly_board::{VehicleConfig, parameters};
+use stampfly_board::VehicleConfig;
+use stampfly_board::simulation::StampFly;
+use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
 use stampfly_lab::estimate::{ATTITUDE, suite};
-use stampfly_host::mission::Mission;
-use stampfly_host::sensing::Sensing;
-use stampfly_host::simulate::FlightConfig;
-use std::fmt::Display;
+use stampfly_sim::vehicle::{Options, Vehicle};
 use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
@@ -49,12 +48,28 @@ impl Default for Command {
     }
 }
 
-/// What decides a simulated flight.
+/// Which vehicle.
 #[derive(Clone, Debug, Args)]
+pub struct VehicleOption {
+    /// The vehicle: one of those that `stampfly --help` lists.
+    #[arg(long = "vehicle", value_name = "NAME", default_value = vehicles::DEFAULT, value_parser = clap::builder::PossibleValuesParser::new(vehicles::NAMES))]
+    pub name: String,
+}
+
+impl Default for VehicleOption {
+    fn default() -> Self {
+        Self { name: vehicles::DEFAULT.into() }
+    }
+}
+
+/// What decides a simulated flight.
+#[derive(Clone, Debug, Default, Args)]
 pub struct SceneOptions {
-    /// Mission to fly: a file, one of the built-in `square` and `hover`, or `random`, drawn from the seed.
-    #[arg(long, value_name = "FILE", default_value = "square")]
-    pub mission: String,
+    #[command(flatten)]
+    pub vehicle: VehicleOption,
+    /// Mission to fly: a file, or one that the vehicle knows by name (StampFly: `square`, `hover`, `random`).
+    #[arg(long, value_name = "FILE")]
+    pub mission: Option<String>,
     /// Change a number of the simulated vehicle or its surroundings (see `--list`).
     #[arg(long, value_name = "NAME=VALUE")]
     pub plant: Vec<String>,
@@ -62,8 +77,8 @@ pub struct SceneOptions {
     #[arg(long, value_name = "NAME=VALUE")]
     pub param: Vec<String>,
     /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
-    #[arg(long, value_name = "K", default_value_t = 1.0)]
-    pub vibration: f64,
+    #[arg(long, value_name = "K")]
+    pub vibration: Option<f64>,
     /// Standard deviation of gusts, m/s.
     #[arg(long, value_name = "M/S")]
     pub gust: Option<f32>,
@@ -85,24 +100,6 @@ pub struct SceneOptions {
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
-}
-
-impl Default for SceneOptions {
-    fn default() -> Self {
-        Self {
-            mission: "square".into(),
-            plant: Vec::new(),
-            param: Vec::new(),
-            vibration: 1.0,
-            gust: None,
-            wind: None,
-            chips: false,
-            cameras: false,
-            jitter: None,
-            list: false,
-            json: false,
-        }
-    }
 }
 
 /// Options of `fly`.
@@ -127,6 +124,8 @@ impl Default for FlyOptions {
 /// Options of `golden`.
 #[derive(Clone, Debug, Args)]
 pub struct GoldenOptions {
+    #[command(flatten)]
+    pub vehicle: VehicleOption,
     /// Fly and record it again, into this file.
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -157,6 +156,12 @@ pub struct CampaignOptions {
 pub struct ReplayOptions {
     /// The log.
     pub file: PathBuf,
+    /// The vehicle, for a log that does not name its own.
+    #[arg(long, value_name = "NAME")]
+    pub vehicle: Option<String>,
+    /// Start at the first key frame after this many seconds on the vehicle's clock, instead of at power-on.
+    #[arg(long, value_name = "SECONDS")]
+    pub from: Option<f64>,
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
@@ -165,6 +170,8 @@ pub struct ReplayOptions {
 /// Options of `topics`.
 #[derive(Clone, Debug, Args)]
 pub struct TopicsOptions {
+    #[command(flatten)]
+    pub vehicle: VehicleOption,
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
@@ -223,19 +230,12 @@ impl EstimateOptions {
 /// Applies `--param`.
 fn set_parameters(config: &mut VehicleConfig, texts: &[String]) -> Result<(), Failure> {
     for text in texts {
-        let (name, value) = assignment(text)?;
-        parameters::set(config, name, value as f32).map_err(|error| format!("--param {text}: {error}"))?;
+        let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
+        let value: f32 = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
+        StampFly::set_parameter(config, name.trim(), value.into())
+            .map_err(|error| format!("--param {text}: {error}"))?;
     }
     Ok(())
-}
-
-/// The value, if it is a number in its range.
-fn within<T: PartialOrd + Display>(name: &str, value: T, low: T, high: T) -> Result<T, Failure> {
-    if low <= value && value <= high {
-        Ok(value)
-    } else {
-        Err(format!("{name} {value} is not from {low} to {high}").into())
-    }
 }
 
 /// Reads `N,E`.
@@ -245,57 +245,22 @@ fn north_and_east(text: &str) -> Result<[f32; 2], String> {
     Ok([parse(north)?, parse(east)?])
 }
 
-/// Splits `name=value`.
-fn assignment(text: &str) -> Result<(&str, f64), Failure> {
-    let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
-    let value = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
-    Ok((name.trim(), value))
-}
-
 impl SceneOptions {
     /// The flight these options describe.
-    pub fn config(&self, seed: u64) -> Result<FlightConfig, Failure> {
-        let mut config = FlightConfig::reference(seed);
-        config.mission = match self.mission.as_str() {
-            "square" => Mission::parse(stampfly_host::mission::REFERENCE)?,
-            "hover" => Mission::parse(stampfly_host::mission::HOVER)?,
-            "random" => Mission::random(seed),
-            path => {
-                let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
-                Mission::parse(&text).map_err(|error| format!("mission {path}: {error}"))?
-            }
-        };
-        config.simulation.vibration = within("--vibration", self.vibration, 0.0, 20.0)?;
-        if let Some(gust) = self.gust {
-            config.simulation.wind.gust = within("--gust", gust, 0.0, 20.0)?;
-        }
-        if let Some([north, east]) = self.wind {
-            within("--wind north", north, -20.0, 20.0)?;
-            within("--wind east", east, -20.0, 20.0)?;
-            config.simulation.wind.mean = [north, east, 0.0].into();
-        }
-        for text in &self.plant {
-            let (name, value) = assignment(text)?;
-            config.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
-        }
-        set_parameters(&mut config.vehicle, &self.param)?;
-        config.sensing = if self.chips { Sensing::Chips } else { Sensing::Models };
-        config.cameras = self.cameras;
-        config.jitter = self.jitter;
-        Ok(config)
+    pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>) -> Result<V::Setup, Failure> {
+        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, .. } = self.clone();
+        let options = Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter };
+        Ok(V::setup(&options, seed)?)
     }
 
     /// Prints what can be changed.
-    pub fn print_list(&self, seed: u64) -> Result<(), Failure> {
-        let config = self.config(seed)?;
-        outln!("--param");
-        for parameter in parameters::PARAMETERS {
-            let value = parameter.get(&config.vehicle);
-            outln!("  {:<30} {value:>12} {:<18} {}", parameter.name, parameter.unit, parameter.meaning);
-        }
-        outln!("\n--plant");
-        for row in config.simulation.plant.iter() {
-            outln!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.description);
+    pub fn print_list<V: Vehicle>(&self, seed: u64) -> Result<(), Failure> {
+        let setup = self.setup::<V>(seed, self.jitter)?;
+        for (title, settings) in [("--param", V::parameters(V::config(&setup))), ("\n--plant", V::plant(&setup))] {
+            outln!("{title}");
+            for row in settings {
+                outln!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.meaning);
+            }
         }
         Ok(())
     }

@@ -5,80 +5,119 @@ use crate::Failure;
 use crate::arguments::CampaignOptions;
 use crate::terminal;
 use serde_json::{Map, json};
-use stampfly_host::campaign::{run_recorded, spreads, workers};
-use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Summary};
-use stampfly_host::recorder::Recorder;
-use stampfly_host::simulate::FlightConfig;
+use stampfly_board::simulation::StampFly;
+use stampfly_host::campaign::{self, Flight, spreads, workers};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
+use stampfly_sim::vehicle::{Vehicle, Witness};
 use std::process::ExitCode;
 use std::time::Instant;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
-    if options.scene.list {
-        options.scene.print_list(options.seed)?;
-        return Ok(ExitCode::SUCCESS);
+    if options.consistency {
+        return consistency(options);
     }
-    let configs: Result<Vec<FlightConfig>, Failure> = (0..options.flights)
+    vehicles::with(&options.scene.vehicle.name, Campaign(options))?
+}
+
+struct Campaign<'o>(&'o CampaignOptions);
+
+impl ForVehicle for Campaign<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let options = self.0;
+        if options.scene.list {
+            options.scene.print_list::<V>(options.seed)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let (flights, factor) = fly_all::<V, ()>(options, &|_, _| ())?;
+        print::<V, ()>(options, &flights, factor, None);
+        Ok(if flights.iter().all(Flight::succeeded) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+}
+
+/// Errors and innovations of the estimator over all flights: a question to the StampFly's.
+fn consistency(options: &CampaignOptions) -> Result<ExitCode, Failure> {
+    if options.scene.vehicle.name != StampFly::NAME {
+        return Err(format!("--consistency is for the estimator of {}", StampFly::NAME).into());
+    }
+    let observe = |seed: u64, setup: &<StampFly as Vehicle>::Setup| Observation::new(setup.vehicle.eskf, seed);
+    let (flights, factor) = fly_all::<StampFly, Observation>(options, &observe)?;
+    let succeeded = flights.iter().all(Flight::succeeded);
+    let (seen, flights): (Vec<_>, Vec<_>) = flights
+        .into_iter()
+        .map(|Flight { seed, flown, witness }| (witness.finish(), Flight::<StampFly, ()> { seed, flown, witness: () }))
+        .unzip();
+    let summary = Summary::of(&seen);
+    print::<StampFly, ()>(options, &flights, factor, Some(&summary));
+    Ok(if succeeded && summary.is_good() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Flies all of them, each with a seed of its own. Also returns simulated over wall time.
+fn fly_all<V: Vehicle, W: Witness<V::Runnables> + Send>(
+    options: &CampaignOptions,
+    witness: &(dyn Fn(u64, &V::Setup) -> W + Sync),
+) -> Result<(Vec<Flight<V, W>>, f64), Failure> {
+    let setups: Result<Vec<_>, Failure> = (0..options.flights)
         .map(|index| {
             let nth = |name: &str, seed: u64| {
                 seed.checked_add(index)
                     .ok_or_else(|| format!("{name} {seed} leaves no seeds for {} flights", options.flights))
             };
-            let mut config = options.scene.config(nth("--seed", options.seed)?)?;
+            let seed = nth("--seed", options.seed)?;
             // Every flight has its own delays, too.
-            config.jitter = config.jitter.map(|seed| nth("--jitter", seed)).transpose()?;
-            Ok(config)
+            let jitter = options.scene.jitter.map(|seed| nth("--jitter", seed)).transpose()?;
+            Ok((seed, options.scene.setup::<V>(seed, jitter)?))
         })
         .collect();
-    let configs = configs?;
     let bar = terminal::bar(options.flights, "flying {wide_bar:.cyan} {pos}/{len} flights, {eta} left");
-    let started = Instant::now();
-    let recorder = |config: &FlightConfig| {
-        let recorder = Recorder::hash_only();
-        if options.consistency { recorder.with_consistency(config.simulation.seed) } else { recorder }
-    };
-    let flights = run_recorded(&configs, &recorder, &|_| bar.inc(1));
+    let begun = Instant::now();
+    let flights = campaign::run::<V, W>(&setups?, witness, &|_| bar.inc(1));
     bar.finish_and_clear();
-    let wall = started.elapsed().as_secs_f64();
-    let simulated: f64 = flights.iter().map(|flight| flight.outcome.duration.seconds_f64()).sum();
-    let landed = flights.iter().filter(|flight| flight.succeeded()).count();
-    let failed: Vec<u64> = flights.iter().filter(|flight| !flight.succeeded()).map(|flight| flight.seed).collect();
-    let looked_at: Vec<_> = flights.iter().filter_map(|flight| flight.consistency.clone()).collect();
-    let consistency = options.consistency.then(|| Summary::of(&looked_at));
+    let simulated: f64 = flights.iter().map(|flight| flight.flown.duration.seconds_f64()).sum();
+    Ok((flights, simulated / begun.elapsed().as_secs_f64()))
+}
 
+fn print<V: Vehicle, W>(
+    options: &CampaignOptions,
+    flights: &[Flight<V, W>],
+    factor: f64,
+    consistency: Option<&Summary>,
+) {
+    let failed: Vec<u64> = flights.iter().filter(|flight| !flight.succeeded()).map(|flight| flight.seed).collect();
+    let (all, succeeded) = (flights.len(), flights.len() - failed.len());
     if options.scene.json {
         let mut object = Map::new();
-        object.insert("flights".into(), json!(flights.len()));
-        object.insert("landed".into(), json!(landed));
+        object.insert("flights".into(), json!(all));
+        object.insert("landed".into(), json!(succeeded));
         object.insert("failed_seeds".into(), json!(failed));
-        for (name, _, spread) in spreads(&flights) {
+        for (name, _, spread) in spreads(flights) {
             object.insert(name.into(), json!(spread));
         }
-        if let Some(summary) = &consistency {
+        if let Some(summary) = consistency {
             object.insert("consistency".into(), json!(summary));
         }
-        object.insert("realtime_factor".into(), json!(simulated / wall));
+        object.insert("realtime_factor".into(), json!(factor));
         outln!("{}", serde_json::Value::Object(object));
-    } else {
-        outln!("{:<22} {:>9} {:>9} {:>9}", "", "median", "95 %", "worst");
-        for (name, unit, spread) in spreads(&flights) {
-            match spread {
-                Some(s) => outln!("{name:<22} {:>9.3} {:>9.3} {:>9.3} {unit}", s.p50, s.p95, s.max),
-                None => outln!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
-            }
-        }
-        let (all, cores) = (flights.len(), workers(flights.len()));
-        let plural = if cores == 1 { "" } else { "s" };
-        let factor = simulated / wall;
-        outln!("\n{landed} of {all} flights landed and disarmed; {factor:.0} × real time on {cores} core{plural}");
-        if !failed.is_empty() {
-            outln!("seeds that did not: {failed:?}");
-        }
-        if let Some(summary) = &consistency {
-            print_consistency(summary);
+        return;
+    }
+    outln!("{:<22} {:>9} {:>9} {:>9}", "", "median", "95 %", "worst");
+    for (name, unit, spread) in spreads(flights) {
+        match spread {
+            Some(s) => outln!("{name:<22} {:>9.3} {:>9.3} {:>9.3} {unit}", s.p50, s.p95, s.max),
+            None => outln!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
         }
     }
-    let consistent = consistency.as_ref().is_none_or(Summary::is_good);
-    Ok(if failed.is_empty() && consistent { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let cores = workers(all);
+    let plural = if cores == 1 { "" } else { "s" };
+    outln!("\n{succeeded} of {all} flights succeeded; {factor:.0} × real time on {cores} core{plural}");
+    if !failed.is_empty() {
+        outln!("seeds that did not: {failed:?}");
+    }
+    if let Some(summary) = consistency {
+        print_consistency(summary);
+    }
 }
 
 fn print_consistency(summary: &Summary) {

@@ -4,10 +4,11 @@ use crate::Failure;
 use crate::arguments::EstimateOptions;
 use crate::terminal;
 use serde::Serialize;
+use stampfly_host::report::Metric;
+use stampfly_host::Report;
+use stampfly_lab::Recording;
 use stampfly_lab::dataset::{self, Kind};
 use stampfly_lab::estimate::{self, Estimated, Figures};
-use stampfly_host::report::Metric;
-use stampfly_host::{Recording, Report};
 use std::path::Path;
 use std::process::ExitCode;
 

@@ -1,132 +1,129 @@
-//! `stampfly fly`: one flight, its log and its report, and one screen about how it went.
+//! `stampfly fly`: one flight, its log and its report, and one screen about it.
 
 use crate::Failure;
 use crate::arguments::FlyOptions;
 use crate::terminal;
 use serde_json::{Map, json};
-use stampfly_board::plan;
-use stampfly_lab::flight_log;
-use stampfly_host::metrics::FIGURES;
-use stampfly_host::recorder::Recorder;
+use stampfly_bus::Schedule;
+use stampfly_host::flown::{Flown, fly};
+use stampfly_host::recorder::{Recorder, Timing};
 use stampfly_host::report::{Metric, Report};
-use stampfly_host::simulate::{Outcome, fly};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_lab::flight_log;
+use stampfly_sim::vehicle::{Vehicle, Verdict};
 use std::path::Path;
 use std::process::ExitCode;
 
 pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
-    if options.scene.list {
-        options.scene.print_list(options.seed)?;
-        return Ok(ExitCode::SUCCESS);
+    vehicles::with(&options.scene.vehicle.name, Fly(options))?
+}
+
+struct Fly<'o>(&'o FlyOptions);
+
+impl ForVehicle for Fly<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let options = self.0;
+        if options.scene.list {
+            options.scene.print_list::<V>(options.seed)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter)?;
+        std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
+        let facts = [
+            ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("seed".to_owned(), options.seed.to_string()),
+            ("mission".to_owned(), options.scene.mission.clone().unwrap_or_else(|| "default".into())),
+        ];
+        let mut recorder = Recorder::<V>::with_log(&setup, &facts).with_timing();
+        let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
+        let flown = fly::<V>(&setup, &mut recorder, &mut |done, word| {
+            bar.set_message(word);
+            bar.set_position((done * 1000.0) as u64);
+        });
+        bar.finish_and_clear();
+
+        let log = options.out.join("flight.ulg");
+        std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
+        let page = options.out.join("flight.html");
+        write_report::<V>(&flown, &recorder, options, &page)?;
+
+        if options.scene.json {
+            print_json(&flown, recorder.hash());
+        } else {
+            print_screen::<V>(&flown, &recorder, &log, &page);
+        }
+        Ok(if flown.outcome.succeeded() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
-    let config = options.scene.config(options.seed)?;
-    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
-    let facts = vec![
-        ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        ("seed".to_owned(), options.seed.to_string()),
-        ("mission".to_owned(), options.scene.mission.clone()),
-    ];
-    let mut recorder = Recorder::with_log(facts).with_timing();
-    let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
-    let outcome = fly(&config, &mut recorder, &mut |done, state| {
-        bar.set_message(state.name());
-        bar.set_position((done * 1000.0) as u64);
-    });
-    bar.finish_and_clear();
-
-    let log = options.out.join("flight.ulg");
-    std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
-
-    let page = options.out.join("flight.html");
-    write_report(&outcome, recorder.log(), options, &page)?;
-
-    if options.scene.json {
-        print_json(&outcome);
-    } else {
-        print_screen(&outcome, &recorder, &log, &page);
-    }
-    let good = outcome.metrics.landed && outcome.metrics.disarmed && outcome.finished;
-    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// The report is made from the log, so it shows what the log holds and nothing else.
-fn write_report(outcome: &Outcome, log: &[u8], options: &FlyOptions, page: &Path) -> Result<(), Failure> {
-    let parsed = flight_log::parse(log)?;
-    let mut metrics: Vec<Metric> = FIGURES
-        .iter()
-        .filter_map(|(name, unit, figure)| Some((name, unit, figure(&outcome.metrics)?)))
-        .map(|(name, unit, value)| Metric::new(*name, format!("{value:.3}"), *unit))
-        .collect();
-    let done = outcome.metrics.landed && outcome.metrics.disarmed;
-    metrics.insert(0, Metric::new("landed, disarmed", if done { "yes" } else { "no" }, "").judged(done));
-    metrics.push(Metric::new("log hash", format!("{:016x}", outcome.log_hash), ""));
+fn write_report<V: Vehicle>(
+    flown: &Flown<V::Outcome>,
+    recorder: &Recorder<V>,
+    options: &FlyOptions,
+    page: &Path,
+) -> Result<(), Failure> {
+    let parsed = flight_log::parse(recorder.log())?;
+    let outcome = &flown.outcome;
+    let mut metrics = vec![Metric::new("verdict", outcome.sentence(), "").judged(outcome.succeeded())];
+    let figures = outcome.figures();
+    let figures = figures.iter().filter_map(|figure| Some((figure, figure.value?)));
+    metrics.extend(figures.map(|(figure, value)| Metric::new(figure.name, format!("{value:.3}"), figure.unit)));
+    metrics.push(Metric::new("log hash", format!("{:016x}", recorder.hash()), ""));
+    let mission = options.scene.mission.as_deref().map(|mission| format!("mission {mission}, ")).unwrap_or_default();
     let report = Report {
-        title: "StampFly flight".into(),
-        subtitle: format!(
-            "simulated, mission {}, seed {}, vibration {}, {:.1} s",
-            options.scene.mission,
-            options.seed,
-            options.scene.vibration,
-            outcome.duration.seconds_f64()
-        ),
+        title: format!("Flight of {}", V::NAME),
+        subtitle: format!("simulated, {mission}seed {}, {:.1} s", options.seed, flown.duration.seconds_f64()),
         metrics,
         flight: &parsed.flight,
     };
     report.write(page).map_err(|error| format!("{}: {error}", page.display()).into())
 }
 
-fn print_json(outcome: &Outcome) {
+fn print_json(flown: &Flown<impl Verdict>, hash: u64) {
     let mut object = Map::new();
-    object.insert("landed".into(), json!(outcome.metrics.landed));
-    object.insert("disarmed".into(), json!(outcome.metrics.disarmed));
-    for (name, _, figure) in FIGURES {
-        object.insert(name.into(), json!(figure(&outcome.metrics)));
+    for (name, value) in flown.outcome.facts() {
+        object.insert(name.into(), json!(value));
     }
-    object.insert("finished".into(), json!(outcome.finished));
-    object.insert("duration_s".into(), json!(outcome.duration.seconds_f64()));
-    object.insert("realtime_factor".into(), json!(outcome.realtime_factor));
-    object.insert("log_hash".into(), json!(format!("{:016x}", outcome.log_hash)));
+    for figure in flown.outcome.figures() {
+        object.insert(figure.name.into(), json!(figure.value));
+    }
+    object.insert("duration_s".into(), json!(flown.duration.seconds_f64()));
+    object.insert("realtime_factor".into(), json!(flown.realtime_factor));
+    object.insert("log_hash".into(), json!(format!("{hash:016x}")));
     outln!("{}", serde_json::Value::Object(object));
 }
 
-fn print_screen(outcome: &Outcome, recorder: &Recorder, log: &Path, page: &Path) {
-    outln!("phases");
-    for phase in &outcome.phases {
-        let mode = if phase.state.name() == "Flying" { format!(" {:?}", phase.mode) } else { String::new() };
-        outln!("  {:>9.3} s  {}{mode}", phase.since.seconds_f64(), phase.state.name());
-    }
+fn print_screen<V: Vehicle>(flown: &Flown<V::Outcome>, recorder: &Recorder<V>, log: &Path, page: &Path) {
+    outln!("flight");
+    flown.outcome.story().iter().for_each(|line| outln!("  {line}"));
     outln!("\nfigures");
-    for (name, unit, figure) in FIGURES {
-        match figure(&outcome.metrics) {
-            Some(value) => outln!("  {name:<22} {value:>8.3} {unit}"),
-            None => outln!("  {name:<22} {:>8}", "–"),
+    for figure in flown.outcome.figures() {
+        match figure.value {
+            Some(value) => outln!("  {:<22} {value:>8.3} {}", figure.name, figure.unit),
+            None => outln!("  {:<22} {:>8}", figure.name, "–"),
         }
     }
-    outln!("  {:<22} {:>8.3} deg", "worst tilt", outcome.worst_tilt_deg);
-    let [first, last] = outcome.battery;
-    outln!("  {:<22} {first:>8.2} V at the start, {last:.2} V at the end", "battery");
     outln!("\nrunnables, wall time on this machine         mean      longest");
-    for (info, row) in plan::ACTIVATIONS.iter().zip(recorder.timing()) {
-        if row.count > 0 {
-            let mean = row.total_ns as f64 / row.count as f64;
-            outln!(
-                "  {:<14} {:>8} activations  {mean:>8.0} ns {:>8.1} us",
-                info.name,
-                row.count,
-                row.longest_ns as f64 / 1e3
-            );
-        }
+    for (info, row) in V::Runnables::ACTIVATIONS.iter().zip(recorder.timing()) {
+        print_timing(info.name, row);
     }
     outln!(
         "\n{:.1} s flown at {:.0} × real time, log hash {:016x}",
-        outcome.duration.seconds_f64(),
-        outcome.realtime_factor,
-        outcome.log_hash
+        flown.duration.seconds_f64(),
+        flown.realtime_factor,
+        recorder.hash()
     );
-    let verdict = match (outcome.metrics.landed, outcome.metrics.disarmed) {
-        (true, true) => "landed and disarmed",
-        (true, false) => "landed, still armed",
-        (false, _) => "DID NOT LAND",
-    };
-    outln!("{verdict}\n\nlog     {}   (for example: ulog_info, PlotJuggler, stampfly replay)", log.display());
+    outln!("{}\n", flown.outcome.sentence());
+    outln!("log     {}   (for example: ulog_info, PlotJuggler, stampfly replay)", log.display());
     outln!("report  {}   (open it in a browser)", page.display());
+}
+
+fn print_timing(name: &str, row: &Timing) {
+    if row.count > 0 {
+        let (mean, longest) = (row.total_ns as f64 / row.count as f64, row.longest_ns as f64 / 1e3);
+        outln!("  {name:<14} {:>8} activations  {mean:>8.0} ns {longest:>8.1} us", row.count);
+    }
 }

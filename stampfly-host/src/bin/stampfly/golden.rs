@@ -3,39 +3,50 @@
 use crate::Failure;
 use crate::arguments::GoldenOptions;
 use serde_json::json;
-use stampfly_board::golden::{FLIGHT, Verdict, play};
+use stampfly_flight::golden::{Verdict, play};
 use stampfly_host::golden::record;
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_sim::vehicle::Vehicle;
 use std::process::ExitCode;
 
 pub fn run(options: &GoldenOptions) -> Result<ExitCode, Failure> {
-    let recorded = options.record.as_ref().map(|_| record()).transpose()?;
-    let flight = recorded.as_deref().unwrap_or(FLIGHT);
-    let report = play(flight, &mut ())?;
-    if let (Some(path), Some(bytes)) = (&options.record, &recorded) {
-        std::fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+    vehicles::with(&options.vehicle.name, Golden(options))?
+}
+
+struct Golden<'o>(&'o GoldenOptions);
+
+impl ForVehicle for Golden<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let options = self.0;
+        let golden = V::golden().ok_or_else(|| format!("{} has no golden flight", V::NAME))?;
+        let recorded = options.record.as_ref().map(|_| record::<V>(&golden)).transpose()?;
+        let flight = recorded.as_deref().unwrap_or(golden.record);
+        let report = play::<V::Runnables>(flight, &V::default_config(), golden.tolerance, &mut ())?;
+        if let (Some(path), Some(bytes)) = (&options.record, &recorded) {
+            std::fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        }
+        let (verdict, worst) = match report.verdict {
+            Verdict::Identical => ("identical", 0.0),
+            Verdict::WithinTolerance { worst } => ("within tolerance", worst),
+            Verdict::Beyond { worst, .. } => ("beyond tolerance", worst),
+        };
+        let hash = format!("{:016x}", report.hash);
+        let (duration, bytes, messages) = (report.duration, flight.len(), report.messages);
+        if options.json {
+            let seconds = duration.seconds_f64();
+            outln!(
+                "{}",
+                json!({
+                    "verdict": verdict, "worst_duty_deviation": worst, "hash": hash, "messages": messages,
+                    "duration_s": seconds, "bytes": bytes,
+                })
+            );
+        } else {
+            outln!("golden flight of {duration}, {bytes} bytes, {messages} messages: hash {hash}");
+            outln!("{verdict}; the output deviates by at most {worst}");
+        }
+        Ok(if report.verdict == Verdict::Identical { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
-    let (verdict, worst) = match report.verdict {
-        Verdict::Identical => ("identical", 0.0),
-        Verdict::WithinTolerance { worst } => ("within tolerance", worst),
-        Verdict::Beyond { worst, .. } => ("beyond tolerance", worst),
-    };
-    let hash = format!("{:016x}", report.hash);
-    if options.json {
-        outln!(
-            "{}",
-            json!({
-                "verdict": verdict, "worst_duty_deviation": worst, "hash": hash, "messages": report.messages,
-                "duration_s": report.duration.seconds_f64(), "bytes": flight.len(),
-            })
-        );
-    } else {
-        outln!(
-            "golden flight of {}, {} bytes, {} messages: hash {hash}",
-            report.duration,
-            flight.len(),
-            report.messages
-        );
-        outln!("{verdict}; duties deviate by at most {worst}");
-    }
-    Ok(if report.verdict == Verdict::Identical { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

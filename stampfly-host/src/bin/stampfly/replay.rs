@@ -3,13 +3,19 @@
 use crate::Failure;
 use crate::arguments::ReplayOptions;
 use serde_json::json;
-use stampfly_host::replay::replay;
+use stampfly_flight::{Replay, replay};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_sim::vehicle::Vehicle;
+use stampfly_types::Instant;
 use std::process::ExitCode;
 
 pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
     let path = options.file.display();
     let bytes = std::fs::read(&options.file).map_err(|error| format!("{path}: {error}"))?;
-    let result = replay(&bytes).map_err(|error| format!("{path}: {error}"))?;
+    let named = options.vehicle.as_deref().or_else(|| replay::vehicle_name(&bytes)).unwrap_or(vehicles::DEFAULT);
+    let from = options.from.map(|seconds| Instant::from_micros((seconds.max(0.0) * 1e6) as u64));
+    let task = Again { bytes: &bytes, options: replay::ReplayOptions { from } };
+    let result = vehicles::with(named, task)?.map_err(|error| format!("{path}: {error}"))?;
     if options.json {
         let difference = result.difference.as_ref().map(|difference| {
             json!({
@@ -21,19 +27,38 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
         outln!(
             "{}",
             json!({
-                "identical": result.difference.is_none(), "activations": result.activations,
-                "samples": result.samples, "difference": difference,
+                "vehicle": named, "identical": result.difference.is_none(), "activations": result.activations,
+                "samples": result.samples, "key_frames": result.key_frames, "gaps": result.gaps,
+                "skipped": result.skipped, "difference": difference,
             })
         );
     } else {
         match &result.difference {
             None => outln!(
-                "{path}: identical: {} activations repeated, {} samples compared bit for bit",
+                "{path}: identical: {} activations repeated, {} samples and {} key frames compared bit for bit",
                 result.activations,
-                result.samples
+                result.samples,
+                result.key_frames
             ),
             Some(difference) => outln!("{path}: differs: {difference}"),
         }
+        if result.skipped > 0 {
+            outln!("{} activations were not repeated: before the start, or in {} gaps", result.skipped, result.gaps);
+        }
     }
     Ok(if result.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+struct Again<'b> {
+    bytes: &'b [u8],
+    options: replay::ReplayOptions,
+}
+
+impl ForVehicle for Again<'_> {
+    type Output = Result<Replay, replay::ReplayError>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let set = |config: &mut _, name: &str, value| V::set_parameter(config, name, value).is_ok();
+        replay::replay::<V::Runnables>(self.bytes, V::default_config(), set, self.options)
+    }
 }

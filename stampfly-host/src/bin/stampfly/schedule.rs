@@ -3,21 +3,36 @@
 use crate::Failure;
 use crate::arguments::TopicsOptions;
 use serde_json::json;
-use stampfly_board::plan::{ACTIVATIONS, RESPONSE_TIMES};
-use stampfly_board::wiring::TOPICS;
-use stampfly_bus::{ActivationInfo, Band, Trigger};
+use stampfly_bus::{ActivationInfo, Band, Schedule, TopicInfo, TopicTable, Trigger, response_time};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_sim::vehicle::Vehicle;
+use stampfly_types::Duration;
 use std::process::ExitCode;
 
 /// Names of the columns.
 const COLUMNS: [&str; 6] = ["runnable", "activated", "band", "budget, us", "response, us", "what"];
 
 pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
-    let rows: Vec<[String; 6]> =
-        ACTIVATIONS.iter().zip(RESPONSE_TIMES).map(|(info, time)| row(info, time.as_micros())).collect();
+    vehicles::with(&options.vehicle.name, Lines(options))?
+}
+
+struct Lines<'o>(&'o TopicsOptions);
+
+impl ForVehicle for Lines<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        print(self.0, V::Runnables::ACTIVATIONS, <<V::Runnables as Schedule>::Topics as TopicTable>::TOPICS)
+    }
+}
+
+fn print(options: &TopicsOptions, table: &[ActivationInfo], topics: &[TopicInfo]) -> Result<ExitCode, Failure> {
+    // A table whose lines have no bounds does not compile.
+    let times: Vec<Duration> = (0..table.len()).filter_map(|line| response_time(table, topics, line).ok()).collect();
+    let lines = || table.iter().zip(&times);
+    let rows: Vec<[String; 6]> = lines().map(|(info, time)| row(info, time.as_micros(), table, topics)).collect();
     if options.json {
-        let rows: Vec<_> = ACTIVATIONS
-            .iter()
-            .zip(RESPONSE_TIMES)
+        let rows: Vec<_> = lines()
             .zip(&rows)
             .map(|((info, time), [name, activated, band, _, _, doc])| {
                 json!({
@@ -45,14 +60,14 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn row(info: &ActivationInfo, response: u64) -> [String; 6] {
+fn row(info: &ActivationInfo, response: u64, table: &[ActivationInfo], all: &[TopicInfo]) -> [String; 6] {
     let mut activated = match info.trigger {
         Trigger::On(topics) => {
-            let names: Vec<&str> = topics.iter().filter_map(|topic| Some(TOPICS.get(*topic)?.name)).collect();
+            let names: Vec<&str> = topics.iter().filter_map(|topic| Some(all.get(*topic)?.name)).collect();
             format!("on {}", names.join(" or "))
         }
         Trigger::Every(period) => format!("every {} ms", period.as_micros() / 1_000),
-        Trigger::After(before) => format!("after {}", ACTIVATIONS.get(before).map_or("", |info| info.name)),
+        Trigger::After(before) => format!("after {}", table.get(before).map_or("", |info| info.name)),
         _ => String::new(),
     };
     if let Some(late) = info.at_latest {

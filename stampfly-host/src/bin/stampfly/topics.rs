@@ -3,12 +3,28 @@
 use crate::Failure;
 use crate::arguments::TopicsOptions;
 use serde_json::json;
-use stampfly_board::wiring::TOPICS;
+use stampfly_bus::{Schedule, TopicInfo, TopicTable};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_sim::vehicle::Vehicle;
 use std::process::ExitCode;
 
 pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
+    vehicles::with(&options.vehicle.name, Topics(options))?
+}
+
+struct Topics<'o>(&'o TopicsOptions);
+
+impl ForVehicle for Topics<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        print(self.0, <<V::Runnables as Schedule>::Topics as TopicTable>::TOPICS)
+    }
+}
+
+fn print(options: &TopicsOptions, table: &[TopicInfo]) -> Result<ExitCode, Failure> {
     if options.json {
-        let rows: Vec<_> = TOPICS
+        let rows: Vec<_> = table
             .iter()
             .map(|topic| {
                 json!({
@@ -24,7 +40,7 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
         outln!("{}", json!({ "topics": rows }));
     } else if options.markdown {
         outln!("| topic | message | policy | rate | publisher | readers | what |\n|---|---|---|---|---|---|---|");
-        for topic in &TOPICS {
+        for topic in table {
             let doc: Vec<_> = topic.doc.iter().map(|line| line.trim()).collect();
             outln!(
                 "| `{}` | `{}` | {} ({}) | {} | {} | {} | {} |",
@@ -40,7 +56,7 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
         }
     } else {
         outln!("{:<18} {:<18} {:<11} {:<9} {:<13} readers", "topic", "type", "policy", "rate", "publisher");
-        for topic in &TOPICS {
+        for topic in table {
             let policy = format!("{}({})", topic.policy, topic.depth);
             outln!(
                 "{:<18} {:<18} {policy:<11} {:<9} {:<13} {}",
@@ -51,7 +67,7 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
                 topic.readers.join(", ")
             );
         }
-        outln!("\n{} topics; the log reads all of them.", TOPICS.len());
+        outln!("\n{} topics; the log reads all of them.", table.len());
     }
     Ok(ExitCode::SUCCESS)
 }
