@@ -192,7 +192,7 @@ impl Input {
 /// A number of microseconds that is whole, as the tables need it.
 pub fn whole_micros(value: f64, at: Span) -> Result<u64> {
     let rounded = value.round();
-    if rounded < 1.0 || rounded > 1e15 {
+    if !(1.0..=1e15).contains(&rounded) {
         return Err(Error::new(at, "this is less than a microsecond, or more than thirty years"));
     }
     Ok(rounded as u64)

@@ -45,7 +45,7 @@ pub use response::{JITTER, Unbounded, response_time};
 pub use schedule::{ActivationInfo, Band, MAX_TRIGGERS, Schedule, Trigger};
 pub use scheduler::{ActivationState, Scheduler};
 pub use stampfly_types::activation::MAX_INPUTS;
-pub use stampfly_types::{Duration, Instant, Message, Stamped};
+pub use stampfly_types::{Duration, Instant, Message, Stamped, message, message_enum, message_flags};
 pub use table::{LATEST_DEPTH, PublishWords, Split, Taps, TopicInfo, TopicTable};
 pub use topic::{
     AnyTopic, Every, Full, Hook, Latest, Lossless, Overwriting, Publisher, Sequential, Subscriber, Tap, Topic,
