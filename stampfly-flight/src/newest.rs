@@ -68,8 +68,10 @@ impl<const TOPICS: usize, const WORDS: usize> NewestSamples<TOPICS, WORDS> {
     pub fn note(&mut self, topic: usize, at: Instant, words: &[u32]) {
         let Some(place) = self.samples.get_mut(topic) else { return };
         let mut copy = [0; WORDS];
-        let Some(part) = copy.get_mut(..words.len()) else { return };
-        part.copy_from_slice(words);
+        if words.len() > WORDS {
+            return;
+        }
+        copy.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
         *place = Some((at, words.len(), copy));
     }
 
@@ -101,7 +103,7 @@ pub fn message<M: Message>(words: &[u32]) -> Option<M> {
     if copy.as_ref().len() != words.len() {
         return None;
     }
-    copy.as_mut().copy_from_slice(words);
+    copy.as_mut().iter_mut().zip(words).for_each(|(to, from)| *to = *from);
     M::from_words(&copy)
 }
 

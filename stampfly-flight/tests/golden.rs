@@ -18,7 +18,7 @@ const MOTORS: usize = Id::actuator_motor as usize;
 const GAIN: f32 = 0.7;
 const TOLERANCE: f32 = 0.01;
 
-/// Half a second towards a wall, with a gap in the ranges, as an executor of its own records it.
+/// Half a second towards a wall, with a gap in the ranges and a burst longer than the topic's ring, as an executor of its own records it.
 fn recorded() -> (Vec<u8>, FlightHash) {
     let start = Instant::from_secs(7);
     let mut bus = Bus::new();
@@ -36,11 +36,13 @@ fn recorded() -> (Vec<u8>, FlightHash) {
     for step in 0..50u64 {
         let clock = start + Duration::from_millis(10) * (step + 1);
         if step % 2 == 0 && !(20..40).contains(&step) {
-            let at = clock - Duration::from_micros(300);
-            let range = TofData { distance: 1.4 - 0.02 * step as f32, valid: true, ..Default::default() };
-            outside.publish_words(RANGE, at, &range.to_words()).expect("a range");
-            writer.sample(RANGE, at, &range.to_words());
-            drain(&mut motors);
+            for later in 0..if step == 44 { 5 } else { 1 } {
+                let at = clock - Duration::from_micros(300 - later);
+                let range = TofData { distance: 1.4 - 0.02 * step as f32, valid: true, ..Default::default() };
+                outside.publish_words(RANGE, at, &range.to_words()).expect("a range");
+                writer.sample(RANGE, at, &range.to_words());
+                drain(&mut motors);
+            }
         }
         flight_loop.run_band(Band::Flight, clock, &mut ());
         flight_loop.run_band(Band::Background, clock, &mut ());
@@ -73,10 +75,12 @@ fn rounding_is_told_from_nonsense() {
     let (record, _) = recorded();
     let slightly = played(&record, GAIN * 1.001).expect("plays").verdict;
     assert!(matches!(slightly, Verdict::WithinTolerance { worst } if worst > 0.0 && worst < 0.001), "{slightly:?}");
+    // The largest duty is 0.98: one per cent of it is within the tolerance, one and a half are not.
+    assert!(matches!(played(&record, GAIN * 1.01).expect("plays").verdict, Verdict::WithinTolerance { .. }));
+    assert!(matches!(played(&record, GAIN * 1.015).expect("plays").verdict, Verdict::Beyond { .. }));
     let first = Instant::from_secs(7) + Duration::from_millis(10);
     let wrong = played(&record, 0.5).expect("plays").verdict;
     assert!(matches!(wrong, Verdict::Beyond { worst, since } if worst > 0.2 && since == first), "{wrong:?}");
-    // `min` hides that the gain is no number, the sign does not: −∞ is below 1.
     let infinite = played(&record, f32::NEG_INFINITY).expect("plays").verdict;
     assert!(matches!(infinite, Verdict::Beyond { worst: f32::INFINITY, .. }), "{infinite:?}");
 }
@@ -140,9 +144,9 @@ fn an_observer_is_told_everything() {
     let report = play::<Rover>(&recorded().0, &GAIN, TOLERANCE, &mut counts).expect("plays");
     assert_eq!(counts.bands, 100);
     assert_eq!(counts.published.iter().sum::<usize>() as u64, report.messages);
-    // Fifteen ranges, and the deadline in the gap; the monitor once in 100 ms.
+    // Fifteen times ranges, four more in the burst, and the deadline in the gap; the monitor once in 100 ms.
     assert_eq!(counts.activations, [15 + 4, 5]);
-    assert_eq!(counts.published, [15, 15 + 4, 5]);
+    assert_eq!(counts.published, [15 + 4, 15 + 4, 5]);
 }
 
 proptest! {
