@@ -7,7 +7,8 @@
 //! * [`frame`]: vectors, quaternions and the conventions they follow;
 //! * [`math`]: the one door to transcendental functions;
 //! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`];
-//! * [`messages`]: the messages themselves, sensor to motor.
+//! * [`messages`]: the messages themselves, sensor to motor;
+//! * [`text`]: a message as text, field by field.
 //!
 //! # Conventions
 //! SI units and radians. Body frame FRD (x forward, y right, z down), world frame NED, attitude as the
@@ -31,6 +32,7 @@ pub mod frame;
 pub mod math;
 pub mod message;
 pub mod messages;
+pub mod text;
 pub mod time;
 
 pub use frame::{GRAVITY, Quat, Vec3};
