@@ -26,12 +26,12 @@ use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::chip::{AxisMap, I2cRegisters, SpiRegisters};
 use stampfly_drivers::slot::Rhythm;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// The rhythm of the inertial sensor on the bus it shares.
 pub const RHYTHM: Rhythm = Rhythm::HZ_400;
 /// The flow sensor's longest transfer: twelve bytes at 2 MHz after 35 µs for the address, with a margin.
-pub const LONGEST_FLOW: Micros = Micros(200);
+pub const LONGEST_FLOW: Duration = Duration::from_micros(200);
 
 /// The inertial sensor. `configuration_file` is Bosch's, 8 kB.
 pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, configuration_file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {

@@ -6,7 +6,7 @@
 use crate::plan;
 use crate::wiring;
 use stampfly_bus::{Activation, AnyTopic, Band, Runnables, Scheduler};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Somebody who wants to know about activations: the log, a profiler.
 pub trait Observer {
@@ -42,18 +42,18 @@ pub struct FlightLoop<'b> {
 impl<'b> FlightLoop<'b> {
     /// A vehicle at power-on.
     #[must_use]
-    pub(crate) fn new(vehicle: plan::Vehicle<'b>, heads: [&'b dyn AnyTopic; wiring::COUNT], start: Micros) -> Self {
+    pub(crate) fn new(vehicle: plan::Vehicle<'b>, heads: [&'b dyn AnyTopic; wiring::COUNT], start: Instant) -> Self {
         Self { vehicle, scheduler: Scheduler::new(&plan::ACTIVATIONS, start), heads }
     }
 
     /// Is anything due in this band?
     #[must_use]
-    pub fn is_due(&self, band: Band, clock: Micros) -> bool {
+    pub fn is_due(&self, band: Band, clock: Instant) -> bool {
         self.scheduler.due(band, 0, clock, &self.heads).is_some()
     }
 
     /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
-    pub fn run_band(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> bool {
+    pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut impl Observer) -> bool {
         let mut next = 0;
         while let Some((index, now)) = self.scheduler.due(band, next, clock, &self.heads) {
             let mut activation = Activation::live(now);
@@ -65,7 +65,7 @@ impl<'b> FlightLoop<'b> {
     }
 
     #[inline]
-    fn start(&mut self, index: usize, activation: &mut Activation, clock: Micros, observer: &mut impl Observer) {
+    fn start(&mut self, index: usize, activation: &mut Activation, clock: Instant, observer: &mut impl Observer) {
         observer.starts(index);
         self.scheduler.started(index, activation.now(), clock, &self.heads);
         self.vehicle.read(index, activation);
@@ -81,7 +81,7 @@ impl<'b> FlightLoop<'b> {
 
     /// Lets the next due activation of this band read its inputs. Whatever is published before
     /// [`finish`](Self::finish) belongs to its next activation, as if it had been interrupted.
-    pub fn start_next(&mut self, band: Band, clock: Micros, observer: &mut impl Observer) -> Option<Pending> {
+    pub fn start_next(&mut self, band: Band, clock: Instant, observer: &mut impl Observer) -> Option<Pending> {
         let (index, now) = self.scheduler.due(band, 0, clock, &self.heads)?;
         let mut activation = Activation::live(now);
         self.start(index, &mut activation, clock, observer);
@@ -105,7 +105,7 @@ impl<'b> FlightLoop<'b> {
     #[must_use]
     pub fn count_inputs(&mut self) -> [usize; plan::COUNT] {
         core::array::from_fn(|index| {
-            let mut activation = Activation::live(Micros::ZERO);
+            let mut activation = Activation::live(Instant::ZERO);
             self.vehicle.read(index, &mut activation);
             activation.inputs().len()
         })
@@ -113,7 +113,7 @@ impl<'b> FlightLoop<'b> {
 
     /// The next instant at which a period or a deadline makes something due.
     #[must_use]
-    pub fn next_tick(&self) -> Option<Micros> {
+    pub fn next_tick(&self) -> Option<Instant> {
         self.scheduler.next_tick()
     }
 }

@@ -6,7 +6,7 @@ use crate::plan;
 use crate::runnables::*;
 use crate::wiring;
 use stampfly_bus::AnyTopic;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// The ends that belong to the world outside the runnables: drivers, links, motors, lights.
 pub struct Outside<'b> {
@@ -45,7 +45,7 @@ pub struct Outside<'b> {
 impl Outside<'_> {
     /// Publishes a recorded sample on the end it came from, by its topic's place in the table. Returns its generation,
     /// or `None` when the topic's publisher is not outside or the words are not the topic's.
-    pub fn publish_words(&mut self, topic: usize, at: Micros, words: &[u32]) -> Option<u32> {
+    pub fn publish_words(&mut self, topic: usize, at: Instant, words: &[u32]) -> Option<u32> {
         macro_rules! by_topic {
             ($($topic:ident => $end:ident),+ $(,)?) => {
                 $(if topic == wiring::Id::$topic as usize { return self.$end.publish_words(at, words) })+
@@ -85,7 +85,7 @@ pub fn assemble<'b>(
     ports: wiring::Ports<'b>,
     heads: [&'b dyn AnyTopic; wiring::COUNT],
     config: &VehicleConfig,
-    start: Micros,
+    start: Instant,
 ) -> Assembled<'b> {
     // Taken apart without `..`: an end that nobody gets is an unused variable.
     let wiring::Ports {

@@ -9,7 +9,7 @@ use stampfly_board::{VehicleConfig, wiring};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, FlightMode, FlightState, ImuData, PilotInput, PowerData, SystemAlert, SystemMode,
 };
-use stampfly_types::{Message, Micros, Vec3};
+use stampfly_types::{Instant, Message, Vec3};
 
 /// A board with everything the console may want to know.
 struct Board {
@@ -29,14 +29,14 @@ impl Board {
         let state = if armed { FlightState::Flying } else { FlightState::IdleGround };
         let blocks = ArmBlocks::LOW_BATTERY | ArmBlocks::THROTTLE;
         let mode = SystemMode { state, armed, mode: FlightMode::AltHold, blocks, ..Default::default() };
-        board.newest.note(wiring::Id::system_mode, Micros(0), &mode.to_words());
+        board.newest.note(wiring::Id::system_mode, Instant::ZERO, &mode.to_words());
         board
     }
 
     fn ask(&mut self, line: &str) -> (String, Request) {
         let mut reply = String::new();
         let mut context = Context {
-            now: Micros::from_secs(5),
+            now: Instant::from_secs(5),
             version: "stampfly 9.9",
             newest: &self.newest,
             sensors: &[SensorLine { name: "imu", health: &self.health }],
@@ -56,10 +56,10 @@ impl Board {
 fn status_says_what_keeps_it_from_arming() {
     let mut board = Board::in_state(false);
     let alert = SystemAlert { active: Alerts::COMM_LOST, ..Default::default() };
-    board.newest.note(wiring::Id::system_alert, Micros(0), &alert.to_words());
+    board.newest.note(wiring::Id::system_alert, Instant::ZERO, &alert.to_words());
     let power = PowerData { voltage: 3.456, current: 0.5, power: 1.7 };
-    board.newest.note(wiring::Id::sensor_power, Micros(0), &power.to_words());
-    board.newest.note(wiring::Id::command_pilot, Micros::from_millis(4_980), &PilotInput::default().to_words());
+    board.newest.note(wiring::Id::sensor_power, Instant::ZERO, &power.to_words());
+    board.newest.note(wiring::Id::command_pilot, Instant::from_millis(4_980), &PilotInput::default().to_words());
     let said = board.says("status");
     for part in
         ["IdleGround, disarmed", "AltHold", "LOW_BATTERY THROTTLE", "COMM_LOST", "3.46 V", "20 ms ago", "awake    5 s"]
@@ -73,7 +73,7 @@ fn status_says_what_keeps_it_from_arming() {
 fn sensors_and_topics_are_shown_with_their_units() {
     let mut board = Board::new();
     let sample = ImuData { accel: Vec3::new(0.5, -0.25, -9.75), gyro: Vec3::zeros(), temperature: 31.5 };
-    board.newest.note(wiring::Id::sensor_imu, Micros::from_millis(4_000), &sample.to_words());
+    board.newest.note(wiring::Id::sensor_imu, Instant::from_millis(4_000), &sample.to_words());
     let said = board.says("sensor imu");
     assert!(said.contains("1000 ms old") && said.contains("accel 0.5 -0.25 -9.75 m/s^2"), "{said}");
     assert_eq!(board.says("topic sensor_imu"), said);

@@ -6,7 +6,7 @@ use stampfly_board::{FlightLoop, VehicleConfig, wiring};
 use stampfly_bus::Band;
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
 use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, ImuData, PilotInput, PowerData, TofData};
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
 const OLD: Address = Address([2, 0, 0, 0, 0, 1]);
@@ -22,16 +22,16 @@ struct Bench<'b> {
     monitor: bool,
     /// Does a program say that it is there?
     program: bool,
-    now: Micros,
+    now: Instant,
 }
 
 impl<'b> Bench<'b> {
     fn new(bus: &'b mut wiring::Bus, peer: Option<Address>) -> Self {
         let wiring::Split { ports, heads, .. } = bus.split(None);
         let Assembled { flight_loop: flight, outside } =
-            assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
+            assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
         let session = Session::new(VEHICLE, 1, peer);
-        Self { flight, outside, session, wanted: false, monitor: true, program: false, now: Micros::ZERO }
+        Self { flight, outside, session, wanted: false, monitor: true, program: false, now: Instant::ZERO }
     }
 
     fn blocks(&mut self) -> ArmBlocks {
@@ -50,13 +50,13 @@ impl<'b> Bench<'b> {
     /// Lets time pass. Every transmitter sends its packet every 20 ms; returns what became of the last one's.
     fn pass(&mut self, millis: u64, pressed: bool, air: &[(Address, bool)]) -> Option<Result<(), Rejected>> {
         let mut last = None;
-        let end = self.now + Micros::from_millis(millis);
+        let end = self.now + Duration::from_millis(millis);
         while self.now < end {
-            self.now += Micros(2_500);
+            self.now += Duration::from_micros(2_500);
             let now = self.now;
             let still = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };
             self.outside.imu.publish(now, &still);
-            if now.0.is_multiple_of(20_000) {
+            if now.as_micros().is_multiple_of(20_000) {
                 self.outside.button.publish(now, &ButtonContact { pressed });
                 self.outside.tof.publish(now, &TofData { distance: 0.03, valid: true, ..Default::default() });
                 if self.monitor {

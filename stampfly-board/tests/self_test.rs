@@ -3,17 +3,17 @@
 use stampfly_board::vehicle::{Assembled, assemble};
 use stampfly_board::{VehicleConfig, messages::TelemetryFrame, wiring};
 use stampfly_bus::Band;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, ArmBlocks, SelfTest, SelfTestVerdict};
 
 /// What the ground station sees after a tenth of a second.
 fn after(verdict: SelfTestVerdict) -> TelemetryFrame {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, .. } = bus.split(None);
-    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
-    outside.self_test.publish(Micros::ZERO, &SelfTest { verdict, worst: 0.0 });
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
+    outside.self_test.publish(Instant::ZERO, &SelfTest { verdict, worst: 0.0 });
     for step in 1..=40 {
-        let now = Micros(2_500 * step);
+        let now = Instant::from_micros(2_500 * step);
         outside.imu.publish(now, &Default::default());
         flight_loop.run_band(Band::Flight, now, &mut ());
         flight_loop.run_band(Band::Background, now, &mut ());

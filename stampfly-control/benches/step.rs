@@ -11,7 +11,7 @@ use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, Setpoint,
     SetpointAxes, StateEstimate, SystemMode, Validity, VehicleStatus,
 };
-use stampfly_types::{Micros, Quat, Vec3};
+use stampfly_types::{Duration, Instant, Quat, Vec3};
 
 struct Situation {
     estimate: StateEstimate,
@@ -60,8 +60,8 @@ fn control(c: &mut Criterion) {
         angular_rate: -s.estimate.angular_rate,
         ..s.estimate
     };
-    let input = |now: Micros, unmet| ControlInput {
-        estimate: if (now.0 / 2_500).is_multiple_of(2) { &s.estimate } else { &other_side },
+    let input = |now: Instant, unmet| ControlInput {
+        estimate: if (now.as_micros() / 2_500).is_multiple_of(2) { &s.estimate } else { &other_side },
         command: &s.command,
         setpoint: &s.setpoint,
         mode: &s.mode,
@@ -69,11 +69,11 @@ fn control(c: &mut Criterion) {
         unmet,
     };
     let mut cascade = CascadeController::default();
-    let mut now = Micros::ZERO;
+    let mut now = Instant::ZERO;
     c.bench_function("cascade and mixer", |b| {
         let mut unmet = [0.0; 4];
         b.iter(|| {
-            now += Micros(2_500);
+            now += Duration::from_micros(2_500);
             let mixed = mixer.mix(&cascade.step(now, &black_box(input(now, unmet))));
             unmet = mixed.unmet;
             mixed
@@ -82,7 +82,7 @@ fn control(c: &mut Criterion) {
     let mut geometric = GeometricController::default();
     c.bench_function("geometric and mixer", |b| {
         b.iter(|| {
-            now += Micros(2_500);
+            now += Duration::from_micros(2_500);
             mixer.mix(&geometric.step(now, &black_box(input(now, [0.0; 4]))))
         });
     });
@@ -92,7 +92,7 @@ fn control(c: &mut Criterion) {
     let mut motors = MotorStage::default();
     c.bench_function("motor stage", |b| {
         b.iter(|| {
-            now += Micros(2_500);
+            now += Duration::from_micros(2_500);
             motors.step(now, &black_box(mixed), Some(3.8), true)
         });
     });
@@ -101,12 +101,12 @@ fn control(c: &mut Criterion) {
 fn guidance(c: &mut Criterion) {
     let s = situation();
     let mut navigator = Navigator::default();
-    let mut now = Micros::ZERO;
+    let mut now = Instant::ZERO;
     let mut estimate = s.estimate;
     let mut north = 0.0;
     c.bench_function("navigator on a route", |b| {
         b.iter(|| {
-            now += Micros(2_500);
+            now += Duration::from_micros(2_500);
             let input = NavigatorInput { mode: &s.mode, estimate: &estimate, status: &s.status, command: &s.command };
             let setpoint = navigator.step(now, &input);
             estimate.position = setpoint.position;

@@ -10,7 +10,7 @@
 //! and the rate at which the acceleration turns the vehicle), so that following a path needs no error to begin with.
 
 use stampfly_types::messages::{ControlOutput, FlightState};
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
 
 use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
 use crate::attitude::{self, AttitudeConfig};
@@ -61,7 +61,7 @@ const THROTTLE_OFF: f32 = 0.03;
 /// ```
 /// use stampfly_control::{CascadeController, ControlInput, Controller};
 /// use stampfly_types::messages::*;
-/// use stampfly_types::{Micros, Vec3};
+/// use stampfly_types::{Instant, Vec3};
 ///
 /// let mut controller = CascadeController::default();
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
@@ -76,7 +76,7 @@ const THROTTLE_OFF: f32 = 0.03;
 ///     estimate: &estimate, command: &CommandSetpoint::default(), setpoint: &setpoint, mode: &mode, status: &status,
 ///     unmet: [0.0; 4],
 /// };
-/// let output = controller.step(Micros(2_500), &input);
+/// let output = controller.step(Instant::from_micros(2_500), &input);
 /// assert!(output.torque.y < 0.0, "nose down to fly forward");
 /// assert!(output.thrust > 0.3, "about its weight");
 /// ```
@@ -188,7 +188,7 @@ impl CascadeController {
 
 impl Controller for CascadeController {
     #[inline]
-    fn step(&mut self, now: Micros, input: &ControlInput<'_>) -> ControlOutput {
+    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.mode.control_resets != self.resets {
             self.resets = input.mode.control_resets;

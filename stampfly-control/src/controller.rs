@@ -5,7 +5,7 @@
 //! [`crate::intent`]. [`CascadeController`](crate::CascadeController) is the default,
 //! [`GeometricController`](crate::GeometricController) the proof that another law fits the same socket.
 
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::{CommandSetpoint, ControlOutput, Setpoint, StateEstimate, SystemMode, VehicleStatus};
 
 /// All a controller may look at in one step.
@@ -34,7 +34,7 @@ pub struct ControlInput<'a> {
 /// * Outputs of the estimate whose validity bit is cleared are not used.
 pub trait Controller {
     /// One control period.
-    fn step(&mut self, now: Micros, input: &ControlInput<'_>) -> ControlOutput;
+    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput;
 
     /// Forgets integrators and filters. What was learned about the vehicle (its hover thrust) stays.
     fn reset(&mut self);

@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Rotation3};
 use stampfly_types::messages::ControlOutput;
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
 use crate::attitude;
 use crate::bound::{symmetric, within};
@@ -74,7 +74,7 @@ impl Default for GeometricConfig {
 /// ```
 /// use stampfly_control::{ControlInput, Controller, GeometricController};
 /// use stampfly_types::messages::*;
-/// use stampfly_types::{Micros, Vec3};
+/// use stampfly_types::{Instant, Vec3};
 ///
 /// // Any controller, behind the same trait.
 /// let mut controller: Box<dyn Controller> = Box::new(GeometricController::default());
@@ -82,7 +82,7 @@ impl Default for GeometricConfig {
 /// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
 /// let status = VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
 /// let setpoint = Setpoint { axes: SetpointAxes::POSITION_Z | SetpointAxes::YAW, ..Default::default() };
-/// let output = controller.step(Micros(2_500), &ControlInput {
+/// let output = controller.step(Instant::from_micros(2_500), &ControlInput {
 ///     estimate: &estimate, command: &CommandSetpoint { roll: 0.5, ..Default::default() }, setpoint: &setpoint,
 ///     mode: &mode, status: &status, unmet: [0.0; 4],
 /// });
@@ -175,7 +175,7 @@ impl GeometricController {
 }
 
 impl Controller for GeometricController {
-    fn step(&mut self, now: Micros, input: &ControlInput<'_>) -> ControlOutput {
+    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.mode.control_resets != self.resets {
             self.resets = input.mode.control_resets;

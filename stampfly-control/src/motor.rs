@@ -8,7 +8,7 @@
 //! thrust, so it is low-passed. A reading that no cell can have is replaced by the nominal voltage.
 
 use stampfly_types::messages::{MAX_MOTORS, MotorOutput};
-use stampfly_types::{Micros, math};
+use stampfly_types::{Instant, math};
 
 use crate::bound::{symmetric, within};
 use crate::mixer::Mixed;
@@ -99,15 +99,15 @@ impl Default for MotorConfig {
 ///
 /// ```
 /// use stampfly_control::{Mixed, MotorStage};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 /// let mut motors = MotorStage::default();
 /// let hover = Mixed { thrust: [0.09, 0.09, 0.09, 0.09, 0.0, 0.0, 0.0, 0.0], count: 4, unmet: [0.0; 4] };
 /// let mut output = Default::default();
 /// for n in 0..20 {
-///     output = motors.step(Micros(2_500 * n), &hover, Some(3.7), true);
+///     output = motors.step(Instant::from_micros(2_500 * n), &hover, Some(3.7), true);
 /// }
 /// assert!((output.duty[0] - 0.69).abs() < 0.01);
-/// assert_eq!(motors.step(Micros(60_000), &hover, Some(3.7), false).duty, [0.0; 8], "not armed, not turning");
+/// assert_eq!(motors.step(Instant::from_micros(60_000), &hover, Some(3.7), false).duty, [0.0; 8], "not armed, not turning");
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorStage {
@@ -132,7 +132,7 @@ impl MotorStage {
 
     /// One control period. `voltage` is the newest battery reading, V; `None` when there is none.
     #[inline]
-    pub fn step(&mut self, now: Micros, mixed: &Mixed, voltage: Option<f32>, armed: bool) -> MotorOutput {
+    pub fn step(&mut self, now: Instant, mixed: &Mixed, voltage: Option<f32>, armed: bool) -> MotorOutput {
         let dt = self.timer.step(now);
         let battery = self.battery(voltage, dt);
         if !armed {
@@ -170,6 +170,7 @@ impl MotorStage {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use stampfly_types::Duration;
 
     fn mixed(thrust: f32) -> Mixed {
         let mut mixed = Mixed { count: 4, ..Mixed::default() };
@@ -189,7 +190,7 @@ mod tests {
     fn implausible_batteries_count_as_nominal() {
         for reading in [None, Some(0.0), Some(2.4), Some(f32::NAN), Some(f32::INFINITY), Some(-4.0), Some(12.0)] {
             let mut motors = MotorStage::default();
-            motors.step(Micros::ZERO, &mixed(0.09), reading, true);
+            motors.step(Instant::ZERO, &mixed(0.09), reading, true);
             assert_eq!(motors.battery_voltage(), 3.7, "{reading:?}");
         }
     }
@@ -200,7 +201,8 @@ mod tests {
         let mut duty = [0.0f32; 2];
         for n in 0..4000u64 {
             let voltage = if n % 2 == 0 { 3.6 } else { 3.8 };
-            duty[n as usize % 2] = motors.step(Micros(n * 2_500), &mixed(0.09), Some(voltage), true).duty[0];
+            duty[n as usize % 2] =
+                motors.step(Instant::from_micros(n * 2_500), &mixed(0.09), Some(voltage), true).duty[0];
         }
         assert!((duty[0] - duty[1]).abs() < 1e-3);
     }
@@ -217,9 +219,9 @@ mod tests {
             steps in prop::collection::vec((any::<f32>(), prop::option::of(any::<f32>()), any::<bool>(), 0u64..30_000), 1..50),
         ) {
             let mut motors = MotorStage::default();
-            let (mut now, mut before) = (Micros::ZERO, [0.0f32; 8]);
+            let (mut now, mut before) = (Instant::ZERO, [0.0f32; 8]);
             for (thrust, voltage, armed, span) in steps {
-                now += Micros(span);
+                now += Duration::from_micros(span);
                 let out = motors.step(now, &mixed(thrust), voltage, armed);
                 for (duty, before) in out.duty.iter().zip(before) {
                     prop_assert!((0.0..=0.95).contains(duty));

@@ -6,13 +6,13 @@ use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
     StateEstimate, SystemMode, Validity, VehicleStatus,
 };
-use stampfly_types::{Micros, Quat, Vec3};
+use stampfly_types::{Duration, Instant, Quat, Vec3};
 
 const DT: f32 = 0.0025;
 
 struct Bench {
     navigator: Navigator,
-    now: Micros,
+    now: Instant,
     mode: SystemMode,
     estimate: StateEstimate,
     status: VehicleStatus,
@@ -25,7 +25,7 @@ impl Bench {
     fn new() -> Self {
         let mut bench = Self {
             navigator: Navigator::default(),
-            now: Micros::ZERO,
+            now: Instant::ZERO,
             mode: SystemMode { state: FlightState::IdleGround, mode: FlightMode::PosHold, ..SystemMode::default() },
             estimate: StateEstimate { valid: Validity::ALL, ..StateEstimate::default() },
             status: VehicleStatus { descent_rate: 0.3, ..VehicleStatus::default() },
@@ -52,7 +52,7 @@ impl Bench {
     }
 
     fn step(&mut self) -> Setpoint {
-        self.now += Micros(2_500);
+        self.now += Duration::from_micros(2_500);
         self.setpoint = self.navigator.step(
             self.now,
             &NavigatorInput {
@@ -134,7 +134,7 @@ fn flies_its_route_stays_and_says_so() {
         if (bench.setpoint.position - command.position).norm() < 1e-3 && there.is_none() {
             there = Some(bench.now);
         }
-        assert!(bench.now < Micros::from_secs(60));
+        assert!(bench.now < Instant::from_secs(60));
     }
     let stayed = bench.now.since(there.expect("was there"));
     assert!((2.0..2.3).contains(&stayed.seconds()), "{stayed}");

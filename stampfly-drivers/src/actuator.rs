@@ -4,7 +4,7 @@ use crate::{ArmToken, Interlock};
 use core::error::Error;
 use core::fmt;
 use embedded_hal::pwm::SetDutyCycle;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::MotorOutput;
 
 /// Motors that take a duty cycle.
@@ -58,10 +58,10 @@ impl Error for MotorError {}
 /// #     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> { self.0 = duty; Ok(()) }
 /// # }
 /// use stampfly_drivers::{MotorOutputs, PwmMotors};
-/// use stampfly_types::{Micros, messages::MotorOutput};
+/// use stampfly_types::{Duration, messages::MotorOutput};
 ///
 /// // At 400 outputs per second a motor takes an eighth of a second to full power.
-/// let mut motors = PwmMotors::new([Channel(9), Channel(9)]).with_slew_limit(8.0, Micros(2_500));
+/// let mut motors = PwmMotors::new([Channel(9), Channel(9)]).with_slew_limit(8.0, Duration::from_micros(2_500));
 /// let mut output = MotorOutput { count: 2, ..Default::default() };
 /// motors.write(&output)?;
 /// output.armed = true;
@@ -94,7 +94,7 @@ impl<P: SetDutyCycle, const N: usize> PwmMotors<P, N> {
     /// Limits how fast a duty rises: by so much a second when outputs come with this period, and slower when they come
     /// less often. A falling duty is never limited. A limit that is not positive keeps the motors still.
     #[must_use]
-    pub fn with_slew_limit(mut self, duty_per_second: f32, period: Micros) -> Self {
+    pub fn with_slew_limit(mut self, duty_per_second: f32, period: Duration) -> Self {
         // NaN gives zero.
         self.rise = (duty_per_second * period.seconds()).max(0.0);
         self
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn a_rise_is_limited_a_fall_is_not_and_a_stop_begins_at_zero() {
         let seen = Cell::new(7);
-        let mut motors = PwmMotors::new([Channel(&seen, false)]).with_slew_limit(4.0, Micros(25_000));
+        let mut motors = PwmMotors::new([Channel(&seen, false)]).with_slew_limit(4.0, Duration::from_micros(25_000));
         let output = |duty: f32| MotorOutput { duty: [duty; 8], count: 1, armed: true, unmet: [0.0; 4] };
         motors.write(&MotorOutput::default()).expect("works");
         let written = |motors: &mut PwmMotors<_, 1>, duty| {
@@ -237,7 +237,8 @@ mod tests {
         motors.write(&MotorOutput::default()).expect("works");
         assert_eq!(written(&mut motors, 1.0), 26);
         for limit in [f32::NAN, -1.0, 0.0] {
-            let mut motors = PwmMotors::new([Channel(&seen, false)]).with_slew_limit(limit, Micros(2_500));
+            let mut motors =
+                PwmMotors::new([Channel(&seen, false)]).with_slew_limit(limit, Duration::from_micros(2_500));
             motors.write(&MotorOutput::default()).expect("works");
             assert_eq!(written(&mut motors, 1.0), 0, "{limit}");
         }

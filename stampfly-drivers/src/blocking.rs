@@ -13,7 +13,7 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use embedded_hal::{delay, i2c, spi};
 use embedded_hal_async as asynchronous;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Runs a future to its end on this thread, spinning while it waits.
 ///
@@ -94,9 +94,9 @@ impl<D: delay::DelayNs> asynchronous::delay::DelayNs for Blocking<D> {
 /// # #[derive(Clone)] struct Delay;
 /// # impl embedded_hal::delay::DelayNs for Delay { fn delay_ns(&mut self, _: u32) {} }
 /// use stampfly_drivers::{Timebase, blocking::BlockingClock};
-/// use stampfly_types::Micros;
-/// let clock = BlockingClock::new(Delay, || Micros(1_000_000));
-/// assert_eq!(clock.now(), Micros::from_secs(1));
+/// use stampfly_types::Instant;
+/// let clock = BlockingClock::new(Delay, || Instant::from_micros(1_000_000));
+/// assert_eq!(clock.now(), Instant::from_secs(1));
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct BlockingClock<D, F> {
@@ -104,7 +104,7 @@ pub struct BlockingClock<D, F> {
     now: F,
 }
 
-impl<D, F: Fn() -> Micros> BlockingClock<D, F> {
+impl<D, F: Fn() -> Instant> BlockingClock<D, F> {
     /// A clock of its two halves.
     pub const fn new(delay: D, now: F) -> Self {
         Self { delay: Blocking(delay), now }
@@ -123,8 +123,8 @@ impl<D: delay::DelayNs, F> asynchronous::delay::DelayNs for BlockingClock<D, F> 
     }
 }
 
-impl<D: delay::DelayNs + Clone, F: Fn() -> Micros + Clone> Timebase for BlockingClock<D, F> {
-    fn now(&self) -> Micros {
+impl<D: delay::DelayNs + Clone, F: Fn() -> Instant + Clone> Timebase for BlockingClock<D, F> {
+    fn now(&self) -> Instant {
         (self.now)()
     }
 }

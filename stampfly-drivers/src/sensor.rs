@@ -1,14 +1,14 @@
 //! One trait per kind of sensor.
 
 use crate::SensorError;
-use stampfly_types::Micros;
 use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
+use stampfly_types::{Duration, Instant};
 
 /// A measurement and the instant it is valid for. How good it is, is part of the measurement: `valid`, `sigma`, `quality`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample<T> {
     /// The instant the data is valid for.
-    pub at: Micros,
+    pub at: Instant,
     /// The measurement.
     pub data: T,
 }
@@ -18,12 +18,12 @@ impl<T> Sample<T> {
     ///
     /// ```
     /// use stampfly_drivers::Sample;
-    /// use stampfly_types::Micros;
-    /// let sample = Sample { at: Micros(1_000), data: () };
-    /// assert_eq!((sample.age(Micros(3_000)), sample.age(Micros::ZERO)), (Micros(2_000), Micros::ZERO));
+    /// use stampfly_types::{Duration, Instant};
+    /// let sample = Sample { at: Instant::from_micros(1_000), data: () };
+    /// assert_eq!((sample.age(Instant::from_micros(3_000)), sample.age(Instant::ZERO)), (Duration::from_micros(2_000), Duration::ZERO));
     /// ```
     #[must_use]
-    pub fn age(&self, now: Micros) -> Micros {
+    pub fn age(&self, now: Instant) -> Duration {
         now.since(self.at)
     }
 }

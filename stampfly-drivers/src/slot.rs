@@ -19,7 +19,7 @@
 //! ```
 //! # use core::convert::Infallible;
 //! # use embedded_hal::{delay::DelayNs, spi::{ErrorType, Operation}};
-//! # use stampfly_types::Micros;
+//! # use stampfly_types::{Duration, Instant};
 //! # struct Device;
 //! # impl ErrorType for Device { type Error = Infallible; }
 //! # impl embedded_hal::spi::SpiDevice for Device {
@@ -29,7 +29,7 @@
 //! # #[derive(Clone)] struct Delay<'a>(&'a Cell<u64>);
 //! # impl DelayNs for Delay<'_> { fn delay_ns(&mut self, ns: u32) { self.0.set(self.0.get() + u64::from(ns)); } }
 //! # let nanos = Cell::new(1_000_000_000);
-//! # let now = || Micros(nanos.get() / 1_000);
+//! # let now = || Instant::from_micros(nanos.get() / 1_000);
 //! # let clock = stampfly_drivers::blocking::BlockingClock::new(Delay(&nanos), now);
 //! # let (imu, flow) = (stampfly_drivers::blocking::Blocking(Device), stampfly_drivers::blocking::Blocking(Device));
 //! use embedded_hal_async::spi::SpiDevice as _;
@@ -38,7 +38,7 @@
 //!
 //! // Two devices of one bus, each with its own chip select and its own clock rate.
 //! let mut slots = Slots::new(clock, Rhythm::HZ_400);
-//! let (mut imu, mut flow, bus) = slots.split(imu, flow, Micros(200));
+//! let (mut imu, mut flow, bus) = slots.split(imu, flow, Duration::from_micros(200));
 //! block_on(imu.write(&[0x80]))?;
 //! block_on(flow.write(&[0x16])).expect("begins when the lead has settled");
 //! assert_eq!(bus.delays(), 0);
@@ -52,22 +52,26 @@ use core::fmt::{self, Debug, Display};
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
 use embedded_hal_async::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// When the lead transfers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rhythm {
     /// From the beginning of one burst of the lead's transfers to that of the next.
-    pub period: Micros,
+    pub period: Duration,
     /// How much earlier than that the next may begin: the lead's clock is not ours, and its task may wake up late.
-    pub guard: Micros,
+    pub guard: Duration,
     /// The longest pause between two transfers of one burst.
-    pub settle: Micros,
+    pub settle: Duration,
 }
 
 impl Rhythm {
     /// The BMI270's driver: a status and a FIFO read every 2.5 ms of a clock that may be off by 3 per cent.
-    pub const HZ_400: Self = Self { period: Micros(2_500), guard: Micros(250), settle: Micros(50) };
+    pub const HZ_400: Self = Self {
+        period: Duration::from_micros(2_500),
+        guard: Duration::from_micros(250),
+        settle: Duration::from_micros(50),
+    };
 }
 
 /// The bus's time, divided between its two devices.
@@ -79,9 +83,9 @@ pub struct Slots<T> {
     /// The guest transfers right now.
     guest: Cell<bool>,
     /// Beginning of the lead's last burst.
-    begun: Cell<Micros>,
+    begun: Cell<Instant>,
     /// End of the lead's last transfer.
-    ended: Cell<Micros>,
+    ended: Cell<Instant>,
     /// Transfers of the lead that ended.
     transfers: Cell<u32>,
     /// Transfers of the lead that had to wait.
@@ -101,7 +105,7 @@ pub struct Lead<'s, D, T> {
 pub struct Guest<'s, D, T> {
     slots: &'s Slots<T>,
     device: D,
-    longest: Micros,
+    longest: Duration,
 }
 
 /// Why the guest's transfer failed.
@@ -138,9 +142,9 @@ enum Opening {
     /// Begin.
     Now,
     /// Ask again at this instant.
-    At(Micros),
+    At(Instant),
     /// Ask again when the lead's next transfer is over, at the latest at this instant.
-    AfterLead(Micros),
+    AfterLead(Instant),
 }
 
 impl<T: Timebase> Slots<T> {
@@ -151,8 +155,8 @@ impl<T: Timebase> Slots<T> {
             rhythm,
             lead: Cell::new(false),
             guest: Cell::new(false),
-            begun: Cell::new(Micros::ZERO),
-            ended: Cell::new(Micros::ZERO),
+            begun: Cell::new(Instant::ZERO),
+            ended: Cell::new(Instant::ZERO),
             transfers: Cell::new(0),
             delays: Cell::new(0),
             waiting_lead: Cell::new(None),
@@ -168,7 +172,7 @@ impl<T: Timebase> Slots<T> {
         &mut self,
         lead: L,
         guest: G,
-        longest: Micros,
+        longest: Duration,
     ) -> (Lead<'_, L, T>, Guest<'_, G, T>, &Self) {
         let slots = &*self;
         (Lead { slots, device: lead }, Guest { slots, device: guest, longest }, slots)
@@ -180,7 +184,7 @@ impl<T: Timebase> Slots<T> {
         self.delays.get()
     }
 
-    fn opening(&self, longest: Micros) -> Opening {
+    fn opening(&self, longest: Duration) -> Opening {
         let now = self.clock.now();
         let Rhythm { period, guard, settle } = self.rhythm;
         let silent = self.ended.get().max(self.begun.get()) + period + period;
@@ -191,7 +195,7 @@ impl<T: Timebase> Slots<T> {
             return Opening::Now;
         }
         let opens = self.ended.get() + settle;
-        let closes = (self.begun.get() + period).since(guard + longest);
+        let closes = self.begun.get() + period - (guard + longest);
         match () {
             () if opens > closes || now > closes => Opening::AfterLead(silent),
             () if now < opens => Opening::At(opens),
@@ -200,7 +204,7 @@ impl<T: Timebase> Slots<T> {
     }
 
     /// Waits for the guest's turn and takes it.
-    async fn open(&self, longest: Micros) -> Turn<'_> {
+    async fn open(&self, longest: Duration) -> Turn<'_> {
         let mut clock = self.clock.clone();
         loop {
             match self.opening(longest) {
@@ -239,7 +243,7 @@ impl<T: Timebase> Slots<T> {
         }
         let now = self.clock.now();
         // Whatever follows within half a period belongs to the same burst.
-        if now.since(self.begun.get()) >= Micros(self.rhythm.period.0 / 2) {
+        if now.since(self.begun.get()) >= self.rhythm.period / 2 {
             self.begun.set(now);
         }
         turn

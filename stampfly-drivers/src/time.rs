@@ -4,7 +4,7 @@ use core::future::{Future, poll_fn};
 use core::pin::pin;
 use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// What a driver needs to stamp its samples and to keep a chip's delays.
 ///
@@ -12,23 +12,23 @@ use stampfly_types::Micros;
 /// that run them hold one; everything that computes is told the time instead.
 pub trait Timebase: DelayNs + Clone {
     /// Time since power-on.
-    fn now(&self) -> Micros;
+    fn now(&self) -> Instant;
 }
 
 /// Waits until an instant; returns at once when it has passed.
-pub async fn sleep_until<T: Timebase>(clock: &mut T, instant: Micros) {
+pub async fn sleep_until<T: Timebase>(clock: &mut T, instant: Instant) {
     let left = instant.since(clock.now());
-    if left > Micros::ZERO {
-        clock.delay_us(u32::try_from(left.0).unwrap_or(u32::MAX)).await;
+    if left > Duration::ZERO {
+        clock.delay_us(u32::try_from(left.as_micros()).unwrap_or(u32::MAX)).await;
     }
 }
 
 /// The outcome of a future, or `None` when it takes longer than `limit`; it is dropped then.
 ///
 /// The future is polled first, so one that never waits costs no timer.
-pub(crate) async fn within<T: Timebase, F: Future>(clock: &T, limit: Micros, future: F) -> Option<F::Output> {
+pub(crate) async fn within<T: Timebase, F: Future>(clock: &T, limit: Duration, future: F) -> Option<F::Output> {
     let mut alarm = clock.clone();
-    let mut alarm = pin!(alarm.delay_us(u32::try_from(limit.0).unwrap_or(u32::MAX)));
+    let mut alarm = pin!(alarm.delay_us(u32::try_from(limit.as_micros()).unwrap_or(u32::MAX)));
     let mut future = pin!(future);
     poll_fn(|context| {
         if let Poll::Ready(value) = future.as_mut().poll(context) {

@@ -7,7 +7,7 @@ use embedded_hal::i2c::{ErrorType, I2c, Operation};
 use stampfly_drivers::PowerMonitor;
 use stampfly_drivers::blocking::{Blocking, BlockingClock, block_on};
 use stampfly_drivers::chip::ina3221::{Config, Ina3221};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 thread_local! {
     static NOW: Cell<u64> = const { Cell::new(0) };
@@ -51,7 +51,7 @@ impl I2c for Wire {
 
 #[test]
 fn a_driver_runs_to_its_end_without_an_executor() {
-    let clock = BlockingClock::new(Delay, || Micros(NOW.get() / 1_000));
+    let clock = BlockingClock::new(Delay, || Instant::from_micros(NOW.get() / 1_000));
     let wire = Blocking(Wire { configuration: [0; 2] });
     let mut battery = Ina3221::new(wire, Ina3221::A0_GROUND, clock, Config::default());
     let sample = block_on(battery.next()).expect("a sample");

@@ -8,7 +8,7 @@ use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmi270::{Bmi270, Config};
 use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_drivers::{Imu, SensorError, SensorErrorKind, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -56,7 +56,7 @@ impl Chip {
     }
 
     fn nanos(&self) -> u64 {
-        self.clock.now().0 * 1_000
+        self.clock.now().as_micros() * 1_000
     }
 
     /// Chip samples taken until now.
@@ -161,10 +161,10 @@ fn samples_come_at_400_hz_in_si_units_and_body_axes_with_the_cross_axis_correcti
     let mut before = first.at;
     for _ in 0..400 {
         let sample = block_on(imu.next()).expect("a sample");
-        let step = sample.at.since(before).0;
+        let step = sample.at.since(before).as_micros();
         assert!((2_450..=2_550).contains(&step), "one tick of the chip's clock: {step}");
         before = sample.at;
-        let latency = clock.now().since(sample.at).0;
+        let latency = clock.now().since(sample.at).as_micros();
         assert!((1_875..2_150).contains(&latency), "three chip samples, the aim and two transfers: {latency}");
     }
     let g = stampfly_types::GRAVITY / 4096.0;
@@ -184,8 +184,8 @@ fn the_stamp_is_the_middle_of_the_filter() {
     for _ in 0..20 {
         let sample = block_on(imu.next()).expect("a sample");
         let counts = sample.data.accel.x / stampfly_types::GRAVITY * 4096.0;
-        let instant = Micros((counts.round() as u64) * PERIOD / 1_000);
-        assert!(sample.at.0.abs_diff(instant.0) <= 60, "{} {}", sample.at, instant);
+        let instant = Instant::from_micros((counts.round() as u64) * PERIOD / 1_000);
+        assert!(sample.at.as_micros().abs_diff(instant.as_micros()) <= 60, "{} {}", sample.at, instant);
     }
 }
 
@@ -202,8 +202,8 @@ fn a_chip_clock_that_is_off_costs_no_sample() {
             let step = (sample.data.accel.x - before.data.accel.x) / stampfly_types::GRAVITY * 4096.0;
             assert!((step - 4.0).abs() < 1e-2, "{step}");
             // One tick, and three nominal periods that the chip makes in another time.
-            assert!((sample.at.since(before.at).0 * 1_000).abs_diff(4 * period) <= 60_000);
-            assert!(clock.now().since(sample.at) < Micros(2_300));
+            assert!((sample.at.since(before.at).as_micros() * 1_000).abs_diff(4 * period) <= 60_000);
+            assert!(clock.now().since(sample.at) < Duration::from_micros(2_300));
             before = sample;
         }
     }
@@ -235,8 +235,8 @@ fn an_overrun_starts_anew_instead_of_mixing_old_samples_with_new() {
     chip.borrow_mut().sample = |n| [(n % 8_192) as i16; 6];
     let sample = block_on(imu.next()).expect("a sample");
     let counts = sample.data.accel.x / stampfly_types::GRAVITY * 4096.0;
-    assert!(sample.at.0.abs_diff(counts.round() as u64 * PERIOD / 1_000) <= 60);
-    assert!(clock.now().since(sample.at) < Micros(2_150));
+    assert!(sample.at.as_micros().abs_diff(counts.round() as u64 * PERIOD / 1_000) <= 60);
+    assert!(clock.now().since(sample.at) < Duration::from_micros(2_150));
 }
 
 #[test]
@@ -246,7 +246,7 @@ fn lost_samples_restart_the_filter_and_cost_two_periods() {
     let before = block_on(imu.next()).expect("a sample").at;
     chip.borrow_mut().header = Some(0x40);
     let after = block_on(imu.next()).expect("a sample").at;
-    assert!((7_000..=8_000).contains(&after.since(before).0), "{}", after.since(before));
+    assert!((7_000..=8_000).contains(&after.since(before).as_micros()), "{}", after.since(before));
     assert_eq!(chip.borrow().writes.iter().filter(|w| w.0 == 0x7E && w.1 == [0xB0]).count(), 2);
 }
 
@@ -278,7 +278,7 @@ fn a_chip_that_forever_initialises_is_given_up() {
     let before = clock.now();
     let outcome = block_on(Bmi270::spi(bus, clock.clone(), &BLOB, AxisMap::IDENTITY, Config::default()).start());
     assert_eq!(outcome, Err(ChipError::Configuration { status: 0 }));
-    assert!(clock.now().since(before) < Micros::from_millis(170));
+    assert!(clock.now().since(before) < Duration::from_millis(170));
 }
 
 #[test]
@@ -302,7 +302,7 @@ fn a_chip_that_stops_sampling_times_out_and_is_set_up_again() {
     let before = clock.now();
     let error = block_on(imu.next()).expect_err("nothing new");
     assert_eq!((error, error.kind()), (ChipError::NoSample, SensorErrorKind::Timeout));
-    assert!(clock.now().since(before) < Micros::from_millis(15), "{}", clock.now().since(before));
+    assert!(clock.now().since(before) < Duration::from_millis(15), "{}", clock.now().since(before));
     chip.borrow_mut().frozen = false;
     chip.borrow_mut().writes.clear();
     block_on(imu.next()).expect("a sample");
@@ -333,8 +333,11 @@ fn one_wrong_bit_anywhere_in_flight_costs_no_more_than_a_sample() {
                 let (gap, step) = (clock.now().since(came), sample.at.since(before.at));
                 came = clock.now();
                 let place = format!("bit {bit} of {register:#04x}");
-                assert!(gap <= Micros::from_millis(5), "{place}: {gap} without a sample");
-                assert!((Micros(1_800)..=Micros(3_200)).contains(&step), "{place}: the next one is {step} later");
+                assert!(gap <= Duration::from_millis(5), "{place}: {gap} without a sample");
+                assert!(
+                    (Duration::from_micros(1_800)..=Duration::from_micros(3_200)).contains(&step),
+                    "{place}: the next one is {step} later"
+                );
             }
             assert_eq!(chip.borrow().flip, None, "it was read");
         }
@@ -352,8 +355,8 @@ fn after_refused_transfers_the_samples_made_meanwhile_come_at_once() {
         clock.advance(18_000);
         let begun = clock.now();
         let sample = block_on(imu.next()).expect("a sample");
-        assert!(clock.now().since(begun) < Micros(1_000), "{}", clock.now().since(begun));
-        assert!(begun.since(sample.at) > Micros(10_000), "from the time of the refusals");
+        assert!(clock.now().since(begun) < Duration::from_micros(1_000), "{}", clock.now().since(begun));
+        assert!(begun.since(sample.at) > Duration::from_micros(10_000), "from the time of the refusals");
     }
 }
 
@@ -371,7 +374,7 @@ fn bus_faults_cost_one_call_each_and_bounded_time() {
         chip.borrow_mut().faults.push((register, fault));
         let before = clock.now();
         assert_eq!(block_on(imu.next()), Err(expected));
-        assert!(clock.now().since(before) <= Micros::from_millis(13));
+        assert!(clock.now().since(before) <= Duration::from_millis(13));
         block_on(imu.next()).expect("a sample");
     }
 }
@@ -391,7 +394,7 @@ fn a_call_dropped_in_the_middle_of_a_fifo_read_never_mixes_old_samples_with_new(
     assert!(chip.borrow().faults.is_empty(), "it was the FIFO read that hung");
     let sample = block_on(imu.next()).expect("a sample");
     let counts = sample.data.accel.x / stampfly_types::GRAVITY * 4096.0;
-    assert!(sample.at.0.abs_diff(counts.round() as u64 * PERIOD / 1_000) <= 60);
+    assert!(sample.at.as_micros().abs_diff(counts.round() as u64 * PERIOD / 1_000) <= 60);
 }
 
 #[test]
@@ -458,7 +461,7 @@ impl Wait for Pin {
                 assert_eq!(chip.registers[0x46..0x48], [52, 0], "four frames");
                 assert_eq!([chip.registers[0x53], chip.registers[0x55], chip.registers[0x58]], [0x0A, 0, 0x02]);
                 let high = ((chip.consumed + 4) * chip.period).div_ceil(1_000);
-                self.clock.advance(high.saturating_sub(self.clock.now().0));
+                self.clock.advance(high.saturating_sub(self.clock.now().as_micros()));
                 Ok(())
             }
             Behaviour::Silent => std::future::pending().await,
@@ -496,7 +499,7 @@ fn with_the_pin_it_follows_the_chips_clock() {
             let sample = block_on(imu.next()).expect("a sample");
             let step = (sample.data.accel.x - before.data.accel.x) / stampfly_types::GRAVITY * 4096.0;
             assert!((step - 4.0).abs() < 1e-2, "{step}");
-            let latency = clock.now().since(sample.at).0;
+            let latency = clock.now().since(sample.at).as_micros();
             assert!(latency < 2_150, "no later than without: {latency}");
             before = sample;
         }
@@ -514,8 +517,8 @@ fn a_pin_that_cannot_be_trusted_is_ignored() {
         let mut before = block_on(imu.next()).expect("a sample").at;
         for round in 0..100 {
             let sample = block_on(imu.next()).expect("a sample");
-            assert!((2_450..=2_550).contains(&sample.at.since(before).0));
-            let latency = clock.now().since(sample.at).0;
+            assert!((2_450..=2_550).contains(&sample.at.since(before).as_micros()));
+            let latency = clock.now().since(sample.at).as_micros();
             assert!(latency < if round < 8 { 2_150 + 312 } else { 2_150 }, "{latency} in round {round}");
             before = sample.at;
         }
@@ -551,7 +554,7 @@ fn the_gyroscopes_self_test_is_started_awaited_and_given_up() {
                     assert_eq!((command.0, &command.1[..]), (0x7E, &[0x02][..]));
                     // A third of a second.
                     let begun = *asked.get_or_insert(time.now());
-                    if ends && time.now().since(begun) > Micros::from_millis(333) {
+                    if ends && time.now().since(begun) > Duration::from_millis(333) {
                         chip.registers[0x69] = 0;
                     }
                 }
@@ -562,7 +565,7 @@ fn the_gyroscopes_self_test_is_started_awaited_and_given_up() {
         let begun = clock.now();
         assert_eq!(block_on(imu.gyro_self_test()), outcome, "{axes:#04x} {status:#04x}");
         let took = clock.now().since(begun);
-        assert!(took < Micros::from_millis(2_200) && took > Micros::from_millis(333), "{took}");
+        assert!(took < Duration::from_millis(2_200) && took > Duration::from_millis(333), "{took}");
         let writes = chip.borrow().writes.clone();
         let test: Vec<(u8, &[u8])> = writes.iter().map(|write| (write.0, &write.1[..])).collect();
         let expected: [(u8, &[u8]); 5] =

@@ -7,7 +7,7 @@ use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmm150::{Bmm150, Config, Preset, Rate};
 use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters};
 use stampfly_drivers::{Magnetometer, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -17,7 +17,7 @@ const TRIM: [u8; 21] = [0, 0, 9, 9, 9, 0, 0, 26, 26, 9, 9, 0xFB, 0x02, 0xAB, 0x6
 struct Chip {
     clock: Clock,
     registers: [u8; 128],
-    begun: Micros,
+    begun: Instant,
     period: u64,
     reported: u64,
     /// Lowest bits of x, y, z after a self test.
@@ -33,7 +33,7 @@ impl Chip {
         let mut chip = Self {
             clock: clock.clone(),
             registers,
-            begun: Micros::ZERO,
+            begun: Instant::ZERO,
             period: 40_000,
             reported: 0,
             self_test: [1; 3],
@@ -75,7 +75,7 @@ impl Chip {
                     return Err(fault);
                 }
                 if register == 0x42 && into.len() == 11 {
-                    let done = self.clock.now().since(self.begun).0 / self.period;
+                    let done = self.clock.now().since(self.begun).as_micros() / self.period;
                     self.registers[0x48] = self.registers[0x48] & !1 | u8::from(done > self.reported);
                     self.reported = done;
                 }
@@ -115,10 +115,10 @@ fn every_sample_comes_once_in_microtesla_and_body_axes() {
         let mut before = first.at;
         for _ in 0..50 {
             let sample = block_on(compass.next()).expect("a sample");
-            assert!(sample.at.since(before).0.abs_diff(chip.borrow().period) <= 2_100);
+            assert!(sample.at.since(before).as_micros().abs_diff(chip.borrow().period) <= 2_100);
             before = sample.at;
         }
-        assert!((before.since(first.at).0 / 50).abs_diff(chip.borrow().period) < 50, "none twice, none lost");
+        assert!((before.since(first.at).as_micros() / 50).abs_diff(chip.borrow().period) < 50, "none twice, none lost");
     }
 }
 
@@ -164,7 +164,7 @@ fn faults_are_bounded_and_healed() {
     chip.borrow_mut().period = 100_000_000;
     let before = clock.now();
     assert_eq!(block_on(compass.next()), Err(ChipError::NoSample));
-    assert!(clock.now().since(before) < Micros::from_millis(85));
+    assert!(clock.now().since(before) < Duration::from_millis(85));
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn a_late_reader_gets_a_sample_whose_instant_is_known() {
     for late in [70_000, 123_456, 1_000_000] {
         clock.advance(late);
         let at = block_on(compass.next()).expect("a sample").at;
-        let into = (at.since(chip.borrow().begun).0 + Preset::Regular.duration().0 / 2) % 40_000;
+        let into = (at.since(chip.borrow().begun).as_micros() + Preset::Regular.duration().as_micros() / 2) % 40_000;
         assert!(into <= 2_100, "{into}");
     }
 }

@@ -7,7 +7,7 @@ use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmp280::{Bmp280, Config};
 use stampfly_drivers::chip::{ChipError, I2cRegisters};
 use stampfly_drivers::{Barometer, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -15,7 +15,7 @@ struct Chip {
     clock: Clock,
     registers: [u8; 256],
     /// When the running conversion ends.
-    busy_until: Micros,
+    busy_until: Instant,
     conversions: u32,
     duration: u64,
     fault: Option<Fault>,
@@ -37,7 +37,7 @@ impl Chip {
         Self {
             clock: clock.clone(),
             registers,
-            busy_until: Micros::ZERO,
+            busy_until: Instant::ZERO,
             conversions: 0,
             duration: 13_500,
             fault: None,
@@ -58,7 +58,7 @@ impl Chip {
                 assert_eq!(control & 3, 1, "forced mode");
                 self.registers[0xF4] = control & 0xFC;
                 self.conversions += 1;
-                self.busy_until = now + Micros(self.duration);
+                self.busy_until = now + Duration::from_micros(self.duration);
             }
             Access::Write(register, data) => self.registers[usize::from(register)] = data[0],
             Access::Read(register, into) => {
@@ -94,11 +94,11 @@ fn every_sample_is_a_conversion_of_its_own_at_the_instant_it_was_made() {
     assert!((first.data.temperature - 25.08).abs() < 1e-4);
     assert!((first.data.altitude - 56.0).abs() < 0.5, "{}", first.data.altitude);
     let age = clock.now().since(first.at);
-    assert!((5_000..8_000).contains(&age.0), "half the conversion and its margin: {age}");
+    assert!((5_000..8_000).contains(&age.as_micros()), "half the conversion and its margin: {age}");
     let mut before = first.at;
     for count in 2..50 {
         let sample = block_on(baro.next()).expect("a sample");
-        assert_eq!(sample.at.since(before), Micros::from_millis(40));
+        assert_eq!(sample.at.since(before), Duration::from_millis(40));
         assert_eq!(chip.borrow().conversions, count);
         before = sample.at;
     }
@@ -111,7 +111,7 @@ fn a_conversion_that_did_not_start_is_started_again_and_never_delivered_twice() 
         chip.borrow_mut().deaf = round % 2;
         let sample = block_on(baro.next()).expect("a sample");
         assert_eq!(chip.borrow().conversions, round + 1);
-        assert!(clock.now().since(sample.at) < Micros::from_millis(8));
+        assert!(clock.now().since(sample.at) < Duration::from_millis(8));
     }
     chip.borrow_mut().deaf = 2;
     assert_eq!(block_on(baro.next()), Err(ChipError::NoSample));
@@ -159,7 +159,7 @@ fn a_conversion_that_does_not_end_is_given_up() {
     chip.borrow_mut().duration = 1_000_000;
     let before = clock.now();
     assert_eq!(block_on(baro.next()), Err(ChipError::NoSample));
-    assert!(clock.now().since(before) < Micros::from_millis(50));
+    assert!(clock.now().since(before) < Duration::from_millis(50));
 }
 
 #[test]
@@ -185,5 +185,5 @@ fn after_a_cancelled_call_the_next_one_waits_for_the_conversion_it_left_behind()
     // The chip asserts that nothing is running when the third begins.
     let sample = block_on(baro.next()).expect("a sample");
     assert_eq!(chip.borrow().conversions, 3);
-    assert!(clock.now().since(sample.at) < Micros::from_millis(8));
+    assert!(clock.now().since(sample.at) < Duration::from_millis(8));
 }

@@ -7,14 +7,14 @@ use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::ina3221::{Config, Ina3221};
 use stampfly_drivers::chip::{ChipError, I2cRegisters};
 use stampfly_drivers::{PowerMonitor, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
 
 struct Chip {
     clock: Clock,
     registers: [u16; 256],
-    begun: Micros,
+    begun: Instant,
     /// Results that have been reported.
     reported: u64,
     cycle: u64,
@@ -29,7 +29,7 @@ impl Chip {
         // 2.00 A over 10 mΩ: 500 counts of 40 µV; 3.8 V: 475 counts of 8 mV.
         registers[3] = 500 << 3;
         registers[4] = 475 << 3;
-        Self { clock: clock.clone(), registers, begun: Micros::ZERO, reported: 0, cycle: 2 * 64 * 588, fault: None }
+        Self { clock: clock.clone(), registers, begun: Instant::ZERO, reported: 0, cycle: 2 * 64 * 588, fault: None }
     }
 
     fn access(&mut self, access: Access<'_>) -> Result<(), Fault> {
@@ -46,7 +46,7 @@ impl Chip {
                     return Err(fault);
                 }
                 if register == 0x0F {
-                    let done = self.clock.now().since(self.begun).0 / self.cycle;
+                    let done = self.clock.now().since(self.begun).as_micros() / self.cycle;
                     self.registers[0x0F] = u16::from(done > self.reported);
                     self.reported = done;
                 }
@@ -82,13 +82,13 @@ fn samples_are_amperes_and_volts_and_every_result_is_read_once() {
         let mut before = first.at;
         for _ in 0..50 {
             let sample = block_on(battery.next()).expect("a sample");
-            let step = sample.at.since(before).0.abs_diff(chip.borrow().cycle);
+            let step = sample.at.since(before).as_micros().abs_diff(chip.borrow().cycle);
             assert!(step <= 2_200, "off by no more than a look at the flag: {step}");
             before = sample.at;
         }
-        let mean = before.since(first.at).0 / 50;
+        let mean = before.since(first.at).as_micros() / 50;
         assert!(mean.abs_diff(chip.borrow().cycle) < 50, "none twice, none lost: {mean}");
-        assert!(clock.now().since(before) < Micros::from_millis(41));
+        assert!(clock.now().since(before) < Duration::from_millis(41));
     }
 }
 
@@ -130,7 +130,7 @@ fn faults_are_bounded_and_healed() {
     chip.borrow_mut().cycle = 100_000_000;
     let before = clock.now();
     assert_eq!(block_on(battery.next()), Err(ChipError::NoSample));
-    assert!(clock.now().since(before) < Micros(2 * usual + 5_000));
+    assert!(clock.now().since(before) < Duration::from_micros(2 * usual + 5_000));
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_cancelled_wait_loses_nothing() {
     cancel(battery.next());
     clock.stop(false);
     let second = block_on(battery.next()).expect("a sample").at;
-    assert!(second.since(first).0.abs_diff(chip.borrow().cycle) <= 2_200);
+    assert!(second.since(first).as_micros().abs_diff(chip.borrow().cycle) <= 2_200);
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn a_late_reader_gets_a_result_whose_instant_is_known() {
         clock.advance(late);
         let at = block_on(battery.next()).expect("a sample").at;
         let (begun, cycle) = (chip.borrow().begun, chip.borrow().cycle);
-        let into = (at.since(begun).0 + cycle / 2) % cycle;
+        let into = (at.since(begun).as_micros() + cycle / 2) % cycle;
         assert!(into <= 2_200, "the middle of a cycle: {into}");
     }
 }

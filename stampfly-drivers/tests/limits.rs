@@ -15,7 +15,7 @@ use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// Goes nowhere.
 struct Pin;
@@ -86,18 +86,20 @@ fn what_the_flight_band_reads_ends_well_within_its_period() {
     type I2c = I2cRegisters<I2cBus<fn(Access<'_>) -> Result<(), Fault>>>;
     let [spi, i2c] = [<Spi as Registers>::LIMIT, <I2c as Registers>::LIMIT];
     // Both sensors once, and four frames of the FIFO.
-    assert!(spi.of(12) <= Micros(350) && spi.of(52) <= Micros(450), "{:?}", spi.of(52));
-    assert!((1..=256).all(|bytes| spi.of(bytes) <= Micros::from_millis(1)), "everything a driver sends at once");
+    assert!(spi.of(12) <= Duration::from_micros(350) && spi.of(52) <= Duration::from_micros(450), "{:?}", spi.of(52));
+    assert!((1..=256).all(|bytes| spi.of(bytes) <= Duration::from_millis(1)), "everything a driver sends at once");
     // At 100 kHz a byte takes nine clocks; nothing that is merely slow is given up.
-    assert!((1..=256).all(|bytes| i2c.of(bytes).0 >= bytes as u64 * 90 && i2c.of(bytes).0 <= 35_000));
-    assert_eq!(spi.of(usize::MAX), Micros(u64::MAX), "no overflow");
+    assert!(
+        (1..=256).all(|bytes| i2c.of(bytes).as_micros() >= bytes as u64 * 90 && i2c.of(bytes).as_micros() <= 35_000)
+    );
+    assert_eq!(spi.of(usize::MAX), Duration::from_micros(u64::MAX), "no overflow");
 }
 
 /// Calls a driver a hundred times on a bus that fails for ever: how long the longest call took, and that all failed.
 macro_rules! worst {
     ($clock:ident, $driver:expr) => {{
         let mut driver = $driver;
-        let mut worst = Micros::ZERO;
+        let mut worst = Duration::ZERO;
         for _ in 0..100 {
             let begun = $clock.now();
             assert!(block_on(driver.next()).is_err());
@@ -125,9 +127,9 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
         ];
         // The last two first leave their chips the time to start up.
         let milliseconds = [1, 11, 11, 11, 15, 60, 125];
-        let limits = milliseconds.map(Micros::from_millis);
+        let limits = milliseconds.map(Duration::from_millis);
         for (worst, limit) in worst.into_iter().zip(limits) {
-            assert!(worst > Micros::ZERO && worst < limit, "{worst} with {fault:?}");
+            assert!(worst > Duration::ZERO && worst < limit, "{worst} with {fault:?}");
         }
     }
 }

@@ -8,7 +8,7 @@ use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::pmw3901::{Config, Pmw3901, codec};
 use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_drivers::{OpticalFlow, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -24,7 +24,7 @@ struct Chip {
     absent: bool,
     fault: Option<Fault>,
     /// Earliest next access.
-    ready: Micros,
+    ready: Instant,
     /// How many more times register 0x47 says no.
     refusals: u32,
     /// A register that can be written only.
@@ -52,7 +52,7 @@ impl Chip {
             shutter: 2,
             absent: false,
             fault: None,
-            ready: Micros::ZERO,
+            ready: Instant::ZERO,
             refusals: 0,
             forgets_witness: false,
             garbles: None,
@@ -115,7 +115,7 @@ impl spi::SpiDevice for Device {
                 }
                 other => panic!("not an access that keeps the data sheet's times: {other:?}"),
             };
-            chip.ready = self.0.now() + Micros(common::TRANSFER + pause);
+            chip.ready = self.0.now() + Duration::from_micros(common::TRANSFER + pause);
             fault.map_or(Ok(()), Err)
         };
         finish(&self.0, outcome).await
@@ -233,7 +233,7 @@ fn after_a_failed_or_cancelled_read_a_new_interval_begins() {
         let before = clock.now();
         let error = block_on(flow.next()).expect_err("the bus failed");
         assert_eq!(error, if fault == Fault::Nack { ChipError::Bus(fault) } else { ChipError::BusTimeout });
-        assert!(clock.now().since(before) <= Micros::from_millis(21));
+        assert!(clock.now().since(before) <= Duration::from_millis(21));
         clock.advance(100_000);
         chip.borrow_mut().counts = [500, 500];
         let sample = block_on(flow.next()).expect("a sample");
@@ -279,7 +279,7 @@ fn a_chip_that_restarts_in_flight_is_noticed_within_a_second_and_set_up_again() 
         }
     };
     assert_eq!(error, ChipError::Restarted);
-    assert!(clock.now().since(begun) <= Micros(1_011_000));
+    assert!(clock.now().since(begun) <= Duration::from_micros(1_011_000));
     chip.borrow_mut().writes.clear();
     block_on(flow.next()).expect("a sample");
     assert!(chip.borrow().writes.len() > 70);
@@ -320,7 +320,7 @@ fn a_chip_that_sees_nothing_for_ten_seconds_is_set_up_again() {
         }
     };
     assert_eq!(error, ChipError::NoSample);
-    assert!((9_900_000..10_100_000).contains(&clock.now().since(begun).0), "{}", clock.now().since(begun));
+    assert!((9_900_000..10_100_000).contains(&clock.now().since(begun).as_micros()), "{}", clock.now().since(begun));
     chip.borrow_mut().writes.clear();
     block_on(flow.next()).expect("a sample, blind or not");
     assert!(chip.borrow().writes.len() > 70);

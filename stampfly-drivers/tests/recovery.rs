@@ -6,7 +6,7 @@ use common::Clock;
 use embedded_hal::digital::{ErrorKind, ErrorType, InputPin, OutputPin};
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::{Recovery, RecoveryError, Timebase, recover_i2c};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -97,7 +97,7 @@ impl InputPin for Line {
     }
 }
 
-fn recover(bus: Bus) -> (Result<Recovery, RecoveryError>, Micros, Rc<RefCell<Bus>>) {
+fn recover(bus: Bus) -> (Result<Recovery, RecoveryError>, Duration, Rc<RefCell<Bus>>) {
     let bus = Rc::new(RefCell::new(Bus { scl: true, sda: true, ..bus }));
     let mut clock = Clock::new();
     let begun = clock.now();
@@ -121,7 +121,7 @@ fn a_device_interrupted_at_any_bit_of_any_byte_lets_go() {
                 Ok(Recovery::WasFree) => assert!(!stuck),
                 Err(error) => panic!("{error:?} at bit {bit} of {byte:#04x}"),
             }
-            assert!(time < Micros(300), "{time}");
+            assert!(time < Duration::from_micros(300), "{time}");
             assert!(bus.borrow().sending.is_none() && bus.borrow().levels() == (true, true));
         }
     }
@@ -137,7 +137,7 @@ fn what_cannot_be_freed_is_told_in_time_and_the_lines_are_let_go() {
     ] {
         let (outcome, time, bus) = recover(bus);
         assert_eq!(outcome, Err(error));
-        assert!(time < Micros::from_millis(1), "{time}");
+        assert!(time < Duration::from_millis(1), "{time}");
         assert!(bus.borrow().scl && bus.borrow().sda);
     }
     assert_eq!(recover(Bus { broken: true, ..Bus::default() }).0, Err(RecoveryError::Pin));

@@ -4,7 +4,7 @@ use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use stampfly_drivers::Timebase;
 use stampfly_drivers::slot::{Guest, Lead, Rhythm, SlotError, Slots};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::{Cell, RefCell};
 use std::convert::Infallible;
 use std::pin::pin;
@@ -32,7 +32,7 @@ impl Clock {
     /// Runs both to their ends, or until this instant.
     fn run<A, B>(
         &self,
-        limit: Micros,
+        limit: Instant,
         first: impl Future<Output = A>,
         second: impl Future<Output = B>,
     ) -> (Option<A>, Option<B>) {
@@ -69,8 +69,8 @@ impl DelayNs for Clock {
 }
 
 impl Timebase for Clock {
-    fn now(&self) -> Micros {
-        Micros(self.0.get() / 1_000)
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.0.get() / 1_000)
     }
 }
 
@@ -107,7 +107,7 @@ impl SpiDevice for Device {
     }
 }
 
-const LONGEST: Micros = Micros(150);
+const LONGEST: Duration = Duration::from_micros(150);
 const BEGIN: u64 = 1_000_000;
 
 struct Bench {
@@ -170,7 +170,7 @@ fn a_lead_in_its_rhythm_never_waits_and_its_guest_not_long() {
         let mut slots = bench.slots();
         let (imu, flow) = bench.devices();
         let (imu, flow, bus) = slots.split(imu, flow, LONGEST);
-        let (clock, end) = (bench.clock.clone(), Micros(BEGIN + 4_000_000));
+        let (clock, end) = (bench.clock.clone(), Instant::from_micros(BEGIN + 4_000_000));
         let (_, waits) = bench.clock.run(end, lead(imu, clock.clone(), late), guest(flow, clock, 300));
         let waits = waits.expect("all of the guest's transfers");
         assert!(waits.iter().all(|wait| *wait <= 2_650 + 78 + 50), "{:?}", waits.iter().max());
@@ -200,9 +200,9 @@ fn a_guests_long_start_goes_on_in_every_pause() {
         bench.clock.now()
     };
     let lead = lead(imu, bench.clock.clone(), |_| 0);
-    let (_, started) = bench.clock.run(Micros(BEGIN + 1_000_000), lead, start);
+    let (_, started) = bench.clock.run(Instant::from_micros(BEGIN + 1_000_000), lead, start);
     let ended = started.expect("all transfers");
-    assert!(ended < Micros(BEGIN + 6_000), "two pauses are enough: {ended}");
+    assert!(ended < Instant::from_micros(BEGIN + 6_000), "two pauses are enough: {ended}");
     assert_eq!(bus.delays(), 0);
 }
 
@@ -219,7 +219,8 @@ fn a_guest_goes_on_by_itself_when_the_lead_is_silent() {
         }
         std::future::pending::<()>().await;
     };
-    let (_, waits) = bench.clock.run(Micros(BEGIN + 9_000_000), dies, guest(flow, bench.clock.clone(), 100));
+    let (_, waits) =
+        bench.clock.run(Instant::from_micros(BEGIN + 9_000_000), dies, guest(flow, bench.clock.clone(), 100));
     let waits = waits.expect("all of the guest's transfers");
     assert!(waits.iter().all(|wait| *wait <= 5_000), "two periods: {:?}", waits.iter().max());
     assert!(waits[30..].iter().all(|wait| *wait == 0), "nobody to wait for");
@@ -239,10 +240,10 @@ fn a_guest_that_breaks_its_promise_is_given_up() {
         outcomes
     };
     let lead = lead(imu, bench.clock.clone(), |_| 0);
-    let (_, outcomes) = bench.clock.run(Micros(BEGIN + 100_000), lead, hangs);
+    let (_, outcomes) = bench.clock.run(Instant::from_micros(BEGIN + 100_000), lead, hangs);
     let late = Err(SlotError::TooLong);
     assert_eq!(outcomes.expect("ended"), [Ok(()), late, late, Ok(())]);
-    assert!(bench.transfers('g').iter().all(|(begun, ended)| ended - begun <= LONGEST.0));
+    assert!(bench.transfers('g').iter().all(|(begun, ended)| ended - begun <= LONGEST.as_micros()));
     assert_eq!(bus.delays(), 0, "the lead did not notice");
 }
 
@@ -267,9 +268,9 @@ fn a_lead_out_of_its_rhythm_waits_for_one_transfer_at_most() {
             flow.write(&[130]).await.expect("works");
         }
     };
-    let (worst, _) = bench.clock.run(Micros(BEGIN + 9_000_000), erratic, greedy);
+    let (worst, _) = bench.clock.run(Instant::from_micros(BEGIN + 9_000_000), erratic, greedy);
     let worst = worst.expect("the lead is never kept out");
-    assert!((1..=LONGEST.0).contains(&worst), "{worst}");
+    assert!((1..=LONGEST.as_micros()).contains(&worst), "{worst}");
     assert!(bus.delays() > 0);
 }
 
@@ -287,10 +288,10 @@ fn whoever_is_dropped_gives_the_bus_back() {
             assert!(first.as_mut().poll(&mut context).is_pending());
             assert!(second.as_mut().poll(&mut context).is_pending());
         };
-        bench.clock.run(Micros(BEGIN + 1_000), both, async {});
+        bench.clock.run(Instant::from_micros(BEGIN + 1_000), both, async {});
     }
     assert!(!bench.wires.0.get());
-    let (lead, guest) = bench.clock.run(Micros(BEGIN + 9_000), imu.write(&[10]), flow.write(&[100]));
+    let (lead, guest) = bench.clock.run(Instant::from_micros(BEGIN + 9_000), imu.write(&[10]), flow.write(&[100]));
     assert!(lead.is_some() && guest.is_some_and(|outcome| outcome.is_ok()));
 }
 
@@ -299,9 +300,9 @@ fn a_guest_that_never_fits_waits_for_silence() {
     let bench = Bench::new();
     let mut slots = bench.slots();
     let (imu, flow) = bench.devices();
-    let (imu, mut flow, _) = slots.split(imu, flow, Micros(2_200));
+    let (imu, mut flow, _) = slots.split(imu, flow, Duration::from_micros(2_200));
     let lead = lead(imu, bench.clock.clone(), |_| 0);
-    let (_, outcome) = bench.clock.run(Micros(BEGIN + 100_000), lead, flow.write(&[10]));
+    let (_, outcome) = bench.clock.run(Instant::from_micros(BEGIN + 100_000), lead, flow.write(&[10]));
     assert_eq!(outcome, None);
 }
 

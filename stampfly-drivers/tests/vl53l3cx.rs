@@ -9,7 +9,7 @@ use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, DistanceMode, RangeStatus, Vl53l3cx};
 use stampfly_drivers::{RangeFinder, SensorError, SensorErrorKind, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
@@ -76,7 +76,7 @@ impl Chip {
         self.registers.fill(0);
         self.registers[0x30] = 0x11;
         (self.address, self.ranging) = (0x29, None);
-        self.up = self.up.map(|_| self.clock.now().0);
+        self.up = self.up.map(|_| self.clock.now().as_micros());
     }
 
     /// Finished measurements, and when the newest was.
@@ -86,12 +86,12 @@ impl Chip {
         }
         let Some((begun, period)) = self.ranging.filter(|_| !self.blind) else { return (self.cleared, 0) };
         // One budget of 33 ms for the first, then one per period.
-        let Some(since) = (self.clock.now().0).checked_sub(begun + 33_000) else { return (0, 0) };
+        let Some(since) = (self.clock.now().as_micros()).checked_sub(begun + 33_000) else { return (0, 0) };
         (1 + since / period, begun + 33_000 + since / period * period)
     }
 
     fn answers(&self, address: u8) -> bool {
-        self.up.is_some_and(|up| self.clock.now().0 >= up + BOOT) && self.address == address
+        self.up.is_some_and(|up| self.clock.now().as_micros() >= up + BOOT) && self.address == address
     }
 
     fn write(&mut self, register: u16, data: &[u8]) {
@@ -112,7 +112,7 @@ impl Chip {
                 let ticks = u32::from_be_bytes(self.registers[0x6C..0x70].try_into().expect("four bytes"));
                 assert_eq!(self.registers[0x30], 0x01, "configured");
                 self.cleared = 0;
-                self.ranging = Some((self.clock.now().0, u64::from(ticks) * 40_000 / 43 / 1_000));
+                self.ranging = Some((self.clock.now().as_micros(), u64::from(ticks) * 40_000 / 43 / 1_000));
             }
             (0x0087, [0x00]) => self.ranging = None,
             _ => {}
@@ -186,7 +186,7 @@ impl OutputPin for Xshut {
 
     fn set_high(&mut self) -> Result<(), Infallible> {
         let mut chip = self.0.borrow_mut();
-        chip.up = Some(chip.clock.now().0);
+        chip.up = Some(chip.clock.now().as_micros());
         Ok(())
     }
 }
@@ -218,7 +218,7 @@ impl Bench {
         self.drivers_with(Config::default())
     }
 
-    fn timed<T>(&self, call: impl Future<Output = T>) -> (T, Micros) {
+    fn timed<T>(&self, call: impl Future<Output = T>) -> (T, Duration) {
         let begun = self.clock.now();
         (block_on(call), self.clock.now().since(begun))
     }
@@ -230,7 +230,7 @@ fn two_on_a_bus_are_moved_one_by_one_and_range_side_by_side() {
     let [mut below, mut ahead] = bench.drivers();
     bench.chips[1].borrow_mut().target = (9, 500);
     let (first, time) = bench.timed(below.next());
-    assert!(first.is_ok() && time < Micros(80_000), "{first:?} after {time}");
+    assert!(first.is_ok() && time < Duration::from_micros(80_000), "{first:?} after {time}");
     block_on(ahead.next()).expect("a sample");
     assert_eq!(bench.chips.each_ref().map(|chip| chip.borrow().address), [0x30, 0x31]);
     for _ in 0..30 {
@@ -251,9 +251,9 @@ fn samples_come_at_30_hz_once_each_and_are_stamped_in_the_middle() {
     let mut before = first.at;
     for _ in 0..300 {
         let sample = block_on(below.next()).expect("a sample");
-        assert!(sample.at.since(before).0.abs_diff(33_333) <= 2_200, "{}", sample.at.since(before));
+        assert!(sample.at.since(before).as_micros().abs_diff(33_333) <= 2_200, "{}", sample.at.since(before));
         let (_, finished) = bench.chips[0].borrow().measured();
-        assert!(sample.at.0.abs_diff(finished - 16_500) <= 1_200, "{} and {finished}", sample.at);
+        assert!(sample.at.as_micros().abs_diff(finished - 16_500) <= 1_200, "{} and {finished}", sample.at);
         before = sample.at;
     }
     let mean = before.since(first.at).seconds() / 300.0;
@@ -301,7 +301,11 @@ fn a_measurement_whose_clear_was_garbled_is_not_delivered_again() {
         bench.chips[0].borrow_mut().held = Some(held);
         let sample = block_on(below.next()).expect("a sample");
         assert!(below.reading().is_some_and(|reading| reading.count > held as u8), "another one");
-        assert!(sample.at.since(before.at) > Micros(50_000), "{} after the one before", sample.at.since(before.at));
+        assert!(
+            sample.at.since(before.at) > Duration::from_micros(50_000),
+            "{} after the one before",
+            sample.at.since(before.at)
+        );
     }
 }
 
@@ -315,7 +319,7 @@ fn a_reader_that_comes_late_gets_a_fresh_measurement() {
         bench.chips[0].borrow_mut().looks = 0;
         let sample = block_on(below.next()).expect("a sample");
         let (age, looks) = (bench.clock.now().since(sample.at), bench.chips[0].borrow().looks);
-        assert!(age < Micros(19_500), "{age} after {late} us");
+        assert!(age < Duration::from_micros(19_500), "{age} after {late} us");
         assert!(looks <= if late <= 123_456 { 6 } else { 19 }, "{looks} looks after {late} us");
     }
 }
@@ -329,7 +333,11 @@ fn a_reader_that_comes_a_little_late_knows_when_the_measurement_was() {
         bench.clock.advance(30_000 + round * 97);
         let sample = block_on(below.next()).expect("a sample");
         let (_, finished) = bench.chips[0].borrow().measured();
-        assert!(sample.at.0.abs_diff(finished - 16_500) <= 1_500, "{} and {finished} in round {round}", sample.at);
+        assert!(
+            sample.at.as_micros().abs_diff(finished - 16_500) <= 1_500,
+            "{} and {finished} in round {round}",
+            sample.at
+        );
     }
 }
 
@@ -350,7 +358,7 @@ fn the_same_measurement_is_never_delivered_twice_whatever_happens_to_its_end() {
     bench.clock.stop(false);
     assert!(bench.chips[0].borrow().faults.is_empty(), "it was the read-out that hung");
     let sample = block_on(below.next()).expect("a sample");
-    assert!(bench.clock.now().since(sample.at) < Micros(19_500));
+    assert!(bench.clock.now().since(sample.at) < Duration::from_micros(19_500));
     let read = bench.chips[0].borrow().read.clone();
     assert_eq!(read.len(), 4);
     assert!(read.windows(2).all(|pair| pair[0] < pair[1]), "{read:?}");
@@ -366,10 +374,10 @@ fn a_chip_that_restarts_is_noticed_and_moved_again_without_its_neighbour() {
     let (outcome, time) = bench.timed(below.next());
     let error = outcome.expect_err("it is gone");
     assert_eq!((error, error.kind()), (ChipError::Restarted, SensorErrorKind::Restarted));
-    assert!(time < Micros(40_000), "{time}");
+    assert!(time < Duration::from_micros(40_000), "{time}");
     block_on(ahead.next()).expect("the neighbour goes on");
     let (outcome, time) = bench.timed(below.next());
-    assert!(outcome.is_ok() && time < Micros(80_000), "{outcome:?} after {time}");
+    assert!(outcome.is_ok() && time < Duration::from_micros(80_000), "{outcome:?} after {time}");
     block_on(ahead.next()).expect("the neighbour goes on");
     assert_eq!(bench.chips.each_ref().map(|chip| chip.borrow().resets), [2, 1]);
     assert_eq!(bench.chips.each_ref().map(|chip| chip.borrow().address), [0x30, 0x31]);
@@ -429,10 +437,10 @@ fn a_chip_that_sees_nothing_new_times_out_and_is_set_up_again() {
     bench.chips[0].borrow_mut().blind = true;
     let (outcome, time) = bench.timed(below.next());
     assert_eq!(outcome, Err(ChipError::NoSample));
-    assert!(time < Micros(2 * 33_333 + 20_000 + 33_333), "{time}");
+    assert!(time < Duration::from_micros(2 * 33_333 + 20_000 + 33_333), "{time}");
     let (outcome, time) = bench.timed(below.next());
     assert_eq!(outcome, Err(ChipError::NoSample));
-    assert!(time < Micros(4 * 33_333 + 350_000), "{time}");
+    assert!(time < Duration::from_micros(4 * 33_333 + 350_000), "{time}");
     bench.chips[0].borrow_mut().blind = false;
     assert!(block_on(below.next()).is_ok());
 }
@@ -454,7 +462,7 @@ fn a_chip_that_is_not_there_or_does_not_start_or_is_another_ends_in_time() {
     bench.chips[0].borrow_mut().boots = false;
     let (outcome, time) = bench.timed(below.next());
     assert_eq!(outcome, Err(ChipError::Configuration { status: 0 }));
-    assert!(time < Micros(110_000), "{time}");
+    assert!(time < Duration::from_micros(110_000), "{time}");
     assert!(bench.chips[0].borrow().up.is_none(), "kept in reset");
 
     bench.chips[0].borrow_mut().boots = true;
@@ -473,7 +481,7 @@ fn a_chip_that_is_not_there_or_does_not_start_or_is_another_ends_in_time() {
     let mut absent = Vl53l3cx::new(bus, Xshut(nobody), &boot, 0x32, clock, Config::default());
     let (outcome, time) = bench.timed(absent.next());
     assert_eq!(outcome, Err(ChipError::Bus(Fault::Nack)));
-    assert!(time < Micros(110_000), "{time}");
+    assert!(time < Duration::from_micros(110_000), "{time}");
 }
 
 #[test]
@@ -484,15 +492,15 @@ fn a_bus_that_never_answers_ends_every_call_in_time() {
     bench.chips[0].borrow_mut().faults = vec![(0x30, Fault::Hang)];
     let (outcome, time) = bench.timed(below.next());
     assert_eq!(outcome, Err(ChipError::BusTimeout));
-    assert!(time < Micros(33_333 + 12_000), "{time}");
+    assert!(time < Duration::from_micros(33_333 + 12_000), "{time}");
     assert!(block_on(below.next()).is_ok());
 }
 
 #[test]
 fn impossible_configurations_are_not_sent() {
     for config in [
-        Config { budget: Micros(20_000), ..Config::default() },
-        Config { period: Micros(30_000), ..Config::default() },
+        Config { budget: Duration::from_micros(20_000), ..Config::default() },
+        Config { period: Duration::from_micros(30_000), ..Config::default() },
         Config { mode: DistanceMode::Short, offset: f32::INFINITY, ..Config::default() },
     ] {
         let bench = Bench::new();

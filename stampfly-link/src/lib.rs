@@ -19,15 +19,15 @@
 //! # Example
 //! ```
 //! use stampfly_link::{Address, ControlPacket, Session};
-//! use stampfly_types::{Micros, messages::PilotInput};
+//! use stampfly_types::{Instant, messages::PilotInput};
 //!
 //! let (vehicle, transmitter) = (Address([1; 6]), Address([2; 6]));
 //! let mut session = Session::new(vehicle, 1, None);
-//! session.start_pairing(Micros(0))?;
-//! assert!(session.beacon(Micros(0)).is_some(), "calls for a transmitter");
+//! session.start_pairing(Instant::ZERO)?;
+//! assert!(session.beacon(Instant::ZERO).is_some(), "calls for a transmitter");
 //!
 //! let bytes = ControlPacket::from_pilot(vehicle, &PilotInput::default()).to_bytes();
-//! assert!(session.receive(Micros(10_000), transmitter, &bytes).is_ok());
+//! assert!(session.receive(Instant::from_micros(10_000), transmitter, &bytes).is_ok());
 //! assert_eq!(session.peer(), Some(transmitter), "the first that answers is the one");
 //! # Ok::<(), stampfly_link::PairingRefused>(())
 //! ```

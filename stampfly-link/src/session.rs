@@ -12,13 +12,13 @@
 //! what may be published.
 
 use crate::{Address, ControlError, ControlPacket, PairingPacket};
-use stampfly_types::Micros;
 use stampfly_types::messages::PilotInput;
+use stampfly_types::{Duration, Instant};
 
 /// Time between two calls for a transmitter.
-const CALL_PERIOD: Micros = Micros::from_millis(500);
+const CALL_PERIOD: Duration = Duration::from_millis(500);
 /// A transmitter that has been silent for this long is looking for vehicles, too.
-const SILENCE: Micros = Micros::from_secs(1);
+const SILENCE: Duration = Duration::from_secs(1);
 
 /// What came in since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,18 +82,18 @@ impl core::error::Error for PairingRefused {}
 ///
 /// ```
 /// use stampfly_link::{Address, ControlPacket, Session};
-/// use stampfly_types::{Micros, messages::PilotInput};
+/// use stampfly_types::{Duration, Instant, messages::PilotInput};
 /// let (vehicle, pilot) = (Address([1; 6]), Address([2; 6]));
 /// let mut session = Session::new(vehicle, 1, Some(pilot));
-/// assert_eq!(session.beacon(Micros(0)), None, "paired: it does not call");
+/// assert_eq!(session.beacon(Instant::ZERO), None, "paired: it does not call");
 /// session.set_armed(true);
-/// assert!(session.start_pairing(Micros(0)).is_err(), "not with motors armed");
+/// assert!(session.start_pairing(Instant::ZERO).is_err(), "not with motors armed");
 ///
 /// let bytes = ControlPacket::centred(vehicle).to_bytes();
-/// assert!(session.receive(Micros(0), Address([3; 6]), &bytes).is_err());
-/// assert_eq!(session.age(Micros(20_000)), None, "a stranger is no sign of life");
-/// assert!(session.receive(Micros(10_000), pilot, &bytes).is_ok());
-/// assert_eq!(session.age(Micros(20_000)), Some(Micros(10_000)));
+/// assert!(session.receive(Instant::ZERO, Address([3; 6]), &bytes).is_err());
+/// assert_eq!(session.age(Instant::from_micros(20_000)), None, "a stranger is no sign of life");
+/// assert!(session.receive(Instant::from_micros(10_000), pilot, &bytes).is_ok());
+/// assert_eq!(session.age(Instant::from_micros(20_000)), Some(Duration::from_micros(10_000)));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {
@@ -102,10 +102,10 @@ pub struct Session {
     peer: Option<Address>,
     armed: bool,
     /// While looking for a transmitter, and without one while armed: when to call next.
-    next_call: Option<Micros>,
-    newest: Option<Micros>,
+    next_call: Option<Instant>,
+    newest: Option<Instant>,
     /// While looking: when the present transmitter was last heard, or looking began.
-    present_heard: Micros,
+    present_heard: Instant,
     counters: Counters,
 }
 
@@ -113,7 +113,7 @@ impl Session {
     /// A vehicle at power-on. Without a peer it looks for one.
     #[must_use]
     pub fn new(vehicle: Address, channel: u8, peer: Option<Address>) -> Self {
-        let next_call = if peer.is_none() { Some(Micros::ZERO) } else { None };
+        let next_call = if peer.is_none() { Some(Instant::ZERO) } else { None };
         Self {
             vehicle,
             channel,
@@ -121,7 +121,7 @@ impl Session {
             armed: false,
             next_call,
             newest: None,
-            present_heard: Micros::ZERO,
+            present_heard: Instant::ZERO,
             counters: Counters::default(),
         }
     }
@@ -139,7 +139,7 @@ impl Session {
     ///
     /// # Errors
     /// With motors armed; nothing has changed then.
-    pub fn start_pairing(&mut self, now: Micros) -> Result<(), PairingRefused> {
+    pub fn start_pairing(&mut self, now: Instant) -> Result<(), PairingRefused> {
         if self.armed {
             return Err(PairingRefused);
         }
@@ -161,7 +161,7 @@ impl Session {
     }
 
     /// The call that is due now, for everybody: ask at least as often as it is due.
-    pub fn beacon(&mut self, now: Micros) -> Option<[u8; PairingPacket::LENGTH]> {
+    pub fn beacon(&mut self, now: Instant) -> Option<[u8; PairingPacket::LENGTH]> {
         let next = self.next_call.filter(|next| now >= *next && !self.armed)?;
         // From the plan, not from now, so that late questions do not add up; but never two at once.
         let planned = next + CALL_PERIOD;
@@ -173,7 +173,7 @@ impl Session {
     ///
     /// # Errors
     /// When it is not the pilot's newest word; it may not be used then.
-    pub fn receive(&mut self, at: Micros, source: Address, bytes: &[u8]) -> Result<PilotInput, Rejected> {
+    pub fn receive(&mut self, at: Instant, source: Address, bytes: &[u8]) -> Result<PilotInput, Rejected> {
         let outcome = self.judge(at, source, bytes);
         let Counters { accepted, old, strangers, length, other_vehicles, checksum, content } = &mut self.counters;
         let counter = match &outcome {
@@ -189,7 +189,7 @@ impl Session {
         outcome
     }
 
-    fn judge(&mut self, at: Micros, source: Address, bytes: &[u8]) -> Result<PilotInput, Rejected> {
+    fn judge(&mut self, at: Instant, source: Address, bytes: &[u8]) -> Result<PilotInput, Rejected> {
         // Whoever listens to one station looks at the source first; whoever looks for one, at everything else.
         if !self.is_pairing() && self.peer != Some(source) {
             return Err(Rejected::Stranger);
@@ -225,7 +225,7 @@ impl Session {
 
     /// How long ago the newest packet was taken.
     #[must_use]
-    pub fn age(&self, now: Micros) -> Option<Micros> {
+    pub fn age(&self, now: Instant) -> Option<Duration> {
         self.newest.map(|at| now.since(at))
     }
 

@@ -4,7 +4,7 @@ use criterion::{Criterion, Throughput};
 use stampfly_log::FlightHash;
 use stampfly_log::ulog::{Definitions, Reader, Sample, Sink, Topic};
 use stampfly_types::messages::{ImuData, StateEstimate};
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 use std::hint::black_box;
 
 /// Takes everything and forgets it.
@@ -40,25 +40,28 @@ fn main() {
     let state = StateEstimate::default().to_words();
 
     let mut hash = FlightHash::new();
-    criterion.bench_function("hash/sensor_imu", |b| b.iter(|| hash.publish(0, 1, Micros(2_500), black_box(&imu))));
-    criterion
-        .bench_function("hash/estimate_state", |b| b.iter(|| hash.publish(1, 1, Micros(2_500), black_box(&state))));
+    criterion.bench_function("hash/sensor_imu", |b| {
+        b.iter(|| hash.publish(0, 1, Instant::from_micros(2_500), black_box(&imu)))
+    });
+    criterion.bench_function("hash/estimate_state", |b| {
+        b.iter(|| hash.publish(1, 1, Instant::from_micros(2_500), black_box(&state)))
+    });
     black_box(hash.finish());
 
-    let mut log = Definitions::start(Nowhere, Micros(0))
+    let mut log = Definitions::start(Nowhere, Instant::ZERO)
         .and_then(|log| log.data(TOPICS, &[]))
         .expect("these sinks take everything");
     for (name, topic, words) in [("write/sensor_imu", 0, &imu[..]), ("write/estimate_state", 1, &state[..])] {
-        let sample = Sample { at: Micros(2_500), generation: 1, words };
+        let sample = Sample { at: Instant::from_micros(2_500), generation: 1, words };
         criterion.bench_function(name, |b| b.iter(|| log.sample(topic, black_box(&sample))));
     }
 
-    let mut log = Definitions::start(Bytes(Vec::new()), Micros(0))
+    let mut log = Definitions::start(Bytes(Vec::new()), Instant::ZERO)
         .and_then(|log| log.data(TOPICS, &[]))
         .expect("these sinks take everything");
     for generation in 0..10_000 {
         for (topic, words) in [(0, &imu[..]), (1, &state[..])] {
-            let _ = log.sample(topic, &Sample { at: Micros(0), generation, words });
+            let _ = log.sample(topic, &Sample { at: Instant::ZERO, generation, words });
         }
     }
     let bytes = log.into_sink().0;

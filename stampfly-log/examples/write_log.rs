@@ -9,7 +9,7 @@
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic};
 use stampfly_log::{Activation, ActivationTopic, FlightHash, Input};
 use stampfly_types::messages::{FlightState, ImuData, PowerData, SystemMode};
-use stampfly_types::{GRAVITY, Message, Micros, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Message, Vec3, math};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
@@ -35,7 +35,7 @@ impl Sink for Disk {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "flight.ulg".to_owned());
-    let mut log = Definitions::start(Disk(BufWriter::new(File::create(&path)?)), Micros(0))?;
+    let mut log = Definitions::start(Disk(BufWriter::new(File::create(&path)?)), Instant::ZERO)?;
     log.info("sys_name", "StampFly")?;
     log.info("ver_hw", "example")?;
     log.parameter("loop_rate", 400.into())?;
@@ -48,15 +48,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         log.sample(topic, &sample)
     };
     for step in 0..2_000u32 {
-        let at = Micros(u64::from(step) * 2_500);
-        let (sin, cos) = math::sin_cos(math::TAU * at.seconds());
+        let at = Instant::from_micros(u64::from(step) * 2_500);
+        let (sin, cos) = math::sin_cos(math::TAU * at.since(Instant::ZERO).seconds());
         let imu = ImuData { accel: Vec3::new(sin, cos, -GRAVITY), gyro: Vec3::new(0.0, 0.0, sin), temperature: 31.5 };
         publish(&mut log, IMU, Sample { at, generation: step + 1, words: &imu.to_words() })?;
         let mut record = Activation::new(0, at);
         record.read(Input { generation: step + 1, taken: 1 })?;
         log.activation(&record)?;
         if step % 40 == 0 {
-            let power = PowerData { voltage: 4.1 - 0.1 * at.seconds(), current: 2.0, power: 8.0 };
+            let power = PowerData { voltage: 4.1 - 0.1 * at.since(Instant::ZERO).seconds(), current: 2.0, power: 8.0 };
             publish(&mut log, POWER, Sample { at, generation: step / 40 + 1, words: &power.to_words() })?;
         }
         if step % 400 == 0 {

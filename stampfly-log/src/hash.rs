@@ -16,7 +16,7 @@
 //! A message enters as: lane A takes topic (bits 0–15), number of words (16–31) and generation (32–63); lane B
 //! takes the stamp; then pairs of words, low word first, go to A, B, A, … An odd last word is paired with zero.
 
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Start values: 64 bits of the fraction of √2 and of √3.
 const SEED: [u64; 2] = [0x6a09_e667_f3bc_c908, 0xbb67_ae85_84ca_a73b];
@@ -31,14 +31,14 @@ const ROTATION: [u32; 2] = [29, 37];
 ///
 /// ```
 /// use stampfly_log::FlightHash;
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let mut flight = FlightHash::new();
-/// flight.publish(3, 1, Micros(2_500), &[0x3f80_0000, 7]);
+/// flight.publish(3, 1, Instant::from_micros(2_500), &[0x3f80_0000, 7]);
 /// let mut replay = FlightHash::new();
-/// replay.publish(3, 1, Micros(2_500), &[0x3f80_0000, 7]);
+/// replay.publish(3, 1, Instant::from_micros(2_500), &[0x3f80_0000, 7]);
 /// assert_eq!(flight.finish(), replay.finish());
-/// replay.publish(3, 2, Micros(5_000), &[0x3f80_0000, 7]);
+/// replay.publish(3, 2, Instant::from_micros(5_000), &[0x3f80_0000, 7]);
 /// assert_ne!(flight.finish(), replay.finish());
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,12 +62,12 @@ impl FlightHash {
 
     /// Takes one published message: its place in the topic table, its generation, its stamp, its words.
     #[inline]
-    pub fn publish(&mut self, topic: u16, generation: u32, at: Micros, words: &[u32]) {
+    pub fn publish(&mut self, topic: u16, generation: u32, at: Instant, words: &[u32]) {
         let [mut a, mut b] = self.lanes;
         // Sixteen bits of length are enough to keep "no word" and "word zero" apart.
         let length = words.len() as u16;
         a = step::<0>(a, pair((u32::from(length) << 16) | u32::from(topic), generation));
-        b = step::<1>(b, at.0);
+        b = step::<1>(b, at.as_micros());
         let (fours, rest) = words.as_chunks::<4>();
         for &[w0, w1, w2, w3] in fours {
             a = step::<0>(a, pair(w0, w1));
@@ -129,7 +129,7 @@ mod tests {
     fn hash(flight: &[Published]) -> u64 {
         let mut hash = FlightHash::new();
         for (topic, generation, at, words) in flight {
-            hash.publish(*topic, *generation, Micros(*at), words);
+            hash.publish(*topic, *generation, Instant::from_micros(*at), words);
         }
         hash.finish()
     }

@@ -16,19 +16,19 @@
 //! # Example
 //! ```
 //! use stampfly_log::ulog::{Definitions, Message, Ram, Reader, Sample, Topic};
-//! use stampfly_types::{Message as _, Micros, messages::PowerData};
+//! use stampfly_types::{Instant, Message as _, messages::PowerData};
 //!
 //! const TOPICS: &[Topic] = &[Topic { name: "sensor_power", fields: PowerData::FIELDS }];
 //! let mut memory = [0; 4096];
-//! let mut log = Definitions::start(Ram::new(&mut memory), Micros(0))?.data(TOPICS, &[])?;
+//! let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(TOPICS, &[])?;
 //! let words = PowerData { voltage: 3.9, current: 2.0, power: 7.8 }.to_words();
-//! log.sample(0, &Sample { at: Micros(2_500), generation: 1, words: &words })?;
+//! log.sample(0, &Sample { at: Instant::from_micros(2_500), generation: 1, words: &words })?;
 //!
 //! let bytes = log.sink().written();
 //! let mut read = PowerData::ZERO;
 //! for message in Reader::new(bytes).expect("a ULog") {
 //!     if let Message::Data { payload, .. } = message.expect("intact") {
-//!         assert_eq!(TOPICS[0].decode(payload, &mut read).expect("ours").at, Micros(2_500));
+//!         assert_eq!(TOPICS[0].decode(payload, &mut read).expect("ours").at, Instant::from_micros(2_500));
 //!     }
 //! }
 //! assert_eq!(read, words);

@@ -19,7 +19,7 @@
 
 use crate::ulog::{Format, Take};
 use core::fmt::{self, Write};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// The largest number of inputs of one activation.
 pub const MAX_INPUTS: usize = 16;
@@ -37,9 +37,9 @@ pub struct Input {
 ///
 /// ```
 /// use stampfly_log::{Activation, Input};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
-/// let mut record = Activation::new(2, Micros(5_000));
+/// let mut record = Activation::new(2, Instant::from_micros(5_000));
 /// record.read(Input { generation: 17, taken: 1 })?;
 /// record.read(Input { generation: 4, taken: 0 })?;
 /// record.refuse(0);
@@ -51,7 +51,7 @@ pub struct Activation {
     /// The runnable's place in the schedule.
     pub index: u8,
     /// The time it was told.
-    pub now: Micros,
+    pub now: Instant,
     /// Bit n: its n-th publish was refused. Bit 31 stands for every publish from the 32nd on.
     pub refused: u32,
     inputs: [Input; MAX_INPUTS],
@@ -73,7 +73,7 @@ impl core::error::Error for TooManyInputs {}
 impl Activation {
     /// An activation that has not read anything yet.
     #[must_use]
-    pub const fn new(index: u8, now: Micros) -> Self {
+    pub const fn new(index: u8, now: Instant) -> Self {
         Self { index, now, refused: 0, inputs: [Input { generation: 0, taken: 0 }; MAX_INPUTS], count: 0 }
     }
 
@@ -100,7 +100,7 @@ impl Activation {
     }
 
     pub(crate) fn encode(&self, out: &mut impl FnMut(&[u8])) {
-        out(&self.now.0.to_le_bytes());
+        out(&self.now.as_micros().to_le_bytes());
         out(&u32::from(self.index).to_le_bytes());
         out(&self.refused.to_le_bytes());
         self.inputs().iter().for_each(|input| out(&input.generation.to_le_bytes()));
@@ -159,7 +159,7 @@ impl ActivationTopic {
     #[must_use]
     pub fn decode(payload: &[u8], inputs: usize) -> Option<Activation> {
         let mut take = Take(payload);
-        let now = Micros(take.u64()?);
+        let now = Instant::from_micros(take.u64()?);
         let mut record = Activation::new(u8::try_from(take.u32()?).ok()?, now);
         record.refused = take.u32()?;
         let mut taken = Take(take.0.get(inputs.checked_mul(4)?..)?);

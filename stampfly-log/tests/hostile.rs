@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use stampfly_log::ulog::{
     FieldError, FlagBits, Format, Level, Message, ParameterValue, ReadError, ReadErrorKind, Reader,
 };
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// A log written by hand from the format description and read without complaint by `pyulog` 1.3.0.
 const HAND_BUILT: &[u8] = include_bytes!("hand_built.ulog");
@@ -15,7 +15,7 @@ const HAND_BUILT: &[u8] = include_bytes!("hand_built.ulog");
 #[test]
 fn the_hand_built_log_is_read() {
     let reader = Reader::new(HAND_BUILT).unwrap();
-    assert_eq!(reader.started(), Micros(1_000));
+    assert_eq!(reader.started(), Instant::from_micros(1_000));
     let messages: Vec<_> = reader.map(Result::unwrap).collect();
     assert_eq!(messages[0], Message::FlagBits(FlagBits::default()));
     let Message::Format(format) = messages[1] else { panic!("{:?}", messages[1]) };
@@ -45,7 +45,7 @@ fn the_hand_built_log_is_read() {
             Message::Parameter { name: "CTL_FREQ", value: ParameterValue::Int32(4_000) },
             Message::Subscription { id: 0, instance: 0, topic: "attitude" },
             Message::Sync,
-            Message::Text { level: Level::Info, tag: None, at: Micros(3_000), text: "armed" },
+            Message::Text { level: Level::Info, tag: None, at: Instant::from_micros(3_000), text: "armed" },
             Message::Dropout { duration: 12 },
             Message::Parameter { name: "RATE_P", value: ParameterValue::Float(0.3) },
         ]
@@ -99,7 +99,7 @@ fn unknown_demands_are_refused_and_unknown_messages_are_passed_on() {
     let items = items(&log);
     assert_eq!(items[0], Ok(Message::Unknown { kind: b'Z', payload: b"news" }));
     assert_eq!(items[1], Err(ReadErrorKind::Malformed(b'P')));
-    let text = Message::Text { level: Level::Notice, tag: Some(2), at: Micros(1), text: "hello" };
+    let text = Message::Text { level: Level::Notice, tag: Some(2), at: Instant::from_micros(1), text: "hello" };
     assert_eq!(items[2], Ok(text));
     assert_eq!(items[3], Ok(Message::ParameterDefault { types: 1, name: "p", value: ParameterValue::Float(1.0) }));
     assert_eq!(items[4], Ok(Message::Unsubscription { id: 1 }));

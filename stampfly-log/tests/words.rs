@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use stampfly_log::ulog::{Definitions, Full, Message, Ram, Reader, Sample, Sink, Stamp, Topic, WriteError};
 use stampfly_log::{Activation, ActivationTopic, Input};
 use stampfly_types::messages::SystemMode;
-use stampfly_types::{FieldKind, Message as _, Micros};
+use stampfly_types::{FieldKind, Instant, Message as _};
 
 /// Words a message of this topic can have: any bits where any bits are allowed, small numbers where not.
 fn words(topic: &Topic) -> impl Strategy<Value = Vec<u32>> + use<> {
@@ -43,7 +43,7 @@ fn samples(log: &[u8]) -> Vec<(usize, u64, u32, Vec<u32>)> {
         {
             let mut words = vec![0; topic.words()];
             let Stamp { at, generation } = topic.decode(payload, &mut words).unwrap();
-            samples.push((usize::from(id), at.0, generation, words));
+            samples.push((usize::from(id), at.as_micros(), generation, words));
         }
     }
     samples
@@ -54,7 +54,7 @@ proptest! {
     fn every_word_comes_back(written in prop::collection::vec(any_sample(), 0..30)) {
         let mut log = start();
         for (topic, at, generation, words) in &written {
-            log.sample(*topic, &Sample { at: Micros(*at), generation: *generation, words }).unwrap();
+            log.sample(*topic, &Sample { at: Instant::from_micros(*at), generation: *generation, words }).unwrap();
         }
         prop_assert_eq!(samples(&log.into_sink().0), written);
     }
@@ -64,7 +64,7 @@ proptest! {
         now: u64, refused: u32, kind in 0..ACTIVATIONS.len(), inputs: [(u32, u16); 3],
     ) {
         let topic = ACTIVATIONS[kind];
-        let mut record = Activation::new(topic.index, Micros(now));
+        let mut record = Activation::new(topic.index, Instant::from_micros(now));
         record.refused = refused;
         for (generation, taken) in &inputs[..topic.inputs] {
             record.read(Input { generation: *generation, taken: *taken }).unwrap();
@@ -83,7 +83,7 @@ proptest! {
     fn numbers_beyond_their_type_are_refused(word in 0x100u32..) {
         let mut words = SystemMode::default().to_words();
         words[0] = word;
-        let sample = Sample { at: Micros(0), generation: 0, words: &words };
+        let sample = Sample { at: Instant::ZERO, generation: 0, words: &words };
         prop_assert_eq!(start().sample(5, &sample), Err(WriteError::OutOfRange("state")));
     }
 }
@@ -130,20 +130,20 @@ fn formats_explain_the_data() {
 fn wrong_samples_are_refused_and_leave_no_trace() {
     let mut log = start();
     let before = log.sink().0.len();
-    let short = Sample { at: Micros(0), generation: 0, words: &[0; 6] };
+    let short = Sample { at: Instant::ZERO, generation: 0, words: &[0; 6] };
     assert_eq!(log.sample(0, &short), Err(WriteError::WordCount));
-    let long = Sample { at: Micros(0), generation: 0, words: &[0; 8] };
+    let long = Sample { at: Instant::ZERO, generation: 0, words: &[0; 8] };
     assert_eq!(log.sample(0, &long), Err(WriteError::WordCount));
     assert_eq!(log.sample(99, &short), Err(WriteError::UnknownTopic));
-    assert_eq!(log.activation(&Activation::new(1, Micros(0))), Err(WriteError::UnknownTopic));
-    assert_eq!(log.activation(&Activation::new(3, Micros(0))), Err(WriteError::WordCount));
-    assert_eq!(log.text(stampfly_log::ulog::Level::Info, Micros(0), &"x".repeat(5_000)), Err(WriteError::TooLong));
+    assert_eq!(log.activation(&Activation::new(1, Instant::ZERO)), Err(WriteError::UnknownTopic));
+    assert_eq!(log.activation(&Activation::new(3, Instant::ZERO)), Err(WriteError::WordCount));
+    assert_eq!(log.text(stampfly_log::ulog::Level::Info, Instant::ZERO, &"x".repeat(5_000)), Err(WriteError::TooLong));
     assert_eq!((log.sink().0.len(), log.lost()), (before, 0));
 }
 
 #[test]
 fn too_long_a_key_is_an_error_and_a_key_at_the_limit_is_not() {
-    let mut log = Definitions::start(Bytes::default(), Micros(0)).unwrap();
+    let mut log = Definitions::start(Bytes::default(), Instant::ZERO).unwrap();
     assert_eq!(log.info(&"k".repeat(250), "value"), Err(WriteError::TooLong));
     assert_eq!(log.info(&"k".repeat(247), "value"), Ok(()), "`char[5] ` and 247 bytes are 255");
     assert_eq!(log.parameter(&"p".repeat(250), 1.0.into()), Err(WriteError::TooLong));
@@ -176,11 +176,11 @@ impl Sink for Shared<'_> {
 #[test]
 fn a_dropout_is_counted_and_marked_once() {
     let gate = std::cell::RefCell::new(Gate { bytes: Vec::new(), closed: false });
-    let mut log = Definitions::start(Shared(&gate), Micros(0)).unwrap().data(TOPICS, &[]).unwrap();
+    let mut log = Definitions::start(Shared(&gate), Instant::ZERO).unwrap().data(TOPICS, &[]).unwrap();
     let words = stampfly_types::messages::PowerData::default().to_words();
     for (millis, closed) in [(0, false), (10, true), (15, true), (40, false), (50, false)] {
         gate.borrow_mut().closed = closed;
-        let sample = Sample { at: Micros::from_millis(millis), generation: 0, words: &words };
+        let sample = Sample { at: Instant::from_millis(millis), generation: 0, words: &words };
         assert_eq!(log.sample(2, &sample), if closed { Err(WriteError::Sink(())) } else { Ok(()) });
     }
     assert_eq!(log.lost(), 2);
@@ -199,9 +199,10 @@ fn a_dropout_is_counted_and_marked_once() {
 #[test]
 fn a_full_memory_keeps_a_readable_log() {
     let mut memory = [0; 3_000];
-    let mut log = Definitions::start(Ram::new(&mut memory), Micros(0)).unwrap().data(&TOPICS[..2], &[]).unwrap();
+    let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO).unwrap().data(&TOPICS[..2], &[]).unwrap();
     let words = [0; 7];
-    let result = (0..).find_map(|n| log.sample(0, &Sample { at: Micros(n), generation: 0, words: &words }).err());
+    let result =
+        (0..).find_map(|n| log.sample(0, &Sample { at: Instant::from_micros(n), generation: 0, words: &words }).err());
     assert_eq!(result, Some(WriteError::Sink(Full)));
     assert!(Reader::new(log.sink().written()).unwrap().all(|message| message.is_ok()));
 }

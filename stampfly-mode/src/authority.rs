@@ -3,8 +3,8 @@
 //! A pilot who moves a stick has the vehicle, at once, and keeps it: guidance does not take it back by itself but has
 //! to be given a new command. Without a fresh frame from anybody the set-point is the failsafe's: level, no climb.
 
-use stampfly_types::Micros;
 use stampfly_types::messages::{CommandSetpoint, CommandSource, PilotInput};
+use stampfly_types::{Duration, Instant};
 
 /// Limits of the arbitration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,12 +14,12 @@ pub struct AuthorityConfig {
     /// Deflection with which a pilot takes over from guidance, share.
     pub take_over: f32,
     /// A pilot's frame older than this is no frame.
-    pub stale: Micros,
+    pub stale: Duration,
 }
 
 impl Default for AuthorityConfig {
     fn default() -> Self {
-        Self { dead_band: 0.05, take_over: 0.15, stale: Micros::from_millis(500) }
+        Self { dead_band: 0.05, take_over: 0.15, stale: Duration::from_millis(500) }
     }
 }
 
@@ -27,18 +27,18 @@ impl Default for AuthorityConfig {
 ///
 /// ```
 /// use stampfly_mode::Authority;
-/// use stampfly_types::{Micros, messages::{CommandSource, PilotInput}};
+/// use stampfly_types::{Instant, messages::{CommandSource, PilotInput}};
 /// let mut authority = Authority::default();
-/// authority.guided(Micros(0));
-/// assert_eq!(authority.step(Micros(1_000)).source, CommandSource::Guided);
-/// authority.pilot(Micros(2_000), &PilotInput { pitch: 0.5, ..Default::default() });
-/// assert_eq!(authority.step(Micros(3_000)).source, CommandSource::Pilot);
+/// authority.guided(Instant::ZERO);
+/// assert_eq!(authority.step(Instant::from_micros(1_000)).source, CommandSource::Guided);
+/// authority.pilot(Instant::from_micros(2_000), &PilotInput { pitch: 0.5, ..Default::default() });
+/// assert_eq!(authority.step(Instant::from_micros(3_000)).source, CommandSource::Pilot);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Authority {
     config: AuthorityConfig,
-    pilot: Option<(Micros, PilotInput)>,
-    guided: Option<Micros>,
+    pilot: Option<(Instant, PilotInput)>,
+    guided: Option<Instant>,
     /// The pilot has taken over and no command has come since.
     pilot_holds: bool,
 }
@@ -51,7 +51,7 @@ impl Authority {
     }
 
     /// A frame from the pilot. Sticks that are not finite count as centred; others are clamped to ±1.
-    pub fn pilot(&mut self, at: Micros, input: &PilotInput) {
+    pub fn pilot(&mut self, at: Instant, input: &PilotInput) {
         let clean = |stick: f32| if stick.is_finite() { stick.clamp(-1.0, 1.0) } else { 0.0 };
         let input = PilotInput {
             roll: clean(input.roll),
@@ -67,13 +67,13 @@ impl Authority {
     }
 
     /// A command from a program, other than a sign of life.
-    pub fn guided(&mut self, at: Micros) {
+    pub fn guided(&mut self, at: Instant) {
         self.guided = Some(at);
         self.pilot_holds = false;
     }
 
     /// A sign of life from a program.
-    pub fn guided_alive(&mut self, at: Micros) {
+    pub fn guided_alive(&mut self, at: Instant) {
         if self.guided.is_some() {
             self.guided = Some(at);
         }
@@ -81,8 +81,8 @@ impl Authority {
 
     /// The set-point now.
     #[must_use]
-    pub fn step(&self, now: Micros) -> CommandSetpoint {
-        let fresh = |at: Micros| now.since(at) < self.config.stale;
+    pub fn step(&self, now: Instant) -> CommandSetpoint {
+        let fresh = |at: Instant| now.since(at) < self.config.stale;
         let pilot = self.pilot.filter(|(at, _)| fresh(*at)).map(|(_, input)| input);
         let guided = self.guided.is_some_and(fresh) && !self.pilot_holds;
         match pilot {
@@ -115,21 +115,21 @@ mod tests {
     #[test]
     fn guidance_does_not_retake_by_being_alive() {
         let mut authority = Authority::default();
-        authority.guided(Micros(0));
-        authority.pilot(Micros(10), &PilotInput { roll: 0.5, ..Default::default() });
-        authority.guided_alive(Micros(20));
-        assert_eq!(authority.step(Micros(30)).source, CommandSource::Pilot);
-        authority.guided(Micros(40));
-        assert_eq!(authority.step(Micros(50)).source, CommandSource::Guided, "a new command does");
+        authority.guided(Instant::ZERO);
+        authority.pilot(Instant::from_micros(10), &PilotInput { roll: 0.5, ..Default::default() });
+        authority.guided_alive(Instant::from_micros(20));
+        assert_eq!(authority.step(Instant::from_micros(30)).source, CommandSource::Pilot);
+        authority.guided(Instant::from_micros(40));
+        assert_eq!(authority.step(Instant::from_micros(50)).source, CommandSource::Guided, "a new command does");
     }
 
     #[test]
     fn silence_is_the_failsafe_and_nan_is_centre() {
         let mut authority = Authority::default();
-        assert_eq!(authority.step(Micros(0)).source, CommandSource::None);
-        authority.pilot(Micros(0), &PilotInput { roll: f32::NAN, pitch: 9.0, ..Default::default() });
-        let setpoint = authority.step(Micros(1));
+        assert_eq!(authority.step(Instant::ZERO).source, CommandSource::None);
+        authority.pilot(Instant::ZERO, &PilotInput { roll: f32::NAN, pitch: 9.0, ..Default::default() });
+        let setpoint = authority.step(Instant::from_micros(1));
         assert_eq!((setpoint.roll, setpoint.pitch), (0.0, 1.0));
-        assert_eq!(authority.step(Micros::from_millis(500)).source, CommandSource::Failsafe);
+        assert_eq!(authority.step(Instant::from_millis(500)).source, CommandSource::Failsafe);
     }
 }

@@ -4,23 +4,23 @@
 //! becomes follows. Shorter than three seconds it is a click, a second one within 400 ms makes it a double click;
 //! holding reports once at three seconds (pair) and once at five (restart), while the button is still down.
 
-use stampfly_types::Micros;
 use stampfly_types::messages::{ButtonEvent, ButtonGesture};
+use stampfly_types::{Duration, Instant};
 
-const DEBOUNCE: Micros = Micros::from_millis(50);
-const DOUBLE_CLICK: Micros = Micros::from_millis(400);
-const HOLD_PAIR: Micros = Micros::from_secs(3);
-const HOLD_RESET: Micros = Micros::from_secs(5);
+const DEBOUNCE: Duration = Duration::from_millis(50);
+const DOUBLE_CLICK: Duration = Duration::from_millis(400);
+const HOLD_PAIR: Duration = Duration::from_secs(3);
+const HOLD_RESET: Duration = Duration::from_secs(5);
 
 /// Turns a contact into gestures.
 ///
 /// ```
 /// use stampfly_mode::ButtonDecoder;
-/// use stampfly_types::{Micros, messages::ButtonGesture};
+/// use stampfly_types::{Instant, messages::ButtonGesture};
 /// let mut button = ButtonDecoder::default();
 /// let mut gestures = Vec::new();
 /// for ms in (0..2_000).step_by(20) {
-///     gestures.extend(button.step(Micros::from_millis(ms), (100..300).contains(&ms)).map(|event| event.gesture));
+///     gestures.extend(button.step(Instant::from_millis(ms), (100..300).contains(&ms)).map(|event| event.gesture));
 /// }
 /// assert_eq!(gestures, [ButtonGesture::Press, ButtonGesture::Click]);
 /// ```
@@ -28,19 +28,19 @@ const HOLD_RESET: Micros = Micros::from_secs(5);
 pub struct ButtonDecoder {
     /// The contact's raw level and since when it has had it.
     raw: bool,
-    raw_since: Micros,
+    raw_since: Instant,
     /// The debounced level and since when.
     pressed: bool,
-    pressed_since: Micros,
+    pressed_since: Instant,
     /// Which hold this press has already reported.
     reported: ButtonGesture,
     /// A click that may still become a double click, and how long it was.
-    click: Option<(Micros, f32)>,
+    click: Option<(Instant, f32)>,
 }
 
 impl ButtonDecoder {
     /// Takes the contact's level; call at 50 Hz or faster.
-    pub fn step(&mut self, now: Micros, contact: bool) -> Option<ButtonEvent> {
+    pub fn step(&mut self, now: Instant, contact: bool) -> Option<ButtonEvent> {
         if contact != self.raw {
             (self.raw, self.raw_since) = (contact, now);
         }
@@ -91,7 +91,7 @@ mod tests {
 
     fn gestures(pressed: impl Fn(u64) -> bool) -> Vec<ButtonGesture> {
         let mut button = ButtonDecoder::default();
-        let events = (0..12_000).step_by(20).filter_map(|ms| button.step(Micros::from_millis(ms), pressed(ms)));
+        let events = (0..12_000).step_by(20).filter_map(|ms| button.step(Instant::from_millis(ms), pressed(ms)));
         events.map(|event| event.gesture).collect()
     }
 
@@ -112,7 +112,7 @@ mod tests {
             let mut button = ButtonDecoder::default();
             let events: Vec<_> = (0..2_900)
                 .step_by(20)
-                .filter_map(|ms| Some((ms, button.step(Micros::from_millis(ms), ms >= start)?)))
+                .filter_map(|ms| Some((ms, button.step(Instant::from_millis(ms), ms >= start)?)))
                 .collect();
             let [(at, event)] = events[..] else { panic!("{events:?}") };
             assert_eq!(event.gesture, ButtonGesture::Press);

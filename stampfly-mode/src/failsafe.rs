@@ -21,7 +21,7 @@ use stampfly_types::messages::{
     Alerts, EstimatorStatus, FlightMode, FlightState, ImuData, PowerData, SelfTestVerdict, StateEstimate, SystemAlert,
     SystemMode, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Vec3, frame, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3, frame, math};
 
 /// Thresholds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,9 +37,9 @@ pub struct FailsafeConfig {
     /// Tilt, rad, and for how long, s.
     pub tumble: [f32; 2],
     /// Silence of the inertial sensor: degraded, lost.
-    pub imu_silence: [Micros; 2],
+    pub imu_silence: [Duration; 2],
     /// Silence of the command link.
-    pub link_silence: Micros,
+    pub link_silence: Duration,
     /// Battery: warn, land, V.
     pub battery: [f32; 2],
     /// Below this a disarmed vehicle has no battery, V.
@@ -49,9 +49,9 @@ pub struct FailsafeConfig {
     /// Time constant of the battery low-pass, s.
     pub battery_time: f32,
     /// Silence of the battery monitor.
-    pub power_silence: Micros,
+    pub power_silence: Duration,
     /// Silence of range and flow in the air.
-    pub aiding_silence: Micros,
+    pub aiding_silence: Duration,
     /// Disagreement of gravity and tilt on the ground, rad, and for how long, s.
     pub tilt_mismatch: [f32; 2],
 }
@@ -64,14 +64,14 @@ impl Default for FailsafeConfig {
             impact_sigmas: 6.0,
             rate: 13.96,
             tumble: [1.05, 0.3],
-            imu_silence: [Micros::from_millis(10), Micros::from_millis(25)],
-            link_silence: Micros::from_millis(500),
+            imu_silence: [Duration::from_millis(10), Duration::from_millis(25)],
+            link_silence: Duration::from_millis(500),
             battery: [3.4, 3.0],
             usb: 3.3,
             battery_hysteresis: 0.1,
             battery_time: 2.0,
-            power_silence: Micros::from_secs(1),
-            aiding_silence: Micros::from_secs(1),
+            power_silence: Duration::from_secs(1),
+            aiding_silence: Duration::from_secs(1),
             tilt_mismatch: [0.1745, 0.5],
         }
     }
@@ -81,19 +81,19 @@ impl Default for FailsafeConfig {
 #[derive(Clone, Copy, Debug)]
 pub struct FailsafeInput<'a> {
     /// Newest inertial sample.
-    pub imu: Option<(Micros, &'a ImuData)>,
+    pub imu: Option<(Instant, &'a ImuData)>,
     /// The estimate.
     pub estimate: &'a StateEstimate,
     /// The estimator's own opinion.
     pub status: &'a EstimatorStatus,
     /// Newest battery sample.
-    pub power: Option<(Micros, &'a PowerData)>,
+    pub power: Option<(Instant, &'a PowerData)>,
     /// Newest command of any kind.
-    pub command: Option<Micros>,
+    pub command: Option<Instant>,
     /// Newest usable range.
-    pub tof: Option<Micros>,
+    pub tof: Option<Instant>,
     /// Newest usable flow.
-    pub flow: Option<Micros>,
+    pub flow: Option<Instant>,
     /// How the self test at power-on ended.
     pub self_test: SelfTestVerdict,
     /// State and mode one step ago.
@@ -104,25 +104,25 @@ pub struct FailsafeInput<'a> {
 ///
 /// ```
 /// use stampfly_mode::{Failsafe, FailsafeInput};
-/// use stampfly_types::{Micros, Vec3, messages::*};
+/// use stampfly_types::{Instant, Vec3, messages::*};
 /// let mut failsafe = Failsafe::default();
 /// let imu = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), ..Default::default() };
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
-///     imu: Some((Micros(0), &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Micros(0), &power)), command: Some(Micros(0)), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, mode: &SystemMode::default(),
+///     imu: Some((Instant::ZERO, &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, mode: &SystemMode::default(),
 /// };
-/// assert!(failsafe.step(Micros(2_500), &quiet).active.is_empty());
+/// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
-/// assert!(failsafe.step(Micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
+/// assert!(failsafe.step(Instant::from_micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Failsafe {
     config: FailsafeConfig,
     active: Alerts,
     seen: Alerts,
-    last_imu: Option<Micros>,
-    last_step: Option<Micros>,
+    last_imu: Option<Instant>,
+    last_step: Option<Instant>,
     impacts: u32,
     overspeeds: u32,
     /// Specific force over about 10 ms: a blow lasts that long, a propeller's shaking averages out.
@@ -131,10 +131,10 @@ pub struct Failsafe {
     force: [f32; 2],
     /// Specific force with a time constant of a second, for the tilt on the ground.
     gravity: Option<Vec3>,
-    tumbled: Option<Micros>,
-    mismatch: Option<Micros>,
+    tumbled: Option<Instant>,
+    mismatch: Option<Instant>,
     voltage: Option<f32>,
-    last_power: Option<Micros>,
+    last_power: Option<Instant>,
 }
 
 /// Alerts that stay until the vehicle is disarmed.
@@ -148,7 +148,7 @@ impl Failsafe {
     }
 
     /// One step; runs on a deadline when there are no samples.
-    pub fn step(&mut self, now: Micros, input: &FailsafeInput<'_>) -> SystemAlert {
+    pub fn step(&mut self, now: Instant, input: &FailsafeInput<'_>) -> SystemAlert {
         let disarmed = !input.mode.armed;
         let mut active = if disarmed { self.active.without(LATCHED) } else { self.active };
         if let Some((at, imu)) = input.imu
@@ -157,7 +157,7 @@ impl Failsafe {
             self.last_imu = Some(at);
             active = self.inspect_motion(active, imu, input.mode.state);
         }
-        let silence = self.last_imu.map_or(now, |at| now.since(at));
+        let silence = self.last_imu.map_or(now.since(Instant::ZERO), |at| now.since(at));
         let [degraded, lost] = self.config.imu_silence;
         active = active.set(Alerts::IMU_DEGRADED, silence >= degraded);
         if silence >= lost {
@@ -166,7 +166,7 @@ impl Failsafe {
         active = self.inspect_attitude(active, now, input);
         active = self.inspect_power(active, now, input, disarmed);
         let airborne = matches!(input.mode.state, FlightState::Flying | FlightState::Landing);
-        let silent = |last: Option<Micros>, limit| last.is_none_or(|at| now.since(at) >= limit);
+        let silent = |last: Option<Instant>, limit| last.is_none_or(|at| now.since(at) >= limit);
         active = active
             .set(Alerts::COMM_LOST, silent(input.command, self.config.link_silence))
             .set(Alerts::TOF_LOST, airborne && silent(input.tof, self.config.aiding_silence))
@@ -209,7 +209,7 @@ impl Failsafe {
         active
     }
 
-    fn inspect_attitude(&mut self, active: Alerts, now: Micros, input: &FailsafeInput<'_>) -> Alerts {
+    fn inspect_attitude(&mut self, active: Alerts, now: Instant, input: &FailsafeInput<'_>) -> Alerts {
         let known = input.estimate.valid.contains(Validity::TILT);
         let flying = matches!(input.mode.state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
         let [tilt, time] = self.config.tumble;
@@ -228,12 +228,12 @@ impl Failsafe {
         if tumbled { active | Alerts::TUMBLED } else { active }
     }
 
-    fn inspect_power(&mut self, active: Alerts, now: Micros, input: &FailsafeInput<'_>, disarmed: bool) -> Alerts {
+    fn inspect_power(&mut self, active: Alerts, now: Instant, input: &FailsafeInput<'_>, disarmed: bool) -> Alerts {
         let last = self.last_power;
         let fresh = input.power.filter(|(at, power)| last != Some(*at) && power.voltage.is_finite());
         let Some((at, power)) = fresh else {
             // At power-on the monitor gets as long for its first sample.
-            let silence = last.map_or(now, |at| now.since(at));
+            let silence = last.map_or(now.since(Instant::ZERO), |at| now.since(at));
             return active.set(Alerts::POWER_LOST, silence >= self.config.power_silence);
         };
         self.last_power = Some(at);
@@ -258,7 +258,7 @@ impl Failsafe {
 }
 
 /// Has the condition held for `seconds` without a break?
-fn lasts(since: &mut Option<Micros>, now: Micros, holds: bool, seconds: f32) -> bool {
+fn lasts(since: &mut Option<Instant>, now: Instant, holds: bool, seconds: f32) -> bool {
     if !holds {
         *since = None;
         return false;
@@ -275,19 +275,19 @@ mod tests {
     struct Rig {
         failsafe: Failsafe,
         mode: SystemMode,
-        now: u64,
+        now: Instant,
     }
 
     impl Rig {
         fn flying() -> Self {
             let mode =
                 SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
-            Self { failsafe: Failsafe::default(), mode, now: 0 }
+            Self { failsafe: Failsafe::default(), mode, now: Instant::ZERO }
         }
 
         fn sample(&mut self, accel: Vec3, gyro: Vec3) -> Alerts {
-            self.now += 2_500;
-            let now = Micros(self.now);
+            self.now += Duration::from_micros(2_500);
+            let now = self.now;
             let imu = ImuData { accel, gyro, temperature: 25.0 };
             let input = FailsafeInput {
                 imu: Some((now, &imu)),
@@ -362,7 +362,7 @@ mod tests {
         let mut failsafe = Failsafe::default();
         let mode = SystemMode { armed: true, ..Default::default() };
         let mut step = |k: u64, voltage: f32| {
-            let at = Micros(k * 100_000);
+            let at = Instant::from_micros(k * 100_000);
             let power = PowerData { voltage, ..Default::default() };
             let imu = ImuData { accel: REST, ..Default::default() };
             let input = FailsafeInput {
@@ -391,13 +391,13 @@ mod tests {
     fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Option<(u64, f32)>) -> Alerts {
         let imu = ImuData { accel: REST, ..Default::default() };
         let battery = PowerData { voltage: power.map_or(0.0, |(_, voltage)| voltage), ..Default::default() };
-        let now = Micros::from_millis(millis);
+        let now = Instant::from_millis(millis);
         let input = FailsafeInput {
             imu: Some((now, &imu)),
             estimate: &StateEstimate::default(),
             status: &EstimatorStatus::default(),
-            power: power.map(|(at, _)| (Micros::from_millis(at), &battery)),
-            command: command.map(Micros::from_millis),
+            power: power.map(|(at, _)| (Instant::from_millis(at), &battery)),
+            command: command.map(Instant::from_millis),
             tof: None,
             flow: None,
             self_test: SelfTestVerdict::NotRun,
@@ -452,13 +452,13 @@ mod tests {
                 estimate,
                 status,
                 power,
-                command: Some(Micros::ZERO),
+                command: Some(Instant::ZERO),
                 tof: None,
                 flow: None,
                 self_test,
                 mode,
             };
-            failsafe.step(Micros::ZERO, &input).active
+            failsafe.step(Instant::ZERO, &input).active
         };
         assert_eq!(step(SelfTestVerdict::Identical), Alerts::NONE);
         assert_eq!(step(SelfTestVerdict::WithinTolerance), Alerts::SELF_TEST_DIFFERS);

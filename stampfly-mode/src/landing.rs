@@ -8,7 +8,7 @@
 //! effect; the ramp also makes the test for touchdown safe: with two thirds of its weight carried, a vehicle that does
 //! not sink stands.
 
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::{
     ControlOutput, FlightState, GroundContact, Setpoint, StateEstimate, Validity, VehicleStatus,
 };
@@ -75,13 +75,13 @@ pub struct LandingInput<'a> {
 ///
 /// ```
 /// use stampfly_mode::{LandingInput, TakeoffLanding};
-/// use stampfly_types::{Micros, messages::*};
+/// use stampfly_types::{Instant, messages::*};
 /// let mut manager = TakeoffLanding::default();
 /// // Standing on the floor in LANDING, asked to sink and not sinking: after a while it has landed.
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let mut landed_at = None;
 /// for k in 0..1000u64 {
-///     let status = manager.step(Micros(2_500 * k), &LandingInput {
+///     let status = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
 ///         estimate: &estimate, state: FlightState::Landing, setpoint: &Setpoint::default(),
 ///         demand: &ControlOutput { thrust: 0.2, ..Default::default() },
 ///     });
@@ -96,13 +96,13 @@ pub struct TakeoffLanding {
     contact: GroundContact,
     /// Height of the estimate when the state was entered.
     entry_height: f32,
-    entered: Micros,
+    entered: Instant,
     /// Since when take-off has been in its band, the descent has stalled, the ceiling has been falling, and the vehicle
     /// has been still under it.
-    in_band: Option<Micros>,
-    stalled: Option<Micros>,
-    ceiling: Option<Micros>,
-    still: Option<Micros>,
+    in_band: Option<Instant>,
+    stalled: Option<Instant>,
+    ceiling: Option<Instant>,
+    still: Option<Instant>,
 }
 
 impl Default for TakeoffLanding {
@@ -112,7 +112,7 @@ impl Default for TakeoffLanding {
 }
 
 /// How long a condition has held without a break, s.
-fn lasting(since: &mut Option<Micros>, now: Micros, holds: bool) -> f32 {
+fn lasting(since: &mut Option<Instant>, now: Instant, holds: bool) -> f32 {
     if !holds {
         *since = None;
         return 0.0;
@@ -129,7 +129,7 @@ impl TakeoffLanding {
             state: FlightState::Init,
             contact: GroundContact::Ground,
             entry_height: 0.0,
-            entered: Micros::ZERO,
+            entered: Instant::ZERO,
             in_band: None,
             stalled: None,
             ceiling: None,
@@ -137,7 +137,7 @@ impl TakeoffLanding {
         }
     }
 
-    fn enter(&mut self, now: Micros, input: &LandingInput<'_>) {
+    fn enter(&mut self, now: Instant, input: &LandingInput<'_>) {
         self.state = input.state;
         self.entered = now;
         self.entry_height = input.estimate.height;
@@ -145,7 +145,7 @@ impl TakeoffLanding {
     }
 
     /// One step, at the control rate.
-    pub fn step(&mut self, now: Micros, input: &LandingInput<'_>) -> VehicleStatus {
+    pub fn step(&mut self, now: Instant, input: &LandingInput<'_>) -> VehicleStatus {
         if input.state != self.state {
             self.enter(now, input);
         }
@@ -222,7 +222,7 @@ mod tests {
                 setpoint: &Setpoint::default(),
                 demand: &ControlOutput { thrust, ..Default::default() },
             };
-            manager.step(Micros(2_500 * k), &input).landed.then_some(t)
+            manager.step(Instant::from_micros(2_500 * k), &input).landed.then_some(t)
         })
     }
 

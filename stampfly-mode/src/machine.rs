@@ -7,11 +7,11 @@
 use crate::arming;
 use crate::touch::Touch;
 use crate::transitions::{Event, is_armed, next};
-use stampfly_types::Micros;
 use stampfly_types::messages::{
     Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightState, GroundContact, GuidedKind,
     PilotInput, StateEstimate, SystemMode, Validity, VehicleStatus,
 };
+use stampfly_types::{Duration, Instant};
 
 /// A command from a program or the board, since the last step.
 pub type Command = GuidedKind;
@@ -49,11 +49,11 @@ const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBL
 /// Alerts that demand a landing at once.
 const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
 /// How long the vehicle hovers without a link before it lands.
-const HOVER_WITHOUT_LINK: Micros = Micros::from_secs(3);
+const HOVER_WITHOUT_LINK: Duration = Duration::from_secs(3);
 /// Time between arming and take-off when the pilot's mode takes off by itself.
-const SPOOL: Micros = Micros::from_millis(300);
+const SPOOL: Duration = Duration::from_millis(300);
 /// An armed vehicle that is not told to take off is disarmed after this long.
-const ARMED_TIMEOUT: Micros = Micros::from_secs(10);
+const ARMED_TIMEOUT: Duration = Duration::from_secs(10);
 /// Height above the ground that means somebody has lifted the vehicle, m, and below which it stands again.
 const HELD_HEIGHT: [f32; 2] = [0.15, 0.08];
 /// Manual throttle that takes off.
@@ -63,7 +63,7 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 ///
 /// ```
 /// use stampfly_mode::{ModeInput, ModeMachine};
-/// use stampfly_types::{Micros, messages::*};
+/// use stampfly_types::{Instant, messages::*};
 /// let mut machine = ModeMachine::default();
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let calibration = CalibrationResult { complete: true, ..Default::default() };
@@ -72,16 +72,16 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 ///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, status: &status,
 ///     pilot: None, commands: &[], button: None,
 /// };
-/// assert_eq!(machine.step(Micros(0), &input).mode.state, FlightState::IdleGround);
+/// assert_eq!(machine.step(Instant::ZERO, &input).mode.state, FlightState::IdleGround);
 /// input.commands = &[GuidedKind::Arm];
-/// assert!(machine.step(Micros(2_500), &input).mode.armed);
+/// assert!(machine.step(Instant::from_micros(2_500), &input).mode.armed);
 /// input.commands = &[GuidedKind::Kill];
-/// assert!(!machine.step(Micros(5_000), &input).mode.armed);
+/// assert!(!machine.step(Instant::from_micros(5_000), &input).mode.armed);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModeMachine {
     output: ModeOutput,
-    entered: Micros,
+    entered: Instant,
     /// The mode asked for; the one in force may be a fallback.
     wanted: FlightMode,
     /// Arm switch of the pilot's last frame; `None` until it has been seen off.
@@ -89,7 +89,7 @@ pub struct ModeMachine {
     /// Armed by pilot or button, which take off by themselves in modes that hold height.
     takes_off: bool,
     crashed: bool,
-    silent_since: Option<Micros>,
+    silent_since: Option<Instant>,
     was_diverged: bool,
     touch: Touch,
     /// While pairing: has the transmitter of before fallen silent?
@@ -98,7 +98,7 @@ pub struct ModeMachine {
 
 impl ModeMachine {
     /// One step, at the control rate.
-    pub fn step(&mut self, now: Micros, input: &ModeInput<'_>) -> ModeOutput {
+    pub fn step(&mut self, now: Instant, input: &ModeInput<'_>) -> ModeOutput {
         let switch = self.pilot_switch(input);
         // Nobody can touch the button of an armed vehicle without holding it.
         let grabbed = self.touch.grabs(now, input.button, is_armed(self.output.mode.state));
@@ -137,7 +137,7 @@ impl ModeMachine {
     }
 
     /// Which of [`Event::ALL`] have happened, in the same order.
-    fn happened(&mut self, now: Micros, input: &ModeInput<'_>, switch: &Switch, grabbed: bool) -> [bool; 10] {
+    fn happened(&mut self, now: Instant, input: &ModeInput<'_>, switch: &Switch, grabbed: bool) -> [bool; 10] {
         let mode = &self.output.mode;
         let commanded = |kind: Command| input.commands.contains(&kind);
         let clicked = input.button == Some(ButtonGesture::Click);
@@ -174,7 +174,7 @@ impl ModeMachine {
     }
 
     /// Callbacks of leaving one state and entering another, in one place.
-    fn leave_and_enter(&mut self, now: Micros, event: Event, state: FlightState, input: &ModeInput<'_>) {
+    fn leave_and_enter(&mut self, now: Instant, event: Event, state: FlightState, input: &ModeInput<'_>) {
         let ModeOutput { mode, estimator } = &mut self.output;
         let left = mode.state;
         mode.state = state;
@@ -279,7 +279,7 @@ mod tests {
         pilot: Option<PilotInput>,
         /// Happens in the next step, and not again.
         button: Option<ButtonGesture>,
-        now: u64,
+        now: Instant,
     }
 
     impl World {
@@ -291,12 +291,12 @@ mod tests {
                 alerts: Alerts::NONE,
                 pilot: None,
                 button: None,
-                now: 0,
+                now: Instant::ZERO,
             }
         }
 
         fn step(&mut self, machine: &mut ModeMachine, commands: &[Command]) -> ModeOutput {
-            self.now += 2_500;
+            self.now += Duration::from_micros(2_500);
             let input = ModeInput {
                 alerts: self.alerts,
                 estimate: &self.estimate,
@@ -306,7 +306,7 @@ mod tests {
                 commands,
                 button: self.button.take(),
             };
-            machine.step(Micros(self.now), &input)
+            machine.step(self.now, &input)
         }
     }
 
@@ -473,8 +473,8 @@ mod tests {
     }
 
     /// Lets time pass without a gesture, then one.
-    fn touch(world: &mut World, machine: &mut ModeMachine, after: Micros, gesture: ButtonGesture) -> SystemMode {
-        world.now += after.0;
+    fn touch(world: &mut World, machine: &mut ModeMachine, after: Duration, gesture: ButtonGesture) -> SystemMode {
+        world.now += after;
         world.button = Some(gesture);
         world.step(machine, &[]).mode
     }
@@ -482,11 +482,11 @@ mod tests {
     #[test]
     fn a_press_stops_the_motors_in_every_state_and_means_nothing_else() {
         use ButtonGesture::{Click, DoubleClick, HoldPair, HoldReset, Press};
-        let millis = Micros::from_millis;
+        let millis = Duration::from_millis;
         for state in [FlightState::Armed, FlightState::TakeOff, FlightState::Flying, FlightState::Landing] {
             for rest in [Click, DoubleClick, HoldPair, HoldReset] {
                 let (mut machine, mut world) = in_state(state);
-                let stopped = touch(&mut world, &mut machine, Micros(0), Press);
+                let stopped = touch(&mut world, &mut machine, Duration::ZERO, Press);
                 assert_eq!((stopped.state, stopped.armed), (FlightState::IdleGround, false), "{state:?}");
                 let later = touch(&mut world, &mut machine, millis(3_000), rest);
                 assert!(!later.armed && !later.pairing, "{state:?} {rest:?}");
@@ -505,9 +505,9 @@ mod tests {
     #[test]
     fn who_touches_the_button_while_somebody_else_arms_stops_the_motors() {
         let (mut machine, mut world) = in_state(FlightState::IdleGround);
-        assert!(!touch(&mut world, &mut machine, Micros(0), ButtonGesture::Press).armed);
+        assert!(!touch(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Press).armed);
         assert!(world.step(&mut machine, &[Command::Arm]).mode.armed);
-        assert!(!touch(&mut world, &mut machine, Micros::from_millis(500), ButtonGesture::Click).armed);
+        assert!(!touch(&mut world, &mut machine, Duration::from_millis(500), ButtonGesture::Click).armed);
     }
 
     #[test]
@@ -516,7 +516,7 @@ mod tests {
         world.alerts = Alerts::IMPACT;
         world.step(&mut machine, &[]);
         world.alerts = Alerts::NONE;
-        let millis = Micros::from_millis;
+        let millis = Duration::from_millis;
         touch(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
         assert_eq!(world.step(&mut machine, &[]).mode.blocks, ArmBlocks::CRASHED, "not yet");
         assert!(!touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed);
@@ -547,9 +547,9 @@ mod tests {
     fn a_click_takes_off_and_holds_the_place() {
         let (mut machine, mut world) = in_state(FlightState::IdleGround);
         machine.wanted = FlightMode::Stabilize;
-        let clicked = touch(&mut world, &mut machine, Micros(0), ButtonGesture::Click);
+        let clicked = touch(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
         assert_eq!((clicked.state, clicked.mode), (FlightState::Armed, FlightMode::PosHold));
-        world.now += SPOOL.0;
+        world.now += SPOOL;
         let later = world.step(&mut machine, &[]).mode;
         assert_eq!((later.state, later.mode), (FlightState::TakeOff, FlightMode::PosHold));
     }

@@ -3,8 +3,8 @@
 //! The status light tells the state, the two body lights the flight mode, as on the StampFly. Rows of a table are
 //! looked at from the top; the first one that applies wins.
 
-use stampfly_types::Micros;
 use stampfly_types::messages::{Alerts, FlightMode, FlightState, Signal, SystemMode, Tone};
+use stampfly_types::{Duration, Instant};
 
 /// How a light shows its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,16 +32,16 @@ const LIME: Colour = [16, 32, 0];
 ///
 /// ```
 /// use stampfly_mode::Signaller;
-/// use stampfly_types::{Micros, messages::*};
+/// use stampfly_types::{Instant, messages::*};
 /// let mut signaller = Signaller::default();
 /// let idle = SystemMode { state: FlightState::IdleGround, ..Default::default() };
-/// let shown = signaller.step(Micros(0), &idle, Alerts::NONE);
+/// let shown = signaller.step(Instant::ZERO, &idle, Alerts::NONE);
 /// assert!(shown.status[1] > 0 && shown.status[0] == 0, "green: ready");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signaller {
     last_state: Option<FlightState>,
-    last_warning: Option<Micros>,
+    last_warning: Option<Instant>,
     tone: Tone,
     tone_count: u32,
 }
@@ -50,11 +50,11 @@ pub struct Signaller {
 const FAULT: Alerts =
     Alerts::IMU_LOST.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::TILT_MISMATCH).with(Alerts::POWER_LOST);
 /// A low battery is called out again after this long.
-const REPEAT: Micros = Micros::from_secs(10);
+const REPEAT: Duration = Duration::from_secs(10);
 
 impl Signaller {
     /// What to show now; call at about 30 Hz.
-    pub fn step(&mut self, now: Micros, mode: &SystemMode, alerts: Alerts) -> Signal {
+    pub fn step(&mut self, now: Instant, mode: &SystemMode, alerts: Alerts) -> Signal {
         let low = alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY);
         let fault = alerts.intersects(FAULT);
         let silent = alerts.contains(Alerts::COMM_LOST);
@@ -110,12 +110,12 @@ impl Signaller {
     }
 }
 
-fn first(rows: &[(bool, Colour, Blink)], now: Micros) -> Colour {
+fn first(rows: &[(bool, Colour, Blink)], now: Instant) -> Colour {
     let Some((_, colour, blink)) = rows.iter().find(|(applies, ..)| *applies) else { return OFF };
     let on = match blink {
         Blink::Solid => true,
-        Blink::Slow => (now.0 / 500_000).is_multiple_of(2),
-        Blink::Fast => (now.0 / 125_000).is_multiple_of(2),
+        Blink::Slow => (now.as_micros() / 500_000).is_multiple_of(2),
+        Blink::Fast => (now.as_micros() / 125_000).is_multiple_of(2),
     };
     if on { *colour } else { OFF }
 }
@@ -129,9 +129,9 @@ mod tests {
         for &state in FlightState::ALL {
             let mode = SystemMode { state, ..Default::default() };
             let mut signaller = Signaller::default();
-            assert_ne!(signaller.step(Micros(0), &mode, Alerts::NONE).status, OFF, "{state:?}");
-            assert_eq!(signaller.step(Micros(0), &mode, Alerts::LOW_BATTERY).status, CYAN);
-            assert_eq!(signaller.step(Micros(0), &mode, Alerts::LOW_BATTERY | Alerts::IMU_LOST).status, RED);
+            assert_ne!(signaller.step(Instant::ZERO, &mode, Alerts::NONE).status, OFF, "{state:?}");
+            assert_eq!(signaller.step(Instant::ZERO, &mode, Alerts::LOW_BATTERY).status, CYAN);
+            assert_eq!(signaller.step(Instant::ZERO, &mode, Alerts::LOW_BATTERY | Alerts::IMU_LOST).status, RED);
         }
     }
 
@@ -140,7 +140,7 @@ mod tests {
         let mut signaller = Signaller::default();
         let mut status = |state, armed, millis| {
             let mode = SystemMode { state, armed, ..Default::default() };
-            signaller.step(Micros::from_millis(millis), &mode, Alerts::COMM_LOST).status
+            signaller.step(Instant::from_millis(millis), &mode, Alerts::COMM_LOST).status
         };
         for millis in (0..2_000).step_by(30) {
             assert_eq!(status(FlightState::IdleGround, false, millis), BLUE, "it does not blink at {millis}");
@@ -155,7 +155,7 @@ mod tests {
     fn faults_are_red() {
         for fault in [Alerts::IMU_LOST, Alerts::ESTIMATE_DIVERGED, Alerts::TILT_MISMATCH, Alerts::POWER_LOST] {
             let mode = SystemMode { state: FlightState::IdleGround, ..Default::default() };
-            assert_eq!(Signaller::default().step(Micros(0), &mode, fault).status, RED, "{fault:?}");
+            assert_eq!(Signaller::default().step(Instant::ZERO, &mode, fault).status, RED, "{fault:?}");
         }
     }
 
@@ -165,7 +165,7 @@ mod tests {
         let mode = SystemMode { state: FlightState::Flying, ..Default::default() };
         let mut count = 0;
         for second in 0..30 {
-            count = signaller.step(Micros::from_secs(second), &mode, Alerts::LOW_BATTERY).tone_count;
+            count = signaller.step(Instant::from_secs(second), &mode, Alerts::LOW_BATTERY).tone_count;
         }
         assert_eq!(count, 4, "the start, and three warnings");
     }

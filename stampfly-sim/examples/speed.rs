@@ -10,8 +10,7 @@ use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, 
 use stampfly_sim::plant::Pose;
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
-use std::time::Instant;
+use stampfly_types::Instant;
 
 const SECONDS: u64 = 60;
 
@@ -34,8 +33,8 @@ fn main() {
         tasks.spawn(async move { while mag.next().await.is_ok() {} });
         tasks.spawn(async move { while baro.next().await.is_ok() {} });
         tasks.spawn(async move { while power.next().await.is_ok() {} });
-        let begin = Instant::now();
-        tasks.run_until(Micros::from_secs(SECONDS));
+        let begin = std::time::Instant::now();
+        tasks.run_until(Instant::from_secs(SECONDS));
         let spent = begin.elapsed().as_secs_f64();
         println!(
             "{name}: {:.0} times real time, {:.2} us per 2.5 ms, height {:.2} m",

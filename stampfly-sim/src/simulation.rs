@@ -4,7 +4,7 @@ use crate::plant::{Plant, PlantParameters, Pose, WindConfig};
 use crate::sensors::Sensors;
 use crate::time::Clock;
 use crate::world::{Truth, World};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// All that decides a simulation. The same configuration gives the same bits on every machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub struct SimulationConfig {
     /// Seed of everything random: specimens, noise, gusts.
     pub seed: u64,
     /// What the clock shows at the start.
-    pub start: Micros,
+    pub start: Instant,
     /// The vehicle and its surroundings.
     pub plant: PlantParameters,
     /// The air.
@@ -27,7 +27,7 @@ impl Default for SimulationConfig {
     fn default() -> Self {
         Self {
             seed: 1,
-            start: Micros::ZERO,
+            start: Instant::ZERO,
             plant: PlantParameters::default(),
             wind: WindConfig::default(),
             vibration: 1.0,

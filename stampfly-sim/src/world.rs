@@ -6,7 +6,7 @@
 
 use crate::plant::{DT, Motion, Plant, ROTORS, STEP};
 use core::cell::RefCell;
-use stampfly_types::{Micros, Quat, Vec3, message};
+use stampfly_types::{Instant, Quat, Vec3, message};
 use std::rc::Rc;
 
 message! {
@@ -41,7 +41,7 @@ const HISTORY: usize = 128;
 #[derive(Debug)]
 struct State {
     plant: Plant,
-    start: Micros,
+    start: Instant,
     /// Steps done since the start.
     steps: u64,
     /// Motion after step k at index k modulo its length.
@@ -49,8 +49,8 @@ struct State {
 }
 
 impl State {
-    fn advance_to(&mut self, instant: Micros) {
-        let wanted = instant.since(self.start).0 / STEP.0;
+    fn advance_to(&mut self, instant: Instant) {
+        let wanted = instant.since(self.start).as_micros() / STEP.as_micros();
         while self.steps < wanted {
             self.plant.step();
             self.steps += 1;
@@ -58,12 +58,12 @@ impl State {
         }
     }
 
-    fn motion_at(&mut self, instant: Micros) -> Motion {
+    fn motion_at(&mut self, instant: Instant) -> Motion {
         self.advance_to(instant);
-        let since_start = instant.since(self.start).0;
+        let since_start = instant.since(self.start).as_micros();
         let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
-        let step = (since_start / STEP.0).max(oldest);
-        let rest = since_start.saturating_sub(step * STEP.0) as f64 * 1e-6;
+        let step = (since_start / STEP.as_micros()).max(oldest);
+        let rest = since_start.saturating_sub(step * STEP.as_micros()) as f64 * 1e-6;
         self.history[step as usize % HISTORY].after(rest.min(DT), self.plant.parameters().gravity)
     }
 }
@@ -73,13 +73,13 @@ impl State {
 /// ```
 /// use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
 /// use stampfly_sim::World;
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let pose = Pose { rotors: 0.0, ..Pose::hovering(2.0) };
 /// let plant = Plant::new(&PlantParameters::default(), &WindConfig::CALM, Some(&pose), 1);
-/// let world = World::new(plant, Micros::ZERO);
-/// let later = world.truth_at(Micros::from_millis(100)).velocity.z;
-/// let earlier = world.truth_at(Micros::from_millis(50)).velocity.z;
+/// let world = World::new(plant, Instant::ZERO);
+/// let later = world.truth_at(Instant::from_millis(100)).velocity.z;
+/// let earlier = world.truth_at(Instant::from_millis(50)).velocity.z;
 /// assert!((later - 0.98).abs() < 0.01 && (earlier - 0.49).abs() < 0.01, "the recent past is kept");
 /// ```
 #[derive(Clone, Debug)]
@@ -88,13 +88,13 @@ pub struct World(Rc<RefCell<State>>);
 impl World {
     /// A world whose time begins at `start`.
     #[must_use]
-    pub fn new(plant: Plant, start: Micros) -> Self {
+    pub fn new(plant: Plant, start: Instant) -> Self {
         let history = Box::new([*plant.motion(); HISTORY]);
         Self(Rc::new(RefCell::new(State { plant, start, steps: 0, history })))
     }
 
     /// Runs the physics up to `instant`. The past does not change.
-    pub fn advance_to(&self, instant: Micros) {
+    pub fn advance_to(&self, instant: Instant) {
         self.0.borrow_mut().advance_to(instant);
     }
 
@@ -103,12 +103,12 @@ impl World {
     /// Between two physics steps it is carried on from the earlier one, so that a motor command given at the same
     /// instant still acts on the next step.
     #[must_use]
-    pub fn motion_at(&self, instant: Micros) -> Motion {
+    pub fn motion_at(&self, instant: Instant) -> Motion {
         self.0.borrow_mut().motion_at(instant)
     }
 
     /// Applies duty cycles, 0 to 1, from `instant` on.
-    pub fn set_duty(&self, instant: Micros, duty: [f64; ROTORS]) {
+    pub fn set_duty(&self, instant: Instant, duty: [f64; ROTORS]) {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
         state.plant.set_duty(duty);
@@ -121,7 +121,7 @@ impl World {
 
     /// The truth at `instant`.
     #[must_use]
-    pub fn truth_at(&self, instant: Micros) -> Truth {
+    pub fn truth_at(&self, instant: Instant) -> Truth {
         let motion = self.motion_at(instant);
         let state = self.0.borrow();
         Truth {

@@ -4,7 +4,7 @@ use stampfly_drivers::{Imu, MotorOutputs, OpticalFlow, RangeFinder};
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::messages::MotorOutput;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 use std::cell::RefCell;
 
 /// All the words two sensors and the truth give in two seconds with the motors running.
@@ -30,7 +30,7 @@ fn fly(seed: u64, with_flow: bool) -> Vec<u32> {
     if with_flow {
         tasks.spawn(async move { while flow.next().await.is_ok() {} });
     }
-    tasks.run_until(Micros::from_secs(2));
+    tasks.run_until(Instant::from_secs(2));
     drop(tasks);
     let mut words = words.into_inner();
     words.extend(world.truth_at(clock.now()).to_words());

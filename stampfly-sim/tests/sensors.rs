@@ -6,7 +6,7 @@ use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, 
 use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::{Micros, Vec3, math};
+use stampfly_types::{Duration, Instant, Vec3, math};
 
 /// A vehicle without weight, motors and air: it keeps its velocity and its turning.
 fn drifting(seed: u64, pose: Pose) -> Simulation {
@@ -47,7 +47,10 @@ fn the_inertial_sensor_at_rest_reads_gravity_and_its_offsets() {
             let Ok(sample) = block_on(&clock, simulation.sensors.imu.next());
             times.push(sample.at);
             let age = clock.now().since(sample.at);
-            assert!((Micros(1_900)..Micros(2_200)).contains(&age), "three chip samples and the read-out: {age}");
+            assert!(
+                (Duration::from_micros(1_900)..Duration::from_micros(2_200)).contains(&age),
+                "three chip samples and the read-out: {age}"
+            );
             let values = sample.data.accel.iter().chain(sample.data.gyro.iter());
             channels.iter_mut().zip(values).for_each(|(channel, value)| channel.push(*value));
         }
@@ -109,7 +112,7 @@ fn a_range_while_climbing_is_valid_for_its_time_stamp() {
     let clock = simulation.clock.clone();
     for _ in 0..60 {
         let Ok(sample) = block_on(&clock, simulation.sensors.tof.next());
-        let expected = 0.5 + sample.at.seconds();
+        let expected = 0.5 + sample.at.since(Instant::ZERO).seconds();
         let error = (sample.data.distance - expected).abs();
         assert!(!sample.data.valid || error < 0.02, "{} instead of {expected}", sample.data.distance);
     }
@@ -194,7 +197,7 @@ fn a_late_flow_reader_loses_no_motion() {
     let clock = simulation.clock.clone();
     let (mut swept, mut time) = (0.0, 0.0);
     for pause in 0..100u64 {
-        clock.advance_to(clock.now() + Micros::from_millis(pause % 7 * 8));
+        clock.advance_to(clock.now() + Duration::from_millis(pause % 7 * 8));
         let Ok(sample) = block_on(&clock, simulation.sensors.flow.next());
         swept += sample.data.delta_x;
         time += sample.data.interval;
@@ -230,11 +233,11 @@ fn the_barometer_reports_each_conversion_once_and_feels_a_metre() {
     let altitude = |height: f64| {
         let mut simulation = drifting(10, Pose::hovering(height));
         let clock = simulation.clock.clone();
-        let mut last = Micros::ZERO;
+        let mut last = Instant::ZERO;
         let values: Vec<f32> = (0..200)
             .map(|_| {
                 let Ok(sample) = block_on(&clock, simulation.sensors.baro.next());
-                assert!(last == Micros::ZERO || (0.068..0.080).contains(&sample.at.since(last).seconds()));
+                assert!(last == Instant::ZERO || (0.068..0.080).contains(&sample.at.since(last).seconds()));
                 last = sample.at;
                 sample.data.altitude
             })

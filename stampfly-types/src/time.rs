@@ -14,7 +14,7 @@
 //! because it is 96 bits of seconds and nanoseconds, whose arithmetic panics on overflow.
 
 use core::fmt;
-use core::ops::{Add, AddAssign, Mul, Sub};
+use core::ops::{Add, AddAssign, Div, Mul, Sub};
 
 const MICROS_PER_MILLI: u64 = 1_000;
 const MICROS_PER_SECOND: u64 = 1_000_000;
@@ -107,6 +107,7 @@ impl Instant {
 /// let period = Duration::from_micros(2_500);
 /// assert_eq!(period.seconds(), 0.0025);
 /// assert_eq!(period * 400, Duration::from_secs(1));
+/// assert_eq!(period / 2, Duration::from_micros(1_250));
 /// assert_eq!(period - Duration::from_millis(3), Duration::ZERO);
 /// assert_eq!(Duration::from_seconds(0.0025), period);
 /// assert_eq!(period.to_string(), "0.002500 s");
@@ -231,6 +232,14 @@ impl Mul<u64> for Duration {
     }
 }
 
+/// Rounds down. Division by zero saturates at [`Duration::MAX`].
+impl Div<u64> for Duration {
+    type Output = Self;
+    fn div(self, divisor: u64) -> Self {
+        Self(self.0.checked_div(divisor).unwrap_or(u64::MAX))
+    }
+}
+
 impl fmt::Display for Instant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         seconds(self.0, f)
@@ -264,13 +273,14 @@ mod tests {
         }
 
         #[test]
-        fn arithmetic_saturates(a: u64, b: u64, factor: u64) {
+        fn arithmetic_saturates(a: u64, b: u64, factor in prop_oneof![0..10u64, any::<u64>()]) {
             let (instant, x, y) = (Instant::from_micros(a), Duration::from_micros(a), Duration::from_micros(b));
             prop_assert_eq!((instant + y).as_micros(), a.saturating_add(b));
             prop_assert_eq!((instant - y).as_micros(), a.saturating_sub(b));
             prop_assert_eq!((x + y).as_micros(), a.saturating_add(b));
             prop_assert_eq!((x - y).as_micros(), a.saturating_sub(b));
             prop_assert_eq!((x * factor).as_micros(), a.saturating_mul(factor));
+            prop_assert_eq!((x / factor).as_micros(), a.checked_div(factor).unwrap_or(u64::MAX));
         }
 
         #[test]

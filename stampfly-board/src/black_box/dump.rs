@@ -74,10 +74,10 @@ impl core::error::Error for DumpError {}
 /// use stampfly_board::{VehicleConfig, wiring};
 /// use stampfly_drivers::blocking::block_on;
 /// use stampfly_types::messages::SystemMode;
-/// use stampfly_types::{Message, Micros};
+/// use stampfly_types::{Instant, Message};
 /// let mut black_box = BlackBox::<256>::new();
 /// let armed = SystemMode { armed: true, ..Default::default() };
-/// black_box.note(wiring::Id::system_mode, Micros(1_000), 1, &armed.to_words());
+/// black_box.note(wiring::Id::system_mode, Instant::from_micros(1_000), 1, &armed.to_words());
 ///
 /// let (mut cursor, mut text) = (black_box.begin(), String::new());
 /// let show = async |line: &str| {

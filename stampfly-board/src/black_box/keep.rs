@@ -4,7 +4,7 @@
 //! of one; decisions when they change; what the others can be computed from, or what ended before the flight, not at all.
 
 use crate::wiring::Id;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// Which samples of a topic are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,19 +14,19 @@ pub enum Keep {
     /// All of them: for events.
     Always,
     /// At most one in this time.
-    Every(Micros),
+    Every(Duration),
     /// One that differs from the last one kept, but none within [`HASTE`] of it; and one a second, so that there always is
     /// one.
     OnChange,
 }
 
 /// A topic that changes all the time must not push everything else out.
-pub const HASTE: Micros = Micros::from_millis(20);
+pub const HASTE: Duration = Duration::from_millis(20);
 /// A topic that does not change is kept this often.
-pub const REMINDER: Micros = Micros::from_secs(1);
+pub const REMINDER: Duration = Duration::from_secs(1);
 
 const fn hertz(rate: u64) -> Keep {
-    Keep::Every(Micros(1_000_000 / rate))
+    Keep::Every(Duration::from_micros(1_000_000 / rate))
 }
 
 /// Which samples of this topic are kept.

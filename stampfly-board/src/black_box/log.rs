@@ -2,7 +2,7 @@
 
 use crate::{VehicleConfig, parameters, wiring};
 use stampfly_log::ulog::{Definitions, ParameterValue, Sink, Topic, WriteError, Writer};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Every topic, as the log wants them.
 static TOPICS: [Topic; wiring::COUNT] = {
@@ -20,16 +20,16 @@ static TOPICS: [Topic; wiring::COUNT] = {
 /// ```
 /// use stampfly_board::{VehicleConfig, black_box};
 /// use stampfly_log::ulog::Ram;
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 /// let mut memory = [0; 16_384];
-/// let log = black_box::open(Ram::new(&mut memory), Micros(0), &VehicleConfig::default())?;
+/// let log = black_box::open(Ram::new(&mut memory), Instant::ZERO, &VehicleConfig::default())?;
 /// assert!(log.sink().written().starts_with(b"ULog"));
 /// # Ok::<(), stampfly_log::ulog::WriteError<stampfly_log::ulog::Full>>(())
 /// ```
 ///
 /// # Errors
 /// When the sink refuses.
-pub fn open<S: Sink>(sink: S, at: Micros, config: &VehicleConfig) -> Result<Writer<'static, S>, WriteError<S::Error>> {
+pub fn open<S: Sink>(sink: S, at: Instant, config: &VehicleConfig) -> Result<Writer<'static, S>, WriteError<S::Error>> {
     head(sink, at, config)?.data(&TOPICS, &[])
 }
 
@@ -37,7 +37,7 @@ pub fn open<S: Sink>(sink: S, at: Micros, config: &VehicleConfig) -> Result<Writ
 ///
 /// # Errors
 /// When the sink refuses.
-pub fn head<S: Sink>(sink: S, at: Micros, config: &VehicleConfig) -> Result<Definitions<S>, WriteError<S::Error>> {
+pub fn head<S: Sink>(sink: S, at: Instant, config: &VehicleConfig) -> Result<Definitions<S>, WriteError<S::Error>> {
     let mut head = Definitions::start(sink, at)?;
     head.info("sys_name", "StampFly")?;
     for parameter in parameters::PARAMETERS {

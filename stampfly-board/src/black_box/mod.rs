@@ -21,10 +21,10 @@ pub use log::{head, open};
 
 use crate::wiring;
 use stampfly_types::messages::SystemMode;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Duration, Instant, Message};
 
 /// Remembering goes on for this long after the motors have stopped: what is lying upside down shows by then.
-pub const AFTERMATH: Micros = Micros::from_millis(250);
+pub const AFTERMATH: Duration = Duration::from_millis(250);
 
 /// Words a StampFly has for it: 40 kB, which are more than five seconds.
 pub const ROOM: usize = 10 * 1024;
@@ -49,7 +49,7 @@ pub struct Record {
     /// Line of the topic table.
     pub topic: usize,
     /// The instant the data is valid for.
-    pub at: Micros,
+    pub at: Instant,
     /// The lowest 24 bits of the topic's running number of this sample.
     pub generation: u32,
     words: [u32; LONGEST],
@@ -83,17 +83,17 @@ pub struct Changed;
 /// ```
 /// use stampfly_board::{black_box::BlackBox, wiring};
 /// use stampfly_types::messages::{SystemMode, TofData};
-/// use stampfly_types::{Message, Micros};
+/// use stampfly_types::{Instant, Message};
 /// let mut black_box = BlackBox::<256>::new();
 /// let armed = SystemMode { armed: true, ..Default::default() };
 /// for millis in 0..400 {
 ///     let range = TofData { distance: 0.001 * millis as f32, valid: true, ..Default::default() };
-///     let at = Micros::from_millis(millis);
+///     let at = Instant::from_millis(millis);
 ///     black_box.note(wiring::Id::system_mode, at, millis as u32, &armed.to_words());
 ///     black_box.note(wiring::Id::sensor_tof, at, millis as u32, &range.to_words());
 /// }
 /// let ranges = black_box.records().filter(|record| record.topic == wiring::Id::sensor_tof as usize);
-/// let kept: Vec<u64> = ranges.map(|record| record.at.0 / 1_000).collect();
+/// let kept: Vec<u64> = ranges.map(|record| record.at.as_micros() / 1_000).collect();
 /// assert_eq!(kept, [0, 100, 200, 300]);
 /// ```
 #[derive(Clone, Debug)]
@@ -104,13 +104,13 @@ pub struct BlackBox<const WORDS: usize> {
     /// Words in use, from there on and round the end.
     used: usize,
     /// The instant of the newest record. Records have the low half of theirs, which means one within half an hour of it.
-    newest: Micros,
+    newest: Instant,
     /// How often something was remembered or forgotten.
     changes: u32,
     /// Until when the flight is worth remembering.
-    until: Micros,
+    until: Instant,
     /// When the last sample of each topic was kept.
-    kept: [Option<Micros>; wiring::COUNT],
+    kept: [Option<Instant>; wiring::COUNT],
     /// The fingerprint of it.
     last: [u32; wiring::COUNT],
 }
@@ -125,16 +125,16 @@ impl<const WORDS: usize> BlackBox<WORDS> {
             memory: [0; WORDS],
             oldest: 0,
             used: 0,
-            newest: Micros::ZERO,
+            newest: Instant::ZERO,
             changes: 0,
-            until: Micros::ZERO,
+            until: Instant::ZERO,
             kept: [None; wiring::COUNT],
             last: [0; wiring::COUNT],
         }
     }
 
     /// Takes a sample, and remembers it if the vehicle flies and [`keep`] says so.
-    pub fn note(&mut self, topic: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    pub fn note(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         if topic == wiring::Id::system_mode && is_armed(words) {
             if at >= self.until {
                 (self.oldest, self.used, self.kept) = (0, 0, [None; wiring::COUNT]);
@@ -147,7 +147,7 @@ impl<const WORDS: usize> BlackBox<WORDS> {
         }
     }
 
-    fn wants(&self, topic: wiring::Id, at: Micros, words: &[u32]) -> bool {
+    fn wants(&self, topic: wiring::Id, at: Instant, words: &[u32]) -> bool {
         let Some(kept) = self.kept.get(topic as usize).copied().flatten() else { return keep(topic) != Keep::Never };
         match keep(topic) {
             Keep::Never => false,
@@ -160,7 +160,7 @@ impl<const WORDS: usize> BlackBox<WORDS> {
         }
     }
 
-    fn remember(&mut self, topic: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    fn remember(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         let place = topic as usize;
         if wiring::TOPICS.get(place).is_none_or(|info| info.words != words.len()) {
             return;
@@ -181,7 +181,7 @@ impl<const WORDS: usize> BlackBox<WORDS> {
             let gone = HEAD + oldest.length;
             (self.oldest, self.used) = ((self.oldest + gone) % WORDS, self.used - gone);
         }
-        let head = [topic as u32 | generation << 8, at.0 as u32];
+        let head = [topic as u32 | generation << 8, at.as_micros() as u32];
         for word in head.iter().chain(words) {
             if let Some(place) = self.memory.get_mut((self.oldest + self.used) % WORDS) {
                 *place = *word;
@@ -198,10 +198,10 @@ impl<const WORDS: usize> BlackBox<WORDS> {
         }
         let word = |index: usize| self.memory.get((self.oldest + offset + index) % WORDS).copied().unwrap_or_default();
         let topic = (word(0) & 0xFF) as usize;
-        let later = i64::from(word(1).wrapping_sub(self.newest.0 as u32).cast_signed());
+        let later = i64::from(word(1).wrapping_sub(self.newest.as_micros() as u32).cast_signed());
         let mut record = Record {
             topic,
-            at: Micros(self.newest.0.saturating_add_signed(later)),
+            at: Instant::from_micros(self.newest.as_micros().saturating_add_signed(later)),
             generation: word(0) >> 8,
             words: [0; LONGEST],
             length: wiring::TOPICS.get(topic)?.words,
@@ -267,7 +267,7 @@ mod tests {
         SystemMode { armed, ..Default::default() }.to_words()
     }
 
-    fn arm<const WORDS: usize>(black_box: &mut BlackBox<WORDS>, at: Micros) {
+    fn arm<const WORDS: usize>(black_box: &mut BlackBox<WORDS>, at: Instant) {
         black_box.note(wiring::Id::system_mode, at, 1, mode(true).as_ref());
     }
 
@@ -275,7 +275,7 @@ mod tests {
         /// What is remembered is the newest, in order and unchanged, and no room is left unused.
         #[test]
         fn the_newest_is_kept(
-            start in any::<u32>().prop_map(|start| Micros(u64::from(start) << 8)),
+            start in any::<u32>().prop_map(|start| Instant::from_micros(u64::from(start) << 8)),
             picks in prop::collection::vec((0usize..4, 0u64..1_000, any::<u32>()), 1..200),
         ) {
             let mut black_box = BlackBox::<257>::new();
@@ -283,7 +283,7 @@ mod tests {
             let mut all = std::vec![(wiring::Id::system_mode as usize, start, 1, mode(true).as_ref().to_vec())];
             let mut at = start;
             for (pick, later, seed) in picks {
-                at += Micros(later);
+                at += Duration::from_micros(later);
                 let topic = EVENTS[pick];
                 let words: Vec<u32> =
                     (0..wiring::TOPICS[topic as usize].words as u32).map(|index| seed.wrapping_add(index)).collect();
@@ -306,19 +306,19 @@ mod tests {
         let event = |black_box: &mut BlackBox<256>, at| black_box.note(wiring::Id::self_test, at, 0, &[0, 0]);
         let events = |black_box: &BlackBox<256>| {
             let events = black_box.records().filter(|record| record.topic == wiring::Id::self_test as usize);
-            events.map(|record| record.at.0 / 1_000).collect::<Vec<_>>()
+            events.map(|record| record.at.as_micros() / 1_000).collect::<Vec<_>>()
         };
-        event(&mut black_box, Micros::from_millis(1));
+        event(&mut black_box, Instant::from_millis(1));
         assert_eq!(black_box.records().count(), 0, "standing about");
-        arm(&mut black_box, Micros::from_millis(10));
-        event(&mut black_box, Micros::from_millis(11));
-        black_box.note(wiring::Id::system_mode, Micros::from_millis(100), 2, mode(false).as_ref());
-        event(&mut black_box, Micros::from_millis(259));
-        event(&mut black_box, Micros::from_millis(260));
+        arm(&mut black_box, Instant::from_millis(10));
+        event(&mut black_box, Instant::from_millis(11));
+        black_box.note(wiring::Id::system_mode, Instant::from_millis(100), 2, mode(false).as_ref());
+        event(&mut black_box, Instant::from_millis(259));
+        event(&mut black_box, Instant::from_millis(260));
         assert_eq!(events(&black_box), [11, 259]);
         let mut cursor = black_box.begin();
         assert!(black_box.next(&mut cursor).is_ok_and(|record| record.is_some()));
-        arm(&mut black_box, Micros::from_millis(500));
+        arm(&mut black_box, Instant::from_millis(500));
         assert_eq!(events(&black_box), [], "the next flight");
         assert_eq!(black_box.next(&mut cursor), Err(Changed));
     }
@@ -330,7 +330,7 @@ mod tests {
             let decided = SystemMode { armed: true, transitions: (millis / 1_500) * 2, ..Default::default() };
             black_box.note(
                 wiring::Id::system_mode,
-                Micros::from_millis(millis.into()),
+                Instant::from_millis(millis.into()),
                 millis,
                 decided.to_words().as_ref(),
             );
@@ -341,7 +341,7 @@ mod tests {
             let decided = SystemMode { armed: true, transitions: millis, ..Default::default() };
             black_box.note(
                 wiring::Id::system_mode,
-                Micros::from_millis(millis.into()),
+                Instant::from_millis(millis.into()),
                 millis,
                 decided.to_words().as_ref(),
             );

@@ -7,7 +7,7 @@ use crate::profile::{HEADING, Profile};
 use crate::tasks::Health;
 use crate::{VehicleConfig, wiring};
 use core::fmt::{self, Write};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::{PilotInput, PowerData, StateEstimate, SystemAlert, SystemMode};
 
 /// A sensor's driver and how it fares.
@@ -22,7 +22,7 @@ pub struct SensorLine<'c> {
 /// What the board knows.
 pub struct Context<'c> {
     /// Now.
-    pub now: Micros,
+    pub now: Instant,
     /// Which firmware this is.
     pub version: &'c str,
     /// The newest sample of every topic.
@@ -70,11 +70,11 @@ pub enum Request {
 /// use stampfly_board::VehicleConfig;
 /// use stampfly_board::console::{Context, Newest, Request, answer};
 /// use stampfly_board::profile::Profile;
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let (newest, profile, mut config) = (Newest::new(), Profile::new(), VehicleConfig::default());
 /// let mut context = Context {
-///     now: Micros(0), version: "1.0", newest: &newest, sensors: &[], profile: &profile, config: &mut config,
+///     now: Instant::ZERO, version: "1.0", newest: &newest, sensors: &[], profile: &profile, config: &mut config,
 /// };
 /// let mut reply = String::new();
 /// assert_eq!(answer("version", &mut context, &mut reply), Ok(Request::Nothing));
@@ -173,10 +173,10 @@ fn status(context: &Context<'_>, reply: &mut impl Write) -> Result<Request, fmt:
         write!(reply, "height   {:.2} m\r\n", estimate.height)?;
     }
     match context.newest.get::<PilotInput>(wiring::Id::command_pilot) {
-        Some((at, _)) => write!(reply, "pilot    heard {} ms ago\r\n", context.now.since(at).0 / 1_000)?,
+        Some((at, _)) => write!(reply, "pilot    heard {} ms ago\r\n", context.now.since(at).as_micros() / 1_000)?,
         None => reply.write_str("pilot    never heard\r\n")?,
     }
-    write!(reply, "awake    {} s\r\n", context.now.0 / 1_000_000)?;
+    write!(reply, "awake    {} s\r\n", context.now.as_micros() / 1_000_000)?;
     Ok(Request::Nothing)
 }
 

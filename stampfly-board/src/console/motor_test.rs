@@ -1,11 +1,11 @@
 //! One motor for two seconds, to see which one it is and which way it turns.
 
 use core::sync::atomic::{AtomicU32, Ordering};
-use stampfly_types::Micros;
 use stampfly_types::messages::MotorOutput;
+use stampfly_types::{Duration, Instant};
 
 /// How long a motor turns.
-const SPAN: Micros = Micros::from_secs(2);
+const SPAN: Duration = Duration::from_secs(2);
 /// Largest duty that is tested, share. Enough to turn without propellers, too little to lift with them.
 const LIMIT: f32 = 0.3;
 
@@ -39,12 +39,12 @@ impl core::error::Error for MotorTestRefused {}
 ///
 /// ```
 /// use stampfly_board::console::MotorTest;
-/// use stampfly_types::{Micros, messages::MotorOutput};
+/// use stampfly_types::{Instant, messages::MotorOutput};
 /// let test = MotorTest::new();
 /// let off = MotorOutput { count: 4, ..Default::default() };
-/// test.start(Micros(0), false, 3, 0.125)?;
-/// assert_eq!(test.apply(Micros::from_secs(1), off).duty[..4], [0.0, 0.0, 0.125, 0.0]);
-/// assert_eq!(test.apply(Micros::from_secs(3), off), off, "two seconds are over");
+/// test.start(Instant::ZERO, false, 3, 0.125)?;
+/// assert_eq!(test.apply(Instant::from_secs(1), off).duty[..4], [0.0, 0.0, 0.125, 0.0]);
+/// assert_eq!(test.apply(Instant::from_secs(3), off), off, "two seconds are over");
 /// # Ok::<(), stampfly_board::console::MotorTestRefused>(())
 /// ```
 #[derive(Debug, Default)]
@@ -55,8 +55,8 @@ pub struct MotorTest {
     until: AtomicU32,
 }
 
-fn millis(at: Micros) -> u32 {
-    (at.0 / 1_000) as u32
+fn millis(at: Instant) -> u32 {
+    (at.as_micros() / 1_000) as u32
 }
 
 impl MotorTest {
@@ -70,7 +70,7 @@ impl MotorTest {
     ///
     /// # Errors
     /// When it is not allowed; nothing has changed then.
-    pub fn start(&self, now: Micros, armed: bool, motor: u8, duty: f32) -> Result<(), MotorTestRefused> {
+    pub fn start(&self, now: Instant, armed: bool, motor: u8, duty: f32) -> Result<(), MotorTestRefused> {
         if armed {
             return Err(MotorTestRefused::Armed);
         }
@@ -93,7 +93,7 @@ impl MotorTest {
 
     /// What the motors get: the output itself, or the test's while there is one and the vehicle is disarmed.
     #[must_use]
-    pub fn apply(&self, now: Micros, output: MotorOutput) -> MotorOutput {
+    pub fn apply(&self, now: Instant, output: MotorOutput) -> MotorOutput {
         let what = self.what.load(Ordering::Acquire);
         let left = self.until.load(Ordering::Relaxed).wrapping_sub(millis(now));
         let [motor, ..] = what.to_le_bytes();
@@ -101,7 +101,7 @@ impl MotorTest {
             return output;
         }
         // The clock has gone past the end: what is left is huge.
-        if output.armed || left == 0 || left > millis(SPAN) {
+        if output.armed || left == 0 || u64::from(left) > SPAN.as_millis() {
             self.stop();
             return output;
         }
@@ -123,37 +123,37 @@ mod tests {
     #[test]
     fn a_test_is_short_small_and_never_of_an_armed_vehicle() {
         let test = MotorTest::new();
-        assert_eq!(test.start(Micros(0), true, 1, 0.1), Err(MotorTestRefused::Armed));
+        assert_eq!(test.start(Instant::ZERO, true, 1, 0.1), Err(MotorTestRefused::Armed));
         for motor in [0, 5, 255] {
-            assert_eq!(test.start(Micros(0), false, motor, 0.1), Err(MotorTestRefused::NoSuchMotor));
+            assert_eq!(test.start(Instant::ZERO, false, motor, 0.1), Err(MotorTestRefused::NoSuchMotor));
         }
         for duty in [-0.1, 0.31, f32::NAN, f32::INFINITY] {
-            assert_eq!(test.start(Micros(0), false, 1, duty), Err(MotorTestRefused::Duty));
+            assert_eq!(test.start(Instant::ZERO, false, 1, duty), Err(MotorTestRefused::Duty));
         }
-        assert_eq!(test.apply(Micros(0), OFF), OFF, "nothing was allowed, nothing turns");
-        assert_eq!(test.start(Micros(0), false, 4, 0.25), Ok(()));
-        let turning = test.apply(Micros(1), OFF);
+        assert_eq!(test.apply(Instant::ZERO, OFF), OFF, "nothing was allowed, nothing turns");
+        assert_eq!(test.start(Instant::ZERO, false, 4, 0.25), Ok(()));
+        let turning = test.apply(Instant::from_micros(1), OFF);
         assert_eq!((turning.armed, turning.duty), (true, [0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0]));
-        assert!(test.apply(Micros(1_999_999), OFF).armed);
-        assert_eq!(test.apply(Micros(2_000_000), OFF), OFF);
-        assert_eq!(test.apply(Micros(1), OFF), OFF, "and does not come back");
+        assert!(test.apply(Instant::from_micros(1_999_999), OFF).armed);
+        assert_eq!(test.apply(Instant::from_micros(2_000_000), OFF), OFF);
+        assert_eq!(test.apply(Instant::from_micros(1), OFF), OFF, "and does not come back");
     }
 
     #[test]
     fn arming_ends_it() {
         let test = MotorTest::new();
-        assert_eq!(test.start(Micros(0), false, 1, 0.2), Ok(()));
+        assert_eq!(test.start(Instant::ZERO, false, 1, 0.2), Ok(()));
         let armed = MotorOutput { armed: true, ..OFF };
-        assert_eq!(test.apply(Micros(1), armed), armed);
-        assert_eq!(test.apply(Micros(2), OFF), OFF);
+        assert_eq!(test.apply(Instant::from_micros(1), armed), armed);
+        assert_eq!(test.apply(Instant::from_micros(2), OFF), OFF);
     }
 
     #[test]
     fn it_ends_in_time_when_the_milliseconds_wrap() {
-        let start = Micros((u64::from(u32::MAX) - 500) * 1_000);
+        let start = Instant::from_millis(u64::from(u32::MAX) - 500);
         let test = MotorTest::new();
         assert_eq!(test.start(start, false, 2, 0.1), Ok(()));
-        assert!(test.apply(start + Micros::from_millis(1_999), OFF).armed);
-        assert!(!test.apply(start + Micros::from_millis(2_000), OFF).armed);
+        assert!(test.apply(start + Duration::from_millis(1_999), OFF).armed);
+        assert!(!test.apply(start + Duration::from_millis(2_000), OFF).armed);
     }
 }

@@ -3,7 +3,7 @@
 use crate::black_box::LONGEST;
 use crate::wiring;
 use core::fmt;
-use stampfly_types::{FieldInfo, FieldKind, Message, Micros};
+use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Message};
 
 /// The newest sample of every topic.
 ///
@@ -11,17 +11,17 @@ use stampfly_types::{FieldInfo, FieldKind, Message, Micros};
 ///
 /// ```
 /// use stampfly_board::{console::Newest, wiring};
-/// use stampfly_types::{Message, Micros, messages::TofData};
+/// use stampfly_types::{Instant, Message, messages::TofData};
 /// let mut newest = Newest::new();
 /// let range = TofData { distance: 0.31, valid: true, ..Default::default() };
-/// newest.note(wiring::Id::sensor_tof, Micros(1_000), &range.to_words());
-/// assert_eq!(newest.get(wiring::Id::sensor_tof), Some((Micros(1_000), range)));
-/// let text = newest.show(wiring::Id::sensor_tof as usize, Micros(3_000)).unwrap().to_string();
+/// newest.note(wiring::Id::sensor_tof, Instant::from_micros(1_000), &range.to_words());
+/// assert_eq!(newest.get(wiring::Id::sensor_tof), Some((Instant::from_micros(1_000), range)));
+/// let text = newest.show(wiring::Id::sensor_tof as usize, Instant::from_micros(3_000)).unwrap().to_string();
 /// assert!(text.contains("distance 0.31 m") && text.contains("valid true"), "{text}");
 /// ```
 #[derive(Clone, Debug)]
 pub struct Newest {
-    samples: [Option<(Micros, [u32; LONGEST])>; wiring::COUNT],
+    samples: [Option<(Instant, [u32; LONGEST])>; wiring::COUNT],
 }
 
 impl Newest {
@@ -32,7 +32,7 @@ impl Newest {
     }
 
     /// Takes a sample.
-    pub fn note(&mut self, topic: wiring::Id, at: Micros, words: &[u32]) {
+    pub fn note(&mut self, topic: wiring::Id, at: Instant, words: &[u32]) {
         let Some(place) = self.samples.get_mut(topic as usize) else { return };
         let mut copy = [0; LONGEST];
         for (to, from) in copy.iter_mut().zip(words) {
@@ -43,7 +43,7 @@ impl Newest {
 
     /// The newest sample of a topic of this message, and its instant; `None` before the first.
     #[must_use]
-    pub fn get<M: Message>(&self, topic: wiring::Id) -> Option<(Micros, M)> {
+    pub fn get<M: Message>(&self, topic: wiring::Id) -> Option<(Instant, M)> {
         let (at, words) = self.samples.get(topic as usize)?.as_ref()?;
         let mut copy = M::ZERO;
         for (to, from) in copy.as_mut().iter_mut().zip(words) {
@@ -54,7 +54,7 @@ impl Newest {
 
     /// The newest sample of the topic in this line of the table, to be displayed; `None` before the first.
     #[must_use]
-    pub fn show(&self, topic: usize, now: Micros) -> Option<impl fmt::Display> {
+    pub fn show(&self, topic: usize, now: Instant) -> Option<impl fmt::Display> {
         let (at, words) = self.samples.get(topic)?.as_ref()?;
         let fields = wiring::TOPICS.get(topic)?.fields;
         Some(Shown { age: now.since(*at), fields, words })
@@ -68,7 +68,7 @@ impl Default for Newest {
 }
 
 struct Shown<'n> {
-    age: Micros,
+    age: Duration,
     fields: &'static [FieldInfo],
     words: &'n [u32],
 }
@@ -76,7 +76,7 @@ struct Shown<'n> {
 /// One line a field: name, values, unit.
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ms old", self.age.0 / 1_000)?;
+        write!(f, "{} ms old", self.age.as_micros() / 1_000)?;
         let mut rest = self.words;
         for field in self.fields {
             let (words, after) = rest.split_at_checked(field.words).unwrap_or_default();

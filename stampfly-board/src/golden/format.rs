@@ -21,7 +21,7 @@ use super::GoldenError;
 use crate::{plan, wiring};
 use heapless::Vec;
 use stampfly_log::FlightHash;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Motors whose duty is recorded.
 pub const MOTORS: usize = 4;
@@ -52,7 +52,7 @@ pub fn tables() -> u64 {
     let activations = plan::ACTIVATIONS.iter().map(|activation| (activation.name, 0));
     for (place, (name, size)) in topics.chain(activations).enumerate() {
         for letter in name.bytes() {
-            hash.publish(place as u16, size as u32, Micros::ZERO, &[u32::from(letter)]);
+            hash.publish(place as u16, size as u32, Instant::ZERO, &[u32::from(letter)]);
         }
     }
     hash.finish()
@@ -61,7 +61,7 @@ pub fn tables() -> u64 {
 /// What is known before the first entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
-    pub(super) start: Micros,
+    pub(super) start: Instant,
     pub(super) hash: u64,
 }
 
@@ -69,9 +69,9 @@ pub(super) struct Header {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Entry {
     /// Somebody outside published.
-    Sample { topic: usize, at: Micros, words: Vec<u32, MAX_WORDS> },
+    Sample { topic: usize, at: Instant, words: Vec<u32, MAX_WORDS> },
     /// The executor looks what is due at this instant.
-    Turn(Micros),
+    Turn(Instant),
     /// What the motors have just been told.
     Duty([f32; MOTORS]),
 }
@@ -79,12 +79,12 @@ pub(super) enum Entry {
 /// The entries of a golden flight, in order.
 pub(super) struct Reader<'a> {
     rest: &'a [u8],
-    clock: Micros,
+    clock: Instant,
 }
 
 /// Reads the header.
 pub(super) fn open(record: &[u8]) -> Result<(Header, Reader<'_>), GoldenError> {
-    let mut reader = Reader { rest: record, clock: Micros::ZERO };
+    let mut reader = Reader { rest: record, clock: Instant::ZERO };
     if reader.array() != Some(MAGIC) {
         return Err(GoldenError::NotGolden);
     }
@@ -97,8 +97,8 @@ pub(super) fn open(record: &[u8]) -> Result<(Header, Reader<'_>), GoldenError> {
     if recorded != tables() {
         return Err(GoldenError::OtherTables);
     }
-    reader.clock = Micros(start);
-    Ok((Header { start: Micros(start), hash }, reader))
+    reader.clock = Instant::from_micros(start);
+    Ok((Header { start: Instant::from_micros(start), hash }, reader))
 }
 
 impl Reader<'_> {
@@ -108,7 +108,7 @@ impl Reader<'_> {
         Some(*head)
     }
 
-    fn instant(&mut self) -> Option<Micros> {
+    fn instant(&mut self) -> Option<Instant> {
         let mut folded = 0;
         for shift in (0..u64::BITS).step_by(7) {
             let [byte] = self.array()?;
@@ -118,7 +118,7 @@ impl Reader<'_> {
             }
         }
         let difference = (folded >> 1).cast_signed() ^ -(folded & 1).cast_signed();
-        Some(Micros(self.clock.0.wrapping_add_signed(difference)))
+        Some(Instant::from_micros(self.clock.as_micros().wrapping_add_signed(difference)))
     }
 
     fn entry(&mut self, kind: u8) -> Option<Entry> {
@@ -161,14 +161,14 @@ impl Iterator for Reader<'_> {
 /// `out` gets the pieces; the [`header`](Self::header) that goes in front of them is made last.
 pub struct Writer<F: FnMut(&[u8])> {
     out: F,
-    start: Micros,
-    clock: Micros,
+    start: Instant,
+    clock: Instant,
     length: usize,
 }
 
 impl<F: FnMut(&[u8])> Writer<F> {
     /// A flight that is switched on at `start`.
-    pub fn new(start: Micros, out: F) -> Self {
+    pub fn new(start: Instant, out: F) -> Self {
         Self { out, start, clock: start, length: HEADER }
     }
 
@@ -178,7 +178,7 @@ impl<F: FnMut(&[u8])> Writer<F> {
         let mut header = [0; HEADER];
         // Magic and length share the first eight bytes.
         let first = u64::from(u32::from_le_bytes(MAGIC)) | (self.length as u64) << 32;
-        for (place, value) in header.chunks_mut(8).zip([first, tables(), self.start.0, hash]) {
+        for (place, value) in header.chunks_mut(8).zip([first, tables(), self.start.as_micros(), hash]) {
             place.copy_from_slice(&value.to_le_bytes());
         }
         header
@@ -189,8 +189,8 @@ impl<F: FnMut(&[u8])> Writer<F> {
         (self.out)(bytes);
     }
 
-    fn instant(&mut self, at: Micros) {
-        let difference = at.0.wrapping_sub(self.clock.0).cast_signed();
+    fn instant(&mut self, at: Instant) {
+        let difference = at.as_micros().wrapping_sub(self.clock.as_micros()).cast_signed();
         let mut folded = (difference << 1 ^ difference >> 63).cast_unsigned();
         while folded >= 0x80 {
             self.put(&[folded as u8 | 0x80]);
@@ -200,7 +200,7 @@ impl<F: FnMut(&[u8])> Writer<F> {
     }
 
     /// Somebody outside published on the topic with this place in the table.
-    pub fn sample(&mut self, topic: u8, at: Micros, words: &[u32]) {
+    pub fn sample(&mut self, topic: u8, at: Instant, words: &[u32]) {
         self.put(&[topic]);
         self.instant(at);
         for word in words {
@@ -209,7 +209,7 @@ impl<F: FnMut(&[u8])> Writer<F> {
     }
 
     /// The executor looked what was due, and ran it.
-    pub fn turn(&mut self, clock: Micros) {
+    pub fn turn(&mut self, clock: Instant) {
         self.put(&[TURN]);
         self.instant(clock);
         self.clock = clock;
@@ -233,10 +233,10 @@ mod tests {
     fn entries() -> impl Strategy<Value = std::vec::Vec<Entry>> {
         let sample = (0..wiring::COUNT, any::<u32>(), any::<u32>()).prop_map(|(topic, at, seed)| Entry::Sample {
             topic,
-            at: Micros(u64::from(at)),
+            at: Instant::from_micros(u64::from(at)),
             words: (0..wiring::TOPICS[topic].words as u32).map(|word| seed.wrapping_mul(word + 1)).collect(),
         });
-        let turn = any::<u32>().prop_map(|at| Entry::Turn(Micros(u64::from(at))));
+        let turn = any::<u32>().prop_map(|at| Entry::Turn(Instant::from_micros(u64::from(at))));
         let duty = any::<[u16; MOTORS]>().prop_map(|duty| Entry::Duty(duty.map(f32::from)));
         prop::collection::vec(prop_oneof![sample, turn, duty], 0..40)
     }
@@ -244,7 +244,7 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_written_is_read(entries in entries(), start in any::<u32>(), hash: u64) {
-            let start = Micros(u64::from(start));
+            let start = Instant::from_micros(u64::from(start));
             let mut bytes = std::vec::Vec::new();
             let mut writer = Writer::new(start, |piece: &[u8]| bytes.extend_from_slice(piece));
             for entry in &entries {

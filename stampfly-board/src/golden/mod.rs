@@ -23,8 +23,8 @@ use core::fmt;
 use format::Entry;
 use stampfly_bus::Band;
 use stampfly_log::FlightHash;
-use stampfly_types::Micros;
 use stampfly_types::messages::MotorOutput;
+use stampfly_types::{Duration, Instant};
 
 /// The golden flight of this version.
 pub const FLIGHT: &[u8] = include_bytes!("../../golden/flight.bin");
@@ -53,7 +53,7 @@ pub enum Verdict {
         /// Largest deviation of a motor's duty; infinite when one was no number.
         worst: f32,
         /// When the tolerance was first exceeded.
-        since: Micros,
+        since: Instant,
     },
 }
 
@@ -67,7 +67,7 @@ pub struct Report {
     /// Messages published.
     pub messages: u64,
     /// Length of the flight.
-    pub duration: Micros,
+    pub duration: Duration,
 }
 
 /// Why a golden flight could not be played.
@@ -97,13 +97,13 @@ impl core::error::Error for GoldenError {}
 /// Somebody who wants to see more of a golden flight than its report: a log, a profiler, a watchdog to be fed.
 pub trait Witness: Observer {
     /// The executor begins to look what is due in a band.
-    fn band_begins(&mut self, _band: Band, _clock: Micros) {}
+    fn band_begins(&mut self, _band: Band, _clock: Instant) {}
 
     /// Nothing more is due in this band.
     fn band_ended(&mut self, _band: Band) {}
 
     /// Somebody has published.
-    fn published(&mut self, _topic: wiring::Id, _at: Micros, _generation: u32, _words: &[u32]) {}
+    fn published(&mut self, _topic: wiring::Id, _at: Instant, _generation: u32, _words: &[u32]) {}
 }
 
 /// Nobody watches.
@@ -172,11 +172,11 @@ fn drain(taps: &mut wiring::Taps<'_>, hash: &mut FlightHash, witness: &mut impl 
 #[derive(Default)]
 struct Deviation {
     worst: f32,
-    since: Option<Micros>,
+    since: Option<Instant>,
 }
 
 impl Deviation {
-    fn add(&mut self, clock: Micros, expected: &[f32; MOTORS], told: &[f32]) {
+    fn add(&mut self, clock: Instant, expected: &[f32; MOTORS], told: &[f32]) {
         for (expected, told) in expected.iter().zip(told) {
             let deviation = (told - expected).abs();
             let deviation = if deviation.is_nan() { f32::INFINITY } else { deviation };

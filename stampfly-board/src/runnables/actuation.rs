@@ -4,13 +4,13 @@ use crate::config::VehicleConfig;
 use crate::wiring;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::{Mixer, MotorStage, MultirotorMixer};
-use stampfly_types::Micros;
 use stampfly_types::messages::*;
+use stampfly_types::{Duration, Instant};
 
 /// Demand older than this turns no motor: the controller has stopped.
-const STALE_DEMAND: Micros = Micros::from_millis(25);
+const STALE_DEMAND: Duration = Duration::from_millis(25);
 /// A battery reading older than this is no reading.
-const STALE_POWER: Micros = Micros::from_secs(1);
+const STALE_POWER: Duration = Duration::from_secs(1);
 
 /// Actuation: thrust and torque in, motor duty out.
 pub struct Actuation<'b> {
@@ -52,7 +52,7 @@ impl<'b> Actuation<'b> {
 impl Runnable for Actuation<'_> {
     fn read(&mut self, activation: &mut Activation) {
         let now = activation.now();
-        let fresh = |at: Micros, limit: Micros| now.since(at) <= limit;
+        let fresh = |at: Instant, limit: Duration| now.since(at) <= limit;
         let demand = activation.latest(&mut self.ports.control);
         self.demand = demand.filter(|s| fresh(s.at, STALE_DEMAND)).map(|s| s.data);
         let mode = activation.latest(&mut self.ports.mode);

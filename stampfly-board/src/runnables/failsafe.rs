@@ -4,7 +4,7 @@ use crate::wiring;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::{Failsafe, FailsafeInput};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
 /// Failsafe: everything that can go wrong in, alerts out.
@@ -21,9 +21,9 @@ pub struct FailsafeMonitor<'b> {
     status: EstimatorStatus,
     self_test: SelfTest,
     mode: SystemMode,
-    last_command: Option<Micros>,
-    last_tof: Option<Micros>,
-    last_flow: Option<Micros>,
+    last_command: Option<Instant>,
+    last_tof: Option<Instant>,
+    last_flow: Option<Instant>,
 }
 
 /// The ends it owns.
@@ -91,7 +91,7 @@ impl Runnable for FailsafeMonitor<'_> {
     }
 
     fn run(&mut self, activation: &mut Activation) {
-        let newest = |a: Option<Micros>, b: Option<Micros>| a.max(b);
+        let newest = |a: Option<Instant>, b: Option<Instant>| a.max(b);
         let usable = |samples: &[Stamped<TofData>]| samples.iter().filter(|s| s.data.valid).map(|s| s.at).max();
         self.last_tof = newest(self.last_tof, usable(&self.tof_samples));
         let flow = self.flow_samples.iter().filter(|s| s.data.valid).map(|s| s.at).max();

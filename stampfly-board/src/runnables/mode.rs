@@ -4,11 +4,11 @@ use crate::wiring;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::{ModeInput, ModeMachine};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::*;
 
 /// A pilot's frame older than this is no frame.
-const STALE_PILOT: Micros = Micros::from_millis(500);
+const STALE_PILOT: Duration = Duration::from_millis(500);
 
 /// State management: alerts, commands and facts in, the vehicle's state out.
 pub struct ModeManager<'b> {

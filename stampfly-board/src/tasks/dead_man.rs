@@ -6,21 +6,21 @@
 //! For firmware, where control and cut-off are two contexts. In a simulation, where they are one, it has nothing to see.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// A dead man's switch.
 ///
 /// ```
 /// use stampfly_board::tasks::DeadMan;
-/// use stampfly_types::Micros;
-/// let switch = DeadMan::new(Micros::from_millis(25));
-/// switch.confirm(Micros::from_millis(100), true);
-/// assert!(!switch.must_cut(|| Micros::from_millis(120)));
-/// assert!(switch.must_cut(|| Micros::from_millis(126)), "silent for more than 25 ms");
-/// switch.confirm(Micros::from_millis(130), true);
-/// assert!(switch.must_cut(|| Micros::from_millis(131)), "once cut, off until it is reset");
+/// use stampfly_types::{Duration, Instant};
+/// let switch = DeadMan::new(Duration::from_millis(25));
+/// switch.confirm(Instant::from_millis(100), true);
+/// assert!(!switch.must_cut(|| Instant::from_millis(120)));
+/// assert!(switch.must_cut(|| Instant::from_millis(126)), "silent for more than 25 ms");
+/// switch.confirm(Instant::from_millis(130), true);
+/// assert!(switch.must_cut(|| Instant::from_millis(131)), "once cut, off until it is reset");
 /// assert!(switch.reset());
-/// assert!(!switch.must_cut(|| Micros::from_millis(132)));
+/// assert!(!switch.must_cut(|| Instant::from_millis(132)));
 /// ```
 #[derive(Debug)]
 pub struct DeadMan {
@@ -39,9 +39,9 @@ impl DeadMan {
     /// A switch that trips when motors which may turn have not been confirmed for longer than `patience`, at most half
     /// an hour.
     #[must_use]
-    pub const fn new(patience: Micros) -> Self {
+    pub const fn new(patience: Duration) -> Self {
         Self {
-            patience: patience.0 as u32,
+            patience: patience.as_micros() as u32,
             confirmed: AtomicU32::new(0),
             armed: AtomicBool::new(false),
             tripped: AtomicBool::new(false),
@@ -50,8 +50,8 @@ impl DeadMan {
     }
 
     /// The motors are under control; `armed` says whether they may turn.
-    pub fn confirm(&self, now: Micros, armed: bool) {
-        self.confirmed.store(now.0 as u32, Ordering::Release);
+    pub fn confirm(&self, now: Instant, armed: bool) {
+        self.confirmed.store(now.as_micros() as u32, Ordering::Release);
         // After the instant: whoever sees the motors armed sees when they were.
         self.armed.store(armed, Ordering::Release);
     }
@@ -66,11 +66,11 @@ impl DeadMan {
     ///
     /// It reads the clock itself, last: the confirmation may come from another core at any instant, and must not seem to
     /// lie in the future.
-    pub fn must_cut(&self, clock: impl FnOnce() -> Micros) -> bool {
+    pub fn must_cut(&self, clock: impl FnOnce() -> Instant) -> bool {
         if self.armed.load(Ordering::Acquire) {
             let confirmed = self.confirmed.load(Ordering::Acquire);
             // Signed, should the clocks of two cores differ by a tick after all.
-            let age = (clock().0 as u32).wrapping_sub(confirmed).cast_signed();
+            let age = (clock().as_micros() as u32).wrapping_sub(confirmed).cast_signed();
             if age > self.patience.cast_signed() {
                 self.tripped.store(true, Ordering::Release);
             }
@@ -103,34 +103,33 @@ impl DeadMan {
 mod tests {
     use super::*;
     use std::thread;
-    use std::time::{Duration, Instant};
 
-    const PATIENCE: Micros = Micros::from_millis(25);
+    const PATIENCE: Duration = Duration::from_millis(25);
 
     #[test]
     fn motors_that_may_not_turn_are_not_cut_and_those_cut_stay_so() {
         let switch = DeadMan::new(PATIENCE);
-        assert!(!switch.must_cut(|| Micros::from_secs(60)), "never armed");
-        switch.confirm(Micros::from_secs(60), true);
-        assert!(!switch.must_cut(|| Micros::from_secs(60) + PATIENCE));
-        assert!(switch.must_cut(|| Micros::from_secs(60) + PATIENCE + Micros(1)));
-        switch.confirm(Micros::from_secs(61), false);
-        assert!(switch.must_cut(|| Micros::from_secs(61)));
+        assert!(!switch.must_cut(|| Instant::from_secs(60)), "never armed");
+        switch.confirm(Instant::from_secs(60), true);
+        assert!(!switch.must_cut(|| Instant::from_secs(60) + PATIENCE));
+        assert!(switch.must_cut(|| Instant::from_secs(60) + PATIENCE + Duration::from_micros(1)));
+        switch.confirm(Instant::from_secs(61), false);
+        assert!(switch.must_cut(|| Instant::from_secs(61)));
         assert!(switch.reset());
-        assert!(!switch.must_cut(|| Micros::from_secs(70)));
+        assert!(!switch.must_cut(|| Instant::from_secs(70)));
         switch.trip_for_good();
         assert!(!switch.reset());
-        assert!(switch.must_cut(|| Micros::from_secs(70)));
+        assert!(switch.must_cut(|| Instant::from_secs(70)));
     }
 
     #[test]
     fn it_trips_in_time_when_the_microseconds_wrap() {
         for before in [0, 1, 24_999, 25_000] {
-            let confirmed = Micros((1 << 32) - before);
+            let confirmed = Instant::from_micros((1 << 32) - before);
             let switch = DeadMan::new(PATIENCE);
             switch.confirm(confirmed, true);
             assert!(!switch.must_cut(|| confirmed + PATIENCE));
-            assert!(switch.must_cut(|| confirmed + PATIENCE + Micros(1)));
+            assert!(switch.must_cut(|| confirmed + PATIENCE + Duration::from_micros(1)));
         }
     }
 
@@ -138,17 +137,17 @@ mod tests {
     fn a_confirmation_between_two_glances_is_not_from_the_future() {
         // What two cores do, tightly: one confirms all the time, the other looks all the time. The patience is long, so
         // that only a confirmation misread as an old one can trip it.
-        let switch = DeadMan::new(Micros::from_secs(60));
-        let start = Instant::now();
-        let now = || Micros(1 << 31) + Micros(start.elapsed().as_micros() as u64);
+        let switch = DeadMan::new(Duration::from_secs(60));
+        let start = std::time::Instant::now();
+        let now = || Instant::from_micros(1 << 31) + Duration::from_micros(start.elapsed().as_micros() as u64);
         switch.confirm(now(), true);
         thread::scope(|scope| {
             scope.spawn(|| {
-                while start.elapsed() < Duration::from_millis(300) {
+                while start.elapsed() < std::time::Duration::from_millis(300) {
                     switch.confirm(now(), true);
                 }
             });
-            while start.elapsed() < Duration::from_millis(300) {
+            while start.elapsed() < std::time::Duration::from_millis(300) {
                 assert!(!switch.must_cut(now));
             }
         });
@@ -158,14 +157,14 @@ mod tests {
     fn the_clock_is_read_after_the_confirmation() {
         // The confirmation comes just before the clock is read: whoever had read the clock first would call it old.
         let switch = DeadMan::new(PATIENCE);
-        switch.confirm(Micros::from_secs(1), true);
+        switch.confirm(Instant::from_secs(1), true);
         let cut = switch.must_cut(|| {
-            switch.confirm(Micros::from_secs(1) + PATIENCE, true);
-            Micros::from_secs(1) + PATIENCE
+            switch.confirm(Instant::from_secs(1) + PATIENCE, true);
+            Instant::from_secs(1) + PATIENCE
         });
         assert!(!cut);
         // And one that is ahead by the ticks of another core's clock is no old one either.
-        switch.confirm(Micros::from_secs(2) + Micros(3), true);
-        assert!(!switch.must_cut(|| Micros::from_secs(2)));
+        switch.confirm(Instant::from_secs(2) + Duration::from_micros(3), true);
+        assert!(!switch.must_cut(|| Instant::from_secs(2)));
     }
 }

@@ -13,10 +13,10 @@ use core::task::Poll;
 use stampfly_bus::Band;
 use stampfly_drivers::time::sleep_until;
 use stampfly_drivers::{MotorOutputs, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// With nothing scheduled, which no vehicle has, the task looks again after this long.
-const IDLE: Micros = Micros::from_millis(10);
+const IDLE: Duration = Duration::from_millis(10);
 
 /// Flies for ever.
 ///

@@ -18,7 +18,7 @@ use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
     StateEstimate, SystemMode, Validity, VehicleStatus,
 };
-use stampfly_types::{Micros, Vec3, frame, math};
+use stampfly_types::{Duration, Instant, Vec3, frame, math};
 
 use super::{Leg, Path, PathLimits, Refusal, Refused, Route, WayPoint};
 use crate::bound::within;
@@ -90,7 +90,7 @@ pub struct NavigatorInput<'a> {
 /// ```
 /// use stampfly_control::guidance::{Navigator, NavigatorInput};
 /// use stampfly_types::messages::*;
-/// use stampfly_types::{Micros, Vec3};
+/// use stampfly_types::{Duration, Instant, Vec3};
 ///
 /// let mut navigator = Navigator::default();
 /// let there = Vec3::new(1.0, 0.0, -0.5);
@@ -99,7 +99,7 @@ pub struct NavigatorInput<'a> {
 /// let mut estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
 /// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
 /// let command = CommandSetpoint { source: CommandSource::Guided, ..Default::default() };
-/// let mut now = Micros::ZERO;
+/// let mut now = Instant::ZERO;
 /// let setpoint = loop {
 ///     let input = NavigatorInput { mode: &mode, estimate: &estimate, status: &Default::default(), command: &command };
 ///     let setpoint = navigator.step(now, &input);
@@ -107,10 +107,10 @@ pub struct NavigatorInput<'a> {
 ///         break setpoint;
 ///     }
 ///     estimate.position = setpoint.position; // a vehicle that follows perfectly
-///     now += Micros(2_500);
+///     now += Duration::from_micros(2_500);
 /// };
 /// assert_eq!(setpoint.position, there);
-/// assert!(now > Micros::from_secs(2) && now < Micros::from_secs(4));
+/// assert!(now > Instant::from_secs(2) && now < Instant::from_secs(4));
 /// # Ok::<(), stampfly_control::guidance::Refused>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -122,7 +122,7 @@ pub struct Navigator {
     /// The way to the take-off height or to the first way-point, while it is being flown.
     leg: Option<Leg>,
     /// Since when the vehicle has been at the first way-point.
-    reached_at: Option<Micros>,
+    reached_at: Option<Instant>,
     arrived: bool,
     take_off: GuidedCommand,
     /// Height reference: where the vehicle last stood.
@@ -190,7 +190,7 @@ impl Navigator {
     }
 
     /// One step: the set-point of this control period.
-    pub fn step(&mut self, now: Micros, input: &NavigatorInput<'_>) -> Setpoint {
+    pub fn step(&mut self, now: Instant, input: &NavigatorInput<'_>) -> Setpoint {
         let dt = self.timer.step(now);
         let mode = input.mode;
         let entered = mode.state != self.state;
@@ -297,7 +297,7 @@ impl Navigator {
         known_horizontally(input)
     }
 
-    fn fly(&mut self, now: Micros, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
+    fn fly(&mut self, now: Instant, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         let guided = input.command.source == CommandSource::Guided;
         if !(guided && input.mode.mode == FlightMode::PosHold) {
             // A leg is a plan from where the path was; once something else has moved it, the plan is void.
@@ -348,7 +348,7 @@ impl Navigator {
         SetpointAxes::POSITION_Z | SetpointAxes::YAW | self.horizontal_axes(input, dt)
     }
 
-    fn follow_route(&mut self, now: Micros, input: &NavigatorInput<'_>, dt: f32) {
+    fn follow_route(&mut self, now: Instant, input: &NavigatorInput<'_>, dt: f32) {
         let Some(way_point) = self.route.first().copied() else {
             self.path.drift(0.0, 0.0, dt);
             self.path.sink(0.0, dt);
@@ -369,7 +369,7 @@ impl Navigator {
         let close = (input.estimate.position - goal).norm() <= self.config.reached;
         if self.path.ends(&leg) && self.path.faces(way_point.yaw) && (close || self.reached_at.is_some()) {
             let since = *self.reached_at.get_or_insert(now);
-            if now.since(since) >= Micros::from_seconds(way_point.dwell) {
+            if now.since(since) >= Duration::from_seconds(way_point.dwell) {
                 self.route.advance();
                 self.leg = None;
                 self.reached_at = None;

@@ -11,7 +11,7 @@ use stampfly_types::messages::{
     CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, SetpointAxes, StateEstimate,
     SystemMode, Validity,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, frame, math};
+use stampfly_types::{Duration, GRAVITY, Quat, Vec3, frame, math};
 
 const GUSTS: f32 = 0.5;
 
@@ -92,7 +92,7 @@ fn mission<C: Controller>(controller: C, airframe: Airframe, wind: f32) -> Figur
             figures.path.add((f.setpoint.position - f.state.position).xy().norm());
             figures.height.add(f.setpoint.position.z - f.state.position.z);
         });
-        assert!(flight.now.since(start) < Micros::from_secs(30), "the route does not end");
+        assert!(flight.now.since(start) < Duration::from_secs(30), "the route does not end");
     }
     figures.seconds = flight.now.since(start).seconds();
     flight.fly(10.0, |f| {

@@ -10,7 +10,7 @@ use stampfly_types::messages::{
     CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, Setpoint, StateEstimate, SystemMode,
     Validity, VehicleStatus,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
 /// What can differ from the vehicle the gains were chosen for.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +54,7 @@ pub struct Flight<C> {
     pub airframe: Airframe,
     pub controller: C,
     pub state: State,
-    pub now: Micros,
+    pub now: Instant,
     pub mode: SystemMode,
     pub status: VehicleStatus,
     pub command: CommandSetpoint,
@@ -69,7 +69,7 @@ pub struct Flight<C> {
     random: u32,
 }
 
-pub const PERIOD: Micros = Micros(2_500);
+pub const PERIOD: Duration = Duration::from_micros(2_500);
 const SUBSTEPS: u32 = 5;
 
 impl<C: Controller> Flight<C> {
@@ -98,7 +98,7 @@ impl<C: Controller> Flight<C> {
                 rate: Vec3::zeros(),
                 thrust: [0.0; 4],
             },
-            now: Micros::from_secs(5),
+            now: Instant::from_secs(5),
             mode: SystemMode {
                 state: FlightState::TakeOff,
                 mode: FlightMode::PosHold,

@@ -6,38 +6,39 @@
 //!
 //! On I2C it is not a real-time guarantee: a device may stretch the clock, and a shared bus may be busy with others.
 
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// A limit as a function of length: so much per byte, and so much for everything else.
 ///
 /// ```
 /// use stampfly_drivers::chip::TransferLimit;
-/// use stampfly_types::Micros;
-/// assert_eq!(TransferLimit::SPI.of(12), Micros(332), "twelve bytes of an inertial sensor");
-/// assert!(TransferLimit::SPI.of(256) < Micros::from_millis(1), "a piece of a configuration file");
-/// assert!(TransferLimit::I2C.of(17) < Micros::from_millis(12), "a range, a hundred kilohertz, a busy bus");
+/// use stampfly_types::Duration;
+/// assert_eq!(TransferLimit::SPI.of(12), Duration::from_micros(332), "twelve bytes of an inertial sensor");
+/// assert!(TransferLimit::SPI.of(256) < Duration::from_millis(1), "a piece of a configuration file");
+/// assert!(TransferLimit::I2C.of(17) < Duration::from_millis(12), "a range, a hundred kilohertz, a busy bus");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TransferLimit {
-    byte: Micros,
-    margin: Micros,
+    byte: Duration,
+    margin: Duration,
 }
 
 impl TransferLimit {
     /// SPI at 4 MHz or more, whose owner waits for no more than one short transfer of a neighbour
     /// ([`slot`](crate::slot)): at most 1 ms for everything the drivers here transfer at once.
-    pub const SPI: Self = Self { byte: Micros(2), margin: Micros(300) };
+    pub const SPI: Self = Self { byte: Duration::from_micros(2), margin: Duration::from_micros(300) };
     /// SPI of a guest on a bus with slots: 1 MHz or more, and it waits for its slot, 5 ms when the lead is silent.
-    pub const SPI_GUEST: Self = Self { byte: Micros(8), margin: Micros(9_000) };
+    pub const SPI_GUEST: Self = Self { byte: Duration::from_micros(8), margin: Duration::from_micros(9_000) };
     /// I2C at 100 kHz or more, nine clocks to a byte, on a bus that is shared: 10 ms for the neighbours' transfers, and
     /// for one of them that stretches the clock.
-    pub const I2C: Self = Self { byte: Micros(90), margin: Micros(10_000) };
+    pub const I2C: Self = Self { byte: Duration::from_micros(90), margin: Duration::from_micros(10_000) };
     /// Addresses, dummy byte, command.
     const OVERHEAD: u64 = 4;
 
     /// The limit of a transfer of so many bytes of data.
     #[must_use]
-    pub const fn of(self, bytes: usize) -> Micros {
-        Micros(self.margin.0.saturating_add(self.byte.0.saturating_mul((bytes as u64).saturating_add(Self::OVERHEAD))))
+    pub const fn of(self, bytes: usize) -> Duration {
+        let transfer = self.byte.as_micros().saturating_mul((bytes as u64).saturating_add(Self::OVERHEAD));
+        Duration::from_micros(self.margin.as_micros().saturating_add(transfer))
     }
 }

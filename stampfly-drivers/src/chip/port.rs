@@ -6,7 +6,7 @@ use crate::time::{sleep_until, within};
 use core::fmt::Debug;
 use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// Registers that count up by themselves; `A` is their address, of one byte or of two.
 pub trait Registers<A = u8> {
@@ -137,21 +137,21 @@ impl<R, T: Timebase> Port<R, T> {
         bounded(&self.clock, R::LIMIT.of(data.len()), self.registers.write(register, data)).await
     }
 
-    pub(crate) fn now(&self) -> Micros {
+    pub(crate) fn now(&self) -> Instant {
         self.clock.now()
     }
 
-    pub(crate) async fn wait(&mut self, span: Micros) {
+    pub(crate) async fn wait(&mut self, span: Duration) {
         let instant = self.clock.now() + span;
         self.wait_until(instant).await;
     }
 
     /// The outcome of a future, or `None` when it is not there at `instant`.
-    pub(crate) async fn until<F: Future>(&self, instant: Micros, future: F) -> Option<F::Output> {
+    pub(crate) async fn until<F: Future>(&self, instant: Instant, future: F) -> Option<F::Output> {
         within(&self.clock, instant.since(self.now()), future).await
     }
 
-    pub(crate) async fn wait_until(&mut self, instant: Micros) {
+    pub(crate) async fn wait_until(&mut self, instant: Instant) {
         sleep_until(&mut self.clock, instant).await;
     }
 }
@@ -166,7 +166,7 @@ impl<I, T> Port<I2cRegisters<I>, T> {
 /// A transfer, given up after `limit`.
 pub(crate) async fn bounded<T: Timebase, V, E>(
     clock: &T,
-    limit: Micros,
+    limit: Duration,
     transfer: impl Future<Output = Result<V, E>>,
 ) -> Result<V, ChipError<E>> {
     within(clock, limit, transfer).await.ok_or(ChipError::BusTimeout)?.map_err(ChipError::Bus)

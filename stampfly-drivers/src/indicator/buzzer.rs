@@ -3,7 +3,7 @@
 use super::Indicator;
 use super::tune::{Note, notes};
 use embedded_hal::pwm::SetDutyCycle;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::Signal;
 
 /// A PWM channel that has its frequency to itself.
@@ -35,13 +35,13 @@ pub trait SetFrequency: SetDutyCycle {
 /// #     fn set_frequency(&mut self, hertz: u32) -> Result<(), Infallible> { self.hertz = hertz; Ok(()) }
 /// # }
 /// use stampfly_drivers::{Buzzer, Indicator};
-/// use stampfly_types::{Micros, messages::{Signal, Tone}};
+/// use stampfly_types::{Instant, messages::{Signal, Tone}};
 ///
 /// let mut buzzer = Buzzer::new(Channel::default());
 /// buzzer.show(&Signal { tone: Tone::Arm, tone_count: 1, ..Default::default() });
 /// let mut heard = Vec::new();
 /// for millis in (0..300).step_by(50) {
-///     buzzer.step(Micros::from_millis(millis))?;
+///     buzzer.step(Instant::from_millis(millis))?;
 ///     heard.push(if buzzer.channel().duty == 0 { 0 } else { buzzer.channel().hertz });
 /// }
 /// assert_eq!(heard, [659, 659, 784, 784, 0, 0]);
@@ -52,7 +52,7 @@ pub struct Buzzer<C: SetFrequency> {
     channel: C,
     tune: &'static [Note],
     /// When it began; `None` until the first step after it was shown.
-    began: Option<Micros>,
+    began: Option<Instant>,
     count: u32,
     /// Pitch the channel plays; `None` when nobody knows.
     sounding: Option<u16>,
@@ -69,9 +69,9 @@ impl<C: SetFrequency> Buzzer<C> {
     ///
     /// # Errors
     /// When the channel refuses; the next step tries again.
-    pub fn step(&mut self, now: Micros) -> Result<(), C::Error> {
+    pub fn step(&mut self, now: Instant) -> Result<(), C::Error> {
         let began = *self.began.get_or_insert(now);
-        let mut left = now.since(began).0 / 1_000;
+        let mut left = now.since(began).as_micros() / 1_000;
         let note = self.tune.iter().find(|(_, millis)| {
             let ends = left < u64::from(*millis);
             left = left.saturating_sub(u64::from(*millis));
@@ -174,7 +174,7 @@ mod tests {
     /// What is heard every 50 ms.
     fn heard(buzzer: &mut Buzzer<Channel<'_>>, state: &Cell<State>, from: u64, steps: u64) -> Vec<u32> {
         let step = |n| {
-            buzzer.step(Micros::from_millis(from + 50 * n)).expect("works");
+            buzzer.step(Instant::from_millis(from + 50 * n)).expect("works");
             if state.get().duty == 0 { 0 } else { state.get().hertz }
         };
         (0..steps).map(step).collect()
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(heard(&mut buzzer, &state, 0, 1), [440]);
         assert_eq!(heard(&mut buzzer, &state, 250, 1), [0], "the pause");
         state.set(State { broken: true, ..state.get() });
-        assert!(buzzer.step(Micros::from_millis(310)).is_err());
+        assert!(buzzer.step(Instant::from_millis(310)).is_err());
         state.set(State { broken: false, ..state.get() });
         assert_eq!(heard(&mut buzzer, &state, 320, 1), [440]);
         assert_eq!(heard(&mut buzzer, &state, 3_600_000, 1), [0]);

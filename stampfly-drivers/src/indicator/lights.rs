@@ -2,11 +2,11 @@
 
 use super::Indicator;
 use smart_leds_trait::{RGB8, SmartLedsWrite};
-use stampfly_types::Micros;
 use stampfly_types::messages::Signal;
+use stampfly_types::{Duration, Instant};
 
 /// How often lights are written that show what they should, for all that is known.
-const REFRESH: Micros = Micros::from_secs(1);
+const REFRESH: Duration = Duration::from_secs(1);
 
 /// A chain of `N` lights that all show the same colour.
 ///
@@ -27,7 +27,7 @@ const REFRESH: Micros = Micros::from_secs(1);
 /// #     }
 /// # }
 /// use stampfly_drivers::{Indicator, Lights};
-/// use stampfly_types::{Micros, messages::Signal};
+/// use stampfly_types::{Instant, messages::Signal};
 ///
 /// // One light for the state, two below and above the body for the flight mode, as on the StampFly.
 /// let (mut status, mut body) = (Lights::<_, 1>::status(Chain::default()), Lights::<_, 2>::body(Chain::default()));
@@ -37,7 +37,7 @@ const REFRESH: Micros = Micros::from_secs(1);
 /// assert_eq!(status.writer().0, [RGB8::new(0, 32, 0)]);
 /// assert_eq!(body.writer().0, [RGB8::new(32, 0, 32); 2]);
 /// // Now and then, with the time.
-/// status.step(Micros::from_secs(5));
+/// status.step(Instant::from_secs(5));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Lights<W, const N: usize> {
@@ -48,7 +48,7 @@ pub struct Lights<W, const N: usize> {
     /// `None` when nobody knows.
     shown: Option<[u8; 3]>,
     /// When to write again.
-    due: Option<Micros>,
+    due: Option<Instant>,
 }
 
 impl<W, const N: usize> Lights<W, N> {
@@ -76,7 +76,7 @@ where
 {
     /// Writes what is shown again when a second has passed since this was called for the last time and did so. To be
     /// called as often as anybody likes.
-    pub fn step(&mut self, now: Micros) {
+    pub fn step(&mut self, now: Instant) {
         if self.due.is_none_or(|due| now >= due) {
             self.due = Some(now + REFRESH);
             self.write();
@@ -149,11 +149,11 @@ mod tests {
     #[test]
     fn what_is_shown_is_written_again_once_a_second() {
         let mut lights = Lights::<_, 1>::body(Chain::default());
-        lights.step(Micros::ZERO);
+        lights.step(Instant::ZERO);
         assert!(lights.writer.writes.is_empty(), "nothing to show yet");
         lights.show(&Signal { body: [7; 3], ..Default::default() });
         for millis in 0..5_000 {
-            lights.step(Micros::from_millis(millis));
+            lights.step(Instant::from_millis(millis));
         }
         // The colour, and again at one to four seconds.
         assert_eq!(lights.writer.writes, vec![[RGB8::new(7, 7, 7)]; 5]);

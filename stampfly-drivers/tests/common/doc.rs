@@ -20,8 +20,8 @@ impl DelayNs for Clock {
 }
 
 impl stampfly_drivers::Timebase for Clock {
-    fn now(&self) -> stampfly_types::Micros {
-        stampfly_types::Micros(1_000_000 + self.0.get() / 1_000)
+    fn now(&self) -> stampfly_types::Instant {
+        stampfly_types::Instant::from_micros(1_000_000 + self.0.get() / 1_000)
     }
 }
 

@@ -6,7 +6,7 @@ use core::convert::Infallible;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::{i2c, spi};
 use stampfly_drivers::Timebase;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use std::rc::Rc;
 
 /// Virtual time in nanoseconds. Whoever waits moves it on, unless it is stopped: then a wait never ends.
@@ -37,8 +37,8 @@ impl DelayNs for Clock {
 }
 
 impl Timebase for Clock {
-    fn now(&self) -> Micros {
-        Micros(self.0.get() / 1_000)
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.0.get() / 1_000)
     }
 }
 

@@ -1,7 +1,7 @@
 //! One message of a log, borrowed from its bytes.
 
 use super::{Declaration, Format, SYNC_MAGIC, Take};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Compatibility flags and the places where data was appended after the flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -168,7 +168,7 @@ pub enum Message<'a> {
         /// Who wrote it, if the log says.
         tag: Option<u16>,
         /// When.
-        at: Micros,
+        at: Instant,
         /// The line.
         text: &'a str,
     },
@@ -223,11 +223,12 @@ impl<'a> Message<'a> {
             b'R' => Self::Unsubscription { id: take.u16()? },
             b'D' => Self::Data { id: take.u16()?, payload: take.0 },
             b'L' => {
-                let (level, at) = (Level::from_char(take.u8()?)?, Micros(take.u64()?));
+                let (level, at) = (Level::from_char(take.u8()?)?, Instant::from_micros(take.u64()?));
                 Self::Text { level, tag: None, at, text: take.text()? }
             }
             b'C' => {
-                let (level, tag, at) = (Level::from_char(take.u8()?)?, Some(take.u16()?), Micros(take.u64()?));
+                let (level, tag, at) =
+                    (Level::from_char(take.u8()?)?, Some(take.u16()?), Instant::from_micros(take.u64()?));
                 Self::Text { level, tag, at, text: take.text()? }
             }
             b'S' => (payload == SYNC_MAGIC).then_some(Self::Sync)?,

@@ -6,7 +6,7 @@
 
 use super::{FlagBits, HEADER, MAGIC, Message, SYNC_MAGIC, Take};
 use core::fmt;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// What is wrong with a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,10 +57,10 @@ impl core::error::Error for ReadError {}
 ///
 /// ```
 /// use stampfly_log::ulog::{Definitions, Message, Ram, Reader};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let mut memory = [0; 256];
-/// let mut log = Definitions::start(Ram::new(&mut memory), Micros(0))?;
+/// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?;
 /// log.info("sys_name", "StampFly")?;
 /// let log = log.data(&[], &[])?;
 /// let infos = Reader::new(log.sink().written()).expect("a ULog").filter_map(|message| match message {
@@ -74,7 +74,7 @@ impl core::error::Error for ReadError {}
 pub struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
-    started: Micros,
+    started: Instant,
     flags: FlagBits,
 }
 
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
         let not_ulog = ReadError { offset: 0, kind: ReadErrorKind::NotULog };
         let mut take = Take(bytes.strip_prefix(&MAGIC).ok_or(not_ulog)?);
         let _version = take.u8().ok_or(not_ulog)?;
-        let started = Micros(take.u64().ok_or(not_ulog)?);
+        let started = Instant::from_micros(take.u64().ok_or(not_ulog)?);
         let mut reader = Self { bytes, at: HEADER, started, flags: FlagBits::default() };
         if let Some(Ok(Message::FlagBits(flags))) = reader.clone().next() {
             if !flags.is_readable() {
@@ -100,7 +100,7 @@ impl<'a> Reader<'a> {
 
     /// The instant the log was started.
     #[must_use]
-    pub const fn started(&self) -> Micros {
+    pub const fn started(&self) -> Instant {
         self.started
     }
 

@@ -3,7 +3,7 @@
 use super::cursor::Cursor;
 use super::{Scalar, TOPIC_HEAD, TOPIC_HEAD_SIZE, Take};
 use core::fmt::{self, Write};
-use stampfly_types::{FieldInfo, FieldKind, Micros};
+use stampfly_types::{FieldInfo, FieldKind, Instant};
 
 /// A topic as the log knows it: a name and the schema of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct Topic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample<'a> {
     /// The instant the data is valid for.
-    pub at: Micros,
+    pub at: Instant,
     /// The topic's running number of this sample.
     pub generation: u32,
     /// The message's words.
@@ -29,7 +29,7 @@ pub struct Sample<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
     /// The instant the data is valid for.
-    pub at: Micros,
+    pub at: Instant,
     /// The topic's running number of this sample.
     pub generation: u32,
 }
@@ -65,7 +65,7 @@ impl Topic {
             return None;
         }
         let mut take = Take(payload);
-        let stamp = Stamp { at: Micros(take.u64()?), generation: take.u32()? };
+        let stamp = Stamp { at: Instant::from_micros(take.u64()?), generation: take.u32()? };
         let mut words = words.iter_mut();
         for field in self.fields {
             let (scalar, count) = stored(field);
@@ -109,7 +109,7 @@ impl Topic {
     /// Writes a sample's payload.
     #[inline]
     pub(super) fn encode(&self, sample: &Sample<'_>, out: &mut Cursor<'_>) -> Result<(), WordsError> {
-        out.put(&sample.at.0.to_le_bytes());
+        out.put(&sample.at.as_micros().to_le_bytes());
         out.put(&sample.generation.to_le_bytes());
         let mut rest = sample.words;
         for field in self.fields {

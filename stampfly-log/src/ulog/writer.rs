@@ -15,7 +15,7 @@ use super::{
 };
 use crate::trace::{Activation, ActivationTopic, TOPIC_PREFIX};
 use core::fmt::{self, Write};
-use stampfly_types::{FieldInfo, FieldKind, Micros};
+use stampfly_types::{FieldInfo, FieldKind, Instant};
 
 /// Size and type in front of each payload.
 const MESSAGE_HEAD: usize = 3;
@@ -91,11 +91,11 @@ impl<S: Sink> Output<S> {
 ///
 /// ```
 /// use stampfly_log::ulog::{Definitions, Ram, Topic};
-/// use stampfly_types::{Message, Micros, messages::ImuData};
+/// use stampfly_types::{Instant, Message, messages::ImuData};
 ///
 /// const TOPICS: &[Topic] = &[Topic { name: "sensor_imu", fields: ImuData::FIELDS }];
 /// let mut memory = [0; 4096];
-/// let mut log = Definitions::start(Ram::new(&mut memory), Micros(0))?;
+/// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?;
 /// log.info("sys_name", "StampFly")?;
 /// log.parameter("rate_roll_p", 0.6.into())?;
 /// let log = log.data(TOPICS, &[])?;
@@ -109,12 +109,12 @@ impl<S: Sink> Definitions<S> {
     ///
     /// # Errors
     /// When the sink refuses the first bytes.
-    pub fn start(mut sink: S, at: Micros) -> Result<Self, WriteError<S::Error>> {
+    pub fn start(mut sink: S, at: Instant) -> Result<Self, WriteError<S::Error>> {
         let mut header = [0; HEADER];
         let mut cursor = Cursor::new(&mut header);
         cursor.put(&MAGIC);
         cursor.put(&[VERSION]);
-        cursor.put(&at.0.to_le_bytes());
+        cursor.put(&at.as_micros().to_le_bytes());
         sink.write(&header).map_err(WriteError::Sink)?;
         let mut output = Output { sink, buffer: [0; MAX_MESSAGE] };
         output.message(b'B', |out| {
@@ -200,7 +200,7 @@ pub struct Writer<'t, S> {
     output: Output<S>,
     topics: &'t [Topic],
     activations: &'t [ActivationTopic],
-    losing_since: Option<Micros>,
+    losing_since: Option<Instant>,
     lost: u32,
 }
 
@@ -239,10 +239,10 @@ impl<S: Sink> Writer<'_, S> {
     ///
     /// # Errors
     /// When the sink refuses (counted as lost) or the line is too long.
-    pub fn text(&mut self, level: Level, at: Micros, line: &str) -> Result<(), WriteError<S::Error>> {
+    pub fn text(&mut self, level: Level, at: Instant, line: &str) -> Result<(), WriteError<S::Error>> {
         self.record(at, b'L', |out| {
             out.put(&[level.to_char()]);
-            out.put(&at.0.to_le_bytes());
+            out.put(&at.as_micros().to_le_bytes());
             out.put(line.as_bytes());
             Ok(())
         })
@@ -286,13 +286,13 @@ impl<S: Sink> Writer<'_, S> {
     #[inline]
     fn record(
         &mut self,
-        at: Micros,
+        at: Instant,
         kind: u8,
         body: impl FnOnce(&mut Cursor<'_>) -> Result<(), WordsError>,
     ) -> Result<(), WriteError<S::Error>> {
         let mut result = Ok(());
         if let Some(since) = self.losing_since {
-            let millis = u16::try_from(at.since(since).0 / 1_000).unwrap_or(u16::MAX).max(1);
+            let millis = u16::try_from(at.since(since).as_micros() / 1_000).unwrap_or(u16::MAX).max(1);
             result = self.output.message(b'O', |out| out.put(&millis.to_le_bytes()));
             if result.is_ok() {
                 self.losing_since = None;
@@ -355,7 +355,7 @@ mod tests {
     /// one of ours (no generation), so format and data go through the message level.
     #[test]
     fn a_hand_built_log_is_written_byte_for_byte() {
-        let mut log = Definitions::start(Bytes(Vec::new()), Micros(1_000)).unwrap();
+        let mut log = Definitions::start(Bytes(Vec::new()), Instant::from_micros(1_000)).unwrap();
         log.0
             .message(b'F', |out| {
                 out.put(b"attitude:uint64_t timestamp;float[4] q;float roll;uint8_t mode;uint8_t[3] _padding0;");
@@ -371,7 +371,7 @@ mod tests {
             if at == 3_500 {
                 log.sync().unwrap();
             }
-            log.record(Micros(at), b'D', |out| {
+            log.record(Instant::from_micros(at), b'D', |out| {
                 out.put(&[0, 0]);
                 out.put(&at.to_le_bytes());
                 [1.0f32, 0.0, 0.0, 0.0, roll].iter().for_each(|value| out.put(&value.to_le_bytes()));
@@ -380,7 +380,7 @@ mod tests {
             })
             .unwrap();
         }
-        log.text(Level::Info, Micros(3_000), "armed").unwrap();
+        log.text(Level::Info, Instant::from_micros(3_000), "armed").unwrap();
         log.output.message(b'O', |out| out.put(&12u16.to_le_bytes())).unwrap();
         log.parameter("RATE_P", 0.3.into()).unwrap();
         let written = log.into_sink().0;

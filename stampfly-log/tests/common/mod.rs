@@ -6,7 +6,7 @@ use stampfly_log::{Activation, ActivationTopic, Input};
 use stampfly_types::messages::{
     EstimatorStatus, ImuData, PowerData, Signal, StateEstimate, SystemAlert, SystemMode, TofData,
 };
-use stampfly_types::{Message, Micros, message};
+use stampfly_types::{Instant, Message, message};
 
 /// Bytes in memory, without limit.
 #[derive(Default)]
@@ -36,7 +36,7 @@ message! {
         /// Sign must survive.
         integer: i32 ["1"],
         /// Time.
-        at: Micros ["us"],
+        at: Instant ["us"],
     }
 }
 
@@ -59,7 +59,7 @@ pub const ACTIVATIONS: &[ActivationTopic] = &[
 ];
 
 pub fn start() -> Writer<'static, Bytes> {
-    let mut log = Definitions::start(Bytes::default(), Micros(1_000)).unwrap();
+    let mut log = Definitions::start(Bytes::default(), Instant::from_micros(1_000)).unwrap();
     log.info("sys_name", "StampFly").unwrap();
     log.parameter("rate_roll_p", 0.6.into()).unwrap();
     log.parameter("loop_rate", 400.into()).unwrap();
@@ -70,7 +70,7 @@ pub fn start() -> Writer<'static, Bytes> {
 pub fn small_log() -> Vec<u8> {
     let mut log = start();
     for step in 0..20u32 {
-        let at = Micros(1_000 + u64::from(step) * 2_500);
+        let at = Instant::from_micros(1_000 + u64::from(step) * 2_500);
         let imu = ImuData { temperature: 25.0 + step as f32, ..Default::default() };
         log.sample(0, &Sample { at, generation: step, words: &imu.to_words() }).unwrap();
         let estimate = StateEstimate { height: step as f32, ..Default::default() };

@@ -32,7 +32,7 @@ use crate::sensors::mag::{MagPhysics, RATE};
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
 use crate::world::World;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 const ID: u16 = 0x40;
 const DATA: u16 = 0x42;
@@ -43,9 +43,9 @@ const REPETITIONS_XY: u16 = 0x51;
 const REPETITIONS_Z: u16 = 0x52;
 const TRIM: u16 = 0x5D;
 /// Suspend to sleep (DS 1.1).
-const WAKE: Micros = Micros(3_000);
+const WAKE: Duration = Duration::from_micros(3_000);
 /// Duration of the self test.
-const SELF_TEST: Micros = Micros(1_000);
+const SELF_TEST: Duration = Duration::from_micros(1_000);
 /// Field of the advanced self test's current, µT.
 const SELF_TEST_FIELD: f64 = 105.0;
 /// Conversions per second in normal mode (DS 5.3.4).
@@ -108,14 +108,14 @@ fn counts(field: [f64; 3], hall: f64) -> [i16; 3] {
 /// use embedded_hal::i2c::I2c;
 /// use stampfly_sim::chips::{Bmm150, I2cBus};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// bus.attach(0x10, Bmm150::new(&simulation.world, &clock, 1));
 /// bus.write(0x10, &[0x4B, 1])?;
-/// clock.advance_to(Micros::from_millis(4));
+/// clock.advance_to(Instant::from_millis(4));
 /// let mut id = [0];
 /// bus.write_read(0x10, &[0x40], &mut id)?;
 /// assert_eq!(id, [0x32]);
@@ -129,14 +129,14 @@ pub struct Bmm150 {
     pace: f64,
     id: u8,
     /// When the chip is awake; none in suspend.
-    awake: Option<Micros>,
+    awake: Option<Instant>,
     /// Registers 0x4C to 0x52.
     settings: [u8; 7],
     /// End of the running conversion.
-    until: Option<Micros>,
+    until: Option<Instant>,
     data: [u8; 8],
     /// End of the running self test.
-    self_test: Option<Micros>,
+    self_test: Option<Instant>,
     /// The sensing elements feel nothing.
     broken: bool,
     /// What a running read sees.
@@ -171,7 +171,7 @@ impl Bmm150 {
         self.settings[usize::from(register - MODE)]
     }
 
-    fn is_awake(&self, now: Micros) -> bool {
+    fn is_awake(&self, now: Instant) -> bool {
         self.awake.is_some_and(|instant| instant <= now)
     }
 
@@ -184,20 +184,20 @@ impl Bmm150 {
         [0x08, 0x10, 0x20].map(|bit| self.setting(AXES) & bit == 0)
     }
 
-    fn conversion_time(&self) -> Micros {
+    fn conversion_time(&self) -> Duration {
         let [x, y, z] = self.measures();
         let (xy, z) = (u64::from(x || y), u64::from(z));
         let (xy_repetitions, z_repetitions) = (self.setting(REPETITIONS_XY), self.setting(REPETITIONS_Z));
         let flat = xy * 145 * (1 + 2 * u64::from(xy_repetitions));
         let upright = z * 500 * (1 + u64::from(z_repetitions));
-        Micros(((flat + upright + 980) as f64 * self.pace) as u64)
+        Duration::from_micros(((flat + upright + 980) as f64 * self.pace) as u64)
     }
 
-    fn start(&mut self, now: Micros) {
+    fn start(&mut self, now: Instant) {
         self.until = (self.mode() < 2).then(|| now + self.conversion_time());
     }
 
-    fn update(&mut self, now: Micros) {
+    fn update(&mut self, now: Instant) {
         if self.self_test.take_if(|end| *end <= now).is_some() {
             self.settings[0] &= !1;
             let passed = u8::from(!self.broken);
@@ -207,7 +207,7 @@ impl Bmm150 {
             self.convert(until);
             if self.mode() == 0 {
                 let rate = RATES[usize::from(self.setting(MODE) >> 3 & 7)];
-                let period = Micros((1e6 / rate * self.pace) as u64);
+                let period = Duration::from_micros((1e6 / rate * self.pace) as u64);
                 self.until = Some(until + period.max(self.conversion_time()));
             } else {
                 // A forced conversion ends in sleep (DS 4.2.4).
@@ -217,7 +217,7 @@ impl Bmm150 {
         }
     }
 
-    fn convert(&mut self, at: Micros) {
+    fn convert(&mut self, at: Instant) {
         let body = self.physics.field(at);
         let hall = (HALL + self.noise.normal()).round();
         // Body is (−y, x, z) of the chip as it is soldered.
@@ -241,7 +241,7 @@ impl Bmm150 {
 }
 
 impl Chip for Bmm150 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
+    fn read(&mut self, register: u16, now: Instant) -> u16 {
         self.update(now);
         if register == POWER {
             return u16::from(self.awake.is_some());
@@ -258,7 +258,7 @@ impl Chip for Bmm150 {
         })
     }
 
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
+    fn write(&mut self, register: u16, value: u16, now: Instant) {
         self.update(now);
         match register {
             POWER if value & 0x82 == 0x82 && self.is_awake(now) => {
@@ -283,7 +283,7 @@ impl Chip for Bmm150 {
         }
     }
 
-    fn reset(&mut self, _: Micros) {
+    fn reset(&mut self, _: Instant) {
         self.awake = None;
         self.settings = SETTINGS;
         self.until = None;
@@ -302,7 +302,7 @@ impl Chip for Bmm150 {
 }
 
 impl I2cChip for Bmm150 {
-    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+    fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool {
         if index.is_multiple_of(2) {
             self.pointer = u16::from(byte);
         } else {
@@ -311,7 +311,7 @@ impl I2cChip for Bmm150 {
         true
     }
 
-    fn send(&mut self, index: usize, now: Micros) -> u8 {
+    fn send(&mut self, index: usize, now: Instant) -> u8 {
         if index == 0 {
             self.update(now);
             self.shadow = self.data;

@@ -25,7 +25,7 @@ use crate::sensors::baro::{BaroPhysics, DEVIATION, RATE};
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
 use crate::world::World;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 const CALIBRATION: u16 = 0x88;
 const ID: u16 = 0xD0;
@@ -36,7 +36,7 @@ const CONFIG: u16 = 0xF5;
 const DATA: u16 = 0xF7;
 const RESET_WORD: u16 = 0xB6;
 /// Start-up time (DS table 2).
-const START_UP: Micros = Micros(2_000);
+const START_UP: Duration = Duration::from_micros(2_000);
 /// What the data registers hold before the first conversion, and for a quantity that is not measured (DS 4.2, 3.3.1).
 const SKIPPED: u32 = 0x80000;
 /// Standby times of normal mode, µs (DS table 11).
@@ -74,8 +74,8 @@ fn invert(rising: impl Fn(f64) -> f64) -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Sleep,
-    Converting { until: Micros },
-    Standby { until: Micros },
+    Converting { until: Instant },
+    Standby { until: Instant },
 }
 
 /// The emulator. The same seed is the same specimen as [`BaroModel`](crate::sensors::BaroModel).
@@ -84,15 +84,15 @@ enum Phase {
 /// use embedded_hal::i2c::I2c;
 /// use stampfly_sim::chips::{Bmp280, I2cBus};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// bus.attach(0x76, Bmp280::new(&simulation.world, &clock, 1));
-/// clock.advance_to(Micros::from_millis(2));
+/// clock.advance_to(Instant::from_millis(2));
 /// bus.write(0x76, &[0xF4, 0b001_001_01])?; // once, forced
-/// clock.advance_to(Micros::from_millis(9));
+/// clock.advance_to(Instant::from_millis(9));
 /// let mut data = [0; 6];
 /// bus.write_read(0x76, &[0xF7], &mut data)?;
 /// assert_ne!(data, [0x80, 0, 0, 0x80, 0, 0]);
@@ -105,7 +105,7 @@ pub struct Bmp280 {
     pace: f64,
     id: u8,
     /// End of the start-up.
-    ready: Micros,
+    ready: Instant,
     phase: Phase,
     control: u8,
     config: u8,
@@ -113,7 +113,7 @@ pub struct Bmp280 {
     pending: Option<u8>,
     /// The sensing element feels nothing.
     broken: bool,
-    last_conversion: Micros,
+    last_conversion: Instant,
     /// Pressure and temperature as the converter gives them.
     data: [u32; 2],
     /// What a running read sees.
@@ -156,25 +156,25 @@ impl Bmp280 {
         [self.control >> 2 & 7, self.control >> 5].map(|code| if code == 0 { 0 } else { 1 << (code.min(5) - 1) })
     }
 
-    fn true_time(&self, microseconds: u64) -> Micros {
-        Micros((microseconds as f64 * self.pace) as u64)
+    fn true_time(&self, microseconds: u64) -> Duration {
+        Duration::from_micros((microseconds as f64 * self.pace) as u64)
     }
 
     /// Typical conversion time: 1 ms, 2 ms per sample, and 0.5 ms when pressure is measured (DS table 13).
-    fn conversion_time(&self) -> Micros {
+    fn conversion_time(&self) -> Duration {
         let [pressure, temperature] = self.oversampling();
         self.true_time(1_000 + 2_000 * (pressure + temperature) + if pressure > 0 { 500 } else { 0 })
     }
 
     /// Sleeps or begins to convert, as the mode bits say: 0 sleep, 1 and 2 forced, 3 normal (DS table 10).
-    fn enter_mode(&mut self, now: Micros) {
+    fn enter_mode(&mut self, now: Instant) {
         self.phase = match self.control & 3 {
             0 => Phase::Sleep,
             _ => Phase::Converting { until: now + self.conversion_time() },
         };
     }
 
-    fn convert(&mut self, at: Micros) {
+    fn convert(&mut self, at: Instant) {
         let [samples, temperature_samples] = self.oversampling();
         let period = f64::from(at.since(self.last_conversion).seconds());
         self.last_conversion = at;
@@ -200,7 +200,7 @@ impl Bmp280 {
         });
     }
 
-    fn update(&mut self, now: Micros) {
+    fn update(&mut self, now: Instant) {
         loop {
             match self.phase {
                 Phase::Converting { until } if until <= now => {
@@ -227,7 +227,7 @@ impl Bmp280 {
 }
 
 impl Chip for Bmp280 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
+    fn read(&mut self, register: u16, now: Instant) -> u16 {
         self.update(now);
         let starting = now < self.ready;
         u16::from(match register {
@@ -248,7 +248,7 @@ impl Chip for Bmp280 {
         })
     }
 
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
+    fn write(&mut self, register: u16, value: u16, now: Instant) {
         self.update(now);
         if now < self.ready {
             return;
@@ -266,7 +266,7 @@ impl Chip for Bmp280 {
         }
     }
 
-    fn reset(&mut self, now: Micros) {
+    fn reset(&mut self, now: Instant) {
         self.ready = now + START_UP;
         self.phase = Phase::Sleep;
         self.control = 0;
@@ -288,7 +288,7 @@ impl Chip for Bmp280 {
 }
 
 impl I2cChip for Bmp280 {
-    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+    fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool {
         if index.is_multiple_of(2) {
             self.pointer = u16::from(byte);
         } else {
@@ -297,7 +297,7 @@ impl I2cChip for Bmp280 {
         true
     }
 
-    fn send(&mut self, index: usize, now: Micros) -> u8 {
+    fn send(&mut self, index: usize, now: Instant) -> u8 {
         if index == 0 {
             self.update(now);
             self.shadow = self.data;

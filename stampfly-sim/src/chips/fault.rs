@@ -4,7 +4,7 @@ use crate::chips::Chip;
 use crate::noise::Noise;
 use crate::time::Clock;
 use core::cell::{Cell, RefCell};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use std::rc::Rc;
 
 /// The faults of one chip. The default is none.
@@ -17,7 +17,7 @@ pub struct Faults {
     /// Probability that a data bit is read or written wrongly, 0 to 1.
     pub bit_errors: f64,
     /// How long the chip holds the clock line low in every transfer. I²C only.
-    pub stretch: Micros,
+    pub stretch: Duration,
 }
 
 /// A handle to a chip on a bus: its faults, and what somebody else may do to it. Clones mean the same chip.

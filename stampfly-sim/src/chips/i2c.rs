@@ -10,7 +10,7 @@ use crate::noise::Noise;
 use crate::time::Clock;
 use core::cell::{Cell, RefCell};
 use embedded_hal::i2c::{ErrorType, NoAcknowledgeSource, Operation};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
 /// Nanoseconds per bit at 400 kHz, the fast mode of the I²C specification (UM10204, table 10).
@@ -38,7 +38,7 @@ impl Device {
 struct State {
     clock: Clock,
     devices: RefCell<Vec<Device>>,
-    busy_until: Cell<Micros>,
+    busy_until: Cell<Instant>,
     /// Clock pulses until the data line is free.
     held: Cell<u8>,
     noise: RefCell<Noise>,
@@ -49,7 +49,7 @@ struct State {
 /// ```
 /// use stampfly_sim::chips::{Bmp280, I2cBus};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
@@ -57,7 +57,7 @@ struct State {
 /// bus.attach(0x76, Bmp280::new(&simulation.world, &clock, 1));
 /// let mut id = [0];
 /// embedded_hal::i2c::I2c::write_read(&mut bus, 0x76, &[0xD0], &mut id)?;
-/// assert_eq!(clock.now(), Micros(98), "39 bits: start, address, register, start, address, data, stop");
+/// assert_eq!(clock.now(), Instant::from_micros(98), "39 bits: start, address, register, start, address, data, stop");
 /// # Ok::<(), stampfly_sim::chips::BusError>(())
 /// ```
 #[derive(Clone)]
@@ -115,7 +115,7 @@ impl I2cBus {
     }
 
     /// How long the chips at this address hold the clock; `None` when nobody acknowledges.
-    fn stretch(&self, address: u8) -> Option<Micros> {
+    fn stretch(&self, address: u8) -> Option<Duration> {
         let acknowledges = |faults: &Faults| {
             let refused = faults.refusals > 0.0 && self.0.noise.borrow_mut().chance(faults.refusals);
             !faults.dead && !refused
@@ -126,20 +126,20 @@ impl I2cBus {
     }
 
     /// Takes the bus. Returns the start, the end, and what is already known to fail.
-    fn begin(&self, address: u8, operations: &[Operation<'_>]) -> (Micros, Micros, Result<(), BusError>) {
+    fn begin(&self, address: u8, operations: &[Operation<'_>]) -> (Instant, Instant, Result<(), BusError>) {
         let start = self.0.clock.now();
         let (bits, stretch, outcome) = match self.stretch(address) {
-            _ if !self.sda_is_high() => (1, Micros::ZERO, Err(BusError::ArbitrationLost)),
-            None => (2 + BYTE, Micros::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
+            _ if !self.sda_is_high() => (1, Duration::ZERO, Err(BusError::ArbitrationLost)),
+            None => (2 + BYTE, Duration::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
             Some(stretch) => (length(operations), stretch, Ok(())),
         };
-        let end = start + Micros((bits * BIT).div_ceil(1_000)) + stretch;
+        let end = start + Duration::from_micros((bits * BIT).div_ceil(1_000)) + stretch;
         self.0.busy_until.set(end);
         (start, end, outcome)
     }
 
     /// Exchanges the bytes of a transfer that began at `start`.
-    fn exchange(&self, address: u8, operations: &mut [Operation<'_>], start: Micros) -> Result<(), BusError> {
+    fn exchange(&self, address: u8, operations: &mut [Operation<'_>], start: Instant) -> Result<(), BusError> {
         let devices = self.0.devices.borrow();
         let answering = |device: &&Device| device.answers(address) && !device.attached.faults().dead;
         let answering: Vec<&Device> = devices.iter().filter(answering).collect();

@@ -25,7 +25,7 @@ use crate::sensors::power::{PowerPhysics, RATE};
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
 use crate::world::World;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 const CONFIGURATION: u16 = 0x00;
 const SHUNT: u16 = 0x03;
@@ -51,13 +51,13 @@ const SHUNT_RESISTANCE: f64 = 0.01;
 /// use embedded_hal::i2c::I2c;
 /// use stampfly_sim::chips::{I2cBus, Ina3221};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// bus.attach(0x40, Ina3221::new(&simulation.world, &clock, 1));
-/// clock.advance_to(Micros::from_millis(8)); // it converts on its own after power-on
+/// clock.advance_to(Instant::from_millis(8)); // it converts on its own after power-on
 /// let mut word = [0; 2];
 /// bus.write_read(0x40, &[0x04], &mut word)?;
 /// let volts = f64::from(i16::from_be_bytes(word) >> 3) * 0.008;
@@ -72,7 +72,7 @@ pub struct Ina3221 {
     part: u16,
     registers: [u16; 18],
     /// Begin of the running conversion; none when powered down or done.
-    begun: Option<Micros>,
+    begun: Option<Instant>,
     /// The converter feels nothing.
     broken: bool,
     pointer: u16,
@@ -110,28 +110,28 @@ impl Ina3221 {
     }
 
     /// Length of a conversion of all channels with all averages, at least a microsecond.
-    fn conversion_time(&self) -> Micros {
+    fn conversion_time(&self) -> Duration {
         let field = |shift: u32| usize::from(self.configuration() >> shift & 7);
         let [shunt, bus] = self.measures();
         let channel = u64::from(shunt) * TIMES[field(3)] + u64::from(bus) * TIMES[field(6)];
         let channels = u64::from((self.configuration() >> 12 & 7).count_ones());
-        Micros(((channels * channel * AVERAGES[field(9)]) as f64 * self.pace).max(1.0) as u64)
+        Duration::from_micros(((channels * channel * AVERAGES[field(9)]) as f64 * self.pace).max(1.0) as u64)
     }
 
-    fn start(&mut self, now: Micros) {
+    fn start(&mut self, now: Instant) {
         self.begun = (self.configuration() & 3 != 0 && self.configuration() & 0x7000 != 0).then_some(now);
     }
 
-    fn update(&mut self, now: Micros) {
+    fn update(&mut self, now: Instant) {
         let Some(begun) = self.begun else { return };
         let length = self.conversion_time();
-        let done = now.since(begun).0 / length.0;
+        let done = now.since(begun).as_micros() / length.as_micros();
         if done == 0 {
             return;
         }
         let continuous = self.configuration() & 4 != 0;
         // Only the newest conversion is left to be seen.
-        let first = if continuous { begun + Micros((done - 1) * length.0) } else { begun };
+        let first = if continuous { begun + length * (done - 1) } else { begun };
         self.begun = continuous.then_some(first + length);
         self.registers[usize::from(MASK)] |= 1;
         if self.configuration() & CHANNEL_TWO == 0 {
@@ -151,7 +151,7 @@ impl Ina3221 {
 }
 
 impl Chip for Ina3221 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
+    fn read(&mut self, register: u16, now: Instant) -> u16 {
         self.update(now);
         match register {
             MAKER => 0x5449,
@@ -166,7 +166,7 @@ impl Chip for Ina3221 {
         }
     }
 
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
+    fn write(&mut self, register: u16, value: u16, now: Instant) {
         self.update(now);
         match register {
             CONFIGURATION if value & 0x8000 != 0 => self.reset(now),
@@ -185,7 +185,7 @@ impl Chip for Ina3221 {
         }
     }
 
-    fn reset(&mut self, now: Micros) {
+    fn reset(&mut self, now: Instant) {
         self.registers = AFTER_RESET;
         self.start(now);
     }
@@ -200,7 +200,7 @@ impl Chip for Ina3221 {
 }
 
 impl I2cChip for Ina3221 {
-    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+    fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool {
         match index {
             0 => self.pointer = u16::from(byte),
             1 => self.half = byte,
@@ -210,7 +210,7 @@ impl I2cChip for Ina3221 {
         true
     }
 
-    fn send(&mut self, index: usize, now: Micros) -> u8 {
+    fn send(&mut self, index: usize, now: Instant) -> u8 {
         if index.is_multiple_of(2) {
             let [high, low] = self.read(self.pointer, now).to_be_bytes();
             self.half = low;

@@ -54,18 +54,18 @@ pub use vl53l3cx::{ShutdownPin, Vl53l3cx};
 use core::fmt;
 use embedded_hal::i2c::NoAcknowledgeSource;
 use embedded_hal::{i2c as hal_i2c, spi as hal_spi};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// A chip as its registers. Time is an argument and does not go back.
 ///
 /// Both numbers are wide enough for every chip; one with 8-bit registers uses the lower half.
 pub trait Chip: fmt::Debug {
     /// Reads a register, with whatever this does to the chip. Registers that do not exist read as zero.
-    fn read(&mut self, register: u16, now: Micros) -> u16;
+    fn read(&mut self, register: u16, now: Instant) -> u16;
     /// Writes a register. Registers that do not exist or cannot be written swallow the value.
-    fn write(&mut self, register: u16, value: u16, now: Micros);
+    fn write(&mut self, register: u16, value: u16, now: Instant);
     /// Power-on reset.
-    fn reset(&mut self, now: Micros);
+    fn reset(&mut self, now: Instant);
     /// Changes what the identity register says.
     fn set_id(&mut self, id: u16);
     /// Breaks or mends the sensing element: the chip answers as before but feels nothing, and its self tests, or those of
@@ -81,11 +81,11 @@ pub trait I2cChip: Chip {
         Some(soldered)
     }
     /// Takes byte number `index` after a (repeated) start in write direction. `false` is no acknowledge.
-    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool;
+    fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool;
     /// Gives byte number `index` after a (repeated) start in read direction.
-    fn send(&mut self, index: usize, now: Micros) -> u8;
+    fn send(&mut self, index: usize, now: Instant) -> u8;
     /// The transfer is over.
-    fn stop(&mut self, _now: Micros) {}
+    fn stop(&mut self, _now: Instant) {}
 }
 
 /// A chip that can sit on an [`SpiBus`].
@@ -93,9 +93,9 @@ pub trait SpiChip: Chip {
     /// The fastest clock that the chip allows, Hz.
     const HIGHEST_CLOCK: u32;
     /// Takes and gives byte number `index` since the chip was selected.
-    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8;
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8;
     /// Chip select goes high.
-    fn release(&mut self, now: Micros);
+    fn release(&mut self, now: Instant);
 }
 
 /// Why a transfer failed.
@@ -142,6 +142,6 @@ impl hal_spi::Error for BusError {
 }
 
 /// An instant `nanoseconds` after `start`, counted in whole microseconds like everything on the virtual clock.
-fn after(start: Micros, nanoseconds: u64) -> Micros {
-    start + Micros(nanoseconds / 1_000)
+fn after(start: Instant, nanoseconds: u64) -> Instant {
+    start + Duration::from_micros(nanoseconds / 1_000)
 }

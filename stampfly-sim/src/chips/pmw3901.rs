@@ -27,13 +27,13 @@ use super::{Chip, SpiChip};
 use crate::sensors::flow::FlowPhysics;
 use crate::time::Clock;
 use crate::world::World;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
-const START_UP: Micros = Micros(45_000);
-const RESET_TIME: Micros = Micros(5_000);
-const READ_PAUSE: Micros = Micros(35);
-const AFTER_WRITE: Micros = Micros(45);
-const AFTER_READ: Micros = Micros(20);
+const START_UP: Duration = Duration::from_micros(45_000);
+const RESET_TIME: Duration = Duration::from_micros(5_000);
+const READ_PAUSE: Duration = Duration::from_micros(35);
+const AFTER_WRITE: Duration = Duration::from_micros(45);
+const AFTER_READ: Duration = Duration::from_micros(20);
 const MOTION: u16 = 0x02;
 const BURST: u8 = 0x16;
 const RESET: u16 = 0x3A;
@@ -62,7 +62,7 @@ const PERFORMANCE: [(u8, u8, u8); 57] = [
 const DISPUTED: [(u8, u8); 3] = [(0x14, 0x65), (0x14, 0x63), (0x15, 0x48)];
 /// The entry before which every copy pauses, and for how long at least.
 const AFTER_PAUSE: (u8, u8, u8) = (0x07, 0x32, 0x44);
-const PAUSE: Micros = Micros(10_000);
+const PAUSE: Duration = Duration::from_micros(10_000);
 /// The specimen's own values at 0x70 and 0x71 of bank 0, from which the list makes settings where 0x73 reads zero.
 const FACTORY: [u8; 2] = [0x1A, 0x60];
 
@@ -72,13 +72,13 @@ const FACTORY: [u8; 2] = [0x1A, 0x60];
 /// use embedded_hal::spi::{Operation, SpiDevice};
 /// use stampfly_sim::chips::{Pmw3901, SpiBus};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
 /// let chip = Pmw3901::new(&simulation.world, &clock, 1);
 /// let (mut port, _) = SpiBus::new(&clock, 1).attach(2_000_000, chip);
-/// clock.advance_to(Micros::from_millis(45));
+/// clock.advance_to(Instant::from_millis(45));
 /// let mut id = [0];
 /// port.transaction(&mut [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)])?;
 /// assert_eq!(id, [0x49]);
@@ -88,22 +88,22 @@ const FACTORY: [u8; 2] = [0x1A, 0x60];
 pub struct Pmw3901 {
     physics: FlowPhysics,
     id: u8,
-    ready: Micros,
+    ready: Instant,
     banks: Vec<[u8; 128]>,
     bank: u8,
     /// Entries of the performance list that have been written in its order, and when the last was.
     tuned: usize,
-    tuned_at: Micros,
+    tuned_at: Instant,
     /// Counts as the last latch left them.
     latched: [i16; 2],
     moved: bool,
     /// The array sees nothing.
     broken: bool,
     /// The next command may begin from here on.
-    idle_until: Micros,
+    idle_until: Instant,
     /// The address byte of this transfer, when it came, and whether it came late enough.
     command: u8,
-    commanded: Micros,
+    commanded: Instant,
     accepts: bool,
     /// What a running burst sends.
     burst: [u8; 12],
@@ -141,7 +141,7 @@ impl Pmw3901 {
     }
 
     /// Follows the performance list: what comes out of its order spoils it.
-    fn tune(&mut self, entry: (u8, u8, u8), now: Micros) {
+    fn tune(&mut self, entry: (u8, u8, u8), now: Instant) {
         let paused = entry != AFTER_PAUSE || now.since(self.tuned_at) >= PAUSE;
         self.tuned = match PERFORMANCE.get(self.tuned) {
             Some(expected) if *expected == entry && paused => self.tuned + 1,
@@ -160,7 +160,7 @@ impl Pmw3901 {
         self.tuned_at = now;
     }
 
-    fn quality(&mut self, now: Micros) -> u8 {
+    fn quality(&mut self, now: Instant) -> u8 {
         let quality = self.physics.quality(now);
         if self.is_tuned() && !self.broken { quality } else { 0 }
     }
@@ -175,7 +175,7 @@ impl Pmw3901 {
         [light + 20, light + 40, light, if quality < DARK { 0x1F } else { 0x03 }, 0x80]
     }
 
-    fn latch(&mut self, now: Micros) {
+    fn latch(&mut self, now: Instant) {
         let counts = self.physics.read(now);
         // Flow along body x is −y of the chip as it is soldered, along body y it is x.
         self.latched = if self.is_tuned() && !self.broken { [counts[1] as i16, -counts[0] as i16] } else { [0; 2] };
@@ -183,7 +183,7 @@ impl Pmw3901 {
     }
 
     /// The registers that are not memory, in bank 0.
-    fn measure(&mut self, register: u16, now: Micros) -> Option<u8> {
+    fn measure(&mut self, register: u16, now: Instant) -> Option<u8> {
         let [x, y] = self.latched.map(i16::to_le_bytes);
         Some(match register {
             0x00 => self.id,
@@ -214,7 +214,7 @@ impl Pmw3901 {
         })
     }
 
-    fn fill_burst(&mut self, now: Micros) {
+    fn fill_burst(&mut self, now: Instant) {
         self.latch(now);
         let quality = self.quality(now);
         let [[x_low, x_high], [y_low, y_high]] = self.latched.map(i16::to_le_bytes);
@@ -226,7 +226,7 @@ impl Pmw3901 {
 }
 
 impl Chip for Pmw3901 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
+    fn read(&mut self, register: u16, now: Instant) -> u16 {
         if now < self.ready {
             return 0;
         }
@@ -240,7 +240,7 @@ impl Chip for Pmw3901 {
         u16::from(if checked { 0x08 } else { measured.unwrap_or(stored) })
     }
 
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
+    fn write(&mut self, register: u16, value: u16, now: Instant) {
         if now < self.ready {
             return;
         }
@@ -258,7 +258,7 @@ impl Chip for Pmw3901 {
         }
     }
 
-    fn reset(&mut self, now: Micros) {
+    fn reset(&mut self, now: Instant) {
         self.ready = now + START_UP;
         // Memory that was never written must not look like a setting: no value of the list is 0xEE.
         self.banks = vec![[0xEE; 128]; 32];
@@ -282,7 +282,7 @@ impl Chip for Pmw3901 {
 impl SpiChip for Pmw3901 {
     const HIGHEST_CLOCK: u32 = 2_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
         if index == 0 {
             self.command = byte;
             self.commanded = now;
@@ -310,7 +310,7 @@ impl SpiChip for Pmw3901 {
         self.burst.get(index - 1).copied().unwrap_or(0)
     }
 
-    fn release(&mut self, now: Micros) {
+    fn release(&mut self, now: Instant) {
         if self.accepts {
             self.idle_until = now + if self.command & 0x80 != 0 { AFTER_WRITE } else { AFTER_READ };
         }

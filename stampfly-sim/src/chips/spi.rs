@@ -9,7 +9,7 @@ use crate::noise::Noise;
 use crate::time::Clock;
 use core::cell::{Cell, RefCell};
 use embedded_hal::spi::{ErrorType, Operation};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
 /// Share of the bits that a chip with a floating select spoils by answering into the same line: its select is taken for
@@ -22,7 +22,7 @@ const STREAM: u64 = 102;
 
 struct State {
     clock: Clock,
-    busy_until: Cell<Micros>,
+    busy_until: Cell<Instant>,
     noise: RefCell<Noise>,
     /// How many chip selects nobody drives.
     floating: Cell<u32>,
@@ -113,7 +113,7 @@ impl<C> SpiPort<C> {
 
 impl<C: SpiChip> SpiPort<C> {
     /// Takes the bus. Returns the start, the end, and what is already known to fail.
-    fn begin(&self, operations: &[Operation<'_, u8>]) -> (Micros, Micros, Result<(), BusError>) {
+    fn begin(&self, operations: &[Operation<'_, u8>]) -> (Instant, Instant, Result<(), BusError>) {
         self.park();
         let state = &self.bus.0;
         let start = state.clock.now();
@@ -129,13 +129,13 @@ impl<C: SpiChip> SpiPort<C> {
                 Operation::DelayNs(delay) => u64::from(*delay),
             })
             .sum();
-        let end = start + Micros(nanoseconds.div_ceil(1_000));
+        let end = start + Duration::from_micros(nanoseconds.div_ceil(1_000));
         state.busy_until.set(end);
         (start, end, if refused { Err(BusError::Overrun) } else { Ok(()) })
     }
 
     /// Exchanges the bytes of a transfer that began at `start` and ended at `end`.
-    fn exchange(&self, operations: &mut [Operation<'_, u8>], start: Micros, end: Micros) {
+    fn exchange(&self, operations: &mut [Operation<'_, u8>], start: Instant, end: Instant) {
         let faults = self.attached.faults();
         let disturbance = if self.bus.0.floating.get() > 0 { DISTURBANCE } else { 0.0 };
         let mut chip = self.chip.borrow_mut();

@@ -44,7 +44,7 @@ use crate::world::World;
 use core::cell::RefCell;
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
 const ADDRESS: u16 = 0x0001;
@@ -68,7 +68,7 @@ const NO_BIAS: u8 = 3;
 const SIZE: usize = 0x0140;
 
 const FIRST_ADDRESS: u8 = 0x29;
-const BOOT: Micros = Micros(1_200);
+const BOOT: Duration = Duration::from_micros(1_200);
 /// Slow oscillator of this specimen.
 const SLOW_OSCILLATOR: u16 = 0x03C0;
 /// Duration of a macro period per pixel clock of the laser's period: 2304 clocks of the fast oscillator, 11.8 MHz, in
@@ -90,14 +90,14 @@ fn macro_periods(code: u16) -> f64 {
 /// use stampfly_sim::chips::{I2cBus, Vl53l3cx};
 /// use stampfly_sim::sensors::Mount;
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// let (chip, _shutdown) = Vl53l3cx::new(&simulation.world, &clock, 1, Mount::Bottom);
 /// bus.attach(0x29, chip);
-/// clock.advance_to(Micros::from_millis(2));
+/// clock.advance_to(Instant::from_millis(2));
 /// bus.write(0x29, &[0x00, 0x01, 0x30])?; // move to another address
 /// let mut id = [0; 2];
 /// bus.write_read(0x30, &[0x01, 0x0F], &mut id)?;
@@ -122,10 +122,10 @@ struct State {
     pace: f64,
     id: u8,
     /// When the chip answers; never while XSHUT is low.
-    ready: Option<Micros>,
+    ready: Option<Instant>,
     registers: Box<[u8; SIZE]>,
     /// Beginning of the running or coming measurement.
-    begin: Option<Micros>,
+    begin: Option<Instant>,
     /// A measurement waits to be taken note of.
     pending: bool,
     /// The detector feels nothing.
@@ -149,11 +149,11 @@ impl State {
     }
 
     /// Whether the chip answers at all at this instant.
-    fn answers(&self, now: Micros) -> bool {
+    fn answers(&self, now: Instant) -> bool {
         self.ready.is_some_and(|ready| ready <= now)
     }
 
-    fn restart(&mut self, ready: Option<Micros>) {
+    fn restart(&mut self, ready: Option<Instant>) {
         self.ready = ready;
         self.registers.fill(0);
         self.begin = None;
@@ -169,12 +169,12 @@ impl State {
         self.set(MODEL, &[self.id, 0xAA, 0x10]);
     }
 
-    fn true_time(&self, microseconds: f64) -> Micros {
-        Micros((microseconds * self.pace) as u64)
+    fn true_time(&self, microseconds: f64) -> Duration {
+        Duration::from_micros((microseconds * self.pace) as u64)
     }
 
     /// How long a measurement takes.
-    fn duration(&self) -> Micros {
+    fn duration(&self) -> Duration {
         let range = |timeout, period| {
             let clocks = 2.0 * (f64::from(self.byte(period)) + 1.0);
             macro_periods(self.word(timeout)) * clocks * MACRO_PERIOD
@@ -183,12 +183,12 @@ impl State {
     }
 
     /// Time from one measurement to the next.
-    fn period(&self) -> Micros {
+    fn period(&self) -> Duration {
         let ticks = f64::from(u32::from_be_bytes(core::array::from_fn(|n| self.byte(PERIOD + n as u16))));
         self.true_time(ticks / (f64::from(SLOW_OSCILLATOR) * 1.075) * 1e3).max(self.duration())
     }
 
-    fn update(&mut self, now: Micros) {
+    fn update(&mut self, now: Instant) {
         while let Some(begin) = self.begin.filter(|begin| !self.pending && *begin + self.duration() <= now) {
             self.measure(begin);
             self.pending = true;
@@ -197,8 +197,8 @@ impl State {
         }
     }
 
-    fn measure(&mut self, begin: Micros) {
-        let reading = self.physics.measure(begin + Micros(self.duration().0 / 2));
+    fn measure(&mut self, begin: Instant) {
+        let reading = self.physics.measure(begin + self.duration() / 2);
         let number = match self.byte(RESULT + 3) {
             255 => 128,
             number => number + 1,
@@ -273,7 +273,7 @@ impl OutputPin for ShutdownPin {
 }
 
 impl Chip for Vl53l3cx {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
+    fn read(&mut self, register: u16, now: Instant) -> u16 {
         let mut state = self.0.borrow_mut();
         state.update(now);
         if register == LINE {
@@ -283,7 +283,7 @@ impl Chip for Vl53l3cx {
         u16::from(state.byte(register))
     }
 
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
+    fn write(&mut self, register: u16, value: u16, now: Instant) {
         let mut state = self.0.borrow_mut();
         state.update(now);
         let byte = value as u8;
@@ -309,7 +309,7 @@ impl Chip for Vl53l3cx {
         }
     }
 
-    fn reset(&mut self, now: Micros) {
+    fn reset(&mut self, now: Instant) {
         let mut state = self.0.borrow_mut();
         if state.ready.is_some() {
             state.restart(Some(now + BOOT));
@@ -333,7 +333,7 @@ impl I2cChip for Vl53l3cx {
         state.answers(state.clock.now()).then(|| state.byte(ADDRESS))
     }
 
-    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+    fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool {
         if index < 2 {
             let mut state = self.0.borrow_mut();
             state.pointer = state.pointer << 8 | u16::from(byte);
@@ -345,7 +345,7 @@ impl I2cChip for Vl53l3cx {
         true
     }
 
-    fn send(&mut self, _: usize, now: Micros) -> u8 {
+    fn send(&mut self, _: usize, now: Instant) -> u8 {
         let register = self.0.borrow().pointer;
         let byte = self.read(register, now) as u8;
         self.0.borrow_mut().pointer = register.wrapping_add(1);

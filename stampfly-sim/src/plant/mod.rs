@@ -20,10 +20,10 @@ pub use wind::{Wind, WindConfig};
 
 use crate::noise::{Noise, Stream};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// Length of one physics step: 1600 of them make a second.
-pub const STEP: Micros = Micros(625);
+pub const STEP: Duration = Duration::from_micros(625);
 
 /// [`STEP`] in seconds.
 pub(crate) const DT: f64 = 625e-6;

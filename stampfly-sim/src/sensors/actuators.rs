@@ -6,7 +6,7 @@ use crate::world::World;
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::{MotorOutput, Signal};
 use std::rc::Rc;
 
@@ -45,7 +45,7 @@ impl MotorOutputs for MotorModel {
 #[derive(Clone, Debug)]
 pub struct IndicatorRecorder {
     clock: Clock,
-    changes: Rc<RefCell<Vec<(Micros, Signal)>>>,
+    changes: Rc<RefCell<Vec<(Instant, Signal)>>>,
 }
 
 impl IndicatorRecorder {
@@ -55,7 +55,7 @@ impl IndicatorRecorder {
 
     /// Every change of the signal with its instant, oldest first.
     #[must_use]
-    pub fn changes(&self) -> Vec<(Micros, Signal)> {
+    pub fn changes(&self) -> Vec<(Instant, Signal)> {
         self.changes.borrow().clone()
     }
 

@@ -6,12 +6,12 @@ use crate::time::Clock;
 use crate::world::World;
 use core::convert::Infallible;
 use stampfly_drivers::{Barometer, Sample};
-use stampfly_types::Micros;
 use stampfly_types::messages::BaroData;
+use stampfly_types::{Duration, Instant};
 
 /// Conversion time plus 62.5 ms of standby.
 pub(crate) const RATE: f64 = 13.5;
-const READ_OUT: Micros = Micros(400);
+const READ_OUT: Duration = Duration::from_micros(400);
 /// Pressure at the floor, Pa.
 const FLOOR_PRESSURE: f64 = 101_000.0;
 /// Standard deviation of one conversion after the chip's filter, Pa: 6 cm, what the static records show.
@@ -37,17 +37,17 @@ pub(crate) struct BaroPhysics {
     world: World,
     noise: Noise,
     drift: f64,
-    start: Micros,
+    start: Instant,
 }
 
 impl BaroPhysics {
-    pub(crate) fn new(world: &World, start: Micros, mut noise: Noise) -> Self {
+    pub(crate) fn new(world: &World, start: Instant, mut noise: Noise) -> Self {
         // Specimens differ by a metre or ten.
         Self { drift: 60.0 * noise.normal(), noise, start, world: world.clone() }
     }
 
     /// One conversion at `at`, Pa, `period` seconds after the one before, with noise of this standard deviation.
-    pub(crate) fn pressure(&mut self, at: Micros, period: f64, deviation: f64) -> f64 {
+    pub(crate) fn pressure(&mut self, at: Instant, period: f64, deviation: f64) -> f64 {
         let motion = self.world.motion_at(at);
         let hover = self.world.inspect(|plant| plant.rotors().hover_speed());
         let height = -motion.position.z;
@@ -60,7 +60,7 @@ impl BaroPhysics {
     }
 
     /// Temperature of the die, °C.
-    pub(crate) fn temperature(&self, at: Micros) -> f32 {
+    pub(crate) fn temperature(&self, at: Instant) -> f32 {
         let minutes = at.since(self.start).seconds() / 60.0;
         25.0 + 8.0 * minutes / (minutes + 2.0)
     }
@@ -89,7 +89,7 @@ impl Barometer for BaroModel {
     type Error = Infallible;
 
     async fn next(&mut self) -> Result<Sample<BaroData>, Infallible> {
-        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.0 as f64);
+        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.as_micros() as f64);
         let at = self.schedule.instant(number);
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);

@@ -11,12 +11,12 @@ use crate::world::World;
 use core::convert::Infallible;
 use nalgebra::{UnitQuaternion, Vector3};
 use stampfly_drivers::{MotionCapture, Sample};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::ExternalPose;
 
 const RATE: f64 = 100.0;
 /// From the exposure to the arrival on board.
-const LATENCY: Micros = Micros(30_000);
+const LATENCY: Duration = Duration::from_micros(30_000);
 /// Standard deviations, m and rad.
 const POSITION: f64 = 0.001;
 const ATTITUDE: f64 = 0.003;
@@ -55,7 +55,7 @@ impl MotionCapture for CameraModel {
 
     async fn next(&mut self) -> Result<Sample<ExternalPose>, Infallible> {
         loop {
-            let number = self.schedule.upcoming(self.clock.now(), LATENCY.0 as f64);
+            let number = self.schedule.upcoming(self.clock.now(), LATENCY.as_micros() as f64);
             let at = self.schedule.instant(number);
             self.clock.sleep_until(at + LATENCY).await;
             self.schedule.reported(number);

@@ -8,8 +8,8 @@ use crate::time::Clock;
 use crate::world::World;
 use core::convert::Infallible;
 use stampfly_drivers::{OpticalFlow, Sample};
-use stampfly_types::Micros;
 use stampfly_types::messages::FlowData;
+use stampfly_types::{Duration, Instant};
 
 /// Pictures per second.
 const FRAME_RATE: f64 = 121.0;
@@ -51,12 +51,12 @@ pub struct FlowModel {
     clock: Clock,
     physics: FlowPhysics,
     reads: Schedule,
-    last_read: Micros,
+    last_read: Instant,
 }
 
 impl FlowPhysics {
     /// The physics and the instants at which the processor reads.
-    pub(crate) fn new(world: &World, start: Micros, seed: u64) -> (Self, Schedule) {
+    pub(crate) fn new(world: &World, start: Instant, seed: u64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Flow);
         let (scale_x, scale_y) = (1.0 + noise.within(0.03), 1.0 + noise.within(0.03));
         let (sin, cos) = libm::sincos(noise.within(1f64.to_radians()));
@@ -76,7 +76,7 @@ impl FlowPhysics {
 
     /// Takes the pictures up to `at` and gives the whole counts since the last call, in the convention of
     /// [`FlowData`].
-    pub(crate) fn read(&mut self, at: Micros) -> [f64; 2] {
+    pub(crate) fn read(&mut self, at: Instant) -> [f64; 2] {
         while self.frames.instant(self.frame) <= at {
             self.expose(self.frame);
             self.frame += 1;
@@ -92,8 +92,8 @@ impl FlowPhysics {
     fn expose(&mut self, number: u64) {
         let end = self.frames.instant(number);
         let period = self.frames.period();
-        let begin = Micros(end.0 - (period as u64).min(end.0));
-        let middle = Micros(begin.0 + end.0.saturating_sub(begin.0) / 2);
+        let begin = end - Duration::from_micros(period as u64);
+        let middle = begin + end.since(begin) / 2;
         let motions = [begin, middle, end].map(|instant| self.world.motion_at(instant));
         let rates = motions.map(|motion| angular_flow(&motion));
         let height = slant_height(&motions[1]);
@@ -110,7 +110,7 @@ impl FlowPhysics {
     }
 
     /// Features found in the picture, the chip's SQUAL.
-    pub(crate) fn quality(&mut self, instant: Micros) -> u8 {
+    pub(crate) fn quality(&mut self, instant: Instant) -> u8 {
         let height = slant_height(&self.world.motion_at(instant));
         let near = 0.5 + 0.5 * ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
         let far = 1.0 - ((height - DIM) / (FAR - DIM)).clamp(0.0, 1.0);

@@ -10,7 +10,7 @@ use core::convert::Infallible;
 use nalgebra::{Matrix3, Vector3};
 use stampfly_drivers::{Decimator, Sample};
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Counts per m/s² at ±8 g.
 const ACCEL_SCALE: f64 = 4096.0 / GRAVITY as f64;
@@ -20,9 +20,9 @@ const RATE: f64 = 1600.0;
 /// Samples in one FIFO read.
 const GROUP: usize = 4;
 /// Interrupt and burst read after the last sample of a group.
-const LATENCY: Micros = Micros(120);
+const LATENCY: Duration = Duration::from_micros(120);
 /// A reader later than this has lost samples (the world's memory is 80 ms).
-const MEMORY: Micros = Micros(60_000);
+const MEMORY: Duration = Duration::from_micros(60_000);
 
 /// Noise per sample: density times the square root of half the rate. Densities per axis from a static record
 /// (x, y, z): accelerometer in m/s²/√Hz, gyroscope in rad/s/√Hz.
@@ -44,7 +44,7 @@ pub(crate) struct ImuPhysics {
     vibration: Vibration,
     /// Samples made so far.
     samples: u64,
-    start: Micros,
+    start: Instant,
     accel_bias: Vector3<f64>,
     gyro_bias: Vector3<f64>,
     /// Misalignment and scale.
@@ -54,7 +54,7 @@ pub(crate) struct ImuPhysics {
 
 impl ImuPhysics {
     /// The physics and the times of its samples, which are always 1600 a second.
-    pub(crate) fn new(world: &World, start: Micros, seed: u64, vibration: f64) -> (Self, Schedule) {
+    pub(crate) fn new(world: &World, start: Instant, seed: u64, vibration: f64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Imu);
         let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
         // Half a degree between the axes, half a per cent of scale.
@@ -81,7 +81,7 @@ impl ImuPhysics {
     }
 
     /// The next sample, taken at `at`: accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s, body.
-    pub(crate) fn sample(&mut self, at: Micros) -> [f64; 6] {
+    pub(crate) fn sample(&mut self, at: Instant) -> [f64; 6] {
         let motion = self.world.motion_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
         let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
@@ -105,7 +105,7 @@ impl ImuPhysics {
     }
 
     /// Temperature of the die, °C: it warms by ten degrees within a few minutes.
-    pub(crate) fn temperature(&self, at: Micros) -> f32 {
+    pub(crate) fn temperature(&self, at: Instant) -> f32 {
         let minutes = at.since(self.start).seconds() / 60.0;
         25.0 + 10.0 * minutes / (minutes + 2.0)
     }
@@ -154,11 +154,11 @@ impl ImuModel {
     ///
     /// For comparisons with recordings that were filtered in other ways; flight code wants
     /// [`Imu::next`](stampfly_drivers::Imu::next).
-    pub async fn next_group(&mut self) -> (Micros, [[i16; 6]; GROUP]) {
+    pub async fn next_group(&mut self) -> (Instant, [[i16; 6]; GROUP]) {
         let now = self.clock.now();
         if now.since(self.schedule.instant(self.cursor)) > MEMORY {
             // Overrun: the oldest samples are gone, and what the filter remembers with them.
-            let first = self.schedule.upcoming(now, MEMORY.0 as f64 * 0.5);
+            let first = self.schedule.upcoming(now, MEMORY.as_micros() as f64 * 0.5);
             self.cursor = first;
             self.decimator = Decimator::default();
         }

@@ -7,11 +7,11 @@ use crate::world::World;
 use core::convert::Infallible;
 use nalgebra::Vector3;
 use stampfly_drivers::{Magnetometer, Sample};
-use stampfly_types::Micros;
 use stampfly_types::messages::MagData;
+use stampfly_types::{Duration, Instant};
 
 pub(crate) const RATE: f64 = 25.0;
-const READ_OUT: Micros = Micros(300);
+const READ_OUT: Duration = Duration::from_micros(300);
 /// The Earth's field in Kanazawa, world NED, µT (World Magnetic Model, rounded): 49° of dip, 8° west.
 const FIELD: [f64; 3] = [30.8, -4.3, 36.4];
 /// Standard deviation of one sample, µT (static records).
@@ -45,7 +45,7 @@ impl MagPhysics {
     }
 
     /// One conversion at `at`, µT, body.
-    pub(crate) fn field(&mut self, at: Micros) -> Vector3<f64> {
+    pub(crate) fn field(&mut self, at: Instant) -> Vector3<f64> {
         let motion = self.world.motion_at(at);
         let motors = (motion.current - self.idle_current).max(0.0) * (1.0 + FLICKER * self.noise.normal());
         motion.attitude.inverse_transform_vector(&Vector3::from(FIELD))
@@ -84,7 +84,7 @@ impl Magnetometer for MagModel {
     type Error = Infallible;
 
     async fn next(&mut self) -> Result<Sample<MagData>, Infallible> {
-        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.0 as f64);
+        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.as_micros() as f64);
         let at = self.schedule.instant(number);
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);

@@ -6,11 +6,11 @@ use crate::time::Clock;
 use crate::world::World;
 use core::convert::Infallible;
 use stampfly_drivers::{PowerMonitor, Sample};
-use stampfly_types::Micros;
 use stampfly_types::messages::PowerData;
+use stampfly_types::{Duration, Instant};
 
 pub(crate) const RATE: f64 = 10.0;
-const READ_OUT: Micros = Micros(300);
+const READ_OUT: Duration = Duration::from_micros(300);
 /// Resolution of the voltage, V.
 const VOLTAGE_STEP: f64 = 0.008;
 /// Resolution of the current, A: 40 µV over 10 mΩ.
@@ -24,11 +24,11 @@ pub(crate) struct PowerPhysics {
     /// Gain error of the shunt and the amplifier.
     gain: f64,
     /// Charge drawn at the previous sample, and when that was.
-    before: (f64, Micros),
+    before: (f64, Instant),
 }
 
 impl PowerPhysics {
-    pub(crate) fn new(world: &World, start: Micros, mut noise: Noise) -> Self {
+    pub(crate) fn new(world: &World, start: Instant, mut noise: Noise) -> Self {
         Self {
             gain: 1.0 + noise.within(0.02),
             noise,
@@ -38,7 +38,7 @@ impl PowerPhysics {
     }
 
     /// Voltage now, V, and mean current since the call before, A.
-    pub(crate) fn measure(&mut self, now: Micros) -> [f64; 2] {
+    pub(crate) fn measure(&mut self, now: Instant) -> [f64; 2] {
         self.world.advance_to(now);
         let (voltage, drawn) = self.world.inspect(|plant| (plant.battery().voltage(), plant.battery().drawn()));
         let mean = (drawn - self.before.0) / f64::from(now.since(self.before.1).seconds()).max(1e-3);
@@ -48,11 +48,13 @@ impl PowerPhysics {
     }
 
     /// Voltage, V, and current, A, averaged over a conversion, as far as the world remembers it.
-    pub(crate) fn mean(&mut self, begin: Micros, end: Micros) -> [f64; 2] {
+    pub(crate) fn mean(&mut self, begin: Instant, end: Instant) -> [f64; 2] {
         const POINTS: u64 = 8;
-        let length = end.since(begin).0;
+        let length = end.since(begin).as_micros();
         let current = (0..POINTS)
-            .map(|point| self.world.motion_at(begin + Micros(length * (2 * point + 1) / (2 * POINTS))).current)
+            .map(|point| {
+                self.world.motion_at(begin + Duration::from_micros(length * (2 * point + 1) / (2 * POINTS))).current
+            })
             .sum::<f64>()
             / POINTS as f64;
         let voltage = self.world.inspect(|plant| plant.battery().voltage()) + 0.003 * self.noise.normal();
@@ -83,7 +85,7 @@ impl PowerMonitor for PowerModel {
     type Error = Infallible;
 
     async fn next(&mut self) -> Result<Sample<PowerData>, Infallible> {
-        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.0 as f64);
+        let number = self.schedule.upcoming(self.clock.now(), READ_OUT.as_micros() as f64);
         let at = self.schedule.instant(number);
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);

@@ -1,7 +1,7 @@
 //! When a chip converts: its own clock, which is not the processor's.
 
 use crate::noise::Noise;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Conversions at a fixed rate, numbered from zero.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,9 +13,9 @@ pub(crate) struct Schedule {
 
 impl Schedule {
     /// Nominally `rate` hertz, off by up to the share `tolerance`, starting anywhere within the first period.
-    pub(crate) fn new(start: Micros, rate: f64, tolerance: f64, noise: &mut Noise) -> Self {
+    pub(crate) fn new(start: Instant, rate: f64, tolerance: f64, noise: &mut Noise) -> Self {
         let period = 1e6 / rate * (1.0 + noise.within(tolerance));
-        Self { first: start.0 as f64 + period * noise.unit(), period, next: 0 }
+        Self { first: start.as_micros() as f64 + period * noise.unit(), period, next: 0 }
     }
 
     /// Length of one period by the chip's clock, in true microseconds.
@@ -24,19 +24,19 @@ impl Schedule {
     }
 
     /// The instant of conversion `number`.
-    pub(crate) fn instant(&self, number: u64) -> Micros {
-        Micros((self.first + number as f64 * self.period) as u64)
+    pub(crate) fn instant(&self, number: u64) -> Instant {
+        Instant::from_micros((self.first + number as f64 * self.period) as u64)
     }
 
     /// Periods between conversion zero and the end of this microsecond; at the instant of a conversion at least its number.
-    pub(crate) fn phase(&self, at: Micros) -> f64 {
-        (at.0 as f64 + 1.0 - self.first) / self.period
+    pub(crate) fn phase(&self, at: Instant) -> f64 {
+        (at.as_micros() as f64 + 1.0 - self.first) / self.period
     }
 
     /// The conversion to report next: the one after the last reported, unless newer ones have already replaced it
     /// in the chip's registers by `now`. A conversion can be read `latency` microseconds after its instant.
-    pub(crate) fn upcoming(&self, now: Micros, latency: f64) -> u64 {
-        let ready = (now.0 as f64 - latency - self.first) / self.period;
+    pub(crate) fn upcoming(&self, now: Instant, latency: f64) -> u64 {
+        let ready = (now.as_micros() as f64 - latency - self.first) / self.period;
         self.next.max(ready.max(0.0) as u64)
     }
 
@@ -49,21 +49,22 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_types::Duration;
 
     #[test]
     fn nothing_is_reported_twice_and_a_late_reader_gets_the_newest() {
-        let mut schedule = Schedule::new(Micros::from_secs(1), 100.0, 0.02, &mut Noise::new(1, 1));
+        let mut schedule = Schedule::new(Instant::from_secs(1), 100.0, 0.02, &mut Noise::new(1, 1));
         assert!((schedule.period() / 10_000.0 - 1.0).abs() <= 0.02);
-        let mut now = Micros::from_secs(1);
+        let mut now = Instant::from_secs(1);
         for expected in 0..5 {
             let number = schedule.upcoming(now, 500.0);
             assert_eq!(number, expected);
-            now = schedule.instant(number) + Micros(500);
+            now = schedule.instant(number) + Duration::from_micros(500);
             schedule.reported(number);
         }
-        now = schedule.instant(20) + Micros(600);
+        now = schedule.instant(20) + Duration::from_micros(600);
         assert_eq!(schedule.upcoming(now, 500.0), 20, "it is ready and the newest");
-        now = schedule.instant(20) + Micros(400);
+        now = schedule.instant(20) + Duration::from_micros(400);
         assert_eq!(schedule.upcoming(now, 500.0), 19, "the next one is not ready yet");
     }
 }

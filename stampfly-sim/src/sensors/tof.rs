@@ -7,12 +7,12 @@ use crate::world::World;
 use core::convert::Infallible;
 use nalgebra::Vector3;
 use stampfly_drivers::{RangeFinder, Sample};
-use stampfly_types::Micros;
 use stampfly_types::messages::TofData;
+use stampfly_types::{Duration, Instant};
 
 pub(crate) const RATE: f64 = 30.0;
 /// Reading 134 bytes over a 400 kHz bus.
-const READ_OUT: Micros = Micros(3_200);
+const READ_OUT: Duration = Duration::from_micros(3_200);
 /// Shortest range that can be told from the cover glass, m.
 const MINIMUM: f64 = 0.020;
 /// Longest range with enough light coming back, m.
@@ -50,7 +50,7 @@ pub(crate) struct RangePhysics {
 
 impl RangePhysics {
     /// The physics and the times of its measurements.
-    pub(crate) fn new(world: &World, start: Micros, seed: u64, mount: Mount) -> (Self, Schedule) {
+    pub(crate) fn new(world: &World, start: Instant, seed: u64, mount: Mount) -> (Self, Schedule) {
         let (stream, beam) = match mount {
             Mount::Bottom => (Stream::BottomTof, Vector3::z()),
             Mount::Front => (Stream::FrontTof, Vector3::x()),
@@ -60,14 +60,14 @@ impl RangePhysics {
         (Self { offset: noise.within(0.003), noise, beam, world: world.clone() }, schedule)
     }
 
-    fn true_distance(&self, instant: Micros) -> Option<f64> {
+    fn true_distance(&self, instant: Instant) -> Option<f64> {
         let motion = self.world.motion_at(instant);
         let slope = (motion.attitude * self.beam).z;
         (slope > 1e-3).then(|| -motion.position.z / slope)
     }
 
     /// A measurement around `instant`.
-    pub(crate) fn measure(&mut self, instant: Micros) -> TofData {
+    pub(crate) fn measure(&mut self, instant: Instant) -> TofData {
         let distance = self.true_distance(instant);
         // The same number of draws whatever happens, so that one flight's noise does not depend on its course.
         let (lost, normal) = (self.noise.chance(DROPOUTS), self.noise.normal());
@@ -124,7 +124,7 @@ impl RangeModel {
 
     /// The true distance along the beam to the floor at `instant`; `None` when the beam misses it.
     #[must_use]
-    pub fn true_distance(&self, instant: Micros) -> Option<f64> {
+    pub fn true_distance(&self, instant: Instant) -> Option<f64> {
         self.physics.true_distance(instant)
     }
 }
@@ -134,12 +134,12 @@ impl RangeFinder for RangeModel {
 
     async fn next(&mut self) -> Result<Sample<TofData>, Infallible> {
         let period = self.schedule.period();
-        let latency = period + READ_OUT.0 as f64;
+        let latency = period + READ_OUT.as_micros() as f64;
         let number = self.schedule.upcoming(self.clock.now(), latency);
         let begin = self.schedule.instant(number);
-        self.clock.sleep_until(begin + Micros(latency as u64)).await;
+        self.clock.sleep_until(begin + Duration::from_micros(latency as u64)).await;
         self.schedule.reported(number);
-        let at = begin + Micros((0.5 * period) as u64);
+        let at = begin + Duration::from_micros((0.5 * period) as u64);
         Ok(Sample { at, data: self.physics.measure(at) })
     }
 }

@@ -10,25 +10,25 @@ use core::pin::Pin;
 use core::task::{Context, Poll};
 use embedded_hal_async::delay::DelayNs;
 use stampfly_drivers::Timebase;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
 #[derive(Debug)]
 struct State {
-    now: Cell<Micros>,
+    now: Cell<Instant>,
     /// Earliest deadline asked for since the executor last looked.
-    wanted: Cell<Option<Micros>>,
+    wanted: Cell<Option<Instant>>,
 }
 
 /// A clock on virtual time. Clones show the same time.
 ///
 /// ```
 /// use stampfly_sim::time::{Clock, block_on};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
-/// let clock = Clock::new(Micros::from_secs(3600));
-/// block_on(&clock, clock.sleep_until(Micros::from_secs(7200)));
-/// assert_eq!(clock.now(), Micros::from_secs(7200));
+/// let clock = Clock::new(Instant::from_secs(3600));
+/// block_on(&clock, clock.sleep_until(Instant::from_secs(7200)));
+/// assert_eq!(clock.now(), Instant::from_secs(7200));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Clock(Rc<State>);
@@ -36,36 +36,36 @@ pub struct Clock(Rc<State>);
 impl Clock {
     /// A clock that shows `start`.
     #[must_use]
-    pub fn new(start: Micros) -> Self {
+    pub fn new(start: Instant) -> Self {
         Self(Rc::new(State { now: Cell::new(start), wanted: Cell::new(None) }))
     }
 
     /// The present instant.
     #[must_use]
-    pub fn now(&self) -> Micros {
+    pub fn now(&self) -> Instant {
         self.0.now.get()
     }
 
     /// Moves the clock on. It never goes back: an earlier instant changes nothing.
     ///
     /// [`Tasks`](super::Tasks) calls this; call it yourself only where no executor runs.
-    pub fn advance_to(&self, instant: Micros) {
+    pub fn advance_to(&self, instant: Instant) {
         self.0.now.set(self.now().max(instant));
     }
 
     /// Waits until the clock shows at least `deadline`.
-    pub fn sleep_until(&self, deadline: Micros) -> Sleep {
+    pub fn sleep_until(&self, deadline: Instant) -> Sleep {
         Sleep { clock: self.clone(), deadline }
     }
 
     /// The earliest deadline asked for since the last call.
-    pub(super) fn take_wanted(&self) -> Option<Micros> {
+    pub(super) fn take_wanted(&self) -> Option<Instant> {
         self.0.wanted.take()
     }
 }
 
 impl Timebase for Clock {
-    fn now(&self) -> Micros {
+    fn now(&self) -> Instant {
         Clock::now(self)
     }
 }
@@ -73,14 +73,14 @@ impl Timebase for Clock {
 impl DelayNs for Clock {
     /// Waits at least this long; the clock counts microseconds, so a fraction of one is a whole one.
     async fn delay_ns(&mut self, ns: u32) {
-        self.sleep_until(self.now() + Micros(u64::from(ns).div_ceil(1_000))).await;
+        self.sleep_until(self.now() + Duration::from_micros(u64::from(ns).div_ceil(1_000))).await;
     }
 }
 
 impl embedded_hal::delay::DelayNs for Clock {
     /// Moves the clock on at once. Where other tasks share the clock they run late, as beside any blocking driver.
     fn delay_ns(&mut self, ns: u32) {
-        self.advance_to(self.now() + Micros(u64::from(ns).div_ceil(1_000)));
+        self.advance_to(self.now() + Duration::from_micros(u64::from(ns).div_ceil(1_000)));
     }
 }
 
@@ -89,7 +89,7 @@ impl embedded_hal::delay::DelayNs for Clock {
 #[must_use = "a future does nothing until it is awaited"]
 pub struct Sleep {
     clock: Clock,
-    deadline: Micros,
+    deadline: Instant,
 }
 
 impl Future for Sleep {

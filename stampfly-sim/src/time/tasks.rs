@@ -9,7 +9,7 @@ use core::future::Future;
 use core::pin::{Pin, pin};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::task::{Context, Poll, Waker};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use std::sync::Arc;
 use std::task::Wake;
 
@@ -34,7 +34,7 @@ impl Wake for Bell {
 
 struct Task<'a> {
     future: Pin<Box<dyn Future<Output = ()> + 'a>>,
-    deadline: Option<Micros>,
+    deadline: Option<Instant>,
     bell: Arc<Bell>,
     waker: Waker,
 }
@@ -44,23 +44,23 @@ struct Task<'a> {
 /// ```
 /// use std::cell::RefCell;
 /// use stampfly_sim::time::{Clock, Tasks};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
-/// let clock = Clock::new(Micros::ZERO);
+/// let clock = Clock::new(Instant::ZERO);
 /// let seen = RefCell::new(Vec::new());
 /// let (log, watch) = (&seen, &clock);
 /// let mut tasks = Tasks::new(clock.clone());
 /// for (name, period) in [("slow", 50), ("fast", 20)] {
 ///     tasks.spawn(async move {
 ///         for tick in 1..=2 {
-///             watch.sleep_until(Micros::from_millis(tick * period)).await;
-///             log.borrow_mut().push((watch.now().0 / 1000, name));
+///             watch.sleep_until(Instant::from_millis(tick * period)).await;
+///             log.borrow_mut().push((watch.now().as_micros() / 1000, name));
 ///         }
 ///     });
 /// }
-/// tasks.run_until(Micros::from_millis(90));
+/// tasks.run_until(Instant::from_millis(90));
 /// drop(tasks);
-/// assert_eq!(clock.now(), Micros::from_millis(90));
+/// assert_eq!(clock.now(), Instant::from_millis(90));
 /// assert_eq!(seen.into_inner(), [(20, "fast"), (40, "fast"), (50, "slow")]);
 /// ```
 pub struct Tasks<'a> {
@@ -98,14 +98,14 @@ impl<'a> Tasks<'a> {
 
     /// The instant of the next step; `None` when no task waits for time.
     #[must_use]
-    pub fn next_deadline(&self) -> Option<Micros> {
+    pub fn next_deadline(&self) -> Option<Instant> {
         if self.any_rung.load(Ordering::Relaxed) { Some(self.clock.now()) } else { self.earliest() }
     }
 
     /// Runs everything that is due at the next deadline, and returns that instant.
     ///
     /// `None`, and nothing done, when no task waits for time.
-    pub fn step(&mut self) -> Option<Micros> {
+    pub fn step(&mut self) -> Option<Instant> {
         self.clock.advance_to(self.next_deadline()?);
         self.answer_bells();
         while let Some((_, index)) = self.first_due() {
@@ -116,19 +116,19 @@ impl<'a> Tasks<'a> {
     }
 
     /// Runs everything that is due up to and including `instant`, where the clock then stands.
-    pub fn run_until(&mut self, instant: Micros) {
+    pub fn run_until(&mut self, instant: Instant) {
         while self.next_deadline().is_some_and(|deadline| deadline <= instant) {
             self.step();
         }
         self.clock.advance_to(instant);
     }
 
-    fn earliest(&self) -> Option<Micros> {
+    fn earliest(&self) -> Option<Instant> {
         self.tasks.iter().flatten().filter_map(|task| task.deadline).min()
     }
 
     /// The task with the smallest (deadline, spawn order) whose deadline has passed.
-    fn first_due(&self) -> Option<(Micros, usize)> {
+    fn first_due(&self) -> Option<(Instant, usize)> {
         let now = self.clock.now();
         let deadlines =
             self.tasks.iter().enumerate().filter_map(|(index, task)| Some((task.as_ref()?.deadline?, index)));
@@ -181,28 +181,28 @@ mod tests {
 
     #[test]
     fn tasks_due_together_run_in_spawn_order() {
-        let clock = Clock::new(Micros::ZERO);
+        let clock = Clock::new(Instant::ZERO);
         let order = RefCell::new(String::new());
         let mut tasks = Tasks::new(clock.clone());
         for name in ['a', 'b', 'c'] {
             let (clock, order) = (clock.clone(), &order);
             tasks.spawn(async move {
                 for tick in 1..=3 {
-                    clock.sleep_until(Micros(tick * 10)).await;
+                    clock.sleep_until(Instant::from_micros(tick * 10)).await;
                     order.borrow_mut().push(name);
                 }
             });
         }
-        assert_eq!(tasks.next_deadline(), Some(Micros::ZERO), "fresh tasks are due now");
+        assert_eq!(tasks.next_deadline(), Some(Instant::ZERO), "fresh tasks are due now");
         while tasks.step().is_some() {}
         assert!(tasks.is_empty());
-        assert_eq!(clock.now(), Micros(30));
+        assert_eq!(clock.now(), Instant::from_micros(30));
         assert_eq!(*order.borrow(), "abcabcabc");
     }
 
     #[test]
     fn a_task_that_waits_for_another_runs_within_the_same_instant() {
-        let clock = Clock::new(Micros::ZERO);
+        let clock = Clock::new(Instant::ZERO);
         let queue: RefCell<(VecDeque<u32>, Option<Waker>)> = RefCell::default();
         let got = RefCell::new(Vec::new());
         let mut tasks = Tasks::new(clock.clone());
@@ -219,29 +219,29 @@ mod tests {
         });
         tasks.spawn(async {
             for value in 1..=2 {
-                clock.sleep_until(Micros(100 * u64::from(value))).await;
+                clock.sleep_until(Instant::from_micros(100 * u64::from(value))).await;
                 queue.borrow_mut().0.push_back(value);
                 if let Some(waker) = queue.borrow_mut().1.take() {
                     waker.wake();
                 }
             }
         });
-        tasks.run_until(Micros(1_000));
+        tasks.run_until(Instant::from_micros(1_000));
         assert_eq!(tasks.next_deadline(), None);
-        assert_eq!(*got.borrow(), [(Micros(100), 1), (Micros(200), 2)]);
+        assert_eq!(*got.borrow(), [(Instant::from_micros(100), 1), (Instant::from_micros(200), 2)]);
     }
 
     #[test]
     fn a_sleep_that_was_dropped_leaves_no_deadline() {
-        let clock = Clock::new(Micros::ZERO);
+        let clock = Clock::new(Instant::ZERO);
         let mut tasks = Tasks::new(clock.clone());
         let sleeper = clock.clone();
         tasks.spawn(async move {
             let mut polled = false;
             poll_fn(move |_| if std::mem::replace(&mut polled, true) { Poll::Ready(()) } else { Poll::Pending }).await;
-            sleeper.sleep_until(Micros(5)).await;
+            sleeper.sleep_until(Instant::from_micros(5)).await;
         });
-        assert_eq!(tasks.step(), Some(Micros::ZERO));
+        assert_eq!(tasks.step(), Some(Instant::ZERO));
         assert_eq!(tasks.next_deadline(), None, "it waits for a bell that nobody rings");
         assert_eq!(tasks.len(), 1);
     }
@@ -249,13 +249,13 @@ mod tests {
     #[test]
     fn delays_round_up_and_never_end_early() {
         use embedded_hal_async::delay::DelayNs;
-        let clock = Clock::new(Micros(7));
+        let clock = Clock::new(Instant::from_micros(7));
         let mut delay = clock.clone();
         block_on(&clock, delay.delay_ns(1));
-        assert_eq!(clock.now(), Micros(8));
+        assert_eq!(clock.now(), Instant::from_micros(8));
         block_on(&clock, delay.delay_ms(2));
-        assert_eq!(clock.now(), Micros(2_008));
-        clock.advance_to(Micros::ZERO);
-        assert_eq!(clock.now(), Micros(2_008), "time does not go back");
+        assert_eq!(clock.now(), Instant::from_micros(2_008));
+        clock.advance_to(Instant::ZERO);
+        assert_eq!(clock.now(), Instant::from_micros(2_008), "time does not go back");
     }
 }

@@ -22,21 +22,21 @@ use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::sensors::Sensors;
 use stampfly_sim::time::{Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// Samples of one source: when, and the channels.
-type Series<const N: usize> = Vec<(Micros, [f32; N])>;
+type Series<const N: usize> = Vec<(Instant, [f32; N])>;
 
 /// The flight: stand for a second, climb to 0.8 m, hover in gusts.
-const END: Micros = Micros::from_secs(14);
+const END: Instant = Instant::from_secs(14);
 /// Compared from here on: every driver runs and the vehicle hovers.
-const BEGIN: Micros = Micros::from_secs(3);
+const BEGIN: Instant = Instant::from_secs(3);
 
 /// Counts of the inertial sensor: ±8 g and ±2000 °/s in 16 bits.
 const IMU: [f32; 6] = [0.0024, 0.0024, 0.0024, 0.001, 0.001, 0.001];
 
 /// A series at this instant, between its neighbours.
-fn at<const N: usize>(series: &Series<N>, instant: Micros) -> Option<[f32; N]> {
+fn at<const N: usize>(series: &Series<N>, instant: Instant) -> Option<[f32; N]> {
     let after = series.partition_point(|(at, _)| *at < instant);
     let ((begin, before), (end, next)) = (series.get(after.checked_sub(1)?)?, series.get(after)?);
     let share = instant.since(*begin).seconds() / end.since(*begin).seconds().max(1e-6);
@@ -57,7 +57,7 @@ fn difference<const N: usize>(driver: &Series<N>, model: &Series<N>) -> [f32; N]
 /// Running sums: what was counted between the begin of the comparison and each instant.
 fn summed(series: &Series<2>) -> Series<2> {
     let mut sum = [0.0; 2];
-    let add = |(at, [x, y]): &(Micros, [f32; 2])| {
+    let add = |(at, [x, y]): &(Instant, [f32; 2])| {
         sum = [sum[0] + x, sum[1] + y];
         (*at, sum)
     };
@@ -90,7 +90,7 @@ fn compare(seed: u64) {
     let board = Board::new(&world, &clock, &config, &image);
     let Sensors { imu, flow, tof, mag, baro, power, mut motors, .. } = sensors;
     // Every chip has started up.
-    clock.advance_to(Micros::from_millis(60));
+    clock.advance_to(Instant::from_millis(60));
 
     let [imu_driver, imu_model] = [const { RefCell::new(Series::<6>::new()) }; 2];
     let [flow_driver, flow_model] = [const { RefCell::new(Series::<2>::new()) }; 2];
@@ -139,10 +139,10 @@ fn compare(seed: u64) {
         loop {
             let now = pilot_clock.now();
             let truth = pilot_world.truth_at(now);
-            if now > Micros::from_secs(1) {
+            if now > Instant::from_secs(1) {
                 let Ok(()) = motors.write(&pilot::fly(&truth, -0.8));
             }
-            pilot_clock.sleep_until(now + Micros(2_500)).await;
+            pilot_clock.sleep_until(now + Duration::from_micros(2_500)).await;
         }
     });
     tasks.run_until(END);

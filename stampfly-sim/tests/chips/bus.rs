@@ -5,7 +5,7 @@ use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource, Operation};
 use embedded_hal::spi::Operation as SpiOperation;
 use stampfly_sim::chips::{Bmp280, BusError, Chip, Faults, I2cBus, Pmw3901, SpiBus, SpiChip};
 use stampfly_sim::time::{Clock, Tasks, block_on};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 
 const ADDRESS: u8 = 0x76;
@@ -31,13 +31,13 @@ fn both_traits_cost_the_bits_of_the_transfer() {
     let mut data = [0; 24];
     // Start, address, register, start, address, 24 bytes, stop: 246 bits of 2.5 µs.
     block_on(&clock, embedded_hal_async::i2c::I2c::write_read(&mut bus, ADDRESS, &[0x88], &mut data)).unwrap();
-    assert_eq!(clock.now(), Micros(615));
+    assert_eq!(clock.now(), Instant::from_micros(615));
     embedded_hal::i2c::I2c::write_read(&mut bus, ADDRESS, &[0x88], &mut data).unwrap();
-    assert_eq!(clock.now(), Micros(1_230));
+    assert_eq!(clock.now(), Instant::from_micros(1_230));
     // Two writes in a row are one: no second start.
     let mut operations = [Operation::Write(&[0xF5]), Operation::Write(&[0])];
     embedded_hal::i2c::I2c::transaction(&mut bus, ADDRESS, &mut operations).unwrap();
-    assert_eq!(clock.now(), Micros(1_230 + 73));
+    assert_eq!(clock.now(), Instant::from_micros(1_230 + 73));
 }
 
 #[test]
@@ -51,10 +51,10 @@ fn tasks_share_the_bus_one_after_the_other() {
             let mut id = [0];
             embedded_hal_async::i2c::I2c::write_read(&mut bus, ADDRESS, &[0xD0], &mut id).await.unwrap();
             assert_eq!(id, [0x58]);
-            ends.borrow_mut().push(clock.now().0);
+            ends.borrow_mut().push(clock.now().as_micros());
         });
     }
-    tasks.run_until(Micros::from_millis(1));
+    tasks.run_until(Instant::from_millis(1));
     drop(tasks);
     assert_eq!(ends.into_inner(), [98, 196, 294]);
 }
@@ -63,7 +63,7 @@ fn tasks_share_the_bus_one_after_the_other() {
 fn an_absent_or_dead_chip_does_not_acknowledge_and_costs_one_byte() {
     let (clock, mut bus, chip) = bus(1);
     assert_eq!(embedded_hal::i2c::I2c::write(&mut bus, 0x77, &[0; 100]), Err(NACK));
-    assert_eq!(clock.now(), Micros(28), "eleven bits");
+    assert_eq!(clock.now(), Instant::from_micros(28), "eleven bits");
     chip.set_faults(Faults { dead: true, ..Default::default() });
     assert_eq!(id(&mut bus), Err(NACK));
     chip.set_faults(Faults::default());
@@ -78,7 +78,7 @@ fn a_held_data_line_blocks_everybody_until_nine_pulses() {
     for _ in 0..3 {
         let before = clock.now();
         assert_eq!(id(&mut bus), Err(BusError::ArbitrationLost));
-        assert!(clock.now().since(before) < Micros(10), "no endless wait");
+        assert!(clock.now().since(before) < Duration::from_micros(10), "no endless wait");
     }
     (0..8).for_each(|_| bus.pulse_scl());
     assert!(!bus.sda_is_high());
@@ -107,15 +107,15 @@ fn refusals_and_bit_errors_come_at_their_rate_and_repeat_with_the_seed() {
 #[test]
 fn a_chip_may_stretch_the_clock() {
     let (clock, mut bus, chip) = bus(1);
-    chip.set_faults(Faults { stretch: Micros(700), ..Default::default() });
+    chip.set_faults(Faults { stretch: Duration::from_micros(700), ..Default::default() });
     assert_eq!(id(&mut bus), Ok(0x58));
-    assert_eq!(clock.now(), Micros(798));
+    assert_eq!(clock.now(), Instant::from_micros(798));
 }
 
 #[test]
 fn another_part_shows_in_the_identity_and_a_reset_in_the_settings() {
     let (clock, mut bus, chip) = bus(1);
-    clock.advance_to(Micros::from_millis(3));
+    clock.advance_to(Instant::from_millis(3));
     chip.set_id(0x60);
     assert_eq!(id(&mut bus), Ok(0x60));
     embedded_hal::i2c::I2c::write(&mut bus, ADDRESS, &[0xF5, 0x48]).unwrap();
@@ -130,7 +130,7 @@ fn another_part_shows_in_the_identity_and_a_reset_in_the_settings() {
 #[test]
 fn a_dropped_transfer_occupies_the_line_and_changes_nothing() {
     let (clock, bus, _) = bus(1);
-    clock.advance_to(Micros::from_millis(3));
+    clock.advance_to(Instant::from_millis(3));
     let start = clock.now();
     let mut dropped = bus.clone();
     {
@@ -141,7 +141,7 @@ fn a_dropped_transfer_occupies_the_line_and_changes_nothing() {
     let mut bus = bus;
     let mut config = [9];
     block_on(&clock, embedded_hal_async::i2c::I2c::write_read(&mut bus, ADDRESS, &[0xF5], &mut config)).unwrap();
-    assert_eq!((config, clock.now().since(start)), ([0], Micros(73 + 98)));
+    assert_eq!((config, clock.now().since(start)), ([0], Duration::from_micros(73 + 98)));
 }
 
 /// A chip that answers the byte before and notes when.
@@ -153,11 +153,11 @@ struct Echo {
 }
 
 impl Chip for Echo {
-    fn read(&mut self, _: u16, _: Micros) -> u16 {
+    fn read(&mut self, _: u16, _: Instant) -> u16 {
         u16::from(self.releases)
     }
-    fn write(&mut self, _: u16, _: u16, _: Micros) {}
-    fn reset(&mut self, _: Micros) {
+    fn write(&mut self, _: u16, _: u16, _: Instant) {}
+    fn reset(&mut self, _: Instant) {
         *self = Self::default();
     }
     fn set_id(&mut self, _: u16) {}
@@ -166,11 +166,11 @@ impl Chip for Echo {
 impl SpiChip for Echo {
     const HIGHEST_CLOCK: u32 = 10_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
-        self.times.push((index, now.0));
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+        self.times.push((index, now.as_micros()));
         core::mem::replace(&mut self.last, byte)
     }
-    fn release(&mut self, _: Micros) {
+    fn release(&mut self, _: Instant) {
         self.releases += 1;
         self.times.clear();
     }
@@ -179,17 +179,17 @@ impl SpiChip for Echo {
 #[test]
 fn spi_transfers_cost_their_bits_and_delays() {
     use embedded_hal::spi::Operation;
-    let clock = Clock::new(Micros::ZERO);
+    let clock = Clock::new(Instant::ZERO);
     let bus = SpiBus::new(&clock, 1);
     let (mut fast, attached) = bus.attach(8_000_000, Echo::default());
     let (mut slow, _) = bus.attach(2_000_000, Echo::default());
     let mut read = [0; 3];
     embedded_hal::spi::SpiDevice::transfer(&mut fast, &mut read, &[1, 2, 3]).unwrap();
-    assert_eq!((read, clock.now()), ([0, 1, 2], Micros(3)));
+    assert_eq!((read, clock.now()), ([0, 1, 2], Instant::from_micros(3)));
     let mut answer = [0; 2];
     let mut operations = [Operation::Write(&[7]), Operation::DelayNs(35_000), Operation::Read(&mut answer)];
     block_on(&clock, embedded_hal_async::spi::SpiDevice::transaction(&mut slow, &mut operations)).unwrap();
-    assert_eq!((answer, clock.now()), ([7, 0], Micros(3 + 4 + 35 + 8)));
+    assert_eq!((answer, clock.now()), ([7, 0], Instant::from_micros(3 + 4 + 35 + 8)));
 
     attached.set_faults(Faults { dead: true, ..Default::default() });
     embedded_hal::spi::SpiDevice::transfer_in_place(&mut fast, &mut read).unwrap();
@@ -228,7 +228,7 @@ fn two_chips_share_the_spi_wires_one_after_the_other() {
     let bus = SpiBus::new(&clock, 1);
     let (imu, _) = bus.attach(8_000_000, Bmi270::new(&simulation.world, &clock, 1, 1.0, &[1]));
     let (flow, _) = bus.attach(2_000_000, Pmw3901::new(&simulation.world, &clock, 1));
-    clock.advance_to(Micros::from_millis(50));
+    clock.advance_to(Instant::from_millis(50));
     let ends = RefCell::new(Vec::new());
     let mut tasks = Tasks::new(clock.clone());
     let (watch, log) = (&clock, &ends);
@@ -237,17 +237,17 @@ fn two_chips_share_the_spi_wires_one_after_the_other() {
         let (mut flow, mut id) = (flow, [0]);
         let mut operations = [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)];
         embedded_hal_async::spi::SpiDevice::transaction(&mut flow, &mut operations).await.unwrap();
-        log.borrow_mut().push((watch.now().0 - 50_000, id[0]));
+        log.borrow_mut().push((watch.now().as_micros() - 50_000, id[0]));
     });
     tasks.spawn(async move {
         let mut imu = imu;
         for _ in 0..2 {
             let mut bytes = [0x80, 0, 0];
             embedded_hal_async::spi::SpiDevice::transfer_in_place(&mut imu, &mut bytes).await.unwrap();
-            log.borrow_mut().push((watch.now().0 - 50_000, bytes[2]));
+            log.borrow_mut().push((watch.now().as_micros() - 50_000, bytes[2]));
         }
     });
-    tasks.run_until(Micros::from_millis(51));
+    tasks.run_until(Instant::from_millis(51));
     drop(tasks);
     // The slow chip holds the wires for 43 µs; the first answer of the other one is the choice of SPI.
     assert_eq!(ends.into_inner(), [(43, 0x49), (46, 0xFF), (49, 0x24)]);
@@ -259,7 +259,7 @@ fn chips_at_one_address_all_listen_and_pull_each_others_ones_down() {
     let simulation = standing();
     let mut bus = I2cBus::new(&simulation.clock, 1);
     let chips = [1, 2].map(|seed| bus.attach(ADDRESS, Bmp280::new(&simulation.world, &simulation.clock, seed)));
-    simulation.clock.advance_to(Micros::from_millis(2));
+    simulation.clock.advance_to(Instant::from_millis(2));
     bus.write(ADDRESS, &[0xF5, 0x08]).unwrap();
     assert_eq!(chips.each_ref().map(|chip| chip.peek(0xF5)), [0x08; 2], "both took it");
     chips[1].set_id(0x61);
@@ -274,16 +274,16 @@ fn chips_at_one_address_all_listen_and_pull_each_others_ones_down() {
 fn a_clock_that_is_too_fast_garbles() {
     use embedded_hal::spi::SpiDevice;
     let simulation = standing();
-    simulation.clock.advance_to(Micros::from_millis(45));
+    simulation.clock.advance_to(Instant::from_millis(45));
     for (frequency, garbles) in [(2_000_000, false), (2_100_000, true)] {
         let chip = Pmw3901::new(&simulation.world, &simulation.clock, 1);
         let (mut port, _) = SpiBus::new(&simulation.clock, 1).attach(frequency, chip);
-        simulation.clock.advance_to(simulation.clock.now() + Micros::from_millis(45));
+        simulation.clock.advance_to(simulation.clock.now() + Duration::from_millis(45));
         let wrong = (0..100).filter(|_| {
             let mut id = [0];
             let mut read = [SpiOperation::Write(&[0]), SpiOperation::DelayNs(35_000), SpiOperation::Read(&mut id)];
             port.transaction(&mut read).unwrap();
-            simulation.clock.advance_to(simulation.clock.now() + Micros(20));
+            simulation.clock.advance_to(simulation.clock.now() + Duration::from_micros(20));
             id != [0x49]
         });
         let wrong = wrong.count();

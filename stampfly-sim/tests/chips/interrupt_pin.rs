@@ -5,7 +5,7 @@ use core::cell::RefCell;
 use embedded_hal::digital::InputPin;
 use embedded_hal_async::digital::Wait;
 use stampfly_sim::time::{Tasks, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// A period of the fastest rate, within the tolerance of the chip's clock, µs.
 const PERIOD: core::ops::RangeInclusive<u64> = 612..=638;
@@ -33,7 +33,7 @@ fn high(chip: &Chip) -> bool {
 fn timed(chip: &Chip, waiting: impl Future<Output = Result<(), core::convert::Infallible>>) -> u64 {
     let begun = chip.simulation.clock.now();
     block_on(&chip.simulation.clock, waiting).unwrap();
-    chip.simulation.clock.now().since(begun).0
+    chip.simulation.clock.now().since(begun).as_micros()
 }
 
 #[test]
@@ -114,14 +114,14 @@ fn a_task_that_waits_runs_at_the_instant_of_the_edge_and_after_transfers() {
     });
     tasks.spawn(async move {
         use embedded_hal_async::spi::SpiDevice;
-        time.sleep_until(begun + Micros(10_000)).await;
+        time.sleep_until(begun + Duration::from_micros(10_000)).await;
         chip.port.write(&[0x58, 0x02]).await.unwrap();
         log.borrow_mut().push(time.now());
-        time.sleep_until(begun + Micros(20_000)).await;
+        time.sleep_until(begun + Duration::from_micros(20_000)).await;
         chip.port.write(&[0x7E, 0xB0]).await.unwrap();
         log.borrow_mut().push(time.now());
     });
-    tasks.run_until(begun + Micros(30_000));
+    tasks.run_until(begun + Duration::from_micros(30_000));
     drop(tasks);
     let [mapped, rose, emptied, fell] = woken.into_inner()[..] else { panic!("four events") };
     assert_eq!((mapped, emptied), (rose, fell), "the writes change the level at once");
@@ -136,7 +136,7 @@ fn no_edge_is_missed_by_a_task_that_runs_late() {
     chip.wait(320);
     if edge.as_mut().poll(&mut context).is_pending() {
         // Several pulses pass while somebody else holds the processor.
-        clock.advance_to(clock.now() + Micros(2_000));
+        clock.advance_to(clock.now() + Duration::from_micros(2_000));
         assert!(edge.as_mut().poll(&mut context).is_ready());
     }
 }

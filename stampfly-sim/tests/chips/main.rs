@@ -14,7 +14,7 @@ mod vl53l3cx;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// A vehicle on the floor in still air.
 fn standing() -> Simulation {
@@ -23,5 +23,5 @@ fn standing() -> Simulation {
 
 /// Lets time pass.
 fn wait(simulation: &Simulation, microseconds: u64) {
-    simulation.clock.advance_to(simulation.clock.now() + Micros(microseconds));
+    simulation.clock.advance_to(simulation.clock.now() + Duration::from_micros(microseconds));
 }

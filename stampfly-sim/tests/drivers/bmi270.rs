@@ -9,7 +9,7 @@ use stampfly_sim::chips::{self, Attached, I2cBus, SpiBus, SpiPort, stand_in_imag
 use stampfly_sim::time::{Clock, Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::messages::ImuData;
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Instant, Vec3};
 
 type Driver<'b> = Bmi270<'b, SpiRegisters<SpiPort<chips::Bmi270>>, Clock>;
 
@@ -24,7 +24,7 @@ fn driver<'b>(port: SpiPort<chips::Bmi270>, clock: &Clock, image: &'b [u8], conf
 }
 
 /// What a call takes.
-fn timed<T>(clock: &Clock, call: impl Future<Output = T>) -> (Micros, T) {
+fn timed<T>(clock: &Clock, call: impl Future<Output = T>) -> (Duration, T) {
     let begun = clock.now();
     let outcome = block_on(clock, call);
     (clock.now().since(begun), outcome)
@@ -59,7 +59,7 @@ fn the_chip_is_told_what_the_configuration_says_in_the_promised_time() {
         let mut imu = driver(port, clock, &image, Config { accel_range, gyro_range, rate });
         let (took, outcome) = timed(clock, imu.start());
         assert_eq!(outcome, Ok(()));
-        assert!((Micros::from_millis(60)..Micros::from_millis(220)).contains(&took), "{took}");
+        assert!((Duration::from_millis(60)..Duration::from_millis(220)).contains(&took), "{took}");
         // Normal bandwidth and performance; low noise of the gyroscope.
         assert_eq!(registers(&attached, 0x40), [0xA0 | r, a, 0xE0 | r, g]);
         // Filtered into the FIFO; headers, accelerometer and gyroscope, oldest given up, no time.
@@ -105,7 +105,7 @@ fn in_flight_every_sample_is_what_the_fifo_held() {
             samples.borrow_mut().push((accel, gyro));
         }
     });
-    tasks.run_until(Micros::from_secs(4));
+    tasks.run_until(Instant::from_secs(4));
     drop(tasks);
     let transfers = transfers.borrow();
     let reads = transfers.iter().filter(|(command, _)| *command == 0xA6);
@@ -135,12 +135,12 @@ fn samples_come_at_the_configured_rate_and_a_late_reader_gets_every_one() {
             if number % 50 == 49 {
                 // 80 ms at 400 Hz, more at the others.
                 late = 32.0 * period;
-                clock.advance_to(clock.now() + Micros(late as u64));
+                clock.advance_to(clock.now() + Duration::from_micros(late as u64));
             }
             let sample = block_on(clock, imu.next()).expect("a sample");
             assert!((sample.data.accel.z + 9.81).abs() < 0.6 && sample.data.gyro.norm() < 0.05, "{sample:?}");
             if let Some(before) = before.replace(sample.at) {
-                let step = sample.at.since(before).0 as f64;
+                let step = sample.at.since(before).as_micros() as f64;
                 // Two per cent of the chip's clock, two ticks, and what the clock is off while nobody looked.
                 let error = (step - period).abs();
                 assert!(
@@ -165,11 +165,11 @@ fn the_self_tests_tell_a_healthy_chip_from_a_broken_one() {
         let expected = if broken { Err(ChipError::SelfTest) } else { Ok(()) };
         let (took, outcome) = timed(clock, imu.self_test());
         assert_eq!(outcome, expected);
-        assert!(took < Micros::from_millis(180), "{took}");
+        assert!(took < Duration::from_millis(180), "{took}");
         assert_eq!(attached.peek(0x6D), 0, "no force is left");
         let (took, outcome) = timed(clock, imu.gyro_self_test());
         assert_eq!(outcome, expected);
-        assert!(took < Micros::from_millis(700), "{took}");
+        assert!(took < Duration::from_millis(700), "{took}");
         let sample = block_on(clock, imu.next()).expect("set up again");
         assert!(broken || (sample.data.accel.z + 9.81).abs() < 0.6, "{sample:?}");
     }
@@ -188,11 +188,11 @@ fn over_i2c_it_measures_the_same() {
         let samples: Vec<_> = (0..400).map(|_| block_on(clock, imu.next()).expect("a sample")).collect();
         assert_eq!(registers(&attached, 0x40), [0xAC, 0x02, 0xEC, 0x00]);
         assert!(samples.iter().all(|sample| (sample.data.accel.z + 9.81).abs() < 0.6), "gravity");
-        let mean = samples[399].at.since(samples[0].at).0 as f64 / 399.0;
+        let mean = samples[399].at.since(samples[0].at).as_micros() as f64 / 399.0;
         assert!((mean / 2_500.0 - 1.0).abs() < 0.025, "{mean} µs between samples");
         for (number, sample) in samples.iter().enumerate() {
             // A tick, and the addresses on the bus.
-            let error = sample.at.0 as f64 - samples[0].at.0 as f64 - mean * number as f64;
+            let error = sample.at.as_micros() as f64 - samples[0].at.as_micros() as f64 - mean * number as f64;
             assert!(error.abs() < 2.0 * (40.0 + 40.0), "seed {seed}, sample {number}: {error} µs off the rhythm");
         }
     }
@@ -210,7 +210,7 @@ fn beside_a_floating_select_it_hardly_ever_starts_until_that_is_driven() {
     let starts: Vec<_> = (0..20).map(|_| timed(clock, imu.start())).collect();
     let failed = starts.iter().filter(|(_, outcome)| outcome.is_err()).count();
     assert!(failed >= 12, "{failed} of 20: {starts:?}");
-    assert!(starts.iter().all(|(took, _)| *took < Micros::from_millis(220)), "none hangs: {starts:?}");
+    assert!(starts.iter().all(|(took, _)| *took < Duration::from_millis(220)), "none hangs: {starts:?}");
     flow.park();
     assert_eq!(block_on(clock, imu.start()), Ok(()));
     assert!((0..100).all(|_| block_on(clock, imu.next()).is_ok()));

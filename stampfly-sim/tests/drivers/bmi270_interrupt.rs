@@ -13,7 +13,7 @@ use stampfly_drivers::chip::bmi270::{Bmi270, Config};
 use stampfly_sim::Simulation;
 use stampfly_sim::chips::{InterruptPin, stand_in_image};
 use stampfly_sim::time::Tasks;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// What may be wrong with the wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,9 +60,9 @@ impl Wait for Pin<'_> {
 /// What came of two seconds.
 struct Run {
     /// When samples were delivered, and for when.
-    samples: Vec<(Micros, Micros)>,
+    samples: Vec<(Instant, Instant)>,
     /// When the pin itself rose: the instants of every fourth sample in the chip.
-    rises: Vec<Micros>,
+    rises: Vec<Instant>,
     /// How often the status was read, all in all.
     looks: usize,
 }
@@ -91,9 +91,9 @@ fn run(seed: u64, before: Wire, after: Wire) -> Run {
             rises.borrow_mut().push(clock.now());
         }
     });
-    tasks.run_until(Micros::from_secs(1));
+    tasks.run_until(Instant::from_secs(1));
     wire.set(after);
-    tasks.run_until(Micros::from_secs(2));
+    tasks.run_until(Instant::from_secs(2));
     drop(tasks);
     // Four frames, push-pull, active high, not latched, watermark on the pin.
     assert_eq!(registers(&attached, 0x46), [52, 0]);
@@ -103,12 +103,12 @@ fn run(seed: u64, before: Wire, after: Wire) -> Run {
 }
 
 /// The longest time from the last chip sample in a delivered one, which is three of them after its stamp, to delivery.
-fn latest(samples: &[(Micros, Micros)]) -> u64 {
-    samples.iter().map(|(seen, at)| seen.since(*at).0.saturating_sub(3 * 625)).max().expect("samples")
+fn latest(samples: &[(Instant, Instant)]) -> u64 {
+    samples.iter().map(|(seen, at)| seen.since(*at).as_micros().saturating_sub(3 * 625)).max().expect("samples")
 }
 
-fn longest_gap(samples: &[(Micros, Micros)]) -> u64 {
-    samples.windows(2).map(|pair| pair[1].0.since(pair[0].0).0).max().expect("samples")
+fn longest_gap(samples: &[(Instant, Instant)]) -> u64 {
+    samples.windows(2).map(|pair| pair[1].0.since(pair[0].0).as_micros()).max().expect("samples")
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn samples_come_by_the_pin_one_look_each() {
         for (seen, at) in &run.samples {
             let rise = run.rises.iter().rev().find(|rise| *rise <= seen).expect("a rise before every sample");
             // The same clock; one tick; the address on the bus.
-            let error = rise.since(*at).0.abs_diff(3 * 625);
+            let error = rise.since(*at).as_micros().abs_diff(3 * 625);
             assert!(error <= 38 + 40 + 4, "seed {seed}: stamped {error} µs off");
         }
     }

@@ -7,7 +7,7 @@ use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters};
 use stampfly_sim::Simulation;
 use stampfly_sim::chips::{self, Attached, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Vec3};
 
 fn bench(config: Config) -> (Simulation, Attached, Bmm150<I2cRegisters<I2cBus>, Clock>) {
     let simulation = standing();
@@ -37,7 +37,7 @@ fn the_chip_is_told_what_the_configuration_says() {
         let begun = simulation.clock.now();
         assert_eq!(block_on(&simulation.clock, driver.start()), Ok(()));
         let took = simulation.clock.now().since(begun);
-        assert!((Micros(6_000)..Micros(9_000)).contains(&took), "7 ms: {took}");
+        assert!((Duration::from_micros(6_000)..Duration::from_micros(9_000)).contains(&took), "7 ms: {took}");
         assert_eq!((attached.peek(0x4B), attached.peek(0x4C), registers(&attached, 0x51)), (1, mode, repetitions));
     }
 }
@@ -53,7 +53,11 @@ fn the_field_is_that_of_the_registers_and_the_models() {
         let expected = Vec3::new(-y as f32, x as f32, z as f32);
         // A count is 0.3 µT.
         assert!((sample.data.field - expected).norm() < 0.001, "{} {expected}", sample.data.field);
-        assert_eq!(clock.now().since(sample.at), Micros(4_892), "the middle of 145 µs · 9 + 500 µs · 15 + 980 µs");
+        assert_eq!(
+            clock.now().since(sample.at),
+            Duration::from_micros(4_892),
+            "the middle of 145 µs · 9 + 500 µs · 15 + 980 µs"
+        );
         read += sample.data.field / 40.0;
         stamps.push(sample.at);
     }
@@ -76,7 +80,7 @@ fn the_self_test_tells_a_healthy_chip_from_a_broken_one() {
         let begun = simulation.clock.now();
         let outcome = block_on(&simulation.clock, driver.self_test());
         assert_eq!(outcome, if broken { Err(ChipError::SelfTest) } else { Ok(()) });
-        assert!(simulation.clock.now().since(begun) < Micros::from_millis(30));
+        assert!(simulation.clock.now().since(begun) < Duration::from_millis(30));
         assert!(block_on(&simulation.clock, driver.next()).is_ok(), "set up again");
     }
 }

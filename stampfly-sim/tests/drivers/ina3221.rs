@@ -48,7 +48,7 @@ fn voltage_and_current_are_those_of_the_registers_and_the_truth() {
         assert!((f64::from(sample.data.voltage) - counts(4) * 0.008).abs() < 1e-5, "{sample:?}");
         assert!((f64::from(sample.data.current) - counts(3) * 0.004).abs() < 1e-5, "{sample:?}");
         assert!((sample.data.voltage - simulation.truth().battery_voltage).abs() < 0.03, "{sample:?}");
-        let age = clock.now().since(sample.at).0;
+        let age = clock.now().since(sample.at).as_micros();
         // The middle of 75 ms, seen within 2 ms.
         assert!((37_000..41_000).contains(&age), "{age} µs");
         stamps.push(sample.at);

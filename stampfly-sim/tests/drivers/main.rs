@@ -27,7 +27,7 @@ use stampfly_sim::plant::WindConfig;
 use stampfly_sim::sensors::MotorModel;
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig, World};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use std::rc::Rc;
 
 /// A vehicle on the floor in still air.
@@ -46,7 +46,7 @@ fn hover(tasks: &mut Tasks<'_>, clock: Clock, world: World, mut motors: MotorMod
         loop {
             let now = clock.now();
             let Ok(()) = motors.write(&pilot::fly(&world.truth_at(now), -0.8));
-            clock.sleep_until(now + Micros(2_500)).await;
+            clock.sleep_until(now + Duration::from_micros(2_500)).await;
         }
     });
 }

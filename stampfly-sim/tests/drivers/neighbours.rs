@@ -7,7 +7,7 @@ use stampfly_drivers::{Barometer, PowerMonitor, SensorError, SensorErrorKind};
 use stampfly_sim::Simulation;
 use stampfly_sim::chips::{self, Attached, Faults, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// A vehicle on the floor in still air, its barometer and its battery monitor on one bus.
 struct Bench {
@@ -26,7 +26,7 @@ fn bench() -> Bench {
     let barometer = bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &clock, 1));
     let monitor = bus.attach(Ina3221::A0_GROUND, chips::Ina3221::new(&simulation.world, &clock, 1));
     // Both start up within two milliseconds.
-    clock.advance_to(clock.now() + Micros::from_millis(5));
+    clock.advance_to(clock.now() + Duration::from_millis(5));
     let baro = Bmp280::new(bus.clone(), Bmp280::SDO_LOW, clock.clone(), bmp280::Config::default());
     let power = Ina3221::new(bus, Ina3221::A0_GROUND, clock.clone(), ina3221::Config::default());
     Bench { simulation, clock, barometer, monitor, baro, power }
@@ -44,7 +44,7 @@ impl Bench {
     }
 
     /// How long a call takes, and what comes of it.
-    fn timed<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> (Micros, T) {
+    fn timed<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> (Duration, T) {
         let begun = self.clock.now();
         let outcome = call(self);
         (self.clock.now().since(begun), outcome)
@@ -70,7 +70,7 @@ fn a_dead_chip_is_an_error_in_time_and_nobody_elses_business() {
     bench.barometer.set_faults(Faults { dead: true, ..Faults::default() });
     for _ in 0..3 {
         let (time, outcome) = bench.timed(Bench::pressure);
-        assert!(outcome.is_err() && time < Micros::from_millis(200), "{outcome:?} after {time:?}");
+        assert!(outcome.is_err() && time < Duration::from_millis(200), "{outcome:?} after {time:?}");
         assert!(bench.voltage().is_ok(), "the neighbour goes on");
     }
     bench.barometer.set_faults(Faults::default());

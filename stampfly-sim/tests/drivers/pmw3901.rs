@@ -8,7 +8,7 @@ use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_sim::chips::{self, Attached, Faults, SpiBus, SpiPort};
 use stampfly_sim::time::{Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 fn soldered(simulation: &Simulation) -> (SpiPort<chips::Pmw3901>, Attached) {
     let chip = chips::Pmw3901::new(&simulation.world, &simulation.clock, 1);
@@ -33,7 +33,7 @@ fn the_start_keeps_every_pause_and_leaves_the_bank_of_the_data() {
     let begun = simulation.clock.now();
     assert_eq!(block_on(&simulation.clock, driver.start()), Ok(()));
     let took = simulation.clock.now().since(begun);
-    assert!((Micros::from_millis(65)..Micros::from_millis(85)).contains(&took), "75 ms: {took}");
+    assert!((Duration::from_millis(65)..Duration::from_millis(85)).contains(&took), "75 ms: {took}");
     // Writes that came too early would be missing: the last of bank 0, and the identity that only this bank shows.
     assert_eq!(registers(&attached, 0x4D), [0x11, 0xA8]);
     assert_eq!([0x5A, 0x5B, 0x40].map(|register| attached.peek(register)), [0x50, 0xA0, 0x80]);
@@ -58,7 +58,7 @@ fn in_flight_every_sample_is_what_the_burst_held() {
             samples.borrow_mut().push(sample);
         }
     });
-    tasks.run_until(Micros::from_secs(6));
+    tasks.run_until(Instant::from_secs(6));
     drop(tasks);
     let (samples, transfers) = (samples.into_inner(), transfers.borrow());
     // The first burst only empties the counts.
@@ -76,7 +76,7 @@ fn in_flight_every_sample_is_what_the_burst_held() {
     for pair in samples.windows(2) {
         let interval = pair[1].at.since(pair[0].at);
         assert!((pair[1].data.interval - interval.seconds()).abs() < 1e-6);
-        assert!((Micros(10_000)..Micros(10_300)).contains(&interval), "{interval}");
+        assert!((Duration::from_micros(10_000)..Duration::from_micros(10_300)).contains(&interval), "{interval}");
     }
 }
 
@@ -91,7 +91,7 @@ fn a_chip_that_lost_its_settings_is_found_out_within_a_second() {
     let begun = clock.now();
     let error = (0..200).find_map(|_| block_on(clock, driver.next()).err());
     assert!(matches!(error, Some(ChipError::Restarted | ChipError::Data)), "{error:?}");
-    assert!(clock.now().since(begun) < Micros::from_millis(1_020), "{}", clock.now().since(begun));
+    assert!(clock.now().since(begun) < Duration::from_millis(1_020), "{}", clock.now().since(begun));
     assert!(block_on(clock, driver.next()).is_ok(), "set up again");
 }
 
@@ -115,7 +115,10 @@ fn after_a_start_that_succeeds_on_a_noisy_bus_it_sees() {
             blind += 1;
             let begun = clock.now();
             while !block_on(clock, driver.next()).is_ok_and(|sample| sample.data.quality > 0) {
-                assert!(clock.now().since(begun) < Micros(10_200_000), "start {started} left it blind for ever");
+                assert!(
+                    clock.now().since(begun) < Duration::from_micros(10_200_000),
+                    "start {started} left it blind for ever"
+                );
             }
         }
     }

@@ -9,14 +9,14 @@ use stampfly_drivers::{Imu, OpticalFlow, Sample};
 use stampfly_sim::chips::{Board, stand_in_image};
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
 use stampfly_types::messages::ImuData;
+use stampfly_types::{Duration, Instant};
 
 /// The flow sensor's longest transfer.
-const LONGEST: Micros = Micros(200);
-const END: Micros = Micros::from_secs(30);
+const LONGEST: Duration = Duration::from_micros(200);
+const END: Instant = Instant::from_secs(30);
 /// Both have started.
-const BEGIN: Micros = Micros::from_secs(1);
+const BEGIN: Instant = Instant::from_secs(1);
 
 /// Asks an inertial sensor again and again.
 async fn deliver(mut imu: impl Imu, note: impl Fn(Sample<ImuData>)) {
@@ -27,7 +27,7 @@ async fn deliver(mut imu: impl Imu, note: impl Fn(Sample<ImuData>)) {
 
 /// The worst of one vehicle, whose inertial sensor's interrupt is wired or not: age of an inertial sample at its
 /// delivery, and time between two flow samples.
-fn worst(seed: u64, wired: bool) -> [Micros; 2] {
+fn worst(seed: u64, wired: bool) -> [Duration; 2] {
     let config = SimulationConfig { seed, ..Default::default() };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
@@ -37,7 +37,7 @@ fn worst(seed: u64, wired: bool) -> [Micros; 2] {
     let (lead, guest, bus) = slots.split(imu, flow, LONGEST);
     let imu = Bmi270::spi(lead, clock.clone(), &image, AxisMap::STAMPFLY_IMU, bmi270::Config::default());
     let mut flow = Pmw3901::new(guest, clock.clone(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default());
-    let [age, interval] = [const { Cell::new(Micros::ZERO) }; 2];
+    let [age, interval] = [const { Cell::new(Duration::ZERO) }; 2];
     let counts = RefCell::new([0; 2]);
     let mut tasks = Tasks::new(clock.clone());
     let note = |sample: Sample<ImuData>| {
@@ -56,7 +56,7 @@ fn worst(seed: u64, wired: bool) -> [Micros; 2] {
         loop {
             let sample = flow.next().await.expect("no error");
             if clock.now() > BEGIN {
-                let gap = before.map_or(Micros::ZERO, |before| sample.at.since(before));
+                let gap = before.map_or(Duration::ZERO, |before| sample.at.since(before));
                 interval.set(interval.get().max(gap));
                 counts.borrow_mut()[1] += 1;
             }
@@ -82,7 +82,7 @@ fn the_lead_never_waits_and_the_guest_hardly() {
         let name = if wired { "with its interrupt" } else { "without its interrupt" };
         println!("inertial sample {name} {} old, {} between flow samples, at worst", most(0), most(1));
         // Three chip samples of a slow clock (1.91 ms) and the read-out; 10 ms and what fits no earlier slot.
-        assert!(most(0) <= Micros(2_150), "{name}: {figures:?}");
-        assert!(most(1) <= Micros(10_750), "{name}: {figures:?}");
+        assert!(most(0) <= Duration::from_micros(2_150), "{name}: {figures:?}");
+        assert!(most(1) <= Duration::from_micros(10_750), "{name}: {figures:?}");
     }
 }

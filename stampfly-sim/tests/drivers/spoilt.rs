@@ -4,7 +4,7 @@ use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
 use stampfly_sim::chips::BusError;
 use stampfly_sim::time::Clock;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// What becomes of the answer of a register.
 pub type Change = Box<dyn Fn(u16, &mut [u8])>;
@@ -12,13 +12,13 @@ pub type Change = Box<dyn Fn(u16, &mut [u8])>;
 /// What is wrong with the bus.
 pub struct Spoil {
     /// How much longer every transfer takes.
-    pub delay: Micros,
+    pub delay: Duration,
     pub change: Option<Change>,
 }
 
 impl Spoil {
     /// Nothing.
-    pub const NOT: Self = Self { delay: Micros::ZERO, change: None };
+    pub const NOT: Self = Self { delay: Duration::ZERO, change: None };
 
     /// Answers are changed.
     pub fn changed(change: Change) -> Self {
@@ -26,7 +26,7 @@ impl Spoil {
     }
 
     /// Every transfer takes so much longer.
-    pub const fn slow(delay: Micros) -> Self {
+    pub const fn slow(delay: Duration) -> Self {
         Self { delay, change: None }
     }
 }

@@ -21,7 +21,7 @@ use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, 
 use stampfly_sim::SimulationConfig;
 use stampfly_sim::chips::{Board, BusError, stand_in_image};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use std::rc::Rc;
 
 /// Transfers until the one that fails, and whether the chip sees that one.
@@ -69,7 +69,7 @@ impl<B: SpiDevice<Error = BusError>> SpiDevice for Unreliable<B> {
 }
 
 /// Polls a call until it ends or this instant has come, and drops it then.
-async fn drop_at<T>(clock: &Clock, instant: Micros, call: impl Future<Output = T>) -> Option<T> {
+async fn drop_at<T>(clock: &Clock, instant: Instant, call: impl Future<Output = T>) -> Option<T> {
     let (mut call, mut end) = (pin!(call), pin!(clock.sleep_until(instant)));
     poll_fn(|context| match (call.as_mut().poll(context), end.as_mut().poll(context)) {
         (Poll::Ready(outcome), _) => Poll::Ready(Some(outcome)),
@@ -87,7 +87,7 @@ macro_rules! recovers {
         fn $name() {
             let image = stand_in_image();
             $(let $image = &image;)?
-            let disturbed = |disturb: &dyn Fn(&Clock, &Trouble) -> Option<Micros>| {
+            let disturbed = |disturb: &dyn Fn(&Clock, &Trouble) -> Option<Instant>| {
                 let (simulation, $trouble) = (standing(), Trouble::default());
                 $(let $boot = BootAddress::new();)?
                 let $clock = simulation.clock.clone();
@@ -119,8 +119,8 @@ macro_rules! recovers {
                 let transfers = (0..).take_while(|number| fails(*number).1).count();
                 assert!((3..1_000).contains(&transfers), "{transfers} transfers until the first sample");
             }
-            for instant in (0..undisturbed.0).step_by($step) {
-                disturbed(&|_, _| Some(Micros(instant)));
+            for instant in (0..undisturbed.as_micros()).step_by($step) {
+                disturbed(&|_, _| Some(Instant::from_micros(instant)));
             }
         }
     };

@@ -9,7 +9,7 @@ use stampfly_sim::chips::{self, Attached, I2cBus, ShutdownPin};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 const BELOW: u8 = 0x30;
 const AHEAD: u8 = 0x31;
@@ -97,7 +97,7 @@ fn in_flight_the_distance_is_that_of_the_registers_and_the_truth() {
             samples.borrow_mut().push((sample, sample.data.distance - along_the_beam));
         }
     });
-    tasks.run_until(Micros::from_secs(6));
+    tasks.run_until(Instant::from_secs(6));
     drop(tasks);
     let samples = samples.into_inner();
     assert!(samples.len() > 160, "{}", samples.len());
@@ -116,7 +116,7 @@ fn the_first_sample_and_the_rhythm_are_in_time() {
     let clock = &simulation.clock;
     let begun = clock.now();
     block_on(clock, below.next()).expect("a measurement");
-    assert!(clock.now().since(begun) < Micros::from_millis(85), "{}", clock.now().since(begun));
+    assert!(clock.now().since(begun) < Duration::from_millis(85), "{}", clock.now().since(begun));
     let stamps: Vec<_> = (0..60).map(|_| block_on(clock, below.next()).expect("a measurement").at).collect();
     let mean = stamps[59].since(stamps[0]).seconds() / 59.0;
     // A measurement begins when the one before has been read, which is up to 2 ms and a read after its end.

@@ -6,6 +6,7 @@ use stampfly_drivers::{Imu, MotorOutputs};
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig, Truth};
+use stampfly_types::Instant;
 use stampfly_types::frame::tilt;
 use stampfly_types::messages::MotorOutput;
 
@@ -18,7 +19,8 @@ fn fly(config: &SimulationConfig, seconds: u32, target: impl Fn(f32) -> Option<f
         for _ in 0..seconds * 400 {
             let Ok(_) = simulation.sensors.imu.next().await;
             let truth = simulation.truth();
-            let output = target(clock.now().seconds()).map_or_else(MotorOutput::default, |d| pilot::fly(&truth, d));
+            let output = target(clock.now().since(Instant::ZERO).seconds())
+                .map_or_else(MotorOutput::default, |d| pilot::fly(&truth, d));
             let Ok(()) = simulation.sensors.motors.write(&output);
             record.push(truth);
         }

@@ -8,11 +8,11 @@ use crate::Timebase;
 use core::convert::Infallible;
 use embedded_hal::digital::ErrorType;
 use embedded_hal_async::digital::Wait;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// How long after the time that samples are due the pin may still rise: half a period of the chip at 1600 Hz. The
 /// chip's clock is off by some per cent, so the pin is usually the better one.
-const LATE: Micros = Micros(312);
+const LATE: Duration = Duration::from_micros(312);
 /// How often in a row the pin may be wrong.
 const PATIENCE: u8 = 4;
 
@@ -46,7 +46,7 @@ impl<P: Wait> Interrupt<P> {
     }
 
     /// Waits until samples are there: for the pin and a little, or until they are due when there is no pin.
-    pub(super) async fn wait<R, T: Timebase>(&mut self, port: &mut Port<R, T>, due: Micros, little: Micros) {
+    pub(super) async fn wait<R, T: Timebase>(&mut self, port: &mut Port<R, T>, due: Instant, little: Duration) {
         self.raised = false;
         match &mut self.pin {
             Some(pin) if self.wrong < PATIENCE && port.now() < due => {

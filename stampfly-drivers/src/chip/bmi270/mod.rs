@@ -22,25 +22,25 @@ use embedded_hal_async::spi::SpiDevice;
 use interrupt::Interrupt;
 pub use interrupt::NoPin;
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Configuration data in one transfer. Even, and small enough for the DMA buffers of small parts.
 const CHUNK: usize = 256;
 /// The chip may be accessed this long after power-on and after leaving power saving (§4 "Start-up").
-const POWER_UP: Micros = Micros(450);
+const POWER_UP: Duration = Duration::from_micros(450);
 /// Idle time after a write in normal mode, "Interface" and timing tables of the data sheet.
-const AFTER_WRITE: Micros = Micros(2);
-const SOFT_RESET: Micros = Micros(2_000);
+const AFTER_WRITE: Duration = Duration::from_micros(2);
+const SOFT_RESET: Duration = Duration::from_micros(2_000);
 /// How long the chip may take to start with its configuration: typically 20 ms.
-const START_UP_LIMIT: Micros = Micros::from_millis(150);
+const START_UP_LIMIT: Duration = Duration::from_millis(150);
 /// The gyroscope's first sample after it is switched on, 45 ms (§1.2), with a margin.
-const GYRO_START: Micros = Micros::from_millis(50);
+const GYRO_START: Duration = Duration::from_millis(50);
 /// Each deflection of the self test settles for 50 ms (§4 "Sensor self-test").
-const SELF_TEST_SETTLE: Micros = Micros::from_millis(51);
+const SELF_TEST_SETTLE: Duration = Duration::from_millis(51);
 /// How long the gyroscope's self test may take. The data sheet gives no figure; Bosch's sensor API waits as long.
-const GYRO_SELF_TEST_LIMIT: Micros = Micros::from_secs(2);
+const GYRO_SELF_TEST_LIMIT: Duration = Duration::from_secs(2);
 /// From the accelerometer on to the selection of the test, as in Bosch's sensor API.
-const BEFORE_GYRO_SELF_TEST: Micros = Micros::from_millis(1);
+const BEFORE_GYRO_SELF_TEST: Duration = Duration::from_millis(1);
 /// Ticks of sensor time from a sample to the read the driver aims at, and to the earliest one it trusts: before, the
 /// FIFO may or may not hold the sample.
 const AIM: u64 = 3;
@@ -119,9 +119,9 @@ pub struct Bmi270<'b, R, T, P = NoPin> {
     reading: bool,
     decimator: Decimator,
     /// When to look again.
-    due: Micros,
+    due: Instant,
     /// The shortest time a status took: the bus alone, without waiting for it.
-    on_bus: Micros,
+    on_bus: Duration,
     cross_axis: f32,
     temperature: f32,
 }
@@ -151,8 +151,8 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
             running: false,
             reading: false,
             decimator: Decimator::default(),
-            due: Micros::ZERO,
-            on_bus: Micros::from_secs(1),
+            due: Instant::ZERO,
+            on_bus: Duration::from_secs(1),
             cross_axis: 0.0,
             // The zero of the chip's scale, until it has measured.
             temperature: 23.0,
@@ -262,7 +262,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.write(register::CMD, &[codec::GYRO_TRIGGER]).await?;
         let deadline = self.port.now() + GYRO_SELF_TEST_LIMIT;
         loop {
-            self.port.wait(Micros::from_millis(1)).await;
+            self.port.wait(Duration::from_millis(1)).await;
             let [running]: [u8; 1] = self.port.read(register::GYR_CRT_CONF).await?;
             if running & codec::GYRO_TEST_RUNS == 0 {
                 break;
@@ -308,7 +308,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             match status & 0x0F {
                 Status::RUNNING => return Ok(()),
                 // Not initialised yet.
-                0 if self.port.now() < deadline => self.port.wait(Micros::from_millis(1)).await,
+                0 if self.port.now() < deadline => self.port.wait(Duration::from_millis(1)).await,
                 _ => return Err(ChipError::Configuration { status }),
             }
         }
@@ -322,15 +322,15 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
     }
 
     /// The status, the instant of the time in it, and how long after that at most the fill level was read.
-    async fn status(&mut self) -> Result<(Status, Micros, Micros), ChipError<R::Error>> {
+    async fn status(&mut self) -> Result<(Status, Instant, Duration), ChipError<R::Error>> {
         let asked = self.port.now();
         let status = Status::decode(&self.port.read(register::SENSORTIME_0).await?);
         let answered = self.port.now();
         let took = answered.since(asked);
         self.on_bus = self.on_bus.min(took);
         // The time comes first, after the addresses: a quarter of the burst, on I2C as on SPI.
-        let before = Micros(self.on_bus.0 / 4);
-        Ok((status, answered.since(self.on_bus.since(before)), took.since(before)))
+        let before = self.on_bus / 4;
+        Ok((status, answered - (self.on_bus - before), took - before))
     }
 
     /// Empties the FIFO and forgets what the filter remembers.
@@ -343,12 +343,12 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
     }
 
     /// The time of so many samples of the chip.
-    fn chip_period(&self, samples: u64) -> Micros {
+    fn chip_period(&self, samples: u64) -> Duration {
         ticks_to_micros(samples * self.config.rate.ticks())
     }
 
     /// The next group of four with the instant of its first sample; `None` when there is a gap before it.
-    async fn group(&mut self, deadline: Micros) -> Result<Option<(Micros, [[i16; 6]; 4])>, ChipError<R::Error>> {
+    async fn group(&mut self, deadline: Instant) -> Result<Option<(Instant, [[i16; 6]; 4])>, ChipError<R::Error>> {
         loop {
             self.interrupt.wait(&mut self.port, self.due, ticks_to_micros(AIM)).await;
             if self.port.now() > deadline {
@@ -370,7 +370,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let period = self.config.rate.ticks();
             let age = u64::from(status.sensor_time) % period;
             let frames = u64::from(status.fifo_bytes) / FRAME_BYTES as u64;
-            let newest = told.since(ticks_to_micros(age));
+            let newest = told - ticks_to_micros(age);
             // Would the next sample have come while the status was on the bus?
             let ambiguous = age < EARLIEST || ticks_to_micros(age) + after >= ticks_to_micros(period);
             self.interrupt.judge(frames >= 4);
@@ -387,7 +387,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             self.reading = false;
             self.due = newest + ticks_to_micros(8u64.saturating_sub(frames) * period + AIM);
             let Some(group) = codec::decode_frames(&bytes, status.holds_whole_frames()) else { return Ok(None) };
-            return Ok(Some((newest.since(self.chip_period(frames - 1)), group)));
+            return Ok(Some((newest - self.chip_period(frames - 1), group)));
         }
     }
 }
@@ -397,8 +397,8 @@ const fn is_believable(status: &Status) -> bool {
     status.start_up == Status::RUNNING && status.holds_whole_frames()
 }
 
-const fn ticks_to_micros(ticks: u64) -> Micros {
-    Micros(ticks.saturating_mul(5_000) / codec::TICKS_IN_5_MILLIS)
+const fn ticks_to_micros(ticks: u64) -> Duration {
+    Duration::from_micros(ticks.saturating_mul(5_000) / codec::TICKS_IN_5_MILLIS)
 }
 
 impl<R: Registers, T: Timebase, P: Wait> Imu for Bmi270<'_, R, T, P> {

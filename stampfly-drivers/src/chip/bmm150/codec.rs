@@ -5,7 +5,7 @@
 //! They agree to within the integer form's rounding. Flight code uses the floating one.
 
 use super::Config;
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Vec3};
 
 /// Register addresses.
 pub mod register {
@@ -58,9 +58,9 @@ impl Preset {
 
     /// How long a measurement takes: 145 µs per repetition of x and y, 500 µs per repetition of z, and 980 µs.
     #[must_use]
-    pub const fn duration(self) -> Micros {
+    pub const fn duration(self) -> Duration {
         let [xy, z] = self.codes();
-        Micros(145 * (1 + 2 * xy as u64) + 500 * (1 + z as u64) + 980)
+        Duration::from_micros(145 * (1 + 2 * xy as u64) + 500 * (1 + z as u64) + 980)
     }
 }
 
@@ -94,7 +94,7 @@ impl Rate {
 
     /// Time between two samples.
     #[must_use]
-    pub const fn period(self) -> Micros {
+    pub const fn period(self) -> Duration {
         let hertz = match self {
             Self::Hz2 => 2,
             Self::Hz6 => 6,
@@ -105,7 +105,7 @@ impl Rate {
             Self::Hz25 => 25,
             Self::Hz30 => 30,
         };
-        Micros(1_000_000 / hertz)
+        Duration::from_micros(1_000_000 / hertz)
     }
 }
 

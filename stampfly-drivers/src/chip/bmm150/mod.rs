@@ -11,15 +11,15 @@ use crate::{Magnetometer, Sample, Timebase};
 pub use codec::{Preset, Rate};
 use codec::{Reading, Trim, register};
 use embedded_hal_async::i2c::I2c;
-use stampfly_types::Micros;
 use stampfly_types::messages::MagData;
+use stampfly_types::{Duration, Instant};
 
 /// From power-on of the chip's logic to the first access: 3 ms.
-const START_UP: Micros = Micros::from_millis(3);
+const START_UP: Duration = Duration::from_millis(3);
 /// How long the self test may take.
-const SELF_TEST_LIMIT: Micros = Micros::from_millis(20);
+const SELF_TEST_LIMIT: Duration = Duration::from_millis(20);
 /// How often the data is looked at once it may be new.
-const POLL: Micros = Micros::from_millis(2);
+const POLL: Duration = Duration::from_millis(2);
 
 /// What the chip is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +71,7 @@ pub struct Bmm150<R, T> {
     /// `None` while the chip is not set up.
     trim: Option<Trim>,
     /// When the next sample may be there.
-    due: Micros,
+    due: Instant,
 }
 
 impl Bmm150<(), ()> {
@@ -83,7 +83,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     /// A driver of the chip with this address.
     pub const fn new(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
         let port = Port::new(I2cRegisters::new(bus, address), clock);
-        Self { port, axes, config, trim: None, due: Micros::ZERO }
+        Self { port, axes, config, trim: None, due: Instant::ZERO }
     }
 
     /// Sets the chip up: power, reset, identification, trim, repetitions, rate. 7 ms.
@@ -144,11 +144,11 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     }
 
     /// Waits for new data, and gives it with the instant it was seen.
-    async fn reading(&mut self) -> Result<(Micros, Reading), ChipError<I::Error>> {
+    async fn reading(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
         let period = self.config.rate.period();
         let asked = self.port.now();
         let deadline = asked + period + period;
-        let mut stale = asked > self.due + Micros(period.0 / 8);
+        let mut stale = asked > self.due + period / 8;
         self.port.wait_until(self.due).await;
         loop {
             let reading = Reading::decode(&self.port.read(register::DATA_X_LSB).await?);
@@ -159,7 +159,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
             }
             if reading.ready && !stale {
                 // A little early: the chip's clock may be fast by a few per cent.
-                self.due = now + Micros(period.0 - period.0 / 16);
+                self.due = now + period - period / 16;
                 return Ok((now, reading));
             }
             stale = false;
@@ -182,7 +182,7 @@ impl<I: I2c, T: Timebase> Magnetometer for Bmm150<I2cRegisters<I>, T> {
         };
         let (seen, reading) = self.reading().await?;
         let field = trim.compensate(&reading).ok_or(ChipError::Data)?;
-        let at = seen.since(Micros(self.config.preset.duration().0 / 2));
+        let at = seen - self.config.preset.duration() / 2;
         Ok(Sample { at, data: MagData { field: self.axes.to_body(field) } })
     }
 }

@@ -1,7 +1,7 @@
 //! Registers, timing and compensation of the BMP280, from Bosch BST-BMP280-DS001 revision 1.23.
 
 use super::Config;
-use stampfly_types::{Micros, math};
+use stampfly_types::{Duration, math};
 
 /// Register addresses, §4.2.
 pub mod register {
@@ -78,14 +78,16 @@ pub const fn filter_bits(config: &Config) -> u8 {
 
 /// The longest a conversion takes, §3.8.1 table 13.
 #[must_use]
-pub const fn conversion_limit(config: &Config) -> Micros {
-    Micros(1_250 + 2_300 * (config.temperature.conversions() + config.pressure.conversions()) + 575)
+pub const fn conversion_limit(config: &Config) -> Duration {
+    Duration::from_micros(1_250 + 2_300 * (config.temperature.conversions() + config.pressure.conversions()) + 575)
 }
 
 /// From the start of a typical conversion to the middle of its pressure part, which is the second, §3.8.1 and §3.3.
 #[must_use]
-pub const fn pressure_instant(config: &Config) -> Micros {
-    Micros(1_000 + 2_000 * config.temperature.conversions() + 1_000 * config.pressure.conversions() + 250)
+pub const fn pressure_instant(config: &Config) -> Duration {
+    Duration::from_micros(
+        1_000 + 2_000 * config.temperature.conversions() + 1_000 * config.pressure.conversions() + 250,
+    )
 }
 
 /// Status, configuration and data: registers 0xF3 to 0xFC in one burst.

@@ -12,16 +12,16 @@ use crate::{Barometer, Sample, Timebase};
 use codec::{Calibration, Reading, register};
 pub use codec::{Filter, Oversampling};
 use embedded_hal_async::i2c::I2c;
-use stampfly_types::Micros;
 use stampfly_types::messages::BaroData;
+use stampfly_types::{Duration, Instant};
 
 /// From reset to the first access, §1 table 2.
-const START_UP: Micros = Micros::from_millis(2);
+const START_UP: Duration = Duration::from_millis(2);
 /// How long the chip may copy its calibration.
-const COPY_LIMIT: Micros = Micros::from_millis(20);
+const COPY_LIMIT: Duration = Duration::from_millis(20);
 /// How often a conversion is started before the chip counts as broken.
 const ATTEMPTS: usize = 2;
-const POLL: Micros = Micros::from_millis(1);
+const POLL: Duration = Duration::from_millis(1);
 /// What the chip can measure, Pa with eight bits after the point, §1 table 2.
 const RANGE: core::ops::RangeInclusive<u32> = 30_000 << 8..=110_000 << 8;
 /// Where it works, hundredths of a degree Celsius, §1 table 2.
@@ -37,7 +37,7 @@ pub struct Config {
     /// Low-pass over samples.
     pub filter: Filter,
     /// Time between two samples; never less than a conversion takes.
-    pub interval: Micros,
+    pub interval: Duration,
 }
 
 impl Default for Config {
@@ -47,7 +47,7 @@ impl Default for Config {
             pressure: Oversampling::X4,
             temperature: Oversampling::X2,
             filter: Filter::C4,
-            interval: Micros::from_millis(40),
+            interval: Duration::from_millis(40),
         }
     }
 }
@@ -85,7 +85,7 @@ pub struct Bmp280<R, T> {
     /// `None` while the chip is not set up.
     calibration: Option<Calibration>,
     /// When the next conversion may begin.
-    due: Micros,
+    due: Instant,
 }
 
 impl Bmp280<(), ()> {
@@ -99,7 +99,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     /// A driver of the chip with this address.
     pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
         let port = Port::new(I2cRegisters::new(bus, address), clock);
-        Self { port, config, calibration: None, due: Micros::ZERO }
+        Self { port, config, calibration: None, due: Instant::ZERO }
     }
 
     /// Sets the chip up: reset, identification, calibration, filter. A few milliseconds.
@@ -175,7 +175,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     /// Starts a conversion, and gives the instant.
     ///
     /// Without one the data registers hold the conversion before, and nothing tells the two apart.
-    async fn begin(&mut self) -> Result<Micros, ChipError<I::Error>> {
+    async fn begin(&mut self) -> Result<Instant, ChipError<I::Error>> {
         let limit = codec::conversion_limit(&self.config);
         for _ in 0..ATTEMPTS {
             let begun = self.port.now();
@@ -192,7 +192,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     }
 
     /// The raw result of the conversion that began at this instant.
-    async fn finish(&mut self, begun: Micros) -> Result<Reading, ChipError<I::Error>> {
+    async fn finish(&mut self, begun: Instant) -> Result<Reading, ChipError<I::Error>> {
         let wanted = (codec::oversampling_bits(&self.config), codec::filter_bits(&self.config));
         let limit = codec::conversion_limit(&self.config);
         self.port.wait_until(begun + limit).await;

@@ -2,7 +2,7 @@
 //! described in its §8.6 "Register Maps".
 
 use super::Config;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// Register addresses, §8.6.1.
 pub mod register {
@@ -124,8 +124,8 @@ pub const fn configuration(config: &Config) -> u16 {
 
 /// From one result to the next.
 #[must_use]
-pub const fn cycle(config: &Config) -> Micros {
-    Micros(2 * config.average.conversions() * config.time.micros())
+pub const fn cycle(config: &Config) -> Duration {
+    Duration::from_micros(2 * config.average.conversions() * config.time.micros())
 }
 
 /// Voltage over the shunt, V: 13 bits, left-justified, 40 µV each, §8.6.2.
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn the_default_gives_more_than_ten_results_a_second() {
         let cycle = cycle(&Config::default());
-        assert_eq!(cycle, Micros(2 * 64 * 588));
-        assert!(cycle < Micros::from_millis(100));
+        assert_eq!(cycle, Duration::from_micros(2 * 64 * 588));
+        assert!(cycle < Duration::from_millis(100));
     }
 }

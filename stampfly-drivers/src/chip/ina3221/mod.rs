@@ -11,15 +11,15 @@ use crate::{PowerMonitor, Sample, Timebase};
 use codec::register;
 pub use codec::{Average, Channel, ConversionTime};
 use embedded_hal_async::i2c::I2c;
-use stampfly_types::Micros;
 use stampfly_types::messages::PowerData;
+use stampfly_types::{Duration, Instant};
 
 /// From a reset to the first access. The data sheet gives no figure.
-const AFTER_RESET: Micros = Micros::from_millis(1);
+const AFTER_RESET: Duration = Duration::from_millis(1);
 /// How often the flag is looked at once it may be up.
-const POLL: Micros = Micros::from_millis(2);
+const POLL: Duration = Duration::from_millis(2);
 /// The single conversion of the self test takes 2.2 ms.
-const SELF_TEST_LIMIT: Micros = Micros::from_millis(10);
+const SELF_TEST_LIMIT: Duration = Duration::from_millis(10);
 
 /// What the chip and the driver are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +70,7 @@ pub struct Ina3221<R, T> {
     config: Config,
     running: bool,
     /// When the next result may be there.
-    due: Micros,
+    due: Instant,
 }
 
 impl Ina3221<(), ()> {
@@ -82,7 +82,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
     /// A driver of the chip with this address.
     pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
         let port = Port::new(I2cRegisters::new(bus, address), clock);
-        Self { port, config, running: false, due: Micros::ZERO }
+        Self { port, config, running: false, due: Instant::ZERO }
     }
 
     /// Sets the chip up: identification, reset, configuration. A millisecond.
@@ -157,12 +157,12 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
     }
 
     /// Waits for the flag that a result is there, and gives the instant it was seen.
-    async fn ready(&mut self) -> Result<Micros, ChipError<I::Error>> {
+    async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
         let cycle = codec::cycle(&self.config);
         let asked = self.port.now();
         let deadline = asked + cycle + cycle;
         // A flag that may have been up for long tells nothing about when: take it down and wait for the next.
-        let mut stale = asked > self.due + Micros(cycle.0 / 8);
+        let mut stale = asked > self.due + cycle / 8;
         self.port.wait_until(self.due).await;
         loop {
             if self.read(register::CONFIGURATION).await? != codec::configuration(&self.config) {
@@ -173,7 +173,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
             let now = self.port.now();
             if flags & codec::CONVERSION_READY != 0 && !stale {
                 // A little early: the chip's clock may be fast by a few per cent.
-                self.due = now + Micros(cycle.0 - cycle.0 / 16);
+                self.due = now + cycle - cycle / 16;
                 return Ok(now);
             }
             stale = false;
@@ -197,7 +197,7 @@ impl<I: I2c, T: Timebase> PowerMonitor for Ina3221<I2cRegisters<I>, T> {
         let current =
             codec::shunt_volts(self.read(self.config.channel.shunt_register()).await?) / self.config.shunt_ohms;
         let voltage = codec::bus_volts(self.read(self.config.channel.bus_register()).await?);
-        let at = seen.since(Micros(codec::cycle(&self.config).0 / 2));
+        let at = seen - codec::cycle(&self.config) / 2;
         Ok(Sample { at, data: PowerData { voltage, current, power: voltage * current } })
     }
 }

@@ -13,38 +13,38 @@ use crate::{OpticalFlow, Sample, Timebase};
 use codec::{Motion, Step, register};
 use embedded_hal_async::spi::{Operation, SpiDevice};
 use stampfly_types::messages::FlowData;
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Instant, Vec3};
 
 /// The longest transfer, a burst.
-const LIMIT: Micros = TransferLimit::SPI_GUEST.of(12);
+const LIMIT: Duration = TransferLimit::SPI_GUEST.of(12);
 /// From power-on to the first access ("Power-up sequence").
-const POWER_UP: Micros = Micros::from_millis(45);
-const AFTER_RESET: Micros = Micros::from_millis(5);
+const POWER_UP: Duration = Duration::from_millis(45);
+const AFTER_RESET: Duration = Duration::from_millis(5);
 /// From an address to the data it asks for (tSRAD), ns.
 const ADDRESS_TO_DATA: u32 = 35_000;
 /// From the end of a write to the next access (tSWW, tSWR).
-const AFTER_WRITE: Micros = Micros(45);
+const AFTER_WRITE: Duration = Duration::from_micros(45);
 /// From the end of a read to the next access (tSRW, tSRR).
-const AFTER_READ: Micros = Micros(20);
+const AFTER_READ: Duration = Duration::from_micros(20);
 /// From the last clock of a write to the end of the chip select (tSCLK-NCS), ns.
 const WRITE_HOLD: u32 = 20_000;
 /// How often a chip that runs is asked whether it still holds what it was told.
-const WITNESS_INTERVAL: Micros = Micros::from_secs(1);
+const WITNESS_INTERVAL: Duration = Duration::from_secs(1);
 /// How often the chip's calibration is asked for before it counts as broken.
 const ATTEMPTS: usize = 10;
 /// Settings that depend on the chip.
 const CALIBRATED: usize = 5;
 /// How many pictures the self test looks at, and from one to the next; the chip makes one in 8 ms.
 const PICTURES: usize = 5;
-const PICTURE: Micros = Micros::from_millis(20);
+const PICTURE: Duration = Duration::from_millis(20);
 /// So long a chip may see nothing at all before it is set up again.
-const BLIND: Micros = Micros::from_secs(10);
+const BLIND: Duration = Duration::from_secs(10);
 
 /// What the driver is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// Time between two samples. Pictures come at 121 Hz: faster than that gives empty samples.
-    pub interval: Micros,
+    pub interval: Duration,
     /// Angle of one count, rad; a lens of another distance has another.
     pub radians_per_count: f32,
 }
@@ -52,7 +52,7 @@ pub struct Config {
 impl Default for Config {
     /// 100 Hz, the module's own lens.
     fn default() -> Self {
-        Self { interval: Micros::from_millis(10), radians_per_count: codec::RADIANS_PER_COUNT }
+        Self { interval: Duration::from_millis(10), radians_per_count: codec::RADIANS_PER_COUNT }
     }
 }
 
@@ -97,13 +97,13 @@ pub struct Pmw3901<S, T> {
     config: Config,
     running: bool,
     /// When the counts were last emptied; `None` when that is unknown.
-    emptied: Option<Micros>,
+    emptied: Option<Instant>,
     /// When to ask next whether the chip restarted; `None` when it cannot be asked.
-    witness: Option<Micros>,
+    witness: Option<Instant>,
     /// What the settings read back as after the last start.
     kept: Option<[u8; CALIBRATED + codec::SETTINGS]>,
     /// When it last saw anything.
-    saw: Micros,
+    saw: Instant,
 }
 
 impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
@@ -118,7 +118,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             emptied: None,
             witness: None,
             kept: None,
-            saw: Micros::ZERO,
+            saw: Instant::ZERO,
         }
     }
 
@@ -188,7 +188,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         for step in codec::PERFORMANCE {
             match *step {
                 Step::Write(register, value) => self.write(register, value).await?,
-                Step::Wait(millis) => self.wait(Micros::from_millis(u64::from(millis))).await,
+                Step::Wait(millis) => self.wait(Duration::from_millis(u64::from(millis))).await,
             }
         }
         Ok(calibrated)
@@ -314,7 +314,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Ok(())
     }
 
-    async fn wait(&mut self, span: Micros) {
+    async fn wait(&mut self, span: Duration) {
         let instant = self.clock.now() + span;
         sleep_until(&mut self.clock, instant).await;
     }

@@ -6,7 +6,7 @@
 //! parts are a formula of ours that meets the published values at 33 ms.
 
 use super::Config;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// Register addresses.
 pub mod register {
@@ -141,9 +141,9 @@ impl DistanceMode {
 /// Can the chip be told so?
 #[must_use]
 pub fn is_possible(config: &Config) -> bool {
-    BUDGETS.contains(&config.budget.0)
+    BUDGETS.contains(&config.budget.as_micros())
         && config.period >= config.budget
-        && config.period <= Micros::from_secs(10)
+        && config.period <= Duration::from_secs(10)
         && config.offset.is_finite()
 }
 
@@ -185,7 +185,7 @@ pub const fn phase_calibration(mode: DistanceMode) -> u8 {
 #[must_use]
 pub const fn ranging(config: &Config) -> [u8; 12] {
     // What is left of the budget, less a tenth, in two equal parts.
-    let part = config.budget.0.saturating_sub(PREPARATION).saturating_mul(450);
+    let part = config.budget.as_micros().saturating_sub(PREPARATION).saturating_mul(450);
     let [first, second] = config.mode.periods();
     let [a1, a0] = encode_timeout(rounded(part, nanos_per_macro_period(first))).to_be_bytes();
     let [b1, b0] = encode_timeout(rounded(part, nanos_per_macro_period(second))).to_be_bytes();
@@ -195,8 +195,8 @@ pub const fn ranging(config: &Config) -> [u8; 12] {
 /// [`register::SYSTEM_INTERMEASUREMENT_PERIOD`] of a chip whose oscillator is so fast. The factor of 1.075 is the
 /// published drivers'.
 #[must_use]
-pub const fn inter_measurement(period: Micros, oscillator: u16) -> [u8; 4] {
-    let ticks = (oscillator as u64 & 0x3FF).saturating_mul(period.0).saturating_mul(43) / 40_000;
+pub const fn inter_measurement(period: Duration, oscillator: u16) -> [u8; 4] {
+    let ticks = (oscillator as u64 & 0x3FF).saturating_mul(period.as_micros()).saturating_mul(43) / 40_000;
     (if ticks > u32::MAX as u64 { u32::MAX } else { ticks as u32 }).to_be_bytes()
 }
 
@@ -333,7 +333,7 @@ mod tests {
     use super::*;
 
     fn config(mode: DistanceMode, millis: u64) -> Config {
-        Config { mode, budget: Micros::from_millis(millis), period: Micros::from_millis(millis), offset: 0.0 }
+        Config { mode, budget: Duration::from_millis(millis), period: Duration::from_millis(millis), offset: 0.0 }
     }
 
     #[test]
@@ -368,16 +368,16 @@ mod tests {
 
     #[test]
     fn the_period_is_in_ticks_of_the_chips_own_clock() {
-        assert_eq!(u32::from_be_bytes(inter_measurement(Micros::from_millis(100), 1_000)), 107_500);
-        assert_eq!(inter_measurement(Micros::from_millis(100), 0xFC00 | 1_000), 107_500u32.to_be_bytes(), "10 bits");
-        assert_eq!(inter_measurement(Micros(u64::MAX), 1_023), u32::MAX.to_be_bytes());
+        assert_eq!(u32::from_be_bytes(inter_measurement(Duration::from_millis(100), 1_000)), 107_500);
+        assert_eq!(inter_measurement(Duration::from_millis(100), 0xFC00 | 1_000), 107_500u32.to_be_bytes(), "10 bits");
+        assert_eq!(inter_measurement(Duration::from_micros(u64::MAX), 1_023), u32::MAX.to_be_bytes());
     }
 
     #[test]
     fn impossible_configurations_are_told() {
         assert!(is_possible(&Config::default()));
         assert!(!is_possible(&config(DistanceMode::Long, 20)) && !is_possible(&config(DistanceMode::Long, 501)));
-        assert!(!is_possible(&Config { period: Micros(32_999), ..Config::default() }));
+        assert!(!is_possible(&Config { period: Duration::from_micros(32_999), ..Config::default() }));
         assert!(!is_possible(&Config { offset: f32::NAN, ..Config::default() }));
     }
 

@@ -20,17 +20,17 @@ use codec::{RESULT_BYTES, register};
 use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::{Error, ErrorKind};
 use embedded_hal_async::i2c::I2c;
-use stampfly_types::Micros;
 use stampfly_types::messages::TofData;
+use stampfly_types::{Duration, Instant};
 
 /// In reset. The data sheet gives no shortest time.
-const RESET: Micros = Micros::from_millis(1);
+const RESET: Duration = Duration::from_millis(1);
 /// From reset to the first access; 1.2 ms at most (§ "Power sequence").
-const BOOT: Micros = Micros::from_millis(4);
+const BOOT: Duration = Duration::from_millis(4);
 /// How long the firmware may take to start.
-const BOOT_LIMIT: Micros = Micros::from_millis(100);
+const BOOT_LIMIT: Duration = Duration::from_millis(100);
 /// How long to wait for the neighbour that is waking up: a little longer than that may take.
-const NEIGHBOUR_LIMIT: Micros = Micros::from_millis(200);
+const NEIGHBOUR_LIMIT: Duration = Duration::from_millis(200);
 /// The chip's clock may be off by one part in this many.
 const DRIFT: u64 = 32;
 /// After so many periods half of one may have drifted away: the rhythm is not known any more.
@@ -38,7 +38,7 @@ const IN_RHYTHM: u64 = DRIFT / 2;
 /// A result that has been seen before is taken back and waited out so often.
 const REPETITIONS: usize = 2;
 /// How often the interrupt is looked at once it may be up.
-const POLL: Micros = Micros::from_millis(2);
+const POLL: Duration = Duration::from_millis(2);
 /// How often the number of the measurement has to advance in the self test.
 const ADVANCES: usize = 2;
 
@@ -48,9 +48,9 @@ pub struct Config {
     /// How far to look.
     pub mode: DistanceMode,
     /// How long to measure, 33 to 500 ms. Twice the time is a third less noise.
-    pub budget: Micros,
+    pub budget: Duration,
     /// From one measurement to the next, no less than the budget.
-    pub period: Micros,
+    pub period: Duration,
     /// Added to what the chip says, m: the error of this chip behind this cover.
     pub offset: f32,
 }
@@ -58,7 +58,12 @@ pub struct Config {
 impl Default for Config {
     /// 4 m, 33 ms, 30 Hz, as it comes from the factory.
     fn default() -> Self {
-        Self { mode: DistanceMode::Long, budget: Micros(33_000), period: Micros(33_333), offset: 0.0 }
+        Self {
+            mode: DistanceMode::Long,
+            budget: Duration::from_micros(33_000),
+            period: Duration::from_micros(33_333),
+            offset: 0.0,
+        }
     }
 }
 
@@ -122,7 +127,7 @@ pub struct Vl53l3cx<'b, I, X, T> {
     /// No measurement since the start.
     first: bool,
     /// When the next measurement may be there.
-    due: Micros,
+    due: Instant,
     /// The newest result since the start, as it came.
     block: Option<[u8; RESULT_BYTES]>,
     reading: Option<Reading>,
@@ -148,7 +153,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             ranging: false,
             stale: false,
             first: true,
-            due: Micros::ZERO,
+            due: Instant::ZERO,
             block: None,
             reading: None,
         }
@@ -303,7 +308,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
     }
 
     /// Waits for a result that has not been there before, and takes its interrupt back.
-    async fn result(&mut self) -> Result<(Micros, [u8; RESULT_BYTES]), ChipError<I::Error>> {
+    async fn result(&mut self) -> Result<(Instant, [u8; RESULT_BYTES]), ChipError<I::Error>> {
         for _ in 0..=REPETITIONS {
             let seen = self.ready().await?;
             // Until the interrupt has been taken back, what follows may be this measurement again.
@@ -321,12 +326,12 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
     }
 
     /// Waits for a new measurement, and gives the instant it was there.
-    async fn ready(&mut self) -> Result<Micros, ChipError<I::Error>> {
+    async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
         let period = self.config.period;
         let asked = self.port.now();
         let deadline = asked.max(self.due) + period + period;
         // An interrupt that may have been up for long tells nothing about when: take it back and wait for the next.
-        self.stale |= asked > self.due + Micros(period.0 / 4);
+        self.stale |= asked > self.due + period / 4;
         self.port.wait_until(self.due).await;
         let mut before = None;
         loop {
@@ -344,8 +349,8 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             if up && !self.stale {
                 // Between two looks; or, up at the first look, when the rhythm says, for all that is known.
                 let seen = match before {
-                    Some(before) => before + Micros(now.since(before).0 / 2),
-                    None => now.min(self.due + period.since(early(period))),
+                    Some(before) => before + now.since(before) / 2,
+                    None => now.min(self.due + (period - early(period))),
                 };
                 self.due = seen + early(period);
                 return Ok(seen);
@@ -356,11 +361,10 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             self.stale = false;
             if up {
                 // The next one comes in the rhythm: nothing to look at, and no bus to take, before.
-                let late = now.since(self.due + period.since(early(period))).0;
-                let missed = if late == 0 { 0 } else { late.checked_div(period.0).unwrap_or(0) + 1 };
+                let late = now.since(self.due + (period - early(period))).as_micros();
+                let missed = if late == 0 { 0 } else { late.checked_div(period.as_micros()).unwrap_or(0) + 1 };
                 if (1..=IN_RHYTHM).contains(&missed) {
-                    let drift = period.0 / DRIFT;
-                    self.due += Micros((period.0 - drift).saturating_mul(missed));
+                    self.due += (period - period / DRIFT) * missed;
                     self.port.wait_until(self.due).await;
                     continue;
                 }
@@ -383,8 +387,8 @@ async fn identification<I: I2c, T: Timebase>(
 }
 
 /// A little early: the chip's clock may be fast by some per cent.
-const fn early(span: Micros) -> Micros {
-    Micros(span.0 - span.0 / 8)
+fn early(span: Duration) -> Duration {
+    span - span / 8
 }
 
 impl<I: I2c, X: OutputPin, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
@@ -407,6 +411,6 @@ impl<I: I2c, X: OutputPin, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
             status: reading.status().number(),
             valid: checked && plausible && reading.status() == RangeStatus::Valid,
         };
-        Ok(Sample { at: seen.since(Micros(self.config.budget.0 / 2)), data })
+        Ok(Sample { at: seen - self.config.budget / 2, data })
     }
 }

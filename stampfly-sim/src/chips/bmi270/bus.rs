@@ -2,11 +2,11 @@
 
 use super::{ACCEL, Bmi270, FIFO_DATA, TIME, UPLOAD_DATA};
 use crate::chips::{Chip, I2cChip, SpiChip};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 impl Bmi270 {
     /// A transfer begins at this register.
-    fn begin(&mut self, register: u8, now: Micros) {
+    fn begin(&mut self, register: u8, now: Instant) {
         self.update(now);
         self.accepts = now >= self.idle_until;
         self.pointer = u16::from(register & 0x7F);
@@ -22,7 +22,7 @@ impl Bmi270 {
         register
     }
 
-    fn take(&mut self, byte: u8, now: Micros) {
+    fn take(&mut self, byte: u8, now: Instant) {
         let register = self.step();
         if self.accepts {
             self.write(register, u16::from(byte), now);
@@ -30,10 +30,10 @@ impl Bmi270 {
     }
 
     /// A transfer is over.
-    fn end(&mut self, wrote: bool, now: Micros) {
+    fn end(&mut self, wrote: bool, now: Instant) {
         if wrote && self.accepts {
             let idle = if self.saves_power() { 450 } else { 2 };
-            self.idle_until = now + Micros(idle);
+            self.idle_until = now + Duration::from_micros(idle);
         }
         self.fifo.release();
         self.drive_pin();
@@ -44,7 +44,7 @@ impl Bmi270 {
 impl SpiChip for Bmi270 {
     const HIGHEST_CLOCK: u32 = 10_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Micros) -> u8 {
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
         if index == 0 {
             self.command = byte;
             self.begin(byte, now);
@@ -65,7 +65,7 @@ impl SpiChip for Bmi270 {
         0xFF
     }
 
-    fn release(&mut self, now: Micros) {
+    fn release(&mut self, now: Instant) {
         let wrote = self.spi && self.command & 0x80 == 0;
         // The rising edge chooses SPI, but not in the start-up, so not at the end of the transfer that resets.
         self.spi = now >= self.ready;
@@ -74,7 +74,7 @@ impl SpiChip for Bmi270 {
 }
 
 impl I2cChip for Bmi270 {
-    fn receive(&mut self, index: usize, byte: u8, now: Micros) -> bool {
+    fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool {
         if index == 0 {
             self.command = 0;
             self.begin(byte, now);
@@ -85,12 +85,12 @@ impl I2cChip for Bmi270 {
         true
     }
 
-    fn send(&mut self, _: usize, now: Micros) -> u8 {
+    fn send(&mut self, _: usize, now: Instant) -> u8 {
         let register = self.step();
         self.read(register, now) as u8
     }
 
-    fn stop(&mut self, now: Micros) {
+    fn stop(&mut self, now: Instant) {
         self.end(self.command != 0, now);
     }
 }

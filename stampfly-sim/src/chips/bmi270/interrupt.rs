@@ -15,11 +15,11 @@ use core::pin::Pin;
 use core::task::{Poll, Waker};
 use embedded_hal::digital::{ErrorType, InputPin};
 use embedded_hal_async::digital::Wait;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
 /// Length of a data-ready pulse.
-const PULSE: Micros = Micros(312);
+const PULSE: Duration = Duration::from_micros(312);
 /// Bits of the pin's register.
 const OUTPUT: u8 = 0x08;
 const ACTIVE_HIGH: u8 = 0x02;
@@ -29,7 +29,7 @@ const ACTIVE_HIGH: u8 = 0x02;
 pub(super) struct Interrupt {
     latched: bool,
     /// End of the data-ready pulse.
-    pulse: Option<Micros>,
+    pulse: Option<Instant>,
     high: bool,
     rises: u64,
     falls: u64,
@@ -44,16 +44,16 @@ impl Default for Interrupt {
 }
 
 impl Interrupt {
-    pub(super) fn begin_pulse(&mut self, at: Micros) {
+    pub(super) fn begin_pulse(&mut self, at: Instant) {
         self.pulse = Some(at + PULSE);
     }
 
-    pub(super) fn pulse_ends(&self) -> Option<Micros> {
+    pub(super) fn pulse_ends(&self) -> Option<Instant> {
         self.pulse
     }
 
     /// Whether a pulse has ended, told once.
-    pub(super) fn end_pulse(&mut self, now: Micros) -> bool {
+    pub(super) fn end_pulse(&mut self, now: Instant) -> bool {
         self.pulse.take_if(|end| *end <= now).is_some()
     }
 
@@ -91,7 +91,7 @@ impl Interrupt {
 /// use embedded_hal::spi::SpiDevice;
 /// use stampfly_sim::chips::{Bmi270, SpiBus};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
@@ -99,7 +99,7 @@ impl Interrupt {
 /// let (mut port, _) = SpiBus::new(&clock, 1).attach(8_000_000, chip);
 /// let mut pin = port.interrupt_pin();
 /// assert_eq!(pin.is_high(), Ok(true), "the board's pull-up");
-/// clock.advance_to(Micros::from_millis(2));
+/// clock.advance_to(Instant::from_millis(2));
 /// port.transfer(&mut [0; 3], &[0x80])?; // chooses SPI
 /// port.write(&[0x53, 0x0A])?; // an output, active high
 /// assert_eq!(pin.is_high(), Ok(false), "nothing to say");

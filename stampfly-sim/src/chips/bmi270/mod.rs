@@ -71,7 +71,7 @@ use fifo::Fifo;
 use interrupt::Interrupt;
 pub use interrupt::InterruptPin;
 use self_test::SelfTest;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 const ID: u16 = 0x00;
 const STATUS: u16 = 0x03;
@@ -134,10 +134,10 @@ const COMMAND_READY: u8 = 0x10;
 const AT_WATERMARK: u8 = 0x02;
 /// Data ready, as what pin 1 may say.
 const DATA_READY: u8 = 0x04;
-const START_UP: Micros = Micros(2_000);
-const UPLOAD_CHECK: Micros = Micros(10_000);
-const ACCEL_START: Micros = Micros(2_000);
-const GYRO_START: Micros = Micros(45_000);
+const START_UP: Duration = Duration::from_micros(2_000);
+const UPLOAD_CHECK: Duration = Duration::from_micros(10_000);
+const ACCEL_START: Duration = Duration::from_micros(2_000);
+const GYRO_START: Duration = Duration::from_micros(45_000);
 /// Rate code of 1600 Hz.
 const FASTEST: u8 = 0x0C;
 /// Bytes of the memory for the upload.
@@ -149,14 +149,14 @@ const UPLOAD_SIZE: usize = 8_192;
 /// use embedded_hal::spi::SpiDevice;
 /// use stampfly_sim::chips::{Bmi270, SpiBus};
 /// use stampfly_sim::{Simulation, SimulationConfig};
-/// use stampfly_types::Micros;
+/// use stampfly_types::Instant;
 ///
 /// let simulation = Simulation::new(&SimulationConfig::default());
 /// let clock = simulation.clock.clone();
 /// let image = [0x5A; 8192];
 /// let chip = Bmi270::new(&simulation.world, &clock, 1, 1.0, &image);
 /// let (mut port, _) = SpiBus::new(&clock, 1).attach(8_000_000, chip);
-/// clock.advance_to(Micros::from_millis(2));
+/// clock.advance_to(Instant::from_millis(2));
 /// let mut answer = [0; 3];
 /// port.transfer(&mut answer, &[0x80])?; // chooses SPI
 /// port.transfer(&mut answer, &[0x80])?;
@@ -174,22 +174,22 @@ pub struct Bmi270 {
     memory: Vec<u8>,
     registers: [u8; 128],
     /// End of the start-up.
-    ready: Micros,
+    ready: Instant,
     /// Beginning of the chip's time.
-    epoch: Micros,
+    epoch: Instant,
     spi: bool,
     /// Before this instant the chip takes no further write.
-    idle_until: Micros,
+    idle_until: Instant,
     /// Whether the running transfer came late enough to be taken.
     accepts: bool,
     /// Whether the upload has been announced.
     prepared: bool,
     /// End of the check of an upload.
-    check: Option<Micros>,
+    check: Option<Instant>,
     /// Byte address of the upload.
     address: usize,
     /// When accelerometer and gyroscope were switched on, if they are.
-    on: [Option<Micros>; 2],
+    on: [Option<Instant>; 2],
     /// Sums of the samples since the last output, accelerometer and gyroscope, and how many.
     sums: [([f64; 3], u64); 2],
     fifo: Fifo,
@@ -259,13 +259,13 @@ impl Bmi270 {
     }
 
     /// The chip's 24-bit time at `at`.
-    fn time(&self, at: Micros) -> [u8; 3] {
+    fn time(&self, at: Instant) -> [u8; 3] {
         let ticks = (16.0 * (self.schedule.phase(at) - self.schedule.phase(self.epoch).floor())) as u32;
         let [low, middle, high, _] = ticks.to_le_bytes();
         [low, middle, high]
     }
 
-    fn update(&mut self, now: Micros) {
+    fn update(&mut self, now: Instant) {
         if let Some(instant) = self.check.filter(|instant| *instant <= now) {
             self.check = None;
             let complete = !self.memory.is_empty() && self.memory.starts_with(&self.image);
@@ -289,12 +289,12 @@ impl Bmi270 {
     }
 
     /// The earliest instant at which something can happen without a transfer.
-    fn next_event(&self) -> Option<Micros> {
+    fn next_event(&self) -> Option<Instant> {
         let sample = (self.on != [None; 2]).then(|| self.schedule.instant(self.tick));
         [sample, self.check, self.interrupt.pulse_ends()].into_iter().flatten().min()
     }
 
-    fn end_pulse(&mut self, now: Micros) {
+    fn end_pulse(&mut self, now: Instant) {
         if self.interrupt.end_pulse(now) {
             self.drive_pin();
         }

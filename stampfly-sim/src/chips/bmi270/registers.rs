@@ -8,10 +8,10 @@ use super::{
     UPLOAD_SIZE,
 };
 use crate::chips::Chip;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 impl Chip for Bmi270 {
-    fn read(&mut self, register: u16, now: Micros) -> u16 {
+    fn read(&mut self, register: u16, now: Instant) -> u16 {
         self.update(now);
         if now < self.ready {
             return 0;
@@ -54,7 +54,7 @@ impl Chip for Bmi270 {
         })
     }
 
-    fn write(&mut self, register: u16, value: u16, now: Micros) {
+    fn write(&mut self, register: u16, value: u16, now: Instant) {
         self.update(now);
         let value = value as u8;
         if now < self.ready || register >= 0x80 {
@@ -128,7 +128,7 @@ impl Chip for Bmi270 {
         }
     }
 
-    fn reset(&mut self, now: Micros) {
+    fn reset(&mut self, now: Instant) {
         self.registers = [0; 128];
         for (register, value) in AFTER_RESET {
             self.set(register, value);

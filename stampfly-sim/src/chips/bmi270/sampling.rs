@@ -6,7 +6,7 @@ use super::{
     READY_ACCEL, READY_GYRO, STATUS, TEMPERATURE,
 };
 use crate::sensors::imu::to_counts;
-use stampfly_types::{GRAVITY, Micros};
+use stampfly_types::{GRAVITY, Instant};
 
 impl Bmi270 {
     /// Samples at 1600 Hz per output of sensor 0 or 1; none where the rate is not allowed (DS 5.2.45, 5.2.47).
@@ -27,7 +27,7 @@ impl Bmi270 {
     }
 
     /// One tick of the sensors.
-    pub(super) fn sample(&mut self, at: Micros) {
+    pub(super) fn sample(&mut self, at: Instant) {
         let [ax, ay, az, gx, gy, gz] = self.physics.sample(at);
         let force = self.self_test.deflect(self.register(ACCEL_SELF_TEST));
         // Body is (y, x, −z) of the chip as it is soldered.
@@ -77,7 +77,7 @@ impl Bmi270 {
     }
 
     /// Switches the sensors as the power register says.
-    pub(super) fn switch(&mut self, now: Micros) {
+    pub(super) fn switch(&mut self, now: Instant) {
         let power = self.register(POWER);
         for (sensor, bit) in [(0, 4), (1, 2)] {
             let on = power & bit != 0 && self.register(INTERNAL_STATUS) & 0x0F == 1;

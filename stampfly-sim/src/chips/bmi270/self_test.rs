@@ -10,7 +10,7 @@
 //! specimen exceeds those limits, a small deflection of a quarter of the large one, a mass that moves evenly and arrives
 //! after 45 ms at the latest, 85 ms for the test of the gyroscope. Retrimming is not modelled.
 
-use stampfly_types::{GRAVITY, Micros};
+use stampfly_types::{Duration, GRAVITY, Instant};
 
 /// Deflection by the positive force, chip axes, g.
 const DEFLECTION: [f64; 3] = [9.0, -8.5, 6.0];
@@ -18,14 +18,14 @@ const DEFLECTION: [f64; 3] = [9.0, -8.5, 6.0];
 const STEP: f64 = 2.0 * 0.000_625 / 0.045;
 /// Deflection of the small amplitude.
 const SMALL: f64 = 0.25;
-const GYRO_DURATION: Micros = Micros(85_000);
+const GYRO_DURATION: Duration = Duration::from_micros(85_000);
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SelfTest {
     /// Where the mass is, −1 to 1.
     place: f64,
     /// End of the running test of the gyroscope.
-    gyro: Option<Micros>,
+    gyro: Option<Instant>,
 }
 
 impl SelfTest {
@@ -38,12 +38,12 @@ impl SelfTest {
         DEFLECTION.map(|deflection| self.place * deflection * f64::from(GRAVITY))
     }
 
-    pub(super) fn begin_gyro(&mut self, now: Micros) {
+    pub(super) fn begin_gyro(&mut self, now: Instant) {
         self.gyro = Some(now + GYRO_DURATION);
     }
 
     /// Whether a test of the gyroscope has ended, told once.
-    pub(super) fn gyro_ends(&mut self, now: Micros) -> bool {
+    pub(super) fn gyro_ends(&mut self, now: Instant) -> bool {
         self.gyro.take_if(|end| *end <= now).is_some()
     }
 }

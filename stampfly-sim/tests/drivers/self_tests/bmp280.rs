@@ -8,14 +8,14 @@ use stampfly_drivers::chip::bmp280::{Bmp280, Config};
 use stampfly_drivers::chip::{ChipError, I2cRegisters};
 use stampfly_sim::chips::{self, Faults, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 fn barometer(spoil: Spoil) -> Bench<Bmp280<I2cRegisters<Spoilt<I2cBus>>, Clock>> {
     let (simulation, config) = (standing(), Config::default());
     let clock = simulation.clock.clone();
     let bus = I2cBus::new(&clock, 1);
     let attached = bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &clock, 1));
-    clock.advance_to(clock.now() + Micros::from_millis(2));
+    clock.advance_to(clock.now() + Duration::from_millis(2));
     let bus = Spoilt { bus, clock: clock.clone(), spoil };
     (clock.clone(), attached, Bmp280::new(bus, Bmp280::SDO_LOW, clock, config))
 }

@@ -8,7 +8,7 @@ use stampfly_drivers::chip::ina3221::{Channel, Config, Ina3221};
 use stampfly_drivers::chip::{ChipError, I2cRegisters};
 use stampfly_sim::chips::{self, Faults, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 fn monitor_of(channel: Channel, spoil: Spoil) -> Bench<Ina3221<I2cRegisters<Spoilt<I2cBus>>, Clock>> {
     let (simulation, config) = (standing(), Config { channel, ..Default::default() });

@@ -45,7 +45,7 @@ macro_rules! tells_healthy_from_broken {
             let outcome = block_on(&clock, driver.self_test());
             let took = clock.now().since(begun);
             assert_eq!(outcome, if broken { Err(ChipError::SelfTest) } else { Ok(()) });
-            assert!(took < Micros::from_millis($millis), "{took}");
+            assert!(took < Duration::from_millis($millis), "{took}");
             attached.set_broken(false);
             let after = [0; 5].map(|_| {
                 let sample = block_on(&clock, driver.next()).expect("a sample");
@@ -60,7 +60,7 @@ macro_rules! tells_healthy_from_broken {
 /// On a bus that never answers, refuses, garbles or is slow, before and after a start.
 macro_rules! ends_in_time {
     ($bench:expr, $slow:expr, $millis:expr) => {
-        let limit = Micros::from_millis($millis);
+        let limit = Duration::from_millis($millis);
         let faults = [
             Faults { dead: true, ..Faults::default() },
             Faults { refusals: 1.0, ..Faults::default() },
@@ -84,8 +84,8 @@ macro_rules! ends_in_time {
                 assert_eq!(block_on(&clock, driver.self_test()), Ok(()), "after {faults:?}");
             }
         }
-        let outcomes: [(Micros, Outcome); 2] =
-            [(Micros::from_secs(100), Err(ChipError::BusTimeout)), (Micros::from_millis($slow), Ok(()))];
+        let outcomes: [(Duration, Outcome); 2] =
+            [(Duration::from_secs(100), Err(ChipError::BusTimeout)), (Duration::from_millis($slow), Ok(()))];
         for (delay, expected) in outcomes {
             let (clock, _, mut driver) = $bench(Spoil::slow(delay));
             let begun = clock.now();
@@ -103,7 +103,7 @@ macro_rules! says {
             let (clock, _, mut driver) = $bench(Spoil::changed(change));
             let begun = clock.now();
             assert_eq!(block_on(&clock, driver.self_test()), expected, "change {number}");
-            assert!(clock.now().since(begun) < Micros::from_millis($millis), "change {number}");
+            assert!(clock.now().since(begun) < Duration::from_millis($millis), "change {number}");
         }
     };
 }

@@ -8,7 +8,7 @@ use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
 use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_sim::chips::{self, Faults, SpiBus, SpiPort};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 fn flow(spoil: Spoil) -> Bench<Pmw3901<Spoilt<SpiPort<chips::Pmw3901>>, Clock>> {
     let (simulation, config) = (standing(), Config::default());

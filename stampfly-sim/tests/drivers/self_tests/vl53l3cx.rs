@@ -9,7 +9,7 @@ use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, Vl53l3cx};
 use stampfly_sim::chips::{self, Faults, I2cBus, ShutdownPin};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 type Range = Vl53l3cx<'static, Spoilt<I2cBus>, ShutdownPin, Clock>;
 
