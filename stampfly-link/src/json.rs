@@ -1,7 +1,7 @@
 //! Datagrams as JSON lines: one flat object per line, for people, scripts and `nc`.
 //!
-//! `{"kind":"PowerData","version":1,"sequence":7,"time":20000,"voltage":4.2,"current":1,"power":4.2}`: members in any order,
-//! all of them, each once; time in µs. Strings are names without escapes, and nothing is nested. The message's own schema is
+//! `{"@kind":"PowerData","@format":1,"@sequence":7,"@time":20000,"voltage":4.2,"current":1,"power":4.2}`: members in any
+//! order, all of them, each once; those of the datagram begin with `@`, which no field does; time in µs. Strings are names without escapes, and nothing is nested. The message's own schema is
 //! the codec, which makes it shorter than the types a general JSON library needs, and it allocates nothing.
 //!
 //! ```
@@ -26,7 +26,7 @@ use core::fmt::{Error, Result as Written, Write};
 use core::str::FromStr;
 use stampfly_types::{Instant, Message, text};
 
-/// Members that are not of the message: kind, version, sequence, time.
+/// Members of the datagram: kind, format, sequence, time.
 const HEADER: usize = 4;
 
 /// Writes a datagram and a line feed.
@@ -50,7 +50,7 @@ impl<W: Write> Visitor for Writer<'_, W> {
     fn message<M: Message>(self, _: u8, message: &M) -> Written {
         let Self { sequence, time, out } = self;
         let (kind, time) = (M::NAME, time.as_micros());
-        write!(out, r#"{{"kind":"{kind}","version":{VERSION},"sequence":{sequence},"time":{time}"#)?;
+        write!(out, r#"{{"@kind":"{kind}","@format":{VERSION},"@sequence":{sequence},"@time":{time}"#)?;
         for (field, words) in text::fields::<M>(&message.to_words()) {
             write!(out, r#","{}":"#, field.name)?;
             text::write(field, words, text::Style::Names, out)?;
@@ -69,13 +69,13 @@ pub fn read<B: Body>(line: &str) -> Result<Datagram<B>, DatagramError> {
     if object.members().any(|member| member.is_none()) {
         return Err(DatagramError::Syntax);
     }
-    if object.number::<u8>("version")? != VERSION {
+    if object.number::<u8>("@format")? != VERSION {
         return Err(DatagramError::Version);
     }
-    let name = object.value("kind")?;
+    let name = object.value("@kind")?;
     let is_named = |known: &str| name.strip_prefix('"').and_then(|name| name.strip_suffix('"')) == Some(known);
     let (kind, _) = B::KINDS.iter().find(|(_, known)| is_named(known)).ok_or(DatagramError::Kind)?;
-    let (sequence, time) = (object.number("sequence")?, Instant::from_micros(object.number("time")?));
+    let (sequence, time) = (object.number("@sequence")?, Instant::from_micros(object.number("@time")?));
     Ok(Datagram { sequence, time, body: B::build(*kind, object)? })
 }
 

@@ -93,7 +93,7 @@ fn a_datagram_has_the_bytes_of_the_table() {
     expected.extend(crc32(&expected).to_le_bytes());
     assert_eq!(bytes(&lever()), expected);
     assert_eq!(expected.len(), length::<Lever>());
-    let json = r#"{"kind":"Lever","version":1,"sequence":67305985,"time":578437695752307201,"position":0.5,"gear":"Drive","locked":true}"#;
+    let json = r#"{"@kind":"Lever","@format":1,"@sequence":67305985,"@time":578437695752307201,"position":0.5,"gear":"Drive","locked":true}"#;
     assert_eq!(line(&lever()), format!("{json}\n"));
 }
 
@@ -102,11 +102,13 @@ fn any_datagram() -> impl Strategy<Value = Any> {
         let gear = Gear::from_number(gear).expect("three gears");
         Table::from(Lever { position, gear, locked })
     });
-    let clock = (any::<u64>(), any::<u32>()).prop_map(|(reading, settings)| {
-        Table::from(Clock { reading: Instant::from_micros(reading), settings })
-    });
-    (any::<u32>(), any::<u64>(), prop_oneof![lever, clock])
-        .prop_map(|(sequence, time, body)| Datagram { sequence, time: Instant::from_micros(time), body })
+    let clock = (any::<u64>(), any::<u32>())
+        .prop_map(|(reading, settings)| Table::from(Clock { reading: Instant::from_micros(reading), settings }));
+    (any::<u32>(), any::<u64>(), prop_oneof![lever, clock]).prop_map(|(sequence, time, body)| Datagram {
+        sequence,
+        time: Instant::from_micros(time),
+        body,
+    })
 }
 
 proptest! {
@@ -174,7 +176,7 @@ fn every_refusal_has_its_reason() {
 #[test]
 fn json_accepts_spaces_and_any_order_and_nothing_else() {
     let read = json::read::<Table>;
-    let good = r#" { "time" : 5, "locked" : 0, "gear" : 2, "position" : -1, "sequence" : 3, "kind" : "Lever", "version" : 1 } "#;
+    let good = r#" { "@time" : 5, "locked" : 0, "gear" : 2, "position" : -1, "@sequence" : 3, "@kind" : "Lever", "@format" : 1 } "#;
     let body = Lever { position: -1.0, gear: Gear::Reverse, locked: false }.into();
     assert_eq!(read(good), Ok(Datagram { sequence: 3, time: Instant::from_micros(5), body }));
     for (from, to, reason) in [
@@ -192,8 +194,8 @@ fn json_accepts_spaces_and_any_order_and_nothing_else() {
         (": -1", ": {}", DatagramError::Value),
         ("\"Lever\"", "\"Liver\"", DatagramError::Kind),
         ("\"Lever\"", "Lever", DatagramError::Kind),
-        ("\"version\" : 1", "\"version\" : 2", DatagramError::Version),
-        ("\"sequence\" : 3", "\"sequence\" : -3", DatagramError::Value),
+        ("\"@format\" : 1", "\"@format\" : 2", DatagramError::Version),
+        ("\"@sequence\" : 3", "\"@sequence\" : -3", DatagramError::Value),
     ] {
         assert_eq!(read(&good.replacen(from, to, 1)), Err(reason), "{from} replaced by {to}");
     }

@@ -85,8 +85,8 @@ pub fn read_line<M: Message>(line: &str) -> Result<M, CsvError> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::string::String;
     use stampfly_types::messages::{ImuData, PowerData};
+    use std::string::String;
 
     proptest! {
         #[test]

@@ -55,7 +55,10 @@ fn the_set_is_a_message() {
     let crane = Crane { slew: Slew { rate: 0.7 }, ..Crane::default() };
     assert_eq!(crane.to_words().map(f32::from_bits), [0.1, 0.5, 0.7]);
     assert_eq!(Crane::from_words(&crane.to_words()), Some(crane));
-    assert_eq!(Crane::FIELDS.iter().map(|field| (field.name, field.count)).collect::<Vec<_>>(), [("hoist", 2), ("slew", 1)]);
+    assert_eq!(
+        Crane::FIELDS.iter().map(|field| (field.name, field.count)).collect::<Vec<_>>(),
+        [("hoist", 2), ("slew", 1)]
+    );
 }
 
 #[test]

@@ -82,7 +82,9 @@ pub fn write(field: &FieldInfo, words: &[u32], style: Style, out: &mut impl Writ
 ///
 /// # Errors
 /// Those of `text_of`.
-pub fn read<'t, M: Message, E>(mut text_of: impl FnMut(&'static FieldInfo) -> Result<&'t str, E>) -> Result<Option<M>, E> {
+pub fn read<'t, M: Message, E>(
+    mut text_of: impl FnMut(&'static FieldInfo) -> Result<&'t str, E>,
+) -> Result<Option<M>, E> {
     let mut words = M::ZERO;
     let mut rest = words.as_mut();
     for field in M::FIELDS {

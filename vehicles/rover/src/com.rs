@@ -18,9 +18,13 @@
 use crate::messages::*;
 use stampfly_link::{datagram, datagrams};
 use stampfly_param::{ParameterRequest, ParameterStatus};
+use stampfly_types::Duration;
 
 /// Room for the longest datagram, bytes.
 pub const MAX: usize = datagram::length::<LogRecord>();
+
+/// How long a [`Subscription`] lasts without being repeated.
+pub const SUBSCRIPTION: Duration = Duration::from_secs(2);
 
 fn is_input(throttle: f32, brake: f32, steer: f32) -> bool {
     (0.0..=1.0).contains(&throttle) && (0.0..=1.0).contains(&brake) && (-1.0..=1.0).contains(&steer)
@@ -44,4 +48,6 @@ datagrams! {
     LogRecord = 6, valid if |m| is_input(m.throttle, m.brake, m.steer) && m.v >= 0.0;
     /// From the rover: which parameters are in use.
     ParameterStatus = 7, valid if |_| true;
+    /// To the rover: who wants the log.
+    Subscription = 8, valid if |_| true;
 }

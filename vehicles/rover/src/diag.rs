@@ -12,8 +12,8 @@
 //! assert_eq!(check(&signals, &Parameters::default()), Faults::DRIVE);
 //! ```
 
-use crate::messages::{BrakeCommand, DriveCommand, DriverInput, Faults, SteeringCommand, VehicleState};
 use crate::Parameters;
+use crate::messages::{BrakeCommand, DriveCommand, DriverInput, Faults, SteeringCommand, VehicleState};
 
 /// The signals of one period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -83,7 +83,7 @@ impl DriverSelector {
             brake: fraction(selected.brake),
             steer: within(selected.steer, 1.0),
         };
-        if sources.system_state == SystemState::Normal { input } else { degraded(input, sources.speed, parameters) }
+        if sources.system_state == SystemState::Degraded { degraded(input, sources.speed, parameters) } else { input }
     }
 }
 

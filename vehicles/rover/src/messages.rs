@@ -86,6 +86,14 @@ message! {
 }
 
 message! {
+    /// Asks for the log, live; lapses after [two seconds](crate::com::SUBSCRIPTION).
+    pub struct Subscription {
+        /// Send every so many lines; 0 ends it.
+        every: u32 ["1"],
+    }
+}
+
+message! {
     /// The selected and limited input: the document's `DriverInput`.
     pub struct DriverInput {
         /// Throttle, 0 to 1.

@@ -89,11 +89,7 @@ impl SafetySupervisor {
         self.reset_held = input.reset;
         self.latched = if reset { present } else { self.latched.max(present) };
         let (replayed_estop, replayed_state) = input.replayed;
-        SafetyStatus {
-            estop: input.estop || replayed_estop,
-            system_state: self.latched.max(replayed_state),
-            stalled,
-        }
+        SafetyStatus { estop: input.estop || replayed_estop, system_state: self.latched.max(replayed_state), stalled }
     }
 }
 

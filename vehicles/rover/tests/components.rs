@@ -41,8 +41,13 @@ impl Bench {
     }
 }
 
-const RESET: SafetyInput =
-    SafetyInput { heartbeats: [0; 6], faulty: false, estop: false, reset: true, replayed: (false, SystemState::Normal) };
+const RESET: SafetyInput = SafetyInput {
+    heartbeats: [0; 6],
+    faulty: false,
+    estop: false,
+    reset: true,
+    replayed: (false, SystemState::Normal),
+};
 
 #[test]
 fn each_component_is_supervised() {
@@ -187,7 +192,8 @@ fn the_demo_begins_when_its_mode_is_entered() {
 fn a_silent_operator_is_a_braking_vehicle() {
     let (mut selector, parameters) = (DriverSelector::default(), Parameters::default().input);
     for (age, expected) in [(None, DriverInput::STOP), (Some(501), DriverInput::STOP)] {
-        let sources = DriverSources { operator_age: age.map(Duration::from_millis), ..sources(mode(InputMode::Manual)) };
+        let sources =
+            DriverSources { operator_age: age.map(Duration::from_millis), ..sources(mode(InputMode::Manual)) };
         assert_eq!(selector.step(at(0), &sources, &parameters), expected);
     }
 }
@@ -220,14 +226,15 @@ proptest! {
 
 #[test]
 fn every_fault_is_found_and_named() {
+    type Spoil = fn(&mut Signals, f32);
     let parameters = Parameters::default();
     let sound = Signals::default();
-    let spoilt = |spoil: fn(&mut Signals, f32), value: f32| {
+    let spoilt = |spoil: Spoil, value: f32| {
         let mut signals = sound;
         spoil(&mut signals, value);
         check(&signals, &parameters)
     };
-    let cases: [(fn(&mut Signals, f32), f32, Faults); 9] = [
+    let cases: [(Spoil, f32, Faults); 9] = [
         (|s, v| s.input.throttle = v, 1.1, Faults::DRIVER_INPUT),
         (|s, v| s.input.brake = v, -0.1, Faults::DRIVER_INPUT),
         (|s, v| s.input.steer = v, 1.1, Faults::DRIVER_INPUT),

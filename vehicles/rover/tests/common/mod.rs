@@ -31,6 +31,7 @@ pub struct Rover {
     heartbeats: [u32; COMPONENTS.len()],
     last_check: Option<Instant>,
     heard: SafetyInput,
+    faulty: bool,
 }
 
 impl Rover {
@@ -44,7 +45,7 @@ impl Rover {
         let replayed = events.replay.map_or_else(Default::default, |record| (record.estop, record.system_state));
         let heard = SafetyInput {
             heartbeats: self.heard.heartbeats,
-            faulty: !diag::check(signals, parameters).is_empty(),
+            faulty: self.faulty,
             estop: events.operator.estop,
             reset: events.operator.reset,
             replayed,
@@ -85,6 +86,7 @@ impl Rover {
             let state = models::step_lateral(&state, TICK, signals.steering.angle, &parameters.vehicle);
             signals.state = VehicleState { t: self.now.seconds_f64() as f32, ..state };
         }
+        self.faulty = !diag::check(signals, parameters).is_empty();
         let commands = (&signals.drive, &signals.brake, &signals.steering);
         LogRecord::new(&signals.input, commands, &signals.state, &self.safety)
     }
