@@ -88,7 +88,7 @@ message! {
 message! {
     /// Asks for the log, live; lapses after [two seconds](crate::com::SUBSCRIPTION).
     pub struct Subscription {
-        /// Send every so many lines; 0 ends it.
+        /// Send every n-th line; 0 ends it.
         every: u32 ["1"],
     }
 }
