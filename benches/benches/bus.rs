@@ -13,13 +13,12 @@ use embassy_sync::watch::Watch;
 use heapless::spsc;
 use stampfly_bus::topics;
 use stampfly_types::messages::ImuData;
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Instant, Vec3};
 use std::future::Future;
 use std::hint::black_box;
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, Waker};
-use std::time::Instant;
 
 topics! {
     /// What is measured.
@@ -37,7 +36,7 @@ fn wake(_topic: usize) {
     WOKEN.store(true, Ordering::Release);
 }
 
-type Timed = (Micros, ImuData);
+type Timed = (Instant, ImuData);
 
 fn sample(seed: u64) -> ImuData {
     let x = seed as f32 * 1e-3;
@@ -56,13 +55,13 @@ fn contenders(measure: &mut impl Measure) {
     let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu }, .. } = bus.split(None);
     let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
     measure.contender("stampfly-bus ring, polling", |k| {
-        tx.publish(Micros(k), &sample(k));
+        tx.publish(Instant::from_micros(k), &sample(k));
         rx.next().map(|s| s.data)
     });
 
     let (mut tx, mut rx) = (newest_imu.tx, newest_imu.estimation);
     measure.contender("stampfly-bus latest, polling", |k| {
-        tx.publish(Micros(k), &sample(k));
+        tx.publish(Instant::from_micros(k), &sample(k));
         rx.latest().map(|s| s.data)
     });
 
@@ -70,21 +69,21 @@ fn contenders(measure: &mut impl Measure) {
     let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu: _newest }, .. } = bus.split(Some(wake));
     let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
     measure.contender("stampfly-bus ring, waiting", |k| {
-        tx.publish(Micros(k), &sample(k));
+        tx.publish(Instant::from_micros(k), &sample(k));
         if WOKEN.swap(false, Ordering::AcqRel) { rx.next().map(|s| s.data) } else { None }
     });
 
     let mut queue: spsc::Queue<Timed, 16> = spsc::Queue::new();
     let (mut producer, mut consumer) = queue.split();
     measure.contender("heapless spsc, polling", |k| {
-        let _ = producer.enqueue((Micros(k), sample(k)));
+        let _ = producer.enqueue((Instant::from_micros(k), sample(k)));
         consumer.dequeue().map(|s| s.1)
     });
 
     let watch: Watch<CriticalSectionRawMutex, Timed, 2> = Watch::new();
     let (sender, mut receiver) = (watch.sender(), watch.receiver().expect("two receivers"));
     measure.contender("embassy-sync Watch, polling", |k| {
-        sender.send((Micros(k), sample(k)));
+        sender.send((Instant::from_micros(k), sample(k)));
         receiver.try_changed().map(|s| s.1)
     });
 
@@ -94,7 +93,7 @@ fn contenders(measure: &mut impl Measure) {
         let mut reader = pin!(receiver.changed());
         let mut context = Context::from_waker(Waker::noop());
         assert!(reader.as_mut().poll(&mut context).is_pending());
-        sender.send((Micros(k), sample(k)));
+        sender.send((Instant::from_micros(k), sample(k)));
         match reader.poll(&mut context) {
             Poll::Ready(s) => Some(s.1),
             Poll::Pending => None,
@@ -105,7 +104,7 @@ fn contenders(measure: &mut impl Measure) {
     let publisher = channel.publisher().expect("one publisher");
     let mut subscriber = channel.subscriber().expect("two subscribers");
     measure.contender("embassy-sync PubSub, polling", |k| {
-        publisher.publish_immediate((Micros(k), sample(k)));
+        publisher.publish_immediate((Instant::from_micros(k), sample(k)));
         match subscriber.try_next_message() {
             Some(WaitResult::Message(s)) => Some(s.1),
             _ => None,
@@ -119,7 +118,7 @@ fn contenders(measure: &mut impl Measure) {
         let mut reader = pin!(subscriber.next_message());
         let mut context = Context::from_waker(Waker::noop());
         assert!(reader.as_mut().poll(&mut context).is_pending());
-        publisher.publish_immediate((Micros(k), sample(k)));
+        publisher.publish_immediate((Instant::from_micros(k), sample(k)));
         match reader.poll(&mut context) {
             Poll::Ready(WaitResult::Message(s)) => Some(s.1),
             _ => None,
@@ -156,7 +155,7 @@ struct Interleaved(Vec<(&'static str, Vec<f64>)>);
 
 impl Measure for Interleaved {
     fn contender(&mut self, name: &'static str, mut round: impl FnMut(u64) -> Option<ImuData>) {
-        let started = Instant::now();
+        let started = std::time::Instant::now();
         for k in 1..=CALLS {
             black_box(round(black_box(k)));
         }

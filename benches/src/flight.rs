@@ -12,7 +12,7 @@ use stampfly_sim::sensors::Sensors;
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::messages::*;
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Instant, Vec3};
 use std::cell::RefCell;
 
 /// Steps of the recording: twenty seconds.
@@ -35,9 +35,9 @@ enum Input {
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     /// When it came in.
-    clock: Micros,
+    clock: Instant,
     /// When it was true.
-    at: Micros,
+    at: Instant,
     input: Input,
 }
 
@@ -50,7 +50,7 @@ struct Vehicle<'b> {
 impl<'b> Vehicle<'b> {
     fn new(bus: &'b mut wiring::Bus) -> Self {
         let wiring::Split { ports, heads, .. } = bus.split(None);
-        let Assembled { flight_loop, outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
+        let Assembled { flight_loop, outside } = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
         Self { flight: flight_loop, outside }
     }
 

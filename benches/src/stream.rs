@@ -18,14 +18,14 @@
 
 use stampfly_eskf::{EskfConfig, Estimator, Fusion, GravityUse, MagModel};
 use stampfly_types::messages::{BaroData, CalibrationResult, FlowData, ImuData, MagData, StateEstimate, TofData};
-use stampfly_types::{GRAVITY, Message, Micros, Quat, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Message, Quat, Vec3, math};
 
 /// Steps until the stream repeats: four seconds.
 pub const STEPS: usize = 1_600;
 /// Length of a step.
-const PERIOD: Micros = Micros(2_500);
+const PERIOD: Duration = Duration::from_micros(2_500);
 /// When the first step begins. Not zero, so that the first samples can be older than it.
-pub const START: Micros = Micros(1_000_000);
+pub const START: Instant = Instant::from_micros(1_000_000);
 
 /// What comes with one inertial sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,19 +80,19 @@ pub fn calibration() -> CalibrationResult {
 
 /// The instant at the end of step `k`.
 #[must_use]
-pub fn end_of(k: u64) -> Micros {
-    Micros(START.0 + (k + 1) * PERIOD.0)
+pub fn end_of(k: u64) -> Instant {
+    START + PERIOD * (k + 1)
 }
 
 /// Everything a user does at 400 Hz, for the step that ends at `at`. Tells what became of range, flow, barometer and
 /// magnetometer.
 #[inline]
-pub fn advance(estimator: &mut impl Estimator, at: Micros, step: &Step) -> [Option<Fusion>; 4] {
+pub fn advance(estimator: &mut impl Estimator, at: Instant, step: &Step) -> [Option<Fusion>; 4] {
     estimator.predict(at, &step.imu);
     [
-        step.tof.map(|tof| estimator.fuse_tof(Micros(at.0 - TOF_AGE.0), &tof)),
-        step.flow.map(|flow| estimator.fuse_flow(Micros(at.0 - FLOW_AGE.0), &flow)),
-        step.baro.map(|baro| estimator.fuse_baro(Micros(at.0 - BARO_AGE.0), &baro)),
+        step.tof.map(|tof| estimator.fuse_tof(at - TOF_AGE, &tof)),
+        step.flow.map(|flow| estimator.fuse_flow(at - FLOW_AGE, &flow)),
+        step.baro.map(|baro| estimator.fuse_baro(at - BARO_AGE, &baro)),
         step.mag.map(|mag| estimator.fuse_mag(at, &mag)),
     ]
 }
@@ -109,9 +109,9 @@ pub const HASH: u64 = 0xcbf2_9ce4_8422_2325;
 
 /// How old a sample is when it comes in. A range is the middle of its integration, a flow sample is stamped when it is
 /// read.
-const TOF_AGE: Micros = Micros(10_000);
-const FLOW_AGE: Micros = Micros(2_000);
-const BARO_AGE: Micros = Micros(5_000);
+const TOF_AGE: Duration = Duration::from_micros(10_000);
+const FLOW_AGE: Duration = Duration::from_micros(2_000);
+const BARO_AGE: Duration = Duration::from_micros(5_000);
 /// From the middle of what a flow sample saw to its coming in, in half steps: half its interval, the sensor's delay of
 /// 12 ms, the age of the stamp.
 const FLOW_MIDDLE: i32 = 15;

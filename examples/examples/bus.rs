@@ -2,7 +2,7 @@
 
 use stampfly_bus::{Activation, Band, Runnable, Runnables, Scheduler, Stamped, schedule, topics};
 use stampfly_types::messages::{StateEstimate, TofData};
-use stampfly_types::{Micros, math};
+use stampfly_types::{Instant, math};
 
 topics! {
     /// Who publishes what for whom.
@@ -54,7 +54,11 @@ impl Runnable for Display<'_> {
     }
     fn run(&mut self, activation: &mut Activation) {
         if let Some(Stamped { generation, data, .. }) = self.newest {
-            println!("{:4.1} s  height {:.3} m, estimate number {generation}", activation.now().seconds(), data.height);
+            println!(
+                "{:4.1} s  height {:.3} m, estimate number {generation}",
+                activation.now().seconds_f64(),
+                data.height
+            );
         }
     }
 }
@@ -66,12 +70,13 @@ fn main() {
         filter: Filter { ranges: range.filter, out: estimate.tx, new: heapless::Vec::new(), height: 0.0 },
         display: Display { estimate: estimate.display, newest: None },
     };
-    let mut scheduler: Scheduler<{ plan::COUNT }, { wiring::COUNT }> = Scheduler::new(&plan::ACTIVATIONS, Micros::ZERO);
+    let mut scheduler: Scheduler<{ plan::COUNT }, { wiring::COUNT }> =
+        Scheduler::new(&plan::ACTIVATIONS, Instant::ZERO);
 
     // The executor: here a loop over a simulated clock, on a vehicle a task that the bus's hook wakes.
     for step in 1..=90 {
-        let clock = Micros(step * 33_333);
-        let distance = 0.5 + 0.2 * math::sin(clock.seconds());
+        let clock = Instant::from_micros(step * 33_333);
+        let distance = 0.5 + 0.2 * math::sin(clock.since(Instant::ZERO).seconds());
         range.tx.publish(clock, &TofData { distance, valid: true, ..Default::default() });
         for band in [Band::Flight, Band::Background] {
             while let Some((index, now)) = scheduler.due(band, 0, clock, &heads) {

@@ -10,7 +10,7 @@ use examples::drivers::Failure;
 use examples::drivers::button::{self, Pressed};
 use stampfly_drivers::PinButton;
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// When the button is down, in milliseconds.
 const PRESSES: [core::ops::Range<u64>; 5] = [1_000..1_200, 3_000..3_120, 3_300..3_420, 6_000..9_600, 12_000..17_500];
@@ -27,7 +27,7 @@ impl ErrorType for Contact {
 
 impl InputPin for Contact {
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        let millis = self.clock.now().0 / 1_000;
+        let millis = self.clock.now().as_micros() / 1_000;
         let down = PRESSES.iter().any(|press| press.contains(&millis));
         let changes = PRESSES.iter().flat_map(|press| [press.start, press.end]);
         let bounces = changes.into_iter().any(|change| (change..change + 15).contains(&millis));
@@ -40,7 +40,7 @@ impl InputPin for Contact {
 }
 
 fn main() -> Result<(), Failure<Infallible>> {
-    let clock = Clock::new(Micros::ZERO);
+    let clock = Clock::new(Instant::ZERO);
     let contact = Contact { clock: clock.clone(), bounce: Cell::default() };
     let pressed = block_on(&clock, button::run(PinButton(contact), clock.clone(), &mut Terminal))?;
     let expected = Pressed { clicks: 1, double_clicks: 1, long: 2, very_long: 1 };

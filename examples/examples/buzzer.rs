@@ -9,7 +9,7 @@ use emulated::Terminal;
 use examples::drivers::{Failure, buzzer};
 use stampfly_drivers::SetFrequency;
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// What the channel played.
 #[derive(Default)]
@@ -43,7 +43,7 @@ impl SetFrequency for Channel<'_> {
 }
 
 fn main() -> Result<(), Failure<Infallible>> {
-    let (clock, heard) = (Clock::new(Micros::ZERO), Heard::default());
+    let (clock, heard) = (Clock::new(Instant::ZERO), Heard::default());
     let played = block_on(&clock, buzzer::run(Channel(&heard), clock.clone(), &mut Terminal))?;
 
     let pitches = heard.pitches.into_inner();

@@ -2,7 +2,7 @@
 
 use stampfly_eskf::calibration::{EllipsoidFit, LevelTrim, SixPosition, StillCalibration, TemperatureTable};
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3, math};
 use std::mem::size_of;
 
 /// What is wrong with this vehicle. Nothing below the sensors knows it.
@@ -16,7 +16,7 @@ const SOFT_IRON: Vec3 = Vec3::new(1.08, 0.95, 1.0);
 
 /// The bench: a clock and sensors with noise.
 struct Bench {
-    now: Micros,
+    now: Instant,
     random: u32,
 }
 
@@ -30,8 +30,8 @@ impl Bench {
     }
 
     /// The next sample of a vehicle that turns at this rate and feels this force.
-    fn sample(&mut self, rate: Vec3, force: Vec3, temperature: f32) -> (Micros, ImuData) {
-        self.now += Micros(2_500);
+    fn sample(&mut self, rate: Vec3, force: Vec3, temperature: f32) -> (Instant, ImuData) {
+        self.now += Duration::from_micros(2_500);
         let gyro = rate + GYRO_BIAS + GYRO_DRIFT * (temperature - 25.0) + self.noise() * 0.004;
         let accel = force.component_mul(&ACCEL_GAIN) + ACCEL_BIAS + self.noise() * 0.03;
         (self.now, ImuData { accel, gyro, temperature })
@@ -39,7 +39,7 @@ impl Bench {
 }
 
 fn main() {
-    let mut bench = Bench { now: Micros::ZERO, random: 1 };
+    let mut bench = Bench { now: Instant::ZERO, random: 1 };
     let (sin, cos) = math::sin_cos(MOUNT_ROLL);
     let level = Vec3::new(0.0, -sin, -cos) * GRAVITY;
     let still = Vec3::zeros();
@@ -47,13 +47,13 @@ fn main() {
     println!("Still, {} bytes: leave it alone for four seconds.", size_of::<StillCalibration>());
     let mut calibration = StillCalibration::default();
     while !calibration.result().complete {
-        let touched = (1.5..1.6).contains(&bench.now.seconds());
+        let touched = (Instant::from_millis(1_500)..Instant::from_millis(1_600)).contains(&bench.now);
         let (now, imu) = bench.sample(if touched { Vec3::x() } else { still }, level, 25.0);
         let before = calibration.result().restarts;
         if let Err(reason) = calibration.step(now, &imu)
             && calibration.result().restarts > before
         {
-            println!("  {:.2} s: {reason:?}, begins again", now.seconds());
+            println!("  {:.2} s: {reason:?}, begins again", now.seconds_f64());
         }
     }
     let quality = calibration.quality().expect("complete");

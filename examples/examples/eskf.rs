@@ -2,7 +2,7 @@
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{CalibrationResult, ImuData, TofData};
-use stampfly_types::{GRAVITY, Micros, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
 /// A vehicle that goes up and down: height and climb rate, and upward acceleration.
 fn truth(seconds: f32) -> (f32, f32, f32) {
@@ -21,13 +21,13 @@ fn main() {
     let mut random = 1;
     let mut eskf = Eskf::new(EskfConfig::default());
     let still = Vec3::new(0.0, 0.0, -GRAVITY);
-    eskf.initialize(Micros::ZERO, &CalibrationResult { specific_force: still, complete: true, ..Default::default() });
+    eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: still, complete: true, ..Default::default() });
 
     println!("  time    height  estimate     error     climb  estimate");
     let (mut squares, mut count) = (0.0, 0.0);
     for step in 1..=20 * 400u64 {
-        let at = Micros(step * 2_500);
-        let (height, climb, acceleration) = truth(at.seconds());
+        let at = Instant::from_micros(step * 2_500);
+        let (height, climb, acceleration) = truth(at.since(Instant::ZERO).seconds());
         // Specific force is what is felt: thrust up is negative z in the body frame.
         let felt = -GRAVITY - acceleration + 0.3 * noise(&mut random);
         eskf.predict(at, &ImuData { accel: Vec3::new(0.0, 0.0, felt), ..Default::default() });
@@ -43,7 +43,7 @@ fn main() {
         if step % 800 == 0 {
             println!(
                 "{:5.1} s {height:8.3} m {:7.3} m {:8.1} mm {climb:6.2} m/s {:6.2} m/s",
-                at.seconds(),
+                at.seconds_f64(),
                 estimate.height,
                 (estimate.height - height) * 1e3,
                 -estimate.velocity.z,

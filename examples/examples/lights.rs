@@ -8,7 +8,7 @@ use emulated::Terminal;
 use examples::drivers::{Failure, lights};
 use smart_leds_trait::{RGB8, SmartLedsWrite};
 use stampfly_sim::time::{Clock, block_on};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// A chain's writer, and every colour that each of its lights was given.
 struct Chain<'a>(&'a RefCell<Vec<Vec<RGB8>>>);
@@ -24,7 +24,7 @@ impl SmartLedsWrite for Chain<'_> {
 }
 
 fn main() -> Result<(), Failure<Infallible>> {
-    let clock = Clock::new(Micros::ZERO);
+    let clock = Clock::new(Instant::ZERO);
     let (status, body) = (RefCell::default(), RefCell::default());
     let shown = block_on(&clock, lights::run(Chain(&status), Chain(&body), clock.clone(), &mut Terminal))?;
 

@@ -1,7 +1,7 @@
 //! A vehicle looks for its transmitter in a room where others fly, too.
 
 use stampfly_link::{Address, ControlPacket, LinkState, PairingPacket, Session, TelemetryPacket};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::{FlightMode, PilotInput};
 
 /// A transmitter: where it is, and which vehicle it sends to.
@@ -26,7 +26,7 @@ fn main() {
         Transmitter { address: Address([2, 0, 0, 0, 0, 2]), vehicle: theirs, sticks: PilotInput::default() };
 
     for step in 0..100u64 {
-        let now = Micros::from_millis(20 * step);
+        let now = Instant::from_millis(20 * step);
         if let Some(call) = vehicle.beacon(now) {
             let call = PairingPacket::decode(&call).expect("a call");
             println!("{now}: {} calls on channel {}", call.vehicle, call.channel);

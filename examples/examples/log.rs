@@ -3,7 +3,7 @@
 use stampfly_log::FlightHash;
 use stampfly_log::ulog::{Column, Definitions, Message, Ram, Reader, Sample, Topic};
 use stampfly_types::messages::{PowerData, TofData};
-use stampfly_types::{Message as _, Micros};
+use stampfly_types::{Instant, Message as _};
 use std::collections::BTreeMap;
 
 const TOPICS: &[Topic] =
@@ -12,12 +12,12 @@ const POWER: usize = 0;
 const TOF: usize = 1;
 
 fn write(memory: &mut [u8]) -> Result<usize, Box<dyn std::error::Error>> {
-    let mut log = Definitions::start(Ram::new(memory), Micros::ZERO)?;
+    let mut log = Definitions::start(Ram::new(memory), Instant::ZERO)?;
     log.info("sys_name", "StampFly")?;
     let mut log = log.data(TOPICS, &[])?;
     let mut hash = FlightHash::new();
     for k in 1..=5u32 {
-        let at = Micros(u64::from(k) * 100_000);
+        let at = Instant::from_micros(u64::from(k) * 100_000);
         let power = PowerData { voltage: 4.1 - 0.02 * k as f32, current: 3.0, power: 12.0 };
         let range = TofData { distance: 0.1 * k as f32, valid: k > 1, ..Default::default() };
         for (topic, words) in [(POWER, power.to_words().as_slice()), (TOF, range.to_words().as_slice())] {

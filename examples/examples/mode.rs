@@ -1,7 +1,7 @@
 //! A flight through the state table, told by its transitions.
 
 use stampfly_mode::{ModeInput, ModeMachine};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
 /// What the vehicle sees, as the story goes on.
@@ -44,9 +44,9 @@ fn main() {
     let mut story = STORY.iter().peekable();
 
     for step in 0..14 * 400u64 {
-        let now = Micros(step * 2_500);
-        while let Some((_, text, change)) = story.next_if(|(millis, ..)| Micros::from_millis(*millis) <= now) {
-            println!("{:5.1} s  {text}", now.seconds());
+        let now = Instant::from_micros(step * 2_500);
+        while let Some((_, text, change)) = story.next_if(|(millis, ..)| Instant::from_millis(*millis) <= now) {
+            println!("{:5.1} s  {text}", now.seconds_f64());
             change(&mut world);
         }
         let World { alerts, estimate, calibration, status, commands } = &world;

@@ -11,7 +11,7 @@ use examples::drivers::{Failure, motors};
 use stampfly_drivers::{MotorError, MotorOutputs, PwmMotors};
 use stampfly_sim::Simulation;
 use stampfly_sim::time::block_on;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::MotorOutput;
 
 /// A timer's channel of 8 bits, wired to one of the simulated motors.
@@ -60,7 +60,7 @@ fn main() -> Result<(), Failure<MotorError>> {
                     order.push(motor);
                 }
             }
-            clock.sleep_until(clock.now() + Micros::from_millis(20)).await;
+            clock.sleep_until(clock.now() + Duration::from_millis(20)).await;
         }
     };
     let mut terminal = Terminal;

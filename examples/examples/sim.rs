@@ -5,7 +5,7 @@ use stampfly_drivers::{Imu, MotorOutputs, RangeFinder};
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::messages::MotorOutput;
-use stampfly_types::{Micros, frame};
+use stampfly_types::{Instant, frame};
 use std::cell::Cell;
 
 fn main() {
@@ -35,7 +35,7 @@ fn main() {
 
     println!("   time   height    range        felt   tilt");
     for tick in 1..=24 {
-        tasks.run_until(Micros::from_millis(tick * 50));
+        tasks.run_until(Instant::from_millis(tick * 50));
         let truth = world.truth_at(clock.now());
         let height = -truth.position.z;
         println!(

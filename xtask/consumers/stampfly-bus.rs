@@ -1,7 +1,7 @@
 //! A stranger's program: a bus of one topic.
 
 use stampfly_bus::topics;
-use stampfly_types::{Micros, messages::TofData};
+use stampfly_types::{Instant, messages::TofData};
 
 topics! {
     /// One topic.
@@ -13,6 +13,6 @@ topics! {
 fn main() {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports: wiring::Ports { mut range }, .. } = bus.split(None);
-    range.tx.publish(Micros(1), &TofData { distance: 0.4, ..Default::default() });
+    range.tx.publish(Instant::from_micros(1), &TofData { distance: 0.4, ..Default::default() });
     assert_eq!(range.display.latest().map(|sample| sample.data.distance), Some(0.4));
 }

@@ -2,14 +2,14 @@
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{CalibrationResult, ImuData, Validity};
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{GRAVITY, Instant, Vec3};
 
 fn main() {
     let accel = Vec3::new(0.0, 0.0, -GRAVITY);
     let mut eskf = Eskf::new(EskfConfig::default());
-    eskf.initialize(Micros::ZERO, &CalibrationResult { specific_force: accel, complete: true, ..Default::default() });
+    eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: accel, complete: true, ..Default::default() });
     for step in 1..=400 {
-        eskf.predict(Micros(step * 2_500), &ImuData { accel, ..Default::default() });
+        eskf.predict(Instant::from_micros(step * 2_500), &ImuData { accel, ..Default::default() });
     }
     let estimate = eskf.estimate();
     assert!(estimate.valid.contains(Validity::TILT) && estimate.velocity.norm() < 0.01, "{estimate:?}");

@@ -1,7 +1,7 @@
 //! A stranger's program: a vehicle that becomes ready.
 
 use stampfly_mode::{ModeInput, ModeMachine};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
 fn main() {
@@ -16,5 +16,5 @@ fn main() {
         commands: &[],
         button: None,
     };
-    assert_eq!(ModeMachine::default().step(Micros(2_500), &input).mode.state, FlightState::IdleGround);
+    assert_eq!(ModeMachine::default().step(Instant::from_micros(2_500), &input).mode.state, FlightState::IdleGround);
 }

@@ -9,7 +9,7 @@ use stampfly_sim::chips::{Board, stand_in_image};
 use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use std::io::Write;
 
 /// What the hand does.
@@ -64,7 +64,7 @@ pub fn run<T>(simulation: &Simulation, script: impl Fn(f64) -> Option<Hand>, exa
                 .map(|duty: f64| duty.clamp(0.0, 1.0))
             });
             world.set_duty(now, duty);
-            clock.sleep_until(now + Micros(2_500)).await;
+            clock.sleep_until(now + Duration::from_micros(2_500)).await;
         }
     };
     match block_on(clock, select(example, hand)) {

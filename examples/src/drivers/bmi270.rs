@@ -13,10 +13,10 @@ use stampfly_drivers::chip::bmi270::{Bmi270, Config};
 use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_drivers::{Imu, Timebase};
 use stampfly_eskf::attitude::Mahony;
-use stampfly_types::{Micros, frame};
+use stampfly_types::{Duration, frame};
 
-const SPAN: Micros = Micros::from_secs(5);
-const LINE: Micros = Micros::from_millis(250);
+const SPAN: Duration = Duration::from_secs(5);
+const LINE: Duration = Duration::from_millis(250);
 /// The filter's gain, 1/s.
 const GAIN: f32 = 0.5;
 

@@ -13,12 +13,12 @@ use embedded_hal_async::i2c::I2c;
 use stampfly_drivers::chip::bmm150::{Bmm150, Config};
 use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_drivers::{Magnetometer, Timebase};
-use stampfly_types::{Micros, math};
+use stampfly_types::{Duration, math};
 
 /// Time for a full turn.
-const TURN: Micros = Micros::from_secs(6);
-const SPAN: Micros = Micros::from_secs(10);
-const LINE: Micros = Micros::from_millis(500);
+const TURN: Duration = Duration::from_secs(6);
+const SPAN: Duration = Duration::from_secs(10);
+const LINE: Duration = Duration::from_millis(500);
 /// The points of the compass, from north through east.
 const POINTS: [&str; 8] = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 

@@ -9,12 +9,12 @@ use embedded_hal_async::i2c::I2c;
 use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::bmp280::{Bmp280, Config};
 use stampfly_drivers::{Barometer, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
 /// What is averaged to be the height zero.
-const ZERO: Micros = Micros::from_secs(1);
-const SPAN: Micros = Micros::from_secs(6);
-const LINE: Micros = Micros::from_millis(400);
+const ZERO: Duration = Duration::from_secs(1);
+const SPAN: Duration = Duration::from_secs(6);
+const LINE: Duration = Duration::from_millis(400);
 
 /// What was found.
 #[derive(Clone, Copy, Debug)]

@@ -5,10 +5,10 @@ use core::convert::Infallible;
 use core::fmt::Write;
 use stampfly_drivers::{Button, Timebase};
 use stampfly_mode::ButtonDecoder;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::ButtonGesture;
 
-const SPAN: Micros = Micros::from_secs(20);
+const SPAN: Duration = Duration::from_secs(20);
 /// How often the contact is looked at.
 const STEP_MS: u32 = 10;
 

@@ -4,13 +4,13 @@ use super::Failure;
 use core::fmt::Write;
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use stampfly_drivers::{Buzzer, Indicator, SetFrequency, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::{Signal, Tone};
 
 /// How often the buzzer plays on.
 const STEP_MS: u32 = 10;
 /// Time for a tune, the longest of which takes half a second, and a pause.
-const TUNE: Micros = Micros::from_millis(800);
+const TUNE: Duration = Duration::from_millis(800);
 
 /// What was played.
 #[derive(Clone, Copy, Debug, Default)]

@@ -7,10 +7,10 @@ use embedded_hal_async::i2c::I2c;
 use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::ina3221::{Config, Ina3221};
 use stampfly_drivers::{PowerMonitor, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
-const SPAN: Micros = Micros::from_secs(5);
-const LINE: Micros = Micros::from_millis(300);
+const SPAN: Duration = Duration::from_secs(5);
+const LINE: Duration = Duration::from_millis(300);
 /// Milliampere hours in an ampere second.
 const MAH: f32 = 1_000.0 / 3_600.0;
 

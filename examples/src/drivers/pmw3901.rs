@@ -10,10 +10,10 @@ use embedded_hal_async::spi::SpiDevice;
 use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
 use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_drivers::{OpticalFlow, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 
-const SPAN: Micros = Micros::from_secs(5);
-const LINE: Micros = Micros::from_millis(250);
+const SPAN: Duration = Duration::from_secs(5);
+const LINE: Duration = Duration::from_millis(250);
 
 /// What was found.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! Numbers as people like to look at them: bars, and spreads of noisy values.
 
 use core::fmt;
-use stampfly_types::{Micros, math};
+use stampfly_types::{Duration, math};
 
 /// A full bar.
 const FULL: &str = "########################";
@@ -77,6 +77,6 @@ impl Spread {
 
 /// Samples per second, when so many came after the first in this time. Zero in no time.
 #[must_use]
-pub fn rate(count: f32, span: Micros) -> f32 {
-    if span > Micros::ZERO { count / span.seconds() } else { 0.0 }
+pub fn rate(count: f32, span: Duration) -> f32 {
+    if span > Duration::ZERO { count / span.seconds() } else { 0.0 }
 }

@@ -12,11 +12,11 @@ use embedded_hal_async::i2c::I2c;
 use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, Vl53l3cx};
 use stampfly_drivers::{RangeFinder, Timebase};
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use stampfly_types::messages::TofData;
 
-const SPAN: Micros = Micros::from_secs(5);
-const LINE: Micros = Micros::from_millis(250);
+const SPAN: Duration = Duration::from_secs(5);
+const LINE: Duration = Duration::from_millis(250);
 /// Addresses beside the one they start at, which is 0x29.
 const DOWN: u8 = 0x30;
 const AHEAD: u8 = 0x31;

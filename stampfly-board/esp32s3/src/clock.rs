@@ -2,31 +2,30 @@
 
 use embassy_time::Timer;
 use embedded_hal_async::delay::DelayNs;
-use esp_hal::time::Instant;
 use stampfly_drivers::Timebase;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// Waits shorter than this are spent waiting: putting a task to sleep and waking it costs about as much.
-const SHORT: Micros = Micros(10);
+const SHORT: Duration = Duration::from_micros(10);
 
 /// The vehicle's clock. There is one counter; every copy reads it.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock;
 
 impl Timebase for Clock {
-    fn now(&self) -> Micros {
-        Micros(Instant::now().duration_since_epoch().as_micros())
+    fn now(&self) -> Instant {
+        Instant::from_micros(esp_hal::time::Instant::now().duration_since_epoch().as_micros())
     }
 }
 
 impl DelayNs for Clock {
     async fn delay_ns(&mut self, ns: u32) {
-        let span = Micros(u64::from(ns.div_ceil(1_000)));
+        let span = Duration::from_micros(u64::from(ns.div_ceil(1_000)));
         if span >= SHORT {
-            return Timer::after_micros(span.0).await;
+            return Timer::after_micros(span.as_micros()).await;
         }
         // One more, because the present microsecond has already begun.
-        let end = self.now() + span + Micros(1);
+        let end = self.now() + span + Duration::from_micros(1);
         while self.now() < end {
             core::hint::spin_loop();
         }

@@ -21,11 +21,10 @@ use esp_hal::timer::PeriodicTimer;
 use esp_hal::timer::timg::{MwdtStage, MwdtStageAction, TimerGroup, Wdt};
 use stampfly_board::tasks::DeadMan;
 use stampfly_drivers::Timebase;
-use stampfly_types::Micros;
 use static_cell::StaticCell;
 
 /// Motors that nobody has confirmed for this long are stopped.
-const PATIENCE: Micros = Micros::from_millis(25);
+const PATIENCE: stampfly_types::Duration = stampfly_types::Duration::from_millis(25);
 /// How often the timer looks. Motors turn for at most `PATIENCE` and this after the last confirmation.
 const PERIOD: Duration = Duration::from_millis(1);
 

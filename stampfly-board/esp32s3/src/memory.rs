@@ -3,20 +3,20 @@
 use crate::clock::Clock;
 use crate::motors;
 use core::cell::RefCell;
-use embassy_time::{Duration, Ticker};
+use embassy_time::Ticker;
 use esp_hal::system::software_reset;
 use stampfly_board::black_box::{BlackBox, ROOM};
 use stampfly_board::console::Newest;
 use stampfly_board::wiring;
 use stampfly_drivers::Timebase;
-use stampfly_types::Micros;
 use stampfly_types::messages::{ButtonEvent, ButtonGesture, SystemMode};
+use stampfly_types::{Duration, Instant};
 use static_cell::ConstStaticCell;
 
 /// A gesture on the button that is older was meant for something else.
-const FRESH: Micros = Micros::from_millis(100);
+const FRESH: Duration = Duration::from_millis(100);
 /// Two periods of the fastest topic: none has room for fewer samples than that.
-const ROUND: Duration = Duration::from_millis(5);
+const ROUND: embassy_time::Duration = embassy_time::Duration::from_millis(5);
 
 /// What the vehicle remembers.
 pub struct Memory {
@@ -26,7 +26,7 @@ pub struct Memory {
     /// The last flight.
     pub black_box: &'static mut BlackBox<ROOM>,
     /// When the vehicle was last seen armed.
-    armed_at: Micros,
+    armed_at: Instant,
 }
 
 impl Memory {
@@ -34,7 +34,7 @@ impl Memory {
     pub fn new(taps: wiring::Taps<'static>) -> Self {
         // Not on anybody's stack on its way here: it is as large as some.
         static BLACK_BOX: ConstStaticCell<BlackBox<ROOM>> = ConstStaticCell::new(BlackBox::new());
-        Self { taps, newest: Newest::new(), black_box: BLACK_BOX.take(), armed_at: Micros::ZERO }
+        Self { taps, newest: Newest::new(), black_box: BLACK_BOX.take(), armed_at: Instant::ZERO }
     }
 
     /// Takes in what was published since the last time.

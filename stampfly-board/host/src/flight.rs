@@ -3,7 +3,7 @@
 //! Comes from a log ([`crate::flight_log`]), from a recording ([`crate::dataset`]) or message by message from a
 //! simulation. Not for replay: numbers are `f64` here, so 64-bit counters beyond 2⁵³ are rounded.
 
-use stampfly_types::{FieldInfo, FieldKind, Message, Micros};
+use stampfly_types::{FieldInfo, FieldKind, Instant, Message};
 use std::collections::BTreeMap;
 
 /// What a field of numbers means.
@@ -30,7 +30,7 @@ pub struct Column {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// The instant each sample is valid for, in log order.
-    pub at: Vec<Micros>,
+    pub at: Vec<Instant>,
     /// The scalars of the topic, in order. All as long as `at`.
     pub columns: Vec<Column>,
     /// What the fields mean, where known.
@@ -63,7 +63,7 @@ impl Series {
     }
 
     /// Appends the words of a message with these fields. Missing words give NaN.
-    pub fn push_words(&mut self, at: Micros, fields: &[FieldInfo], words: &[u32]) {
+    pub fn push_words(&mut self, at: Instant, fields: &[FieldInfo], words: &[u32]) {
         self.at.push(at);
         let mut words = words.iter().copied();
         let kinds = fields.iter().flat_map(|field| std::iter::repeat_n(field.kind, field.count));
@@ -106,7 +106,7 @@ impl Series {
 
     /// Index of the newest sample at or before this instant.
     #[must_use]
-    pub fn index_at(&self, at: Micros) -> Option<usize> {
+    pub fn index_at(&self, at: Instant) -> Option<usize> {
         self.at.partition_point(|stamp| *stamp <= at).checked_sub(1)
     }
 }
@@ -115,7 +115,7 @@ impl Series {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Event {
     /// When.
-    pub at: Micros,
+    pub at: Instant,
     /// What.
     pub text: String,
 }
@@ -124,10 +124,10 @@ pub struct Event {
 ///
 /// ```
 /// use stampfly_host::Flight;
-/// use stampfly_types::{Micros, messages::PowerData};
+/// use stampfly_types::{Instant, messages::PowerData};
 ///
 /// let mut flight = Flight::default();
-/// flight.push("sensor_power", Micros(0), &PowerData { voltage: 4.1, current: 2.0, power: 8.2 });
+/// flight.push("sensor_power", Instant::ZERO, &PowerData { voltage: 4.1, current: 2.0, power: 8.2 });
 /// let power = &flight.topics["sensor_power"];
 /// assert_eq!(power.column("current"), Some(&[2.0][..]));
 /// assert_eq!(power.unit("voltage"), "V");
@@ -139,19 +139,19 @@ pub struct Flight {
     /// Facts about the flight.
     pub info: BTreeMap<String, String>,
     /// Parameters, with each value they had and since when; the first value since the start.
-    pub parameters: BTreeMap<String, Vec<(Micros, f64)>>,
+    pub parameters: BTreeMap<String, Vec<(Instant, f64)>>,
     /// Lines of text.
     pub events: Vec<Event>,
 }
 
 impl Flight {
     /// Appends one message to a topic, which is made when new.
-    pub fn push<M: Message>(&mut self, topic: &str, at: Micros, message: &M) {
+    pub fn push<M: Message>(&mut self, topic: &str, at: Instant, message: &M) {
         self.push_words(topic, at, M::FIELDS, message.to_words().as_ref());
     }
 
     /// Appends one message, as words, to a topic, which is made when new.
-    pub fn push_words(&mut self, topic: &str, at: Micros, fields: &[FieldInfo], words: &[u32]) {
+    pub fn push_words(&mut self, topic: &str, at: Instant, fields: &[FieldInfo], words: &[u32]) {
         if !self.topics.contains_key(topic) {
             self.topics.insert(topic.to_owned(), Series::of_fields(fields));
         }
@@ -162,7 +162,7 @@ impl Flight {
 
     /// The earliest and the latest stamp of any topic.
     #[must_use]
-    pub fn span(&self) -> Option<(Micros, Micros)> {
+    pub fn span(&self) -> Option<(Instant, Instant)> {
         let stamps = || self.topics.values().flat_map(|series| &series.at);
         Some((*stamps().min()?, *stamps().max()?))
     }
@@ -177,31 +177,31 @@ mod tests {
     fn columns_follow_the_schema() {
         let mut flight = Flight::default();
         let estimate = StateEstimate { height: 2.0, ..Default::default() };
-        flight.push("estimate_state", Micros(5), &estimate);
-        flight.push("system_mode", Micros(7), &SystemMode::default());
+        flight.push("estimate_state", Instant::from_micros(5), &estimate);
+        flight.push("system_mode", Instant::from_micros(7), &SystemMode::default());
         let series = &flight.topics["estimate_state"];
         assert_eq!(series.column("height"), Some(&[2.0][..]));
         assert_eq!(series.columns_of::<4>("attitude").map(|q| q.map(|c| c[0])), Some([1.0, 0.0, 0.0, 0.0]));
         assert_eq!(series.unit("velocity"), "m/s");
         assert_eq!(series.unit("attitude"), "");
         assert_eq!(flight.topics["system_mode"].names("state")[3], ("Armed".to_owned(), 3));
-        assert_eq!(flight.span(), Some((Micros(5), Micros(7))));
+        assert_eq!(flight.span(), Some((Instant::from_micros(5), Instant::from_micros(7))));
         assert!(series.columns.iter().all(|column| column.values.len() == series.at.len()));
     }
 
     #[test]
     fn words_that_are_missing_are_not_a_number() {
         let mut series = Series::of_fields(StateEstimate::FIELDS);
-        series.push_words(Micros(0), StateEstimate::FIELDS, &[1.0f32.to_bits()]);
+        series.push_words(Instant::ZERO, StateEstimate::FIELDS, &[1.0f32.to_bits()]);
         assert_eq!(series.columns[0].values, [1.0]);
         assert!(series.columns[1..].iter().all(|column| column.values[0].is_nan()));
     }
 
     #[test]
     fn the_newest_sample_up_to_an_instant() {
-        let series = Series { at: vec![Micros(10), Micros(20)], ..Default::default() };
+        let series = Series { at: vec![Instant::from_micros(10), Instant::from_micros(20)], ..Default::default() };
         assert_eq!(
-            [9, 10, 19, 20, 99].map(|at| series.index_at(Micros(at))),
+            [9, 10, 19, 20, 99].map(|at| series.index_at(Instant::from_micros(at))),
             [None, Some(0), Some(0), Some(1), Some(1)]
         );
     }

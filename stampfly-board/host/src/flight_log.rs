@@ -5,7 +5,7 @@
 
 use crate::flight::{Column, Event, Flight, Meaning};
 use stampfly_log::ulog::{self, Format, Message, NAMES_PREFIX, ParameterValue, ReadError, Reader, UNITS_PREFIX};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -87,9 +87,9 @@ pub struct FlightLog {
     /// The flight.
     pub flight: Flight,
     /// The instant the log was started.
-    pub started: Micros,
+    pub started: Instant,
     /// Length of each dropout in milliseconds, and the time of the newest sample before it.
-    pub dropouts: Vec<(Micros, u16)>,
+    pub dropouts: Vec<(Instant, u16)>,
     /// What was left out.
     pub omissions: Vec<Omission>,
 }
@@ -118,13 +118,13 @@ pub fn load(path: impl AsRef<Path>) -> Result<FlightLog, LogError> {
 /// ```
 /// use stampfly_host::flight_log;
 /// use stampfly_log::ulog::{Definitions, Ram, Sample, Topic};
-/// use stampfly_types::{Message, Micros, messages::PowerData};
+/// use stampfly_types::{Instant, Message, messages::PowerData};
 ///
 /// let mut memory = [0; 4096];
 /// let topics = [Topic { name: "sensor_power", fields: PowerData::FIELDS }];
-/// let mut log = Definitions::start(Ram::new(&mut memory), Micros(0))?.data(&topics, &[])?;
+/// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(&topics, &[])?;
 /// let words = PowerData { voltage: 3.5, current: 2.0, power: 7.0 }.to_words();
-/// log.sample(0, &Sample { at: Micros(10), generation: 1, words: &words })?;
+/// log.sample(0, &Sample { at: Instant::from_micros(10), generation: 1, words: &words })?;
 ///
 /// let flight = flight_log::parse(log.sink().written())?.flight;
 /// assert_eq!(flight.topics["sensor_power"].column("voltage"), Some(&[3.5][..]));
@@ -208,7 +208,7 @@ pub fn parse(bytes: &[u8]) -> Result<FlightLog, ReadError> {
 
 impl Subscription<'_> {
     /// Appends a sample to its columns and returns its stamp.
-    fn take(&mut self, flight: &mut Flight, payload: &[u8]) -> Option<Micros> {
+    fn take(&mut self, flight: &mut Flight, payload: &[u8]) -> Option<Instant> {
         let series = flight.topics.get_mut(&self.topic)?;
         let values: Option<Vec<f64>> = self.columns.iter().map(|column| column.read(payload)).collect();
         let stamp = self.stamp.and_then(|offset| payload.get(offset..)?.first_chunk()).copied();
@@ -221,7 +221,7 @@ impl Subscription<'_> {
             self.short += 1;
             return None;
         }
-        let at = Micros(u64::from_le_bytes(stamp));
+        let at = Instant::from_micros(u64::from_le_bytes(stamp));
         series.at.push(at);
         series.columns.iter_mut().zip(values).for_each(|(column, value)| column.values.push(value));
         Some(at)

@@ -13,18 +13,18 @@ use crate::simulate::{FlightConfig, fly};
 use stampfly_board::golden::{GoldenError, MOTORS, Report, Witness, Writer, play};
 use stampfly_board::{Observer, wiring};
 use stampfly_bus::{Activation, Band};
-use stampfly_types::{Message, Micros, messages::MotorOutput};
+use stampfly_types::{Duration, Instant, Message, messages::MotorOutput};
 use std::collections::BTreeMap;
 use std::fmt;
 
 /// The shortest flight that has everything: calibration, standing, arming, take-off, hovering, landing.
 const MISSION: &str = "arm\ntakeoff 0.2\nhover 0.3\nland\n";
 /// The record goes on for this long after the last change of state.
-const TAIL: Micros = Micros::from_millis(100);
+const TAIL: Duration = Duration::from_millis(100);
 /// The duties are written down so often.
-const DUTY_PERIOD: Micros = Micros::from_millis(20);
+const DUTY_PERIOD: Duration = Duration::from_millis(20);
 /// Time between the activations in which every sensor has something new.
-const GATHERING: Micros = Micros::from_millis(500);
+const GATHERING: Duration = Duration::from_millis(500);
 /// The sensors that are gathered.
 const GATHERED: [wiring::Id; 5] = [
     wiring::Id::sensor_tof,
@@ -42,24 +42,24 @@ pub enum Event {
         /// The topic.
         topic: wiring::Id,
         /// The sample's instant.
-        at: Micros,
+        at: Instant,
         /// The message.
         words: Vec<u32>,
     },
     /// The executor ran what was due.
-    Turn(Micros),
+    Turn(Instant),
 }
 
 /// Collects what a vehicle is given, in order.
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     collected: Vec<Event>,
-    turn: Option<Micros>,
+    turn: Option<Instant>,
 }
 
 impl Inputs {
     /// The executor is about to look what is due.
-    pub(crate) fn turn(&mut self, clock: Micros) {
+    pub(crate) fn turn(&mut self, clock: Instant) {
         self.turn = Some(clock);
     }
 
@@ -68,7 +68,7 @@ impl Inputs {
         self.collected.extend(self.turn.take().map(Event::Turn));
     }
 
-    pub(crate) fn sample(&mut self, topic: wiring::Id, at: Micros, words: &[u32]) {
+    pub(crate) fn sample(&mut self, topic: wiring::Id, at: Instant, words: &[u32]) {
         if is_outside(topic as usize) {
             self.collected.push(Event::Sample { topic, at, words: words.to_vec() });
         }
@@ -128,7 +128,7 @@ fn configuration() -> Option<FlightConfig> {
 }
 
 /// Leaves out what happened after `end`.
-fn shorten(inputs: &mut Vec<Event>, end: Micros) {
+fn shorten(inputs: &mut Vec<Event>, end: Instant) {
     let late = |input: &Event| matches!(input, Event::Turn(clock) if *clock > end);
     if let Some(first) = inputs.iter().position(late) {
         inputs.truncate(first);
@@ -136,18 +136,18 @@ fn shorten(inputs: &mut Vec<Event>, end: Micros) {
 }
 
 /// Now and then, when the samples of all other sensors are youngest, holds them back until the next inertial sample comes.
-fn gather(inputs: &mut Vec<Event>, start: Micros) {
+fn gather(inputs: &mut Vec<Event>, start: Instant) {
     let mut newest = [None; GATHERED.len()];
     // Of each stretch of time, the inertial sample that the others are closest to: age of the oldest, and places.
-    let mut closest: BTreeMap<u64, (Micros, usize, [usize; GATHERED.len()])> = BTreeMap::new();
+    let mut closest: BTreeMap<u64, (Duration, usize, [usize; GATHERED.len()])> = BTreeMap::new();
     for (place, input) in inputs.iter().enumerate() {
         match input {
             Event::Sample { topic: wiring::Id::sensor_imu, at, .. } => {
                 let [Some(tof), Some(flow), Some(mag), Some(baro), Some(power)] = newest else { continue };
                 // The battery's slow monitor would decide alone; nobody asks it for its age.
-                let age = [tof, flow, mag, baro].map(|(seen, _): (Micros, _)| at.since(seen));
+                let age = [tof, flow, mag, baro].map(|(seen, _): (Instant, _)| at.since(seen));
                 let oldest = age.into_iter().max().unwrap_or_default();
-                let stretch = at.since(start).0 / GATHERING.0;
+                let stretch = at.since(start).as_micros() / GATHERING.as_micros();
                 let best = closest.get(&stretch).is_some_and(|(best, ..)| *best <= oldest);
                 if !best {
                     closest.insert(stretch, (oldest, place, [tof, flow, mag, baro, power].map(|(_, place)| place)));
@@ -172,7 +172,7 @@ fn gather(inputs: &mut Vec<Event>, start: Micros) {
 }
 
 /// Writes a record of these inputs, with what comes of them here.
-fn write(inputs: &[Event], start: Micros) -> Result<(Vec<u8>, Report), GoldenError> {
+fn write(inputs: &[Event], start: Instant) -> Result<(Vec<u8>, Report), GoldenError> {
     // Played once without expecting anything, to find out what to expect.
     let mut duties = Duties::default();
     let first = play(&encode(inputs, start, &[], 0), &mut duties)?;
@@ -182,7 +182,7 @@ fn write(inputs: &[Event], start: Micros) -> Result<(Vec<u8>, Report), GoldenErr
 }
 
 /// The bytes of a record: inputs, the duties after each of its turns, and the hash.
-fn encode(inputs: &[Event], start: Micros, duties: &[[f32; MOTORS]], hash: u64) -> Vec<u8> {
+fn encode(inputs: &[Event], start: Instant, duties: &[[f32; MOTORS]], hash: u64) -> Vec<u8> {
     let mut entries = Vec::new();
     let mut writer = Writer::new(start, |bytes: &[u8]| entries.extend_from_slice(bytes));
     let (mut duties, mut due) = (duties.iter(), start);
@@ -216,7 +216,7 @@ impl Observer for Duties {
 }
 
 impl Witness for Duties {
-    fn published(&mut self, topic: wiring::Id, _: Micros, _: u32, words: &[u32]) {
+    fn published(&mut self, topic: wiring::Id, _: Instant, _: u32, words: &[u32]) {
         let output = words.try_into().ok().and_then(|words| MotorOutput::from_words(&words));
         if let (wiring::Id::actuator_motor, Some(output)) = (topic, output) {
             self.now = std::array::from_fn(|motor| output.duty[motor]);
@@ -226,7 +226,7 @@ impl Witness for Duties {
         }
     }
 
-    fn band_begins(&mut self, band: Band, _: Micros) {
+    fn band_begins(&mut self, band: Band, _: Instant) {
         if band == Band::Flight {
             self.of_turns.push(self.now);
         }
@@ -241,7 +241,7 @@ mod tests {
     use stampfly_types::messages::ImuData;
 
     /// The golden flight as it was flown, with its hash.
-    fn flown() -> (Vec<Event>, Micros, u64) {
+    fn flown() -> (Vec<Event>, Instant, u64) {
         let config = configuration().expect("a mission");
         let mut recorder = Recorder::hash_only().with_inputs();
         let outcome = fly(&config, &mut recorder, &mut |_, _| {});
@@ -285,7 +285,7 @@ mod tests {
         impl Witness for Gatherings {}
         let mut gatherings = Gatherings::default();
         let report = play(FLIGHT, &mut gatherings).expect("plays");
-        let expected = (report.duration.0 / GATHERING.0) as usize;
+        let expected = (report.duration.as_micros() / GATHERING.as_micros()) as usize;
         assert!(gatherings.0 >= expected, "{} of {expected}", gatherings.0);
     }
 

@@ -8,11 +8,11 @@ use stampfly_board::messages::TelemetryFrame;
 use stampfly_board::wiring;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::{FlightState, GuidedCommand, GuidedKind};
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Vec3};
 use std::cell::Cell;
 
 /// How often it looks and speaks.
-const PERIOD: Micros = Micros::from_millis(20);
+const PERIOD: Duration = Duration::from_millis(20);
 /// Signs of life come at every n-th look.
 const LIFE_DIVIDER: u32 = 5;
 
@@ -102,7 +102,7 @@ pub async fn fly(
                 link.wait_for(|frame| frame.remaining == 0 || frame.state != FlightState::Flying).await;
             }
             Step::Hover { seconds } => {
-                let until = link.clock.now() + Micros::from_seconds(seconds);
+                let until = link.clock.now() + Duration::from_seconds(seconds);
                 while link.clock.now() < until {
                     link.look().await;
                 }

@@ -16,13 +16,13 @@
 use serde::Serialize;
 use stampfly_sim::Truth;
 use stampfly_types::messages::{FlightMode, FlightState, Setpoint, StateEstimate, SystemMode};
-use stampfly_types::{Micros, Vec3, frame};
+use stampfly_types::{Duration, Instant, Vec3, frame};
 
 /// One instant of a flight.
 #[derive(Clone, Copy, Debug)]
-pub struct Instant<'a> {
+pub struct Snapshot<'a> {
     /// When.
-    pub at: Micros,
+    pub at: Instant,
     /// What is really the case, positions from the take-off spot.
     pub truth: &'a Truth,
     /// Where the vehicle should be.
@@ -94,15 +94,15 @@ impl Rms {
 /// A stretch during which the set-point rested.
 #[derive(Clone, Copy, Debug)]
 struct Rest {
-    since: Micros,
+    since: Instant,
     from: Vec3,
     farthest: f32,
 }
 
 /// A vehicle that has just been stopped is not hovering yet.
-const SETTLE: Micros = Micros::from_secs(1);
+const SETTLE: Duration = Duration::from_secs(1);
 /// Time into FLYING that still counts as take-off.
-const TAKEOFF_TAIL: Micros = Micros::from_secs(3);
+const TAKEOFF_TAIL: Duration = Duration::from_secs(3);
 
 /// Collects a flight's figures as it goes.
 #[derive(Clone, Debug, Default)]
@@ -112,12 +112,12 @@ pub struct Collector {
     altitude: Rms,
     highest: Option<f32>,
     takeoff_goal: Option<f32>,
-    flying_since: Option<Micros>,
+    flying_since: Option<Instant>,
     touchdown: Option<f32>,
     was_in_contact: bool,
     tilt: Option<f32>,
     rest: Option<Rest>,
-    longest: Option<(Micros, f32)>,
+    longest: Option<(Duration, f32)>,
     last: Option<Last>,
     flew: bool,
 }
@@ -125,7 +125,7 @@ pub struct Collector {
 /// What there is to know about the instant before.
 #[derive(Clone, Copy, Debug)]
 struct Last {
-    at: Micros,
+    at: Instant,
     place: Vec3,
     sink: f32,
     state: FlightState,
@@ -134,8 +134,8 @@ struct Last {
 
 impl Collector {
     /// Takes one instant. Call at the control rate.
-    pub fn add(&mut self, now: &Instant<'_>) {
-        let Instant { at, truth, setpoint, estimate, mode } = *now;
+    pub fn add(&mut self, now: &Snapshot<'_>) {
+        let Snapshot { at, truth, setpoint, estimate, mode } = *now;
         let holding = mode.state == FlightState::Flying && mode.mode == FlightMode::PosHold;
         match mode.state {
             FlightState::TakeOff => {
@@ -184,7 +184,7 @@ impl Collector {
         self.highest = Some(self.highest.map_or(height, |h| h.max(height)));
     }
 
-    fn end_rest(&mut self, at: Micros) {
+    fn end_rest(&mut self, at: Instant) {
         if let Some(rest) = self.rest.take() {
             let length = at.since(rest.since);
             if self.longest.is_none_or(|(longest, _)| length > longest) {

@@ -12,7 +12,7 @@ use stampfly_bus::Activation;
 use stampfly_log::ulog::{Sample, Sink, Topic, Writer};
 use stampfly_log::{ActivationTopic, FlightHash, Input};
 use stampfly_sim::Truth;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 use std::convert::Infallible;
 use std::sync::LazyLock;
 
@@ -29,7 +29,7 @@ pub static TOPICS: LazyLock<Vec<Topic>> = LazyLock::new(|| {
 static ACTIVATIONS: LazyLock<Vec<ActivationTopic>> = LazyLock::new(|| {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, .. } = bus.split(None);
-    let inputs = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO).flight_loop.count_inputs();
+    let inputs = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO).flight_loop.count_inputs();
     let rows = plan::ACTIVATIONS.iter().zip(inputs).enumerate();
     rows.map(|(index, (info, inputs))| ActivationTopic { name: info.name, index: index as u8, inputs }).collect()
 });
@@ -121,7 +121,7 @@ impl Recorder {
         Self { inputs: Some(Inputs::default()), ..self }
     }
 
-    pub(crate) fn begin(&mut self, start: Micros, config: &VehicleConfig) {
+    pub(crate) fn begin(&mut self, start: Instant, config: &VehicleConfig) {
         if let Consistency::Wanted(seed) = self.consistency {
             self.consistency = Consistency::Yes(Box::new(Observation::new(config.eskf, seed)));
         }
@@ -140,13 +140,13 @@ impl Recorder {
     }
 
     /// The executor is about to look what is due.
-    pub(crate) fn turn(&mut self, clock: Micros) {
+    pub(crate) fn turn(&mut self, clock: Instant) {
         if let Some(inputs) = &mut self.inputs {
             inputs.turn(clock);
         }
     }
 
-    pub(crate) fn sample(&mut self, id: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    pub(crate) fn sample(&mut self, id: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         self.hash.publish(id as u16, generation, at, words);
         if let Some(inputs) = &mut self.inputs {
             inputs.sample(id, at, words);
@@ -160,7 +160,7 @@ impl Recorder {
         }
     }
 
-    pub(crate) fn truth(&mut self, at: Micros, generation: u32, truth: &Truth) {
+    pub(crate) fn truth(&mut self, at: Instant, generation: u32, truth: &Truth) {
         if let Consistency::Yes(observation) = &mut self.consistency {
             observation.truth(at, truth);
         }

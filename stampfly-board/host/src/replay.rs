@@ -11,7 +11,7 @@ use stampfly_bus::{Activation, InputRecord};
 use stampfly_log::ActivationTopic;
 use stampfly_log::trace::TOPIC_PREFIX;
 use stampfly_log::ulog::{Message, ParameterValue, ReadError, Reader};
-use stampfly_types::{FieldInfo, FieldKind, Micros};
+use stampfly_types::{FieldInfo, FieldKind, Instant};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -32,7 +32,7 @@ pub struct Difference {
     /// The activation that published the sample.
     pub activation: String,
     /// The instant it was told.
-    pub now: Micros,
+    pub now: Instant,
     /// The topic.
     pub topic: String,
     /// The sample's number.
@@ -72,7 +72,7 @@ pub enum ReplayError {
         /// The activation.
         activation: String,
         /// The instant it was told.
-        now: Micros,
+        now: Instant,
     },
 }
 
@@ -95,19 +95,19 @@ impl std::error::Error for ReplayError {}
 /// One entry of the log that matters here.
 enum Entry {
     /// A sample somebody outside published.
-    Outside { topic: usize, at: Micros, words: Vec<u32> },
+    Outside { topic: usize, at: Instant, words: Vec<u32> },
     /// An activation.
     Activation { index: usize, record: stampfly_log::Activation },
 }
 
 /// A recorded sample of a topic that a runnable publishes.
-type Recorded = BTreeMap<(usize, u32), (Micros, Vec<u32>)>;
+type Recorded = BTreeMap<(usize, u32), (Instant, Vec<u32>)>;
 
 struct Script {
     entries: Vec<Entry>,
     recorded: Recorded,
     config: VehicleConfig,
-    start: Micros,
+    start: Instant,
 }
 
 /// Is the publisher of this topic none of the runnables?
@@ -121,7 +121,7 @@ fn read(bytes: &[u8]) -> Result<Script, ReplayError> {
         entries: Vec::new(),
         recorded: Recorded::new(),
         config: VehicleConfig::default(),
-        start: Micros::ZERO,
+        start: Instant::ZERO,
     };
     let mut places: BTreeMap<u16, Place> = BTreeMap::new();
     let mut formats: BTreeMap<String, usize> = BTreeMap::new();
@@ -268,7 +268,12 @@ pub fn replay(bytes: &[u8]) -> Result<Replay, ReplayError> {
 }
 
 /// The first field that differs, as recorded and as replayed.
-fn describe(topic: usize, before: Option<&(Micros, Vec<u32>)>, at: Micros, words: &[u32]) -> (String, String, String) {
+fn describe(
+    topic: usize,
+    before: Option<&(Instant, Vec<u32>)>,
+    at: Instant,
+    words: &[u32],
+) -> (String, String, String) {
     let Some((was_at, was)) = before else {
         return ("(the whole sample)".into(), "nothing".into(), "a sample".into());
     };

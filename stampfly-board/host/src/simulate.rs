@@ -8,7 +8,7 @@
 //! must still replay.
 
 use crate::ground_station::{self, Progress};
-use crate::metrics::{Collector, Instant, Metrics};
+use crate::metrics::{Collector, Metrics, Snapshot};
 use crate::mission::Mission;
 use crate::recorder::Recorder;
 use crate::sensing::{self, Healths, Models, Sensing, Shared, Topics};
@@ -24,8 +24,7 @@ use stampfly_sim::sensors::{MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig, Truth};
 use stampfly_types::messages::{FlightState, MotorOutput, Setpoint, StateEstimate, SystemMode};
-use stampfly_types::{Message, Micros, Quat, Vec3, frame};
-use std::time::Instant as WallInstant;
+use stampfly_types::{Duration, Instant, Message, Quat, Vec3, frame};
 
 /// All that decides a flight.
 #[derive(Clone, Debug)]
@@ -43,7 +42,7 @@ pub struct FlightConfig {
     /// Seed of the executor's delays; `None` for an executor that is never late.
     pub jitter: Option<u64>,
     /// The flight is broken off after this long.
-    pub limit: Micros,
+    pub limit: Duration,
 }
 
 impl FlightConfig {
@@ -57,7 +56,7 @@ impl FlightConfig {
             sensing: Sensing::Models,
             cameras: false,
             jitter: None,
-            limit: Micros::from_secs(180),
+            limit: Duration::from_secs(180),
         }
     }
 }
@@ -66,7 +65,7 @@ impl FlightConfig {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phase {
     /// When it began.
-    pub since: Micros,
+    pub since: Instant,
     /// State.
     pub state: FlightState,
     /// Mode.
@@ -85,7 +84,7 @@ pub struct Outcome {
     /// Hash over everything that was published.
     pub log_hash: u64,
     /// Simulated time.
-    pub duration: Micros,
+    pub duration: Duration,
     /// Simulated time over wall time.
     pub realtime_factor: f64,
     /// Largest true tilt, degrees.
@@ -99,7 +98,7 @@ pub struct Outcome {
 }
 
 /// After the mission the vehicle is watched for this long.
-const TAIL: Micros = Micros::from_secs(1);
+const TAIL: Duration = Duration::from_secs(1);
 
 /// What is watched beside the bus: truth, and the newest of what it is compared with.
 struct Watch {
@@ -135,7 +134,7 @@ impl Watch {
     }
 
     /// Notes what a topic published. Returns the instant of a new set-point: that is when the truth is due.
-    fn note(&mut self, id: wiring::Id, at: Micros, words: &[u32]) -> Option<Micros> {
+    fn note(&mut self, id: wiring::Id, at: Instant, words: &[u32]) -> Option<Instant> {
         fn read<M: Message>(words: &[u32], into: &mut M)
         where
             M::Words: for<'w> TryFrom<&'w [u32]>,
@@ -174,7 +173,7 @@ impl Watch {
     ///
     /// Nothing on board knows north: the vehicle's world begins where it stood and ahead of it, so the truth is turned
     /// and moved into that world first.
-    fn compare(&mut self, at: Micros, truth: &mut Truth, recorder: &mut Recorder) {
+    fn compare(&mut self, at: Instant, truth: &mut Truth, recorder: &mut Recorder) {
         truth.position = self.turn * (truth.position - self.origin);
         truth.velocity = self.turn * truth.velocity;
         truth.wind = self.turn * truth.wind;
@@ -185,7 +184,7 @@ impl Watch {
         let first = self.battery.map_or(truth.battery_voltage, |[first, _]| first);
         self.battery = Some([first, truth.battery_voltage]);
         let (setpoint, estimate, mode) = (self.setpoint, self.estimate, self.mode);
-        self.collector.add(&Instant { at, truth, setpoint: &setpoint, estimate: &estimate, mode: &mode });
+        self.collector.add(&Snapshot { at, truth, setpoint: &setpoint, estimate: &estimate, mode: &mode });
     }
 }
 
@@ -200,10 +199,10 @@ impl Jitter {
     }
 
     /// Delay of the flight band: mostly some 100 µs, one time in twenty several milliseconds.
-    fn flight(&mut self) -> Micros {
-        let Some(random) = &mut self.random else { return Micros::ZERO };
+    fn flight(&mut self) -> Duration {
+        let Some(random) = &mut self.random else { return Duration::ZERO };
         let draw = u64::from(random.next_u32());
-        Micros(match draw % 20 {
+        Duration::from_micros(match draw % 20 {
             0 => 2_000 + draw / 20 % 6_000,
             1..=3 => 300 + draw / 20 % 1_700,
             _ => draw / 20 % 300,
@@ -211,10 +210,10 @@ impl Jitter {
     }
 
     /// Time between reading and publishing of a background activation.
-    fn background(&mut self) -> Micros {
-        let Some(random) = &mut self.random else { return Micros::ZERO };
+    fn background(&mut self) -> Duration {
+        let Some(random) = &mut self.random else { return Duration::ZERO };
         let draw = u64::from(random.next_u32());
-        Micros(if draw % 10 == 0 { draw / 10 % 10_000 } else { draw / 10 % 500 })
+        Duration::from_micros(if draw % 10 == 0 { draw / 10 % 10_000 } else { draw / 10 % 500 })
     }
 }
 
@@ -223,7 +222,7 @@ impl Jitter {
 /// # Panics
 /// Never by design; a panic here is a defect of the flight stack.
 pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMut(f32, FlightState)) -> Outcome {
-    let started = WallInstant::now();
+    let started = std::time::Instant::now();
     let start = config.simulation.start;
     let Simulation { clock, world, sensors } = Simulation::new(&config.simulation);
     let Sensors { imu, tof, flow, mag, baro, cameras, power, mut motors, mut indicator, button } = sensors;
@@ -259,9 +258,9 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
 
     let mut watch = Watch::new(&world.truth_at(start));
     let mut jitter = Jitter::new(config.jitter);
-    let mut flight_at: Option<Micros> = None;
-    let mut interrupted: Option<(Micros, Pending)> = None;
-    let mut finished_at: Option<Micros> = None;
+    let mut flight_at: Option<Instant> = None;
+    let mut interrupted: Option<(Instant, Pending)> = None;
+    let mut finished_at: Option<Instant> = None;
     let mut next_report = start;
     let end = start + config.limit;
     loop {
@@ -293,7 +292,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
             None => {
                 while let Some(pending) = flight_loop.start_next(Band::Background, now, recorder) {
                     let takes = jitter.background();
-                    if takes > Micros::ZERO {
+                    if takes > Duration::ZERO {
                         interrupted = Some((now + takes, pending));
                         break;
                     }
@@ -307,7 +306,7 @@ pub fn fly(config: &FlightConfig, recorder: &mut Recorder, report: &mut dyn FnMu
         drain(&mut taps, &mut watch, recorder, &world);
 
         if now >= next_report {
-            next_report = now + Micros::from_millis(100);
+            next_report = now + Duration::from_millis(100);
             report(progress.done.get() as f32 / config.mission.steps.len().max(1) as f32, watch.mode.state);
         }
         if progress.finished.get() {
@@ -365,6 +364,6 @@ fn drive(from: &mut wiring::actuator_motor::Rx<'_>, motors: &mut MotorModel) {
 async fn watch_button(clock: Clock, mut button: impl Button, mut publisher: wiring::button_contact::Tx<'_>) {
     loop {
         publisher.publish(clock.now(), &ButtonContact { pressed: button.is_pressed() });
-        clock.sleep_until(clock.now() + Micros::from_millis(20)).await;
+        clock.sleep_until(clock.now() + Duration::from_millis(20)).await;
     }
 }

@@ -6,7 +6,7 @@
 
 use stampfly_host::dataset::{self, Recording};
 use stampfly_host::estimate::{self, Figures};
-use stampfly_types::{Micros, Vec3, frame};
+use stampfly_types::{Duration, Instant, Vec3, frame};
 
 /// Set by the build script.
 const FOLDER: &str = env!("STAMPFLY_DATA_FOLDER");
@@ -85,7 +85,7 @@ fn a_magnet_on_the_sensor_is_found() {
 #[cfg_attr(not(recorded_data), ignore = "set STAMPFLY_DATA to the recorded data")]
 fn a_field_that_turns_for_a_while_is_not_followed() {
     // Turned by 20° about the vertical, neither stronger nor steeper. VQF: 5.08°, 3.46°, 5.32°, 3.81°.
-    let span = Micros::from_secs(70)..Micros::from_secs(82);
+    let span = Instant::from_secs(70)..Instant::from_secs(82);
     let ours = changed(|recording| {
         let plain = estimate::run(recording, &estimate::suite(recording.kind));
         let turn = frame::from_yaw(-20f32.to_radians());
@@ -113,11 +113,11 @@ fn a_bias_of_a_degree_a_second_that_rest_shows_costs_nothing() {
 fn a_start_in_motion_with_an_unknown_bias() {
     // Picked up two seconds before the recording begins. VQF, of the same: 1.47°, 5.36°, 6.17°, 3.62°.
     let ours = changed(|recording| {
-        let moving = recording.truth.iter().find(|point| point.counts).unwrap().at + Micros::from_secs(2);
+        let moving = recording.truth.iter().find(|point| point.counts).unwrap().at + Duration::from_secs(2);
         recording.imu.retain(|sample| sample.at >= moving);
         recording.mag.retain(|sample| sample.at >= moving);
         // Three seconds to find its feet.
-        recording.truth.retain(|point| point.at >= moving + Micros::from_secs(3));
+        recording.truth.retain(|point| point.at >= moving + Duration::from_secs(3));
         recording.imu.iter_mut().for_each(|sample| sample.data.gyro += Vec3::new(0.0105, 0.0087, -0.0122));
     });
     assert!(ours <= 0.6 * 4.16, "{ours}°");

@@ -11,14 +11,14 @@ use stampfly_host::mission::{Mission, REFERENCE};
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_types::messages::{ImuData, PilotInput, SystemMode};
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Duration, Instant, Message};
 use std::sync::LazyLock;
 
 /// The accident happens so long after the motors were allowed to turn.
-const FLIGHT: Micros = Micros::from_secs(20);
+const FLIGHT: Duration = Duration::from_secs(20);
 
 /// A flight that ends with a blow, as the firmware remembers it; and when the motors stopped.
-static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Micros)> = LazyLock::new(|| {
+static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Instant)> = LazyLock::new(|| {
     let mut recorder = Recorder::hash_only().with_inputs();
     let mission = Mission::parse(REFERENCE).expect("the reference mission");
     fly(&FlightConfig { mission, ..FlightConfig::reference(7) }, &mut recorder, &mut |_, _| {});
@@ -26,7 +26,7 @@ static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Micros)> = LazyLock::new(|| {
     let mut black_box = Box::new(BlackBox::new());
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO);
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
     let (mut armed_at, mut stopped_at, mut pilot) = (None, None, 0u32);
     for event in recorder.into_inputs() {
         match event {
@@ -56,12 +56,12 @@ static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Micros)> = LazyLock::new(|| {
                     }
                 });
                 // A mission is flown by a program; the transmitter would be heard as well.
-                if now >= Micros::from_millis(20 * u64::from(pilot)) {
+                if now >= Instant::from_millis(20 * u64::from(pilot)) {
                     pilot += 1;
                     let sticks = PilotInput { roll: 1e-3 * pilot as f32, ..Default::default() };
                     black_box.note(wiring::Id::command_pilot, now, pilot, &sticks.to_words());
                 }
-                if stopped_at.is_some_and(|stopped| now >= stopped + Micros::from_secs(3)) {
+                if stopped_at.is_some_and(|stopped| now >= stopped + Duration::from_secs(3)) {
                     break;
                 }
             }
@@ -96,7 +96,7 @@ fn five_seconds_of_flight_are_kept() {
     let oldest = black_box.records().map(|record| record.at).min().expect("records");
     let span = stopped.since(oldest);
     println!("{:.2} s of flight in {} kB", span.seconds_f64(), ROOM * 4 / 1024);
-    assert!(span >= Micros::from_secs(5), "{span}");
+    assert!(span >= Duration::from_secs(5), "{span}");
     assert!(span < FLIGHT, "the flight was longer than the memory");
 }
 
@@ -129,15 +129,15 @@ fn the_dump_is_a_log_that_shows_the_last_second() {
         ("system_mode", 1, 1_005),
     ] {
         let series = &flight.topics[topic];
-        let last_second: Vec<Micros> = series
+        let last_second: Vec<Instant> = series
             .at
             .iter()
             .copied()
-            .filter(|at| *at <= stopped && stopped.since(*at) <= Micros::from_secs(1))
+            .filter(|at| *at <= stopped && stopped.since(*at) <= Duration::from_secs(1))
             .collect();
         assert!(last_second.len() >= least, "{topic}: {} samples", last_second.len());
         let longest = last_second.windows(2).map(|pair| pair[1].since(pair[0])).max().unwrap_or_default();
-        assert!(longest <= Micros::from_millis(gap), "{topic}: nothing for {longest}");
+        assert!(longest <= Duration::from_millis(gap), "{topic}: nothing for {longest}");
     }
     let modes = &flight.topics["system_mode"];
     let armed = modes.column("armed").expect("a column");
@@ -170,12 +170,12 @@ fn a_flight_that_begins_while_the_last_is_told_ends_it() {
     let armed = SystemMode { armed: true, ..Default::default() }.to_words();
     let nothing = block_on(dump(|| Ok(black_box.records().next()), &VehicleConfig::default(), "", async |_| Ok(())));
     assert_eq!(nothing, Err(DumpError::Empty));
-    black_box.note(wiring::Id::system_mode, Micros(1), 1, &armed);
+    black_box.note(wiring::Id::system_mode, Instant::from_micros(1), 1, &armed);
     let (mut cursor, mut asked) = (black_box.begin(), 0);
     let next = || {
         asked += 1;
         if asked == 2 {
-            black_box.note(wiring::Id::system_mode, Micros::from_secs(9), 2, &armed);
+            black_box.note(wiring::Id::system_mode, Instant::from_secs(9), 2, &armed);
         }
         black_box.next(&mut cursor)
     };

@@ -5,7 +5,7 @@
 use stampfly_host::mission::Mission;
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::{FlightConfig, fly};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 const SEEDS: [u64; 8] = [1, 2, 3, 5, 8, 13, 21, 34];
 
@@ -59,7 +59,7 @@ fn whatever_decides_a_flight_changes_its_hash() {
     let mut hashes = vec![
         ("nothing", hash(&reference)),
         ("seed", changed(|config| config.simulation.seed = 2)),
-        ("start", changed(|config| config.simulation.start = Micros(1))),
+        ("start", changed(|config| config.simulation.start = Instant::from_micros(1))),
         ("mass", changed(|config| config.simulation.plant.mass *= 1.000_001)),
         ("vibration", changed(|config| config.simulation.vibration = 0.999)),
         ("gust", changed(|config| config.simulation.wind.gust = 0.499)),

@@ -7,7 +7,7 @@ use stampfly_host::mission::{HOVER, Mission, REFERENCE};
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_host::{Flight, flight::Series};
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 
 const TAKE_OFF: f64 = 4.0;
@@ -18,7 +18,7 @@ const POS_HOLD: f64 = 3.0;
 
 /// What the four topics say at one instant.
 struct Row {
-    at: Micros,
+    at: Instant,
     truth: [f64; 3],
     sink: f64,
     tilt_deg: f64,
@@ -53,7 +53,7 @@ fn vector(series: &Series, field: &str, index: usize) -> [f64; 3] {
 fn rows(flight: &Flight) -> Vec<Row> {
     let [truth, setpoint, estimate, mode] =
         ["truth", "setpoint", "estimate_state", "system_mode"].map(|topic| &flight.topics[topic]);
-    let row = |(index, at): (usize, &Micros)| {
+    let row = |(index, at): (usize, &Instant)| {
         let [s, e, m] = [setpoint, estimate, mode].map(|series| series.index_at(*at).expect("published before"));
         // The angle between body z and world z, from the third diagonal element of the rotation matrix.
         let [x, y] = ["attitude[1]", "attitude[2]"].map(|name| column(truth, name)[index]);
@@ -102,7 +102,7 @@ fn recompute(rows: &[Row]) -> BTreeMap<&'static str, f64> {
     // "highest truth above the take-off height, from take-off to three seconds into flight"
     let flying = rows.iter().find(|row| row.state == FLYING).expect("it flew").at;
     let climbing =
-        |row: &&Row| row.state == TAKE_OFF || row.state == FLYING && row.at.since(flying) < Micros::from_secs(3);
+        |row: &&Row| row.state == TAKE_OFF || row.state == FLYING && row.at.since(flying) < Duration::from_secs(3);
     let goal = rows.iter().rfind(|row| row.state == TAKE_OFF).expect("it took off").goal[2];
     let goal =
         rows.iter().filter(|row| row.state == FLYING).filter(climbing).map(|row| row.goal[2]).fold(goal, f64::min);
@@ -119,7 +119,7 @@ fn recompute(rows: &[Row]) -> BTreeMap<&'static str, f64> {
         .filter(|stretch| stretch[0].holds_place() && stretch[0].at_rest)
         .collect();
     let settled =
-        rests.iter().flat_map(|rest| rest.iter().filter(|row| row.at.since(rest[0].at) >= Micros::from_secs(1)));
+        rests.iter().flat_map(|rest| rest.iter().filter(|row| row.at.since(rest[0].at) >= Duration::from_secs(1)));
     figures.insert("hover_tilt_max_deg", highest(settled.map(|row| row.tilt_deg)));
     let longest = rests.iter().max_by_key(|rest| rest[rest.len() - 1].at.since(rest[0].at)).expect("it rested");
     figures.insert("hover_drift_m", highest(longest.iter().map(|row| apart(row.truth, longest[0].truth))));

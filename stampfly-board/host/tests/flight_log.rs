@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use stampfly_host::flight_log::{self, LogErrorKind, Omission};
 use stampfly_log::ulog::{Definitions, Level, ReadErrorKind, Sample, Sink, Topic};
 use stampfly_types::messages::{StateEstimate, SystemMode};
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 
 struct Bytes(Vec<u8>);
 
@@ -21,12 +21,12 @@ fn log() -> Vec<u8> {
         Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
         Topic { name: "system_mode", fields: SystemMode::FIELDS },
     ];
-    let mut log = Definitions::start(Bytes(Vec::new()), Micros(500)).unwrap();
+    let mut log = Definitions::start(Bytes(Vec::new()), Instant::from_micros(500)).unwrap();
     log.info("sys_name", "StampFly").unwrap();
     log.parameter("gain", 1.5.into()).unwrap();
     let mut log = log.data(&topics, &[]).unwrap();
     for n in 0..50u32 {
-        let at = Micros(1_000 * u64::from(n + 1));
+        let at = Instant::from_micros(1_000 * u64::from(n + 1));
         let estimate = StateEstimate { height: n as f32, ..Default::default() };
         log.sample(0, &Sample { at, generation: n, words: &estimate.to_words() }).unwrap();
         if n % 10 == 0 {
@@ -35,7 +35,7 @@ fn log() -> Vec<u8> {
             log.sync().unwrap();
         }
     }
-    log.text(Level::Info, Micros(20_000), "hello").unwrap();
+    log.text(Level::Info, Instant::from_micros(20_000), "hello").unwrap();
     log.parameter("gain", 2.5.into()).unwrap();
     log.into_sink().0
 }
@@ -44,7 +44,7 @@ fn log() -> Vec<u8> {
 fn our_log_becomes_series_with_units_and_names() {
     let log = flight_log::parse(&log()).unwrap();
     assert_eq!(log.omissions, []);
-    assert_eq!(log.started, Micros(500));
+    assert_eq!(log.started, Instant::from_micros(500));
     let flight = log.flight;
     let estimate = &flight.topics["estimate_state"];
     assert_eq!(estimate.at.len(), 50);
@@ -54,8 +54,8 @@ fn our_log_becomes_series_with_units_and_names() {
     assert_eq!(flight.topics["system_mode"].column("transitions").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
     assert_eq!(flight.topics["system_mode"].names("state")[5], ("Flying".to_owned(), 5));
     assert_eq!(flight.info["sys_name"], "StampFly");
-    assert_eq!(flight.parameters["gain"], [(Micros(500), 1.5), (Micros(50_000), 2.5)]);
-    assert_eq!((flight.events[0].at, flight.events[0].text.as_str()), (Micros(20_000), "hello"));
+    assert_eq!(flight.parameters["gain"], [(Instant::from_micros(500), 1.5), (Instant::from_micros(50_000), 2.5)]);
+    assert_eq!((flight.events[0].at, flight.events[0].text.as_str()), (Instant::from_micros(20_000), "hello"));
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn errors_name_the_file() {
 
 /// A log with one topic whose format and data are given.
 fn foreign(format: &str, samples: &[&[u8]]) -> Vec<u8> {
-    let mut log = Definitions::start(Bytes(Vec::new()), Micros(0)).unwrap().data(&[], &[]).unwrap().into_sink().0;
+    let mut log = Definitions::start(Bytes(Vec::new()), Instant::ZERO).unwrap().data(&[], &[]).unwrap().into_sink().0;
     let mut message = |kind: u8, parts: &[&[u8]]| {
         let payload = parts.concat();
         log.extend((payload.len() as u16).to_le_bytes());

@@ -14,7 +14,7 @@ use stampfly_log::FlightHash;
 use stampfly_sim::Simulation;
 use stampfly_sim::sensors::Sensors;
 use stampfly_sim::time::Tasks;
-use stampfly_types::Micros;
+use stampfly_types::Duration;
 use std::convert::Infallible;
 
 /// Counts the activations of every runnable.
@@ -72,7 +72,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
     tasks.spawn(async move {
         loop {
             button.publish(time.now(), &Default::default());
-            time.sleep_until(time.now() + Micros::from_millis(20)).await;
+            time.sleep_until(time.now() + Duration::from_millis(20)).await;
         }
     });
     tasks.spawn(ground_station::fly(clock.clone(), &config.mission, outside.guided, outside.telemetry, &progress));

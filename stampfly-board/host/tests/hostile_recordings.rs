@@ -61,7 +61,7 @@ fn frames_of_a_trial_become_ours() {
     assert!((field.x - 20.0).abs() < 1e-4 && (field.z - 40.0).abs() < 1e-4, "north and down: {field:?}");
     let place = truth.position.unwrap();
     assert_eq!([place.x, place.y, place.z], [2.0, 1.0, -3.0]);
-    assert_eq!(truth.at.0, 20_000);
+    assert_eq!(truth.at.as_micros(), 20_000);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_mode::transitions::{Event, next};
 use stampfly_sim::plant::Pose;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use stampfly_types::messages::FlightState;
 
 /// Numbers from a seed.
@@ -78,9 +78,9 @@ fn random_mission(number: u64) -> FlightConfig {
     scene.pose = Some(Pose::standing(&scene.plant, draw.within(-core::f64::consts::PI, core::f64::consts::PI)));
     scene.start = match number % 4 {
         // 32 bits of microseconds end in flight.
-        0 => Micros((1 << 32) - 10_000_000),
-        1 => Micros(draw.within(0.0, 1e13) as u64),
-        _ => Micros::ZERO,
+        0 => Instant::from_micros((1 << 32) - 10_000_000),
+        1 => Instant::from_micros(draw.within(0.0, 1e13) as u64),
+        _ => Instant::ZERO,
     };
     config.jitter = number.is_multiple_of(6).then_some(number);
     config
@@ -166,7 +166,7 @@ fn the_missions_differ_in_what_they_should_differ_in() {
     let configs: Vec<FlightConfig> = (1..=300).map(random_mission).collect();
     let count = |what: &dyn Fn(&FlightConfig) -> bool| configs.iter().filter(|config| what(config)).count();
     assert!(count(&|config| config.jitter.is_some()) >= 40, "executors that are late");
-    assert!(count(&|config| config.simulation.start.0 == (1 << 32) - 10_000_000) >= 60, "32 bits overflow");
+    assert!(count(&|config| config.simulation.start.as_micros() == (1 << 32) - 10_000_000) >= 60, "32 bits overflow");
     for steps in 4..=7 {
         assert!(count(&|config| config.mission.steps.len() == steps) >= 40, "{steps} steps");
     }

@@ -3,7 +3,7 @@
 //! These need the recorded data; see `build.rs` for how they are found.
 
 use stampfly_host::dataset::{self, Kind, Recording};
-use stampfly_types::{Micros, Quat, Vec3, math};
+use stampfly_types::{Duration, Instant, Quat, Vec3, math};
 
 /// Set by the build script.
 const FOLDER: &str = env!("STAMPFLY_DATA_FOLDER");
@@ -35,7 +35,7 @@ fn mean(vectors: impl Iterator<Item = Vec3>) -> Vec3 {
 
 /// Mean of the specific force in the world, over all instants with a known attitude. NED: (0, 0, −9.81).
 fn mean_force(recording: &Recording) -> Vec3 {
-    let attitude_at = |at: Micros| {
+    let attitude_at = |at: Instant| {
         let next = recording.truth.partition_point(|point| point.at < at);
         recording.truth.get(next).and_then(|point| point.attitude)
     };
@@ -43,9 +43,9 @@ fn mean_force(recording: &Recording) -> Vec3 {
 }
 
 /// Correlation of the gyro's three axes with the rate the reference turned at, both averaged over `window`.
-fn rate_correlation(recording: &Recording, window: Micros) -> Vec3 {
+fn rate_correlation(recording: &Recording, window: Duration) -> Vec3 {
     let (mut sums, mut count) = ([Vec3::zeros(); 3], 0);
-    let seen: Vec<(Micros, Quat)> = recording.truth.iter().filter_map(|p| Some((p.at, p.attitude?))).collect();
+    let seen: Vec<(Instant, Quat)> = recording.truth.iter().filter_map(|p| Some((p.at, p.attitude?))).collect();
     let mut start = 0;
     for end in 0..seen.len() {
         let span = seen[end].0.since(seen[start].0);
@@ -53,7 +53,7 @@ fn rate_correlation(recording: &Recording, window: Micros) -> Vec3 {
             continue;
         }
         // Body rate from the rotation between two instants; a gap in the reference is not a rotation.
-        if span.0 < 2 * window.0 {
+        if span.as_micros() < 2 * window.as_micros() {
             let turned = (seen[start].1.inverse() * seen[end].1).scaled_axis() / span.seconds();
             let from = recording.imu.partition_point(|s| s.at <= seen[start].0);
             let to = recording.imu.partition_point(|s| s.at <= seen[end].0);
@@ -138,7 +138,7 @@ fn stampfly_flights_are_read_whole_and_in_order() {
     let highest = wide.tof.iter().map(|s| s.data.distance).fold(0.0, f32::max);
     assert!((1.3..1.4).contains(&highest), "the README says 1.339 m, read {highest}");
     assert!(wide.device.is_some() && batched.device.is_none());
-    assert_eq!(wide.timing.longest, Micros::from_millis(192));
+    assert_eq!(wide.timing.longest, Duration::from_millis(192));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn nanobench_frames_agree_with_physics() {
         assert_eq!(flight.kind, Kind::NanoBench, "{name}");
         let force = mean_force(flight);
         assert!((-10.3..-9.3).contains(&force.z) && force.xy().norm() < 0.6, "{name}: {force:?}");
-        let correlation = rate_correlation(flight, Micros::from_millis(50));
+        let correlation = rate_correlation(flight, Duration::from_millis(50));
         // Slow circles hardly turn about z, hence the low bound; a wrong axis or sign gives zero or less.
         assert!(correlation.min() > 0.3 && correlation.sum() > 1.6, "{name}: {correlation:?}");
         // The velocity is the derivative of the position, in the same frame.
@@ -186,7 +186,7 @@ fn broad_frames_agree_with_physics() {
         assert_eq!(trial.kind, Kind::Broad, "{name}");
         let force = mean_force(trial);
         assert!((-9.9..-9.7).contains(&force.z) && force.xy().norm() < 0.15, "{name}: {force:?}");
-        let correlation = rate_correlation(trial, Micros::from_millis(20));
+        let correlation = rate_correlation(trial, Duration::from_millis(20));
         assert!(correlation.min() > 0.95, "{name}: {correlation:?}");
         // The field points north and, in central Europe, steeply down.
         let seen = trial.truth.iter().zip(&trial.mag).filter_map(|(p, m)| Some(p.attitude? * m.data.field));

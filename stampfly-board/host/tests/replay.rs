@@ -9,7 +9,7 @@ use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Message, ReadErrorKind, Reader, Sample, Sink, Topic};
 use stampfly_types::messages::{ImuData, PowerData};
-use stampfly_types::{Message as _, Micros};
+use stampfly_types::{Duration, Instant, Message as _};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -32,7 +32,7 @@ static FLIGHT: LazyLock<Vec<u8>> = LazyLock::new(|| record(&config(1, None)));
 /// One message of a log that carries a sample: which topic, when, and where its bytes are.
 struct Place {
     topic: String,
-    at: Micros,
+    at: Instant,
     payload: Range<usize>,
 }
 
@@ -54,7 +54,7 @@ fn places(log: &[u8]) -> Vec<Place> {
             }
             Message::Data { id, payload } => {
                 let start = payload.as_ptr() as usize - log.as_ptr() as usize;
-                let at = Micros(u64::from_le_bytes(*payload.first_chunk().expect("a stamp")));
+                let at = Instant::from_micros(u64::from_le_bytes(*payload.first_chunk().expect("a stamp")));
                 places.push(Place { topic: names[&id].clone(), at, payload: start..start + payload.len() });
             }
             _ => {}
@@ -64,7 +64,7 @@ fn places(log: &[u8]) -> Vec<Place> {
 }
 
 /// The first sample of a topic at or after this instant.
-fn find(log: &[u8], topic: &str, at: Micros) -> Place {
+fn find(log: &[u8], topic: &str, at: Instant) -> Place {
     places(log).into_iter().find(|place| place.topic == topic && place.at >= at).expect("the flight lasts longer")
 }
 
@@ -91,7 +91,7 @@ fn flights_replay_bit_for_bit() {
     for (seed, jitter) in [(1, None), (2, None), (3, Some(1)), (4, Some(2)), (5, Some(3)), (6, Some(4))] {
         let mut config = config(seed, jitter);
         // Stamps beyond 32 bits, too.
-        config.simulation.start = Micros(if seed % 2 == 0 { (1 << 32) - 6_000_000 } else { 0 });
+        config.simulation.start = Instant::from_micros(if seed % 2 == 0 { (1 << 32) - 6_000_000 } else { 0 });
         let log = record(&config);
         let result = replay(&log).expect("a log that can be replayed");
         assert_eq!(result.difference, None, "seed {seed}, jitter {jitter:?}");
@@ -104,7 +104,7 @@ fn parameters_come_from_the_log() {
     let mut config = config(1, None);
     config.vehicle.cascade.altitude.height_gain *= 1.5;
     config.vehicle.estimator = 1.0;
-    config.limit = Micros::from_secs(8);
+    config.limit = Duration::from_secs(8);
     let result = replay(&record(&config)).expect("a log that can be replayed");
     assert_eq!(result.difference, None);
 }
@@ -150,7 +150,7 @@ fn jitter_does_disturb() {
 #[test]
 fn one_flipped_bit_is_found_and_named() {
     let log = &*FLIGHT;
-    let place = find(log, "sensor_imu", Micros::from_secs(7));
+    let place = find(log, "sensor_imu", Instant::from_secs(7));
     let accel = offset(log, "sensor_imu", "accel", Some(0));
     let mut changed = log.clone();
     changed[place.payload.start + accel + 1] ^= 0x10; // mantissa, 2^-11 of the value
@@ -178,7 +178,7 @@ fn a_changed_parameter_or_output_is_found_too() {
     changed[at + name.len() + 1] ^= 0x10;
     assert_eq!(difference(&changed).activation, "control");
 
-    let place = find(log, "actuator_motor", Micros::from_secs(7));
+    let place = find(log, "actuator_motor", Instant::from_secs(7));
     let mut changed = log.clone();
     changed[place.payload.start + offset(log, "actuator_motor", "duty", Some(2))] ^= 1;
     let found = difference(&changed);
@@ -188,13 +188,13 @@ fn a_changed_parameter_or_output_is_found_too() {
 #[test]
 fn what_is_missing_is_found() {
     let log = &*FLIGHT;
-    let at = Micros::from_secs(7);
+    let at = Instant::from_secs(7);
     for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "command")] {
         let place = find(log, topic, at);
         match replay(&without(log, place.message())) {
             Err(ReplayError::Gap { activation, now }) => {
                 assert_eq!(activation, reader, "{topic}");
-                let late = now.since(place.at).0.max(place.at.since(now).0);
+                let late = now.since(place.at).as_micros().max(place.at.since(now).as_micros());
                 assert!(late < 20_000, "{topic} from {}, found missing at {now}", place.at);
             }
             other => panic!("a sample of {topic} is missing, and replay says {other:?}"),
@@ -223,7 +223,7 @@ fn the_last_output_missing_its_activation_is_found() {
 #[test]
 fn a_log_that_was_cut_off_is_refused_with_the_place() {
     let log = &*FLIGHT;
-    let place = find(log, "sensor_imu", Micros::from_secs(7));
+    let place = find(log, "sensor_imu", Instant::from_secs(7));
     let cut = place.payload.start + 3;
     match replay(&log[..cut]) {
         Err(ReplayError::Log(error)) => {
@@ -250,7 +250,7 @@ fn written(
     parameter: Option<(&str, f32)>,
     write: impl FnOnce(&mut stampfly_log::ulog::Writer<'_, Memory>),
 ) -> Vec<u8> {
-    let mut head = Definitions::start(Memory::default(), Micros::ZERO).expect("memory");
+    let mut head = Definitions::start(Memory::default(), Instant::ZERO).expect("memory");
     if let Some((name, value)) = parameter {
         head.parameter(name, value.into()).expect("memory");
     }
@@ -268,7 +268,7 @@ fn logs_of_others_are_refused_with_a_reason() {
 
     let foreign = [Topic { name: "vehicle_attitude", fields: PowerData::FIELDS }];
     let words = PowerData::default().to_words();
-    let sample = Sample { at: Micros(1), generation: 1, words: &words };
+    let sample = Sample { at: Instant::from_micros(1), generation: 1, words: &words };
     let log = written(&foreign, &[], None, |log| log.sample(0, &sample).expect("memory"));
     assert_eq!(replay(&log), Err(ReplayError::NoActivations));
 
@@ -305,7 +305,7 @@ fn activations_with_other_inputs_are_refused() {
     for inputs in [0, 1, 16] {
         let activations = [ActivationTopic { name, index: 0, inputs }];
         let log = written(&TOPICS, &activations, None, |log| {
-            let mut record = stampfly_log::Activation::new(0, Micros(2_500));
+            let mut record = stampfly_log::Activation::new(0, Instant::from_micros(2_500));
             for _ in 0..inputs {
                 record.read(stampfly_log::Input::default()).expect("room");
             }
@@ -317,7 +317,7 @@ fn activations_with_other_inputs_are_refused() {
 
 /// The first second of a flight: small enough to be damaged many times.
 static SECOND: LazyLock<Vec<u8>> =
-    LazyLock::new(|| record(&FlightConfig { limit: Micros::from_secs(1), ..config(1, Some(1)) }));
+    LazyLock::new(|| record(&FlightConfig { limit: Duration::from_secs(1), ..config(1, Some(1)) }));
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]

@@ -5,7 +5,7 @@ mod made_up;
 use serde_json::Value;
 use stampfly_host::report::Metric;
 use stampfly_host::{Flight, Report};
-use stampfly_types::{Micros, messages::PowerData};
+use stampfly_types::{Instant, messages::PowerData};
 
 fn page(flight: &Flight) -> String {
     Report { title: "A flight".to_owned(), subtitle: String::new(), metrics: Vec::new(), flight }.html()
@@ -93,7 +93,7 @@ fn what_a_flight_does_not_have_is_left_out() {
     assert_eq!((panels(&empty).len(), empty["scene"].as_array().unwrap().len()), (0, 0));
     for step in 0..10 {
         let power = PowerData { voltage: 4.0, current: f32::NAN, power: 0.0 };
-        flight.push("sensor_power", Micros::from_millis(step * 100), &power);
+        flight.push("sensor_power", Instant::from_millis(step * 100), &power);
     }
     assert_eq!(panels(&data(&page(&flight))), ["Battery/Voltage"], "a column without one number is no plot");
 }

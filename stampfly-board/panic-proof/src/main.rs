@@ -21,7 +21,7 @@ use stampfly_bus::Band;
 use stampfly_drivers::Decimator;
 use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
 use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 unsafe extern "C" {
     fn a_panic_can_be_reached() -> !;
@@ -49,10 +49,10 @@ fn vehicle() {
     let config: VehicleConfig = black_box(VehicleConfig::default());
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &config, black_box(Micros::ZERO));
+    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &config, black_box(Instant::ZERO));
     let mut memory = BlackBox::<1024>::new();
     while black_box(true) {
-        let at: Micros = black_box(Micros::ZERO);
+        let at: Instant = black_box(Instant::ZERO);
         outside.imu.publish(at, &black_box(Default::default()));
         outside.tof.publish(at, &black_box(Default::default()));
         outside.flow.publish(at, &black_box(Default::default()));
@@ -75,7 +75,7 @@ fn vehicle() {
 fn radio() {
     let mut session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
     while black_box(true) {
-        let (at, bytes) = (black_box(Micros::ZERO), black_box(&[0u8; 32][..]));
+        let (at, bytes) = (black_box(Instant::ZERO), black_box(&[0u8; 32][..]));
         session.set_armed(black_box(false));
         let _ = black_box(session.start_pairing(at));
         black_box((session.beacon(at), session.age(at)));

@@ -55,7 +55,7 @@ fn run() -> bool {
     outln!("recorded: {} bytes, {lost} messages lost, hash {:016x}", bytes.len(), memory::hash(bytes));
     outln!("stack: {} bytes of a vehicle and its bus", golden::STACK);
     for (info, tally) in plan::ACTIVATIONS.iter().zip(&profile.runnables) {
-        tally.print(format_args!("{}, budget {} us", info.name, info.budget.0));
+        tally.print(format_args!("{}, budget {} us", info.name, info.budget.as_micros()));
     }
     profile.chain.print("chain");
     profile.everything.print("chain, every sensor new");

@@ -1,7 +1,7 @@
 //! The memory a flight record is written into, and one number for what is in it.
 
 use stampfly_log::FlightHash;
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// Room for the whole record, bytes.
 pub const SIZE: usize = 3 << 20;
@@ -21,7 +21,7 @@ pub fn hash(bytes: &[u8]) -> u64 {
             }
             *word = u32::from_le_bytes(whole);
         }
-        hash.publish(piece.len() as u16, number as u32, Micros::ZERO, &words);
+        hash.publish(piece.len() as u16, number as u32, Instant::ZERO, &words);
     }
     hash.finish()
 }

@@ -10,7 +10,7 @@ use stampfly_board::golden::Witness;
 use stampfly_board::{Observer, plan, wiring};
 use stampfly_bus::{Activation, Band};
 use stampfly_types::messages::SystemMode;
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 
 /// Inputs of the estimation that are sensors of the vehicle: inertial, range, flow, field, pressure.
 const SENSORS: usize = 5;
@@ -89,9 +89,9 @@ impl<'t> Profile<'t> {
             watching: 0,
         };
         // An activation of nobody in which nothing happens.
-        let nothing = Activation::live(Micros::ZERO);
+        let nothing = Activation::live(Instant::ZERO);
         let watch = |_| {
-            profile.band_begins(Band::Background, Micros::ZERO);
+            profile.band_begins(Band::Background, Instant::ZERO);
             profile.has_read(plan::COUNT, &nothing);
             profile.finished(plan::COUNT, &nothing);
             profile.pass
@@ -143,7 +143,7 @@ impl Observer for Profile<'_> {
 }
 
 impl Witness for Profile<'_> {
-    fn band_begins(&mut self, band: Band, _: Micros) {
+    fn band_begins(&mut self, band: Band, _: Instant) {
         if band == Band::Flight {
             self.recording.add(self.recorded, self.armed);
             self.recorded = 0;
@@ -163,7 +163,7 @@ impl Witness for Profile<'_> {
         }
     }
 
-    fn published(&mut self, topic: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    fn published(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         if topic == wiring::Id::system_mode
             && let Ok(words) = words.try_into()
             && let Some(mode) = SystemMode::from_words(&words)

@@ -5,7 +5,7 @@ use stampfly_board::{VehicleConfig, parameters, plan, wiring};
 use stampfly_bus::Activation;
 use stampfly_log::ulog::{Definitions, Ram, Sample, Topic, Writer};
 use stampfly_log::{ActivationTopic, Input};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// The record's topics are the bus's.
 static TOPICS: [Topic; wiring::COUNT] = {
@@ -22,7 +22,7 @@ static TOPICS: [Topic; wiring::COUNT] = {
 pub fn activations() -> [ActivationTopic; plan::COUNT] {
     let mut bus = wiring::Bus::new();
     let wiring::Split { ports, heads, .. } = bus.split(None);
-    let inputs = assemble(ports, heads, &VehicleConfig::default(), Micros::ZERO).flight_loop.count_inputs();
+    let inputs = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO).flight_loop.count_inputs();
     core::array::from_fn(|index| ActivationTopic {
         name: plan::ACTIVATIONS[index].name,
         index: index as u8,
@@ -36,7 +36,7 @@ pub struct Record<'t>(Writer<'t, Ram<'t>>);
 impl<'t> Record<'t> {
     /// Facts, parameters and formats. `None` when there is no room for them.
     pub fn begin(memory: &'t mut [u8], activations: &'t [ActivationTopic]) -> Option<Self> {
-        let mut head = Definitions::start(Ram::new(memory), Micros::ZERO).ok()?;
+        let mut head = Definitions::start(Ram::new(memory), Instant::ZERO).ok()?;
         head.info("sys_name", "StampFly").ok()?;
         for parameter in parameters::PARAMETERS {
             head.parameter(parameter.name, parameter.get(&VehicleConfig::default()).into()).ok()?;
@@ -45,7 +45,7 @@ impl<'t> Record<'t> {
     }
 
     /// One sample of a topic. What does not fit any more is counted.
-    pub fn sample(&mut self, topic: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    pub fn sample(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         let _ = self.0.sample(topic as usize, &Sample { at, generation, words });
     }
 

@@ -8,16 +8,16 @@ use stampfly_sim::Truth;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, StateEstimate, TofData,
 };
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 use std::collections::BTreeMap;
 use std::error::Error;
 
-type Samples<M> = Vec<(Micros, M)>;
+type Samples<M> = Vec<(Instant, M)>;
 
 /// What one activation of the estimation was given.
 #[derive(Clone, Default)]
 pub struct Given {
-    pub now: Micros,
+    pub now: Instant,
     pub calibration: Option<CalibrationResult>,
     pub command: Option<EstimatorCommand>,
     pub imu: Samples<ImuData>,
@@ -30,8 +30,8 @@ pub struct Given {
 /// One flight.
 pub struct Flown {
     pub given: Vec<Given>,
-    pub truth: BTreeMap<Micros, Truth>,
-    pub published: BTreeMap<Micros, StateEstimate>,
+    pub truth: BTreeMap<Instant, Truth>,
+    pub published: BTreeMap<Instant, StateEstimate>,
 }
 
 impl Given {
@@ -83,7 +83,7 @@ impl Flown {
                 Entry::Data { id, payload } => match names.get(&id).map(String::as_str) {
                     Some("activation_estimation") => {
                         // An activation begins with its instant.
-                        let now = payload.first_chunk().map(|bytes| Micros(u64::from_le_bytes(*bytes)));
+                        let now = payload.first_chunk().map(|bytes| Instant::from_micros(u64::from_le_bytes(*bytes)));
                         pending.now = now.ok_or("an activation without an instant")?;
                         let Given { calibration, command, .. } = pending;
                         flown.given.push(std::mem::take(&mut pending));
@@ -116,7 +116,7 @@ impl Flown {
 }
 
 /// A message of the log; `None` for one that is not as this program writes it.
-fn decode<M: Message>(name: &str, payload: &[u8]) -> Option<(Micros, M)>
+fn decode<M: Message>(name: &str, payload: &[u8]) -> Option<(Instant, M)>
 where
     M::Words: for<'w> TryFrom<&'w [u32]>,
 {

@@ -4,7 +4,7 @@ use crate::{draw, range};
 use stampfly_host::chart::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Panel, RED, Scale, Shape};
 use stampfly_host::dataset::{self, Recording};
 use stampfly_host::estimate::{self, Estimated};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -26,7 +26,7 @@ fn estimated(file: &str) -> Result<Option<(Recording, Estimated)>, Box<dyn Error
     Ok(Some((recording, estimated)))
 }
 
-fn seconds(at: Micros, start: Micros) -> f64 {
+fn seconds(at: Instant, start: Instant) -> f64 {
     at.since(start).seconds_f64()
 }
 

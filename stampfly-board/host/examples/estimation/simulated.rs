@@ -11,7 +11,7 @@ use stampfly_host::chart::{Axis, BLUE, Chart, Mark, ORANGE, Panel, Shape};
 use stampfly_host::mission::Mission;
 use stampfly_host::simulate::FlightConfig;
 use stampfly_sim::Truth;
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Duration, Instant, Vec3};
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -21,7 +21,7 @@ const THIN: usize = 20;
 const FAST: &str =
     "arm\ntakeoff 1\ngoto 3 0 1 speed 2\ngoto 3 3 1 speed 2\ngoto 0 3 1 speed 2\ngoto 0 0 1 speed 2\nland";
 /// A camera system: how often, and how well, m.
-const CAMERA_PERIOD: Micros = Micros::from_millis(20);
+const CAMERA_PERIOD: Duration = Duration::from_millis(20);
 const CAMERA_SIGMA: f32 = 0.005;
 
 /// Errors beside what the filter believes of them: the reference mission.
@@ -89,13 +89,13 @@ pub fn consistency() -> Result<(), Box<dyn Error>> {
 }
 
 /// Position error, RMS and largest, m, of a flight on a camera system that is late.
-fn on_cameras(flown: &Flown, delay: Micros, tell: bool) -> [f64; 2] {
+fn on_cameras(flown: &Flown, delay: Duration, tell: bool) -> [f64; 2] {
     let mut noise = ChaCha8Rng::seed_from_u64(7);
     let mut normal = || {
         let sum: f64 = (0..12).map(|_| f64::from(noise.next_u32()) / 2f64.powi(32)).sum();
         (sum - 6.0) as f32
     };
-    let mut pictures: Vec<(Micros, Vec3)> = Vec::new();
+    let mut pictures: Vec<(Instant, Vec3)> = Vec::new();
     for (at, truth) in &flown.truth {
         if pictures.last().is_none_or(|(last, _)| at.since(*last) >= CAMERA_PERIOD) {
             pictures.push((*at, truth.position + Vec3::from_fn(|_, _| normal() * CAMERA_SIGMA)));
@@ -131,7 +131,7 @@ pub fn late() -> Result<(), Box<dyn Error>> {
     let mut lines: BTreeMap<bool, [Vec<[f64; 2]>; 2]> = BTreeMap::new();
     for millis in (0..=90).step_by(10) {
         let errors = [true, false].map(|tell| {
-            let errors = on_cameras(&flown, Micros::from_millis(millis), tell);
+            let errors = on_cameras(&flown, Duration::from_millis(millis), tell);
             let lines = lines.entry(tell).or_default();
             for (line, error) in lines.iter_mut().zip(errors) {
                 line.push([millis as f64, error]);

@@ -9,12 +9,12 @@ use stampfly_eskf::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCI
 use stampfly_eskf::{EskfConfig, Estimator, Fusion};
 use stampfly_sim::{Noise, Truth};
 use stampfly_types::messages::{FlightState, SystemMode, Validity};
-use stampfly_types::{Message, Micros, Quat, Vec3};
+use stampfly_types::{Duration, Instant, Message, Quat, Vec3};
 
 /// Errors are looked at this often.
-const PERIOD: Micros = Micros::from_millis(100);
+const PERIOD: Duration = Duration::from_millis(100);
 /// A sensor that is kept out for this long must be back in, or the estimate must say that it is lost.
-const PATIENCE: Micros = Micros::from_secs(1);
+const PATIENCE: Duration = Duration::from_secs(1);
 /// The random number stream that chooses the instant looked at.
 const STREAM: u64 = 2_000;
 /// Errors beyond these are a lost estimate: horizontal and vertical velocity m/s, tilt rad, height m.
@@ -72,7 +72,7 @@ impl Mean {
 #[derive(Debug, Default)]
 struct Followed {
     innovations: Vec<f64>,
-    kept_out_since: Option<Micros>,
+    kept_out_since: Option<Instant>,
     reported: bool,
 }
 
@@ -84,11 +84,11 @@ pub struct Observation {
     random: Noise,
     mode: SystemMode,
     snapshots: Vec<Snapshot>,
-    due: Micros,
+    due: Instant,
     sensors: [Followed; SENSORS.len()],
     /// What gyroscope and accelerometer showed beyond the truth.
     offsets: [Mean; 2],
-    lost_since: Option<Micros>,
+    lost_since: Option<Instant>,
     result: FlightConsistency,
 }
 
@@ -102,7 +102,7 @@ impl Observation {
             random: Noise::new(seed, STREAM),
             mode: SystemMode::default(),
             snapshots: Vec::new(),
-            due: Micros::ZERO,
+            due: Instant::ZERO,
             sensors: Default::default(),
             offsets: [Mean::default(); 2],
             lost_since: None,
@@ -111,7 +111,7 @@ impl Observation {
     }
 
     /// Takes a sample off the bus.
-    pub fn sample(&mut self, id: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    pub fn sample(&mut self, id: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         self.shadow.sample(id, at, generation, words);
         if id == wiring::Id::system_mode
             && let Ok(words) = words.try_into()
@@ -151,7 +151,7 @@ impl Observation {
     }
 
     /// Takes the truth at an instant, in the vehicle's world.
-    pub fn truth(&mut self, at: Micros, truth: &Truth) {
+    pub fn truth(&mut self, at: Instant, truth: &Truth) {
         // An executor that is late has estimated an older instant by now.
         let Some((_, imu)) = self.shadow.imu().filter(|(stamp, _)| *stamp == at) else { return };
         if self.mode.state != FlightState::Flying {
@@ -188,7 +188,7 @@ impl Observation {
     }
 
     /// Counts stretches of time in which the estimate is useless and does not know it.
-    fn watch(&mut self, at: Micros, error: &SVector<f64, N>) {
+    fn watch(&mut self, at: Instant, error: &SVector<f64, N>) {
         let estimate = self.shadow.estimator().estimate();
         let valid = |part| estimate.valid.contains(part);
         let velocity = error.fixed_rows::<3>(VELOCITY).norm();

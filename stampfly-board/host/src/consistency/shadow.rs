@@ -10,7 +10,7 @@ use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, ExternalPose, FlowData, ImuData, MagData, TofData,
 };
-use stampfly_types::{Message, Micros};
+use stampfly_types::{Instant, Message};
 use std::collections::VecDeque;
 
 /// Samples of a topic that are kept: more than its ring holds.
@@ -18,7 +18,7 @@ const KEPT: usize = 64;
 
 /// The newest samples of one topic.
 #[derive(Debug)]
-struct Recent<M>(VecDeque<(u32, Micros, M)>);
+struct Recent<M>(VecDeque<(u32, Instant, M)>);
 
 impl<M> Default for Recent<M> {
     fn default() -> Self {
@@ -27,7 +27,7 @@ impl<M> Default for Recent<M> {
 }
 
 impl<M: Message + Copy> Recent<M> {
-    fn add(&mut self, at: Micros, generation: u32, words: &[u32])
+    fn add(&mut self, at: Instant, generation: u32, words: &[u32])
     where
         M::Words: for<'w> TryFrom<&'w [u32]>,
     {
@@ -42,7 +42,7 @@ impl<M: Message + Copy> Recent<M> {
     }
 
     /// The samples that an activation took.
-    fn taken(&self, input: InputRecord) -> impl Iterator<Item = (Micros, M)> {
+    fn taken(&self, input: InputRecord) -> impl Iterator<Item = (Instant, M)> {
         let first = input.generation.wrapping_sub(u32::from(input.taken));
         let taken = move |generation: u32| generation > first && generation <= input.generation;
         self.0.iter().filter(move |sample| taken(sample.0)).map(|(_, at, message)| (*at, *message))
@@ -74,7 +74,7 @@ pub struct Shadow {
     pose: Recent<ExternalPose>,
     calibration: Recent<CalibrationResult>,
     command: Recent<EstimatorCommand>,
-    last_imu: Option<(Micros, ImuData)>,
+    last_imu: Option<(Instant, ImuData)>,
 }
 
 impl Shadow {
@@ -105,7 +105,7 @@ impl Shadow {
 
     /// The inertial sample the estimate is of.
     #[must_use]
-    pub fn imu(&self) -> Option<(Micros, ImuData)> {
+    pub fn imu(&self) -> Option<(Instant, ImuData)> {
         self.last_imu
     }
 
@@ -116,7 +116,7 @@ impl Shadow {
     }
 
     /// Takes a sample off the bus. An estimate is compared with its own.
-    pub fn sample(&mut self, id: wiring::Id, at: Micros, generation: u32, words: &[u32]) {
+    pub fn sample(&mut self, id: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
         match id {
             wiring::Id::sensor_imu => self.imu.add(at, generation, words),
             wiring::Id::sensor_tof => self.tof.add(at, generation, words),
@@ -137,7 +137,7 @@ impl Shadow {
     }
 
     /// Repeats an activation of the estimation. `seen` is told the fate of each sample.
-    pub fn activation(&mut self, index: usize, activation: &Activation, seen: &mut dyn FnMut(Sensor, Micros, Fusion)) {
+    pub fn activation(&mut self, index: usize, activation: &Activation, seen: &mut dyn FnMut(Sensor, Instant, Fusion)) {
         if plan::ACTIVATIONS.get(index).is_none_or(|info| info.name != "estimation") {
             return;
         }

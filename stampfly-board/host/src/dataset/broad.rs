@@ -9,7 +9,7 @@ use super::timing::Clock;
 use super::{DatasetErrorKind, Kind, Recording, TruthPoint, attitude};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{ImuData, MagData};
-use stampfly_types::{Micros, Vec3};
+use stampfly_types::{Instant, Vec3};
 
 pub(super) fn is(arrays: &Arrays) -> bool {
     ["gyr", "acc", "mag", "quat", "movement"].iter().all(|name| arrays.contains_key(*name))
@@ -37,7 +37,7 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
             return Err(broken(name, format!("{length} rows where gyr has {}", gyro.len())));
         }
     }
-    let stamp = |row: usize| Micros((row as f64 * 1e6 / rate + 0.5) as u64);
+    let stamp = |row: usize| Instant::from_micros((row as f64 * 1e6 / rate + 0.5) as u64);
 
     let rows = gyro.iter().zip(accel).enumerate().map(|(row, (gyro, accel))| {
         let data = ImuData { accel: body(*accel), gyro: body(*gyro), temperature: 25.0 };

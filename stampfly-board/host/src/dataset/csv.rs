@@ -98,11 +98,11 @@ impl Row<'_> {
         place: usize,
         name: &str,
         unit: f64,
-    ) -> Result<stampfly_types::Micros, DatasetErrorKind> {
+    ) -> Result<stampfly_types::Instant, DatasetErrorKind> {
         let value = self.number(place, name)?;
         // Ten years; beyond that a stamp is damage, and a calculation with it might overflow.
         if (0.0..3.2e8).contains(&(value * unit * 1e-6)) {
-            Ok(stampfly_types::Micros((value * unit + 0.5) as u64))
+            Ok(stampfly_types::Instant::from_micros((value * unit + 0.5) as u64))
         } else {
             Err(broken(self.line, name, format!("{value} is not a time")))
         }

@@ -25,7 +25,7 @@ pub use timing::Timing;
 use crate::flight::Flight;
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{BaroData, FlowData, ImuData, MagData, TofData};
-use stampfly_types::{Message, Micros, Quat, Vec3, message};
+use stampfly_types::{Duration, Instant, Message, Quat, Vec3, message};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ impl fmt::Display for Kind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruthPoint {
     /// When.
-    pub at: Micros,
+    pub at: Instant,
     /// Body FRD → world NED.
     pub attitude: Option<Quat>,
     /// World NED, metres.
@@ -77,7 +77,7 @@ pub struct TruthPoint {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DevicePoint {
     /// When.
-    pub at: Micros,
+    pub at: Instant,
     /// Body FRD → world NED.
     pub attitude: Quat,
     /// World NED, metres.
@@ -264,10 +264,10 @@ impl Recording {
 
     /// First to last inertial sample.
     #[must_use]
-    pub fn duration(&self) -> Micros {
+    pub fn duration(&self) -> Duration {
         match (self.imu.first(), self.imu.last()) {
             (Some(first), Some(last)) => last.at.since(first.at),
-            _ => Micros::ZERO,
+            _ => Duration::ZERO,
         }
     }
 

@@ -11,7 +11,7 @@ use super::timing::{Clock, straight_end};
 use super::{DatasetErrorKind, DevicePoint, Kind, Recording, TruthPoint, attitude};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::ImuData;
-use stampfly_types::{GRAVITY, Micros, Vec3};
+use stampfly_types::{GRAVITY, Instant, Vec3};
 
 pub(super) fn is(arrays: &Arrays) -> bool {
     ["t", "data", "cols"].iter().all(|name| arrays.contains_key(*name))
@@ -60,10 +60,10 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
         return Err(broken("data", format!("{} rows for {} times", data.rows, time.len())));
     }
     let stamps = time.iter().map(|[seconds]| match (0.0..3.2e8).contains(seconds) {
-        true => Ok(Micros((seconds * 1e6 + 0.5) as u64)),
+        true => Ok(Instant::from_micros((seconds * 1e6 + 0.5) as u64)),
         false => Err(broken("t", format!("{seconds} is not a time"))),
     });
-    let stamps: Vec<Micros> = stamps.collect::<Result<_, _>>()?;
+    let stamps: Vec<Instant> = stamps.collect::<Result<_, _>>()?;
     let table = Table { names, data };
 
     let accel = table.columns(["imu_acc_x", "imu_acc_y", "imu_acc_z"])?;

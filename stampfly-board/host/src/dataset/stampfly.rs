@@ -5,7 +5,7 @@ use super::timing::{Clock, Held};
 use super::{DatasetErrorKind, DevicePoint, Kind, Recording};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{BaroData, FlowData, ImuData, MagData, TofData};
-use stampfly_types::{Micros, Quat, Vec3, math};
+use stampfly_types::{Duration, Instant, Quat, Vec3, math};
 
 /// Radians per count of the flow sensor.
 const RADIANS_PER_COUNT: f64 = 0.002_22;
@@ -21,10 +21,10 @@ const TOF_RANGE: std::ops::RangeInclusive<f64> = 0.01..=4.0;
 const ROOM_TEMPERATURE: f32 = 25.0;
 
 /// How often each sensor has something new.
-const TOF_PERIOD: Micros = Micros::from_millis(33);
-const FLOW_PERIOD: Micros = Micros::from_millis(10);
-const MAG_PERIOD: Micros = Micros::from_millis(40);
-const BARO_PERIOD: Micros = Micros::from_millis(70);
+const TOF_PERIOD: Duration = Duration::from_millis(33);
+const FLOW_PERIOD: Duration = Duration::from_millis(10);
+const MAG_PERIOD: Duration = Duration::from_millis(40);
+const BARO_PERIOD: Duration = Duration::from_millis(70);
 
 pub(super) fn is_log(first_line: &[u8]) -> bool {
     first_line.starts_with(b"timestamp_ms,dt_ms,raw_accel_x,")
@@ -34,7 +34,7 @@ pub(super) fn is_flight(first_line: &[u8]) -> bool {
     first_line.starts_with(b"timestamp_ms,gyro_x,") || first_line.starts_with(b"timestamp_ms,roll_deg,")
 }
 
-fn stamp(row: &Row<'_>) -> Result<Micros, DatasetErrorKind> {
+fn stamp(row: &Row<'_>) -> Result<Instant, DatasetErrorKind> {
     row.micros(0, "timestamp_ms", 1_000.0)
 }
 
@@ -43,7 +43,7 @@ fn vector([x, y, z]: [f64; 3]) -> Vec3 {
 }
 
 /// One inertial row: acceleration, rate.
-fn imu(at: Micros, [ax, ay, az, gx, gy, gz]: [f64; 6]) -> Sample<ImuData> {
+fn imu(at: Instant, [ax, ay, az, gx, gy, gz]: [f64; 6]) -> Sample<ImuData> {
     let data = ImuData { accel: vector([ax, ay, az]), gyro: vector([gx, gy, gz]), temperature: ROOM_TEMPERATURE };
     Sample { at, data }
 }
@@ -53,7 +53,7 @@ fn range(distance: f64) -> TofData {
 }
 
 /// The device's own estimate: position, velocity, roll, pitch, yaw.
-fn device(at: Micros, values: [f64; 9]) -> DevicePoint {
+fn device(at: Instant, values: [f64; 9]) -> DevicePoint {
     let [px, py, pz, vx, vy, vz, roll, pitch, yaw] = values;
     let [roll, pitch, yaw] = [roll, pitch, yaw].map(|degrees| degrees.to_radians() as f32);
     DevicePoint {

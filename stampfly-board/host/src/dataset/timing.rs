@@ -5,8 +5,8 @@
 //! distinct times.
 
 use stampfly_drivers::Sample;
-use stampfly_types::Micros;
 use stampfly_types::messages::ImuData;
+use stampfly_types::{Duration, Instant};
 
 /// What was done to the time stamps, and how even they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub struct Timing {
     /// Intervals longer than three usual ones.
     pub gaps: usize,
     /// The longest interval.
-    pub longest: Micros,
+    pub longest: Duration,
 }
 
 /// Who stamped the samples.
@@ -55,18 +55,18 @@ pub(super) fn put_in_order(rows: Vec<Sample<ImuData>>, clock: Clock) -> (Vec<Sam
 
     let intervals = kept.len().saturating_sub(1).max(1) as u64;
     let usual = match (kept.first(), kept.last()) {
-        (Some(first), Some(last)) => last.at.since(first.at).0 / intervals,
+        (Some(first), Some(last)) => last.at.since(first.at).as_micros() / intervals,
         _ => 0,
     };
     let mut before = None;
     for batch in kept.chunk_by_mut(|a, b| a.at == b.at) {
         let Some(stamp) = batch.first().map(|row| row.at) else { continue };
         let count = batch.len() as u64;
-        let room = before.map_or(stamp.0, |before: Micros| stamp.since(before).0);
+        let room = before.map_or(stamp.as_micros(), |before: Instant| stamp.since(before).as_micros());
         let step = usual.min(room / count);
         timing.spread += batch.len() - 1;
         for (row, behind) in batch.iter_mut().zip((0..count).rev()) {
-            row.at = Micros(stamp.0 - behind * step);
+            row.at = stamp - Duration::from_micros(behind * step);
         }
         before = Some(stamp);
     }
@@ -76,8 +76,8 @@ pub(super) fn put_in_order(rows: Vec<Sample<ImuData>>, clock: Clock) -> (Vec<Sam
     timing.spread -= (total - kept.len()).min(timing.spread);
     timing.backwards += total - kept.len();
 
-    let mut gaps: Vec<u64> = kept.windows(2).map(|pair| pair[1].at.since(pair[0].at).0).collect();
-    timing.longest = Micros(gaps.iter().copied().max().unwrap_or(0));
+    let mut gaps: Vec<u64> = kept.windows(2).map(|pair| pair[1].at.since(pair[0].at).as_micros()).collect();
+    timing.longest = Duration::from_micros(gaps.iter().copied().max().unwrap_or(0));
     gaps.sort_unstable();
     let median = gaps.get(gaps.len() / 2).copied().unwrap_or(0);
     timing.gaps = gaps.iter().filter(|gap| **gap > 3 * median).count();
@@ -107,23 +107,24 @@ pub(super) fn straight_end(rows: &[Sample<ImuData>]) -> usize {
 
 /// Tells new samples of a slow sensor from repetitions of the last one in a fast log.
 pub(super) struct Held<T> {
-    period: Micros,
-    row: Option<Micros>,
-    last: Option<(Micros, T)>,
+    period: Duration,
+    row: Option<Instant>,
+    last: Option<(Instant, T)>,
 }
 
 impl<T: PartialEq + Copy> Held<T> {
     /// A sensor that has a new sample about every `period`.
-    pub(super) fn new(period: Micros) -> Self {
+    pub(super) fn new(period: Duration) -> Self {
         Self { period, row: None, last: None }
     }
 
     /// Is this a new sample? A changed value is. So is an unchanged one where the log itself is no faster than the sensor,
     /// and otherwise once half a period more than one has passed.
-    pub(super) fn is_new(&mut self, at: Micros, value: T) -> bool {
-        let slow_log = self.row.replace(at).is_some_and(|row| at.since(row).0 * 10 >= self.period.0 * 9);
+    pub(super) fn is_new(&mut self, at: Instant, value: T) -> bool {
+        let slow_log =
+            self.row.replace(at).is_some_and(|row| at.since(row).as_micros() * 10 >= self.period.as_micros() * 9);
         let new = self.last.is_none_or(|(since, last)| {
-            let overdue = at.since(since).0 >= self.period.0 + self.period.0 / 2;
+            let overdue = at.since(since).as_micros() >= self.period.as_micros() + self.period.as_micros() / 2;
             at > since && (last != value || slow_log || overdue)
         });
         if new {
@@ -141,16 +142,16 @@ mod tests {
 
     fn row(millis: u64, value: f32) -> Sample<ImuData> {
         let data = ImuData { accel: Vec3::new(value, 0.0, -9.8), ..Default::default() };
-        Sample { at: Micros::from_millis(millis), data }
+        Sample { at: Instant::from_millis(millis), data }
     }
 
     #[test]
     fn a_batch_is_spread_over_the_time_before_its_stamp() {
         let rows = vec![row(100, 1.0), row(110, 2.0), row(110, 3.0), row(110, 4.0), row(110, 5.0), row(120, 6.0)];
         let (samples, timing) = put_in_order(rows, Clock::Raw);
-        let stamps: Vec<_> = samples.iter().map(|sample| sample.at.0).collect();
+        let stamps: Vec<_> = samples.iter().map(|sample| sample.at.as_micros()).collect();
         assert_eq!(stamps, [100_000, 102_500, 105_000, 107_500, 110_000, 120_000]);
-        assert_eq!((timing.spread, timing.longest), (3, Micros(10_000)));
+        assert_eq!((timing.spread, timing.longest), (3, Duration::from_micros(10_000)));
     }
 
     #[test]
@@ -178,15 +179,15 @@ mod tests {
 
     #[test]
     fn a_held_value_is_new_when_it_changes_or_is_overdue() {
-        let mut tof = Held::new(Micros::from_millis(33));
-        let new: Vec<_> = (0..12).filter(|i| tof.is_new(Micros::from_millis(i * 10), i32::from(*i >= 3))).collect();
+        let mut tof = Held::new(Duration::from_millis(33));
+        let new: Vec<_> = (0..12).filter(|i| tof.is_new(Instant::from_millis(i * 10), i32::from(*i >= 3))).collect();
         assert_eq!(new, [0, 3, 8]);
     }
 
     #[test]
     fn in_a_log_slower_than_the_sensor_every_row_is_a_sample() {
-        let mut flow = Held::new(Micros::from_millis(10));
-        assert!((0..20).all(|row| flow.is_new(Micros::from_millis(row * 11), 0)));
+        let mut flow = Held::new(Duration::from_millis(10));
+        assert!((0..20).all(|row| flow.is_new(Instant::from_millis(row * 11), 0)));
     }
 
     proptest! {

@@ -9,7 +9,7 @@ use super::start::Start;
 use crate::dataset::Recording;
 use serde::Serialize;
 use stampfly_eskf::{Complementary, ComplementaryConfig, Estimator};
-use stampfly_types::{Micros, Vec3, frame, math};
+use stampfly_types::{Instant, Vec3, frame, math};
 
 /// A gap in the flow longer than this is not bridged.
 const LONGEST_STEP: f32 = 0.1;
@@ -37,13 +37,13 @@ impl Reach {
 
 /// The path by flow alone: an instant, north and east in metres, per flow sample. Empty without flow or range.
 #[must_use]
-pub fn path(recording: &Recording, start: &Start) -> Vec<(Micros, [f32; 2])> {
+pub fn path(recording: &Recording, start: &Start) -> Vec<(Instant, [f32; 2])> {
     let mut attitude = Complementary::new(ComplementaryConfig::default());
     attitude.initialize(start.at, &start.calibration);
     let mut imu = recording.imu.iter().filter(|sample| sample.at >= start.at).peekable();
     let mut ranges = recording.tof.iter().filter(|sample| sample.data.valid).peekable();
     let (mut range, mut rates, mut count) = (None, Vec3::zeros(), 0.0f32);
-    let (mut place, mut before) = ([0.0f32; 2], None::<Micros>);
+    let (mut place, mut before) = ([0.0f32; 2], None::<Instant>);
     let mut path = Vec::new();
     for flow in recording.flow.iter().filter(|sample| sample.at >= start.at) {
         while let Some(sample) = imu.next_if(|sample| sample.at <= flow.at) {
@@ -73,7 +73,7 @@ pub fn path(recording: &Recording, start: &Start) -> Vec<(Micros, [f32; 2])> {
 
 /// How far flow alone says it went; `None` without flow or range.
 #[must_use]
-pub fn reach(path: &[(Micros, [f32; 2])]) -> Option<Reach> {
+pub fn reach(path: &[(Instant, [f32; 2])]) -> Option<Reach> {
     let mut reach = Reach::default();
     path.iter().for_each(|(_, [north, east])| reach.add(*north, *east));
     (!path.is_empty()).then_some(reach)

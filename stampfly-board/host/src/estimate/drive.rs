@@ -8,14 +8,13 @@ use stampfly_drivers::Sample;
 use stampfly_eskf::attitude::AttitudeFilter;
 use stampfly_eskf::{Complementary, Eskf, Estimator, Fusion};
 use stampfly_types::messages::{EstimatorStatus, StateEstimate};
-use stampfly_types::{Micros, Quat, Vec3, frame};
+use stampfly_types::{Duration, Instant, Quat, Vec3, frame};
 use std::collections::BTreeMap;
 use std::iter::Peekable;
 use std::slice::Iter;
-use std::time::Instant;
 
 /// Velocities from motion capture are offered at most this often.
-const VELOCITY_PERIOD: Micros = Micros::from_millis(20);
+const VELOCITY_PERIOD: Duration = Duration::from_millis(20);
 /// Their standard deviation, m/s.
 const VELOCITY_SIGMA: f32 = 0.05;
 
@@ -54,7 +53,7 @@ impl Tally {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// Stamp of the inertial sample.
-    pub at: Micros,
+    pub at: Instant,
     /// The state, in the recording's world: heading as in the reference, origin where the estimator started.
     pub state: StateEstimate,
     /// How the sensors fared so far.
@@ -75,7 +74,7 @@ pub struct Drive {
 }
 
 /// Samples of one sensor up to an instant.
-fn up_to<M: Copy>(samples: &mut Peekable<Iter<'_, Sample<M>>>, at: Micros) -> impl Iterator<Item = (Micros, M)> {
+fn up_to<M: Copy>(samples: &mut Peekable<Iter<'_, Sample<M>>>, at: Instant) -> impl Iterator<Item = (Instant, M)> {
     std::iter::from_fn(move || samples.next_if(|sample| sample.at <= at).map(|sample| (sample.at, sample.data)))
 }
 
@@ -116,7 +115,7 @@ fn through(recording: &Recording, start: &Start, mut estimator: impl Estimator) 
     let mut tally = |sensor, fusion| tallies.entry(sensor).or_default().add(fusion);
     let mut instances = Vec::with_capacity(recording.imu.len());
 
-    let begun = Instant::now();
+    let begun = std::time::Instant::now();
     let mut updates = 0u64;
     estimator.initialize(start.at, &start.calibration);
     for sample in recording.imu.iter().filter(|sample| sample.at > start.at) {

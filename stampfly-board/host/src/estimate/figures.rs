@@ -6,17 +6,17 @@ use super::drive::{Drive, Instance};
 use super::start::Start;
 use crate::dataset::{Kind, Recording, TruthPoint};
 use serde::Serialize;
-use stampfly_types::Micros;
 use stampfly_types::messages::{StateEstimate, Validity};
+use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 
 /// Farther than this from the reference, horizontally, an estimate is lost, m.
 const LOST: f64 = 2.0;
 /// An estimate older than this is not compared with the truth.
-const STALE: Micros = Micros::from_millis(50);
+const STALE: Duration = Duration::from_millis(50);
 /// NanoBench counts flight, not the floor: above this height, m, and after this time.
 const NANOBENCH_HEIGHT: f32 = 0.3;
-const NANOBENCH_SETTLED: Micros = Micros::from_secs(3);
+const NANOBENCH_SETTLED: Duration = Duration::from_secs(3);
 
 /// How good an estimate is. `None` where the recording has nothing to tell by.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -120,13 +120,13 @@ impl Figures {
 }
 
 /// The newest estimate at or before an instant.
-fn newest(instances: &[Instance], at: Micros) -> Option<&Instance> {
+fn newest(instances: &[Instance], at: Instant) -> Option<&Instance> {
     let index = instances.partition_point(|instance| instance.at <= at).checked_sub(1)?;
     instances.get(index).filter(|instance| at.since(instance.at) < STALE)
 }
 
 /// Does the data set's own metric count this instant?
-fn counts(kind: Kind, start: Micros, point: &TruthPoint) -> bool {
+fn counts(kind: Kind, start: Instant, point: &TruthPoint) -> bool {
     let flying = point.position.is_some_and(|place| -place.z > NANOBENCH_HEIGHT);
     point.counts && (kind != Kind::NanoBench || (flying && point.at.since(start) >= NANOBENCH_SETTLED))
 }
@@ -151,7 +151,7 @@ fn accuracy(recording: &Recording, start: &Start, drive: &Drive) -> Accuracy {
 
 /// How good the device's own attitude was, where the data set's metric counts.
 fn device(recording: &Recording) -> Accuracy {
-    let first = recording.imu.first().map_or(Micros::ZERO, |sample| sample.at);
+    let first = recording.imu.first().map_or(Instant::ZERO, |sample| sample.at);
     let own = recording.device.as_deref().unwrap_or_default();
     let mut accuracy = Accuracy::default();
     for point in recording.truth.iter().filter(|point| counts(recording.kind, first, point)) {
@@ -171,7 +171,7 @@ fn travelled(instances: &[Instance]) -> Reach {
 }
 
 /// Largest horizontal distance between the estimate and the way by flow alone.
-fn apart(instances: &[Instance], reckoned: &[(Micros, [f32; 2])]) -> Option<f64> {
+fn apart(instances: &[Instance], reckoned: &[(Instant, [f32; 2])]) -> Option<f64> {
     let mut reach = Reach::default();
     for (at, [north, east]) in reckoned {
         let Some(now) = newest(instances, *at) else { continue };

@@ -6,25 +6,25 @@
 use crate::dataset::{Kind, Recording};
 use stampfly_eskf::attitude_from_specific_force;
 use stampfly_types::messages::CalibrationResult;
-use stampfly_types::{Micros, Quat, Vec3, frame, math};
+use stampfly_types::{Duration, Instant, Quat, Vec3, frame, math};
 
 /// Rest as long as this is a still-calibration.
-const STILL: Micros = Micros::from_millis(700);
+const STILL: Duration = Duration::from_millis(700);
 /// The rest must begin this soon.
-const SEARCH: Micros = Micros::from_millis(1_000);
+const SEARCH: Duration = Duration::from_millis(1_000);
 /// A hand trembles by 20 mrad/s and more, the sensors' noise is below 2 mrad/s and 20 mm/s².
 const STILL_RATE: f32 = 0.006;
 const STILL_FORCE: f32 = 0.08;
 /// A bias larger than this is a steady turn.
 const LARGEST_BIAS: f32 = 0.1;
 /// Without rest: the time over which gravity is averaged.
-const GLANCE: Micros = Micros::from_millis(250);
+const GLANCE: Duration = Duration::from_millis(250);
 
 /// Where and how an estimator starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
     /// The instant before the first sample that is used.
-    pub at: Micros,
+    pub at: Instant,
     /// What is known by then. `complete` when the vehicle was at rest.
     pub calibration: CalibrationResult,
     /// Heading of the body at `at` in the recording's world. Estimators start at heading zero; their results are
@@ -44,12 +44,13 @@ impl Start {
     /// The start of a recording, from its first second and a half.
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
-        let first = recording.imu.first().map_or(Micros::ZERO, |sample| sample.at);
-        let candidates = (0..).map(|step| first + Micros(step * 100_000)).take_while(|at| at.since(first) <= SEARCH);
+        let first = recording.imu.first().map_or(Instant::ZERO, |sample| sample.at);
+        let candidates =
+            (0..).map(|step| first + Duration::from_micros(step * 100_000)).take_while(|at| at.since(first) <= SEARCH);
         let rest = candidates.into_iter().find_map(|from| Some((from, rest_from(recording, from)?)));
         let (at, mut calibration) = rest.unwrap_or_else(|| (first, glance(recording, first)));
         let span = if calibration.complete { STILL } else { GLANCE };
-        let within = |stamp: Micros| (at..at + span).contains(&stamp);
+        let within = |stamp: Instant| (at..at + span).contains(&stamp);
         let fields = recording.mag.iter().filter(|sample| within(sample.at)).map(|sample| sample.data.field);
         calibration.field = moments(fields).0;
         let ground = recording.baro.iter().find(|sample| sample.at >= at);
@@ -59,7 +60,7 @@ impl Start {
 }
 
 /// The calibration from a rest that begins at `from`; `None` when there is none.
-fn rest_from(recording: &Recording, from: Micros) -> Option<CalibrationResult> {
+fn rest_from(recording: &Recording, from: Instant) -> Option<CalibrationResult> {
     let end = from + STILL;
     let samples = || recording.imu.iter().filter(move |sample| (from..end).contains(&sample.at));
     if recording.imu.last()?.at < end || samples().count() < 20 {
@@ -78,14 +79,14 @@ fn rest_from(recording: &Recording, from: Micros) -> Option<CalibrationResult> {
 }
 
 /// What the first moment of a moving recording tells.
-fn glance(recording: &Recording, first: Micros) -> CalibrationResult {
+fn glance(recording: &Recording, first: Instant) -> CalibrationResult {
     let samples = recording.imu.iter().take_while(|sample| sample.at.since(first) < GLANCE);
     let (specific_force, _) = moments(samples.map(|sample| sample.data.accel));
     CalibrationResult { specific_force, ..CalibrationResult::default() }
 }
 
 /// Heading in the recording's world: from magnetic north where the world is defined by it, otherwise as it was seen.
-fn heading(recording: &Recording, at: Micros, calibration: &CalibrationResult) -> f32 {
+fn heading(recording: &Recording, at: Instant, calibration: &CalibrationResult) -> f32 {
     let [w, x, y, z] = attitude_from_specific_force(&calibration.specific_force);
     let level = Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
     if recording.kind == Kind::Broad && calibration.field.xy().norm() > 1.0 {
@@ -119,7 +120,7 @@ mod tests {
         let start = Start::of(&capture((0..200).map(|n| (0.01 + noise(n), noise(n)))));
         assert!(start.calibration.complete);
         assert!((start.calibration.gyro_bias - Vec3::new(0.0106, 0.002, -0.003)).amax() < 1e-4);
-        assert_eq!((start.at, start.heading), (Micros::ZERO, 0.0));
+        assert_eq!((start.at, start.heading), (Instant::ZERO, 0.0));
     }
 
     #[test]
@@ -134,7 +135,7 @@ mod tests {
     fn a_rest_that_begins_late_is_found() {
         let moving = (0..200).map(|n| if n < 55 { (0.3 - noise(n), 1.0) } else { (noise(n), noise(n)) });
         let start = Start::of(&capture(moving));
-        assert!(start.calibration.complete && start.at == Micros::from_millis(600), "{start:?}");
+        assert!(start.calibration.complete && start.at == Instant::from_millis(600), "{start:?}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::flight::Series;
 use serde::Serialize;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
 /// The most points a channel has; a screen has fewer columns.
 const MAX_POINTS: u64 = 6_000;
@@ -16,7 +16,7 @@ const HOLD: u64 = 150_000;
 /// Evenly spaced instants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
-    pub(super) start: Micros,
+    pub(super) start: Instant,
     pub(super) step: u64,
     pub(super) points: u64,
 }
@@ -35,15 +35,15 @@ pub(super) enum Pick {
 }
 
 impl Grid {
-    pub(super) fn new((start, end): (Micros, Micros)) -> Self {
-        let span = end.since(start).0;
+    pub(super) fn new((start, end): (Instant, Instant)) -> Self {
+        let span = end.since(start).as_micros();
         let step = (span / MAX_POINTS).max(MIN_STEP);
         Self { start, step, points: span / step + 1 }
     }
 
     /// The instants.
-    pub(super) fn stamps(self) -> impl Iterator<Item = Micros> {
-        (0..self.points).map(move |point| Micros(self.start.0 + point * self.step))
+    pub(super) fn stamps(self) -> impl Iterator<Item = Instant> {
+        (0..self.points).map(move |point| self.start + Duration::from_micros(point * self.step))
     }
 
     /// Brings values of a series onto the grid. Where there is none: NaN.
@@ -58,7 +58,7 @@ impl Grid {
             let between = values.get(from..to).unwrap_or_default();
             from = to;
             let newest = to.checked_sub(1).and_then(|index| Some((*series.at.get(index)?, *values.get(index)?)));
-            let fresh = newest.filter(|(stamp, _)| pick == Pick::Latched || at.since(*stamp).0 <= hold);
+            let fresh = newest.filter(|(stamp, _)| pick == Pick::Latched || at.since(*stamp).as_micros() <= hold);
             let newest = fresh.map_or(f64::NAN, |(_, value)| value);
             let value = match pick {
                 Pick::Mean if !between.is_empty() => between.iter().sum::<f64>() / between.len() as f64,
@@ -73,7 +73,7 @@ impl Grid {
 
 /// For how long a value of this series counts as present.
 fn hold_of(series: &Series) -> u64 {
-    let span = series.at.last().zip(series.at.first()).map_or(0, |(last, first)| last.since(*first).0);
+    let span = series.at.last().zip(series.at.first()).map_or(0, |(last, first)| last.since(*first).as_micros());
     let interval = span / (series.at.len().saturating_sub(1).max(1) as u64);
     (interval * HOLD_INTERVALS).max(HOLD)
 }
@@ -123,7 +123,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn series(stamps: &[u64]) -> Series {
-        Series { at: stamps.iter().map(|millis| Micros::from_millis(*millis)).collect(), ..Default::default() }
+        Series { at: stamps.iter().map(|millis| Instant::from_millis(*millis)).collect(), ..Default::default() }
     }
 
     #[test]
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn every_way_to_pick() {
-        let grid = Grid::new((Micros(0), Micros::from_millis(40)));
+        let grid = Grid::new((Instant::ZERO, Instant::from_millis(40)));
         let series = series(&[0, 4, 8, 12, 40]);
         let values = [1.0, -9.0, 2.0, 3.0, 4.0];
         assert_eq!(grid.resample(&series, &values, Pick::Newest), [1.0, 2.0, 3.0, 3.0, 4.0]);
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn old_values_are_missing_unless_they_are_latched() {
-        let grid = Grid::new((Micros(0), Micros::from_millis(1_000)));
+        let grid = Grid::new((Instant::ZERO, Instant::from_millis(1_000)));
         let series = series(&[100, 110, 120]);
         let newest = grid.resample(&series, &[1.0, 2.0, 3.0], Pick::Newest);
         assert!(newest[9].is_nan() && newest[12] == 3.0 && newest[27] == 3.0 && newest[28].is_nan());
@@ -157,9 +157,9 @@ mod tests {
 
     #[test]
     fn a_long_flight_has_no_more_points_than_a_screen_can_show() {
-        assert_eq!(Grid::new((Micros(0), Micros::from_secs(30))).points, 3_001);
-        assert!(Grid::new((Micros(0), Micros::from_secs(86_400))).points <= MAX_POINTS + 1);
-        assert_eq!(Grid::new((Micros(5), Micros(5))).points, 1);
+        assert_eq!(Grid::new((Instant::ZERO, Instant::from_secs(30))).points, 3_001);
+        assert!(Grid::new((Instant::ZERO, Instant::from_secs(86_400))).points <= MAX_POINTS + 1);
+        assert_eq!(Grid::new((Instant::from_micros(5), Instant::from_micros(5))).points, 1);
     }
 
     proptest! {

@@ -44,11 +44,11 @@ impl Metric {
 ///
 /// ```
 /// use stampfly_host::{Flight, Report, report::Metric};
-/// use stampfly_types::{Micros, messages::StateEstimate};
+/// use stampfly_types::{Instant, messages::StateEstimate};
 ///
 /// let mut flight = Flight::default();
 /// for step in 0..100 {
-///     flight.push("estimate_state", Micros::from_millis(step * 10), &StateEstimate::default());
+///     flight.push("estimate_state", Instant::from_millis(step * 10), &StateEstimate::default());
 /// }
 /// let report = Report {
 ///     title: "Hover".to_owned(),

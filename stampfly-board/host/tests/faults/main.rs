@@ -9,12 +9,12 @@ use core::ops::Range;
 use rig::{Access, NAMES, Said, run, run_with};
 use stampfly_drivers::SensorErrorKind;
 use stampfly_sim::chips::Faults;
-use stampfly_types::Micros;
+use stampfly_types::{Duration, Instant};
 
-const BEGIN: Micros = Micros::from_millis(1_000);
-const FAULT_ENDS: Micros = Micros::from_millis(1_400);
-const FAULT: Range<Micros> = BEGIN..FAULT_ENDS;
-const END: Micros = Micros::from_millis(3_500);
+const BEGIN: Instant = Instant::from_millis(1_000);
+const FAULT_ENDS: Instant = Instant::from_millis(1_400);
+const FAULT: Range<Instant> = BEGIN..FAULT_ENDS;
+const END: Instant = Instant::from_millis(3_500);
 
 /// What each driver promises, ms: time between samples, from a fault to an error, from its end to a sample.
 ///
@@ -31,28 +31,28 @@ const PROMISES: [(u64, u64, u64); 7] = [
     (36, 90, 900),   // tof_front
 ];
 
-fn promise(index: usize) -> [Micros; 3] {
+fn promise(index: usize) -> [Duration; 3] {
     let (period, error, recovery) = PROMISES[index];
-    [period, error, recovery].map(Micros::from_millis)
+    [period, error, recovery].map(Duration::from_millis)
 }
 
-fn samples(said: &[Said]) -> impl Iterator<Item = (Micros, f32)> {
+fn samples(said: &[Said]) -> impl Iterator<Item = (Instant, f32)> {
     said.iter().filter_map(|(at, said)| said.ok().map(|figure| (*at, figure)))
 }
 
-fn errors(said: &[Said]) -> Vec<(Micros, SensorErrorKind)> {
+fn errors(said: &[Said]) -> Vec<(Instant, SensorErrorKind)> {
     said.iter().filter_map(|(at, said)| said.err().map(|kind| (*at, kind))).collect()
 }
 
 /// The longest time without a sample between two instants.
-fn longest_gap(said: &[Said], begin: Micros, end: Micros) -> Micros {
+fn longest_gap(said: &[Said], begin: Instant, end: Instant) -> Duration {
     let instants = samples(said).map(|(at, _)| at).filter(|at| (begin..=end).contains(at));
-    let (last, gap) = instants.fold((begin, Micros::ZERO), |(last, gap), at| (at, gap.max(at.since(last))));
+    let (last, gap) = instants.fold((begin, Duration::ZERO), |(last, gap), at| (at, gap.max(at.since(last))));
     gap.max(end.since(last))
 }
 
 /// The same from one second after the start on, when everything runs.
-fn assert_unharmed(index: usize, said: &[Said], end: Micros, what: &str) {
+fn assert_unharmed(index: usize, said: &[Said], end: Instant, what: &str) {
     let late: Vec<_> = errors(said).into_iter().filter(|(at, _)| *at >= BEGIN).collect();
     assert!(late.is_empty(), "{what}: {} said {late:?}", NAMES[index]);
     let [period, ..] = promise(index);
@@ -62,16 +62,16 @@ fn assert_unharmed(index: usize, said: &[Said], end: Micros, what: &str) {
 }
 
 /// Samples come again within the promised time, and say what they said before.
-fn assert_recovered(index: usize, said: &[Said], from: Micros, end: Micros, what: &str) {
+fn assert_recovered(index: usize, said: &[Said], from: Instant, end: Instant, what: &str) {
     let [.., recovery] = promise(index);
     let again = samples(said).map(|(at, _)| at).find(|at| *at > from);
     let took = again.map(|at| at.since(from));
     assert!(took.is_some_and(|took| took <= recovery), "{what}: {} took {took:?}", NAMES[index]);
-    let mean = |begin: Micros, end: Micros| {
+    let mean = |begin: Instant, end: Instant| {
         let figures: Vec<f32> = samples(said).filter(|(at, _)| (begin..end).contains(at)).map(|(_, f)| f).collect();
         figures.iter().sum::<f32>() / figures.len() as f32
     };
-    let (before, after) = (mean(Micros::from_millis(700), BEGIN), mean(end.since(Micros::from_millis(700)), end));
+    let (before, after) = (mean(Instant::from_millis(700), BEGIN), mean(end - Duration::from_millis(700), end));
     // Noise of the mean of some samples: m/s², share, µT, Pa, V, m, share.
     let tolerance = [0.05, 0.1, 1.0, 2.0, 0.02, 0.002, 0.1][index];
     assert!((before - after).abs() < tolerance, "{what}: {} says {after} after {before}", NAMES[index]);
@@ -107,7 +107,7 @@ fn heal(access: &Access, index: usize) {
 }
 
 /// An error of one of these kinds came in time, and no sample during the fault but those already on their way.
-fn assert_failed(index: usize, said: &[Said], fault: &Range<Micros>, kinds: &[SensorErrorKind], what: &str) {
+fn assert_failed(index: usize, said: &[Said], fault: &Range<Instant>, kinds: &[SensorErrorKind], what: &str) {
     let [_, limit, _] = promise(index);
     let during: Vec<_> = errors(said).into_iter().filter(|(at, _)| fault.contains(at)).collect();
     let first = during.first().map(|(at, _)| at.since(fault.start));
@@ -123,7 +123,7 @@ fn without_a_fault_nobody_says_an_error() {
     for (index, said) in said.iter().enumerate() {
         assert_unharmed(index, said, END, "no fault");
         let first = samples(said).next().map(|(at, _)| at);
-        assert!(first.is_some_and(|at| at < Micros::from_millis(700)), "{} began {first:?}", NAMES[index]);
+        assert!(first.is_some_and(|at| at < Instant::from_millis(700)), "{} began {first:?}", NAMES[index]);
     }
 }
 
@@ -149,9 +149,9 @@ fn refused_transfers() {
 #[test]
 fn a_short_refusal_leaves_a_short_gap_in_the_inertial_samples() {
     // Motors are cut after 25 ms without a sample. A period has passed when the fault begins, and a pause after its end.
-    let (unavoidable, end) = (Micros(5_200), Micros::from_millis(1_100));
-    for refused in [1, 8, 18].map(Micros::from_millis) {
-        for begin in (0..10).map(|n| BEGIN + Micros(270 * n)) {
+    let (unavoidable, end) = (Duration::from_micros(5_200), Instant::from_millis(1_100));
+    for refused in [1, 8, 18].map(Duration::from_millis) {
+        for begin in (0..10).map(|n| BEGIN + Duration::from_micros(270 * n)) {
             let refusing = set(Faults { refusals: 1.0, ..Faults::default() });
             let said =
                 run(end, &[(begin, &|access| refusing(access, 0)), (begin + refused, &|access| heal(access, 0))]);
@@ -192,7 +192,7 @@ fn bit_errors() {
 #[test]
 fn a_stretched_clock() {
     // Half a millisecond in every transfer: slow, but within what every driver allows.
-    let slow = Faults { stretch: Micros(500), ..Faults::default() };
+    let slow = Faults { stretch: Duration::from_micros(500), ..Faults::default() };
     each(&ON_I2C, "stretching", set(slow), heal, |index, said| assert_unharmed(index, said, END, "stretching"));
 }
 
@@ -202,9 +202,9 @@ fn a_clock_that_is_held() {
     // between they have their turns, and nobody is worse off afterwards. Who waits behind a held transfer is given up
     // with it and asks again after 80 ms at most, so which turns are lost is a matter of chance: in two seconds the
     // slowest neighbour is served some twenty times, and less than half of that would be starving.
-    let held = Faults { stretch: Micros::from_millis(15), ..Faults::default() };
-    let ends = Micros::from_millis(3_000);
-    let end = Micros::from_millis(5_100);
+    let held = Faults { stretch: Duration::from_millis(15), ..Faults::default() };
+    let ends = Instant::from_millis(3_000);
+    let end = Instant::from_millis(5_100);
     for index in ON_I2C {
         let said = run(end, &[(BEGIN, &|access| set(held)(access, index)), (ends, &|access| heal(access, index))]);
         let fault = BEGIN..ends;

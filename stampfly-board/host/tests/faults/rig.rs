@@ -13,13 +13,13 @@ use stampfly_sim::chips::{AttachedChips, Board, I2cBus, stand_in_image};
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 /// What a driver said, and when: a figure of its sample, or its error.
-pub type Said = (Micros, Result<f32, SensorErrorKind>);
+pub type Said = (Instant, Result<f32, SensorErrorKind>);
 
 /// Something that is done to the rig, and when.
-pub type Event<'a> = (Micros, &'a dyn Fn(&Access));
+pub type Event<'a> = (Instant, &'a dyn Fn(&Access));
 
 /// The chips' names, in the order of what [`run`] returns.
 pub const NAMES: [&str; 7] = ["imu", "flow", "mag", "baro", "power", "tof", "tof_front"];
@@ -38,13 +38,13 @@ impl Access {
     }
 }
 
-/// Runs for `duration`; at each instant of `events` something is done.
-pub fn run(duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
-    run_with(SimulationConfig::default().seed, duration, events)
+/// Runs until `end`; at each instant of `events` something is done.
+pub fn run(end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7] {
+    run_with(SimulationConfig::default().seed, end, events)
 }
 
 /// The same with chips and noise of this seed.
-pub fn run_with(seed: u64, duration: Micros, events: &[Event<'_>]) -> [Vec<Said>; 7] {
+pub fn run_with(seed: u64, end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7] {
     let config = SimulationConfig { wind: WindConfig::CALM, seed, ..Default::default() };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
@@ -89,7 +89,7 @@ pub fn run_with(seed: u64, duration: Micros, events: &[Event<'_>]) -> [Vec<Said>
         tasks.run_until(*instant);
         action(&access);
     }
-    tasks.run_until(duration);
+    tasks.run_until(end);
     drop(tasks);
     notes.map(RefCell::into_inner)
 }

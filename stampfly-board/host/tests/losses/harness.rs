@@ -16,7 +16,7 @@ use stampfly_sim::{Simulation, SimulationConfig, Truth};
 use stampfly_types::messages::{
     Alerts, FlightState, GuidedCommand, GuidedKind, MotorOutput, PilotInput, SystemAlert, SystemMode,
 };
-use stampfly_types::{Message, Micros, Vec3};
+use stampfly_types::{Duration, Instant, Message, Vec3};
 use std::cell::Cell;
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -33,11 +33,11 @@ pub struct Hands<'b> {
 
 impl Hands<'_> {
     pub async fn sleep(&self, seconds: f32) {
-        self.clock.sleep_until(self.clock.now() + Micros::from_seconds(seconds)).await;
+        self.clock.sleep_until(self.clock.now() + Duration::from_seconds(seconds)).await;
     }
 
     /// Sends a command and returns the instant.
-    pub fn command(&mut self, kind: GuidedKind) -> Micros {
+    pub fn command(&mut self, kind: GuidedKind) -> Instant {
         let now = self.clock.now();
         let position = Vec3::new(0.0, 0.0, -0.5);
         self.guided.publish(now, GuidedCommand { kind, position, ..Default::default() }).expect("room in the queue");
@@ -45,7 +45,7 @@ impl Hands<'_> {
     }
 
     /// A frame from the pilot's transmitter; returns the instant.
-    pub fn frame(&mut self, input: &PilotInput) -> Micros {
+    pub fn frame(&mut self, input: &PilotInput) -> Instant {
         self.pilot.publish(self.clock.now(), input);
         self.clock.now()
     }
@@ -82,22 +82,22 @@ impl Hands<'_> {
 /// What came of it: every sample of the topics that matter, and the truth beside every motor command.
 #[derive(Default)]
 pub struct Seen {
-    pub modes: Vec<(Micros, SystemMode)>,
-    pub alerts: Vec<(Micros, Alerts)>,
-    pub motors: Vec<(Micros, MotorOutput)>,
-    pub truths: Vec<(Micros, Truth)>,
+    pub modes: Vec<(Instant, SystemMode)>,
+    pub alerts: Vec<(Instant, Alerts)>,
+    pub motors: Vec<(Instant, MotorOutput)>,
+    pub truths: Vec<(Instant, Truth)>,
 }
 
 impl Seen {
     /// States in the order they were entered, with the instants.
-    pub fn states(&self) -> Vec<(Micros, FlightState)> {
-        let mut states: Vec<(Micros, FlightState)> = self.modes.iter().map(|(at, mode)| (*at, mode.state)).collect();
+    pub fn states(&self) -> Vec<(Instant, FlightState)> {
+        let mut states: Vec<(Instant, FlightState)> = self.modes.iter().map(|(at, mode)| (*at, mode.state)).collect();
         states.dedup_by_key(|(_, state)| *state);
         states
     }
 
     /// When a state was first entered at or after an instant.
-    pub fn entered(&self, state: FlightState, after: Micros) -> Option<Micros> {
+    pub fn entered(&self, state: FlightState, after: Instant) -> Option<Instant> {
         self.states().into_iter().find(|(at, entered)| *entered == state && *at >= after).map(|(at, _)| at)
     }
 
@@ -107,7 +107,7 @@ impl Seen {
 
     /// From the first motor command at or after `since` that has every motor off, how long it took to get there. They
     /// have to stay off.
-    pub fn motors_off_after(&self, since: Micros) -> Micros {
+    pub fn motors_off_after(&self, since: Instant) -> Duration {
         let off = |output: &MotorOutput| !output.armed && output.duty.iter().all(|duty| *duty == 0.0);
         let later = || self.motors.iter().filter(|(at, _)| *at >= since);
         let (at, _) = later().find(|(_, output)| off(output)).expect("the motors are switched off");
@@ -116,7 +116,7 @@ impl Seen {
     }
 
     /// The largest horizontal distance from where it was at `since`, until `until`.
-    pub fn drift(&self, since: Micros, until: Micros) -> f32 {
+    pub fn drift(&self, since: Instant, until: Instant) -> f32 {
         let mut stretch =
             self.truths.iter().filter(|(at, _)| (since..=until).contains(at)).map(|(_, truth)| truth.position);
         let from = stretch.next().expect("a stretch");
@@ -162,7 +162,7 @@ pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Sc
     tasks.spawn(async move {
         loop {
             contact.publish(watch.now(), &ButtonContact { pressed: pin.is_pressed() });
-            watch.sleep_until(watch.now() + Micros::from_millis(20)).await;
+            watch.sleep_until(watch.now() + Duration::from_millis(20)).await;
         }
     });
     tasks.spawn(script(Hands {
@@ -175,7 +175,7 @@ pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Sc
     }));
 
     let mut seen = Seen::default();
-    let end = config.start + Micros::from_seconds(seconds);
+    let end = config.start + Duration::from_seconds(seconds);
     while clock.now() < end {
         let tick = flight_loop.next_tick().filter(|tick| *tick > clock.now());
         let next = tasks.next_deadline().into_iter().chain(tick).min().expect("sensors never end");

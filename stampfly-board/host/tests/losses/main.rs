@@ -3,24 +3,24 @@
 mod harness;
 
 use harness::{Seen, run};
-use stampfly_types::Micros;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightState, GuidedKind, PilotInput};
+use stampfly_types::{Duration, Instant};
 use std::cell::Cell;
 use std::rc::Rc;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
 
-/// The vehicle's inertial sensor may be 2 % slow: a control period, in microseconds.
-const PERIOD: u64 = 2_551;
+/// A control period: the vehicle's inertial sensor may be 2 % slow.
+const PERIOD: Duration = Duration::from_micros(2_551);
 
 /// Where a script leaves the instant at which it did what the test is about.
-fn instant() -> (Rc<Cell<Micros>>, Rc<Cell<Micros>>) {
-    let cell = Rc::new(Cell::new(Micros::ZERO));
+fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
+    let cell = Rc::new(Cell::new(Instant::ZERO));
     (cell.clone(), cell)
 }
 
 /// It hovers for three seconds after half a second of silence, over its place, then lands there.
-fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Micros) {
+fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Instant) {
     let landing = seen.entered(FlightState::Landing, silent_since).expect("it lands");
     let waited = landing.since(silent_since).seconds();
     assert!((3.45..3.6).contains(&waited), "seed {seed}: landing after {waited} s of silence");
@@ -32,7 +32,7 @@ fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Micros) {
     assert_eq!((mode.state, mode.armed, truth.contact), (FlightState::IdleGround, false, true), "seed {seed}");
     let drift = seen.drift(silent_since, landing);
     assert!(drift < 0.25, "seed {seed}: drifted {drift} m while waiting");
-    let moved = seen.drift(silent_since, Micros(u64::MAX));
+    let moved = seen.drift(silent_since, Instant::MAX);
     assert!(moved < 0.4, "seed {seed}: landed {moved} m away");
     for (at, output) in &seen.motors {
         assert!(output.duty.iter().all(|duty| (0.0..=1.0).contains(duty)), "seed {seed}: {output:?} at {at}");
@@ -111,7 +111,7 @@ fn kill_stops_the_motors_within_a_control_period() {
             })
         });
         let took = seen.motors_off_after(since.get());
-        assert!(took.0 <= PERIOD, "seed {seed}: by command {took}");
+        assert!(took <= PERIOD, "seed {seed}: by command {took}");
         assert!(!seen.end().0.armed);
 
         let (since, note) = instant();
@@ -124,7 +124,7 @@ fn kill_stops_the_motors_within_a_control_period() {
             })
         });
         let took = seen.motors_off_after(since.get());
-        assert!(took.0 <= PERIOD, "seed {seed}: by the pilot {took}");
+        assert!(took <= PERIOD, "seed {seed}: by the pilot {took}");
     }
 }
 
@@ -142,9 +142,9 @@ fn a_silent_inertial_sensor() {
             })
         });
         let took = seen.motors_off_after(since.get());
-        assert!((20_000..=32_500).contains(&took.0), "seed {seed}: {took}");
+        assert!((Duration::from_millis(20)..=Duration::from_micros(32_500)).contains(&took), "seed {seed}: {took}");
         let degraded = seen.alerts.iter().find(|(_, alerts)| alerts.contains(Alerts::IMU_DEGRADED)).expect("noticed").0;
-        assert!(degraded.since(since.get()) <= Micros::from_millis(15), "seed {seed}: {degraded}");
+        assert!(degraded.since(since.get()) <= Duration::from_millis(15), "seed {seed}: {degraded}");
     }
 }
 
@@ -167,10 +167,11 @@ fn a_hiccup_of_the_inertial_sensor() {
     assert!(seen.alerts.iter().any(|(_, alerts)| alerts.contains(Alerts::IMU_DEGRADED)));
     assert!(seen.alerts.iter().all(|(_, alerts)| !alerts.contains(Alerts::IMU_LOST)));
     assert!(
-        seen.entered(FlightState::Landing, since.get()).is_some_and(|at| at.since(since.get()) > Micros::from_secs(2))
+        seen.entered(FlightState::Landing, since.get())
+            .is_some_and(|at| at.since(since.get()) > Duration::from_secs(2))
     );
     assert_eq!((seen.end().0.state, seen.end().1.contact), (FlightState::IdleGround, true));
-    assert!(seen.drift(since.get(), Micros(u64::MAX)) < 0.3);
+    assert!(seen.drift(since.get(), Instant::MAX) < 0.3);
 }
 
 /// A finger, and somebody who is heard: a click takes off and holds the place, a press stops the motors, and what follows
@@ -197,10 +198,10 @@ fn a_button_takes_off_and_stops_the_motors() {
         let expected =
             [S::Init, S::IdleGround, S::Armed, S::TakeOff, S::Flying, S::IdleGround, S::IdleHeld, S::IdleGround];
         assert_eq!(states, expected, "seed {seed}");
-        let flying = |mode: &&(Micros, stampfly_types::messages::SystemMode)| mode.1.state == S::Flying;
+        let flying = |mode: &&(Instant, stampfly_types::messages::SystemMode)| mode.1.state == S::Flying;
         assert!(seen.modes.iter().filter(flying).all(|(_, mode)| mode.mode == FlightMode::PosHold), "seed {seed}");
         let took = seen.motors_off_after(since.get());
-        assert!((50_000..110_000).contains(&took.0), "seed {seed}: {took}");
+        assert!((Duration::from_millis(50)..Duration::from_millis(110)).contains(&took), "seed {seed}: {took}");
     }
 }
 

@@ -6,7 +6,7 @@ use stampfly_types::messages::{
     Alerts, ControlOutput, EstimatorStatus, FlightMode, FlightState, ImuData, MotorOutput, PowerData, Setpoint,
     SetpointAxes, StateEstimate, SystemAlert, SystemMode, TofData,
 };
-use stampfly_types::{GRAVITY, Micros, Quat, Vec3, math, message};
+use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math, message};
 
 message! {
     /// What the made-up world knows.
@@ -25,8 +25,8 @@ pub fn flight() -> Flight {
     let mut flight = Flight::default();
     let mut states = Vec::new();
     for step in 0..24_000u64 {
-        let at = Micros(step * 2_500);
-        let t = at.seconds();
+        let at = Instant::from_micros(step * 2_500);
+        let t = at.since(Instant::ZERO).seconds();
         let height = 0.6 * (smooth((t - 4.0) / 3.0) - smooth((t - 52.0) / 5.0));
         let phase = math::TAU * (t - 10.0).clamp(0.0, 40.0) / 20.0;
         let place = |phase: f32| Vec3::new(0.8 * math::sin(phase), 0.5 * math::sin(2.0 * phase), -height);

@@ -13,7 +13,7 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
     if options.json {
         let difference = result.difference.as_ref().map(|difference| {
             json!({
-                "activation": difference.activation, "now_us": difference.now.0, "topic": difference.topic,
+                "activation": difference.activation, "now_us": difference.now.as_micros(), "topic": difference.topic,
                 "generation": difference.generation, "field": difference.field,
                 "recorded": difference.recorded, "replayed": difference.replayed,
             })

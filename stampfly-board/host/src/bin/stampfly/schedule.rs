@@ -12,7 +12,8 @@ use std::process::ExitCode;
 const COLUMNS: [&str; 6] = ["runnable", "activated", "band", "budget, us", "response, us", "what"];
 
 pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
-    let rows: Vec<[String; 6]> = ACTIVATIONS.iter().zip(RESPONSE_TIMES).map(|(info, time)| row(info, time.0)).collect();
+    let rows: Vec<[String; 6]> =
+        ACTIVATIONS.iter().zip(RESPONSE_TIMES).map(|(info, time)| row(info, time.as_micros())).collect();
     if options.json {
         let rows: Vec<_> = ACTIVATIONS
             .iter()
@@ -20,8 +21,8 @@ pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
             .zip(&rows)
             .map(|((info, time), [name, activated, band, _, _, doc])| {
                 json!({
-                    "name": name, "activated": activated, "band": band, "budget_us": info.budget.0,
-                    "response_us": time.0, "doc": doc,
+                    "name": name, "activated": activated, "band": band, "budget_us": info.budget.as_micros(),
+                    "response_us": time.as_micros(), "doc": doc,
                 })
             })
             .collect();
@@ -50,17 +51,17 @@ fn row(info: &ActivationInfo, response: u64) -> [String; 6] {
             let names: Vec<&str> = topics.iter().filter_map(|topic| Some(TOPICS.get(*topic)?.name)).collect();
             format!("on {}", names.join(" or "))
         }
-        Trigger::Every(period) => format!("every {} ms", period.0 / 1_000),
+        Trigger::Every(period) => format!("every {} ms", period.as_micros() / 1_000),
         Trigger::After(before) => format!("after {}", ACTIVATIONS.get(before).map_or("", |info| info.name)),
         _ => String::new(),
     };
     if let Some(late) = info.at_latest {
-        activated += &format!(" or at latest {} ms", late.0 / 1_000);
+        activated += &format!(" or at latest {} ms", late.as_micros() / 1_000);
     }
     let band = match info.band {
         Band::Flight => "flight",
         _ => "background",
     };
     let doc: Vec<&str> = info.doc.iter().map(|line| line.trim()).collect();
-    [info.name.into(), activated, band.into(), info.budget.0.to_string(), response.to_string(), doc.join(" ")]
+    [info.name.into(), activated, band.into(), info.budget.as_micros().to_string(), response.to_string(), doc.join(" ")]
 }
