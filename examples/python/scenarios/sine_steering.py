@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from stampfly_rover import DEFAULT_ADDRESS, LogRecord, OperatorCommand, RoverClient  # noqa: E402
+from stampfly_rover import DEFAULT_ADDRESS, OperatorCommand, RoverClient  # noqa: E402
 
 #: Frequencies of the swing, Hz, and the time driven at each, s.
 FREQUENCIES = (0.5, 1.0, 2.0, 4.0)
