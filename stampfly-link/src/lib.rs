@@ -6,6 +6,8 @@
 //! | [`ControlPacket`] | sticks and switches, 14 bytes | in a transmitter, a simulator, a test |
 //! | [`PairingPacket`] | the vehicle's call for a transmitter, 11 bytes | in a transmitter |
 //! | [`TelemetryPacket`] | what the vehicle tells its pilot, 22 bytes | at either end |
+//! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
+//! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
 //! fixed order, from the cheapest check to the dearest, a packet is taken whole or not at all, and nothing that was
@@ -36,15 +38,24 @@ extern crate std;
 
 mod address;
 mod control;
+pub mod datagram;
+pub mod json;
 mod pairing;
+mod sequence;
 mod session;
 mod telemetry;
 
 pub use address::Address;
 pub use control::{ControlError, ControlPacket};
+pub use datagram::{Datagram, DatagramError};
 pub use pairing::{PairingError, PairingPacket};
+pub use sequence::SequenceFilter;
 pub use session::{Counters, PairingRefused, Rejected, Session};
 pub use telemetry::{LinkState, TelemetryError, TelemetryPacket};
+
+/// For [`datagrams!`].
+#[doc(hidden)]
+pub use stampfly_types as __types;
 
 /// The checksum of every packet that has one: the sum of the bytes before it, modulo 256.
 fn checksum(bytes: &[u8]) -> u8 {

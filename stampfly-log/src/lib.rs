@@ -3,6 +3,7 @@
 //! | module | what it is | when to use it |
 //! |---|---|---|
 //! | [`ulog`] | writer and reader of ULog, the file format of PX4 | every flight log, on the vehicle and on a host |
+//! | [`csv`] | one type of message as CSV that reads back bit for bit | small logs for tools and people |
 //! | [`trace`] | what each activation of a runnable saw | when a log must replay bit for bit |
 //! | [`hash`] | one 64-bit number for a whole flight | to ask whether two flights were the same |
 //!
@@ -38,6 +39,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod csv;
 pub mod hash;
 pub mod trace;
 pub mod ulog;

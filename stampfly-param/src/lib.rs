@@ -1,7 +1,9 @@
-//! Parameters that survive a power cut: values with names, in flash.
+//! Parameters: a table of them, a change while the vehicle runs, and values that survive a power cut.
 //!
 //! | type | what it is |
 //! |---|---|
+//! | [`parameters!`] | declares a vehicle's parameters: name, default, range, unit |
+//! | [`ParameterSet`] | applies a change as a whole at the next period, and rolls it back |
 //! | [`ParameterStore`] | loads and saves values by name, on any NOR flash |
 //! | [`Disarmed`] | the proof without which nothing is written |
 //! | [`key`] | the number a name has in flash |
@@ -26,11 +28,19 @@ extern crate std;
 mod disarmed;
 mod error;
 mod pages;
+mod set;
 mod store;
+mod table;
 
 pub use disarmed::Disarmed;
 pub use error::{EraseError, LoadError, OpenError, SaveError};
+pub use set::{ParameterAction, ParameterRequest, ParameterSet, ParameterStatus};
 pub use store::{ParameterStore, key};
+pub use table::{Parameter, ParameterError, ParameterTable};
+
+/// For [`parameters!`].
+#[doc(hidden)]
+pub use stampfly_types as __types;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

@@ -8,7 +8,8 @@
 //! * [`math`]: the one door to transcendental functions;
 //! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`];
 //! * [`messages`]: the messages themselves, sensor to motor;
-//! * [`activation`]: the record of what a runnable read, for the log and for replay.
+//! * [`activation`]: the record of what a runnable read, for the log and for replay;
+//! * [`text`]: a message as text, field by field.
 //!
 //! # Conventions
 //! SI units and radians. Body frame FRD (x forward, y right, z down), world frame NED, attitude as the
@@ -34,6 +35,7 @@ pub mod math;
 pub mod message;
 pub mod messages;
 pub mod stamped;
+pub mod text;
 pub mod time;
 
 pub use activation::{ActivationRecord, InputRecord};

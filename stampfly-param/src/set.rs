@@ -1,0 +1,162 @@
+//! Changing the parameters of a running vehicle: collect, validate, apply at the next period, roll back.
+//!
+//! Requests change a candidate; nothing is in use before `Apply`, and then the whole candidate at once, at the start of
+//! the next period. The set before is kept: `RollBack` returns to it, and so does a fault found within the probation
+//! after a change. Only the last change can be rolled back; a second `RollBack` undoes the first.
+//!
+//! Use it for what may change while the vehicle moves. For what needs a vehicle at rest, save it and restart.
+
+use crate::{ParameterError, ParameterTable};
+use stampfly_types::{Duration, Instant, message, message_enum};
+
+message_enum! {
+    /// What to do with the parameters.
+    pub enum ParameterAction {
+        /// Change one value of the candidate.
+        Set = 0,
+        /// Validate the candidate and use it from the next period on.
+        Apply = 1,
+        /// Go back to the set before the last change.
+        RollBack = 2,
+    }
+}
+
+message! {
+    /// One step of a change of parameters.
+    pub struct ParameterRequest {
+        /// What to do.
+        action: ParameterAction ["1"],
+        /// For `Set`: the parameter's place in [`ParameterTable::TABLE`].
+        index: u32 ["1"],
+        /// For `Set`: the value, in the parameter's unit.
+        value: f32 ["SI"],
+    }
+}
+
+message! {
+    /// Which parameters are in use.
+    pub struct ParameterStatus {
+        /// Number of changes that took effect, roll-backs included.
+        version: u32 ["1"],
+        /// When the last one did.
+        applied_at: Instant ["us"],
+        /// Number of requests refused.
+        refused: u32 ["1"],
+    }
+}
+
+/// The parameters in use, the ones before, and the candidate.
+///
+/// ```
+/// use stampfly_param::{ParameterSet, parameters};
+/// use stampfly_types::{Duration, Instant};
+///
+/// parameters! {
+///     /// A lamp.
+///     pub struct Lamp, consistent if |_lamp| true;
+///     /// Light.
+///     light: Light {
+///         /// Brightness.
+///         level = 0.5 in [0.0, 1.0] "1";
+///     }
+/// }
+///
+/// let mut set = ParameterSet::new(Lamp::default(), Duration::from_secs(1))?;
+/// set.set(0, 0.8)?;
+/// set.apply()?;
+/// assert_eq!(set.step(Instant::from_millis(10), true).light.level, 0.8);
+/// assert_eq!(set.step(Instant::from_millis(20), false).light.level, 0.5, "a fault rolls the change back");
+/// # Ok::<(), stampfly_param::ParameterError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterSet<P> {
+    active: P,
+    previous: P,
+    candidate: P,
+    pending: bool,
+    on_probation: bool,
+    probation: Duration,
+    status: ParameterStatus,
+}
+
+impl<P: ParameterTable> ParameterSet<P> {
+    /// A set that starts with these values. A fault within `probation` after a change rolls it back.
+    ///
+    /// # Errors
+    /// When the values are not [valid](ParameterTable::validate).
+    pub fn new(parameters: P, probation: Duration) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        let [active, previous, candidate] = [parameters; 3];
+        let status = ParameterStatus::default();
+        Ok(Self { active, previous, candidate, pending: false, on_probation: false, probation, status })
+    }
+
+    /// Changes one value of the candidate.
+    ///
+    /// # Errors
+    /// When there is no such parameter, or the value is out of range.
+    pub fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
+        P::TABLE.get(index).ok_or(ParameterError::Unknown)?.set(&mut self.candidate, value)
+    }
+
+    /// Validates the candidate; the next [`step`](Self::step) uses it.
+    ///
+    /// # Errors
+    /// When the candidate is not valid. It then starts again from the set in use.
+    pub fn apply(&mut self) -> Result<(), ParameterError> {
+        let verdict = self.candidate.validate();
+        match verdict {
+            Ok(()) => self.pending = true,
+            Err(_) => self.candidate = self.active,
+        }
+        verdict
+    }
+
+    /// The next [`step`](Self::step) uses the set before the last change.
+    pub fn roll_back(&mut self) {
+        self.candidate = self.previous;
+        self.pending = true;
+    }
+
+    /// Does what a request asks for. A refusal is counted in the [`status`](Self::status).
+    ///
+    /// # Errors
+    /// As [`set`](Self::set) and [`apply`](Self::apply).
+    pub fn request(&mut self, request: &ParameterRequest) -> Result<(), ParameterError> {
+        let outcome = match request.action {
+            ParameterAction::Set => usize::try_from(request.index)
+                .map_err(|_| ParameterError::Unknown)
+                .and_then(|index| self.set(index, request.value)),
+            ParameterAction::Apply => self.apply(),
+            ParameterAction::RollBack => {
+                self.roll_back();
+                Ok(())
+            }
+        };
+        self.status.refused = self.status.refused.saturating_add(u32::from(outcome.is_err()));
+        outcome
+    }
+
+    /// Start of a period: the parameters to use in it. `healthy`: no fault was found in the period before.
+    pub fn step(&mut self, now: Instant, healthy: bool) -> P {
+        self.on_probation &= now.since(self.status.applied_at) <= self.probation;
+        let failed = self.on_probation && !healthy;
+        if failed {
+            self.roll_back();
+        }
+        if core::mem::take(&mut self.pending) {
+            self.previous = core::mem::replace(&mut self.active, self.candidate);
+            // The set before the change has run without the fault: it is not on probation.
+            self.on_probation = !failed;
+            self.status.version = self.status.version.saturating_add(1);
+            self.status.applied_at = now;
+        }
+        self.active
+    }
+
+    /// Version, time of the last change, requests refused.
+    #[must_use]
+    pub fn status(&self) -> ParameterStatus {
+        self.status
+    }
+}

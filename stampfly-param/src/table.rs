@@ -1,0 +1,180 @@
+//! The parameters of a vehicle as a table: name, default, range and unit in one line each.
+//!
+//! [`parameters!`](crate::parameters!) makes one plain struct per group, for the component that is configured by it, and one
+//! message of all groups, so that the set in use is a topic: logged, replayed, and with the table's values as its default.
+//! Names are `group.name`. To change values of a running vehicle use a [`ParameterSet`](crate::ParameterSet), to keep them
+//! over a power cut a [`ParameterStore`](crate::ParameterStore).
+//!
+//! Only `f32`. A choice between two components is not a number: make it an enumeration of the vehicle's configuration.
+
+use core::fmt;
+
+/// One parameter of the set `P`: a line of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter<P> {
+    /// `group.name`.
+    pub name: &'static str,
+    /// Smallest value accepted.
+    pub min: f32,
+    /// Largest value accepted.
+    pub max: f32,
+    /// SI unit, `"1"` where there is none.
+    pub unit: &'static str,
+    #[doc(hidden)]
+    pub __field: fn(&mut P) -> &mut f32,
+}
+
+/// Why parameters were refused. Nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ParameterError {
+    /// There is no such parameter.
+    Unknown,
+    /// The value is outside its range, or not a number.
+    OutOfRange,
+    /// Each value is in its range, but they contradict one another.
+    Inconsistent,
+}
+
+impl fmt::Display for ParameterError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Unknown => "there is no such parameter",
+            Self::OutOfRange => "the value is out of range",
+            Self::Inconsistent => "the values contradict one another",
+        })
+    }
+}
+
+impl core::error::Error for ParameterError {}
+
+impl<P: Copy> Parameter<P> {
+    /// The value in this set.
+    #[must_use]
+    pub fn get(&self, parameters: &P) -> f32 {
+        *(self.__field)(&mut { *parameters })
+    }
+
+    /// Changes the value.
+    ///
+    /// # Errors
+    /// [`ParameterError::OutOfRange`].
+    pub fn set(&self, parameters: &mut P, value: f32) -> Result<(), ParameterError> {
+        if !(self.min..=self.max).contains(&value) {
+            return Err(ParameterError::OutOfRange);
+        }
+        *(self.__field)(parameters) = value;
+        Ok(())
+    }
+}
+
+/// A set of parameters with its table. Implemented by [`parameters!`](crate::parameters!).
+pub trait ParameterTable: Copy + Default + 'static {
+    /// Every parameter, in the order it was declared in. The place is its number in a
+    /// [`ParameterRequest`](crate::ParameterRequest).
+    const TABLE: &'static [Parameter<Self>];
+
+    /// Do the values agree with one another, each being in its range?
+    fn is_consistent(&self) -> bool;
+
+    /// The parameter of this name.
+    ///
+    /// # Errors
+    /// [`ParameterError::Unknown`].
+    fn find(name: &str) -> Result<&'static Parameter<Self>, ParameterError> {
+        Self::TABLE.iter().find(|parameter| parameter.name == name).ok_or(ParameterError::Unknown)
+    }
+
+    /// Checks the set as a whole.
+    ///
+    /// # Errors
+    /// When a value is outside its range, or they contradict one another.
+    fn validate(&self) -> Result<(), ParameterError> {
+        if !Self::TABLE.iter().all(|row| (row.min..=row.max).contains(&row.get(self))) {
+            return Err(ParameterError::OutOfRange);
+        }
+        if self.is_consistent() { Ok(()) } else { Err(ParameterError::Inconsistent) }
+    }
+}
+
+/// Declares the parameters of a vehicle.
+///
+/// ```
+/// use stampfly_param::{ParameterError, ParameterTable, parameters};
+///
+/// parameters! {
+///     /// The parameters of a boat.
+///     pub struct BoatParameters, consistent if |p| p.motor.idle < p.motor.full;
+///
+///     /// Motor.
+///     motor: MotorParameters {
+///         /// Duty at full throttle.
+///         full = 0.9 in [0.1, 1.0] "1";
+///         /// Duty at rest.
+///         idle = 0.05 in [0.0, 0.5] "1";
+///     }
+///     /// Rudder.
+///     rudder: RudderParameters {
+///         /// Angle at the stop.
+///         max_angle = 0.5 in [0.1, 1.0] "rad";
+///     }
+/// }
+///
+/// let mut parameters = BoatParameters::default();
+/// assert_eq!(parameters.motor.full, 0.9);
+/// BoatParameters::find("motor.idle")?.set(&mut parameters, 0.5)?;
+/// BoatParameters::find("motor.full")?.set(&mut parameters, 0.4)?;
+/// assert_eq!(parameters.validate(), Err(ParameterError::Inconsistent));
+/// assert_eq!(BoatParameters::find("rudder.max_angle")?.set(&mut parameters, f32::NAN), Err(ParameterError::OutOfRange));
+/// # Ok::<(), ParameterError>(())
+/// ```
+#[macro_export]
+macro_rules! parameters {
+    (
+        $(#[$set_doc:meta])* $vis:vis struct $Set:ident, consistent if |$set:ident| $consistent:expr;
+        $($(#[$group_doc:meta])* $group:ident: $Group:ident {
+            $($(#[$doc:meta])* $name:ident = $default:literal in [$min:literal, $max:literal] $unit:literal;)+
+        })+
+    ) => {
+        $(
+            $(#[$group_doc])*
+            #[derive(Clone, Copy, Debug, PartialEq)]
+            $vis struct $Group { $($(#[$doc])* pub $name: f32),+ }
+
+            impl Default for $Group {
+                fn default() -> Self { Self { $($name: $default),+ } }
+            }
+
+            // The numbers of a group are one field of the message, because a message's own default is zeros.
+            impl $crate::__types::Field for $Group {
+                const KIND: $crate::__types::FieldKind = $crate::__types::FieldKind::F32;
+                const COUNT: usize = [$($default),+].len();
+                const WORDS: usize = Self::COUNT;
+                fn write(&self, words: &mut [u32]) {
+                    words.iter_mut().zip([$(self.$name),+]).for_each(|(word, value)| *word = value.to_bits());
+                }
+                fn read(words: &[u32]) -> Option<Self> {
+                    let mut words = words.iter();
+                    Some(Self { $($name: f32::from_bits(*words.next()?)),+ })
+                }
+            }
+        )+
+
+        $crate::__types::message! {
+            $(#[$set_doc])*
+            $vis struct $Set { $($(#[$group_doc])* $group: $Group ["SI"]),+ }
+        }
+
+        impl $crate::ParameterTable for $Set {
+            const TABLE: &'static [$crate::Parameter<Self>] = &[$($($crate::Parameter {
+                name: concat!(stringify!($group), ".", stringify!($name)),
+                min: $min, max: $max, unit: $unit, __field: |parameters| &mut parameters.$group.$name,
+            }),+),+];
+
+            fn is_consistent(&self) -> bool {
+                let $set = self;
+                $consistent
+            }
+        }
+    };
+}

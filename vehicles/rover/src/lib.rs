@@ -1,0 +1,34 @@
+//! A rover made from the StampFly flight stack: the second vehicle of the family, a software-defined vehicle in the
+//! architecture of AUTOSAR (software components over a runtime environment, pure models below).
+//!
+//! * [`models`]: engine, brake, steering, vehicle dynamics as pure functions;
+//! * [`driver_input`], [`safety`], [`diag`]: the components with state or decisions;
+//! * [`parameters`]: the table of parameters, in one group per component;
+//! * [`messages`]: what travels on the rover's topics;
+//! * [`com`]: what travels over UDP.
+//!
+//! # Frame
+//! This vehicle follows its own architecture document, not the FRD/NED of the aircraft: **x forward at the start,
+//! y left, yaw counter-clockwise positive** (the convention of mathematics and of ISO 8855), so a steering angle
+//! δ > 0 turns left. The public logs and reference values of the document are in this frame, and a log that must be
+//! compared with them is worth more than a sign in common with a quadcopter. NED is (x, −y, −yaw).
+//!
+//! # Emergency stop
+//! It is applied in every component and again in the dynamics: engine 0, brake at its emergency deceleration, steering
+//! to the centre, and the dynamics subtract a further deceleration. It is latched by [`safety`].
+#![no_std]
+
+pub mod com;
+pub mod diag;
+pub mod driver_input;
+pub mod messages;
+pub mod models;
+pub mod parameters;
+pub mod safety;
+
+pub use parameters::Parameters;
+
+/// The README's example, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
