@@ -6,6 +6,7 @@ message_enum! {
     /// How sure the anemometer is.
     pub enum Trust {
         /// Not at all.
+        #[default]
         None = 0,
         /// A guess from the drift.
         Estimated = 1,
@@ -22,7 +23,7 @@ message! {
         /// One standard deviation.
         sigma: f32 ["m/s"],
         /// Where it comes from.
-        trust: Trust ["1"],
+        trust: Trust,
     }
 }
 

@@ -7,7 +7,7 @@ message! {
     /// The board's button as its pin shows it, not debounced.
     pub struct ButtonContact {
         /// Closed?
-        pressed: bool ["1"],
+        pressed: bool,
     }
 }
 
@@ -15,15 +15,15 @@ message! {
     /// What a ground station needs to know, at a rate a radio can carry.
     pub struct TelemetryFrame {
         /// Where the vehicle is in its life.
-        state: FlightState ["1"],
+        state: FlightState,
         /// The flight mode.
-        mode: FlightMode ["1"],
+        mode: FlightMode,
         /// May the motors turn?
-        armed: bool ["1"],
+        armed: bool,
         /// Why arming would be refused.
-        blocks: ArmBlocks ["1"],
+        blocks: ArmBlocks,
         /// What the failsafe has found.
-        alerts: Alerts ["1"],
+        alerts: Alerts,
         /// Estimated position, world NED.
         position: Vec3 ["m"],
         /// Estimated velocity, world NED.
@@ -33,8 +33,8 @@ message! {
         /// Battery voltage.
         battery: f32 ["V"],
         /// Way-points still ahead.
-        remaining: u32 ["1"],
+        remaining: u32,
         /// Is the route finished?
-        arrived: bool ["1"],
+        arrived: bool,
     }
 }

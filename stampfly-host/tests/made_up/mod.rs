@@ -12,7 +12,7 @@ message! {
     /// What the made-up world knows.
     struct Truth {
         /// Body FRD → world NED.
-        attitude: Quat ["1"],
+        attitude: Quat,
         /// World NED.
         position: Vec3 ["m"],
         /// World NED.

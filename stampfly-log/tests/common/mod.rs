@@ -29,13 +29,13 @@ message! {
         /// An array of two words each.
         wides: [u64; 2] ["us"],
         /// Sign must survive.
-        signed: i16 ["1"],
+        signed: i16,
         /// Sign must survive.
-        signeds: [i16; 3] ["1"],
+        signeds: [i16; 3],
         /// Sixteen bits.
-        half: u16 ["1"],
+        half: u16,
         /// Sign must survive.
-        integer: i32 ["1"],
+        integer: i32,
         /// Time.
         at: Instant ["us"],
     }
