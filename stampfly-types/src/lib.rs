@@ -38,6 +38,8 @@ pub mod message;
 pub mod messages;
 mod named;
 pub mod schema;
+#[doc(hidden)]
+pub mod serial;
 pub mod stamped;
 pub mod text;
 pub mod time;

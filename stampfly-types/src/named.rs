@@ -69,6 +69,8 @@ macro_rules! message_enum {
                 Self::from_number(*words.first()?)
             }
         }
+
+        $crate::__serde_field!($Name);
     };
 }
 
@@ -167,6 +169,8 @@ macro_rules! message_flags {
                 (bits & !Self::ALL.0 == 0).then_some(Self(bits))
             }
         }
+
+        $crate::__serde_field!($Name);
     };
 }
 
