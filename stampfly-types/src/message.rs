@@ -62,7 +62,7 @@ pub trait Message: Copy + PartialEq + core::fmt::Debug + 'static {
 ///     /// A share.
 ///     pub struct Share {
 ///         /// Of the whole.
-///         part: f32,
+///         part: f32 ["1"],
 ///     }
 /// }
 /// ```

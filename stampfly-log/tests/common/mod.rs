@@ -7,7 +7,7 @@ use stampfly_types::messages::{
     EstimatorStatus, ImuData, PowerData, Signal, StateEstimate, SystemAlert, SystemMode, TofData,
 };
 use stampfly_types::{ActivationRecord, InputRecord};
-use stampfly_types::{Instant, Message, message};
+use stampfly_types::{Duration, Instant, Message, Vec3, message};
 
 /// Bytes in memory, without limit.
 #[derive(Default)]
@@ -18,6 +18,16 @@ impl Sink for Bytes {
     fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
         self.0.extend_from_slice(bytes);
         Ok(())
+    }
+}
+
+message! {
+    /// A message in a message.
+    pub struct Part {
+        /// An option in a message in an array.
+        known: Option<Duration> ["us"],
+        /// Sixteen digits.
+        share: f64,
     }
 }
 
@@ -38,6 +48,18 @@ message! {
         integer: i32,
         /// Time.
         at: Instant ["us"],
+        /// Sign must survive.
+        both_ways: i64 ["us"],
+        /// Sixteen digits.
+        precise: f64,
+        /// Sign must survive.
+        small: i8,
+        /// More than `Default` knows.
+        many: [i8; 40],
+        /// A value or none.
+        maybe: Option<Vec3> ["m/s"],
+        /// Messages in an array.
+        part: [Part; 2],
     }
 }
 
