@@ -6,6 +6,7 @@
 //! short runs, because a shared machine has other things to do.
 
 use crate::Failure;
+use crate::arguments::Arguments;
 use crate::repository::{Repository, capture, json, run as run_program};
 use serde_json::Value;
 use std::fs;
@@ -21,7 +22,7 @@ const SPEEDS: [(&[&str], f64); 2] = [(&[], 300.0), (&["--chips"], 100.0)];
 const TIMED: &str = "8";
 const RUNS: usize = 5;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
     let mut failures = Vec::new();
     for (mission, arguments) in CAMPAIGNS {

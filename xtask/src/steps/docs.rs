@@ -7,8 +7,9 @@
 //! git knows or would take. Every picture must be shown somewhere,
 //! and the guide to tuning must name every field there is to tune.
 
+use crate::Failure;
+use crate::arguments::Arguments;
 use crate::repository::{Repository, capture};
-use crate::{FIX, Failure, asks};
 use std::fs;
 use std::path::Path;
 
@@ -38,8 +39,8 @@ const GENERATED: &[(&str, &str, &str)] = &[
     ),
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = asks(arguments, FIX);
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let fix = arguments.fix;
     let mut stale = Vec::new();
     let mut all = String::new();
     let (documents, _) =

@@ -6,6 +6,7 @@
 
 use super::esp32;
 use crate::Failure;
+use crate::arguments::Arguments;
 use crate::elf::{Program, panics};
 use crate::repository::Repository;
 use std::collections::BTreeSet;
@@ -29,8 +30,8 @@ const ALLOWED: [(&str, &str, &str); 3] = [
     ("/esp32c6-", "panic_bounds_check", "the manufacturer's table of registers: every pin has one"),
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let path = arguments.first().map_or_else(|| esp32::c6(repository), |path| Ok(path.into()))?;
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
     let found = calls(&Program::read(&path)?);
     // Nothing to be found would look just like nothing found.
     if let Some((place, callee, _)) = ALLOWED.iter().find(|row| !found.iter().any(|call| call.is_allowed_by(row))) {

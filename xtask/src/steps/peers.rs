@@ -5,9 +5,10 @@
 //! bar is the ratio, for people to read. Beside it stand figures of programs in C and C++, measured once elsewhere: the
 //! two crates that were measured there, too, tell how the machines compare.
 
+use crate::Failure;
+use crate::arguments::Arguments;
 use crate::repository::{Repository, capture};
 use crate::steps::cortex_m4f::{self, Counted};
-use crate::{FIX, Failure, asks};
 use std::fmt::Write;
 use std::fs;
 
@@ -32,8 +33,8 @@ const ELSEWHERE: &[(&str, u32, u32)] = &[
     ("for scale: the crate `kfilter` 0.5", 676, 661),
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = asks(arguments, FIX);
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let fix = arguments.fix;
     let mut reports = Vec::new();
     for (folder, flags) in SETTINGS {
         let mut bench = repository.cargo();
