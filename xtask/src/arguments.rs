@@ -1,7 +1,6 @@
-//! The command line: one subcommand per step of [`STEPS`](crate::STEPS), made with clap from that table.
+//! What a step can be told, on the command line and in the program.
 
-use crate::{Failure, Step};
-use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
+use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use std::path::PathBuf;
 
 /// An argument that a step accepts.
@@ -34,11 +33,9 @@ pub struct Arguments {
     pub rest: Vec<String>,
 }
 
-/// The subcommand that runs every step of `ci`.
-pub const CI: &str = "ci";
-
 impl Accepts {
-    fn arg(self) -> Arg {
+    /// As clap knows it.
+    pub fn arg(self) -> Arg {
         match self {
             Self::Fix => Arg::new("fix")
                 .long("fix")
@@ -58,7 +55,7 @@ impl Accepts {
     }
 
     /// Moves the value of this argument, if it was given.
-    fn take(self, matches: &ArgMatches, arguments: &mut Arguments) {
+    pub fn take(self, matches: &ArgMatches, arguments: &mut Arguments) {
         match self {
             Self::Fix => arguments.fix = matches.get_flag("fix"),
             Self::Debian => arguments.debian = matches.get_flag("debian"),
@@ -66,84 +63,5 @@ impl Accepts {
             Self::Seconds => arguments.seconds = matches.get_one("SECONDS").copied(),
             Self::Rest => arguments.rest = matches.get_many("ARGUMENTS").unwrap_or_default().cloned().collect(),
         }
-    }
-}
-
-/// The whole command line. Steps of `ci` are marked with `*`.
-pub fn command(steps: &'static [Step]) -> Command {
-    let ci = Command::new(CI).about("* Run every step marked *, in this order, until one fails");
-    let steps = steps.iter().map(|step| {
-        let mark = if step.in_ci { '*' } else { ' ' };
-        Command::new(step.name)
-            .about(format!("{mark} {}", step.about))
-            .args(step.accepts.iter().map(|argument| argument.arg()))
-    });
-    Command::new("xtask")
-        .bin_name("cargo xtask")
-        .about("Checks of this repository. Steps marked * are part of `ci`.")
-        .after_help("Exit code: 0 when the step passed, 1 when it failed, 2 when the command line was wrong.")
-        .subcommand_required(true)
-        .arg_required_else_help(true)
-        .disable_help_subcommand(true)
-        .subcommand(ci)
-        .subcommands(steps)
-}
-
-/// The step that the command line names and its arguments; `None` for `ci`.
-pub fn chosen<'s>(steps: &'s [Step], matches: &ArgMatches) -> Result<Option<(&'s Step, Arguments)>, Failure> {
-    let (name, matches) = matches.subcommand().ok_or("no step")?;
-    if name == CI {
-        return Ok(None);
-    }
-    let step = steps.iter().find(|step| step.name == name).ok_or_else(|| format!("no step `{name}`"))?;
-    let mut arguments = Arguments::default();
-    for argument in step.accepts {
-        argument.take(matches, &mut arguments);
-    }
-    Ok(Some((step, arguments)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const STEPS: &[Step] = &[
-        Step::new("plain", "", |_, _| Ok(())),
-        Step::new("one", "", |_, _| Ok(())).accepting(&[Accepts::Fix, Accepts::File]),
-        Step::new("any", "", |_, _| Ok(())).accepting(&[Accepts::Rest]),
-    ];
-
-    /// The arguments of a step, or the exit code of a refusal.
-    fn parsed(line: &str) -> Result<Arguments, i32> {
-        let words = std::iter::once("xtask").chain(line.split_whitespace());
-        let matches = command(STEPS).try_get_matches_from(words).map_err(|e| e.exit_code())?;
-        Ok(chosen(STEPS, &matches)
-            .expect("clap knows the same steps")
-            .map(|(_, arguments)| arguments)
-            .unwrap_or_default())
-    }
-
-    #[test]
-    fn unknown_steps_and_arguments_are_refused() {
-        for wrong in ["", "none", "plain --bogus", "plain --fix", "plain x", "one a.elf b.elf", "ci --fix", "ci plain"]
-        {
-            assert_eq!(parsed(wrong), Err(2), "{wrong}");
-        }
-        assert_eq!(parsed("--help"), Err(0));
-        assert_eq!(parsed("one --help"), Err(0));
-        assert_eq!(parsed("ci"), Ok(Arguments::default()));
-    }
-
-    #[test]
-    fn accepted_arguments_arrive() {
-        let file = Some(PathBuf::from("a.elf"));
-        assert_eq!(parsed("one a.elf --fix"), Ok(Arguments { fix: true, file, ..Arguments::default() }));
-        let rest = ["--nocapture", "x", "-y"].map(str::to_owned).into();
-        assert_eq!(parsed("any --nocapture x -y"), Ok(Arguments { rest, ..Arguments::default() }));
-    }
-
-    #[test]
-    fn the_table_of_steps_makes_a_valid_command_line() {
-        command(crate::STEPS).debug_assert();
     }
 }

@@ -1,8 +1,8 @@
 //! `ci`: everything, with a table of what it took.
 
 use crate::arguments::Arguments;
-use crate::repository::Repository;
-use crate::{Failure, Step};
+use crate::repository::{Failure, Repository};
+use crate::step::Step;
 use std::time::Instant;
 
 pub fn run(repository: &Repository, steps: &[Step]) -> Result<(), Failure> {

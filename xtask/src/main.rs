@@ -7,71 +7,23 @@ mod arguments;
 mod ci;
 mod elf;
 mod machine;
+mod modules;
+mod page;
 mod ratchet;
 mod repository;
+mod step;
 mod steps;
 
 use arguments::Accepts::{Debian, File, Fix, Rest};
-use arguments::{Accepts, Arguments};
 use repository::Repository;
 use std::process::ExitCode;
-
-/// Why a step failed, in words.
-type Failure = String;
-
-/// What a step runs.
-type Run = fn(&Repository, &Arguments) -> Result<(), Failure>;
-
-/// One check.
-struct Step {
-    name: &'static str,
-    /// For `--help`.
-    about: &'static str,
-    accepts: &'static [Accepts],
-    /// Is it part of `ci`?
-    in_ci: bool,
-    /// Most seconds it may take.
-    limit: Option<f64>,
-    run: Run,
-}
-
-impl Step {
-    /// A step of `ci` without arguments.
-    const fn new(name: &'static str, about: &'static str, run: Run) -> Self {
-        Self { name, about, accepts: &[], in_ci: true, limit: None, run }
-    }
-
-    const fn accepting(self, accepts: &'static [Accepts]) -> Self {
-        Self { accepts, ..self }
-    }
-
-    const fn within(self, seconds: f64) -> Self {
-        Self { limit: Some(seconds), ..self }
-    }
-
-    /// Not part of `ci`.
-    const fn manual(self) -> Self {
-        Self { in_ci: false, ..self }
-    }
-
-    /// Runs it and compares the time it took with its limit.
-    fn check(&self, repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-        let begun = std::time::Instant::now();
-        (self.run)(repository, arguments)?;
-        self.in_time(begun.elapsed().as_secs_f64())
-    }
-
-    fn in_time(&self, seconds: f64) -> Result<(), Failure> {
-        let Some(limit) = self.limit else { return Ok(()) };
-        println!("{}: {seconds:.0} s of {limit} s", self.name);
-        if seconds > limit { Err(format!("took {seconds:.0} s, more than {limit} s")) } else { Ok(()) }
-    }
-}
+use step::Step;
 
 /// In the order of `ci`: fast and frequent failures first.
 const STEPS: &[Step] = &[
     Step::new("machine", "List the missing programs that the steps need", steps::machine::run),
     Step::new("fmt", "Check the formatting", steps::fmt::run),
+    Step::new("files", "Find dependency cycles between source files", steps::files::run),
     Step::new("clippy", "Lint every target; a warning fails", steps::clippy::run),
     Step::new("test", "Run `cargo test`, on recorded data as well", steps::test::run).accepting(&[Rest]),
     Step::new("examples", "Run every example to its end", steps::examples::run),
@@ -110,9 +62,9 @@ const STEPS: &[Step] = &[
 
 fn main() -> ExitCode {
     // Exits with 0 after `--help` and with 2 after a wrong command line.
-    let matches = arguments::command(STEPS).get_matches();
+    let matches = step::command(STEPS).get_matches();
     let repository = Repository::find();
-    let outcome = match arguments::chosen(STEPS, &matches) {
+    let outcome = match step::chosen(STEPS, &matches) {
         Ok(Some((step, arguments))) => {
             step.check(&repository, &arguments).map_err(|failure| format!("{}: {failure}", step.name))
         }
@@ -125,17 +77,5 @@ fn main() -> ExitCode {
             eprintln!("xtask {failure}");
             ExitCode::FAILURE
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_limit_is_kept() {
-        let limited = Step::new("limited", "", |_, _| Ok(())).within(300.0);
-        assert!(limited.in_time(300.0).is_ok() && limited.in_time(301.0).is_err());
-        assert!(Step::new("free", "", |_, _| Ok(())).in_time(1e6).is_ok());
     }
 }

@@ -4,8 +4,7 @@
 //! more. Beyond that it fails in both directions: a gain that is not committed is lost again unnoticed. Comments of the file
 //! survive an update.
 
-use crate::Failure;
-use crate::repository::Repository;
+use crate::repository::{Failure, Repository};
 use std::fs;
 use std::path::PathBuf;
 use toml_edit::{DocumentMut, Item, Table, Value, value};

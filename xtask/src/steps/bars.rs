@@ -5,9 +5,8 @@
 //! depend on the machine: they are less than half of what a PC of 2024 does. Processor time counts, and the best of some
 //! short runs, because a shared machine has other things to do.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture, json, run as run_program};
+use crate::repository::{Failure, Repository, capture, json, run as run_program};
 use serde_json::Value;
 use std::fs;
 

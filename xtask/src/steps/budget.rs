@@ -4,11 +4,10 @@
 //! Instructions are not cycles, and a PC's are not the target's: the figure is for noticing change, and it is exact
 //! enough to notice a per cent, which a clock on a shared machine is not.
 
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::machine::{VALGRIND, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::repository::{Failure, Repository, capture, run as run_program};
 
 /// Steps of the two runs: both end in hover.
 const SHORT: u64 = 6_000;

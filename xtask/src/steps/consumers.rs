@@ -4,9 +4,8 @@
 //! forgot to ask for itself. So a small program per crate (`xtask/consumers`) is built where the workspace cannot help
 //! it, depending on that crate and on the vocabulary of `stampfly-types`, and run.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, run as run_program};
+use crate::repository::{Failure, Repository, run as run_program};
 use std::fs;
 use std::path::Path;
 

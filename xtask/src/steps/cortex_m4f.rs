@@ -4,11 +4,10 @@
 //! The count is exact and the same on every host. Instructions are not cycles. The package `benches/cortex-m4f` is outside
 //! the workspace, so its format and its warnings are looked at here, too.
 
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::machine::{EMULATED_ARM, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use std::process::Command;
 
 const TARGET: &str = "thumbv7em-none-eabihf";

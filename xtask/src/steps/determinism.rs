@@ -2,9 +2,8 @@
 //!
 //! Compares the hash over everything published that `stampfly fly --seed N --json` prints.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture, json};
+use crate::repository::{Failure, Repository, capture, json};
 
 const PROFILES: [&str; 2] = ["release", "unoptimised"];
 const SEEDS: [&str; 2] = ["1", "2"];

@@ -1,8 +1,7 @@
 //! `doc`: broken links and malformed documentation are errors.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, run as run_program};
+use crate::repository::{Failure, Repository, run as run_program};
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let mut doc = repository.cargo();

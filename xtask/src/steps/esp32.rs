@@ -12,10 +12,9 @@
 //! comes with the sources of its own core library, which both need, and is installed when it is missing.
 
 use super::no_std::debian_cargo;
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
-use crate::repository::{Repository, capture, python_tool, run as run_program};
+use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use object::{Object, ObjectSection};
 use std::fs;
 use std::path::{Path, PathBuf};

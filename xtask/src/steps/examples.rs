@@ -1,8 +1,7 @@
 //! `examples`: every example of the examples package still runs to its end.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture};
+use crate::repository::{Failure, Repository, capture};
 use std::fs;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {

@@ -2,9 +2,8 @@
 //!
 //! Takes some minutes. Not part of `ci`: figures are read by people, and the bars they must meet are tests.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture};
+use crate::repository::{Failure, Repository, capture};
 use std::fmt::Write;
 
 const BEGIN: &str = "<!-- figures: cargo xtask figures -->\n";

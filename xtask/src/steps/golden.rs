@@ -3,9 +3,8 @@
 //!
 //! Recorded again by `--fix`, after a change that is meant to change flights.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture};
+use crate::repository::{Failure, Repository, capture};
 use std::fs;
 use std::process::Command;
 

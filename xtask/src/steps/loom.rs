@@ -1,8 +1,7 @@
 //! `loom`: the bus's models, in every interleaving and with every value the memory model allows.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, run as run_program};
+use crate::repository::{Failure, Repository, run as run_program};
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     // Its own folder, because every dependency is built with another flag. No backtraces: the twins have to panic.

@@ -2,10 +2,9 @@
 //!
 //! Debian's packages are installed by the steps themselves where that is possible, which is as root with `apt-get`.
 
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::machine::{ALL, exists, installing, missing};
-use crate::repository::{Repository, capture, in_ci};
+use crate::repository::{Failure, Repository, capture, in_ci};
 use std::process::{Command, Stdio};
 
 /// Programs that no step installs, and how to.

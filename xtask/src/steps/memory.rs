@@ -8,12 +8,11 @@
 //! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
 use super::esp32;
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::elf::stack::{Behind, Stack};
 use crate::elf::{C, CONSTANTS, Program, Sizes};
 use crate::ratchet::Budget;
-use crate::repository::Repository;
+use crate::repository::{Failure, Repository};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

@@ -11,6 +11,7 @@ pub mod docs;
 pub mod esp32;
 pub mod examples;
 pub mod figures;
+pub mod files;
 pub mod fmt;
 pub mod golden;
 pub mod loom;

@@ -3,10 +3,9 @@
 //! The targets come from rustup. Where rustup cannot deliver them, Debian's compiler builds the core library from its
 //! own sources instead; it is installed when it is missing.
 
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::machine::{COMPILER, provide};
-use crate::repository::{Repository, add_targets, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, run as run_program};
 use std::process::Command;
 
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];

@@ -2,9 +2,8 @@
 //!
 //! Works on a fresh clone, so that a file that exists but was never committed is noticed.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::fs;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {

@@ -5,10 +5,9 @@
 //! manufacturer's library does inside one of our generic functions is that library's. A call that tells no place is ours.
 
 use super::esp32;
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::elf::{Program, panics};
-use crate::repository::Repository;
+use crate::repository::{Failure, Repository};
 use std::collections::BTreeSet;
 
 /// Crates that fly. The firmware itself may panic while it starts, before any motor can turn.

@@ -4,10 +4,9 @@
 //! with and without. Another core is another proof: compilers unroll and merge differently for each. What is optimised for
 //! size keeps a few index checks that are never hit; where they are is said, and there may not be more of them.
 
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;

@@ -5,11 +5,10 @@
 //! one, and asks for a margin of two because of it. The package `stampfly-board/qemu` is outside the workspace, so its
 //! format and its warnings are looked at here, too.
 
-use crate::Failure;
 use crate::arguments::Arguments;
 use crate::machine::{COMPILER, EMULATED_ARM, EMULATED_OTHERS, LINKER, XTENSA as XTENSA_BACK_END, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use crate::steps::no_std::debian_cargo;
 use std::fmt::Write;
 use std::process::Command;

@@ -4,9 +4,8 @@
 //! repository. Without them the rest still means something on a developer's machine; in continuous integration
 //! (`CI=true`) their absence is an error, so that a green run is never one that looked at nothing.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, in_ci, run as run_program};
+use crate::repository::{Failure, Repository, in_ci, run as run_program};
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let data = repository.data();

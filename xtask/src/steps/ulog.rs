@@ -1,8 +1,7 @@
 //! `ulog`: the tools of the format's own authors open the log of a flight and find samples in it.
 
-use crate::Failure;
 use crate::arguments::Arguments;
-use crate::repository::{Repository, capture, python_tool, run as run_program};
+use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use std::fs;
 
 const PYULOG: &str = "pyulog==1.3.0";
