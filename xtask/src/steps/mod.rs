@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod budget;
 pub mod clippy;
+pub mod constants;
 pub mod consumers;
 pub mod cortex_m4f;
 pub mod determinism;
