@@ -12,7 +12,7 @@ pub enum Accepts {
     Debian,
     /// `FILE`: check this file instead of building one.
     File,
-    /// `SECONDS`: how long to run.
+    /// `SECONDS`: how long to search.
     Seconds,
     /// Everything else on the line goes to the program that the step runs.
     Rest,
@@ -27,7 +27,7 @@ pub struct Arguments {
     pub debian: bool,
     /// The file to check.
     pub file: Option<PathBuf>,
-    /// How long to run.
+    /// How long to search.
     pub seconds: Option<u64>,
     /// For the program that the step runs.
     pub rest: Vec<String>,
@@ -45,7 +45,9 @@ impl Accepts {
                 Arg::new("debian").long("debian").action(ArgAction::SetTrue).help("Build with Debian's compiler")
             }
             Self::File => Arg::new("FILE").value_parser(value_parser!(PathBuf)).help("Check this file"),
-            Self::Seconds => Arg::new("SECONDS").value_parser(value_parser!(u64)).help("Run each target for this long"),
+            Self::Seconds => Arg::new("SECONDS")
+                .value_parser(value_parser!(u64))
+                .help("Search for new inputs with libFuzzer, each target for this long"),
             Self::Rest => Arg::new("ARGUMENTS")
                 .num_args(0..)
                 .trailing_var_arg(true)

@@ -14,7 +14,7 @@ mod repository;
 mod step;
 mod steps;
 
-use arguments::Accepts::{Debian, File, Fix, Rest};
+use arguments::Accepts::{Debian, File, Fix, Rest, Seconds};
 use repository::Repository;
 use std::process::ExitCode;
 use step::Step;
@@ -32,6 +32,8 @@ const STEPS: &[Step] = &[
     Step::new("no-std", "Build the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).accepting(&[Rest]),
     Step::new("consumers", "Build and run one program per crate outside the workspace", steps::consumers::run),
+    Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
+        .accepting(&[Seconds]),
     Step::new("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run).accepting(&[File]),
     Step::new("budget", "Count the instructions of a 400 Hz step on this PC", steps::budget::run),
     Step::new(

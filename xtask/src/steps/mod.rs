@@ -14,6 +14,7 @@ pub mod examples;
 pub mod figures;
 pub mod files;
 pub mod fmt;
+pub mod fuzz;
 pub mod golden;
 pub mod loom;
 pub mod machine;
