@@ -50,7 +50,9 @@ fn run() -> bool {
         Verdict::Beyond { worst, since } => outln!("duties deviate by {worst}, beyond tolerance since {since}"),
     }
     outln!("published: {} messages, hash {:016x}", report.messages, report.hash);
-    let (bytes, lost) = (profile.record.sink().written(), profile.record.lost());
+    let lost = profile.record.lost();
+    let written = profile.record.into_sink();
+    let bytes = written.written();
     outln!("recorded: {} bytes, {lost} messages lost, hash {:016x}", bytes.len(), memory::hash(bytes));
     outln!("stack: {} bytes of a vehicle and its bus", stack_size::<Runnables>());
     for (info, tally) in ACTIVATIONS.iter().zip(&profile.runnables) {

@@ -141,6 +141,7 @@ impl Observer for Profile<'_> {
         self.pass += self.runnable;
         self.ran = true;
         self.runnable = 0;
+        self.write(|record| record.finished(activation));
         self.since = machine::ticks();
     }
 }
