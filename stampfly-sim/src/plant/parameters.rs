@@ -119,13 +119,13 @@ parameters! {
         motor_voltage_c = 1.53e-2 ["V"] in 0.0 ..= 1.0, "Steady motor voltage: constant part, friction (flight anchored).";
         motor_resistance = 0.76 ["ohm"] in 0.05 ..= 5.0, "Winding, switch and leads; chosen so that the battery lasts the four minutes it does, since the voltage curve leaves it free.";
         rotor_inertia = 1.375e-8 ["kg*m^2"] in 1e-10 ..= 1e-6, "Moment of inertia of motor and propeller (coast-down); gives a lag of 20 ms at hover.";
-        manufacturing_spread = 1.0 in 0.0 ..= 5.0, "Scales the per-seed differences between rotors and the offset of the centre of mass; 0 is the perfect vehicle.";
+        manufacturing_spread = 1.0 ["1"] in 0.0 ..= 5.0, "Scales the per-seed differences between rotors and the offset of the centre of mass; 0 is the perfect vehicle.";
         drag_horizontal = 0.015 ["N*s/m"] in 0.0 ..= 1.0, "Rotor drag along body x and y at hover speed of the rotors (typical for the size).";
         drag_vertical = 0.0515 ["N*s/m"] in 0.0 ..= 1.0, "Loss of thrust with climb speed at hover (1.4 1/s of damping, from theory).";
         drag_quadratic = 0.004 ["N*s^2/m^2"] in 0.0 ..= 1.0, "Drag of the body over air speed squared (flat plate of its size).";
         drag_rotation = 1.0e-6 ["N*m*s^2/rad^2"] in 0.0 ..= 1e-3, "Drag torque over angular rate squared.";
         battery_capacity = 0.300 ["A*h"] in 0.01 ..= 10.0, "Capacity of the battery (label).";
-        battery_charge = 1.0 in 0.0 ..= 1.0, "State of charge at the start.";
+        battery_charge = 1.0 ["1"] in 0.0 ..= 1.0, "State of charge at the start.";
         battery_resistance = 0.06 ["ohm"] in 0.0 ..= 1.0, "Internal resistance that acts at once, leads included.";
         battery_polarisation = 0.03 ["ohm"] in 0.0 ..= 1.0, "Internal resistance that acts with the time constant.";
         battery_time_constant = 10.0 ["s"] in 0.1 ..= 1000.0, "Time constant of the polarisation.";
@@ -134,8 +134,8 @@ parameters! {
         foot_offset = 0.030 ["m"] in 0.005 ..= 0.2, "Distance of each foot from the body's x and y axis.";
         foot_stiffness = 700.0 ["N/m"] in 10.0 ..= 1000.0, "Spring of one foot or corner on the floor.";
         foot_damping = 2.0 ["N*s/m"] in 0.0 ..= 3.0, "Damper of one foot or corner on the floor.";
-        foot_friction = 0.6 in 0.0 ..= 2.0, "Friction coefficient of feet and corners.";
-        ground_effect_gain = 0.10 in 0.0 ..= 1.0, "Extra thrust with the rotors at the floor.";
+        foot_friction = 0.6 ["1"] in 0.0 ..= 2.0, "Friction coefficient of feet and corners.";
+        ground_effect_gain = 0.10 ["1"] in 0.0 ..= 1.0, "Extra thrust with the rotors at the floor.";
         ground_effect_height = 0.05 ["m"] in 0.001 ..= 1.0, "Height over which the ground effect fades by e.";
     }
 }
