@@ -15,12 +15,10 @@ pub mod devices;
 pub mod golden;
 pub mod messages;
 pub mod parameters;
-pub mod profile;
 pub mod runnables;
 pub mod schedule;
 #[cfg(feature = "simulation")]
 pub mod simulation;
-pub mod tasks;
 pub mod topics;
 
 pub use config::VehicleConfig;

@@ -1,9 +1,10 @@
 //! Button, mode machine, radio and arm switch together, as the firmware joins them: a vehicle changes its transmitter.
 
 use stampfly_board::messages::ButtonContact;
-use stampfly_board::vehicle::{Assembled, Outside, assemble};
-use stampfly_board::{FlightLoop, VehicleConfig, wiring};
+use stampfly_board::schedule::Runnables;
+use stampfly_board::{VehicleConfig, topics};
 use stampfly_bus::Band;
+use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
 use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, ImuData, PilotInput, PowerData, TofData};
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
@@ -14,8 +15,8 @@ const NEW: Address = Address([2, 0, 0, 0, 0, 2]);
 
 /// A vehicle on a table, with its end of the radio.
 struct Bench<'b> {
-    flight: FlightLoop<'b>,
-    outside: Outside<'b>,
+    flight: FlightLoop<'b, Runnables>,
+    outside: topics::Outside<'b>,
     session: Session,
     wanted: bool,
     /// Does the battery monitor answer?
@@ -26,25 +27,24 @@ struct Bench<'b> {
 }
 
 impl<'b> Bench<'b> {
-    fn new(bus: &'b mut wiring::Bus, peer: Option<Address>) -> Self {
-        let wiring::Split { ports, heads, .. } = bus.split(None);
-        let Assembled { flight_loop: flight, outside } =
-            assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
+    fn new(bus: &'b mut topics::Bus, peer: Option<Address>) -> Self {
+        let Assembled { flight_loop: flight, outside, .. } =
+            Assembled::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
         let session = Session::new(VEHICLE, 1, peer);
         Self { flight, outside, session, wanted: false, monitor: true, program: false, now: Instant::ZERO }
     }
 
     fn blocks(&mut self) -> ArmBlocks {
-        self.outside.telemetry.latest().map(|frame| frame.data.blocks).unwrap_or_default()
+        self.outside.link.telemetry.latest().map(|frame| frame.data.blocks).unwrap_or_default()
     }
 
     fn armed(&mut self) -> bool {
-        self.outside.telemetry.latest().is_some_and(|frame| frame.data.armed)
+        self.outside.link.telemetry.latest().is_some_and(|frame| frame.data.armed)
     }
 
     fn command(&mut self, kind: GuidedKind) {
         let command = GuidedCommand { kind, ..Default::default() };
-        self.outside.guided.publish(self.now, command).expect("room in the queue");
+        self.outside.link.command_guided.publish(self.now, command).expect("room in the queue");
     }
 
     /// Lets time pass. Every transmitter sends its packet every 20 ms; returns what became of the last one's.
@@ -55,12 +55,15 @@ impl<'b> Bench<'b> {
             self.now += Duration::from_micros(2_500);
             let now = self.now;
             let still = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };
-            self.outside.imu.publish(now, &still);
+            self.outside.imu.sensor_imu.publish(now, &still);
             if now.as_micros().is_multiple_of(20_000) {
-                self.outside.button.publish(now, &ButtonContact { pressed });
-                self.outside.tof.publish(now, &TofData { distance: 0.03, valid: true, ..Default::default() });
+                self.outside.button_pin.button_contact.publish(now, &ButtonContact { pressed });
+                self.outside
+                    .tof
+                    .sensor_tof
+                    .publish(now, &TofData { distance: 0.03, valid: true, ..Default::default() });
                 if self.monitor {
-                    self.outside.power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
+                    self.outside.power.sensor_power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
                 }
                 if self.program {
                     self.command(GuidedKind::None);
@@ -70,7 +73,7 @@ impl<'b> Bench<'b> {
                     let bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
                     let heard = self.session.receive(now, *source, &bytes);
                     if let Ok(input) = &heard {
-                        self.outside.pilot.publish(now, input);
+                        self.outside.link.command_pilot.publish(now, input);
                     }
                     last = Some(heard.map(|_| ()));
                 }
@@ -95,7 +98,7 @@ impl<'b> Bench<'b> {
 
 #[test]
 fn a_vehicle_changes_its_transmitter() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, Some(OLD));
     assert_eq!(bench.pass(6_000, false, &[(OLD, false)]), Some(Ok(())));
     assert_eq!(bench.blocks(), ArmBlocks::NONE, "calibrated and ready");
@@ -129,7 +132,7 @@ fn a_vehicle_changes_its_transmitter() {
 
 #[test]
 fn a_vehicle_that_never_had_a_transmitter_takes_none_while_a_program_flies_it() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, None);
     bench.program = true;
     bench.pass(6_000, false, &[]);
@@ -146,7 +149,7 @@ fn a_vehicle_that_never_had_a_transmitter_takes_none_while_a_program_flies_it() 
 
 #[test]
 fn a_vehicle_armed_while_it_looks_goes_back_to_its_transmitter() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, Some(OLD));
     bench.program = true;
     bench.pass(6_000, false, &[(OLD, false)]);
@@ -163,7 +166,7 @@ fn a_vehicle_armed_while_it_looks_goes_back_to_its_transmitter() {
 #[test]
 fn a_click_without_a_transmitter_does_nothing() {
     for peer in [None, Some(OLD)] {
-        let mut bus = wiring::Bus::new();
+        let mut bus = topics::Bus::new();
         let mut bench = Bench::new(&mut bus, peer);
         bench.pass(6_000, false, &[]);
         assert_eq!(bench.blocks(), ArmBlocks::NO_LINK);
@@ -184,13 +187,13 @@ fn a_click_without_a_transmitter_does_nothing() {
 
 #[test]
 fn a_silent_battery_monitor_refuses_arming() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, Some(OLD));
     bench.monitor = false;
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.pass(200, false, &[(OLD, true)]);
     assert_eq!((bench.armed(), bench.blocks()), (false, ArmBlocks::SENSOR));
-    assert!(bench.outside.telemetry.latest().is_some_and(|frame| frame.data.alerts == Alerts::POWER_LOST));
+    assert!(bench.outside.link.telemetry.latest().is_some_and(|frame| frame.data.alerts == Alerts::POWER_LOST));
     bench.monitor = true;
     bench.pass(200, false, &[(OLD, false)]);
     bench.pass(200, false, &[(OLD, true)]);
@@ -202,7 +205,7 @@ fn a_silent_battery_monitor_refuses_arming() {
 
 #[test]
 fn who_changes_his_mind_keeps_his_transmitter() {
-    let mut bus = wiring::Bus::new();
+    let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, Some(OLD));
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.pass(3_500, true, &[(OLD, false)]);

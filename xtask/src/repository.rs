@@ -1,9 +1,11 @@
 //! Where the sources are, what the library crates are called, and how a program is run.
 
-use crate::Failure;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+
+/// Why something failed, in words.
+pub type Failure = String;
 
 /// Libraries for a PC. Every other one has to build for bare metal.
 const HOST_ONLY: &[&str] = &["stampfly-sim"];

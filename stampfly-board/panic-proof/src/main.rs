@@ -14,12 +14,13 @@
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
-use stampfly_board::black_box::BlackBox;
-use stampfly_board::vehicle::{Assembled, assemble};
-use stampfly_board::{VehicleConfig, golden, wiring};
-use stampfly_bus::Band;
+use stampfly_board::black_box::{BlackBox, RETENTION};
+use stampfly_board::schedule::Runnables;
+use stampfly_board::{VehicleConfig, golden, topics};
+use stampfly_bus::{Band, Taps};
 use stampfly_drivers::Decimator;
 use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
+use stampfly_flight::Assembled;
 use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
 use stampfly_types::Instant;
 
@@ -39,7 +40,7 @@ extern "C" fn flight() {
     vehicle();
     radio();
     chips();
-    let _ = black_box(golden::play(black_box(golden::FLIGHT), &mut ()));
+    let _ = black_box(golden::self_test());
     #[cfg(feature = "control")]
     black_box(black_box([1u32, 2, 3])[black_box(1usize)]);
 }
@@ -47,26 +48,27 @@ extern "C" fn flight() {
 /// Everything between the sensors' topics and the motors'.
 fn vehicle() {
     let config: VehicleConfig = black_box(VehicleConfig::default());
-    let mut bus = wiring::Bus::new();
-    let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &config, black_box(Instant::ZERO));
-    let mut memory = BlackBox::<1024>::new();
+    let mut bus = topics::Bus::new();
+    let vehicle = Assembled::<Runnables>::new(bus.split(None), &config, black_box(Instant::ZERO));
+    let Assembled { mut flight_loop, mut outside, mut taps } = vehicle;
+    let mut memory = BlackBox::<1024>::new(RETENTION);
     while black_box(true) {
         let at: Instant = black_box(Instant::ZERO);
-        outside.imu.publish(at, &black_box(Default::default()));
-        outside.tof.publish(at, &black_box(Default::default()));
-        outside.flow.publish(at, &black_box(Default::default()));
-        outside.mag.publish(at, &black_box(Default::default()));
-        outside.baro.publish(at, &black_box(Default::default()));
-        outside.cameras.publish(at, &black_box(Default::default()));
-        outside.power.publish(at, &black_box(Default::default()));
-        outside.pilot.publish(at, &black_box(Default::default()));
-        outside.button.publish(at, &black_box(Default::default()));
-        let _ = outside.guided.publish(at, black_box(Default::default()));
+        outside.imu.sensor_imu.publish(at, &black_box(Default::default()));
+        outside.tof.sensor_tof.publish(at, &black_box(Default::default()));
+        outside.flow.sensor_flow.publish(at, &black_box(Default::default()));
+        outside.mag.sensor_mag.publish(at, &black_box(Default::default()));
+        outside.baro.sensor_baro.publish(at, &black_box(Default::default()));
+        outside.cameras.external_pose.publish(at, &black_box(Default::default()));
+        outside.power.sensor_power.publish(at, &black_box(Default::default()));
+        outside.link.command_pilot.publish(at, &black_box(Default::default()));
+        outside.button_pin.button_contact.publish(at, &black_box(Default::default()));
+        let _ = outside.link.command_guided.publish(at, black_box(Default::default()));
         flight_loop.run_band(Band::Flight, black_box(at), &mut ());
         flight_loop.run_band(Band::Background, black_box(at), &mut ());
-        black_box((outside.motors.latest(), outside.indicator.latest(), outside.telemetry.latest()));
-        taps.drain(&mut |id, at, generation, words| memory.note(id, at, generation, words));
+        black_box(outside.motors.actuator_motor.latest());
+        black_box((outside.indicator.signal.latest(), outside.link.telemetry.latest()));
+        taps.drain(&mut |topic, at, generation, words| memory.note(topic, at, generation, words));
         black_box(memory.records().count());
     }
 }

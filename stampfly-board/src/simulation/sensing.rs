@@ -1,10 +1,10 @@
 //! The tasks that feed the bus: models of the sensors, or the real drivers over emulated chips.
 
-use crate::tasks::{Health, Retry, pump};
 use crate::{devices, topics};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
+use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_sim::chips::{self, I2cBus, stand_in_image};
 use stampfly_sim::sensors::{ButtonModel, IndicatorRecorder, MotorModel, Sensors};
@@ -25,19 +25,19 @@ pub enum Sensing {
 /// What stands in for the inertial sensor's configuration file, at both ends of the bus.
 pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
 
-/// How the sensors' tasks fare, in the order in which they were started.
-pub type Healths = [Health; 8];
+/// How the sensors do, in the order in which they were started.
+pub type Healths = [SensorHealth; 8];
 
 /// A task that publishes a sensor's samples for as long as the vehicle is on.
 macro_rules! spawn {
-    ($tasks:ident, $clock:ident, $health:ident, $retry:ident, $sensor:expr => $publisher:expr) => {{
+    ($tasks:ident, $clock:ident, $health:ident, $backoff:ident, $sensor:expr => $publisher:expr) => {{
         let (mut sensor, mut publisher) = ($sensor, $publisher);
-        let (clock, health): (_, &Health) = ($clock.clone(), $health.next().expect("one for each sensor"));
+        let (clock, health): (_, &SensorHealth) = ($clock.clone(), $health.next().expect("one for each sensor"));
         $tasks.spawn(async move {
             let publish = |at, data: &_| {
                 publisher.publish(at, data);
             };
-            match pump(async || sensor.next().await, publish, clock, Retry::$retry, health).await {}
+            match run_sensor(async || sensor.next().await, publish, clock, Backoff::$backoff, health).await {}
         });
     }};
 }
@@ -90,14 +90,14 @@ pub(super) fn start_models<'a>(
     health: &'a Healths,
 ) -> Actuators {
     let mut health = health.iter();
-    spawn!(tasks, clock, health, PROMPT, models.imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, PATIENT, models.tof => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, PATIENT, models.flow => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, PATIENT, models.mag => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, PATIENT, models.baro => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, PATIENT, models.power => ends.power.sensor_power);
+    spawn!(tasks, clock, health, CRITICAL, models.imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, SHARED, models.tof => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, SHARED, models.flow => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, SHARED, models.mag => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, SHARED, models.baro => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, SHARED, models.power => ends.power.sensor_power);
     if let Some(ends) = ends.cameras {
-        spawn!(tasks, clock, health, PATIENT, models.cameras => ends.external_pose);
+        spawn!(tasks, clock, health, SHARED, models.cameras => ends.external_pose);
     }
     Actuators { motors: models.motors, indicator: models.indicator, button: models.button }
 }
@@ -121,15 +121,15 @@ pub(super) fn start_drivers<'a>(
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
     let imu = devices::imu(imu, time(), &IMAGE).with_interrupt(ready);
-    spawn!(tasks, clock, health, PROMPT, imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, PATIENT, down => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, PATIENT, ahead => ends.tof_front.sensor_tof_front);
-    spawn!(tasks, clock, health, PATIENT, devices::flow(flow, time()) => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, PATIENT, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, PATIENT, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, PATIENT, devices::power(to_power, time()) => ends.power.sensor_power);
+    spawn!(tasks, clock, health, CRITICAL, imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, SHARED, down => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, SHARED, ahead => ends.tof_front.sensor_tof_front);
+    spawn!(tasks, clock, health, SHARED, devices::flow(flow, time()) => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, SHARED, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, SHARED, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, SHARED, devices::power(to_power, time()) => ends.power.sensor_power);
     if let Some(ends) = ends.cameras {
-        spawn!(tasks, clock, health, PATIENT, models.cameras => ends.external_pose);
+        spawn!(tasks, clock, health, SHARED, models.cameras => ends.external_pose);
     }
     Actuators { motors: models.motors, indicator: models.indicator, button: models.button }
 }

@@ -3,7 +3,7 @@
 mod riscv;
 pub mod stack;
 
-use crate::Failure;
+use crate::repository::Failure;
 use object::elf::SHF_ALLOC;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 use std::collections::BTreeMap;

@@ -5,8 +5,8 @@
 //! depend on the machine: they are less than half of what a PC of 2024 does. Processor time counts, and the best of some
 //! short runs, because a shared machine has other things to do.
 
-use crate::Failure;
-use crate::repository::{Repository, capture, json, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, json, run as run_program};
 use serde_json::Value;
 use std::fs;
 
@@ -21,7 +21,7 @@ const SPEEDS: [(&[&str], f64); 2] = [(&[], 300.0), (&["--chips"], 100.0)];
 const TIMED: &str = "8";
 const RUNS: usize = 5;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
     let mut failures = Vec::new();
     for (mission, arguments) in CAMPAIGNS {

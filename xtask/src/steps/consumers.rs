@@ -4,12 +4,12 @@
 //! forgot to ask for itself. So a small program per crate (`xtask/consumers`) is built where the workspace cannot help
 //! it, depending on that crate and on the vocabulary of `stampfly-types`, and run.
 
-use crate::Failure;
-use crate::repository::{Repository, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, run as run_program};
 use std::fs;
 use std::path::Path;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let place = std::env::temp_dir().join(format!("stampfly-consumers-{}", std::process::id()));
     let outcome = repository.libraries()?.iter().try_for_each(|library| consume(repository, &library.name, &place));
     // Nothing depends on its removal.

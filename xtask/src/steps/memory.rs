@@ -8,11 +8,11 @@
 //! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
 use super::esp32;
+use crate::arguments::Arguments;
 use crate::elf::stack::{Behind, Stack};
 use crate::elf::{C, CONSTANTS, Program, Sizes};
 use crate::ratchet::Budget;
-use crate::repository::Repository;
-use crate::{FIX, Failure, asks};
+use crate::repository::{Failure, Repository};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -39,37 +39,48 @@ const ROM: u64 = 512;
 /// Part of its stack that a task may take; the rest is for interrupts, and for what nobody thought of.
 const SHARE: f64 = 0.5;
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let path = match arguments.iter().find(|argument| *argument != FIX) {
-        None => esp32::c6(repository)?,
-        Some(path) => path.into(),
-    };
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
     let program = Program::read(&path)?;
     let budget = Budget::read(repository, BUDGET)?;
-    let mut ledger = Ledger { budget, fix: asks(arguments, FIX), failures: Vec::new() };
+    let mut ledger = Ledger { budget, fix: arguments.fix, held: BTreeSet::new(), failures: Vec::new() };
     sizes(&program, &mut ledger)?;
     stacks(&path, &program, &mut ledger)?;
     ledger.close()
 }
+
+/// Tables of the budget.
+const TABLES: [&str; 3] = ["flash", "memory", "stack"];
 
 /// The committed figures beside the measured ones. Says all that is wrong at once: a change moves many of them.
 struct Ledger {
     budget: Budget,
     /// Commit to what is measured instead of comparing it.
     fix: bool,
+    /// Figures compared so far.
+    held: BTreeSet<(&'static str, String)>,
     failures: Vec<Failure>,
 }
 
 impl Ledger {
-    fn hold(&mut self, name: &str, measured: u64, unit: &str) {
-        if self.fix {
-            self.budget.set(name, measured as f64);
-        } else {
-            self.failures.extend(self.budget.hold(name, measured as f64, unit).err());
-        }
+    fn hold(&mut self, table: &'static str, name: &str, measured: u64, unit: &str) {
+        let (key, measured) = ([table, name], measured as f64);
+        let outcome = if self.fix { self.budget.set(&key, measured) } else { self.budget.hold(&key, measured, unit) };
+        self.failures.extend(outcome.err());
+        self.held.insert((table, name.to_owned()));
     }
 
-    fn close(self) -> Result<(), Failure> {
+    fn close(mut self) -> Result<(), Failure> {
+        for table in TABLES {
+            for name in self.budget.names(table).into_iter().filter(|name| !self.held.contains(&(table, name.clone())))
+            {
+                if self.fix {
+                    self.budget.remove(table, &name);
+                } else {
+                    self.failures.push(format!("{table}.{name}: in {BUDGET}, but not in the program"));
+                }
+            }
+        }
         if self.fix {
             self.budget.write()?;
         }
@@ -100,8 +111,8 @@ fn sizes(program: &Program, held: &mut Ledger) -> Result<(), Failure> {
     }
     println!("{:<28} {:>9} {:>9}", "all", program.sections.flash, program.sections.memory);
     for (row, sizes) in rows_held(&owners) {
-        held.hold(&format!("flash.{row}"), sizes.flash, "bytes of flash");
-        held.hold(&format!("memory.{row}"), sizes.memory, "bytes of static memory");
+        held.hold("flash", row, sizes.flash, "bytes of flash");
+        held.hold("memory", row, sizes.memory, "bytes of static memory");
     }
     Ok(())
 }
@@ -134,7 +145,7 @@ fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failu
         if !ours.is_empty() {
             held.failures.push(format!("{task}: without a bound: {ours:?}"));
         }
-        held.hold(&format!("stack.{task}"), depth.bytes, "bytes of stack");
+        held.hold("stack", task, depth.bytes, "bytes of stack");
         for (name, frame) in depth.way.iter().filter(|(_, frame)| *frame >= 256) {
             println!("    {frame:>6}  {:.100}", name);
         }

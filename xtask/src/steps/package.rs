@@ -2,11 +2,11 @@
 //!
 //! Works on a fresh clone, so that a file that exists but was never committed is noticed.
 
-use crate::Failure;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::fs;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let (uncommitted, _) = capture(repository.command("git").args(["status", "--porcelain"]))?;
     if !uncommitted.is_empty() {
         eprintln!("not committed and therefore not looked at:\n{uncommitted}");

@@ -5,9 +5,9 @@
 //! manufacturer's library does inside one of our generic functions is that library's. A call that tells no place is ours.
 
 use super::esp32;
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::elf::{Program, panics};
-use crate::repository::Repository;
+use crate::repository::{Failure, Repository};
 use std::collections::BTreeSet;
 
 /// Crates that fly. The firmware itself may panic while it starts, before any motor can turn.
@@ -29,8 +29,8 @@ const ALLOWED: [(&str, &str, &str); 3] = [
     ("/esp32c6-", "panic_bounds_check", "the manufacturer's table of registers: every pin has one"),
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let path = arguments.first().map_or_else(|| esp32::c6(repository), |path| Ok(path.into()))?;
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
     let found = calls(&Program::read(&path)?);
     // Nothing to be found would look just like nothing found.
     if let Some((place, callee, _)) = ALLOWED.iter().find(|row| !found.iter().any(|call| call.is_allowed_by(row))) {
