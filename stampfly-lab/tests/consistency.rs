@@ -1,10 +1,10 @@
 //! Is the estimator as good as it says, and is that measured rightly?
 
 use stampfly_host::campaign::run_recorded;
-use stampfly_lab::consistency::Summary;
 use stampfly_host::mission::Mission;
 use stampfly_host::recorder::Recorder;
 use stampfly_host::simulate::FlightConfig;
+use stampfly_lab::consistency::Summary;
 
 fn campaign(flights: u64, change: impl Fn(&mut FlightConfig)) -> Summary {
     let configs: Vec<FlightConfig> = (1..=flights)

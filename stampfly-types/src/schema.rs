@@ -284,19 +284,20 @@ impl Leaf {
         self.count * self.kind.size()
     }
 
-    /// Its words among the message's; `None` when they are too few.
+    /// The words of one element among the message's; `None` when there is no such element or its words are missing.
     #[must_use]
-    pub fn words<'w>(&self, message: &'w [u32]) -> Option<&'w [u32]> {
-        message.get(self.offset..)?.get(..self.size())
+    pub fn words<'w>(&self, message: &'w [u32], element: usize) -> Option<&'w [u32]> {
+        if element >= self.count {
+            return None;
+        }
+        let size = self.kind.size();
+        message.get(self.offset + element * size..)?.get(..size)
     }
 
     /// The value of one element; `None` when there is no such element or its words are missing.
     #[must_use]
     pub fn value(&self, message: &[u32], element: usize) -> Option<Value> {
-        if element >= self.count {
-            return None;
-        }
-        self.kind.value(message.get(self.offset + element * self.kind.size()..)?)
+        self.kind.value(self.words(message, element)?)
     }
 }
 
