@@ -29,7 +29,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     Budget::read(repository, "benches/budget.toml")?.hold(&["instructions_per_step"], measured, "instructions per step")
 }
 
-/// Instructions of one run of so many steps.
+/// Instructions of one run.
 fn count(repository: &Repository, steps: u64) -> Result<u64, Failure> {
     let program = repository.target("release/examples/chain_steps");
     let mut valgrind = repository.command("valgrind");

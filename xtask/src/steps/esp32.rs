@@ -26,7 +26,7 @@ const STAND_IN: &str = "loongarch32-unknown-none-softfloat";
 /// The name cargo and esp-hal know the S3 by.
 const S3: &str = "xtensa-esp32s3-none-elf.json";
 const C6: &str = "riscv32imac-unknown-none-elf";
-/// Espressif's tool, the version whose words are read here.
+/// Espressif's tool; its output is parsed here.
 const ESPTOOL: &str = "esptool==5.6.0";
 /// No S3 has this pin; `src/pins.rs` asks for it when told to.
 const WRONG_PIN: &str = "GPIO22";

@@ -19,7 +19,7 @@ use std::path::Path;
 const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
 /// What is called through pointers, by whom: estimation reaches the estimator that the parameters chose, the scheduler
 /// asks topics for their newest, a drained bus hands messages to a closure, formatted text asks each value to write
-/// itself, executors run tasks, everybody else wakes them.
+/// itself, executors run tasks, all other callers wake them.
 const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "runnables::estimation::Estimation", targets: ESTIMATOR, nests: None },
     // Wherever in it the compiler puts estimation.
@@ -33,10 +33,10 @@ const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "", targets: &["raw::waker::"], nests: None },
 ];
 const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyTopic>::"];
-/// Bytes of stack that a function is assumed to take whose code is not in the program: those in ROM, which compute with
-/// floating point, copy memory, wait, or ask the flash chip, and call little. Nothing in the program tells.
+/// Bytes of stack assumed for a function in ROM, whose code is not in the program. These compute with floating point, copy
+/// memory, wait, or access the flash chip, and call little.
 const ROM: u64 = 512;
-/// Part of its stack that a task may take; the rest is for interrupts, and for what nobody thought of.
+/// Part of its stack that a task may take. The rest is for interrupts and for errors of this bound.
 const SHARE: f64 = 0.5;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
@@ -88,8 +88,7 @@ impl Ledger {
     }
 }
 
-/// Rows of the ledger that have a budget of their own: our crates and what cannot be told apart. Everybody else's crates
-/// share one.
+/// The row of all crates that are not ours.
 const OTHERS: &str = "others";
 /// What no symbol covers: alignment, and text that was merged.
 const NAMELESS: &str = "nameless";
@@ -117,7 +116,7 @@ fn sizes(program: &Program, held: &mut Ledger) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The rows that are held: ours one by one, everybody else's crates together.
+/// The rows that are held: ours one by one, all other crates together.
 fn rows_held<'a>(owners: &BTreeMap<&'a str, Sizes>) -> BTreeMap<&'a str, Sizes> {
     let mut rows: BTreeMap<&str, Sizes> = BTreeMap::new();
     for (owner, sizes) in owners {
@@ -165,7 +164,7 @@ fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failu
     Ok(())
 }
 
-/// Whose stack something has.
+/// The stack that a task runs on.
 enum Core {
     Flight,
     Ground,
@@ -173,7 +172,7 @@ enum Core {
     OnTopOfAssembly,
 }
 
-/// A task: its name, parts of the name of the function that polls it, whose stack it runs on.
+/// A task: name, parts of the name of the function that polls it, stack.
 type Task = (&'static str, &'static [&'static str], Core);
 
 const TASKS: [Task; 8] = [
@@ -193,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn our_crates_have_a_row_each_and_everybody_else_shares_one() {
+    fn our_crates_have_a_row_each_and_all_others_share_one() {
         let sizes = |flash| Sizes { flash, memory: 1 };
         let owners = [("stampfly_eskf", 5), ("core", 6), ("libm", 7), ("C", 8), ("constants", 9)];
         let rows = rows_held(&owners.map(|(owner, flash)| (owner, sizes(flash))).into());

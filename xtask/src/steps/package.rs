@@ -14,8 +14,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let clone = repository.target("package-clone");
     let _ = fs::remove_dir_all(&clone);
     run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
-    // A place of its own for every commit: cargo keeps what it has unpacked of a version, and ours does not change with
-    // every commit.
+    // One folder per commit: cargo does not unpack a version twice, and ours does not change with every commit.
     let (commit, _) = capture(repository.command("git").args(["rev-parse", "--short", "HEAD"]))?;
     let packages = repository.target("packages");
     let _ = fs::remove_dir_all(&packages);
