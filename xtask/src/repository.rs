@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 pub type Failure = String;
 
 /// Libraries for a PC. Every other one has to build for bare metal.
-const HOST_ONLY: &[&str] = &["stampfly-sim"];
+const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab", "stampfly-sim"];
 
 /// The working copy.
 pub struct Repository {
