@@ -15,6 +15,7 @@ pub const MAX_INPUTS: usize = 16;
 
 /// How far one input had been read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InputRecord {
     /// Generation of the newest sample read so far, in this activation or before; zero before the first.
     pub generation: u32,
@@ -34,6 +35,7 @@ pub struct InputRecord {
 /// # Ok::<(), stampfly_types::activation::TooManyInputs>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ActivationRecord {
     /// The runnable's line in the activation table.
     pub index: u8,
@@ -42,7 +44,14 @@ pub struct ActivationRecord {
     /// Bit n: its n-th publish on a queue was refused. Bit 31 stands for every one from the 32nd on.
     pub refused: u32,
     inputs: [InputRecord; MAX_INPUTS],
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "up_to_max_inputs"))]
     count: u8,
+}
+
+#[cfg(feature = "serde")]
+fn up_to_max_inputs<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u8, D::Error> {
+    let count: u8 = serde::Deserialize::deserialize(deserializer)?;
+    if usize::from(count) <= MAX_INPUTS { Ok(count) } else { Err(serde::de::Error::custom("too many inputs")) }
 }
 
 /// Only the inputs that are in use count.

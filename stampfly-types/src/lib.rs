@@ -33,6 +33,8 @@ pub mod frame;
 pub mod math;
 pub mod message;
 pub mod messages;
+#[doc(hidden)]
+pub mod serial;
 pub mod stamped;
 pub mod time;
 

@@ -285,6 +285,8 @@ macro_rules! message {
                 Some(Self { $($field),* })
             }
         }
+
+        $crate::__serde_message!($Name);
     };
 }
 
@@ -351,6 +353,8 @@ macro_rules! message_enum {
                 Self::from_number(*words.first()?)
             }
         }
+
+        $crate::__serde_field!($Name);
     };
 }
 
@@ -445,6 +449,8 @@ macro_rules! message_flags {
                 (bits & !Self::ALL.0 == 0).then_some(Self(bits))
             }
         }
+
+        $crate::__serde_field!($Name);
     };
 }
 

@@ -11,6 +11,7 @@ use crate::{Duration, Instant};
 /// assert_eq!(range.age(Instant::from_millis(39)), Duration::ZERO);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stamped<T> {
     /// The instant the data is valid for.
     pub at: Instant,
