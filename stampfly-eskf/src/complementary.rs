@@ -20,6 +20,7 @@ use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Gains of the [`Complementary`] filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ComplementaryConfig {
     /// Attitude correction by gravity, 1/s.
     pub gravity_gain: f32,
@@ -64,6 +65,7 @@ impl Default for ComplementaryConfig {
 /// assert!(filter.estimate().attitude.angle() < 1e-6);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Complementary {
     config: ComplementaryConfig,
     state: Nominal,

@@ -3,6 +3,7 @@
 /// Tuning of [`Eskf`](crate::Eskf). One set serves a sensor suite; the defaults are the StampFly's (BMI270, VL53L3CX,
 /// PMW3901, BMP280).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EskfConfig {
     /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and axes;
     /// vibration is `accel_roughness`.
@@ -113,6 +114,7 @@ const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
 
 /// What of the magnetic field is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MagModel {
     /// Its heading only: nearby motors bend it by more than any tilt. See [`aid::heading`](crate::aid::heading).
     #[default]
@@ -123,6 +125,7 @@ pub enum MagModel {
 
 /// When the accelerometer is an inclinometer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GravityUse {
     /// While nothing measures velocity: otherwise velocity shows the tilt, and better.
     #[default]

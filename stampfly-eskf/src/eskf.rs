@@ -54,6 +54,7 @@ const STILL_DIVIDER: u32 = 4;
 
 /// Running mean of inertial samples between two looks at gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Mean {
     sum: Vec3,
     count: f32,
@@ -93,6 +94,7 @@ impl Mean {
 /// assert!((estimate.height - 0.5).abs() < 0.01);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Eskf {
     config: EskfConfig,
     noise: ProcessNoise,

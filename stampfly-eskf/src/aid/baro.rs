@@ -26,6 +26,7 @@ pub fn altitude(state: &Nominal, offset: f32) -> Row {
 /// assert!((offset.value() - 120.45).abs() < 0.05);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Offset {
     value: f32,
     variance: f32,

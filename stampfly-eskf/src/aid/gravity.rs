@@ -48,6 +48,7 @@ const FORGET: Duration = Duration::from_micros(200_000);
 /// assert_eq!(acceleration.at(Instant::from_micros(2_000_000)), Vec3::zeros());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Acceleration {
     seen: Option<Instant>,
     velocity: Vec3,

@@ -26,6 +26,7 @@ const CLEAN: f32 = 0.8;
 
 /// Estimates the gyro's bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct GyroBias {
     value: Vec3,
     calibrated: Vec3,

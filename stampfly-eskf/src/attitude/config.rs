@@ -5,6 +5,7 @@
 /// The defaults suit a consumer-grade sensor on anything that moves by hand, by wheel or by rotor. Nothing here needs
 /// tuning to a motion; the two delays are properties of the sensors and worth measuring.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttitudeConfig {
     /// Time over which specific force is averaged, s. Longer than a hand accelerates one way, shorter than the gyro
     /// needs to drift by a degree.

@@ -24,6 +24,7 @@ const HEADING_SIGMA: f32 = 0.35;
 
 /// What the trait needs and the filter does not: time, and a record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Bookkeeping {
     now: Instant,
     initialized: bool,

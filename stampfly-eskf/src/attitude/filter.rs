@@ -60,6 +60,7 @@ const MOVING_START: f32 = 1.0;
 /// assert!((yaw.to_degrees() + 45.0).abs() < 0.1);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttitudeFilter {
     pub(super) config: AttitudeConfig,
     /// Body → drifting.

@@ -29,6 +29,7 @@ const DROPPED_ABOVE: f32 = 0.8;
 
 /// Running mean and variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Spread {
     mean: f32,
     variance: f32,
@@ -44,6 +45,7 @@ impl Spread {
 
 /// Estimates the offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct HardIron {
     /// World's field in the level frame, then offset in the body, µT.
     state: SVector<f32, 6>,

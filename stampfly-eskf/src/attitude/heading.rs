@@ -25,6 +25,7 @@ const NO_IDEA: f32 = 3.0;
 
 /// Heading of the level frame in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Heading {
     /// Direction of the level part of the reference field in the world, rad.
     north: f32,

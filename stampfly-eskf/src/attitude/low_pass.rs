@@ -15,6 +15,7 @@ use nalgebra::SVector;
 
 /// Low-pass of `N` channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct LowPass<const N: usize> {
     time_constant: f32,
     /// Time filtered so far, up to the time constant.

@@ -19,6 +19,7 @@ const SMOOTHING: f32 = 0.05;
 
 /// A field as it is known without a heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Field {
     strength: f32,
     dip: f32,
@@ -70,6 +71,7 @@ pub(super) enum Verdict {
 
 /// Watches the field.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Magnetic {
     current: LowPass<2>,
     reference: Option<Field>,

@@ -28,6 +28,7 @@ use stampfly_types::{Quat, Vec3, math};
 /// assert!((frame::roll_pitch_yaw(&filter.attitude())[0].to_degrees() - 30.0).abs() < 0.1);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mahony {
     gain: f32,
     attitude: Quat,

@@ -12,6 +12,7 @@ use stampfly_types::Vec3;
 
 /// Watches for rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RestDetector {
     gyro: LowPass<3>,
     accel: LowPass<3>,

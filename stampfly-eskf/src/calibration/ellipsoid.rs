@@ -17,6 +17,7 @@ use stampfly_types::{Vec3, math};
 
 /// What is accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EllipsoidConfig {
     /// A sample nearer than this to the last one taken is left out, µT: waiting must not outweigh turning.
     pub spacing: f32,
@@ -110,6 +111,7 @@ pub struct EllipsoidQuality {
 
 /// Corrects a magnetometer: matrix · (measured − offset).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MagCorrection {
     /// Hard iron, body FRD, µT.
     pub offset: Vec3,
@@ -170,6 +172,7 @@ const DIRECTIONS: [[f32; 3]; 13] = [
 /// assert!((correction.strength - 48.0).abs() < 0.01 && quality.coverage == 1.0 && quality.residual < 0.01);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EllipsoidFit {
     config: EllipsoidConfig,
     /// The first sample, and the last one taken, µT.

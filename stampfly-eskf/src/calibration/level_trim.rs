@@ -40,6 +40,7 @@ pub struct LevelTrimQuality {
 
 /// The tilt of the sensor against the airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trim {
     /// The sensor is rolled by this against the airframe, rad.
     pub roll: f32,
@@ -88,6 +89,7 @@ impl Trim {
 /// assert!(trim.correct(felt.accel).xy().norm() < 1e-4 && quality.force_error.abs() < 1e-3);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LevelTrim {
     average: StillAverage,
     tilt_max: f32,

@@ -94,6 +94,7 @@ pub struct SixPositionQuality {
 
 /// Corrects an accelerometer: (measured − bias) · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AccelCorrection {
     /// What it shows without any force, body FRD, m/s².
     pub bias: Vec3,
@@ -141,6 +142,7 @@ const CREEP: f32 = 0.25;
 /// assert!(quality.residual < 1e-3 && quality.residual_before > 0.1);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SixPosition {
     average: StillAverage,
     /// A hold has been taken, and nobody has touched the vehicle since.

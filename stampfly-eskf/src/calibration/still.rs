@@ -37,6 +37,7 @@ pub struct StillQuality {
 /// assert!(calibration.quality().unwrap().force_error.abs() < 0.01);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StillCalibration {
     average: StillAverage,
     mean: Option<StillMean>,

@@ -12,6 +12,7 @@ use stampfly_types::{Instant, Vec3, math};
 
 /// What counts as still.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StillnessConfig {
     /// Largest mean angular rate, rad/s. Above the gyro's own offset, which may be 1 °/s an axis.
     pub rate_max: f32,
@@ -58,6 +59,7 @@ pub enum NotStill {
 
 /// The mean of a still stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StillMean {
     /// Mean angular rate, which is the gyro's bias, body FRD, rad/s.
     pub gyro: Vec3,
@@ -80,6 +82,7 @@ const LARGEST: f32 = 1e6;
 
 /// Mean and variance with an exponential window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Spread {
     mean: Vec3,
     variance: f32,
@@ -96,6 +99,7 @@ impl Spread {
 /// Sums over one stretch. Squares are of the distance from the first value, because the difference of large squares is
 /// noise in `f32`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sums {
     first: Vec3,
     sum: Vec3,
@@ -133,6 +137,7 @@ impl Sums {
 /// assert_eq!(average.step(Instant::from_secs(1), &turning), Err(NotStill::Turning));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StillAverage {
     config: StillnessConfig,
     rate: Spread,
@@ -218,7 +223,7 @@ impl StillAverage {
         if now.since(since).seconds() < self.config.settle {
             return Ok(None);
         }
-        self.count += 1;
+        self.count = self.count.saturating_add(1);
         self.gyro.add(&imu.gyro, self.count);
         self.accel.add(&imu.accel, self.count);
         self.temperature += imu.temperature;

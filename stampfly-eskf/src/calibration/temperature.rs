@@ -79,6 +79,7 @@ pub struct TemperatureQuality {
 
 /// Means of the stretches in a bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Bin {
     stretches: u32,
     samples: u32,
@@ -119,6 +120,7 @@ impl Bin {
 /// assert_eq!(table.bias(80.0).unwrap().reach, Reach::Clamped);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TemperatureTable {
     average: StillAverage,
     bins: [Bin; BINS],

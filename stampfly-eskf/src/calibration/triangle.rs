@@ -12,6 +12,14 @@ const DEPENDENT: f32 = 1e-4;
 /// Equations in `WIDTH` − 1 unknowns, as the triangle they come down to. The right-hand side is the last column; in its
 /// last place stands the norm of the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "[[f32; WIDTH]; WIDTH]: serde::Serialize",
+        deserialize = "[[f32; WIDTH]; WIDTH]: serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct Triangle<const WIDTH: usize> {
     rows: [[f32; WIDTH]; WIDTH],
 }

@@ -31,6 +31,7 @@ const SENSORS: usize = Sensor::Attitude as usize + 1;
 
 /// What one sensor has been doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Record {
     /// Stamp of its newest measurement.
     stamp: Option<Instant>,
@@ -53,6 +54,7 @@ pub(super) enum Verdict {
 
 /// The records of all sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gates {
     records: [Record; SENSORS],
     last_reset: Instant,

@@ -13,6 +13,7 @@ const LIMIT: f32 = 0.8;
 
 /// The mean of a sensor's innovations, each in its standard deviation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Persistence {
     mean: [f32; 2],
 }

@@ -21,12 +21,14 @@ type Row = [f32; WIDTH];
 
 /// A symmetric 15 × 15 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Covariance {
     rows: [Row; N],
 }
 
 /// White noise driving the error state, as variances a second.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ProcessNoise {
     /// Of the velocity: (m/s)²/s.
     pub velocity: f32,

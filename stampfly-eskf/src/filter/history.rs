@@ -21,6 +21,7 @@ const _: () = assert!((DEPTH - 1) as f32 * SHORTEST > REACH);
 
 /// A stretch of time and what happened in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Stretch {
     length: f32,
     /// Mean rate without bias, body.
@@ -52,8 +53,11 @@ const NOTHING: Stretch = Stretch {
 /// assert!((history.mean_rate(0.0, 0.01).unwrap() - Vec3::x()).amax() < 1e-5);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct History {
+    #[cfg_attr(feature = "serde", serde(with = "stored::stretches"))]
     stretches: [Stretch; DEPTH],
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "stored::place"))]
     newest: usize,
 }
 
@@ -134,6 +138,54 @@ impl History {
             end = begin;
         }
         (time > 1e-5).then(|| sum / time)
+    }
+}
+
+/// What serde does not derive.
+#[cfg(feature = "serde")]
+mod stored {
+    use super::{DEPTH, NOTHING, Stretch};
+    use core::fmt;
+    use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+
+    /// The place of a stretch; any other number is refused.
+    pub fn place<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+        let place = usize::deserialize(deserializer)?;
+        if place < DEPTH { Ok(place) } else { Err(D::Error::custom("beyond the memory of the last tenth of a second")) }
+    }
+
+    /// Arrays of more than 32 elements.
+    pub mod stretches {
+        use super::*;
+        use serde::ser::{SerializeTuple, Serializer};
+
+        pub fn serialize<S: Serializer>(stretches: &[Stretch; DEPTH], serializer: S) -> Result<S::Ok, S::Error> {
+            let mut tuple = serializer.serialize_tuple(DEPTH)?;
+            stretches.iter().try_for_each(|stretch| tuple.serialize_element(stretch))?;
+            tuple.end()
+        }
+
+        pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Stretch; DEPTH], D::Error> {
+            deserializer.deserialize_tuple(DEPTH, All)
+        }
+    }
+
+    struct All;
+
+    impl<'de> Visitor<'de> for All {
+        type Value = [Stretch; DEPTH];
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "{DEPTH} stretches")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Self::Value, A::Error> {
+            let mut stretches = [NOTHING; DEPTH];
+            for (index, stretch) in stretches.iter_mut().enumerate() {
+                *stretch = sequence.next_element()?.ok_or_else(|| A::Error::invalid_length(index, &self))?;
+            }
+            Ok(stretches)
+        }
     }
 }
 

@@ -26,6 +26,7 @@ use stampfly_types::{GRAVITY, Vec3};
 
 /// What the inertial sensor saw between two instants. See the [module](self) documentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Passage {
     /// Length τ, s. Negative for a look ahead.
     pub duration: f32,

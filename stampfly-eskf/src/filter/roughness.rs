@@ -26,6 +26,7 @@ const MEMORY: f32 = 0.05;
 /// assert!((roughness.mean_square() - 0.04 / 3.0).abs() < 1e-4);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Roughness {
     last: Option<Vec3>,
     mean_square: f32,

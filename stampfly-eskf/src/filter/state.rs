@@ -5,6 +5,7 @@ use stampfly_types::{GRAVITY, Quat, Vec3};
 
 /// The nominal state: what the filter believes, without its doubt.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nominal {
     /// World NED, m.
     pub position: Vec3,
