@@ -13,6 +13,7 @@ use crate::rate::integration;
 
 /// Gains and limits of the vertical loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AltitudeConfig {
     /// Velocity per height error, 1/s.
     pub height_gain: f32,
@@ -96,6 +97,7 @@ pub struct ThrustLimits {
 /// assert!(altitude.step(&too_low, &limits, 0.0025) > config.hover_thrust);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AltitudeController {
     config: AltitudeConfig,
     climb: Pid,

@@ -14,6 +14,7 @@ use crate::bound::symmetric;
 
 /// Gains and limits of the attitude loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttitudeConfig {
     /// Rate per tilt error, 1/s.
     pub tilt_gain: f32,

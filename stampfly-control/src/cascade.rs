@@ -23,6 +23,7 @@ use crate::timing::StepTimer;
 
 /// Gains and limits of all loops. The default is the StampFly.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CascadeConfig {
     /// Body rate.
     pub rate: RateConfig,
@@ -38,6 +39,7 @@ pub struct CascadeConfig {
 
 /// What full stick means in the modes that command angles or rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StickConfig {
     /// Lean at full stick, rad.
     pub lean_max: f32,
@@ -81,6 +83,7 @@ const THROTTLE_OFF: f32 = 0.03;
 /// assert!(output.thrust > 0.3, "about its weight");
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CascadeController {
     attitude: AttitudeConfig,
     sticks: StickConfig,

@@ -22,6 +22,7 @@ use crate::timing::StepTimer;
 /// Gains of the geometric controller. All of them are per unit of mass or inertia, so they are squared frequencies
 /// and dampings and hold for vehicles of any size.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GeometricConfig {
     /// Mass, kg.
     pub mass: f32,
@@ -89,6 +90,7 @@ impl Default for GeometricConfig {
 /// assert!(output.torque.x > 0.0, "stick right, right wing down");
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GeometricController {
     config: GeometricConfig,
     tan_tilt_max: f32,

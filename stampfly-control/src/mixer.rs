@@ -83,6 +83,7 @@ impl core::error::Error for GeometryError {}
 
 /// One rotor's share of each demand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Shares {
     thrust: f32,
     /// One over `thrust`.
@@ -104,10 +105,19 @@ struct Shares {
 /// assert_eq!(right.unmet, [0.0; 4]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MultirotorMixer {
     shares: [Shares; MAX_MOTORS],
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "up_to_max_motors"))]
     count: usize,
     thrust_max: f32,
+}
+
+/// Refuses more rotors than there are shares.
+#[cfg(feature = "serde")]
+fn up_to_max_motors<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    let count = serde::Deserialize::deserialize(deserializer)?;
+    if count <= MAX_MOTORS { Ok(count) } else { Err(serde::de::Error::custom("too many rotors")) }
 }
 
 impl MultirotorMixer {

@@ -16,6 +16,7 @@ use crate::timing::StepTimer;
 
 /// How a motor with its propeller turns voltage into thrust.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotorCurve {
     /// Thrust per squared speed, N/(rad/s)².
     pub ct: f32,
@@ -62,6 +63,7 @@ impl MotorCurve {
 
 /// Curve, battery and limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotorConfig {
     /// The motors' curve.
     pub curve: MotorCurve,
@@ -110,6 +112,7 @@ impl Default for MotorConfig {
 /// assert_eq!(motors.step(Instant::from_micros(60_000), &hover, Some(3.7), false).duty, [0.0; 8], "not armed, not turning");
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotorStage {
     config: MotorConfig,
     voltage: Option<f32>,

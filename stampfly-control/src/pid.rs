@@ -12,6 +12,7 @@ use num_traits::float::FloatCore;
 
 /// Gains of a [`Pid`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PidGains<T = f32> {
     /// Proportional gain, output units per measured unit.
     pub kp: T,
@@ -58,6 +59,7 @@ pub enum Integration {
 /// assert!((level - 3.0).abs() < 1e-3, "the integral has learned the leak");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pid<T = f32> {
     gains: PidGains<T>,
     limit: T,
@@ -71,6 +73,7 @@ pub struct Pid<T = f32> {
 
 /// Coefficients that depend on the gains and the step length only; kept, because the step length hardly changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Discrete<T> {
     dt: T,
     integral: T,

@@ -10,6 +10,7 @@ use crate::pid::{Integration, Pid, PidGains};
 
 /// Gains and limits of the horizontal loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PositionConfig {
     /// Velocity per position error, 1/s.
     pub position_gain: f32,
@@ -43,6 +44,7 @@ impl Default for PositionConfig {
 /// assert!(acceleration.x > 0.0 && acceleration.y == 0.0 && acceleration.z == 0.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PositionController {
     position_gain: f32,
     correction_max: f32,

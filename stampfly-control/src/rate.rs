@@ -10,6 +10,7 @@ use crate::pid::{Integration, Pid, PidGains};
 
 /// Gains and limits of the body-rate loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RateConfig {
     /// Roll, N·m per rad/s.
     pub roll: PidGains,
@@ -43,6 +44,7 @@ impl Default for RateConfig {
 /// assert!(torque.x > 0.0 && torque.y == 0.0 && torque.z == 0.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RateController {
     axes: [Pid; 3],
     /// Last torque asked: tells in which direction an unmet share points.

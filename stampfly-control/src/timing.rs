@@ -17,6 +17,7 @@ use stampfly_types::{Duration, Instant};
 /// assert_eq!(timer.step(Instant::from_micros(900_000)), 0.02, "a stall counts as 20 ms");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StepTimer {
     last: Option<Instant>,
 }

@@ -14,6 +14,7 @@ use super::{FilterError, angle_per_sample};
 
 /// The five numbers of a second-order section, normalised to a0 = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BiquadCoefficients<T = f32> {
     /// Feed-forward: present sample, previous, the one before.
     pub b: [T; 3],
@@ -71,6 +72,7 @@ fn prototype(frequency: f32, sample_rate: f32, quality: f32) -> Result<(f32, f32
 /// # Ok::<(), stampfly_control::filter::FilterError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Biquad<T = f32> {
     coefficients: BiquadCoefficients<T>,
     state: [T; 2],
@@ -132,6 +134,14 @@ impl<T: FloatCore> Biquad<T> {
 /// # Ok::<(), stampfly_control::filter::FilterError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "[Biquad<T>; N]: serde::Serialize",
+        deserialize = "[Biquad<T>; N]: serde::Deserialize<'de>"
+    ))
+)]
 pub struct BiquadChain<T, const N: usize> {
     stages: [Biquad<T>; N],
 }

@@ -24,6 +24,7 @@ const FADE: f32 = 0.1;
 
 /// One line of the spectrum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Resonator {
     /// λ·e^(jω).
     turn: [f32; 2],
@@ -59,6 +60,14 @@ impl Resonator {
 /// # Ok::<(), stampfly_control::filter::FilterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "[Resonator; BINS]: serde::Serialize",
+        deserialize = "[Resonator; BINS]: serde::Deserialize<'de>"
+    ))
+)]
 pub struct DynamicNotch<const BINS: usize> {
     resonators: [Resonator; BINS],
     lowest: f32,
@@ -108,7 +117,7 @@ impl<const BINS: usize> DynamicNotch<BINS> {
         for resonator in &mut self.resonators {
             resonator.step(sample);
         }
-        self.count += 1;
+        self.count = self.count.saturating_add(1);
         if self.count >= LOOK {
             self.count = 0;
             self.look();

@@ -20,6 +20,7 @@ use super::{FilterError, angle_per_sample};
 /// # Ok::<(), stampfly_control::filter::FilterError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LowPass<T = f32> {
     alpha: T,
     value: T,

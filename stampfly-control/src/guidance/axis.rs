@@ -13,6 +13,7 @@ use crate::bound::{symmetric, within};
 
 /// Bounds of motion along one axis; all positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounds {
     /// Largest speed, per second.
     pub speed: f32,
@@ -45,6 +46,7 @@ impl Bounds {
 /// assert!(seconds < 2.8, "1 m at 0.5 m/s, plus starting and stopping: {seconds}");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Axis {
     /// Position.
     pub position: f32,

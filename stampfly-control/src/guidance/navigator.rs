@@ -26,6 +26,7 @@ use crate::timing::StepTimer;
 
 /// Speeds, heights and tolerances of the [`Navigator`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NavigatorConfig {
     /// Bounds of the path.
     pub limits: PathLimits,
@@ -114,6 +115,7 @@ pub struct NavigatorInput<'a> {
 /// # Ok::<(), stampfly_control::guidance::Refused>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Navigator {
     config: NavigatorConfig,
     timer: StepTimer,

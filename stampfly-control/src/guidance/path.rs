@@ -13,6 +13,7 @@ use crate::bound::symmetric;
 
 /// Bounds of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PathLimits {
     /// North and east, m/s, m/s², m/s³.
     pub horizontal: Bounds,
@@ -35,6 +36,7 @@ impl Default for PathLimits {
 
 /// A goal and the bounds on the way to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Leg {
     /// Where the leg ends, world frame, m.
     pub goal: Vec3,
@@ -56,6 +58,7 @@ pub struct Leg {
 /// }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Path {
     limits: PathLimits,
     north: Axis,

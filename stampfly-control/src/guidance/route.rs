@@ -11,6 +11,7 @@ use stampfly_types::messages::GuidedCommand;
 
 /// A place to go to, and for how long to stay.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WayPoint {
     /// World frame, relative to the origin, m.
     pub position: Vec3,
@@ -66,8 +67,9 @@ impl core::error::Error for Refused {}
 /// assert_eq!(route.append(point), Err(point), "full: given back");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Route {
-    ahead: Deque<WayPoint, { Self::CAPACITY }>,
+    ahead: Deque<WayPoint, { Route::CAPACITY }>,
 }
 
 impl Route {
