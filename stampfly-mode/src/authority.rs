@@ -8,6 +8,7 @@ use stampfly_types::{Duration, Instant};
 
 /// Limits of the arbitration.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AuthorityConfig {
     /// Sticks closer to their centre than this are centred, share.
     pub dead_band: f32,
@@ -35,6 +36,7 @@ impl Default for AuthorityConfig {
 /// assert_eq!(authority.step(Instant::from_micros(3_000)).source, CommandSource::Pilot);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Authority {
     config: AuthorityConfig,
     pilot: Option<(Instant, PilotInput)>,

@@ -25,6 +25,7 @@ const HOLD_RESET: Duration = Duration::from_secs(5);
 /// assert_eq!(gestures, [ButtonGesture::Press, ButtonGesture::Click]);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ButtonDecoder {
     /// The contact's raw level and since when it has had it.
     raw: bool,

@@ -25,6 +25,7 @@ use stampfly_types::{Duration, GRAVITY, Instant, Vec3, frame, math};
 
 /// Thresholds.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FailsafeConfig {
     /// Impact, m/s².
     pub impact: f32,
@@ -117,6 +118,7 @@ pub struct FailsafeInput<'a> {
 /// assert!(failsafe.step(Instant::from_micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Failsafe {
     config: FailsafeConfig,
     active: Alerts,

@@ -15,6 +15,7 @@ use stampfly_types::messages::{
 
 /// Limits of take-off and landing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LandingConfig {
     /// Thrust that carries the vehicle, N.
     pub hover_thrust: f32,
@@ -90,6 +91,7 @@ pub struct LandingInput<'a> {
 /// assert!(landed_at.is_some_and(|t| t > 0.3 && t < 1.5));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TakeoffLanding {
     config: LandingConfig,
     state: FlightState,

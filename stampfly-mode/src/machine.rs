@@ -37,6 +37,7 @@ pub struct ModeInput<'a> {
 
 /// What the machine decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModeOutput {
     /// State, mode, armed.
     pub mode: SystemMode,
@@ -79,6 +80,7 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 /// assert!(!machine.step(Instant::from_micros(5_000), &input).mode.armed);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModeMachine {
     output: ModeOutput,
     entered: Instant,

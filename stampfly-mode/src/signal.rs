@@ -39,6 +39,7 @@ const LIME: Colour = [16, 32, 0];
 /// assert!(shown.status[1] > 0 && shown.status[0] == 0, "green: ready");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Signaller {
     last_state: Option<FlightState>,
     last_warning: Option<Instant>,

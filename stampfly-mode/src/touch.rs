@@ -12,6 +12,7 @@ const CALM: Duration = Duration::from_secs(2);
 
 /// A hand on the button. The touch that stops the motors means nothing else, and neither do those right after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Touch {
     /// It has stopped the motors.
     spent: bool,
