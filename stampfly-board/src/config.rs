@@ -8,6 +8,7 @@ use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 
 /// Configuration of every component of one vehicle.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct VehicleConfig {
     /// 0: error-state Kalman filter, 1: complementary filter.
     pub estimator: f32,

@@ -10,6 +10,7 @@ use crate::runnables::*;
 stampfly_bus::schedule! {
     /// The StampFly's runnables: the state of the vehicle.
     #[derive(Clone)]
+    #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
     pub struct Runnables on crate::topics from VehicleConfig;
 
     /// State estimation.

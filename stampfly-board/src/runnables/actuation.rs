@@ -13,6 +13,7 @@ const STALE_POWER: Duration = Duration::from_secs(1);
 
 /// Actuation: thrust and torque in, motor duty out.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Actuation {
     mixer: MultirotorMixer,
     motors: MotorStage,

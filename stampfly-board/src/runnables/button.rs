@@ -7,6 +7,7 @@ use stampfly_mode::ButtonDecoder;
 
 /// Button: a contact in, gestures out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Button {
     decoder: ButtonDecoder,
 }

@@ -8,6 +8,7 @@ use stampfly_types::messages::CalibrationResult;
 
 /// Calibration: still samples in, biases and the first attitude out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Calibration {
     calibration: StillCalibration,
     published: CalibrationResult,

@@ -8,6 +8,7 @@ use stampfly_types::messages::GuidedKind;
 
 /// Command: every source of commands in, one arbitrated set of sticks out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Command {
     authority: Authority,
 }

@@ -7,6 +7,7 @@ use stampfly_control::{CascadeController, ControlInput, Controller, GeometricCon
 
 /// The controllers this vehicle can be told to use (`controller.type`).
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 #[allow(clippy::large_enum_variant, reason = "there is one of them, for as long as the vehicle is on")]
 enum Choice {
     Cascade(CascadeController),
@@ -15,6 +16,7 @@ enum Choice {
 
 /// Control: state and set-point in, thrust and torque out.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Control {
     controller: Choice,
 }

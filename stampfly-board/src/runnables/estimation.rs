@@ -7,6 +7,7 @@ use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, feed};
 
 /// The estimators this vehicle can be told to use (`estimator.type`).
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 #[allow(clippy::large_enum_variant, reason = "there is one of them, for as long as the vehicle is on")]
 enum Choice {
     Eskf(Eskf),
@@ -15,6 +16,7 @@ enum Choice {
 
 /// Estimation: every sensor in, the vehicle's state out.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimation {
     estimator: Choice,
     /// Has the still-calibration been used?

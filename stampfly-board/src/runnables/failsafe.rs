@@ -8,6 +8,7 @@ use stampfly_types::Instant;
 
 /// Failsafe: everything that can go wrong in, alerts out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Failsafe {
     failsafe: stampfly_mode::Failsafe,
     last_command: Option<Instant>,

@@ -7,6 +7,7 @@ use stampfly_mode::{LandingInput, TakeoffLanding};
 
 /// Take-off and landing manager: the estimate in, contact with the ground out.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Landing {
     manager: TakeoffLanding,
 }

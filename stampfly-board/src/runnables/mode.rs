@@ -13,6 +13,7 @@ const STALE_PILOT: Duration = Duration::from_millis(500);
 
 /// State management: alerts, commands and facts in, the vehicle's state out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mode {
     machine: ModeMachine,
     pilot: Option<Stamped<PilotInput>>,

@@ -7,6 +7,7 @@ use stampfly_control::guidance::{Navigator, NavigatorInput};
 
 /// Navigator: commands and state in, the vehicle's path out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Navigation {
     navigator: Navigator,
 }

@@ -7,6 +7,7 @@ use stampfly_mode::Signaller;
 
 /// Notification: state and alerts in, lights and sound out.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Notification {
     signaller: Signaller,
 }

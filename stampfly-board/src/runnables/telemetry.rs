@@ -8,6 +8,7 @@ use stampfly_types::frame::roll_pitch_yaw;
 
 /// Telemetry: the newest of everything a ground station wants, at a rate a radio can carry.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Telemetry {
     frame: TelemetryFrame,
 }
