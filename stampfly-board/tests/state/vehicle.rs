@@ -41,6 +41,14 @@ fn publish(outside: &mut topics::Outside<'_>, k: u64, n: &mut Numbers) {
     }
 }
 
+/// Everything that is in the runnables, whether it is serialised or not.
+fn shown(runnables: &Runnables) -> String {
+    let Runnables { estimation, failsafe, landing, mode, navigation, control, actuation, .. } = runnables;
+    let Runnables { calibration, command, button, notification, telemetry, .. } = runnables;
+    let flight = format!("{estimation:?} {failsafe:?} {landing:?} {mode:?} {navigation:?} {control:?} {actuation:?}");
+    format!("{flight} {calibration:?} {command:?} {button:?} {notification:?} {telemetry:?}")
+}
+
 /// Starts up, is calibrated, armed and takes off; key frames are made on the way. From each the vehicle goes on, on a
 /// fresh bus, as it went on.
 fn goes_on(config: &VehicleConfig) {
@@ -64,6 +72,7 @@ fn goes_on(config: &VehicleConfig) {
             if k == place {
                 let length = key_frame::encode(&live.flight_loop, at(k), &mut frame).expect("room");
                 assert_eq!(key_frame::restore(&frame[..length], flight_loop, outside), Ok(at(k)));
+                assert_eq!(shown(flight_loop.runnables()), shown(live.flight_loop.runnables()));
             }
             if k > place {
                 publish(outside, k, &mut same_numbers.clone());
