@@ -2,7 +2,7 @@
 
 use crate::Input;
 use stampfly_link::{Address, ControlPacket, PairingPacket, Session, TelemetryPacket};
-use stampfly_types::Micros;
+use stampfly_types::Instant;
 
 const VEHICLE: Address = Address([0x34, 0x85, 0x18, 0xAB, 0xCD, 0xEF]);
 /// Stations that send.
@@ -23,7 +23,7 @@ pub fn radio_packets(data: &[u8]) {
     while !input.is_empty() {
         let (event, step) = (input.byte(), input.byte());
         now += u64::from(step) * 10_000;
-        let at = Micros(now);
+        let at = Instant::from_micros(now);
         let before = session.peer();
         match event % 8 {
             0 => armed = true,
@@ -48,7 +48,7 @@ pub fn radio_packets(data: &[u8]) {
 }
 
 /// A frame: its length and its bytes, or a valid packet with a byte changed.
-fn receive(session: &mut Session, at: Micros, event: u8, input: &mut Input<'_>) {
+fn receive(session: &mut Session, at: Instant, event: u8, input: &mut Input<'_>) {
     let source = STATIONS[usize::from(event >> 3) % STATIONS.len()];
     let mut valid = ControlPacket::centred(VEHICLE).to_bytes();
     let bytes = if event % 8 == 5 {
@@ -81,7 +81,7 @@ fn receive(session: &mut Session, at: Micros, event: u8, input: &mut Input<'_>) 
         Ok(pilot) => {
             assert_eq!(counted(session), (accepted + 1, refused));
             assert_eq!(session.peer(), Some(source));
-            assert_eq!(session.age(at), Some(Micros::ZERO));
+            assert_eq!(session.age(at), Some(Instant::ZERO));
             let sticks = [pilot.roll, pilot.pitch, pilot.yaw, pilot.throttle];
             assert!(sticks.iter().all(|stick| (-1.0..=1.0).contains(stick)), "{pilot:?}");
         }

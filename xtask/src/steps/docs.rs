@@ -32,13 +32,13 @@ const GENERATED: &[(&str, &str, &str)] = &[
         "docs/topics.md",
         "topics",
         "# Topics\n\nThe topics of the StampFly, their publishers and their readers. Printed from the topic table in \
-         `stampfly-board/src/topic_table.rs` by `cargo xtask docs --fix`. The log reads every topic.",
+         `stampfly-board/src/topics.rs` by `cargo xtask docs --fix`. The log reads every topic.",
     ),
     (
         "docs/schedule.md",
         "schedule",
         "# Schedule\n\nThe activations of the StampFly's runnables. Printed from the activation table in \
-         `stampfly-board/src/activation_table.rs` by `cargo xtask docs --fix`.\n\nThe budget is the most that an activation \
+         `stampfly-board/src/schedule.rs` by `cargo xtask docs --fix`.\n\nThe budget is the most that an activation \
          may take on the target; `cargo xtask qemu` counts what it takes. The response is the longest time from a \
          runnable's trigger until it has published, provided that every runnable keeps to its budget: for `actuation` \
          that is the time from an inertial sample to the motors. The compiler computes it (`stampfly-bus/src/response.rs`) \
