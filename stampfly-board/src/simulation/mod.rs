@@ -13,9 +13,11 @@ pub mod flight;
 pub mod ground_station;
 pub mod metrics;
 pub mod mission;
+mod page;
 pub mod sensing;
 
 pub use flight::{Outcome, Phase, Setup};
+pub use page::PAGE;
 
 use crate::config::VehicleConfig;
 use crate::golden;
@@ -26,7 +28,7 @@ use sensing::Sensing;
 use stampfly_flight::parameters::{self, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
-use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Setting, SetupError, Vehicle};
+use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Page, Setting, SetupError, Vehicle};
 use stampfly_types::Message;
 use std::fmt::Display;
 use std::format;
@@ -39,6 +41,7 @@ pub struct StampFly;
 impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
+    const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
     type Surroundings = flight::Surroundings;

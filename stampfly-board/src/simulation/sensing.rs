@@ -42,24 +42,12 @@ macro_rules! spawn {
     }};
 }
 
-/// The ends that sensors publish to.
-pub(super) struct SensorEnds<'b> {
-    pub imu: topics::ImuEnds<'b>,
-    pub tof: topics::TofEnds<'b>,
-    pub tof_front: topics::TofFrontEnds<'b>,
-    pub flow: topics::FlowEnds<'b>,
-    pub mag: topics::MagEnds<'b>,
-    pub baro: topics::BaroEnds<'b>,
-    pub power: topics::PowerEnds<'b>,
-    /// Only where cameras watch.
-    pub cameras: Option<topics::CamerasEnds<'b>>,
-}
-
-/// What is left of the models when the sensors have been started.
-pub(super) struct Actuators {
-    pub motors: MotorModel,
-    pub indicator: IndicatorRecorder,
-    pub button: ButtonModel,
+/// What is left when the sensors have been started: models, and the ends of everybody else outside.
+pub(super) struct Others<'b> {
+    pub motors: (MotorModel, topics::MotorsEnds<'b>),
+    pub indicator: (IndicatorRecorder, topics::IndicatorEnds<'b>),
+    pub button: (ButtonModel, topics::ButtonPinEnds<'b>),
+    pub link: topics::LinkEnds<'b>,
 }
 
 /// What the drivers of one vehicle share; to be made before the tasks.
@@ -86,9 +74,10 @@ pub(super) fn start_models<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
     models: Sensors,
-    ends: SensorEnds<'a>,
+    ends: topics::Outside<'a>,
+    cameras: bool,
     health: &'a Healths,
-) -> Actuators {
+) -> Others<'a> {
     let mut health = health.iter();
     spawn!(tasks, clock, health, CRITICAL, models.imu => ends.imu.sensor_imu);
     spawn!(tasks, clock, health, SHARED, models.tof => ends.tof.sensor_tof);
@@ -96,10 +85,15 @@ pub(super) fn start_models<'a>(
     spawn!(tasks, clock, health, SHARED, models.mag => ends.mag.sensor_mag);
     spawn!(tasks, clock, health, SHARED, models.baro => ends.baro.sensor_baro);
     spawn!(tasks, clock, health, SHARED, models.power => ends.power.sensor_power);
-    if let Some(ends) = ends.cameras {
-        spawn!(tasks, clock, health, SHARED, models.cameras => ends.external_pose);
+    if cameras {
+        spawn!(tasks, clock, health, SHARED, models.cameras => ends.cameras.external_pose);
     }
-    Actuators { motors: models.motors, indicator: models.indicator, button: models.button }
+    Others {
+        motors: (models.motors, ends.motors),
+        indicator: (models.indicator, ends.indicator),
+        button: (models.button, ends.button_pin),
+        link: ends.link,
+    }
 }
 
 /// Starts a task for each driver, over these chips.
@@ -109,9 +103,10 @@ pub(super) fn start_drivers<'a>(
     board: chips::Board,
     shared: &'a mut Shared,
     models: Sensors,
-    ends: SensorEnds<'a>,
+    ends: topics::Outside<'a>,
+    cameras: bool,
     health: &'a Healths,
-) -> Actuators {
+) -> Others<'a> {
     let mut health = health.iter();
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = shared.i2c.split();
     let chips::Board { imu, flow, shutdown_bottom, shutdown_front, .. } = board;
@@ -128,8 +123,13 @@ pub(super) fn start_drivers<'a>(
     spawn!(tasks, clock, health, SHARED, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
     spawn!(tasks, clock, health, SHARED, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
     spawn!(tasks, clock, health, SHARED, devices::power(to_power, time()) => ends.power.sensor_power);
-    if let Some(ends) = ends.cameras {
-        spawn!(tasks, clock, health, SHARED, models.cameras => ends.external_pose);
+    if cameras {
+        spawn!(tasks, clock, health, SHARED, models.cameras => ends.cameras.external_pose);
     }
-    Actuators { motors: models.motors, indicator: models.indicator, button: models.button }
+    Others {
+        motors: (models.motors, ends.motors),
+        indicator: (models.indicator, ends.indicator),
+        button: (models.button, ends.button_pin),
+        link: ends.link,
+    }
 }

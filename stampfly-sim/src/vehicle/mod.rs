@@ -12,9 +12,11 @@
 
 mod executor;
 mod jitter;
+mod page;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, fly};
+pub use page::{Body, Observer, Page, PanelSpec, Pick};
 pub use witness::Witness;
 
 use crate::time::{Clock, Tasks};
@@ -164,6 +166,8 @@ pub trait Vehicle: 'static {
     const NAME: &'static str;
     /// Topics that its surroundings add to the log.
     const BESIDE: &'static [Topic];
+    /// What a page about a flight shows of it. By default a plot per topic and unit.
+    const PAGE: Page = Page { observers: &[], setpoint: None, panels: &[], bands: &[], alerts: None, body: Body::NONE };
     /// Its runnables. Serialisable, so that a log can hold key frames.
     type Runnables: Schedule + Serialize + DeserializeOwned;
     /// All that decides a flight.

@@ -4,8 +4,8 @@ use crate::Failure;
 use crate::arguments::EstimateOptions;
 use crate::terminal;
 use serde::Serialize;
-use stampfly_host::report::Metric;
 use stampfly_host::Report;
+use stampfly_host::report::Metric;
 use stampfly_lab::Recording;
 use stampfly_lab::dataset::{self, Kind};
 use stampfly_lab::estimate::{self, Estimated, Figures};
@@ -58,6 +58,7 @@ fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {
             title: recording.name.clone(),
             subtitle: format!("estimate over a recording: {}", recording.kind),
             metrics: metrics(&recording, &estimated),
+            page: &stampfly_board::simulation::PAGE,
             flight: &flight,
         };
         report.write(&page).map_err(|error| format!("{}: {error}", page.display()))?;
