@@ -177,11 +177,11 @@ impl vehicle::Surroundings for Surroundings {
             baro,
             cameras,
             power,
-            self_test: _,
             link,
             button_pin,
             motors,
             indicator,
+            ..
         } = outside;
         let cameras = Some(cameras).filter(|_| setup.cameras);
         let ends = SensorEnds { imu, tof, tof_front, flow, mag, baro, power, cameras };
