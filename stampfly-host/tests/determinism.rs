@@ -34,7 +34,11 @@ fn watching_changes_nothing() {
     assert_eq!(hash_with(&setup, Recorder::<StampFly>::with_log(&setup, &[])), expected, "with a log");
     assert_eq!(hash_with(&setup, Recorder::<StampFly>::hash_only().with_timing()), expected, "with timing");
     let facts = [("who".to_owned(), "somebody".to_owned())];
-    assert_eq!(hash_with(&setup, Recorder::<StampFly>::with_log(&setup, &facts).with_timing()), expected, "with both, and facts");
+    assert_eq!(
+        hash_with(&setup, Recorder::<StampFly>::with_log(&setup, &facts).with_timing()),
+        expected,
+        "with both, and facts"
+    );
 }
 
 #[test]

@@ -94,9 +94,9 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
     };
     let (time, alarm, count) = (clock.clone(), clock.clone(), Count(&ran));
     let flight_loop = &mut flight_loop;
-    tasks.spawn(async move {
-        match task::fly(sensing, flight_loop, || time.now(), alarm, count, write_motors).await {}
-    });
+    tasks.spawn(
+        async move { match task::fly(sensing, flight_loop, || time.now(), alarm, count, write_motors).await {} },
+    );
 
     let mut hash = FlightHash::new();
     let end = setup.simulation.start + expected.duration;

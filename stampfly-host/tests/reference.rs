@@ -73,7 +73,12 @@ fn four_times_the_vibration_still_lands() {
     let flights = campaign(|setup| setup.simulation.vibration = 4.0);
     expect(&flights, &[("touchdown_speed_mps", 1.0), ("land_error_m", 1.0)]);
     for flight in &flights {
-        assert!(flight.flown.outcome.worst_tilt_deg < 35.0, "seed {}: {}°", flight.seed, flight.flown.outcome.worst_tilt_deg);
+        assert!(
+            flight.flown.outcome.worst_tilt_deg < 35.0,
+            "seed {}: {}°",
+            flight.seed,
+            flight.flown.outcome.worst_tilt_deg
+        );
     }
 }
 

@@ -3,10 +3,10 @@
 //! The simulator's executor flies the stack as in every mission, in surroundings of this test's own: without mission, log
 //! and figures; in exchange a script may use every command there is, press the button and silence the inertial sensor.
 
+use stampfly_board::VehicleConfig;
 use stampfly_board::messages::{ButtonContact, TelemetryFrame};
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics::{self, Id};
-use stampfly_board::VehicleConfig;
 use stampfly_drivers::{
     Barometer, Button, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
 };
