@@ -4,8 +4,8 @@
 //! cargo run -p stampfly-host --example report -- out.html [FILE]
 //! ```
 
-use stampfly_host::report::Metric;
-use stampfly_host::{Flight, Report, dataset, flight_log};
+use stampfly_host::{Report, report::Metric};
+use stampfly_lab::{Flight, dataset, flight_log};
 
 #[path = "../tests/made_up/mod.rs"]
 mod made_up;

@@ -3,8 +3,8 @@
 mod made_up;
 
 use serde_json::Value;
-use stampfly_host::report::Metric;
-use stampfly_host::{Flight, Report};
+use stampfly_host::{Report, report::Metric};
+use stampfly_lab::Flight;
 use stampfly_types::{Instant, messages::PowerData};
 
 fn page(flight: &Flight) -> String {
