@@ -82,3 +82,40 @@ parameters! {
         watchdog = 0.3 in [0.15, 5.0] "s";
     }
 }
+
+parameters! {
+    /// How the vehicle is put together: read at power-on and fixed from then on.
+    pub struct Assembly, consistent if |_assembly| true;
+
+    /// Components in processes of their own.
+    remote: RemoteComponents {
+        /// 1: the engine is another process, heard through Com.
+        engine = 0.0 in [0.0, 1.0] "1";
+    }
+    /// Where the vehicle stands.
+    start: StartPose {
+        /// Forward.
+        x = 0.0 in [-1000.0, 1000.0] "m";
+        /// Left.
+        y = 0.0 in [-1000.0, 1000.0] "m";
+        /// Counter-clockwise.
+        yaw = 0.0 in [-10.0, 10.0] "rad";
+    }
+}
+
+/// What the runnables are configured from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Config {
+    /// The parameters at power-on.
+    pub parameters: Parameters,
+    /// What cannot change afterwards.
+    pub assembly: Assembly,
+}
+
+impl Config {
+    /// Is the engine another process?
+    #[must_use]
+    pub fn has_remote_engine(&self) -> bool {
+        self.assembly.remote.engine > 0.5
+    }
+}
