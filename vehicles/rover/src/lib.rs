@@ -35,7 +35,7 @@ pub mod schedule;
 pub mod simulation;
 pub mod topics;
 
-pub use parameters::{Config, Parameters};
+pub use parameters::Parameters;
 pub use schedule::Runnables;
 
 /// The README's example, compiled.

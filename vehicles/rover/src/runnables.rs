@@ -10,7 +10,7 @@ use crate::parameters::PROBATION;
 use crate::safety::{SafetyInput, SafetySupervisor};
 use crate::schedule::TICK;
 use crate::topics::*;
-use crate::{Config, Parameters, diag, models};
+use crate::{Parameters, diag, models};
 use serde::{Deserialize, Serialize};
 use stampfly_bus::{Activation, LATEST_DEPTH, NewestInput, Runnable};
 use stampfly_param::{ParameterSet, ParameterStatus};
@@ -30,36 +30,40 @@ fn must_stop(now: Instant, status: &SafetyStatusInput<'_>, parameters: &Paramete
     status.get().must_stop(status.sample().map(|sample| sample.age(now)), &parameters.safety)
 }
 
-/// Components without a state of their own.
-macro_rules! stateless {
-    ($($(#[$doc:meta])* $Name:ident),+) => { $(
+/// Components that begin with nothing but their default.
+macro_rules! components {
+    ($($(#[$doc:meta])* $Name:ident($State:ty);)+) => { $(
         $(#[$doc])*
         #[derive(Clone, Debug, Serialize, Deserialize)]
-        pub struct $Name;
+        pub struct $Name($State);
 
         impl $Name {
-            pub(crate) fn new(_: &Config) -> Self {
-                Self
+            pub(crate) fn new(_: &Parameters) -> Self {
+                Self(<$State>::default())
             }
         }
     )+ };
 }
 
-stateless! {
+components! {
+    /// Heartbeats, faults and the emergency stop to the state of the vehicle.
+    SafetySupervisorSwc(SafetySupervisor);
+    /// Operator, scenario or recorded log to the driver's input.
+    DriverInputSwc(DriverSelector);
+    /// Throttle to acceleration. Remembers whether the engine is another process.
+    EngineSwc(bool);
     /// Pedal to deceleration.
-    BrakeSwc,
+    BrakeSwc(());
+    /// Wheel to steering angle, which it remembers, because it lags.
+    SteeringSwc(f32);
+    /// Commands to motion.
+    VehicleDynamicsSwc(VehicleState);
     /// Signals to one line of the log.
-    LoggingSwc
-}
-
-/// Heartbeats, faults and the emergency stop to the state of the vehicle.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct SafetySupervisorSwc(SafetySupervisor);
-
-impl SafetySupervisorSwc {
-    pub(crate) fn new(_: &Config) -> Self {
-        Self(SafetySupervisor::default())
-    }
+    LoggingSwc(());
+    /// Signals to faults. Remembers all it has seen.
+    DiagSwc(Faults);
+    /// Is everything heard that must be? Remembers which components are other processes.
+    ComSwc(Components);
 }
 
 impl Runnable for SafetySupervisorSwc {
@@ -96,9 +100,9 @@ pub struct NvmSwc {
 }
 
 impl NvmSwc {
-    pub(crate) fn new(config: &Config) -> Self {
-        // A vehicle that was configured with values it would refuse starts with the defaults.
-        Self { set: ParameterSet::new(config.parameters, PROBATION).unwrap_or_default(), published: None }
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        // A vehicle that is given values it would refuse starts with the table's.
+        Self { set: ParameterSet::new(*parameters, PROBATION).unwrap_or_default(), published: None }
     }
 }
 
@@ -121,16 +125,6 @@ impl Runnable for NvmSwc {
     }
 }
 
-/// Operator, scenario or recorded log to the driver's input.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct DriverInputSwc(DriverSelector);
-
-impl DriverInputSwc {
-    pub(crate) fn new(_: &Config) -> Self {
-        Self(DriverSelector::default())
-    }
-}
-
 impl Runnable for DriverInputSwc {
     type Ends<'b> = DriverInputEnds<'b>;
 
@@ -148,30 +142,18 @@ impl Runnable for DriverInputSwc {
     }
 }
 
-/// Throttle to acceleration, or what the engine in another process says.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct EngineSwc {
-    is_remote: bool,
-}
-
-impl EngineSwc {
-    pub(crate) fn new(config: &Config) -> Self {
-        Self { is_remote: config.has_remote_engine() }
-    }
-}
-
 impl Runnable for EngineSwc {
     type Ends<'b> = EngineEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut EngineEnds<'_>) {
         let (now, parameters) = (activation.now(), ends.parameters.get());
         let estop = must_stop(now, &ends.safety_status, parameters);
-        let acceleration = match self.is_remote {
+        let remote = &ends.remote_drive;
+        self.0 |= remote.is_new();
+        let acceleration = match self.0 {
             false => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
-            true if ends.remote_drive.is_new() => {
-                if estop { 0.0 } else { ends.remote_drive.get().acceleration }
-            }
-            // Each command is a heartbeat; without one this engine has none either.
+            true if remote.is_new() => if estop { 0.0 } else { remote.get().acceleration },
+            // Each command is a heartbeat; without one this component has none either.
             true => return,
         };
         ends.drive_command.publish(now, &DriveCommand { acceleration });
@@ -189,18 +171,6 @@ impl Runnable for BrakeSwc {
     }
 }
 
-/// Wheel to steering angle, with its lag.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct SteeringSwc {
-    angle: f32,
-}
-
-impl SteeringSwc {
-    pub(crate) fn new(_: &Config) -> Self {
-        Self { angle: 0.0 }
-    }
-}
-
 impl Runnable for SteeringSwc {
     type Ends<'b> = SteeringEnds<'b>;
 
@@ -208,19 +178,8 @@ impl Runnable for SteeringSwc {
         let (now, parameters) = (activation.now(), ends.parameters.get());
         let estop = must_stop(now, &ends.safety_status, parameters);
         let target = models::steering_target(ends.driver_input.get().steer, estop, &parameters.steering);
-        self.angle = models::step_steering(self.angle, target, TICK, &parameters.steering);
-        ends.steering_command.publish(now, &SteeringCommand { angle: self.angle });
-    }
-}
-
-/// Commands to motion.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct VehicleDynamicsSwc(VehicleState);
-
-impl VehicleDynamicsSwc {
-    pub(crate) fn new(config: &Config) -> Self {
-        let start = &config.assembly.start;
-        Self(VehicleState { x: start.x, y: start.y, yaw: start.yaw, ..VehicleState::default() })
+        self.0 = models::step_steering(self.0, target, TICK, &parameters.steering);
+        ends.steering_command.publish(now, &SteeringCommand { angle: self.0 });
     }
 }
 
@@ -251,18 +210,6 @@ impl Runnable for LoggingSwc {
     }
 }
 
-/// Signals to faults.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct DiagSwc {
-    seen: Faults,
-}
-
-impl DiagSwc {
-    pub(crate) fn new(_: &Config) -> Self {
-        Self { seen: Faults::NONE }
-    }
-}
-
 impl Runnable for DiagSwc {
     type Ends<'b> = DiagEnds<'b>;
 
@@ -275,20 +222,8 @@ impl Runnable for DiagSwc {
             state: *ends.vehicle_state.get(),
         };
         let faults = diag::check(&signals, ends.parameters.get());
-        self.seen = self.seen | faults;
-        ends.diag_status.publish(activation.now(), &DiagStatus { faults, seen: self.seen });
-    }
-}
-
-/// Is everything heard that must be?
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct ComSwc {
-    needs_engine: bool,
-}
-
-impl ComSwc {
-    pub(crate) fn new(config: &Config) -> Self {
-        Self { needs_engine: config.has_remote_engine() }
+        self.0 = self.0 | faults;
+        ends.diag_status.publish(activation.now(), &DiagStatus { faults, seen: self.0 });
     }
 }
 
@@ -296,9 +231,10 @@ impl Runnable for ComSwc {
     type Ends<'b> = ComEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut ComEnds<'_>) {
-        // Without a heartbeat of Com and of the component that is not heard, two are missing: an emergency stop.
         let heard = Components::NONE.set(Components::ENGINE, ends.remote_drive.is_new());
-        if !self.needs_engine || heard.contains(Components::ENGINE) {
+        self.0 = self.0 | heard;
+        // When one is not heard, its heartbeat and this one are missing: two, so an emergency stop.
+        if heard == self.0 {
             ends.com_status.publish(activation.now(), &ComStatus { heard });
         }
     }

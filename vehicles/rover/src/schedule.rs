@@ -3,7 +3,7 @@
 //! The tick of 10 ms is a chain from driver input to diagnosis. The supervisor runs before it, whenever the operator or a
 //! replay says something, so an emergency stop acts in the tick that follows it.
 
-use crate::Config;
+use crate::Parameters;
 use crate::runnables::*;
 use serde::{Deserialize, Serialize};
 use stampfly_types::Duration;
@@ -14,7 +14,7 @@ pub const TICK: Duration = Duration::from_millis(10);
 stampfly_bus::schedule! {
     /// The rover's runnables: the state of the vehicle.
     #[derive(Clone, Debug, Serialize, Deserialize)]
-    pub struct Runnables on crate::topics from Config;
+    pub struct Runnables on crate::topics from Parameters;
 
     /// Heartbeats, faults and the emergency stop; every 100 ms even when nothing is said.
     safety_supervisor = SafetySupervisorSwc: on operator_command | replay_record or at latest 100 ms, flight, 40 us;
