@@ -93,13 +93,7 @@ impl<A: PartialEq, T: Default, const N: usize> Peers<A, T, N> {
     }
 
     /// Hands `put` a message for every peer that wants it, with the peer's address.
-    pub fn send<B: Body>(
-        &mut self,
-        now: Instant,
-        body: B,
-        wants: impl Fn(&T) -> bool,
-        put: &mut dyn FnMut(&A, &[u8]),
-    ) {
+    pub fn send<B: Body>(&mut self, now: Instant, body: B, wants: impl Fn(&T) -> bool, put: &mut dyn FnMut(&A, &[u8])) {
         let mut datagram = Datagram { sequence: self.sequence, time: now, body };
         for peer in self.peers.iter().flatten().filter(|peer| wants(&peer.notes)) {
             datagram.sequence = self.sequence;

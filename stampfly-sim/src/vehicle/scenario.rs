@@ -8,8 +8,8 @@
 //! 6.0  end
 //! ```
 //!
-//! Times are seconds from the start, ascending. A check is made on the first line of the log at or after its time. For
-//! vehicles that are driven by hand; one that is told where to go has a mission instead.
+//! Times are seconds from the start, ascending. A check is made on the first line of the log at or after its time; a command
+//! acts after its time, so a check at the same time sees what was before it. For vehicles that are driven by hand; one that is told where to go has a mission instead.
 
 use core::marker::PhantomData;
 use stampfly_types::{FieldInfo, FieldKind, Message, text};
@@ -73,7 +73,8 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
                 ["end"] => (scenario.end, ended) = (time, true),
                 ["check", check @ ..] => scenario.checks.push(parse_check::<L>(time, check).map_err(at)?),
                 words => {
-                    let command = changed(&scenario.command(time), words).filter(is_valid);
+                    let before = scenario.commands.last().map_or_else(C::default, |(_, command)| *command);
+                    let command = changed(&before, words).filter(is_valid);
                     let command = command.ok_or_else(|| at(format!("'{}' is no command", words.join(" "))))?;
                     scenario.commands.push((time, command));
                 }
@@ -88,10 +89,10 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
         self.end
     }
 
-    /// The command at this time; the default before the first.
+    /// The command that acts at this time; the default before the first.
     #[must_use]
     pub fn command(&self, time: f32) -> C {
-        let command = self.commands.iter().rev().find(|(since, _)| *since <= time);
+        let command = self.commands.iter().rev().find(|(since, _)| *since < time);
         command.map_or_else(C::default, |(_, command)| *command)
     }
 

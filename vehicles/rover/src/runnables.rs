@@ -152,7 +152,13 @@ impl Runnable for EngineSwc {
         self.0 |= remote.is_new();
         let acceleration = match self.0 {
             false => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
-            true if remote.is_new() => if estop { 0.0 } else { remote.get().acceleration },
+            true if remote.is_new() => {
+                if estop {
+                    0.0
+                } else {
+                    remote.get().acceleration
+                }
+            }
             // Each command is a heartbeat; without one this component has none either.
             true => return,
         };

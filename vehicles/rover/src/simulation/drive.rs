@@ -173,13 +173,14 @@ impl vehicle::Around for Around<'_> {
     }
 
     fn progress(&self) -> (f32, &'static str) {
-        let (done, all) = (self.lines.len(), Rover::options(self.setup).limit.seconds() / TICK.seconds());
-        (done as f32 / all, self.lines.last().map_or("", |line| line.system_state.name()))
+        (
+            self.lines.len() as f32 / self.setup.ticks() as f32,
+            self.lines.last().map_or("", |line| line.system_state.name()),
+        )
     }
 
     fn is_over(&mut self, _: Instant) -> bool {
-        // At the limit.
-        false
+        self.lines.len() as u64 >= self.setup.ticks()
     }
 
     fn finish(self) -> Drive {

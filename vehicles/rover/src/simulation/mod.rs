@@ -11,6 +11,7 @@ pub use drive::{Around, Drive, Surroundings};
 
 use crate::com::Body;
 use crate::messages::{LogRecord, OperatorCommand};
+use crate::schedule::TICK;
 use crate::{Parameters, Runnables};
 use stampfly_link::datagram::Body as _;
 use stampfly_log::csv;
@@ -66,6 +67,18 @@ pub struct Setup {
     pub jitter: Option<u64>,
 }
 
+impl Setup {
+    /// For how many ticks it is driven.
+    fn ticks(&self) -> u64 {
+        let limit = match &self.driver {
+            Driver::Scenario(scenario) => Duration::from_seconds(scenario.end()),
+            Driver::Replay(lines) => return lines.len() as u64,
+            Driver::Live(live) => live.limit,
+        };
+        limit.as_micros() / TICK.as_micros()
+    }
+}
+
 /// The drive when no other is asked for: every mode, an emergency stop, a reset.
 const COURSE: &str = include_str!("../../scenarios/course.txt");
 /// Random number streams of vehicle and operator.
@@ -118,11 +131,8 @@ impl Vehicle for Rover {
     }
 
     fn options(setup: &Setup) -> FlightOptions {
-        let limit = match &setup.driver {
-            Driver::Live(live) => live.limit,
-            Driver::Scenario(scenario) => Duration::from_seconds(scenario.end()),
-            Driver::Replay(lines) => Duration::from_millis(10 * lines.len() as u64),
-        };
+        // The drive itself says when it is over; an executor may be late.
+        let limit = Duration::from_micros(TICK.as_micros() * (setup.ticks() + 1));
         FlightOptions { start: Instant::ZERO, limit, jitter: setup.jitter }
     }
 
