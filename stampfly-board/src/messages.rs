@@ -43,9 +43,9 @@ message! {
     /// One motor to turn. Ignored while the vehicle is armed, and over when it has been armed since.
     pub struct MotorTest {
         /// 1 to 4; 0 for none.
-        motor: u32 ["1"],
+        motor: u32,
         /// Share of the full duty.
-        duty: f32 ["1"],
+        duty: f32,
         /// When it ends, µs since power-on.
         until: u64 ["us"],
     }
@@ -55,7 +55,7 @@ message! {
     /// Is flash being written? It stops both cores for up to 200 ms, so no motor may turn.
     pub struct StorageBusy {
         /// From before the first write to after the last.
-        busy: bool ["1"],
+        busy: bool,
     }
 }
 
@@ -63,7 +63,7 @@ message! {
     /// Look for another transmitter, or stop looking.
     pub struct PairingRequest {
         /// Look for one?
-        wanted: bool ["1"],
+        wanted: bool,
     }
 }
 
@@ -71,7 +71,7 @@ message! {
     /// A transmitter's address.
     pub struct LinkPeer {
         /// Its six bytes, the first one highest.
-        address: u64 ["1"],
+        address: u64,
     }
 }
 
@@ -79,7 +79,7 @@ message! {
     /// The processor is to be restarted.
     pub struct RestartRequest {
         /// Always true.
-        requested: bool ["1"],
+        requested: bool,
     }
 }
 
@@ -87,7 +87,7 @@ message! {
     /// State of the cut-off, which stops motors that the flight task does not confirm.
     pub struct CutoffState {
         /// Has it stopped the motors, and not been reset since?
-        tripped: bool ["1"],
+        tripped: bool,
     }
 }
 

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         },
     };
     let metrics = metrics(&flight);
-    Report { title, subtitle, metrics, flight: &flight }.write(&out)?;
+    Report { title, subtitle, metrics, page: &stampfly_board::simulation::PAGE, flight: &flight }.write(&out)?;
     println!("{out}");
     Ok(())
 }

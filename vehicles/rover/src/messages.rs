@@ -167,7 +167,7 @@ message! {
     /// Com works, and hears every component that is another process.
     pub struct ComStatus {
         /// Those heard since the last time.
-        heard: Components ["1"],
+        heard: Components,
     }
 }
 
