@@ -111,7 +111,7 @@ fn without_arguments_it_flies() {
     let folder = folder("nothing");
     let ran = run(&folder, &[]);
     assert_eq!(ran.code, 0, "{}", ran.err);
-    for part in ["phases", "TakeOff", "figures", "landed and disarmed", "flight.ulg", "flight.html"] {
+    for part in ["flight\n", "IdleGround", "TakeOff", "figures", "landed and disarmed", "flight.ulg", "flight.html"] {
         assert!(ran.out.contains(part), "{part} is missing:\n{}", ran.out);
     }
     assert!(FIGURES.iter().all(|figure| ran.out.contains(figure)), "{}", ran.out);
