@@ -56,8 +56,19 @@ pub async fn run(parts: Parts) {
     // A version that is too long ends early.
     let _ = write!(version, concat!("stampfly-esp32s3 ", env!("CARGO_PKG_VERSION"), ", {}"), tested);
     let (flown, screen) = (config.clone(), Screen(screen));
-    let mut console =
-        Console { screen, memory, health, profile, ends, storage, storage_ends, config, flown, version, unstored: None };
+    let mut console = Console {
+        screen,
+        memory,
+        health,
+        profile,
+        ends,
+        storage,
+        storage_ends,
+        config,
+        flown,
+        version,
+        unstored: None,
+    };
     let mut editor = LineEditor::<80>::new();
     let mut typed = [0; 64];
     let mut ticker = Ticker::every(STORE_PERIOD);
@@ -128,11 +139,13 @@ impl Console {
             }
             Request::Vehicle(command) => {
                 command.publish(Clock.now(), &mut self.ends);
-                self.screen.show(match command {
-                    Command::Pair(true) => "looking for a transmitter\r\n",
-                    Command::TestMotor { .. } => "turning for two seconds\r\n",
-                    Command::Pair(false) | Command::StopMotor => "stopped\r\n",
-                }).await;
+                self.screen
+                    .show(match command {
+                        Command::Pair(true) => "looking for a transmitter\r\n",
+                        Command::TestMotor { .. } => "turning for two seconds\r\n",
+                        Command::Pair(false) | Command::StopMotor => "stopped\r\n",
+                    })
+                    .await;
             }
             Request::DumpLog => self.dump().await,
             Request::Reboot => restart(),

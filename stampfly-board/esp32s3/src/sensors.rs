@@ -83,7 +83,13 @@ pub async fn run(parts: Parts) {
     let mut baro_chip = devices::barometer(to_baro, Clock);
     let mut power_chip = devices::power(to_power, Clock);
     join5(
-        run_sensor(async || down.next().await, |at, sample| _ = tof.sensor_tof.publish(at, sample), Clock, Backoff::SHARED, &health.tof),
+        run_sensor(
+            async || down.next().await,
+            |at, sample| _ = tof.sensor_tof.publish(at, sample),
+            Clock,
+            Backoff::SHARED,
+            &health.tof,
+        ),
         run_sensor(
             async || ahead.next().await,
             |at, sample| _ = tof_front.sensor_tof_front.publish(at, sample),

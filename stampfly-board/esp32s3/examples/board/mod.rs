@@ -23,7 +23,7 @@ mod panic;
 #[path = "../../src/pins.rs"]
 pub mod pins;
 #[path = "../../src/safe_state.rs"]
-mod safe_state;
+pub mod safe_state;
 #[path = "../../src/spi.rs"]
 pub mod spi;
 
