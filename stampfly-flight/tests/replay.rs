@@ -5,9 +5,7 @@ use core::convert::Infallible;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 use stampfly_bus::{Activation, Band, Duration, Instant, Runnable, Taps, TopicTable, message};
-use stampfly_flight::{
-    Assembled, LogSchema, Recorder, Replay, ReplayError, ReplayOptions, key_frame, replay::replay,
-};
+use stampfly_flight::{Assembled, LogSchema, Recorder, Replay, ReplayError, ReplayOptions, key_frame, replay::replay};
 use stampfly_log::ulog::{Definitions, Sink};
 
 message! {
@@ -211,7 +209,8 @@ fn another_robots_key_frame_is_refused() {
     let length = key_frame::encode(&flight_loop, Instant::from_millis(3), &mut frame).expect("room");
     assert_eq!(key_frame::encode(&flight_loop, Instant::ZERO, &mut [0; 16]), Err(key_frame::KeyFrameError::NoRoom));
     let mut again = topics::Bus::new();
-    let Assembled { mut flight_loop, mut outside, .. } = Assembled::<Robot>::new(again.split(None), &GAIN, Instant::ZERO);
+    let Assembled { mut flight_loop, mut outside, .. } =
+        Assembled::<Robot>::new(again.split(None), &GAIN, Instant::ZERO);
     let mut restore = |bytes: &[u8]| key_frame::restore(bytes, &mut flight_loop, &mut outside);
     assert_eq!(restore(&frame[..length]), Ok(Instant::from_millis(3)));
     for cut in 0..length {
