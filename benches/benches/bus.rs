@@ -11,7 +11,6 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pubsub::{PubSubChannel, WaitResult};
 use embassy_sync::watch::Watch;
 use heapless::spsc;
-use stampfly_bus::topics;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3};
 use std::future::Future;
@@ -20,13 +19,18 @@ use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, Waker};
 
-topics! {
-    /// What is measured.
-    pub mod wiring;
-    /// A sample.
-    sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe];
-    /// The newest sample.
-    newest_imu: ImuData = latest @ 400 Hz from imu => [estimation];
+/// What is measured.
+mod topics {
+    use stampfly_types::messages::ImuData;
+
+    stampfly_bus::topics! {
+        outside imu, estimation, failsafe;
+
+        /// A sample.
+        sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe];
+        /// The newest sample.
+        newest_imu: ImuData = latest @ 400 Hz from imu => [estimation];
+    }
 }
 
 static WOKEN: AtomicBool = AtomicBool::new(false);
@@ -51,23 +55,23 @@ trait Measure {
 
 /// Hands every contender's publish-and-read to `measure`, in turn.
 fn contenders(measure: &mut impl Measure) {
-    let mut bus = wiring::Bus::new();
-    let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu }, .. } = bus.split(None);
-    let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
+    let mut bus = topics::Bus::new();
+    let topics::Outside { imu, estimation, failsafe: _other } = bus.split(None).outside;
+    let (mut tx, mut rx) = (imu.sensor_imu, estimation.sensor_imu);
     measure.contender("stampfly-bus ring, polling", |k| {
         tx.publish(Instant::from_micros(k), &sample(k));
         rx.next().map(|s| s.data)
     });
 
-    let (mut tx, mut rx) = (newest_imu.tx, newest_imu.estimation);
+    let (mut tx, mut rx) = (imu.newest_imu, estimation.newest_imu);
     measure.contender("stampfly-bus latest, polling", |k| {
         tx.publish(Instant::from_micros(k), &sample(k));
         rx.latest().map(|s| s.data)
     });
 
-    let mut bus = wiring::Bus::new();
-    let wiring::Split { ports: wiring::Ports { sensor_imu, newest_imu: _newest }, .. } = bus.split(Some(wake));
-    let (mut tx, mut rx, _other) = (sensor_imu.tx, sensor_imu.estimation, sensor_imu.failsafe);
+    let mut bus = topics::Bus::new();
+    let topics::Outside { imu, estimation, failsafe: _other } = bus.split(Some(wake)).outside;
+    let (mut tx, mut rx) = (imu.sensor_imu, estimation.sensor_imu);
     measure.contender("stampfly-bus ring, waiting", |k| {
         tx.publish(Instant::from_micros(k), &sample(k));
         if WOKEN.swap(false, Ordering::AcqRel) { rx.next().map(|s| s.data) } else { None }

@@ -1,13 +1,13 @@
 //! One period of the flight loop, inertial sample to motor duty, on a recorded flight: the whole and every stage.
 //!
 //! The vehicle is the assembled StampFly in the air, with the other sensors at their rates, so the figures are the
-//! mean mix and not a best case. A stage is a runnable: it computes and publishes; reading its topics is in the whole
-//! only.
+//! mean mix and not a best case. A stage is a runnable: it reads its topics, computes and publishes.
 
 use criterion::{Criterion, criterion_group};
 use stampfly_benches::flight::{FLYING_FROM, Recording, Replay, STEPS};
-use stampfly_board::{Observer, plan, wiring};
+use stampfly_board::{schedule, topics};
 use stampfly_bus::{Activation, Band};
+use stampfly_flight::Observer;
 use std::time::{Duration, Instant};
 
 /// Time of so many activations.
@@ -21,31 +21,32 @@ struct Sum {
 struct Stages {
     begun: Instant,
     /// By line of the activation table.
-    sums: [Sum; plan::COUNT],
+    sums: [Sum; schedule::COUNT],
     /// The estimation's, in steps where the inertial sensor was alone.
     predict: Sum,
 }
 
 impl Stages {
     fn new() -> Self {
-        Self { begun: Instant::now(), sums: [Sum::default(); plan::COUNT], predict: Sum::default() }
+        Self { begun: Instant::now(), sums: [Sum::default(); schedule::COUNT], predict: Sum::default() }
     }
 }
 
 impl Observer for Stages {
-    fn has_read(&mut self, _: usize, _: &Activation) {}
-
     fn starts(&mut self, _: usize) {
         self.begun = Instant::now();
     }
 
-    fn finished(&mut self, index: usize, activation: &Activation) {
+    fn finished(&mut self, activation: &Activation) {
         let time = self.begun.elapsed();
+        let index = usize::from(activation.record().index);
         let add = |sum: &mut Sum| *sum = Sum { time: sum.time + time, count: sum.count + 1 };
         add(&mut self.sums[index]);
         // The estimation reads the inertial sensor first, then the four others.
-        let others = activation.inputs().get(1..5);
-        if index == plan::Id::estimation as usize && others.is_some_and(|inputs| inputs.iter().all(|i| i.taken == 0)) {
+        let others = activation.record().inputs().get(1..5);
+        if index == schedule::Id::estimation as usize
+            && others.is_some_and(|inputs| inputs.iter().all(|i| i.taken == 0))
+        {
             add(&mut self.predict);
         }
     }
@@ -68,7 +69,7 @@ fn fly(recording: &Recording, steps: u64, mut measure: impl FnMut(&mut Replay<'_
     let flights = steps.div_ceil(in_the_air as u64);
     let mut total = Duration::ZERO;
     for _ in 0..flights {
-        let mut bus = wiring::Bus::new();
+        let mut bus = topics::Bus::new();
         let mut replay = recording.replay(&mut bus);
         replay.skip(FLYING_FROM);
         total += measure(&mut replay, in_the_air);
@@ -101,7 +102,7 @@ fn bench(c: &mut Criterion) {
     group.bench_function("estimation, inertial sample only", |b| {
         b.iter_custom(|steps| fly(&recording, steps, |replay, n| stage(replay, n, clock, |stages| stages.predict)));
     });
-    for (index, activation) in plan::ACTIVATIONS.iter().enumerate().filter(|(_, a)| a.band == Band::Flight) {
+    for (index, activation) in schedule::ACTIVATIONS.iter().enumerate().filter(|(_, a)| a.band == Band::Flight) {
         group.bench_function(activation.name, |b| {
             b.iter_custom(|steps| fly(&recording, steps, |replay, n| stage(replay, n, clock, |s| s.sums[index])));
         });

@@ -1,4 +1,4 @@
-//! One 400 Hz step of a state estimator: ours beside those of the registry, interleaved in one run.
+//! One 400 Hz step of a state estimator: ours beside those of the registry.
 //!
 //! Everybody gets the same stream ([`stream`]): an inertial sample at every step and flow, range, barometer and
 //! magnetometer at their rates. Ours is given samples and stamps and does everything a user asks for: gates, late samples,
@@ -13,9 +13,8 @@
 //! The attitude filters are a class of their own, with inertial samples and the magnetometer at its rate. All compute
 //! with `f32`, except the low-pass filter inside `vqf-rs`, which is always `f64`.
 //!
-//! Before anything is measured each contender must follow the path, and ours must accept every sample. The last lines
-//! print the ratios of the medians of seven interleaved rounds, which is the figure to quote: single rounds vary with
-//! whatever else the machine does. `-- medians` prints nothing but them; `cargo xtask peers` makes a table of two runs.
+//! Before anything is measured each contender must follow the path, and ours must accept every sample.
+//! `cargo xtask peers` runs this several times and makes a table of the medians.
 
 #[path = "estimators/euler.rs"]
 mod euler;
@@ -32,7 +31,7 @@ use stampfly_eskf::attitude::{AttitudeConfig, AttitudeFilter, Mahony};
 use stampfly_eskf::{Eskf, Estimator};
 use stampfly_types::{Quat, Vec3};
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const PERIOD: f32 = 0.0025;
 
@@ -281,7 +280,7 @@ fn bench(c: &mut Criterion) {
 
 criterion_group!(benches, bench);
 
-const ROUNDS: usize = 7;
+/// Steps of a check.
 const CALLS: u64 = 200_000;
 
 fn steps() -> Vec<Step> {
@@ -324,58 +323,8 @@ fn check(steps: &[Step]) {
     }
 }
 
-fn median(times: &mut [f64]) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
-}
-
-/// Times of every contender, one a round: the median of its passes through the stream, so that one in which the machine
-/// did something else does not count.
-#[derive(Default)]
-struct Interleaved(Vec<(&'static str, Vec<f64>)>);
-
-impl<Output> Measure<Output> for Interleaved {
-    fn contender(&mut self, name: &'static str, mut step: impl FnMut(u64) -> Output) {
-        let mut passes = Vec::new();
-        let mut k = 0;
-        while k < CALLS {
-            let started = Instant::now();
-            for _ in 0..stream::STEPS {
-                black_box(step(black_box(k)));
-                k += 1;
-            }
-            passes.push(started.elapsed().as_secs_f64() * 1e9 / stream::STEPS as f64);
-        }
-        let nanoseconds = median(&mut passes);
-        match self.0.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, times)) => times.push(nanoseconds),
-            None => self.0.push((name, vec![nanoseconds])),
-        }
-    }
-}
-
-impl Interleaved {
-    /// Medians, and as ratios to the first contender.
-    fn print(mut self, title: &str) {
-        println!("\n{title}: median of {ROUNDS} interleaved rounds of {CALLS} steps");
-        let first = median(&mut self.0[0].1);
-        for (name, times) in &mut self.0 {
-            let time = median(times);
-            println!("{name:<36} {time:>8.1} ns   this / first = {:.2}", time / first);
-        }
-    }
-}
-
 fn main() {
     check(&steps());
     benches();
     Criterion::default().configure_from_args().final_summary();
-    let steps = steps();
-    let [mut whole, mut attitude] = [Interleaved::default(), Interleaved::default()];
-    for _ in 0..ROUNDS {
-        filters(&steps, &mut whole);
-        attitudes(&steps, &mut attitude);
-    }
-    whole.print("400 Hz step");
-    attitude.print("400 Hz step, attitude only");
 }

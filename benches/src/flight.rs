@@ -4,10 +4,11 @@
 //! vehicle repeats the flight without the simulator, so that only the flight stack is measured; that the motors are
 //! told the same bits again shows that the replay is the flight.
 
-use stampfly_board::vehicle::{Assembled, Outside, assemble};
-use stampfly_board::{FlightLoop, Observer, VehicleConfig, wiring};
+use stampfly_board::schedule::Runnables;
+use stampfly_board::{VehicleConfig, topics};
 use stampfly_bus::Band;
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample};
+use stampfly_flight::{Assembled, FlightLoop, Observer};
 use stampfly_sim::sensors::Sensors;
 use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
@@ -43,28 +44,28 @@ struct Arrival {
 
 /// A vehicle at the moment before its next step.
 struct Vehicle<'b> {
-    flight: FlightLoop<'b>,
-    outside: Outside<'b>,
+    flight: FlightLoop<'b, Runnables>,
+    outside: topics::Outside<'b>,
 }
 
 impl<'b> Vehicle<'b> {
-    fn new(bus: &'b mut wiring::Bus) -> Self {
-        let wiring::Split { ports, heads, .. } = bus.split(None);
-        let Assembled { flight_loop, outside } = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
-        Self { flight: flight_loop, outside }
+    fn new(bus: &'b mut topics::Bus) -> Self {
+        let Assembled { flight_loop: flight, outside, .. } =
+            Assembled::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+        Self { flight, outside }
     }
 
     /// Publishes a sample. One from the inertial sensor completes a step: everything due runs.
     fn take(&mut self, arrival: &Arrival, observer: &mut impl Observer) {
         let (at, outside) = (arrival.at, &mut self.outside);
         match arrival.input {
-            Input::Imu(data) => outside.imu.publish(at, &data),
-            Input::Tof(data) => outside.tof.publish(at, &data),
-            Input::Flow(data) => outside.flow.publish(at, &data),
-            Input::Mag(data) => outside.mag.publish(at, &data),
-            Input::Baro(data) => outside.baro.publish(at, &data),
-            Input::Power(data) => outside.power.publish(at, &data),
-            Input::Guided(data) => outside.guided.publish(at, data).expect("a few commands a second"),
+            Input::Imu(data) => outside.imu.sensor_imu.publish(at, &data),
+            Input::Tof(data) => outside.tof.sensor_tof.publish(at, &data),
+            Input::Flow(data) => outside.flow.sensor_flow.publish(at, &data),
+            Input::Mag(data) => outside.mag.sensor_mag.publish(at, &data),
+            Input::Baro(data) => outside.baro.sensor_baro.publish(at, &data),
+            Input::Power(data) => outside.power.sensor_power.publish(at, &data),
+            Input::Guided(data) => outside.link.command_guided.publish(at, data).expect("a few commands a second"),
         };
         if matches!(arrival.input, Input::Imu(_)) {
             for band in [Band::Flight, Band::Background] {
@@ -74,7 +75,7 @@ impl<'b> Vehicle<'b> {
     }
 
     fn motors(&mut self) -> MotorOutput {
-        self.outside.motors.latest().map(|sample| sample.data).unwrap_or_default()
+        self.outside.motors.actuator_motor.latest().map(|sample| sample.data).unwrap_or_default()
     }
 }
 
@@ -90,7 +91,7 @@ impl Recording {
     #[must_use]
     pub fn new() -> Self {
         let simulation = Simulation::new(&SimulationConfig::default());
-        let mut bus = wiring::Bus::new();
+        let mut bus = topics::Bus::new();
         let recorder = RefCell::new(Recorder {
             vehicle: Vehicle::new(&mut bus),
             arrivals: Vec::new(),
@@ -137,7 +138,7 @@ impl Recording {
 
     /// A fresh vehicle on this bus, to fly the recording again.
     #[must_use]
-    pub fn replay<'b>(&self, bus: &'b mut wiring::Bus) -> Replay<'_, 'b> {
+    pub fn replay<'b>(&self, bus: &'b mut topics::Bus) -> Replay<'_, 'b> {
         Replay { recording: self, arrivals: self.arrivals.iter(), vehicle: Vehicle::new(bus), steps: 0 }
     }
 }
@@ -201,7 +202,7 @@ impl Recorder<'_> {
         self.arrive(imu);
         let output = self.vehicle.motors();
         self.motors.push(output);
-        let telemetry = self.vehicle.outside.telemetry.latest();
+        let telemetry = self.vehicle.outside.link.telemetry.latest();
         if telemetry.is_some_and(|frame| frame.data.state == FlightState::Flying) {
             self.flying_since.get_or_insert(self.motors.len());
         } else {

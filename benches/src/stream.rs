@@ -16,9 +16,9 @@
 //! Compiled into the benchmark and into the firmware that counts instructions; needs nothing but our two crates. Not for
 //! tests of accuracy: nothing in it is hard.
 
-use stampfly_eskf::{EskfConfig, Estimator, Fusion, GravityUse, MagModel};
+use stampfly_eskf::{Aiding, EskfConfig, Estimator, Fusion, GravityUse, MagModel, Measurements, feed};
 use stampfly_types::messages::{BaroData, CalibrationResult, FlowData, ImuData, MagData, StateEstimate, TofData};
-use stampfly_types::{Duration, GRAVITY, Instant, Message, Quat, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Message, Quat, Stamped, Vec3, math};
 
 /// Steps until the stream repeats: four seconds.
 pub const STEPS: usize = 1_600;
@@ -84,17 +84,36 @@ pub fn end_of(k: u64) -> Instant {
     START + PERIOD * (k + 1)
 }
 
-/// Everything a user does at 400 Hz, for the step that ends at `at`. Tells what became of range, flow, barometer and
-/// magnetometer.
+/// Everything a user does at 400 Hz, for the step that ends at `at`, in the vehicle's order. Returns what became of range,
+/// flow, barometer and magnetometer.
 #[inline]
 pub fn advance(estimator: &mut impl Estimator, at: Instant, step: &Step) -> [Option<Fusion>; 4] {
-    estimator.predict(at, &step.imu);
-    [
-        step.tof.map(|tof| estimator.fuse_tof(at - TOF_AGE, &tof)),
-        step.flow.map(|flow| estimator.fuse_flow(at - FLOW_AGE, &flow)),
-        step.baro.map(|baro| estimator.fuse_baro(at - BARO_AGE, &baro)),
-        step.mag.map(|mag| estimator.fuse_mag(at, &mag)),
-    ]
+    let imu = [Stamped { at, generation: 0, data: step.imu }];
+    let (tof, flow) = (stamped(at - TOF_AGE, step.tof), stamped(at - FLOW_AGE, step.flow));
+    let (mag, baro) = (stamped(at, step.mag), stamped(at - BARO_AGE, step.baro));
+    let measurements = Measurements {
+        imu: &imu,
+        tof: tof.as_slice(),
+        flow: flow.as_slice(),
+        mag: mag.as_slice(),
+        baro: baro.as_slice(),
+        pose: &[],
+    };
+    let mut fusions = [None; 4];
+    let [tof, flow, baro, mag] = &mut fusions;
+    feed(estimator, &measurements, |aiding, _, fusion| match aiding {
+        Aiding::Tof => *tof = Some(fusion),
+        Aiding::Flow => *flow = Some(fusion),
+        Aiding::Baro => *baro = Some(fusion),
+        Aiding::Mag => *mag = Some(fusion),
+        _ => {}
+    });
+    fusions
+}
+
+/// A sample as the bus hands it over, if there is one.
+fn stamped<M>(at: Instant, data: Option<M>) -> Option<Stamped<M>> {
+    data.map(|data| Stamped { at, generation: 0, data })
 }
 
 /// One number for all bits of all estimates so far (FNV-1a): start with [`HASH`].

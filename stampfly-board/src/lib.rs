@@ -13,14 +13,13 @@ mod config;
 pub mod console;
 pub mod devices;
 pub mod golden;
+pub mod link;
 pub mod messages;
 pub mod parameters;
-pub mod profile;
 pub mod runnables;
 pub mod schedule;
 #[cfg(feature = "simulation")]
 pub mod simulation;
-pub mod tasks;
 pub mod topics;
 
 pub use config::VehicleConfig;

@@ -1,62 +1,29 @@
-//! The parameters people may change, by name.
+//! The StampFly's parameters, by name.
 //!
 //! One line per parameter: name, range, unit, field, meaning. Defaults are the fields' own. The log stores every
-//! value, so a replay flies with the parameters of the flight.
+//! value, so a replay flies with the parameters of the flight. [`stampfly_flight::parameters`] finds and changes them by
+//! name.
 
 use crate::config::VehicleConfig;
+use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 
-/// The name in flash of the transmitter the vehicle belongs to: the six bytes of its address, as one value, because half
-/// an address is somebody else's.
+/// The name in flash of the transmitter the vehicle is paired with: the six bytes of its address as one value, so that a
+/// power cut cannot leave half of an address.
 pub const PEER: &str = "link.peer";
 
-/// One parameter.
-#[derive(Clone, Copy)]
-pub struct Parameter {
-    /// `function.target.parameter`.
-    pub name: &'static str,
-    /// Smallest value accepted.
-    pub min: f32,
-    /// Largest value accepted.
-    pub max: f32,
-    /// SI unit, `"1"` where there is none.
-    pub unit: &'static str,
-    /// What it does.
-    pub meaning: &'static str,
-    field: fn(&mut VehicleConfig) -> &mut f32,
+/// A line of the table.
+struct Line {
+    info: ParameterInfo<'static>,
+    get: fn(&VehicleConfig) -> f32,
+    set: fn(&mut VehicleConfig, f32),
 }
-
-/// Why a parameter was not changed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum ParameterError {
-    /// There is no parameter of this name.
-    Unknown,
-    /// The value is outside the range, or not a number.
-    OutOfRange {
-        /// Smallest value accepted.
-        min: f32,
-        /// Largest value accepted.
-        max: f32,
-    },
-}
-
-impl core::fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Unknown => write!(f, "there is no such parameter"),
-            Self::OutOfRange { min, max } => write!(f, "the value must be from {min} to {max}"),
-        }
-    }
-}
-
-impl core::error::Error for ParameterError {}
 
 macro_rules! parameters {
     ($($name:literal [$min:literal, $max:literal] $unit:literal $($field:ident).+ => $meaning:literal;)+) => {
-        /// Every parameter, in the order people look for them.
-        pub const PARAMETERS: &[Parameter] = &[$(Parameter {
-            name: $name, min: $min, max: $max, unit: $unit, meaning: $meaning,
-            field: |config| &mut config.$($field).+,
+        const TABLE: &[Line] = &[$(Line {
+            info: ParameterInfo { name: $name, min: $min, max: $max, unit: $unit, meaning: $meaning },
+            get: |config| config.$($field).+,
+            set: |config, value| config.$($field).+ = value,
         }),+];
     };
 }
@@ -101,49 +68,37 @@ parameters! {
     "motor.slew.max" [1.0, 1000.0] "1/s" motor.slew_max => "largest change of duty";
 }
 
-impl Parameter {
-    /// The value in this configuration.
-    #[must_use]
-    pub fn get(&self, config: &VehicleConfig) -> f32 {
-        *(self.field)(&mut config.clone())
-    }
-
-    /// Changes the value.
-    ///
-    /// # Errors
-    /// [`ParameterError::OutOfRange`]; the configuration is unchanged.
-    pub fn set(&self, config: &mut VehicleConfig, value: f32) -> Result<(), ParameterError> {
-        if !(self.min..=self.max).contains(&value) {
-            return Err(ParameterError::OutOfRange { min: self.min, max: self.max });
-        }
-        *(self.field)(config) = value;
-        Ok(())
-    }
+/// Every parameter, in the order of their numbers.
+pub fn all() -> impl ExactSizeIterator<Item = ParameterInfo<'static>> {
+    TABLE.iter().map(|line| line.info)
 }
 
-/// The parameter of this name.
-///
-/// # Errors
-/// [`ParameterError::Unknown`].
-pub fn find(name: &str) -> Result<&'static Parameter, ParameterError> {
-    PARAMETERS.iter().find(|parameter| parameter.name == name).ok_or(ParameterError::Unknown)
-}
-
-/// Changes a parameter by name.
-///
 /// ```
-/// use stampfly_board::{VehicleConfig, parameters};
+/// use stampfly_board::VehicleConfig;
+/// use stampfly_flight::parameters;
 /// let mut config = VehicleConfig::default();
 /// parameters::set(&mut config, "eskf.obs.flow_noise", 0.2)?;
 /// assert!(parameters::set(&mut config, "eskf.obs.flow_noise", f32::NAN).is_err());
 /// assert_eq!(config.eskf.flow_sigma, 0.2);
 /// # Ok::<(), parameters::ParameterError>(())
 /// ```
-///
-/// # Errors
-/// When there is no such parameter or the value is out of range; the configuration is unchanged.
-pub fn set(config: &mut VehicleConfig, name: &str, value: f32) -> Result<(), ParameterError> {
-    find(name)?.set(config, value)
+impl Parameters for VehicleConfig {
+    fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
+        TABLE.get(index).map(|line| line.info)
+    }
+
+    fn get(&self, index: usize) -> Option<f32> {
+        TABLE.get(index).map(|line| (line.get)(self))
+    }
+
+    fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
+        let Line { info: ParameterInfo { min, max, .. }, set, .. } = TABLE.get(index).ok_or(ParameterError::Unknown)?;
+        if !(*min..=*max).contains(&value) {
+            return Err(ParameterError::OutOfRange { min: *min, max: *max });
+        }
+        set(self, value);
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -154,16 +109,16 @@ mod tests {
     #[test]
     fn every_default_is_in_range_and_every_name_is_unique() {
         let config = VehicleConfig::default();
-        for (index, parameter) in PARAMETERS.iter().enumerate() {
-            let value = parameter.get(&config);
-            assert!((parameter.min..=parameter.max).contains(&value), "{} = {value}", parameter.name);
-            assert!(PARAMETERS[..index].iter().all(|other| other.name != parameter.name), "{}", parameter.name);
+        for (index, info) in all().enumerate() {
+            let value = config.get(index).expect("in the table");
+            assert!((info.min..=info.max).contains(&value), "{} = {value}", info.name);
+            assert!(all().take(index).all(|other| other.name != info.name), "{}", info.name);
         }
     }
 
     #[test]
-    fn no_two_names_share_a_place_in_flash() {
-        let names: Vec<&str> = PARAMETERS.iter().map(|parameter| parameter.name).chain([PEER]).collect();
+    fn no_two_names_share_a_key_in_flash() {
+        let names: Vec<&str> = all().map(|info| info.name).chain([PEER]).collect();
         for (index, name) in names.iter().enumerate() {
             let key = stampfly_param::key(name);
             let twin = names[..index].iter().find(|other| stampfly_param::key(other) == key);
@@ -172,15 +127,15 @@ mod tests {
     }
 
     #[test]
-    fn each_parameter_reaches_a_field_of_its_own() {
-        for parameter in PARAMETERS {
+    fn each_parameter_is_a_field_of_its_own() {
+        let default = VehicleConfig::default();
+        for (index, info) in all().enumerate() {
             let mut config = VehicleConfig::default();
-            let changed = if parameter.get(&config) == parameter.min { parameter.max } else { parameter.min };
-            parameter.set(&mut config, changed).expect("the range includes its ends");
-            for other in PARAMETERS {
-                let expected =
-                    if other.name == parameter.name { changed } else { other.get(&VehicleConfig::default()) };
-                assert_eq!(other.get(&config), expected, "{} changed {}", parameter.name, other.name);
+            let changed = if config.get(index) == Some(info.min) { info.max } else { info.min };
+            config.set(index, changed).expect("the range includes its ends");
+            for (other, of_other) in all().enumerate() {
+                let expected = if other == index { Some(changed) } else { default.get(other) };
+                assert_eq!(config.get(other), expected, "{} changed {}", info.name, of_other.name);
             }
         }
     }

@@ -1,24 +1,25 @@
 //! A machine that computes something else does not arm, and says why; one with other bits only says so.
 
-use stampfly_board::vehicle::{Assembled, assemble};
-use stampfly_board::{VehicleConfig, messages::TelemetryFrame, wiring};
+use stampfly_board::schedule::Runnables;
+use stampfly_board::{VehicleConfig, messages::TelemetryFrame, topics};
 use stampfly_bus::Band;
+use stampfly_flight::Assembled;
 use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, ArmBlocks, SelfTest, SelfTestVerdict};
 
 /// What the ground station sees after a tenth of a second.
 fn after(verdict: SelfTestVerdict) -> TelemetryFrame {
-    let mut bus = wiring::Bus::new();
-    let wiring::Split { ports, heads, .. } = bus.split(None);
-    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
-    outside.self_test.publish(Instant::ZERO, &SelfTest { verdict, worst: 0.0 });
+    let mut bus = topics::Bus::new();
+    let vehicle = Assembled::<Runnables>::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+    let (mut flight_loop, mut outside) = (vehicle.flight_loop, vehicle.outside);
+    outside.self_test.self_test.publish(Instant::ZERO, &SelfTest { verdict, worst: 0.0 });
     for step in 1..=40 {
         let now = Instant::from_micros(2_500 * step);
-        outside.imu.publish(now, &Default::default());
+        outside.imu.sensor_imu.publish(now, &Default::default());
         flight_loop.run_band(Band::Flight, now, &mut ());
         flight_loop.run_band(Band::Background, now, &mut ());
     }
-    outside.telemetry.latest().expect("fifty a second").data
+    outside.link.telemetry.latest().expect("fifty a second").data
 }
 
 #[test]

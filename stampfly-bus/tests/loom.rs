@@ -16,9 +16,9 @@ message! {
     /// Two words that must never be seen apart.
     pub struct Pair {
         /// The sample's number.
-        number: u32 ["1"],
+        number: u32,
         /// Its complement.
-        complement: u32 ["1"],
+        complement: u32,
     }
 }
 

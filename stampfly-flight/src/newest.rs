@@ -5,7 +5,7 @@
 
 use core::fmt;
 use stampfly_bus::TopicInfo;
-use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Message};
+use stampfly_types::{Duration, FieldInfo, Instant, Message, leaves};
 
 /// Most words of a message that the black box and the golden flight take.
 pub const MAX_MESSAGE: usize = 64;
@@ -107,7 +107,7 @@ pub fn message<M: Message>(words: &[u32]) -> Option<M> {
     M::from_words(&copy)
 }
 
-/// A sample in words, to be displayed: its age, then one line a field with name, values and unit.
+/// A sample in words, to be displayed: its age, then one line a leaf field with name, values and unit.
 #[derive(Clone, Copy, Debug)]
 pub struct ShownSample<'w> {
     age: Duration,
@@ -126,50 +126,17 @@ impl<'w> ShownSample<'w> {
 impl fmt::Display for ShownSample<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ms old", self.age.as_millis())?;
-        for (field, words) in fields(self.fields, self.words) {
-            write!(f, "\r\n  {}", field.name)?;
-            let each = field.words.checked_div(field.count).unwrap_or(1).max(1);
-            words.chunks(each).try_for_each(|value| show(f, field.kind, value))?;
-            if field.unit != "1" {
-                write!(f, " {}", field.unit)?;
+        for leaf in leaves(self.fields) {
+            write!(f, "\r\n  {}", leaf.name)?;
+            let values = (0..leaf.count).map_while(|element| leaf.value(self.words, element));
+            for value in values {
+                write!(f, " {value}")?;
+            }
+            if !leaf.unit.is_empty() {
+                write!(f, " {}", leaf.unit)?;
             }
         }
         Ok(())
-    }
-}
-
-/// Every field of a message with its words, in order. Words that are missing are left out.
-pub(crate) fn fields<'w>(
-    fields: &'static [FieldInfo],
-    words: &'w [u32],
-) -> impl Iterator<Item = (&'static FieldInfo, &'w [u32])> {
-    let mut rest = words;
-    fields.iter().map(move |field| {
-        let (words, after) = rest.split_at_checked(field.words).unwrap_or((rest, &[]));
-        rest = after;
-        (field, words)
-    })
-}
-
-fn show(f: &mut fmt::Formatter<'_>, kind: FieldKind, words: &[u32]) -> fmt::Result {
-    let word = words.first().copied().unwrap_or_default();
-    match kind {
-        FieldKind::F32 => write!(f, " {}", f32::from_bits(word)),
-        FieldKind::I32 | FieldKind::I16 => write!(f, " {}", word.cast_signed()),
-        FieldKind::Bool => write!(f, " {}", word != 0),
-        FieldKind::Enum(names) => match names.iter().find(|(_, number)| *number == word) {
-            Some((name, _)) => write!(f, " {name}"),
-            None => write!(f, " {word}?"),
-        },
-        FieldKind::Flags(_) if word == 0 => f.write_str(" none"),
-        FieldKind::Flags(names) => {
-            names.iter().filter(|(_, bit)| word & bit != 0).try_for_each(|(name, _)| write!(f, " {name}"))
-        }
-        FieldKind::U64 => {
-            let high = words.get(1).copied().unwrap_or_default();
-            write!(f, " {}", u64::from(word) | u64::from(high) << 32)
-        }
-        _ => write!(f, " {word}"),
     }
 }
 

@@ -3,7 +3,7 @@
 //! Comes from a log ([`crate::flight_log`]), from a recording ([`crate::dataset`]) or message by message from a
 //! simulation. Not for replay: numbers are `f64` here, so 64-bit counters beyond 2⁵³ are rounded.
 
-use stampfly_types::{FieldInfo, FieldKind, Instant, Message};
+use stampfly_types::{FieldInfo, FieldKind, Instant, Message, Value, leaves};
 use std::collections::BTreeMap;
 
 /// What a field of numbers means.
@@ -18,7 +18,7 @@ pub struct Meaning {
 /// One scalar over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
-    /// `position[0]`, or `height` when the field is no array.
+    /// `position[0]`, or `height` when the field is no array. A field of a message in a message is `wind_speed`.
     pub name: String,
     /// The field the scalar belongs to, `position`.
     pub field: String,
@@ -40,41 +40,32 @@ pub struct Series {
 impl Series {
     /// An empty series with the columns of a message.
     #[must_use]
-    pub fn of_fields(fields: &[FieldInfo]) -> Self {
+    pub fn of_fields(fields: &'static [FieldInfo]) -> Self {
         let mut series = Self::default();
-        for field in fields {
-            let name = |index: usize| match field.count {
-                1 => field.name.to_owned(),
-                _ => format!("{}[{index}]", field.name),
-            };
-            let column = |index| Column { name: name(index), field: field.name.to_owned(), values: Vec::new() };
-            series.columns.extend((0..field.count).map(column));
-            let names = match field.kind {
+        for leaf in leaves(fields) {
+            let field = leaf.name.to_string();
+            let name = |index: usize| if leaf.count == 1 { field.clone() } else { format!("{field}[{index}]") };
+            let column = |index| Column { name: name(index), field: field.clone(), values: Vec::new() };
+            series.columns.extend((0..leaf.count).map(column));
+            let names = match leaf.kind {
                 FieldKind::Enum(names) | FieldKind::Flags(names) => names,
                 _ => &[],
             };
-            let unit = if field.unit == "1" { String::new() } else { field.unit.to_owned() };
+            let unit = leaf.unit.to_owned();
             let names: Vec<_> = names.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
             if !unit.is_empty() || !names.is_empty() {
-                series.meanings.insert(field.name.to_owned(), Meaning { unit, names });
+                series.meanings.insert(field, Meaning { unit, names });
             }
         }
         series
     }
 
     /// Appends the words of a message with these fields. Missing words give NaN.
-    pub fn push_words(&mut self, at: Instant, fields: &[FieldInfo], words: &[u32]) {
+    pub fn push_words(&mut self, at: Instant, fields: &'static [FieldInfo], words: &[u32]) {
         self.at.push(at);
-        let mut words = words.iter().copied();
-        let kinds = fields.iter().flat_map(|field| std::iter::repeat_n(field.kind, field.count));
-        for (column, kind) in self.columns.iter_mut().zip(kinds) {
-            let value = words.next().and_then(|word| match kind {
-                FieldKind::F32 => Some(f64::from(f32::from_bits(word))),
-                FieldKind::I32 | FieldKind::I16 => Some(f64::from(word.cast_signed())),
-                FieldKind::U64 => words.next().map(|high| (u64::from(word) | u64::from(high) << 32) as f64),
-                _ => Some(f64::from(word)),
-            });
-            column.values.push(value.unwrap_or(f64::NAN));
+        let elements = leaves(fields).flat_map(|leaf| (0..leaf.count).map(move |element| leaf.value(words, element)));
+        for (column, value) in self.columns.iter_mut().zip(elements) {
+            column.values.push(value.map_or(f64::NAN, Value::as_f64));
         }
     }
 
@@ -151,7 +142,7 @@ impl Flight {
     }
 
     /// Appends one message, as words, to a topic, which is made when new.
-    pub fn push_words(&mut self, topic: &str, at: Instant, fields: &[FieldInfo], words: &[u32]) {
+    pub fn push_words(&mut self, topic: &str, at: Instant, fields: &'static [FieldInfo], words: &[u32]) {
         if !self.topics.contains_key(topic) {
             self.topics.insert(topic.to_owned(), Series::of_fields(fields));
         }

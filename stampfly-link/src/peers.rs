@@ -101,7 +101,7 @@ impl<A: PartialEq, T: Default, const N: usize> Peers<A, T, N> {
             let mut text = Text { buffer: [0; MAX_DATAGRAM], length: 0 };
             let bytes = match peer.uses_json {
                 true => json::write(&datagram, &mut text).ok().and_then(|()| text.buffer.get(..text.length)),
-                false => datagram.write(&mut text.buffer).ok().map(|bytes| &*bytes),
+                false => datagram.write(&mut text.buffer).ok().map(|bytes| bytes as &[u8]),
             };
             // What must not be sent is not: the message is not valid.
             if let Some(bytes) = bytes {

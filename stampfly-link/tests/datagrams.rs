@@ -9,6 +9,7 @@ message_enum! {
     /// A gear.
     pub enum Gear {
         /// Backwards.
+        #[default]
         Reverse = 2,
         /// None.
         Neutral = 0,
@@ -21,11 +22,11 @@ message! {
     /// A lever.
     pub struct Lever {
         /// Where it is.
-        position: f32 ["1"],
+        position: f32,
         /// What it has chosen.
-        gear: Gear ["1"],
+        gear: Gear,
         /// Is it locked?
-        locked: bool ["1"],
+        locked: bool,
     }
 }
 
@@ -35,7 +36,7 @@ message! {
         /// Its time.
         reading: Instant ["us"],
         /// How often it was set.
-        settings: u32 ["1"],
+        settings: u32,
     }
 }
 

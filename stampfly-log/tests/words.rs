@@ -8,24 +8,22 @@ use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Full, Message, Ram, Reader, Sample, Sink, Stamp, Topic, WriteError};
 use stampfly_types::messages::SystemMode;
 use stampfly_types::{ActivationRecord, InputRecord};
-use stampfly_types::{FieldKind, Instant, Message as _};
+use stampfly_types::{FieldKind, Instant, Message as _, leaves};
 
 /// Words a message of this topic can have: any bits where any bits are allowed, small numbers where not.
 fn words(topic: &Topic) -> impl Strategy<Value = Vec<u32>> + use<> {
-    let fields: Vec<_> = topic.fields.to_vec();
+    let fields = topic.fields;
     prop::collection::vec(any::<u32>(), topic.words()).prop_map(move |mut words| {
-        let mut rest = words.as_mut_slice();
-        for field in &fields {
-            let (here, after) = rest.split_at_mut(field.words);
-            for word in here {
-                *word = match field.kind {
+        for leaf in leaves(fields) {
+            for word in &mut words[leaf.offset..][..leaf.size()] {
+                *word = match leaf.kind {
                     FieldKind::U8 | FieldKind::Bool | FieldKind::Enum(_) => *word & 0xff,
                     FieldKind::U16 => *word & 0xffff,
                     FieldKind::I16 => i32::from(*word as i16).cast_unsigned(),
+                    FieldKind::I8 => i32::from(*word as i8).cast_unsigned(),
                     _ => *word,
                 };
             }
-            rest = after;
         }
         words
     })
@@ -115,11 +113,15 @@ fn formats_explain_the_data() {
         formats[0].fields,
         "uint64_t timestamp;uint32_t generation;float[3] accel;float[3] gyro;float temperature;"
     );
-    let odd =
-        "uint64_t wide;uint64_t[2] wides;int16_t signed;int16_t[3] signeds;uint16_t half;int32_t integer;uint64_t at;";
+    let odd = "uint64_t wide;uint64_t[2] wides;int16_t signed;int16_t[3] signeds;uint16_t half;int32_t integer;\
+               uint64_t at;int64_t both_ways;double precise;int8_t small;int8_t[40] many;uint8_t maybe_present;\
+               float[3] maybe;uint8_t part_0_known_present;uint64_t part_0_known;double part_0_share;\
+               uint8_t part_1_known_present;uint64_t part_1_known;double part_1_share;";
     assert_eq!(formats[TOPICS.len() - 1].fields, format!("uint64_t timestamp;uint32_t generation;{odd}"));
+    let units = "wide=us wides=us at=us both_ways=us maybe=m/s part_0_known=us part_1_known=us";
+    assert!(infos.contains(&("units/odd", units)));
     assert!(infos.contains(&("units/sensor_imu", "accel=m/s^2 gyro=rad/s temperature=degC")));
-    assert!(infos.contains(&("names/system_mode/mode", "Stabilize=1 Acro=0 AltHold=2 PosHold=3")));
+    assert!(infos.contains(&("names/system_mode/mode", "Acro=0 Stabilize=1 AltHold=2 PosHold=3")));
     assert!(
         infos
             .iter()

@@ -13,6 +13,7 @@ message_enum! {
     /// What to do with the parameters.
     pub enum ParameterAction {
         /// Change one value of the candidate.
+        #[default]
         Set = 0,
         /// Validate the candidate and use it from the next period on.
         Apply = 1,
@@ -25,9 +26,9 @@ message! {
     /// One step of a change of parameters.
     pub struct ParameterRequest {
         /// What to do.
-        action: ParameterAction ["1"],
+        action: ParameterAction,
         /// For `Set`: the parameter's place in [`ParameterTable::TABLE`].
-        index: u32 ["1"],
+        index: u32,
         /// For `Set`: the value, in the parameter's unit.
         value: f32 ["SI"],
     }
@@ -37,11 +38,11 @@ message! {
     /// Which parameters are in use.
     pub struct ParameterStatus {
         /// Number of changes that took effect, roll-backs included.
-        version: u32 ["1"],
+        version: u32,
         /// When the last one did.
         applied_at: Instant ["us"],
         /// Number of requests refused.
-        refused: u32 ["1"],
+        refused: u32,
     }
 }
 

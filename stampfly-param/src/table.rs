@@ -151,7 +151,10 @@ macro_rules! parameters {
             impl $crate::__types::Field for $Group {
                 const KIND: $crate::__types::FieldKind = $crate::__types::FieldKind::F32;
                 const COUNT: usize = [$($default),+].len();
-                const WORDS: usize = Self::COUNT;
+                const SIZE: usize = Self::COUNT;
+                fn initial() -> Self {
+                    Self::default()
+                }
                 fn write(&self, words: &mut [u32]) {
                     words.iter_mut().zip([$(self.$name),+]).for_each(|(word, value)| *word = value.to_bits());
                 }

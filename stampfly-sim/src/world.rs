@@ -13,7 +13,7 @@ message! {
     /// What is really the case: the reference for every estimate.
     pub struct Truth {
         /// Body FRD → world NED.
-        attitude: Quat ["1"],
+        attitude: Quat,
         /// World NED, floor at zero.
         position: Vec3 ["m"],
         /// World NED.
@@ -31,7 +31,7 @@ message! {
         /// Battery current.
         battery_current: f32 ["A"],
         /// Does anything touch the floor?
-        contact: bool ["1"],
+        contact: bool,
     }
 }
 

@@ -6,7 +6,8 @@
 //! * [`time`]: [`Instant`] and [`Duration`], the only time there is;
 //! * [`frame`]: vectors, quaternions and the conventions they follow;
 //! * [`math`]: the one door to transcendental functions;
-//! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`];
+//! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`]; [`field`]: of which values
+//!   it is made; [`schema`]: what its words mean;
 //! * [`messages`]: the messages themselves, sensor to motor;
 //! * [`activation`]: the record of what a runnable read, for the log and for replay;
 //! * [`text`]: a message as text, field by field.
@@ -30,10 +31,13 @@
 extern crate std;
 
 pub mod activation;
+pub mod field;
 pub mod frame;
 pub mod math;
 pub mod message;
 pub mod messages;
+mod named;
+pub mod schema;
 #[doc(hidden)]
 pub mod serial;
 pub mod stamped;
@@ -41,7 +45,9 @@ pub mod text;
 pub mod time;
 
 pub use activation::{ActivationRecord, InputRecord};
+pub use field::Field;
 pub use frame::{GRAVITY, Quat, Vec3};
-pub use message::{Field, FieldInfo, FieldKind, Message};
+pub use message::Message;
+pub use schema::{FieldInfo, FieldKind, Leaf, Value, leaves};
 pub use stamped::Stamped;
 pub use time::{Duration, Instant};

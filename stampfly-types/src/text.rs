@@ -10,7 +10,7 @@
 //!     /// A lamp.
 //!     pub struct Lamp {
 //!         /// Is it on?
-//!         on: bool ["1"],
+//!         on: bool,
 //!         /// Its power.
 //!         power: f32 ["W"],
 //!     }
@@ -128,11 +128,11 @@ mod tests {
     message! {
         /// One field of every kind.
         struct Kinds {
-            real: f32 ["1"],
-            unsigned: u32 ["1"],
-            signed: i32 ["1"],
-            small: i16 ["1"],
-            truth: bool ["1"],
+            real: f32,
+            unsigned: u32,
+            signed: i32,
+            small: i16,
+            truth: bool,
             time: Instant ["us"],
         }
     }

@@ -1,7 +1,8 @@
 //! `ci`: everything, with a table of what it took.
 
-use crate::repository::Repository;
-use crate::{Failure, Step};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository};
+use crate::step::Step;
 use std::time::Instant;
 
 pub fn run(repository: &Repository, steps: &[Step]) -> Result<(), Failure> {
@@ -15,7 +16,7 @@ pub fn run(repository: &Repository, steps: &[Step]) -> Result<(), Failure> {
         }
         eprintln!("\n=== {}: {}", step.name, step.about);
         let begun = Instant::now();
-        let outcome = step.check(repository, &[]);
+        let outcome = step.check(repository, &Arguments::default());
         let seconds = begun.elapsed().as_secs_f64();
         table.push((step.name, if outcome.is_ok() { "ok" } else { "FAILED" }, seconds));
         failed = outcome.err().map(|failure| format!("step `{}` failed: {failure}", step.name));

@@ -3,8 +3,7 @@
 //! A tool is there when what is used of it is there, not when something of the same name is. A step asks for its tools with
 //! [`provide`]; the step `machine` asks for all of them before anything is built.
 
-use crate::Failure;
-use crate::repository::{Repository, run};
+use crate::repository::{Failure, Repository, run};
 use std::path::Path;
 use std::process::{Command, Stdio};
 

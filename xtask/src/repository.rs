@@ -1,12 +1,14 @@
 //! Where the sources are, what the library crates are called, and how a program is run.
 
-use crate::Failure;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+/// Why something failed, in words.
+pub type Failure = String;
+
 /// Libraries for a PC. Every other one has to build for bare metal.
-const HOST_ONLY: &[&str] = &["stampfly-sim"];
+const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab", "stampfly-sim"];
 
 /// The working copy.
 pub struct Repository {

@@ -25,20 +25,19 @@ mod profile;
 mod record;
 
 use profile::Profile;
-use record::Record;
-use stampfly_board::golden::{self, Verdict};
-use stampfly_board::plan;
+use stampfly_board::golden;
+use stampfly_board::schedule::{ACTIVATIONS, Runnables};
+use stampfly_flight::golden::{Verdict, stack_size};
 
 /// What each machine runs once it is awake. Says whether every bit was as recorded.
 fn run() -> bool {
-    let activations = record::activations();
     let mut memory = [0; memory::SIZE];
-    let Some(record) = Record::begin(&mut memory, &activations) else {
+    let Some(record) = record::begin(&mut memory) else {
         outln!("no room for a flight record");
         return false;
     };
     let mut profile = Profile::new(record);
-    let report = match golden::play(golden::FLIGHT, &mut profile) {
+    let report = match golden::play(&mut profile) {
         Ok(report) => report,
         Err(error) => {
             outln!("{error}");
@@ -51,10 +50,12 @@ fn run() -> bool {
         Verdict::Beyond { worst, since } => outln!("duties deviate by {worst}, beyond tolerance since {since}"),
     }
     outln!("published: {} messages, hash {:016x}", report.messages, report.hash);
-    let (bytes, lost) = (profile.record.bytes(), profile.record.lost());
+    let lost = profile.record.lost();
+    let written = profile.record.into_sink();
+    let bytes = written.written();
     outln!("recorded: {} bytes, {lost} messages lost, hash {:016x}", bytes.len(), memory::hash(bytes));
-    outln!("stack: {} bytes of a vehicle and its bus", golden::STACK);
-    for (info, tally) in plan::ACTIVATIONS.iter().zip(&profile.runnables) {
+    outln!("stack: {} bytes of a vehicle and its bus", stack_size::<Runnables>());
+    for (info, tally) in ACTIVATIONS.iter().zip(&profile.runnables) {
         tally.print(format_args!("{}, budget {} us", info.name, info.budget.as_micros()));
     }
     profile.chain.print("chain");

@@ -6,11 +6,14 @@
 use crate::machine::{self, Ticks};
 use crate::record::Record;
 use core::fmt::Display;
-use stampfly_board::golden::Witness;
-use stampfly_board::{Observer, plan, wiring};
+use stampfly_board::schedule::{COUNT, Id};
+use stampfly_board::topics;
 use stampfly_bus::{Activation, Band};
+use stampfly_flight::Observer;
+use stampfly_flight::golden::PlayObserver;
+use stampfly_flight::newest::message;
+use stampfly_types::Instant;
 use stampfly_types::messages::SystemMode;
-use stampfly_types::{Instant, Message};
 
 /// Inputs of the estimation that are sensors of the vehicle: inertial, range, flow, field, pressure.
 const SENSORS: usize = 5;
@@ -44,7 +47,7 @@ impl Tally {
 /// Watches a golden flight.
 pub struct Profile<'t> {
     /// By place in the schedule.
-    pub runnables: [Tally; plan::COUNT],
+    pub runnables: [Tally; COUNT],
     /// The flight band, from one sample to the duties that follow from it.
     pub chain: Tally,
     /// The same where every sensor of the vehicle had something new.
@@ -73,7 +76,7 @@ impl<'t> Profile<'t> {
     pub fn new(record: Record<'t>) -> Self {
         let look = |_| machine::ticks().until(machine::ticks());
         let mut profile = Self {
-            runnables: [Tally::default(); plan::COUNT],
+            runnables: [Tally::default(); COUNT],
             chain: Tally::default(),
             everything: Tally::default(),
             recording: Tally::default(),
@@ -89,11 +92,11 @@ impl<'t> Profile<'t> {
             watching: 0,
         };
         // An activation of nobody in which nothing happens.
-        let nothing = Activation::live(Instant::ZERO);
+        let nothing = Activation::live(COUNT as u8, Instant::ZERO);
         let watch = |_| {
-            profile.band_begins(Band::Background, Instant::ZERO);
-            profile.has_read(plan::COUNT, &nothing);
-            profile.finished(plan::COUNT, &nothing);
+            profile.band_starts(Band::Background, Instant::ZERO);
+            profile.has_read(&nothing);
+            profile.finished(&nothing);
             profile.pass
         };
         profile.watching = (0..16).map(watch).min().unwrap_or(0);
@@ -118,32 +121,33 @@ impl<'t> Profile<'t> {
 // Never inlined, so that watching always takes the same.
 impl Observer for Profile<'_> {
     #[inline(never)]
-    fn has_read(&mut self, index: usize, activation: &Activation) {
+    fn has_read(&mut self, activation: &Activation) {
         self.runnable += self.elapsed();
-        if index == plan::Id::estimation as usize {
-            let sensors = activation.inputs().get(..SENSORS).unwrap_or_default();
+        if usize::from(activation.record().index) == Id::estimation as usize {
+            let sensors = activation.record().inputs().get(..SENSORS).unwrap_or_default();
             self.all_new = sensors.len() == SENSORS && sensors.iter().all(|input| input.taken > 0);
         }
-        self.write(|record| record.activation(index, activation));
+        self.write(|record| record.has_read(activation));
         self.since = machine::ticks();
     }
 
     #[inline(never)]
-    fn finished(&mut self, index: usize, _: &Activation) {
+    fn finished(&mut self, activation: &Activation) {
         self.runnable = (self.runnable + self.elapsed()).saturating_sub(self.watching);
         let armed = self.armed;
-        if let Some(tally) = self.runnables.get_mut(index) {
+        if let Some(tally) = self.runnables.get_mut(usize::from(activation.record().index)) {
             tally.add(self.runnable, armed);
         }
         self.pass += self.runnable;
         self.ran = true;
         self.runnable = 0;
+        self.write(|record| record.finished(activation));
         self.since = machine::ticks();
     }
 }
 
-impl Witness for Profile<'_> {
-    fn band_begins(&mut self, band: Band, _: Instant) {
+impl PlayObserver for Profile<'_> {
+    fn band_starts(&mut self, band: Band, _: Instant) {
         if band == Band::Flight {
             self.recording.add(self.recorded, self.armed);
             self.recorded = 0;
@@ -152,7 +156,7 @@ impl Witness for Profile<'_> {
         self.since = machine::ticks();
     }
 
-    fn band_ended(&mut self, band: Band) {
+    fn band_finished(&mut self, band: Band) {
         // Finding out that nothing more is due is part of it.
         let looked = self.elapsed().saturating_sub(self.looking);
         if band == Band::Flight && self.ran {
@@ -163,10 +167,9 @@ impl Witness for Profile<'_> {
         }
     }
 
-    fn published(&mut self, topic: wiring::Id, at: Instant, generation: u32, words: &[u32]) {
-        if topic == wiring::Id::system_mode
-            && let Ok(words) = words.try_into()
-            && let Some(mode) = SystemMode::from_words(&words)
+    fn published(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
+        if topic == topics::Id::system_mode as usize
+            && let Some(mode) = message::<SystemMode>(words)
         {
             self.armed = mode.armed;
         }

@@ -3,7 +3,7 @@
 use super::ground_station::{self, Progress};
 use super::metrics::{Collector, FIGURES, Metrics, Snapshot};
 use super::mission::{self, Mission};
-use super::sensing::{self, Healths, Sensing, SensorEnds, Shared};
+use super::sensing::{self, Healths, Others, Sensing, Shared};
 use crate::config::VehicleConfig;
 use crate::messages::ButtonContact;
 use crate::schedule::Runnables;
@@ -171,29 +171,13 @@ impl vehicle::Surroundings for Surroundings {
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
         let Self { setup, clock, world, sensors, shared, board, progress, health } = self;
-        let topics::Outside {
-            imu,
-            tof,
-            tof_front,
-            flow,
-            mag,
-            baro,
-            cameras,
-            power,
-            self_test: _,
-            link,
-            button_pin,
-            motors,
-            indicator,
-        } = outside;
-        let cameras = Some(cameras).filter(|_| setup.cameras);
-        let ends = SensorEnds { imu, tof, tof_front, flow, mag, baro, power, cameras };
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
-        let actuators = match setup.sensing {
-            Sensing::Models => sensing::start_models(tasks, clock, sensors, ends, health),
-            Sensing::Chips => sensing::start_drivers(tasks, clock, board, shared, sensors, ends, health),
+        let cameras = setup.cameras;
+        let Others { motors, indicator, button, link } = match setup.sensing {
+            Sensing::Models => sensing::start_models(tasks, clock, sensors, outside, cameras, health),
+            Sensing::Chips => sensing::start_drivers(tasks, clock, (board, shared), sensors, outside, cameras, health),
         };
-        tasks.spawn(watch_button(clock.clone(), actuators.button, button_pin.button_contact));
+        tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
         let station = ground_station::fly(clock.clone(), &setup.mission, link.command_guided, link.telemetry, progress);
         tasks.spawn(station);
         Around {
@@ -201,10 +185,10 @@ impl vehicle::Surroundings for Surroundings {
             steps: setup.mission.steps.len(),
             progress,
             watch: Watch::new(&world.truth_at(setup.simulation.start)),
-            duties: motors.actuator_motor,
-            motors: actuators.motors,
-            signals: indicator.signal,
-            indicator: actuators.indicator,
+            duties: motors.1.actuator_motor,
+            motors: motors.0,
+            signals: indicator.1.signal,
+            indicator: indicator.0,
             finished_at: None,
         }
     }

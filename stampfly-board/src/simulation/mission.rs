@@ -184,6 +184,7 @@ fn parse_goto(arguments: &[&str]) -> Result<Step, String> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
 
     #[test]
     fn the_built_in_missions_are_missions() {

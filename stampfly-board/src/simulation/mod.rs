@@ -13,18 +13,22 @@ pub mod flight;
 pub mod ground_station;
 pub mod metrics;
 pub mod mission;
+mod page;
 pub mod sensing;
 
 pub use flight::{Outcome, Phase, Setup};
+pub use page::PAGE;
 
 use crate::config::VehicleConfig;
-use crate::parameters;
+use crate::golden;
 use crate::schedule::Runnables;
+use crate::topics::Id;
 use mission::Mission;
 use sensing::Sensing;
+use stampfly_flight::parameters::{self, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
-use stampfly_sim::vehicle::{FlightOptions, Options, Setting, SetupError, Vehicle};
+use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Page, Setting, SetupError, Vehicle};
 use stampfly_types::Message;
 use std::fmt::Display;
 use std::format;
@@ -37,6 +41,7 @@ pub struct StampFly;
 impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
+    const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
     type Surroundings = flight::Surroundings;
@@ -100,18 +105,34 @@ impl Vehicle for StampFly {
     }
 
     fn parameters(config: &VehicleConfig) -> Vec<Setting> {
-        let settings = parameters::PARAMETERS.iter().map(|parameter| Setting {
-            name: parameter.name,
-            value: f64::from(parameter.get(config)),
-            unit: parameter.unit,
-            meaning: parameter.meaning,
+        let settings = crate::parameters::all().enumerate().filter_map(|(index, info)| {
+            let value = f64::from(config.get(index)?);
+            Some(Setting { name: info.name, value, unit: info.unit, meaning: info.meaning })
         });
         settings.collect()
     }
 
     fn set_parameter(config: &mut VehicleConfig, name: &str, value: ParameterValue) -> Result<(), SetupError> {
         let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
-        parameters::set(config, name, value).map_err(|error| format!("{name}: {error}"))
+        parameters::set(config, name, value).map(drop).map_err(|error| format!("{name}: {error}"))
+    }
+
+    fn golden() -> Option<Golden<Self>> {
+        Some(Golden {
+            setup: Setup { mission: Mission::parse(GOLDEN).ok()?, ..Setup::reference(1) },
+            record: golden::FLIGHT,
+            output: golden::OUTPUT as usize,
+            tolerance: golden::TOLERANCE,
+            leading: Id::sensor_imu as usize,
+            gathered: &[
+                Id::sensor_tof as usize,
+                Id::sensor_flow as usize,
+                Id::sensor_mag as usize,
+                Id::sensor_baro as usize,
+                Id::sensor_power as usize,
+            ],
+            settled: |outcome| outcome.phases.last().map(|phase| phase.since),
+        })
     }
 
     fn plant(setup: &Setup) -> Vec<Setting> {
@@ -121,6 +142,9 @@ impl Vehicle for StampFly {
         settings.collect()
     }
 }
+
+/// The mission of the golden flight.
+const GOLDEN: &str = "arm\ntakeoff 0.2\nhover 0.3\nland\n";
 
 /// The value, if it is a number in its range.
 fn within<T: PartialOrd + Display>(name: &str, value: T, low: T, high: T) -> Result<T, SetupError> {

@@ -1,10 +1,10 @@
 //! The tasks that feed the bus: models of the sensors, or the real drivers over emulated chips.
 
-use crate::tasks::{Health, Retry, pump};
 use crate::{devices, topics};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
+use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_sim::chips::{self, I2cBus, stand_in_image};
 use stampfly_sim::sensors::{ButtonModel, IndicatorRecorder, MotorModel, Sensors};
@@ -25,41 +25,29 @@ pub enum Sensing {
 /// What stands in for the inertial sensor's configuration file, at both ends of the bus.
 pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
 
-/// How the sensors' tasks fare, in the order in which they were started.
-pub type Healths = [Health; 8];
+/// How the sensors do, in the order in which they were started.
+pub type Healths = [SensorHealth; 8];
 
 /// A task that publishes a sensor's samples for as long as the vehicle is on.
 macro_rules! spawn {
-    ($tasks:ident, $clock:ident, $health:ident, $retry:ident, $sensor:expr => $publisher:expr) => {{
+    ($tasks:ident, $clock:ident, $health:ident, $backoff:ident, $sensor:expr => $publisher:expr) => {{
         let (mut sensor, mut publisher) = ($sensor, $publisher);
-        let (clock, health): (_, &Health) = ($clock.clone(), $health.next().expect("one for each sensor"));
+        let (clock, health): (_, &SensorHealth) = ($clock.clone(), $health.next().expect("one for each sensor"));
         $tasks.spawn(async move {
             let publish = |at, data: &_| {
                 publisher.publish(at, data);
             };
-            match pump(async || sensor.next().await, publish, clock, Retry::$retry, health).await {}
+            match run_sensor(async || sensor.next().await, publish, clock, Backoff::$backoff, health).await {}
         });
     }};
 }
 
-/// The ends that sensors publish to.
-pub(super) struct SensorEnds<'b> {
-    pub imu: topics::ImuEnds<'b>,
-    pub tof: topics::TofEnds<'b>,
-    pub tof_front: topics::TofFrontEnds<'b>,
-    pub flow: topics::FlowEnds<'b>,
-    pub mag: topics::MagEnds<'b>,
-    pub baro: topics::BaroEnds<'b>,
-    pub power: topics::PowerEnds<'b>,
-    /// Only where cameras watch.
-    pub cameras: Option<topics::CamerasEnds<'b>>,
-}
-
-/// What is left of the models when the sensors have been started.
-pub(super) struct Actuators {
-    pub motors: MotorModel,
-    pub indicator: IndicatorRecorder,
-    pub button: ButtonModel,
+/// What is left when the sensors have been started: models, and the ends of everybody else outside.
+pub(super) struct Others<'b> {
+    pub motors: (MotorModel, topics::MotorsEnds<'b>),
+    pub indicator: (IndicatorRecorder, topics::IndicatorEnds<'b>),
+    pub button: (ButtonModel, topics::ButtonPinEnds<'b>),
+    pub link: topics::LinkEnds<'b>,
 }
 
 /// What the drivers of one vehicle share; to be made before the tasks.
@@ -86,32 +74,38 @@ pub(super) fn start_models<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
     models: Sensors,
-    ends: SensorEnds<'a>,
+    ends: topics::Outside<'a>,
+    cameras: bool,
     health: &'a Healths,
-) -> Actuators {
+) -> Others<'a> {
     let mut health = health.iter();
-    spawn!(tasks, clock, health, PROMPT, models.imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, PATIENT, models.tof => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, PATIENT, models.flow => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, PATIENT, models.mag => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, PATIENT, models.baro => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, PATIENT, models.power => ends.power.sensor_power);
-    if let Some(ends) = ends.cameras {
-        spawn!(tasks, clock, health, PATIENT, models.cameras => ends.external_pose);
+    spawn!(tasks, clock, health, CRITICAL, models.imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, SHARED, models.tof => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, SHARED, models.flow => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, SHARED, models.mag => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, SHARED, models.baro => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, SHARED, models.power => ends.power.sensor_power);
+    if cameras {
+        spawn!(tasks, clock, health, SHARED, models.cameras => ends.cameras.external_pose);
     }
-    Actuators { motors: models.motors, indicator: models.indicator, button: models.button }
+    Others {
+        motors: (models.motors, ends.motors),
+        indicator: (models.indicator, ends.indicator),
+        button: (models.button, ends.button_pin),
+        link: ends.link,
+    }
 }
 
 /// Starts a task for each driver, over these chips.
 pub(super) fn start_drivers<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
-    board: chips::Board,
-    shared: &'a mut Shared,
+    (board, shared): (chips::Board, &'a mut Shared),
     models: Sensors,
-    ends: SensorEnds<'a>,
+    ends: topics::Outside<'a>,
+    cameras: bool,
     health: &'a Healths,
-) -> Actuators {
+) -> Others<'a> {
     let mut health = health.iter();
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = shared.i2c.split();
     let chips::Board { imu, flow, shutdown_bottom, shutdown_front, .. } = board;
@@ -121,15 +115,20 @@ pub(super) fn start_drivers<'a>(
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
     let imu = devices::imu(imu, time(), &IMAGE).with_interrupt(ready);
-    spawn!(tasks, clock, health, PROMPT, imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, PATIENT, down => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, PATIENT, ahead => ends.tof_front.sensor_tof_front);
-    spawn!(tasks, clock, health, PATIENT, devices::flow(flow, time()) => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, PATIENT, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, PATIENT, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, PATIENT, devices::power(to_power, time()) => ends.power.sensor_power);
-    if let Some(ends) = ends.cameras {
-        spawn!(tasks, clock, health, PATIENT, models.cameras => ends.external_pose);
+    spawn!(tasks, clock, health, CRITICAL, imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, SHARED, down => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, SHARED, ahead => ends.tof_front.sensor_tof_front);
+    spawn!(tasks, clock, health, SHARED, devices::flow(flow, time()) => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, SHARED, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, SHARED, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, SHARED, devices::power(to_power, time()) => ends.power.sensor_power);
+    if cameras {
+        spawn!(tasks, clock, health, SHARED, models.cameras => ends.cameras.external_pose);
     }
-    Actuators { motors: models.motors, indicator: models.indicator, button: models.button }
+    Others {
+        motors: (models.motors, ends.motors),
+        indicator: (models.indicator, ends.indicator),
+        button: (models.button, ends.button_pin),
+        link: ends.link,
+    }
 }

@@ -13,14 +13,14 @@ mod format;
 
 pub use format::{Writer, tables};
 
-use crate::newest::{MAX_MESSAGE, fields};
+use crate::newest::MAX_MESSAGE;
 use crate::{Assembled, Observer};
 use core::fmt;
 use format::Entry;
 use heapless::Vec;
 use stampfly_bus::{Band, PublishWords, Schedule, Taps, TopicTable};
 use stampfly_log::FlightHash;
-use stampfly_types::{Duration, FieldInfo, FieldKind, Instant};
+use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Leaf, leaves};
 
 /// What a machine made of a golden flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,11 +197,12 @@ struct Deviation {
 impl Deviation {
     /// Compares the numbers in two samples. An output that was never published is empty.
     fn add(&mut self, clock: Instant, info: &'static [FieldInfo], expected: &[u32], output: &[u32]) {
-        let numbers = fields(info, expected).zip(fields(info, output));
-        for ((_, expected), (_, output)) in numbers.filter(|((field, _), _)| field.kind == FieldKind::F32) {
-            for (index, expected) in expected.iter().enumerate() {
-                let output = output.get(index).copied().unwrap_or(f32::NAN.to_bits());
-                let deviation = (f32::from_bits(output) - f32::from_bits(*expected)).abs();
+        let is_real = |leaf: &Leaf| matches!(leaf.kind, FieldKind::F32 | FieldKind::F64);
+        for leaf in leaves(info).filter(is_real) {
+            let number =
+                |words: &[u32], element| leaf.value(words, element).map_or(f32::NAN, |value| value.as_f64() as f32);
+            for element in 0..leaf.count {
+                let deviation = (number(output, element) - number(expected, element)).abs();
                 let deviation = if deviation.is_nan() { f32::INFINITY } else { deviation };
                 self.worst = self.worst.max(deviation);
                 if deviation > self.tolerance {

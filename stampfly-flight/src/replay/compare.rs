@@ -6,7 +6,7 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use core::fmt;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
-use stampfly_types::{ActivationRecord, FieldKind, Instant};
+use stampfly_types::{ActivationRecord, Instant, Value, leaves};
 
 /// Where a replay and its log part.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,35 +142,25 @@ fn first_difference(info: &TopicInfo, recorded: &[u32], replayed: &[u32]) -> Opt
     if recorded == replayed {
         return None;
     }
-    let mut first = 0;
-    for field in info.fields {
-        let each = field.words / field.count.max(1);
-        for element in 0..field.count {
-            let range = first + element * each..first + (element + 1) * each;
-            let (was, is) = (recorded.get(range.clone()), replayed.get(range));
-            if was != is {
-                let name = if field.count > 1 { format!("{}[{element}]", field.name) } else { field.name.into() };
-                return Some((name, show(field.kind, was), show(field.kind, is)));
+    for leaf in leaves(info.fields) {
+        for element in 0..leaf.count {
+            // As words: NaN is not equal to itself, but the same words are the same sample.
+            if leaf.words(recorded, element) != leaf.words(replayed, element) {
+                let [was, is] = [recorded, replayed].map(|words| leaf.value(words, element));
+                let name = if leaf.count > 1 { format!("{}[{element}]", leaf.name) } else { leaf.name.to_string() };
+                return Some((name, show(was), show(is)));
             }
         }
-        first += field.words;
     }
     Some(("(number of words)".into(), recorded.len().to_string(), replayed.len().to_string()))
 }
 
-fn show(kind: FieldKind, words: Option<&[u32]>) -> String {
-    let word = words.and_then(|words| words.first()).copied().unwrap_or_default();
-    match kind {
-        FieldKind::F32 => format!("{:?}", f32::from_bits(word)),
-        FieldKind::I32 | FieldKind::I16 => word.cast_signed().to_string(),
-        FieldKind::U64 => {
-            let high = words.and_then(|words| words.get(1)).copied().unwrap_or_default();
-            (u64::from(word) | u64::from(high) << 32).to_string()
-        }
-        FieldKind::Enum(names) => names
-            .iter()
-            .find(|(_, number)| *number == word)
-            .map_or_else(|| word.to_string(), |(name, _)| (*name).into()),
-        _ => word.to_string(),
+/// Every digit of a number, so that what differs is seen to differ.
+fn show(value: Option<Value>) -> String {
+    match value {
+        Some(Value::F32(number)) => format!("{number:?}"),
+        Some(Value::F64(number)) => format!("{number:?}"),
+        Some(value) => value.to_string(),
+        None => "nothing".into(),
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use stampfly_lab::flight::Series;
+use stampfly_sim::vehicle::Pick;
 use stampfly_types::{Duration, Instant};
 
 /// The most points a channel has; a screen has fewer columns.
@@ -19,19 +20,6 @@ pub(super) struct Grid {
     pub(super) start: Instant,
     pub(super) step: u64,
     pub(super) points: u64,
-}
-
-/// How several samples, or none, between two points become one value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Pick {
-    /// The newest one, as long as it is fresh.
-    Newest,
-    /// The newest one, however old: for states that are published when they change.
-    Latched,
-    /// The mean, for fast and noisy signals.
-    Mean,
-    /// The one farthest from zero: for what must not be overlooked.
-    Peak,
 }
 
 impl Grid {

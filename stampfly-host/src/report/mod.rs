@@ -11,6 +11,7 @@ mod page;
 mod panels;
 
 use stampfly_lab::Flight;
+use stampfly_sim::vehicle::Page;
 use std::io;
 use std::path::Path;
 
@@ -45,6 +46,7 @@ impl Metric {
 /// ```
 /// use stampfly_host::{Report, report::Metric};
 /// use stampfly_lab::Flight;
+/// use stampfly_board::simulation::PAGE;
 /// use stampfly_types::{Instant, messages::StateEstimate};
 ///
 /// let mut flight = Flight::default();
@@ -55,6 +57,7 @@ impl Metric {
 ///     title: "Hover".to_owned(),
 ///     subtitle: "one second on the ground".to_owned(),
 ///     metrics: vec![Metric::new("Drift", "0.00", "m").judged(true)],
+///     page: &PAGE,
 ///     flight: &flight,
 /// };
 /// let html = report.html();
@@ -68,9 +71,9 @@ pub struct Report<'a> {
     pub subtitle: String,
     /// The summary, in order.
     pub metrics: Vec<Metric>,
-    /// What to show. Topics: `sensor_imu`, `sensor_tof`, `sensor_mag`, `sensor_flow`,
-    /// `sensor_baro`, `sensor_power`, `estimate_state`, `estimate_status`,
-    /// `system_mode`, `system_alert`, `setpoint`, `control_output`, `actuator_motor`, `truth` and `device`.
+    /// What the vehicle wants to be shown of it.
+    pub page: &'static Page,
+    /// The flight.
     pub flight: &'a Flight,
 }
 

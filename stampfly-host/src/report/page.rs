@@ -4,6 +4,7 @@ use super::grid::{Channel, Grid};
 use super::panels::{Actor, Band, Builder, Panel};
 use super::{Metric, Report};
 use serde::Serialize;
+use stampfly_sim::vehicle::Body;
 
 /// The page's script, in the order its parts need each other.
 const SCRIPT: &str = concat!(
@@ -27,15 +28,28 @@ struct Page {
     bands: Vec<Band>,
     events: Vec<(f64, String)>,
     scene: Vec<Actor>,
+    body: BodyShape,
+}
+
+/// What the vehicle looks like, for the script.
+#[derive(Serialize)]
+struct BodyShape {
+    rings: &'static [[f32; 3]],
+    radius: f32,
+    outline: &'static [[f32; 2]],
+    down: f32,
+    nose: f32,
+    reach: f32,
 }
 
 /// Puts the page together.
 pub(super) fn html(report: &Report<'_>) -> String {
     let span = report.flight.span().unwrap_or_default();
     let grid = Grid::new(span);
-    let mut builder = Builder::new(report.flight, grid);
+    let mut builder = Builder::new(report.flight, report.page, grid);
     builder.all_panels();
     let scene = builder.scene();
+    let Body { rings, radius, outline, down, nose, reach } = report.page.body;
     let page = Page {
         start: grid.start.seconds_f64(),
         step: grid.step as f64 * 1e-6,
@@ -43,6 +57,7 @@ pub(super) fn html(report: &Report<'_>) -> String {
         bands: builder.bands(),
         events: report.flight.events.iter().map(|event| (event.at.seconds_f64(), event.text.clone())).collect(),
         scene,
+        body: BodyShape { rings, radius, outline, down, nose, reach },
         channels: builder.channels,
         panels: builder.panels,
     };

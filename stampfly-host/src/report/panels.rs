@@ -2,9 +2,10 @@
 //!
 //! Everything that depends on the flight is decided here; the script of the page only draws.
 
-use super::grid::{Channel, Grid, Pick};
+use super::grid::{Channel, Grid};
 use serde::Serialize;
-use stampfly_lab::flight::{Flight, Series};
+use stampfly_lab::flight::{Column, Flight, Series};
+use stampfly_sim::vehicle::{Observer, Page, PanelSpec, Pick};
 use stampfly_types::messages::SetpointAxes;
 use stampfly_types::{Quat, frame};
 
@@ -13,7 +14,7 @@ use stampfly_types::{Quat, frame};
 pub(super) struct Panel {
     group: &'static str,
     title: String,
-    unit: &'static str,
+    unit: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     limit: Option<f64>,
     logarithmic: bool,
@@ -53,17 +54,14 @@ pub(super) struct Builder<'a> {
     grid: Grid,
     pub(super) channels: Vec<Channel>,
     pub(super) panels: Vec<Panel>,
+    page: &'static Page,
 }
-
-/// The three who may know where the vehicle is, and the one that says where it should be.
-const OBSERVERS: [(&str, &str, &str); 3] =
-    [("estimate_state", "estimate", "estimate"), ("truth", "truth", "truth"), ("device", "device", "on board")];
 
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(flight: &'a Flight, grid: Grid) -> Self {
-        Self { flight, grid, channels: Vec::new(), panels: Vec::new() }
+    pub(super) fn new(flight: &'a Flight, page: &'static Page, grid: Grid) -> Self {
+        Self { flight, grid, channels: Vec::new(), panels: Vec::new(), page }
     }
 
     fn series(&self, topic: &str) -> Option<&'a Series> {
@@ -96,27 +94,59 @@ impl<'a> Builder<'a> {
     }
 
     /// A plot of the lines there are; none if there are none.
-    fn panel(&mut self, group: &'static str, title: impl Into<String>, unit: &'static str, lines: Vec<Option<Line>>) {
+    fn panel(
+        &mut self,
+        group: &'static str,
+        title: impl Into<String>,
+        unit: impl Into<String>,
+        lines: Vec<Option<Line>>,
+    ) {
         let lines: Vec<Line> = lines.into_iter().flatten().collect();
         if !lines.is_empty() {
-            self.panels.push(Panel { group, title: title.into(), unit, limit: None, logarithmic: false, lines });
+            let (title, unit) = (title.into(), unit.into());
+            self.panels.push(Panel { group, title, unit, limit: None, logarithmic: false, lines });
         }
     }
 
-    /// Several columns of one topic in one plot, numbered colours.
-    fn columns_panel(
-        &mut self,
-        group: &'static str,
-        title: &str,
-        unit: &'static str,
-        topic: &str,
-        columns: &[(&str, &str)],
-        (factor, pick): (f64, Pick),
-    ) {
-        let lines = columns.iter().enumerate();
-        let lines = lines.map(|(role, (column, name))| self.column((topic, column), name, role, factor, pick));
+    /// A plot as the vehicle wants it, numbered colours.
+    fn spec(&mut self, spec: &PanelSpec) {
+        let lines = spec.lines.iter().enumerate();
+        let lines =
+            lines.map(|(role, (column, name))| self.column((spec.topic, column), name, role, spec.factor, spec.pick));
         let lines = lines.collect();
-        self.panel(group, title, unit, lines);
+        let before = self.panels.len();
+        self.panel(spec.group, spec.title, spec.unit, lines);
+        if let Some(panel) = self.panels.get_mut(before) {
+            panel.limit = spec.limit;
+            panel.logarithmic = spec.limit.is_some();
+        }
+    }
+
+    /// A plot per topic and unit of everything that the vehicle's page does not mention.
+    fn unmentioned(&mut self) {
+        let page = self.page;
+        let mentioned = |topic: &str| {
+            page.observers.iter().any(|observer| observer.topic == topic)
+                || page.setpoint == Some(topic)
+                || page.panels.iter().any(|panel| panel.topic == topic)
+                || page.bands.iter().any(|(of, ..)| *of == topic)
+                || page.alerts.is_some_and(|(of, _)| of == topic)
+        };
+        let flight = self.flight;
+        for (topic, series) in flight.topics.iter().filter(|(topic, _)| !mentioned(topic)) {
+            let mut units: Vec<String> = series.columns.iter().map(|column| unit_of(series, column)).collect();
+            units.sort();
+            units.dedup();
+            for unit in units {
+                let columns = series.columns.iter().filter(|column| unit_of(series, column) == unit).enumerate();
+                let columns: Vec<_> = columns.map(|(role, column)| (role, column.name.clone())).collect();
+                let lines = columns
+                    .into_iter()
+                    .map(|(role, name)| self.column((topic, &name), &name, role, 1.0, Pick::Latched))
+                    .collect();
+                self.panel("Topics", topic.replace('_', " "), unit, lines);
+            }
+        }
     }
 
     /// Roll, pitch and yaw of a topic's attitude on the grid, degrees.
@@ -137,7 +167,7 @@ impl<'a> Builder<'a> {
 
     /// A vector of the set-point on the grid, where its axes are commanded.
     fn commanded(&self, field: &str, axes: [SetpointAxes; 3]) -> Option<[Vec<f64>; 3]> {
-        let series = self.series("setpoint")?;
+        let series = self.series(self.page.setpoint?)?;
         let mask = series.column("axes")?;
         let columns = series.columns_of::<3>(field)?;
         let mut columns = columns.into_iter().zip(axes);
@@ -150,8 +180,10 @@ impl<'a> Builder<'a> {
     }
 
     fn attitude_panels(&mut self) {
-        let observed: Vec<_> = OBSERVERS.iter().filter_map(|(topic, ..)| Some((*topic, self.angles(topic)?))).collect();
-        let heading = self.series("setpoint").and_then(|series| {
+        let observers = self.page.observers.iter();
+        let observed: Vec<_> =
+            observers.filter_map(|observer| Some((observer, self.angles(observer.topic)?))).collect();
+        let heading = self.page.setpoint.and_then(|topic| self.series(topic)).and_then(|series| {
             let masked = series.column("yaw")?.iter().zip(series.column("axes")?);
             let masked = masked.map(|(yaw, bits)| match *bits as u32 & SetpointAxes::YAW.bits() {
                 0 => f64::NAN,
@@ -161,9 +193,8 @@ impl<'a> Builder<'a> {
         });
         for (axis, title) in ["Roll", "Pitch", "Yaw"].into_iter().enumerate() {
             let mut lines = Vec::new();
-            for (topic, angles) in &observed {
-                let (_, role, name) = observer(topic);
-                lines.push(self.line(name, role, &angles[axis]));
+            for (observer, angles) in &observed {
+                lines.push(self.line(observer.name, observer.role, &angles[axis]));
             }
             if let (2, Some(heading)) = (axis, &heading) {
                 lines.push(self.line("set-point", "setpoint", heading));
@@ -178,15 +209,12 @@ impl<'a> Builder<'a> {
         for (axis, title) in ["North", "East", "Up"].into_iter().enumerate() {
             let factor = if axis == 2 { -1.0 } else { 1.0 };
             let mut lines = Vec::new();
-            for (topic, role, name) in OBSERVERS {
+            for Observer { topic, role, name } in self.page.observers {
                 lines.push(self.column((topic, &format!("{field}[{axis}]")), name, role, factor, Pick::Newest));
             }
             if let Some(commanded) = &commanded {
                 let values: Vec<f64> = commanded[axis].iter().map(|value| value * factor).collect();
                 lines.push(self.line("set-point", "setpoint", &values));
-            }
-            if axis == 2 && field == "position" {
-                lines.push(self.column(("sensor_tof", "distance"), "range", "range", 1.0, Pick::Newest));
             }
             self.panel(group, title, unit, lines);
         }
@@ -194,77 +222,20 @@ impl<'a> Builder<'a> {
 
     /// Every plot there can be, in the order of the page.
     pub(super) fn all_panels(&mut self) {
-        use Pick::{Mean, Newest, Peak};
         self.attitude_panels();
         let (xy, z) = (SetpointAxes::POSITION_XY, SetpointAxes::POSITION_Z);
         self.vector_panels("Position", "m", "position", [xy, xy, z]);
         let (xy, z) = (xy | SetpointAxes::VELOCITY_XY, z | SetpointAxes::VELOCITY_Z);
         self.vector_panels("Velocity", "m/s", "velocity", [xy, xy, z]);
 
-        let motors = self.series("actuator_motor").and_then(|series| series.column("count")?.last().copied());
-        let motors: Vec<_> = (0..motors.unwrap_or(0.0) as usize)
-            .map(|motor| {
-                self.column(
-                    ("actuator_motor", &format!("duty[{motor}]")),
-                    &format!("M{}", motor + 1),
-                    motor,
-                    100.0,
-                    Mean,
-                )
-            })
-            .collect();
-        self.panel("Actuators", "Motor duty", "%", motors);
-        let thrust = self.column(("control_output", "thrust"), "thrust", 0, 1.0, Mean);
-        self.panel("Actuators", "Thrust demand", "N", vec![thrust]);
-        let axes = [("torque[0]", "roll"), ("torque[1]", "pitch"), ("torque[2]", "yaw")];
-        self.columns_panel("Actuators", "Torque demand", "mN·m", "control_output", &axes, (1e3, Mean));
-
-        let ranges = [("tof_innovation", "range"), ("baro_innovation", "baro")];
-        self.columns_panel("Estimator", "Innovation, height", "m", "estimate_status", &ranges, (1.0, Peak));
-        let flows = [("flow_innovation[0]", "forward"), ("flow_innovation[1]", "right")];
-        self.columns_panel("Estimator", "Innovation, flow", "m/s", "estimate_status", &flows, (1.0, Peak));
-        let angles = [("mag_innovation", "heading"), ("accel_innovation", "gravity")];
-        self.columns_panel("Estimator", "Innovation, angles", "°", "estimate_status", &angles, (DEGREES, Peak));
-        let ratios = ["tof", "flow", "baro", "mag", "accel"].map(|sensor| (format!("{sensor}_ratio"), sensor));
-        let ratios: Vec<_> = ratios.iter().map(|(column, name)| (column.as_str(), *name)).collect();
-        let before = self.panels.len();
-        self.columns_panel("Estimator", "Test ratio", "", "estimate_status", &ratios, (1.0, Peak));
-        if let Some(panel) = self.panels.get_mut(before) {
-            panel.limit = Some(1.0);
-            panel.logarithmic = true;
-        }
-
-        let vector = |field: &str| ["x", "y", "z"].map(|axis| (field.to_owned(), axis));
-        for (title, unit, field, factor) in
-            [("Angular rate", "°/s", "gyro", DEGREES), ("Specific force", "m/s²", "accel", 1.0)]
-        {
-            let lines = vector(field).into_iter().enumerate();
-            let lines = lines.map(|(axis, (field, name))| {
-                self.column(("sensor_imu", &format!("{field}[{axis}]")), name, axis, factor, Mean)
-            });
-            let lines = lines.collect();
-            self.panel("Sensors", title, unit, lines);
-        }
-        let axes = [("field[0]", "x"), ("field[1]", "y"), ("field[2]", "z")];
-        self.columns_panel("Sensors", "Magnetic field", "µT", "sensor_mag", &axes, (1.0, Newest));
-        let angles = [("delta_x", "forward"), ("delta_y", "right")];
-        self.columns_panel("Sensors", "Flow per sample", "mrad", "sensor_flow", &angles, (1e3, Mean));
-        self.columns_panel(
-            "Sensors",
-            "Barometric altitude",
-            "m",
-            "sensor_baro",
-            &[("altitude", "baro")],
-            (1.0, Newest),
-        );
-        self.columns_panel("Battery", "Voltage", "V", "sensor_power", &[("voltage", "voltage")], (1.0, Newest));
-        self.columns_panel("Battery", "Current", "A", "sensor_power", &[("current", "current")], (1.0, Newest));
+        self.page.panels.iter().for_each(|spec| self.spec(spec));
+        self.unmentioned();
     }
 
     /// Who moves through space, the estimate first.
     pub(super) fn scene(&mut self) -> Vec<Actor> {
         let mut actors = Vec::new();
-        for (topic, role, _) in OBSERVERS {
+        for Observer { topic, role, .. } in self.page.observers {
             let Some(series) = self.series(topic) else { continue };
             let position = series
                 .columns_of::<3>("position")
@@ -318,12 +289,7 @@ impl<'a> Builder<'a> {
 
     pub(super) fn bands(&self) -> Vec<Band> {
         let mut bands = Vec::new();
-        let states = [
-            ("system_mode", "state", "State"),
-            ("system_mode", "mode", "Mode"),
-            ("command_setpoint", "source", "Command"),
-        ];
-        for (topic, column, title) in states {
+        for (topic, column, title) in self.page.bands {
             let names = self.series(topic).map(|series| series.names(column)).unwrap_or_default();
             let name = |number: u32| {
                 let known = names.iter().find(|(_, known)| *known == number);
@@ -332,11 +298,12 @@ impl<'a> Builder<'a> {
             let stretches: Vec<_> =
                 self.stretches(topic, column).into_iter().map(|(a, b, n)| (a, b, name(n), n)).collect();
             if !stretches.is_empty() {
-                bands.push(Band { title: title.to_owned(), alert: false, stretches });
+                bands.push(Band { title: (*title).to_owned(), alert: false, stretches });
             }
         }
-        let alerts = self.stretches("system_alert", "active");
-        let names = self.series("system_alert").map(|series| series.names("active")).unwrap_or_default();
+        let Some((topic, column)) = self.page.alerts else { return bands };
+        let alerts = self.stretches(topic, column);
+        let names = self.series(topic).map(|series| series.names(column)).unwrap_or_default();
         for (name, bit) in names {
             let mut stretches: Vec<(f64, f64, String, u32)> = Vec::new();
             for (from, to, bits) in alerts.iter().filter(|(.., bits)| bits & bit != 0) {
@@ -354,7 +321,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The row of [`OBSERVERS`] with this topic.
-fn observer(topic: &str) -> (&'static str, &'static str, &'static str) {
-    OBSERVERS.into_iter().find(|(known, ..)| *known == topic).unwrap_or(("", "0", ""))
+/// The unit of a column, empty where there is none or it is not known.
+fn unit_of(series: &Series, column: &Column) -> String {
+    series.meanings.get(&column.field).map(|meaning| meaning.unit.clone()).unwrap_or_default()
 }

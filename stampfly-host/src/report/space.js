@@ -105,8 +105,7 @@ const rotate = ([w, x, y, z], [a, b, c]) => {
   return [a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx];
 };
 
-const ARM = 0.0325; // Metres from the middle to a motor, along each axis.
-const PROPELLER = 0.0157;
+const body = data.body; // Metres, forward, right, down.
 
 const attitudeAt = (actor, index) => {
   const q = actor.attitude ? actor.attitude.map((channel) => channels[channel][index]) : [1, 0, 0, 0];
@@ -136,22 +135,20 @@ const drawVehicle = (context, project, actor, index, scale, ghost) => {
     const shadow = [];
     for (let k = 0; k <= 24; k++) {
       const angle = (k / 24) * 2 * Math.PI;
-      shadow.push(project([foot[0] + 1.2 * ARM * scale * Math.cos(angle), foot[1] + 1.2 * ARM * scale * Math.sin(angle), foot[2]]));
+      shadow.push(project([foot[0] + 1.2 * body.reach * scale * Math.cos(angle), foot[1] + 1.2 * body.reach * scale * Math.sin(angle), foot[2]]));
     }
     fillPoints(context, shadow);
     context.globalAlpha = 1;
   }
 
-  const motors = [[ARM, ARM], [-ARM, ARM], [-ARM, -ARM], [ARM, -ARM]];
   const parts = [];
-  const HEIGHT = -0.008;
-  for (const [forward, right] of motors) {
+  for (const [forward, right, down] of body.rings) {
     const ring = [];
     for (let k = 0; k <= 28; k++) {
       const angle = (k / 28) * 2 * Math.PI;
-      ring.push(project(world([forward + PROPELLER * 1.35 * Math.cos(angle), right + PROPELLER * 1.35 * Math.sin(angle), HEIGHT])));
+      ring.push(project(world([forward + body.radius * Math.cos(angle), right + body.radius * Math.sin(angle), down])));
     }
-    const hub = project(world([forward, right, HEIGHT]));
+    const hub = project(world([forward, right, down]));
     const root = project(world([0, 0, 0]));
     if (!hub || !root) continue;
     parts.push({ depth: hub[2], paint: () => {
@@ -167,8 +164,7 @@ const drawVehicle = (context, project, actor, index, scale, ghost) => {
       strokePoints(context, ring);
     } });
   }
-  const box = [[0.018, 0.011], [0.018, -0.011], [-0.018, -0.011], [-0.018, 0.011]];
-  const top = box.map(([f, r]) => project(world([f, r, -0.007])));
+  const top = body.outline.map(([f, r]) => project(world([f, r, body.down])));
   const center = project(world([0, 0, 0]));
   if (center) {
     parts.push({ depth: center[2], paint: () => {
@@ -176,7 +172,7 @@ const drawVehicle = (context, project, actor, index, scale, ghost) => {
       context.globalAlpha = ghost ? 0.2 : 0.92;
       fillPoints(context, top);
       context.globalAlpha = ghost ? 0.5 : 1;
-      const nose = [world([0.018, 0, -0.007]), world([0.05, 0, -0.007])].map(project);
+      const nose = [world([0, 0, body.down]), world([body.nose, 0, body.down])].map(project);
       context.strokeStyle = main;
       context.lineWidth = ghost ? 1 : 2.6;
       strokePoints(context, nose);
@@ -221,7 +217,7 @@ const drawSpace = () => {
     context.globalAlpha = 1;
   }
   // Large enough to see the attitude, never smaller than it is.
-  const scale = Math.max(1, (camera.distance * 0.048) / ARM);
+  const scale = Math.max(1, (camera.distance * 0.048) / body.reach);
   const target = data.scene.find((actor) => actor.role === 'setpoint');
   const goal = target && positionAt(target, index);
   const mark = goal && project(goal);

@@ -234,7 +234,7 @@ message! {
     /// How [`TruthPoint`] and [`DevicePoint`] look as a topic.
     struct Pose {
         /// Body FRD → world NED.
-        attitude: Quat ["1"],
+        attitude: Quat,
         /// World NED.
         position: Vec3 ["m"],
         /// World NED.

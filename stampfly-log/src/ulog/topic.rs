@@ -1,9 +1,13 @@
 //! Topics: from the words of a message to the bytes of a sample and back, without loss.
+//!
+//! A ULog field is a scalar or an array of scalars, so a message is stored as the [leaves](stampfly_types::schema) of its
+//! schema: an `Option<f32>` named `range` as `range_present` and `range`, a message named `wind` as `wind_speed` and so on.
+//! ULog's own nested formats are not used: few tools read them.
 
 use super::cursor::Cursor;
 use super::{Scalar, TOPIC_HEAD, TOPIC_HEAD_SIZE, Take};
 use core::fmt::{self, Write};
-use stampfly_types::{FieldInfo, FieldKind, Instant};
+use stampfly_types::{FieldInfo, FieldKind, Instant, Leaf, leaves};
 
 /// A topic as the log knows it: a name and the schema of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +57,8 @@ impl Topic {
     /// Number of bytes of a sample in the log.
     #[must_use]
     pub fn size(&self) -> usize {
-        TOPIC_HEAD_SIZE + self.fields.iter().map(stored).map(|(scalar, count)| scalar.size() * count).sum::<usize>()
+        TOPIC_HEAD_SIZE
+            + leaves(self.fields).map(|leaf| stored(&leaf)).map(|(scalar, count)| scalar.size() * count).sum::<usize>()
     }
 
     /// The words of a sample, from its payload. Exactly the words that were written.
@@ -67,15 +72,16 @@ impl Topic {
         let mut take = Take(payload);
         let stamp = Stamp { at: Instant::from_micros(take.u64()?), generation: take.u32()? };
         let mut words = words.iter_mut();
-        for field in self.fields {
-            let (scalar, count) = stored(field);
+        for leaf in leaves(self.fields) {
+            let (scalar, count) = stored(&leaf);
             for _ in 0..count {
                 let word = words.next()?;
                 match scalar {
                     Scalar::U8 => *word = u32::from(take.u8()?),
                     Scalar::U16 => *word = u32::from(take.u16()?),
+                    Scalar::I8 => *word = i32::from(take.u8()?.cast_signed()).cast_unsigned(),
                     Scalar::I16 => *word = i32::from(take.u16()?.cast_signed()).cast_unsigned(),
-                    Scalar::U64 => {
+                    Scalar::U64 | Scalar::I64 | Scalar::F64 => {
                         *word = take.u32()?;
                         *words.next()? = take.u32()?;
                     }
@@ -96,13 +102,9 @@ impl Topic {
     /// Writes `uint64_t timestamp;uint32_t generation;…`.
     pub(super) fn write_fields(&self, out: &mut impl Write) -> fmt::Result {
         out.write_str(TOPIC_HEAD)?;
-        self.fields.iter().try_for_each(|field| {
-            let (scalar, count) = stored(field);
-            match count {
-                0 => Ok(()),
-                1 => write!(out, "{} {};", scalar.name(), field.name),
-                _ => write!(out, "{}[{count}] {};", scalar.name(), field.name),
-            }
+        leaves(self.fields).try_for_each(|leaf| match stored(&leaf) {
+            (scalar, 1) => write!(out, "{} {};", scalar.name(), leaf.name),
+            (scalar, count) => write!(out, "{}[{count}] {};", scalar.name(), leaf.name),
         })
     }
 
@@ -112,19 +114,20 @@ impl Topic {
         out.put(&sample.at.as_micros().to_le_bytes());
         out.put(&sample.generation.to_le_bytes());
         let mut rest = sample.words;
-        for field in self.fields {
-            let (words, after) = rest.split_at_checked(field.words).ok_or(WordsError::Count)?;
+        for leaf in leaves(self.fields) {
+            let (words, after) = rest.split_at_checked(leaf.size()).ok_or(WordsError::Count)?;
             rest = after;
-            match stored(field).0 {
+            match stored(&leaf).0 {
                 Scalar::U8 => put_narrow(out, words, |word| u8::try_from(word).ok().map(u8::to_le_bytes)),
                 Scalar::U16 => put_narrow(out, words, |word| u16::try_from(word).ok().map(u16::to_le_bytes)),
+                Scalar::I8 => put_narrow(out, words, |word| i8::try_from(word.cast_signed()).ok().map(i8::to_le_bytes)),
                 Scalar::I16 => {
                     put_narrow(out, words, |word| i16::try_from(word.cast_signed()).ok().map(i16::to_le_bytes))
                 }
                 // Two words of a 64-bit number are low first, as little-endian bytes are.
                 _ => put_narrow(out, words, |word| Some(word.to_le_bytes())),
             }
-            .ok_or(WordsError::Range(field.name))?;
+            .ok_or(WordsError::Range(leaf.name.field()))?;
         }
         if rest.is_empty() { Ok(()) } else { Err(WordsError::Count) }
     }
@@ -139,26 +142,29 @@ fn put_narrow<const N: usize>(
     words.iter().try_for_each(|word| bytes(*word).map(|bytes| out.put(&bytes)))
 }
 
-/// How a field is stored: the type and the number of elements.
+/// How a leaf is stored: the type and the number of elements.
 #[inline]
-fn stored(field: &FieldInfo) -> (Scalar, usize) {
-    let scalar = match field.kind {
+fn stored(leaf: &Leaf) -> (Scalar, usize) {
+    let scalar = match leaf.kind {
         FieldKind::F32 => Scalar::F32,
+        FieldKind::F64 => Scalar::F64,
         FieldKind::U32 | FieldKind::Flags(_) => Scalar::U32,
         FieldKind::I32 => Scalar::I32,
         FieldKind::U16 => Scalar::U16,
         FieldKind::I16 => Scalar::I16,
         FieldKind::U8 | FieldKind::Bool => Scalar::U8,
+        FieldKind::I8 => Scalar::I8,
         FieldKind::U64 => Scalar::U64,
+        FieldKind::I64 => Scalar::I64,
         FieldKind::Enum(names) => match names.iter().map(|(_, number)| *number).max() {
             Some(0x1_0000..) => Scalar::U32,
             Some(0x100..) => Scalar::U16,
             _ => Scalar::U8,
         },
         // A kind younger than this crate: its words as they are.
-        _ => return (Scalar::U32, field.words),
+        _ => return (Scalar::U32, leaf.size()),
     };
-    (scalar, field.count)
+    (scalar, leaf.count)
 }
 
 /// Accepts exactly the text it holds, piece by piece.

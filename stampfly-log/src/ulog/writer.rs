@@ -16,7 +16,7 @@ use super::{
 };
 use crate::trace::{self, TOPIC_PREFIX};
 use core::fmt::{self, Write};
-use stampfly_types::{ActivationRecord, FieldInfo, FieldKind, Instant};
+use stampfly_types::{ActivationRecord, FieldKind, Instant, leaves};
 
 /// Size and type in front of each payload.
 const MESSAGE_HEAD: usize = 3;
@@ -165,13 +165,15 @@ impl<S: Sink> Definitions<S> {
                 let _ = write!(out, "{}:", topic.name);
                 let _ = topic.write_fields(out);
             })?;
-            if topic.fields.iter().any(|field| field.unit != "1") {
-                output.info(format_args!("{UNITS_PREFIX}{}", topic.name), |out| write_units(topic.fields, out))?;
+            let with_unit = || leaves(topic.fields).filter(|leaf| !leaf.unit.is_empty());
+            if with_unit().next().is_some() {
+                let units = |out: &mut dyn Write| separated(with_unit().map(|leaf| (leaf.name, leaf.unit)), out);
+                output.info(format_args!("{UNITS_PREFIX}{}", topic.name), units)?;
             }
-            for field in topic.fields {
-                if let FieldKind::Enum(names) | FieldKind::Flags(names) = field.kind {
-                    let key = format_args!("{NAMES_PREFIX}{}/{}", topic.name, field.name);
-                    output.info(key, |out| write_names(names, out))?;
+            for leaf in leaves(topic.fields) {
+                if let FieldKind::Enum(names) | FieldKind::Flags(names) = leaf.kind {
+                    let key = format_args!("{NAMES_PREFIX}{}/{}", topic.name, leaf.name);
+                    output.info(key, |out| separated(names.iter().copied(), out))?;
                 }
             }
         }
@@ -347,16 +349,11 @@ impl Write for Count {
     }
 }
 
-fn write_units(fields: &[FieldInfo], out: &mut dyn Write) -> fmt::Result {
-    separated(fields.iter().filter(|field| field.unit != "1").map(|field| (field.name, field.unit)), out)
-}
-
-fn write_names(names: &[(&str, u32)], out: &mut dyn Write) -> fmt::Result {
-    separated(names.iter().copied(), out)
-}
-
 /// `key=value key=value …`
-fn separated<'a, V: fmt::Display>(pairs: impl Iterator<Item = (&'a str, V)>, out: &mut dyn Write) -> fmt::Result {
+fn separated<K: fmt::Display, V: fmt::Display>(
+    pairs: impl Iterator<Item = (K, V)>,
+    out: &mut dyn Write,
+) -> fmt::Result {
     for (index, (key, value)) in pairs.enumerate() {
         let space = if index == 0 { "" } else { " " };
         write!(out, "{space}{key}={value}")?;

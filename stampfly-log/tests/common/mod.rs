@@ -7,7 +7,7 @@ use stampfly_types::messages::{
     EstimatorStatus, ImuData, PowerData, Signal, StateEstimate, SystemAlert, SystemMode, TofData,
 };
 use stampfly_types::{ActivationRecord, InputRecord};
-use stampfly_types::{Instant, Message, message};
+use stampfly_types::{Duration, Instant, Message, Vec3, message};
 
 /// Bytes in memory, without limit.
 #[derive(Default)]
@@ -22,6 +22,16 @@ impl Sink for Bytes {
 }
 
 message! {
+    /// A message in a message.
+    pub struct Part {
+        /// An option in a message in an array.
+        known: Option<Duration> ["us"],
+        /// Sixteen digits.
+        share: f64,
+    }
+}
+
+message! {
     /// One field of every kind the messages of the stack do not use.
     pub struct Odd {
         /// Two words.
@@ -29,15 +39,27 @@ message! {
         /// An array of two words each.
         wides: [u64; 2] ["us"],
         /// Sign must survive.
-        signed: i16 ["1"],
+        signed: i16,
         /// Sign must survive.
-        signeds: [i16; 3] ["1"],
+        signeds: [i16; 3],
         /// Sixteen bits.
-        half: u16 ["1"],
+        half: u16,
         /// Sign must survive.
-        integer: i32 ["1"],
+        integer: i32,
         /// Time.
         at: Instant ["us"],
+        /// Sign must survive.
+        both_ways: i64 ["us"],
+        /// Sixteen digits.
+        precise: f64,
+        /// Sign must survive.
+        small: i8,
+        /// More than `Default` knows.
+        many: [i8; 40],
+        /// A value or none.
+        maybe: Option<Vec3> ["m/s"],
+        /// Messages in an array.
+        part: [Part; 2],
     }
 }
 

@@ -15,11 +15,13 @@
 mod executor;
 mod jitter;
 mod live;
+mod page;
 mod scenario;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, fly};
 pub use live::Live;
+pub use page::{Body, Observer, Page, PanelSpec, Pick};
 pub use scenario::Scenario;
 pub use witness::Witness;
 
@@ -177,6 +179,8 @@ pub trait Vehicle: 'static {
     const NAME: &'static str;
     /// Topics that its surroundings add to the log.
     const BESIDE: &'static [Topic];
+    /// What a page about a flight shows of it. By default a plot per topic and unit.
+    const PAGE: Page = Page { observers: &[], setpoint: None, panels: &[], bands: &[], alerts: None, body: Body::NONE };
     /// Its runnables. Serialisable, so that a log can hold key frames.
     type Runnables: Schedule + Serialize + DeserializeOwned;
     /// All that decides a flight.

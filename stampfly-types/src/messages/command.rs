@@ -10,19 +10,19 @@ message! {
     /// One authenticated frame of a pilot's transmitter, normalised. Right and up are positive.
     pub struct PilotInput {
         /// Roll stick, −1 to 1, right positive.
-        roll: f32 ["1"],
+        roll: f32,
         /// Pitch stick, −1 to 1, forward positive (nose down, flying forward).
-        pitch: f32 ["1"],
+        pitch: f32,
         /// Yaw stick, −1 to 1, clockwise seen from above positive.
-        yaw: f32 ["1"],
+        yaw: f32,
         /// Throttle stick, −1 to 1, spring centred: zero holds height in the modes that hold it.
-        throttle: f32 ["1"],
+        throttle: f32,
         /// The flight mode the switches select.
-        mode: FlightMode ["1"],
+        mode: FlightMode,
         /// Arm switch. Arming needs a rising edge seen by the vehicle.
-        arm: bool ["1"],
+        arm: bool,
         /// Emergency stop: motors off now, whatever the state.
-        kill: bool ["1"],
+        kill: bool,
     }
 }
 
@@ -30,6 +30,7 @@ message_enum! {
     /// What a guided command asks for.
     pub enum GuidedKind {
         /// Nothing.
+        #[default]
         None = 0,
         /// Allow the motors.
         Arm = 1,
@@ -52,7 +53,7 @@ message! {
     /// A command from a program: the ground station, a mission file, a script.
     pub struct GuidedCommand {
         /// What is asked.
-        kind: GuidedKind ["1"],
+        kind: GuidedKind,
         /// Goal in the world frame, relative to the origin.
         position: Vec3 ["m"],
         /// Goal heading.
@@ -68,6 +69,7 @@ message_enum! {
     /// What the button did.
     pub enum ButtonGesture {
         /// Nothing.
+        #[default]
         None = 0,
         /// Pressed and let go.
         Click = 1,
@@ -86,7 +88,7 @@ message! {
     /// What happened on the board's button: every press at once, and what became of it.
     pub struct ButtonEvent {
         /// What happened.
-        gesture: ButtonGesture ["1"],
+        gesture: ButtonGesture,
         /// How long the button has been down, or was.
         held: f32 ["s"],
     }
@@ -96,6 +98,7 @@ message_enum! {
     /// Who has authority over the set-point.
     pub enum CommandSource {
         /// Nobody: level, hold, no climb.
+        #[default]
         None = 0,
         /// The pilot's sticks.
         Pilot = 1,
@@ -110,15 +113,15 @@ message! {
     /// The arbitrated command: one authority, sticks normalised, dead band applied.
     pub struct CommandSetpoint {
         /// −1 to 1; meaning depends on the flight mode.
-        throttle: f32 ["1"],
+        throttle: f32,
         /// −1 to 1, right positive.
-        roll: f32 ["1"],
+        roll: f32,
         /// −1 to 1, forward positive.
-        pitch: f32 ["1"],
+        pitch: f32,
         /// −1 to 1, clockwise positive.
-        yaw: f32 ["1"],
+        yaw: f32,
         /// Whose command it is.
-        source: CommandSource ["1"],
+        source: CommandSource,
     }
 }
 
@@ -154,10 +157,10 @@ message! {
         /// Heading rate.
         yaw_rate: f32 ["rad/s"],
         /// Which of the above are commanded.
-        axes: SetpointAxes ["1"],
+        axes: SetpointAxes,
         /// Way-points still ahead, the present one included.
-        remaining: u32 ["1"],
+        remaining: u32,
         /// Has the last way-point been reached and its dwell time passed?
-        arrived: bool ["1"],
+        arrived: bool,
     }
 }

@@ -19,12 +19,12 @@ message! {
     /// What is sent to the motors.
     pub struct MotorOutput {
         /// Duty cycle per motor, 0 to 1. The StampFly's order: front right, rear right, rear left, front left.
-        duty: [f32; MAX_MOTORS] ["1"],
+        duty: [f32; MAX_MOTORS],
         /// How many of them exist.
-        count: u8 ["1"],
+        count: u8,
         /// May the motors turn? When not, every duty is exactly zero.
-        armed: bool ["1"],
+        armed: bool,
         /// Share of the torque demand that could not be met, 0 is none: roll, pitch, yaw, thrust.
-        unmet: [f32; 4] ["1"],
+        unmet: [f32; 4],
     }
 }

@@ -48,7 +48,7 @@ message! {
     /// The vehicle's state as the estimator sees it.
     pub struct StateEstimate {
         /// Body FRD → world NED.
-        attitude: Quat ["1"],
+        attitude: Quat,
         /// World NED, origin where the vehicle was initialised.
         position: Vec3 ["m"],
         /// World NED.
@@ -66,9 +66,9 @@ message! {
         /// One standard deviation of the horizontal position, root of the trace.
         position_std_xy: f32 ["m"],
         /// Which of the above may be used.
-        valid: Validity ["1"],
+        valid: Validity,
         /// Sensors that took part within the last second.
-        sensors: SensorMask ["1"],
+        sensors: SensorMask,
     }
 }
 
@@ -80,31 +80,31 @@ message! {
         /// Innovation of the last range, along the vertical.
         tof_innovation: f32 ["m"],
         /// Test ratio of the last range.
-        tof_ratio: f32 ["1"],
+        tof_ratio: f32,
         /// Innovation of the last flow sample, body x and y.
         flow_innovation: [f32; 2] ["m/s"],
         /// Test ratio of the last flow sample.
-        flow_ratio: f32 ["1"],
+        flow_ratio: f32,
         /// Innovation of the last barometric altitude.
         baro_innovation: f32 ["m"],
         /// Test ratio of the last barometric altitude.
-        baro_ratio: f32 ["1"],
+        baro_ratio: f32,
         /// Innovation of the last magnetic heading.
         mag_innovation: f32 ["rad"],
         /// Test ratio of the last magnetic heading.
-        mag_ratio: f32 ["1"],
+        mag_ratio: f32,
         /// Angle between measured and predicted gravity.
         accel_innovation: f32 ["rad"],
         /// Test ratio of the last accelerometer attitude.
-        accel_ratio: f32 ["1"],
+        accel_ratio: f32,
         /// Measurements refused since the start: range, flow, baro, mag, accelerometer.
-        refused: [u32; 5] ["1"],
+        refused: [u32; 5],
         /// Measurements offered since the start, in the same order.
-        offered: [u32; 5] ["1"],
+        offered: [u32; 5],
         /// Resets since the start.
-        resets: u32 ["1"],
+        resets: u32,
         /// Is the estimate lost?
-        diverged: bool ["1"],
+        diverged: bool,
     }
 }
 
@@ -112,11 +112,11 @@ message! {
     /// What the mode machine asks of the estimator. Level-triggered, except the reset counters.
     pub struct EstimatorCommand {
         /// The vehicle stands still on the ground: hold velocity at zero.
-        on_ground: bool ["1"],
+        on_ground: bool,
         /// A change of this number asks for position and velocity to be set to zero.
-        origin_resets: u32 ["1"],
+        origin_resets: u32,
         /// A change of this number asks for a full new start from calibration.
-        full_resets: u32 ["1"],
+        full_resets: u32,
     }
 }
 
@@ -132,10 +132,10 @@ message! {
         /// Barometric altitude of the ground.
         baro_altitude: f32 ["m"],
         /// Share of the still period that has been collected, 0 to 1.
-        progress: f32 ["1"],
+        progress: f32,
         /// Finished: the values above may be used.
-        complete: bool ["1"],
+        complete: bool,
         /// How often motion restarted the collection.
-        restarts: u32 ["1"],
+        restarts: u32,
     }
 }

@@ -27,9 +27,9 @@ message! {
         /// What the sensor says of the measurement, for the log, as ST's drivers number it: 0 valid, 1 standard deviation
         /// too high, 2 signal too low, 4 phase out of bounds, 5 hardware, 6 valid but not checked for wrap-around,
         /// 7 wrapped around, 8 not computed, 9 cover glass, 10 starting, 11 merged targets, 13 too close, 255 nothing new.
-        status: u8 ["1"],
+        status: u8,
         /// Does the driver vouch for the distance?
-        valid: bool ["1"],
+        valid: bool,
     }
 }
 
@@ -46,9 +46,9 @@ message! {
         /// Time over which the angles were swept.
         interval: f32 ["s"],
         /// Surface quality as the chip counts features, 0 is blind.
-        quality: u8 ["1"],
+        quality: u8,
         /// Does the driver vouch for the sample?
-        valid: bool ["1"],
+        valid: bool,
     }
 }
 
@@ -93,7 +93,7 @@ message! {
         /// Position, world NED.
         position: Vec3 ["m"],
         /// Attitude, body FRD → world NED.
-        attitude: Quat ["1"],
+        attitude: Quat,
         /// Standard deviation of the position, per axis; zero when there is none.
         position_sigma: f32 ["m"],
         /// Standard deviation of the attitude, per axis; zero when there is none.

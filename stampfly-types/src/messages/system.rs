@@ -6,6 +6,7 @@ message_enum! {
     /// Where the vehicle is in its life. Failsafe is an event, never a state.
     pub enum FlightState {
         /// Sensors and calibration are starting.
+        #[default]
         Init = 0,
         /// Standing on the ground, motors off.
         IdleGround = 1,
@@ -25,10 +26,11 @@ message_enum! {
 message_enum! {
     /// What the sticks mean while flying.
     pub enum FlightMode {
-        /// Sticks command angles; throttle commands thrust.
-        Stabilize = 1,
         /// Sticks command rates; throttle commands thrust.
         Acro = 0,
+        /// Sticks command angles; throttle commands thrust.
+        #[default]
+        Stabilize = 1,
         /// Sticks command angles; throttle commands climb rate.
         AltHold = 2,
         /// Sticks command velocities; released, the vehicle holds its place.
@@ -74,19 +76,19 @@ message! {
     /// The mode machine's decision.
     pub struct SystemMode {
         /// Where the vehicle is in its life.
-        state: FlightState ["1"],
+        state: FlightState,
         /// The flight mode, in force while flying.
-        mode: FlightMode ["1"],
+        mode: FlightMode,
         /// May the motors turn?
-        armed: bool ["1"],
+        armed: bool,
         /// Pairing with a transmitter.
-        pairing: bool ["1"],
+        pairing: bool,
         /// Why arming would be refused right now.
-        blocks: ArmBlocks ["1"],
+        blocks: ArmBlocks,
         /// Transitions since power-on.
-        transitions: u32 ["1"],
+        transitions: u32,
         /// A change of this number resets the controller.
-        control_resets: u32 ["1"],
+        control_resets: u32,
     }
 }
 
@@ -133,6 +135,7 @@ message_enum! {
     /// How the self test at power-on ended.
     pub enum SelfTestVerdict {
         /// It was not run.
+        #[default]
         NotRun = 0,
         /// Every bit as recorded.
         Identical = 1,
@@ -147,9 +150,9 @@ message! {
     /// What the self test at power-on found.
     pub struct SelfTest {
         /// How it ended.
-        verdict: SelfTestVerdict ["1"],
+        verdict: SelfTestVerdict,
         /// Largest deviation of a motor's duty; infinite when one was no number.
-        worst: f32 ["1"],
+        worst: f32,
     }
 }
 
@@ -157,9 +160,9 @@ message! {
     /// The failsafe's findings.
     pub struct SystemAlert {
         /// Conditions present now, or latched.
-        active: Alerts ["1"],
+        active: Alerts,
         /// Conditions that became present since power-on, for the log and for people.
-        seen: Alerts ["1"],
+        seen: Alerts,
     }
 }
 
@@ -167,6 +170,7 @@ message_enum! {
     /// Contact with the ground.
     pub enum GroundContact {
         /// Standing.
+        #[default]
         Ground = 0,
         /// Not standing.
         Air = 1,
@@ -177,13 +181,13 @@ message! {
     /// What the take-off and landing manager sees, and what it asks of the vertical controller.
     pub struct VehicleStatus {
         /// Contact with the ground.
-        contact: GroundContact ["1"],
+        contact: GroundContact,
         /// Take-off has reached its height and settled.
-        takeoff_complete: bool ["1"],
+        takeoff_complete: bool,
         /// Touchdown is confirmed.
-        landed: bool ["1"],
+        landed: bool,
         /// Upper limit on collective thrust as a share of hover thrust; above one while unlimited.
-        thrust_ceiling: f32 ["1"],
+        thrust_ceiling: f32,
         /// Descent speed asked for while landing.
         descent_rate: f32 ["m/s"],
     }
@@ -193,6 +197,7 @@ message_enum! {
     /// A short tune.
     pub enum Tone {
         /// Silence.
+        #[default]
         None = 0,
         /// Power-on.
         Start = 1,
@@ -215,12 +220,12 @@ message! {
     /// What people see and hear.
     pub struct Signal {
         /// Colour of the status light, red, green, blue, 0 to 255.
-        status: [u8; 3] ["1"],
+        status: [u8; 3],
         /// Colour of the two body lights.
-        body: [u8; 3] ["1"],
+        body: [u8; 3],
         /// Tune to start; repeats are edges of `tone_count`.
-        tone: Tone ["1"],
+        tone: Tone,
         /// A change of this number starts the tune.
-        tone_count: u32 ["1"],
+        tone_count: u32,
     }
 }

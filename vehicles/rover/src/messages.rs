@@ -9,6 +9,7 @@ message_enum! {
     /// Where the driver's input comes from.
     pub enum InputMode {
         /// The operator's throttle, brake and steering.
+        #[default]
         Manual = 0,
         /// The built-in scenario.
         Demo = 1,
@@ -21,6 +22,7 @@ message_enum! {
     /// State of the safety supervisor, in order of severity.
     pub enum SystemState {
         /// Everything works.
+        #[default]
         Normal = 0,
         /// Part of the vehicle has failed: speed and steering are limited, the log continues.
         Degraded = 1,
@@ -71,17 +73,17 @@ message! {
     /// What the operator asks for; from outside, through Com.
     pub struct OperatorCommand {
         /// Throttle, 0 to 1.
-        throttle: f32 ["1"],
+        throttle: f32,
         /// Brake, 0 to 1.
-        brake: f32 ["1"],
+        brake: f32,
         /// Steering, −1 (right) to 1 (left).
-        steer: f32 ["1"],
+        steer: f32,
         /// Source of the driver's input.
-        mode: InputMode ["1"],
+        mode: InputMode,
         /// Emergency stop.
-        estop: bool ["1"],
+        estop: bool,
         /// Leave Degraded or EStop; acts when it changes from false to true.
-        reset: bool ["1"],
+        reset: bool,
     }
 }
 
@@ -89,7 +91,7 @@ message! {
     /// Asks for the log, live; lapses after [two seconds](crate::com::SUBSCRIPTION).
     pub struct Subscription {
         /// Send every n-th line; 0 ends it.
-        every: u32 ["1"],
+        every: u32,
     }
 }
 
@@ -97,11 +99,11 @@ message! {
     /// The selected and limited input: the document's `DriverInput`.
     pub struct DriverInput {
         /// Throttle, 0 to 1.
-        throttle: f32 ["1"],
+        throttle: f32,
         /// Brake, 0 to 1.
-        brake: f32 ["1"],
+        brake: f32,
         /// Steering, −1 (right) to 1 (left).
-        steer: f32 ["1"],
+        steer: f32,
     }
 }
 
@@ -153,11 +155,11 @@ message! {
     /// What the safety supervisor has decided.
     pub struct SafetyStatus {
         /// Is an emergency stop commanded from outside at this moment?
-        estop: bool ["1"],
+        estop: bool,
         /// The latched state.
-        system_state: SystemState ["1"],
+        system_state: SystemState,
         /// Components without a heartbeat at this moment.
-        stalled: Components ["1"],
+        stalled: Components,
     }
 }
 
@@ -165,7 +167,7 @@ message! {
     /// Com works, and hears every component that is another process.
     pub struct ComStatus {
         /// Those heard since the last time.
-        heard: Components ["1"],
+        heard: Components,
     }
 }
 
@@ -173,9 +175,9 @@ message! {
     /// What the diagnosis has found.
     pub struct DiagStatus {
         /// Faults in this period.
-        faults: Faults ["1"],
+        faults: Faults,
         /// Every fault since the start.
-        seen: Faults ["1"],
+        seen: Faults,
     }
 }
 
@@ -185,11 +187,11 @@ message! {
         /// Time of the state since the start.
         t: f32 ["s"],
         /// Throttle, 0 to 1.
-        throttle: f32 ["1"],
+        throttle: f32,
         /// Brake, 0 to 1.
-        brake: f32 ["1"],
+        brake: f32,
         /// Steering, −1 to 1.
-        steer: f32 ["1"],
+        steer: f32,
         /// Acceleration of the engine.
         drive_accel_cmd: f32 ["m/s^2"],
         /// Deceleration of the brake.
@@ -209,9 +211,9 @@ message! {
         /// Angular velocity of the wheels.
         wheel_omega: f32 ["rad/s"],
         /// Emergency stop commanded from outside.
-        estop: bool ["1"],
+        estop: bool,
         /// State of the safety supervisor.
-        system_state: SystemState ["1"],
+        system_state: SystemState,
     }
 }
 

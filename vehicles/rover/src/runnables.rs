@@ -224,7 +224,7 @@ impl Runnable for DiagSwc {
             state: *ends.vehicle_state.get(),
         };
         let faults = diag::check(&signals, ends.parameters.get());
-        self.0 = self.0 | faults;
+        self.0 |= faults;
         ends.diag_status.publish(activation.now(), &DiagStatus { faults, seen: self.0 });
     }
 }
@@ -234,7 +234,7 @@ impl Runnable for ComSwc {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut ComEnds<'_>) {
         let heard = Components::NONE.set(Components::ENGINE, ends.remote_drive.is_new());
-        self.0 = self.0 | heard;
+        self.0 |= heard;
         // When one is not heard, its heartbeat and this one are missing: two, so an emergency stop.
         if heard == self.0 {
             ends.com_status.publish(activation.now(), &ComStatus { heard });

@@ -1,17 +1,17 @@
-//! A linked program as its functions and objects: how large each is, whose it is, whom it calls.
+//! The functions and objects of a linked program: size, owning crate, callees.
 
 mod riscv;
 pub mod stack;
 
-use crate::Failure;
+use crate::repository::Failure;
 use object::elf::SHF_ALLOC;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Whose text, tables and merged variables the compiler named itself: some Rust crate's.
+/// Owner of objects that the compiler named itself (text, tables, merged variables): some Rust crate.
 pub const CONSTANTS: &str = "constants";
-/// Whose names are not Rust's.
+/// Owner of objects whose names are not Rust names.
 pub const C: &str = "C";
 
 /// One function or object.
@@ -236,7 +236,7 @@ pub mod tests {
     }
 
     #[test]
-    fn a_name_says_whose_it_is() {
+    fn the_name_tells_the_crate() {
         assert_eq!(owning_crate("stampfly_eskf::eskf::Eskf::new"), "stampfly_eskf");
         assert_eq!(owning_crate("<stampfly_eskf::eskf::Eskf as stampfly_eskf::Estimator>::predict"), "stampfly_eskf");
         assert_eq!(owning_crate("<&mut dyn embassy_time::Driver>::now"), "embassy_time");
@@ -244,7 +244,7 @@ pub mod tests {
     }
 
     #[test]
-    fn what_the_compiler_named_is_not_cs() {
+    fn names_made_by_the_compiler_do_not_count_as_c() {
         assert_eq!(owner(".Lanon.aca3.930", ".Lanon.aca3.930"), "constants");
         assert_eq!(owner(".Lswitch.table.x", ".Lswitch.table.x"), "constants");
         assert_eq!(owner("sta_input", "sta_input"), "C");

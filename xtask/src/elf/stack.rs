@@ -1,9 +1,9 @@
-//! The deepest a function can get, over everything it calls.
+//! Bound of the stack of a function, over everything it calls.
 //!
-//! A call through a pointer could go anywhere; a table says which functions may be behind whose, and the deepest of them
-//! counts at every such call. What is behind a pointer may call through pointers itself. When that leads back to the same
-//! row of the table, as with a value whose text contains another value's, the row has to say how often. Recursion
-//! otherwise, and frames of unknown size, have no bound and are named; so are functions whose code is not in the program.
+//! A table lists the possible targets of calls through pointers, by caller; at every such call the deepest target counts.
+//! Targets may call through pointers themselves. When that leads back to the same row of the table, as when formatting a
+//! value formats another one inside it, the row has to say how often. Any other recursion, and frames of unknown size, have no
+//! bound and are reported, as are functions whose code is not in the program.
 
 use super::{Program, Symbol, panics};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,17 +1,17 @@
 //! `bars`: do a hundred flights keep every bar, and are they simulated fast enough?
 //!
-//! The bars of the flights stand in `stampfly-board/host/bars.rs`, where the tests find them, too; the reference mission has
+//! The bars of the flights stand in `stampfly-host/bars.rs`, where the tests find them, too; the reference mission has
 //! to keep its own both over models of the sensors and through the real drivers. The bars of speed are for one core and
 //! depend on the machine: they are less than half of what a PC of 2024 does. Processor time counts, and the best of some
 //! short runs, because a shared machine has other things to do.
 
-use crate::Failure;
-use crate::repository::{Repository, capture, json, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, json, run as run_program};
 use serde_json::Value;
 use std::fs;
 
 /// Mission, figure, statistic, bar.
-const BARS: [(&str, &str, &str, f64); 7] = include!("../../../stampfly-board/host/bars.rs");
+const BARS: [(&str, &str, &str, f64); 7] = include!("../../../stampfly-host/bars.rs");
 /// Mission, and arguments besides.
 const CAMPAIGNS: [(&str, &[&str]); 3] = [("square", &[]), ("square", &["--chips"]), ("hover", &[])];
 const FLIGHTS: &str = "100";
@@ -21,7 +21,7 @@ const SPEEDS: [(&[&str], f64); 2] = [(&[], 300.0), (&["--chips"], 100.0)];
 const TIMED: &str = "8";
 const RUNS: usize = 5;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
     let mut failures = Vec::new();
     for (mission, arguments) in CAMPAIGNS {

@@ -4,16 +4,16 @@
 //! Instructions are not cycles, and a PC's are not the target's: the figure is for noticing change, and it is exact
 //! enough to notice a per cent, which a clock on a shared machine is not.
 
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::machine::{VALGRIND, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::repository::{Failure, Repository, capture, run as run_program};
 
 /// Steps of the two runs: both end in hover.
 const SHORT: u64 = 6_000;
 const LONG: u64 = 8_000;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&VALGRIND])?;
     run_program(repository.cargo().args([
         "build",
@@ -26,10 +26,10 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     ]))?;
     let measured = (count(repository, LONG)? - count(repository, SHORT)?) as f64 / (LONG - SHORT) as f64;
 
-    Budget::read(repository, "benches/budget.toml")?.hold("instructions_per_step", measured, "instructions per step")
+    Budget::read(repository, "benches/budget.toml")?.hold(&["instructions_per_step"], measured, "instructions per step")
 }
 
-/// Instructions of one run of so many steps.
+/// Instructions of one run.
 fn count(repository: &Repository, steps: u64) -> Result<u64, Failure> {
     let program = repository.target("release/examples/chain_steps");
     let mut valgrind = repository.command("valgrind");

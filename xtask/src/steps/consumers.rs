@@ -4,14 +4,24 @@
 //! forgot to ask for itself. So a small program per crate (`xtask/consumers`) is built where the workspace cannot help
 //! it, depending on that crate and on the vocabulary of `stampfly-types`, and run.
 
-use crate::Failure;
-use crate::repository::{Repository, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, run as run_program};
 use std::fs;
 use std::path::Path;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+/// Libraries that nobody depends on by themselves: the macros come with the bus, the others belong to the program.
+const NOT_ALONE: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab"];
+/// What a program needs beside a library that assembles others.
+const BESIDE: &[(&str, &[&str])] =
+    &[("stampfly-board", &["stampfly-bus", "stampfly-flight"]), ("stampfly-flight", &["stampfly-bus"])];
+
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let place = std::env::temp_dir().join(format!("stampfly-consumers-{}", std::process::id()));
-    let outcome = repository.libraries()?.iter().try_for_each(|library| consume(repository, &library.name, &place));
+    let outcome = repository
+        .libraries()?
+        .iter()
+        .filter(|library| !NOT_ALONE.contains(&library.name.as_str()))
+        .try_for_each(|library| consume(repository, &library.name, &place));
     // Nothing depends on its removal.
     let _ = fs::remove_dir_all(&place);
     outcome
@@ -30,6 +40,8 @@ fn consume(repository: &Repository, name: &str, place: &Path) -> Result<(), Fail
     if name != "stampfly-types" {
         manifest += &dependency("stampfly-types");
     }
+    let beside = BESIDE.iter().filter(|(library, _)| *library == name).flat_map(|(_, beside)| *beside);
+    manifest.extend(beside.map(|name| dependency(name)));
     let io = |e: std::io::Error| format!("{}: {e}", folder.display());
     fs::create_dir_all(folder.join("src")).map_err(io)?;
     fs::write(folder.join("Cargo.toml"), manifest).map_err(io)?;

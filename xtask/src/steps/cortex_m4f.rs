@@ -4,10 +4,10 @@
 //! The count is exact and the same on every host. Instructions are not cycles. The package `benches/cortex-m4f` is outside
 //! the workspace, so its format and its warnings are looked at here, too.
 
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::machine::{EMULATED_ARM, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use std::process::Command;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -16,7 +16,7 @@ const BAR: f64 = 12_000.0;
 /// A run takes less than a second. One that faulted would never end.
 const SECONDS: &str = "120";
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     add_targets(repository, &[TARGET])?;
     run_program(firmware(repository, "cargo").args(["fmt", "--check"]))?;
     let mut clippy = firmware(repository, "cargo");
@@ -34,7 +34,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
         if !here.lines().any(|line| line == format!("{name}: hash {hash}")) {
             failures.push(format!("{name}: the host's estimates have other bits:\n{here}"));
         }
-        failures.extend(budget.hold(name, mean, "instructions per step").err());
+        failures.extend(budget.hold(&["instructions_per_step", name], mean, "instructions per step").err());
         if mean > BAR {
             failures.push(format!("{name}: {mean} instructions per step; {BAR} is the most there may ever be"));
         }

@@ -2,13 +2,13 @@
 //!
 //! Compares the hash over everything published that `stampfly fly --seed N --json` prints.
 
-use crate::Failure;
-use crate::repository::{Repository, capture, json};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, json};
 
 const PROFILES: [&str; 2] = ["release", "unoptimised"];
 const SEEDS: [&str; 2] = ["1", "2"];
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let mut hashes = Vec::new();
     for seed in SEEDS {
         let mut of_seed = Vec::new();

@@ -1,9 +1,9 @@
 //! `doc`: broken links and malformed documentation are errors.
 
-use crate::Failure;
-use crate::repository::{Repository, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, run as run_program};
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let mut doc = repository.cargo();
     doc.env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--no-deps", "--quiet"]);
     for library in repository.libraries()? {

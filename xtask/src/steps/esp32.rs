@@ -12,9 +12,9 @@
 //! comes with the sources of its own core library, which both need, and is installed when it is missing.
 
 use super::no_std::debian_cargo;
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
-use crate::repository::{Repository, capture, python_tool, run as run_program};
+use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use object::{Object, ObjectSection};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,12 +26,12 @@ const STAND_IN: &str = "loongarch32-unknown-none-softfloat";
 /// The name cargo and esp-hal know the S3 by.
 const S3: &str = "xtensa-esp32s3-none-elf.json";
 const C6: &str = "riscv32imac-unknown-none-elf";
-/// Espressif's tool, the version whose words are read here.
+/// Espressif's tool; its output is parsed here.
 const ESPTOOL: &str = "esptool==5.6.0";
 /// No S3 has this pin; `src/pins.rs` asks for it when told to.
 const WRONG_PIN: &str = "GPIO22";
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let format = repository.root.join(PACKAGE).join("Cargo.toml");
     run_program(repository.cargo().args(["fmt", "--check", "--manifest-path"]).arg(format))?;
     provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;

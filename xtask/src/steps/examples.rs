@@ -1,10 +1,10 @@
 //! `examples`: every example of the examples package still runs to its end.
 
-use crate::Failure;
-use crate::repository::{Repository, capture};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture};
 use std::fs;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let folder = repository.root.join("examples/examples");
     let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     // What is no file is what examples share.

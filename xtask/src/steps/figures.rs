@@ -2,8 +2,8 @@
 //!
 //! Takes some minutes. Not part of `ci`: figures are read by people, and the bars they must meet are tests.
 
-use crate::Failure;
-use crate::repository::{Repository, capture};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture};
 use std::fmt::Write;
 
 const BEGIN: &str = "<!-- figures: cargo xtask figures -->\n";
@@ -20,7 +20,7 @@ const CAMPAIGNS: &[(&str, &[&str])] = &[
     ("Four times the recorded vibration, 100 seeds", &["campaign", "--flights", "100", "--vibration", "4"]),
 ];
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let mut text = String::new();
     for (title, arguments) in CAMPAIGNS {
         let (table, _) = stampfly(repository, arguments)?;

@@ -3,8 +3,8 @@
 //!
 //! Recorded again by `--fix`, after a change that is meant to change flights.
 
-use crate::repository::{Repository, capture};
-use crate::{FIX, Failure, asks};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture};
 use std::fs;
 use std::process::Command;
 
@@ -13,8 +13,8 @@ const PROFILES: [&str; 2] = ["release", "unoptimised"];
 /// A flight that grows beyond this is no longer what a repository and a flash memory should hold.
 const MOST_BYTES: usize = 150_000;
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = asks(arguments, FIX);
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let fix = arguments.fix;
     let committed = repository.root.join(RECORD);
     let folder = repository.target("golden");
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -1,9 +1,9 @@
 //! `loom`: the bus's models, in every interleaving and with every value the memory model allows.
 
-use crate::Failure;
-use crate::repository::{Repository, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, run as run_program};
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     // Its own folder, because every dependency is built with another flag. No backtraces: the twins have to panic.
     run_program(
         repository
@@ -13,6 +13,6 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
             .args(["test", "--release", "-p", "stampfly-bus", "--test", "loom", "--target-dir"])
             .arg(repository.target("loom"))
             .arg("--")
-            .args(arguments),
+            .args(&arguments.rest),
     )
 }

@@ -2,9 +2,9 @@
 //!
 //! Debian's packages are installed by the steps themselves where that is possible, which is as root with `apt-get`.
 
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::machine::{ALL, exists, installing, missing};
-use crate::repository::{Repository, capture, in_ci};
+use crate::repository::{Failure, Repository, capture, in_ci};
 use std::process::{Command, Stdio};
 
 /// Programs that no step installs, and how to.
@@ -22,7 +22,7 @@ const PARTS: [(&[&str], &str); 3] = [
     (&["python3", "-c", "import ensurepip, venv"], "apt-get install -y python3-venv"),
 ];
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let programs = PROGRAMS.iter().filter(|(program, _)| !exists(program)).map(|(_, command)| *command);
     let parts = PARTS.iter().filter(|(test, _)| !works(repository, test)).map(|(_, command)| *command);
     let mut wanted: Vec<String> = programs.chain(parts).map(str::to_owned).collect();

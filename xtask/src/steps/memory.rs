@@ -8,18 +8,18 @@
 //! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
 use super::esp32;
+use crate::arguments::Arguments;
 use crate::elf::stack::{Behind, Stack};
 use crate::elf::{C, CONSTANTS, Program, Sizes};
 use crate::ratchet::Budget;
-use crate::repository::Repository;
-use crate::{FIX, Failure, asks};
+use crate::repository::{Failure, Repository};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
 /// What is called through pointers, by whom: estimation reaches the estimator that the parameters chose, the scheduler
 /// asks topics for their newest, a drained bus hands messages to a closure, formatted text asks each value to write
-/// itself, executors run tasks, everybody else wakes them.
+/// itself, executors run tasks, all other callers wake them.
 const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "runnables::estimation::Estimation", targets: ESTIMATOR, nests: None },
     // Wherever in it the compiler puts estimation.
@@ -33,43 +33,54 @@ const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "", targets: &["raw::waker::"], nests: None },
 ];
 const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyTopic>::"];
-/// Bytes of stack that a function is assumed to take whose code is not in the program: those in ROM, which compute with
-/// floating point, copy memory, wait, or ask the flash chip, and call little. Nothing in the program tells.
+/// Bytes of stack assumed for a function in ROM, whose code is not in the program. These compute with floating point, copy
+/// memory, wait, or access the flash chip, and call little.
 const ROM: u64 = 512;
-/// Part of its stack that a task may take; the rest is for interrupts, and for what nobody thought of.
+/// Part of its stack that a task may take. The rest is for interrupts and for errors of this bound.
 const SHARE: f64 = 0.5;
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let path = match arguments.iter().find(|argument| *argument != FIX) {
-        None => esp32::c6(repository)?,
-        Some(path) => path.into(),
-    };
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
     let program = Program::read(&path)?;
     let budget = Budget::read(repository, BUDGET)?;
-    let mut ledger = Ledger { budget, fix: asks(arguments, FIX), failures: Vec::new() };
+    let mut ledger = Ledger { budget, fix: arguments.fix, held: BTreeSet::new(), failures: Vec::new() };
     sizes(&program, &mut ledger)?;
     stacks(&path, &program, &mut ledger)?;
     ledger.close()
 }
+
+/// Tables of the budget.
+const TABLES: [&str; 3] = ["flash", "memory", "stack"];
 
 /// The committed figures beside the measured ones. Says all that is wrong at once: a change moves many of them.
 struct Ledger {
     budget: Budget,
     /// Commit to what is measured instead of comparing it.
     fix: bool,
+    /// Figures compared so far.
+    held: BTreeSet<(&'static str, String)>,
     failures: Vec<Failure>,
 }
 
 impl Ledger {
-    fn hold(&mut self, name: &str, measured: u64, unit: &str) {
-        if self.fix {
-            self.budget.set(name, measured as f64);
-        } else {
-            self.failures.extend(self.budget.hold(name, measured as f64, unit).err());
-        }
+    fn hold(&mut self, table: &'static str, name: &str, measured: u64, unit: &str) {
+        let (key, measured) = ([table, name], measured as f64);
+        let outcome = if self.fix { self.budget.set(&key, measured) } else { self.budget.hold(&key, measured, unit) };
+        self.failures.extend(outcome.err());
+        self.held.insert((table, name.to_owned()));
     }
 
-    fn close(self) -> Result<(), Failure> {
+    fn close(mut self) -> Result<(), Failure> {
+        for table in TABLES {
+            for name in self.budget.names(table).into_iter().filter(|name| !self.held.contains(&(table, name.clone())))
+            {
+                if self.fix {
+                    self.budget.remove(table, &name);
+                } else {
+                    self.failures.push(format!("{table}.{name}: in {BUDGET}, but not in the program"));
+                }
+            }
+        }
         if self.fix {
             self.budget.write()?;
         }
@@ -77,8 +88,7 @@ impl Ledger {
     }
 }
 
-/// Rows of the ledger that have a budget of their own: our crates and what cannot be told apart. Everybody else's crates
-/// share one.
+/// The row of all crates that are not ours.
 const OTHERS: &str = "others";
 /// What no symbol covers: alignment, and text that was merged.
 const NAMELESS: &str = "nameless";
@@ -100,13 +110,13 @@ fn sizes(program: &Program, held: &mut Ledger) -> Result<(), Failure> {
     }
     println!("{:<28} {:>9} {:>9}", "all", program.sections.flash, program.sections.memory);
     for (row, sizes) in rows_held(&owners) {
-        held.hold(&format!("flash.{row}"), sizes.flash, "bytes of flash");
-        held.hold(&format!("memory.{row}"), sizes.memory, "bytes of static memory");
+        held.hold("flash", row, sizes.flash, "bytes of flash");
+        held.hold("memory", row, sizes.memory, "bytes of static memory");
     }
     Ok(())
 }
 
-/// The rows that are held: ours one by one, everybody else's crates together.
+/// The rows that are held: ours one by one, all other crates together.
 fn rows_held<'a>(owners: &BTreeMap<&'a str, Sizes>) -> BTreeMap<&'a str, Sizes> {
     let mut rows: BTreeMap<&str, Sizes> = BTreeMap::new();
     for (owner, sizes) in owners {
@@ -134,7 +144,7 @@ fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failu
         if !ours.is_empty() {
             held.failures.push(format!("{task}: without a bound: {ours:?}"));
         }
-        held.hold(&format!("stack.{task}"), depth.bytes, "bytes of stack");
+        held.hold("stack", task, depth.bytes, "bytes of stack");
         for (name, frame) in depth.way.iter().filter(|(_, frame)| *frame >= 256) {
             println!("    {frame:>6}  {:.100}", name);
         }
@@ -154,7 +164,7 @@ fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failu
     Ok(())
 }
 
-/// Whose stack something has.
+/// The stack that a task runs on.
 enum Core {
     Flight,
     Ground,
@@ -162,7 +172,7 @@ enum Core {
     OnTopOfAssembly,
 }
 
-/// A task: its name, parts of the name of the function that polls it, whose stack it runs on.
+/// A task: name, parts of the name of the function that polls it, stack.
 type Task = (&'static str, &'static [&'static str], Core);
 
 const TASKS: [Task; 8] = [
@@ -182,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn our_crates_have_a_row_each_and_everybody_else_shares_one() {
+    fn our_crates_have_a_row_each_and_all_others_share_one() {
         let sizes = |flash| Sizes { flash, memory: 1 };
         let owners = [("stampfly_eskf", 5), ("core", 6), ("libm", 7), ("C", 8), ("constants", 9)];
         let rows = rows_held(&owners.map(|(owner, flash)| (owner, sizes(flash))).into());

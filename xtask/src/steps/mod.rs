@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod budget;
 pub mod clippy;
+pub mod constants;
 pub mod consumers;
 pub mod cortex_m4f;
 pub mod determinism;
@@ -11,7 +12,9 @@ pub mod docs;
 pub mod esp32;
 pub mod examples;
 pub mod figures;
+pub mod files;
 pub mod fmt;
+pub mod fuzz;
 pub mod golden;
 pub mod loom;
 pub mod machine;

@@ -3,15 +3,15 @@
 //! The targets come from rustup. Where rustup cannot deliver them, Debian's compiler builds the core library from its
 //! own sources instead; it is installed when it is missing.
 
+use crate::arguments::Arguments;
 use crate::machine::{COMPILER, provide};
-use crate::repository::{Repository, add_targets, run as run_program};
-use crate::{Failure, asks};
+use crate::repository::{Failure, Repository, add_targets, run as run_program};
 use std::process::Command;
 
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let debian = asks(arguments, "--debian")
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let debian = arguments.debian
         || add_targets(repository, &TARGETS).map_err(|e| eprintln!("{e}\nusing Debian's compiler instead")).is_err();
     if debian {
         provide(repository, &[&COMPILER])?;

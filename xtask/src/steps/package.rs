@@ -2,11 +2,11 @@
 //!
 //! Works on a fresh clone, so that a file that exists but was never committed is noticed.
 
-use crate::Failure;
-use crate::repository::{Repository, capture, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::fs;
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let (uncommitted, _) = capture(repository.command("git").args(["status", "--porcelain"]))?;
     if !uncommitted.is_empty() {
         eprintln!("not committed and therefore not looked at:\n{uncommitted}");
@@ -14,8 +14,7 @@ pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
     let clone = repository.target("package-clone");
     let _ = fs::remove_dir_all(&clone);
     run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
-    // A place of its own for every commit: cargo keeps what it has unpacked of a version, and ours does not change with
-    // every commit.
+    // One folder per commit: cargo does not unpack a version twice, and ours does not change with every commit.
     let (commit, _) = capture(repository.command("git").args(["rev-parse", "--short", "HEAD"]))?;
     let packages = repository.target("packages");
     let _ = fs::remove_dir_all(&packages);

@@ -1,37 +1,31 @@
 //! `panic-calls`: does flight code, as it stands in the linked firmware, call anything that panics?
 //!
 //! `panic-proof` links the flight code alone; this looks at what the firmware made of it, drivers and their waiting
-//! included, in the ESP32-C6 program. Whose a call is says the place in the sources that it passes on: what the
+//! included, in the ESP32-C6 program. A call belongs to the source file that it passes on: what the
 //! manufacturer's library does inside one of our generic functions is that library's. A call that tells no place is ours.
 
 use super::esp32;
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::elf::{Program, panics};
-use crate::repository::Repository;
+use crate::repository::{Failure, Repository};
 use std::collections::BTreeSet;
 
-/// Crates that fly. The firmware itself may panic while it starts, before any motor can turn.
-const FLIGHT: [&str; 8] = [
-    "stampfly_board",
-    "stampfly_bus",
-    "stampfly_control",
-    "stampfly_drivers",
-    "stampfly_eskf",
-    "stampfly_link",
-    "stampfly_mode",
-    "stampfly_types",
-];
+/// Libraries without flight code: parameters are read before the flight and written after it, logs are read on a PC. The
+/// firmware itself may panic while it starts, before any motor can turn.
+const NOT_FLIGHT: [&str; 2] = ["stampfly-log", "stampfly-param"];
 
-/// A part of the place, a part of what is called, and why nobody minds.
+/// Part of the place, part of the callee, and why the call is harmless.
 const ALLOWED: [(&str, &str, &str); 3] = [
     ("", "panic_const_async_fn_resumed", "a state machine polled after its end: only a broken executor does that"),
     ("/esp-hal-", "", "the manufacturer's: a clock that stands still, a pin that its table has not"),
     ("/esp32c6-", "panic_bounds_check", "the manufacturer's table of registers: every pin has one"),
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let path = arguments.first().map_or_else(|| esp32::c6(repository), |path| Ok(path.into()))?;
-    let found = calls(&Program::read(&path)?);
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
+    let libraries = repository.libraries()?.into_iter().filter(|library| library.bare_metal);
+    let flight = libraries.map(|library| library.name).filter(|name| !NOT_FLIGHT.contains(&name.as_str()));
+    let found = calls(&Program::read(&path)?, &flight.map(|name| name.replace('-', "_")).collect());
     // Nothing to be found would look just like nothing found.
     if let Some((place, callee, _)) = ALLOWED.iter().find(|row| !found.iter().any(|call| call.is_allowed_by(row))) {
         return Err(format!("no call of `{callee}` from `{place}` is left: is the program read as it should be?"));
@@ -59,9 +53,9 @@ impl Call {
 }
 
 /// What functions of the flight code call that panics.
-fn calls(program: &Program) -> BTreeSet<Call> {
+fn calls(program: &Program, flight: &BTreeSet<String>) -> BTreeSet<Call> {
     let mut found = BTreeSet::new();
-    for symbol in program.symbols.values().filter(|symbol| FLIGHT.contains(&symbol.owner.as_str())) {
+    for symbol in program.symbols.values().filter(|symbol| flight.contains(&symbol.owner)) {
         for (target, arguments) in symbol.code.iter().flat_map(|code| &code.constants) {
             let Some(target) = program.symbols.get(target).filter(|target| panics(&target.name)) else { continue };
             let place = arguments.iter().find_map(|argument| program.location(*argument)).unwrap_or_default();
@@ -90,7 +84,7 @@ mod tests {
             (BOUNDS, 0, &[], 0),
             ("stampfly_eskf::other", 0, &[], 0),
         ]);
-        assert_eq!(calls(&program), [call("", BOUNDS)].into());
+        assert_eq!(calls(&program, &["stampfly_eskf".to_owned()].into()), [call("", BOUNDS)].into());
     }
 
     #[test]

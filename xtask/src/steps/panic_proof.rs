@@ -4,9 +4,9 @@
 //! with and without. Another core is another proof: compilers unroll and merge differently for each. What is optimised for
 //! size keeps a few index checks that are never hit; where they are is said, and there may not be more of them.
 
-use crate::Failure;
+use crate::arguments::Arguments;
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
@@ -19,7 +19,7 @@ const FOR_SIZE: &str = "thumbv7em-none-eabihf";
 /// The function that does not exist.
 const MISSING: &str = "undefined symbol: a_panic_can_be_reached";
 
-pub fn run(repository: &Repository, _: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     add_targets(repository, &TARGETS)?;
     run_program(package(repository).args(["fmt", "--check"]))?;
     let mut clippy = package(repository);
@@ -42,7 +42,7 @@ fn for_size(repository: &Repository) -> Result<(), Failure> {
         println!("size: {calls} in {caller}");
     }
     let calls: usize = callers.values().sum();
-    Budget::read(repository, BUDGET)?.hold("size", calls as f64, "calls that panic")
+    Budget::read(repository, BUDGET)?.hold(&["size"], calls as f64, "calls that panic")
 }
 
 fn prove(repository: &Repository, target: &str) -> Result<(), Failure> {

@@ -1,15 +1,17 @@
-//! `peers`: a step of our estimator beside its peers', for the default target and for this machine's own.
+//! `peers`: a step of our estimator beside other crates', for the default target and for this machine's own.
 //!
-//! Runs the benchmark `estimators` twice and prints a table; `--fix` writes it into the estimator's README. Takes some
-//! minutes with the builds. Not part of `ci`: a clock on a shared machine says nothing that could fail a build, and the
-//! bar is the ratio, for people to read. Beside it stand figures of programs in C and C++, measured once elsewhere: the
-//! two crates that were measured there, too, tell how the machines compare.
+//! Runs the benchmark `estimators`, reads the medians that criterion writes as JSON, and prints a table; `--fix` writes it into
+//! the estimator's README. Takes some minutes with the builds. Not part of `ci`: a clock on a shared machine says nothing
+//! that could fail a build. Beside it stand figures of programs in C and C++, measured once elsewhere: the two crates that
+//! were measured there as well show how the machines compare.
 
-use crate::repository::{Repository, capture};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, json, run as run_program};
 use crate::steps::cortex_m4f::{self, Counted};
-use crate::{FIX, Failure, asks};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
+use std::path::Path;
 
 const README: &str = "stampfly-eskf/README.md";
 const BEGIN: &str = "<!-- peers: cargo xtask peers --fix -->\n";
@@ -17,6 +19,11 @@ const END: &str = "<!-- end of peers -->";
 
 /// Folder for the build, compiler flags.
 const SETTINGS: [(&str, &str); 2] = [("default", ""), ("native", "-C target-cpu=native")];
+/// Runs of the benchmark for each setting. The least of their medians counts: criterion measures one contender after the
+/// other, and other programs on the machine can only slow one of them down.
+const ROUNDS: usize = 3;
+/// Groups of the benchmark, and whom the others of the group are compared with.
+const GROUPS: [(&str, &str); 2] = [("400 Hz step", "stampfly-eskf"), ("400 Hz step, attitude only", "AttitudeFilter")];
 
 /// Name, nanoseconds for the x86-64 baseline and for the machine's own instructions: the better of gcc 12.2 -O2 or -O3
 /// and clang 14, rustc 1.95 for the crates. Medians.
@@ -32,66 +39,91 @@ const ELSEWHERE: &[(&str, u32, u32)] = &[
     ("for scale: the crate `kfilter` 0.5", 676, 661),
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = asks(arguments, FIX);
-    let mut reports = Vec::new();
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let mut medians = Vec::new();
     for (folder, flags) in SETTINGS {
-        let mut bench = repository.cargo();
-        bench.args(["bench", "--quiet", "-p", "stampfly-benches", "--bench", "estimators", "--target-dir"]);
-        bench.arg(repository.target("peers").join(folder)).args(["--", "medians"]).env("RUSTFLAGS", flags);
-        reports.push(capture(&mut bench)?.0);
+        let target = repository.target("peers").join(folder);
+        let home = target.join("criterion");
+        let mut rounds = Vec::new();
+        for _ in 0..ROUNDS {
+            // What an earlier run left there would count, too.
+            let _ = fs::remove_dir_all(&home);
+            let mut bench = repository.cargo();
+            bench.args(["bench", "--quiet", "-p", "stampfly-benches", "--bench", "estimators", "--target-dir"]);
+            bench.arg(&target).env("CRITERION_HOME", &home).env("RUSTFLAGS", flags);
+            run_program(&mut bench)?;
+            rounds.push(measured(&home)?);
+        }
+        medians.push(least(&rounds)?);
     }
-    let [default, native] = reports.as_slice() else { return Err("two runs were expected".to_owned()) };
-    let ours = table(&machine(repository)?, &measured(default)?, &measured(native)?)?;
+    let [default, native] = medians.as_slice() else { return Err("two settings were expected".to_owned()) };
+    let ours = table(&machine(repository)?, default, native)?;
     let text = format!("{ours}\n{}\n{}", on_target(&cortex_m4f::emulate(repository)?)?, elsewhere());
     print!("{text}");
-    if fix { repository.fill(README, BEGIN, END, &text) } else { Ok(()) }
+    if arguments.fix { repository.fill(README, BEGIN, END, &text) } else { Ok(()) }
 }
 
-/// What one run found out about one contender.
-#[derive(Debug, PartialEq)]
-struct Line<'a> {
-    group: &'a str,
-    name: &'a str,
-    nanoseconds: f64,
-    ratio: f64,
-}
+/// Nanoseconds of a step, by group and contender.
+type Times = BTreeMap<(String, String), f64>;
 
-/// The medians at the end of the benchmark's output.
-fn measured(report: &str) -> Result<Vec<Line<'_>>, Failure> {
-    let mut lines = Vec::new();
-    let mut group = "";
-    for line in report.lines() {
-        if let Some((title, _)) = line.split_once(": median of ") {
-            group = title;
-        } else if let Some((left, ratio)) = line.split_once(" ns   this / first = ") {
-            let (name, time) = left.rsplit_once(' ').ok_or_else(|| format!("no time in `{line}`"))?;
-            let number = |text: &str| text.trim().parse().map_err(|e| format!("`{text}` in `{line}`: {e}"));
-            lines.push(Line { group, name: name.trim(), nanoseconds: number(time)?, ratio: number(ratio)? });
+/// Criterion's medians: `GROUP/CONTENDER/new/estimates.json` beside a `benchmark.json` with the names.
+fn measured(home: &Path) -> Result<Times, Failure> {
+    let mut times = Times::new();
+    for contender in folders(home)?.iter().flat_map(|group| folders(group).unwrap_or_default()) {
+        let new = contender.join("new");
+        if !new.is_dir() {
+            continue;
         }
+        let read = |name: &str| {
+            let path = new.join(name);
+            json(&fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?)
+        };
+        let (benchmark, estimates) = (read("benchmark.json")?, read("estimates.json")?);
+        let name = |key: &str| benchmark[key].as_str().map(str::to_owned);
+        let median = estimates["median"]["point_estimate"].as_f64();
+        let (Some(group), Some(name), Some(median)) = (name("group_id"), name("function_id"), median) else {
+            return Err(format!("{}: no names or no median", new.display()));
+        };
+        times.insert((group, name), median);
     }
-    if lines.is_empty() { Err(format!("no medians in\n{report}")) } else { Ok(lines) }
+    if times.is_empty() { Err(format!("criterion left no medians in {}", home.display())) } else { Ok(times) }
 }
 
-fn table(machine: &str, default: &[Line], native: &[Line]) -> Result<String, Failure> {
-    let mut text = format!("{machine}; `f32`, gates on in ours, medians of seven interleaved rounds.\n");
-    let mut group = "";
-    for line in default {
-        let other = native.iter().find(|other| (other.group, other.name) == (line.group, line.name));
-        let other = other.ok_or_else(|| format!("`{}` was measured once only", line.name))?;
-        if line.group != group {
-            group = line.group;
-            let _ = write!(
-                text,
-                "\n| {group} | x86-64 | to first | `target-cpu=native` | to first |\n|---|---|---|---|---|\n"
-            );
+fn folders(path: &Path) -> Result<Vec<std::path::PathBuf>, Failure> {
+    let entries = fs::read_dir(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_dir()).collect())
+}
+
+/// The least of some runs, contender by contender.
+fn least(rounds: &[Times]) -> Result<Times, Failure> {
+    let mut fastest = Times::new();
+    for key in rounds.iter().flat_map(BTreeMap::keys) {
+        let times: Option<Vec<f64>> = rounds.iter().map(|round| round.get(key).copied()).collect();
+        let times = times.ok_or_else(|| format!("{key:?} was not measured in every run"))?;
+        fastest.insert(key.clone(), times.into_iter().fold(f64::INFINITY, f64::min));
+    }
+    Ok(fastest)
+}
+
+/// One table per group: ours first, the others by their times.
+fn table(machine: &str, default: &Times, native: &Times) -> Result<String, Failure> {
+    let mut text = format!("{machine}; `f32`, gates on in ours, the least median of {ROUNDS} runs of the benchmark.\n");
+    for (group, ours) in GROUPS {
+        let time = |times: &Times, name: &str| {
+            let time = times.get(&(group.to_owned(), name.to_owned())).copied();
+            time.ok_or_else(|| format!("`{name}` of `{group}` was not measured"))
+        };
+        let (ours_default, ours_native) = (time(default, ours)?, time(native, ours)?);
+        let mut rows: Vec<(&str, f64)> =
+            default.iter().filter(|((of, _), _)| of == group).map(|((_, name), time)| (name.as_str(), *time)).collect();
+        rows.sort_by(|(a, a_time), (b, b_time)| (*a != ours).cmp(&(*b != ours)).then(a_time.total_cmp(b_time)));
+        let _ =
+            write!(text, "\n| {group} | x86-64 | to first | `target-cpu=native` | to first |\n|---|---|---|---|---|\n");
+        for (name, default) in rows {
+            let native = time(native, name)?;
+            let (ratio, native_ratio) = (default / ours_default, native / ours_native);
+            let _ = writeln!(text, "| {name} | {default:.0} ns | {ratio:.2} | {native:.0} ns | {native_ratio:.2} |");
         }
-        let Line { name, nanoseconds, ratio, .. } = line;
-        let _ = writeln!(
-            text,
-            "| {name} | {nanoseconds:.0} ns | {ratio:.2} | {:.0} ns | {:.2} |",
-            other.nanoseconds, other.ratio
-        );
     }
     Ok(text)
 }
@@ -132,16 +164,55 @@ fn machine(repository: &Repository) -> Result<String, Failure> {
 mod tests {
     use super::*;
 
+    fn write(home: &Path, group: &str, name: &str, median: f64) {
+        let new = home.join(group).join(name).join("new");
+        fs::create_dir_all(&new).expect("a folder");
+        let benchmark = serde_json::json!({ "group_id": group, "function_id": name });
+        fs::write(new.join("benchmark.json"), benchmark.to_string()).expect("a file");
+        let estimates =
+            serde_json::json!({ "mean": { "point_estimate": 0.0 }, "median": { "point_estimate": median } });
+        fs::write(new.join("estimates.json"), estimates.to_string()).expect("a file");
+    }
+
     #[test]
-    fn reads_the_medians_and_nothing_else() {
-        let report = "x was off by 0.1 at most\n\nstep: median of 7 interleaved rounds of 200 steps\n\
-                      ours, fast       10.0 ns   this / first = 1.00\ntheirs          25.4 ns   this / first = 2.54\n";
-        let line = |name, nanoseconds, ratio| Line { group: "step", name, nanoseconds, ratio };
-        assert_eq!(measured(report), Ok(vec![line("ours, fast", 10.0, 1.0), line("theirs", 25.4, 2.54)]));
-        assert!(measured("nothing").is_err());
-        let lines = measured(report).expect("read");
-        let table = table("a machine", &lines, &lines).expect("both");
-        assert!(table.contains("| theirs | 25 ns | 2.54 | 25 ns | 2.54 |"), "{table}");
-        assert!(super::table("a machine", &lines, &lines[..1]).is_err());
+    fn reads_what_criterion_writes() {
+        let home = std::env::temp_dir().join(format!("peers-{}", std::process::id()));
+        write(&home, "a", "x", 2.5);
+        write(&home, "b", "x", 3.5);
+        // Criterion's pages are beside the figures.
+        fs::create_dir_all(home.join("report"))
+            .and_then(|()| fs::create_dir_all(home.join("a/report")))
+            .expect("folders");
+        let times = measured(&home).expect("two medians");
+        let key = |group: &str| (group.to_owned(), "x".to_owned());
+        assert_eq!(times, [(key("a"), 2.5), (key("b"), 3.5)].into());
+        fs::remove_dir_all(&home).expect("it is ours");
+        assert!(measured(&home).is_err());
+    }
+
+    fn times(ours: f64) -> Times {
+        let mut times = Times::new();
+        for (group, name) in GROUPS {
+            times.insert((group.to_owned(), name.to_owned()), ours);
+            times.insert((group.to_owned(), "theirs".to_owned()), 5.0);
+        }
+        times
+    }
+
+    #[test]
+    fn the_fastest_run_counts() {
+        let rounds = [times(10.0), times(9.0), times(40.0)];
+        assert_eq!(least(&rounds), Ok(times(9.0)));
+        assert!(least(&[times(9.0), Times::new()]).is_err());
+    }
+
+    #[test]
+    fn ours_is_first_and_the_measure_of_the_others() {
+        let text = table("a machine", &times(10.0), &times(20.0)).expect("complete");
+        assert!(
+            text.contains("| stampfly-eskf | 10 ns | 1.00 | 20 ns | 1.00 |\n| theirs | 5 ns | 0.50 | 5 ns | 0.25 |"),
+            "{text}"
+        );
+        assert!(table("a machine", &times(10.0), &Times::new()).is_err());
     }
 }

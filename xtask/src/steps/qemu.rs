@@ -5,11 +5,11 @@
 //! one, and asks for a margin of two because of it. The package `stampfly-board/qemu` is outside the workspace, so its
 //! format and its warnings are looked at here, too.
 
+use crate::arguments::Arguments;
 use crate::machine::{COMPILER, EMULATED_ARM, EMULATED_OTHERS, LINKER, XTENSA as XTENSA_BACK_END, provide};
 use crate::ratchet::Budget;
-use crate::repository::{Repository, add_targets, capture, run as run_program};
+use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use crate::steps::no_std::debian_cargo;
-use crate::{FIX, Failure, asks};
 use std::fmt::Write;
 use std::process::Command;
 
@@ -45,8 +45,8 @@ const MACHINES: [Machine; 3] = [
     XTENSA,
 ];
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
-    let fix = asks(arguments, FIX);
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    let fix = arguments.fix;
     provide(repository, &[&EMULATED_ARM, &EMULATED_OTHERS])?;
     run_program(inside(repository, repository.cargo()).args(["fmt", "--check"]))?;
     let mut clippy = inside(repository, repository.cargo());
@@ -177,7 +177,7 @@ fn hold(budget: &Budget, machine: &Machine, counts: &[Count]) -> Result<(), Fail
     for chain in counts.iter().filter(|count| count.name == CHAIN) {
         within_bar(machine.name, chain)?;
         for (what, measured) in [("mean", chain.mean), ("most", chain.most)] {
-            budget.hold(&format!("{} {what}", machine.name), measured, "instructions from sample to motors")?;
+            budget.hold(&[machine.name, what], measured, "instructions from sample to motors")?;
         }
     }
     Ok(())

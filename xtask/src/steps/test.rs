@@ -4,10 +4,10 @@
 //! repository. Without them the rest still means something on a developer's machine; in continuous integration
 //! (`CI=true`) their absence is an error, so that a green run is never one that looked at nothing.
 
-use crate::Failure;
-use crate::repository::{Repository, in_ci, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, in_ci, run as run_program};
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let data = repository.data();
     match &data {
         Some(folder) => eprintln!("recorded data: {}", folder.display()),
@@ -18,7 +18,7 @@ pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure>
     if let Some(folder) = data {
         test.env("STAMPFLY_DATA", folder);
     }
-    run_program(test.arg("test").args(arguments))?;
+    run_program(test.arg("test").args(&arguments.rest))?;
     // Not among the default members, so that `cargo test` at home builds only what flies.
     run_program(repository.cargo().args(["test", "--quiet", "-p", "xtask"]))
 }

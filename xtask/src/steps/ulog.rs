@@ -1,23 +1,23 @@
 //! `ulog`: the tools of the format's own authors open the log of a flight and find samples in it.
 
-use crate::Failure;
-use crate::repository::{Repository, capture, python_tool, run as run_program};
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use std::fs;
 
 const PYULOG: &str = "pyulog==1.3.0";
 
-pub fn run(repository: &Repository, arguments: &[String]) -> Result<(), Failure> {
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let folder = repository.target("ulog");
     let io = |e: std::io::Error| format!("{}: {e}", folder.display());
     fs::create_dir_all(&folder).map_err(io)?;
-    let log = match arguments {
-        [] => {
+    let log = match &arguments.file {
+        None => {
             let mut fly = repository.cargo();
             fly.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "fly", "--out"]).arg(&folder);
             run_program(&mut fly)?;
             folder.join("flight.ulg")
         }
-        [path, ..] => std::path::absolute(path).map_err(io)?,
+        Some(path) => std::path::absolute(path).map_err(io)?,
     };
 
     let (info, _) = capture(python_tool(repository, PYULOG, "ulog_info")?.arg(&log))?;

@@ -58,6 +58,7 @@ fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {
             title: recording.name.clone(),
             subtitle: format!("estimate over a recording: {}", recording.kind),
             metrics: metrics(&recording, &estimated),
+            page: &stampfly_board::simulation::PAGE,
             flight: &flight,
         };
         report.write(&page).map_err(|error| format!("{}: {error}", page.display()))?;

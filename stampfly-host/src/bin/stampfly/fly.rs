@@ -91,6 +91,7 @@ fn write_report<V: Vehicle>(
         title: format!("Flight of {}", V::NAME),
         subtitle: format!("simulated, {mission}seed {}, {:.1} s", options.seed, flown.duration.seconds_f64()),
         metrics,
+        page: &V::PAGE,
         flight: &parsed.flight,
     };
     report.write(page).map_err(|error| format!("{}: {error}", page.display()).into())

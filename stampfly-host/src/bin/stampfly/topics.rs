@@ -6,6 +6,7 @@ use serde_json::json;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::Vehicle;
+use stampfly_types::leaves;
 use std::process::ExitCode;
 
 pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
@@ -31,8 +32,8 @@ fn print(options: &TopicsOptions, table: &[TopicInfo]) -> Result<ExitCode, Failu
                     "name": topic.name, "type": topic.message, "policy": topic.policy, "depth": topic.depth,
                     "rate": topic.rate, "publisher": topic.publisher, "readers": topic.readers,
                     "doc": topic.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" "),
-                    "fields": topic.fields.iter().map(|field| json!({
-                        "name": field.name, "unit": field.unit, "count": field.count,
+                    "fields": leaves(topic.fields).map(|leaf| json!({
+                        "name": leaf.name.to_string(), "unit": leaf.unit, "count": leaf.count,
                     })).collect::<Vec<_>>(),
                 })
             })

@@ -1,0 +1,112 @@
+//! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
+
+use crate::{console_line, parameter_image, radio_packets, ulog};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Longest input, bytes.
+const LONGEST: usize = 4_096;
+
+/// Calls the target with every file of its corpus, and with mutations of them.
+fn smoke(name: &str, target: impl Fn(&[u8]), mutations: usize) {
+    let corpus = corpus(name);
+    for (file, data) in &corpus {
+        if catch_unwind(AssertUnwindSafe(|| target(data))).is_err() {
+            panic!("{name} fails with corpus/{name}/{file}");
+        }
+    }
+    let inputs: Vec<&[u8]> = corpus.iter().map(|(_, data)| data.as_slice()).collect();
+    let failing = first_failure(&inputs, target, mutations);
+    if let Some(data) = failing {
+        let path = std::env::temp_dir().join(format!("{name}-failing-input"));
+        std::fs::write(&path, &data).expect("a place for the input");
+        panic!("{name} fails with {} bytes, which are in {}", data.len(), path.display());
+    }
+}
+
+/// The first mutation with which the target panics.
+fn first_failure(inputs: &[&[u8]], target: impl Fn(&[u8]), mutations: usize) -> Option<Vec<u8>> {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    for index in 0..mutations {
+        let other = inputs[random.random_range(0..inputs.len())];
+        let mut data = inputs[index % inputs.len()].to_vec();
+        for _ in 0..random.random_range(1..=4) {
+            mutate(&mut data, other, &mut random);
+        }
+        data.truncate(LONGEST);
+        if catch_unwind(AssertUnwindSafe(|| target(&data))).is_err() {
+            return Some(data);
+        }
+    }
+    None
+}
+
+/// One change of the kinds that libFuzzer makes, too.
+fn mutate(data: &mut Vec<u8>, other: &[u8], random: &mut impl Rng) {
+    let place = random.random_range(0..=data.len());
+    let end = random.random_range(place..=data.len().min(place + 64));
+    match random.random_range(0..7) {
+        0 => data.iter_mut().skip(place).take(1).for_each(|byte| *byte ^= 1 << random.random_range(0..8)),
+        1 => data.iter_mut().skip(place).take(1).for_each(|byte| *byte = random.random()),
+        2 => data.insert(place, [0, 1, 0x0A, 0x20, 0x7F, 0x80, 0xFF][random.random_range(0..7)]),
+        3 => drop(data.drain(place..end)),
+        4 => {
+            let copy = data[place..end].to_vec();
+            let to = random.random_range(0..=data.len());
+            data.splice(to..to, copy);
+        }
+        5 => {
+            let from = random.random_range(0..=other.len());
+            data.truncate(place);
+            data.extend(&other[from..]);
+        }
+        _ => data[place..end].fill(random.random()),
+    }
+}
+
+/// The files of a target's corpus, by name.
+fn corpus(name: &str) -> Vec<(String, Vec<u8>)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(name);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut files: Vec<_> = entries
+        .map(|entry| {
+            let path = entry.expect("a readable folder").path();
+            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            (file, std::fs::read(&path).expect("a readable file"))
+        })
+        .collect();
+    files.sort();
+    assert!(!files.is_empty(), "{} is empty", folder.display());
+    files
+}
+
+#[test]
+fn console() {
+    smoke("console_line", console_line, 60_000);
+}
+
+#[test]
+fn parameters() {
+    smoke("parameter_image", parameter_image, 40_000);
+}
+
+#[test]
+fn packets() {
+    smoke("radio_packets", radio_packets, 400_000);
+}
+
+#[test]
+fn logs() {
+    smoke("ulog", ulog, 150_000);
+}
+
+/// A target that fails is found out, and a mutation reaches what no file of the corpus does.
+#[test]
+fn a_failure_is_found() {
+    let fails_on_ff = |data: &[u8]| assert!(!data.contains(&0xFF) || data.len() < 4);
+    let found = first_failure(&[b"harmless", b"as well"], fails_on_ff, 2_000).expect("found");
+    assert!(found.contains(&0xFF));
+    assert_eq!(first_failure(&[b"harmless"], |_| {}, 2_000), None);
+}

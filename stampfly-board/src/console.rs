@@ -1,0 +1,204 @@
+//! The StampFly at a console: its status, and its commands beside those of every vehicle.
+//!
+//! | command | does |
+//! |---|---|
+//! | `pair`, `pair stop` | looks for a transmitter, stops looking |
+//! | `motor test N PERCENT` | turns one motor for [`TEST_TIME`], to see which one it is and which way it turns |
+//! | `motor stop` | stops it |
+//!
+//! [`stampfly_flight::console::answer`] does the rest, and [`Command::publish`] carries them out.
+
+use crate::messages::{CutoffState, MotorTest, PairingRequest};
+use crate::topics::{COUNT, ConsoleEnds, Id, TOPICS};
+use crate::{VehicleConfig, schedule};
+use core::fmt;
+use stampfly_bus::TopicInfo;
+use stampfly_flight::console::{CommandError, SensorLine, Vehicle};
+use stampfly_flight::newest::longest_message;
+use stampfly_flight::parameters::Parameters;
+use stampfly_flight::profile::Rows;
+use stampfly_types::messages::{PilotInput, PowerData, StateEstimate, SystemAlert, SystemMode};
+use stampfly_types::{Duration, Instant};
+
+/// How long a motor turns in a test.
+pub const TEST_TIME: Duration = Duration::from_secs(2);
+/// Largest duty in a test, share: enough to turn without propellers, too little to lift with them.
+pub const TEST_DUTY: f32 = 0.3;
+/// Motors that can be tested.
+const MOTORS: u8 = 4;
+
+/// The newest sample of every topic of this vehicle.
+pub type Newest = stampfly_flight::NewestSamples<COUNT, { longest_message(&TOPICS) }>;
+
+/// Execution times of every runnable of this vehicle.
+pub type Profile = stampfly_flight::Profile<{ schedule::COUNT }>;
+
+/// A command of this vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Look for a transmitter, or stop looking.
+    Pair(bool),
+    /// Turn one motor.
+    TestMotor {
+        /// 1 to 4.
+        motor: u8,
+        /// Share of the full duty.
+        duty: f32,
+    },
+    /// Stop the motor test.
+    StopMotor,
+}
+
+impl Command {
+    /// Carries it out, by topic. A test ends [`TEST_TIME`] after `now`.
+    pub fn publish(self, now: Instant, ends: &mut ConsoleEnds<'_>) {
+        match self {
+            Self::Pair(wanted) => {
+                ends.pairing_request.publish(now, &PairingRequest { wanted });
+            }
+            Self::TestMotor { motor, duty } => {
+                let until = (now + TEST_TIME).as_micros();
+                ends.motor_test.publish(now, &MotorTest { motor: motor.into(), duty, until });
+            }
+            Self::StopMotor => {
+                ends.motor_test.publish(now, &MotorTest::default());
+            }
+        }
+    }
+}
+
+/// What the console knows, borrowed for one answer.
+///
+/// ```
+/// use stampfly_board::console::{Console, Newest, Profile};
+/// use stampfly_board::{VehicleConfig, schedule};
+/// use stampfly_flight::console::{Request, answer};
+/// use stampfly_types::Instant;
+///
+/// let (newest, profile) = (Newest::new(), Profile::new(&schedule::ACTIVATIONS));
+/// let mut config = VehicleConfig::default();
+/// let mut console =
+///     Console { version: "1.0", newest: &newest, sensors: &[], profile: &profile, config: &mut config };
+/// let mut reply = String::new();
+/// assert_eq!(answer("param set eskf.gate 3.5", Instant::ZERO, &mut console, &mut reply), Ok(Request::Nothing));
+/// assert_eq!(config.eskf.gate, 3.5);
+/// ```
+pub struct Console<'c> {
+    /// Version of the firmware.
+    pub version: &'c str,
+    /// The newest sample of every topic.
+    pub newest: &'c Newest,
+    /// Every sensor.
+    pub sensors: &'c [SensorLine<'c>],
+    /// Execution times.
+    pub profile: &'c Profile,
+    /// The configuration of the next start. `param set` changes it.
+    pub config: &'c mut VehicleConfig,
+}
+
+const PAIR: &str = "pair [stop]";
+const MOTOR: &str = "motor test N PERCENT | stop";
+
+impl Vehicle for Console<'_> {
+    type Command = Command;
+    type Request = Command;
+    const COMMANDS: &'static [(&'static str, &'static str)] = &[
+        ("pair", "look for a transmitter"),
+        ("pair stop", "stop looking"),
+        ("motor test N PERCENT", "turn motor N (1 front right, 2 rear right, 3 rear left, 4 front left) for 2 s"),
+        ("motor stop", "stop it"),
+    ];
+    const TOPICS: &'static [TopicInfo] = &TOPICS;
+
+    fn is_armed(&self) -> Option<bool> {
+        self.newest.get::<SystemMode>(Id::system_mode as usize).map(|(_, mode)| mode.armed)
+    }
+
+    fn version(&self) -> &str {
+        self.version
+    }
+
+    fn status(&self, now: Instant, reply: &mut dyn fmt::Write) -> fmt::Result {
+        let newest = self.newest;
+        let mode = newest.get::<SystemMode>(Id::system_mode as usize).map(|(_, mode)| mode).unwrap_or_default();
+        let alert = newest.get::<SystemAlert>(Id::system_alert as usize).map(|(_, alert)| alert).unwrap_or_default();
+        write!(reply, "state    {}, {}\r\n", mode.state.name(), if mode.armed { "ARMED" } else { "disarmed" })?;
+        write!(reply, "mode     {}\r\n", mode.mode.name())?;
+        list(reply, "blocks", mode.blocks.names())?;
+        list(reply, "alerts", alert.active.names())?;
+        if newest.get::<CutoffState>(Id::cutoff_state as usize).is_some_and(|(_, cutoff)| cutoff.tripped) {
+            reply.write_str("motors   CUT OFF, until the vehicle is disarmed\r\n")?;
+        }
+        if let Some((_, power)) = newest.get::<PowerData>(Id::sensor_power as usize) {
+            write!(reply, "battery  {:.2} V, {:.2} A\r\n", power.voltage, power.current)?;
+        }
+        if let Some((_, estimate)) = newest.get::<StateEstimate>(Id::estimate_state as usize) {
+            write!(reply, "height   {:.2} m\r\n", estimate.height)?;
+        }
+        match newest.get::<PilotInput>(Id::command_pilot as usize) {
+            Some((at, _)) => write!(reply, "pilot    heard {} ms ago\r\n", now.since(at).as_millis())?,
+            None => reply.write_str("pilot    never heard\r\n")?,
+        }
+        write!(reply, "awake    {} s\r\n", now.as_micros() / 1_000_000)
+    }
+
+    fn newest(&self, topic: usize) -> Option<(Instant, &[u32])> {
+        self.newest.words(topic)
+    }
+
+    fn sensors(&self) -> &[SensorLine<'_>] {
+        self.sensors
+    }
+
+    fn profile(&self) -> Rows<'_> {
+        self.profile.rows()
+    }
+
+    fn parameters(&mut self) -> &mut dyn Parameters {
+        self.config
+    }
+
+    fn parse(words: &[&str]) -> Result<Command, CommandError> {
+        match words {
+            ["pair"] => Ok(Command::Pair(true)),
+            ["pair", "stop"] => Ok(Command::Pair(false)),
+            ["pair", ..] => Err(CommandError::Usage(PAIR)),
+            ["motor", "test", motor, percent] => {
+                let motor = motor.parse().map_err(|_| CommandError::Usage(MOTOR))?;
+                let percent = percent.strip_suffix('%').unwrap_or(percent);
+                let percent: f32 = percent.parse().map_err(|_| CommandError::Usage(MOTOR))?;
+                Ok(Command::TestMotor { motor, duty: percent / 100.0 })
+            }
+            ["motor", "stop"] => Ok(Command::StopMotor),
+            ["motor", ..] => Err(CommandError::Usage(MOTOR)),
+            _ => Err(CommandError::Unknown),
+        }
+    }
+
+    fn answer(
+        &mut self,
+        command: Command,
+        _: Instant,
+        reply: &mut dyn fmt::Write,
+    ) -> Result<Option<Command>, fmt::Error> {
+        if let Command::TestMotor { motor, duty } = command {
+            if !(1..=MOTORS).contains(&motor) {
+                return write!(reply, "there is no such motor\r\n").map(|()| None);
+            }
+            if !(0.0..=TEST_DUTY).contains(&duty) {
+                return write!(reply, "from 0 to {} per cent\r\n", TEST_DUTY * 100.0).map(|()| None);
+            }
+        }
+        Ok(Some(command))
+    }
+
+    fn needs_disarmed(request: &Command) -> bool {
+        *request != Command::StopMotor
+    }
+}
+
+fn list(reply: &mut dyn fmt::Write, what: &str, mut names: impl Iterator<Item = &'static str>) -> fmt::Result {
+    write!(reply, "{what:<9}{}", names.next().unwrap_or("none"))?;
+    names.try_for_each(|name| write!(reply, " {name}"))?;
+    reply.write_str("\r\n")
+}

@@ -1,0 +1,302 @@
+//! Values that can stand in a message, and how each becomes 32-bit words.
+//!
+//! | value | words |
+//! |---|---|
+//! | `f32`, integers of up to 32 bits, `bool`, an enumeration, a set of flags | 1 |
+//! | `f64`, `u64`, `i64`, [`Instant`], [`Duration`] | 2, the low one first |
+//! | [`Vec3`], [`Quat`] | 3, and 4 in the order w, x, y, z |
+//! | `[T; N]` | N times those of `T`, for any N |
+//! | `Option<T>` | 1 that says whether there is a value, then those of `T`, zero when there is none |
+//! | a message | those of its fields |
+//!
+//! Implemented by [`message!`](crate::message!), [`message_enum!`](crate::message_enum!) and
+//! [`message_flags!`](crate::message_flags!) for what they declare. Implement [`Field`] by hand for a type of your own
+//! whose words another `Field` already describes, as [`Instant`] is stored like a `u64`.
+
+use crate::schema::FieldKind;
+use crate::{Duration, Instant, Quat, Vec3};
+
+/// One value inside a message: how many words it takes, and how to write and read them.
+pub trait Field: Copy {
+    /// How one element is stored in the log.
+    const KIND: FieldKind;
+    /// How many elements of `KIND`.
+    const COUNT: usize;
+    /// How many 32-bit words, all elements together.
+    const SIZE: usize;
+
+    /// The value a new message has here. [`Default`] cannot be asked for it: long arrays have none.
+    fn initial() -> Self;
+
+    /// Writes exactly [`Self::SIZE`] words. Words that do not fit are dropped.
+    fn write(&self, words: &mut [u32]);
+
+    /// Reads the value back; `None` when the words are no such value (a bool of 2, an unknown variant, too few words).
+    fn read(words: &[u32]) -> Option<Self>;
+}
+
+macro_rules! one_word {
+    ($($type:ty, $kind:ident, |$value:ident| $write:expr, |$word:ident| $read:expr;)*) => { $(
+        impl Field for $type {
+            const KIND: FieldKind = FieldKind::$kind;
+            const COUNT: usize = 1;
+            const SIZE: usize = 1;
+            #[inline]
+            fn initial() -> Self {
+                Self::default()
+            }
+            #[inline]
+            fn write(&self, words: &mut [u32]) {
+                let $value = *self;
+                if let Some(word) = words.first_mut() { *word = $write }
+            }
+            #[inline]
+            fn read(words: &[u32]) -> Option<Self> {
+                let $word = *words.first()?;
+                $read
+            }
+        }
+    )* };
+}
+
+one_word! {
+    f32, F32, |v| v.to_bits(), |w| Some(f32::from_bits(w));
+    u32, U32, |v| v, |w| Some(w);
+    i32, I32, |v| v.cast_unsigned(), |w| Some(w.cast_signed());
+    u16, U16, |v| u32::from(v), |w| u16::try_from(w).ok();
+    i16, I16, |v| i32::from(v).cast_unsigned(), |w| i16::try_from(w.cast_signed()).ok();
+    u8, U8, |v| u32::from(v), |w| u8::try_from(w).ok();
+    i8, I8, |v| i32::from(v).cast_unsigned(), |w| i8::try_from(w.cast_signed()).ok();
+    bool, Bool, |v| u32::from(v), |w| match w { 0 => Some(false), 1 => Some(true), _ => None };
+}
+
+macro_rules! two_words {
+    ($($type:ty, $kind:ident, |$value:ident| $write:expr, |$bits:ident| $read:expr;)*) => { $(
+        impl Field for $type {
+            const KIND: FieldKind = FieldKind::$kind;
+            const COUNT: usize = 1;
+            const SIZE: usize = 2;
+            #[inline]
+            fn initial() -> Self {
+                Self::default()
+            }
+            #[inline]
+            fn write(&self, words: &mut [u32]) {
+                let $value = *self;
+                let bits: u64 = $write;
+                if let [low, high, ..] = words {
+                    *low = bits as u32;
+                    *high = (bits >> 32) as u32;
+                }
+            }
+            #[inline]
+            fn read(words: &[u32]) -> Option<Self> {
+                let [low, high, ..] = words else { return None };
+                let $bits = u64::from(*low) | u64::from(*high) << 32;
+                Some($read)
+            }
+        }
+    )* };
+}
+
+two_words! {
+    f64, F64, |v| v.to_bits(), |bits| f64::from_bits(bits);
+    u64, U64, |v| v, |bits| bits;
+    i64, I64, |v| v.cast_unsigned(), |bits| bits.cast_signed();
+    Instant, U64, |v| v.as_micros(), |bits| Instant::from_micros(bits);
+    Duration, U64, |v| v.as_micros(), |bits| Duration::from_micros(bits);
+}
+
+impl<T: Field, const N: usize> Field for [T; N] {
+    const KIND: FieldKind = T::KIND;
+    const COUNT: usize = N * T::COUNT;
+    const SIZE: usize = N * T::SIZE;
+    #[inline]
+    fn initial() -> Self {
+        [T::initial(); N]
+    }
+    #[inline]
+    fn write(&self, words: &mut [u32]) {
+        let mut rest = words;
+        for value in self {
+            let Some((here, after)) = rest.split_at_mut_checked(T::SIZE) else { return };
+            value.write(here);
+            rest = after;
+        }
+    }
+    #[inline]
+    fn read(words: &[u32]) -> Option<Self> {
+        let mut out = Self::initial();
+        let mut rest = words;
+        for value in &mut out {
+            let (here, after) = rest.split_at_checked(T::SIZE)?;
+            *value = T::read(here)?;
+            rest = after;
+        }
+        Some(out)
+    }
+}
+
+/// Words of an absent value that are not zero are refused: the same value always has the same words.
+impl<T: Field> Field for Option<T> {
+    const KIND: FieldKind = FieldKind::Option { kind: &T::KIND, count: T::COUNT };
+    const COUNT: usize = 1;
+    const SIZE: usize = 1 + T::SIZE;
+    #[inline]
+    fn initial() -> Self {
+        None
+    }
+    #[inline]
+    fn write(&self, words: &mut [u32]) {
+        if let Some((present, rest)) = words.split_first_mut() {
+            *present = u32::from(self.is_some());
+            match self {
+                Some(value) => value.write(rest),
+                None => rest.iter_mut().take(T::SIZE).for_each(|word| *word = 0),
+            }
+        }
+    }
+    #[inline]
+    fn read(words: &[u32]) -> Option<Self> {
+        let (present, rest) = words.split_first()?;
+        let value = rest.get(..T::SIZE)?;
+        match bool::read(&[*present])? {
+            true => T::read(value).map(Some),
+            false => value.iter().all(|word| *word == 0).then_some(None),
+        }
+    }
+}
+
+impl Field for Vec3 {
+    const KIND: FieldKind = FieldKind::F32;
+    const COUNT: usize = 3;
+    const SIZE: usize = 3;
+    #[inline]
+    fn initial() -> Self {
+        Self::default()
+    }
+    #[inline]
+    fn write(&self, words: &mut [u32]) {
+        if let [x, y, z, ..] = words {
+            *x = self.x.to_bits();
+            *y = self.y.to_bits();
+            *z = self.z.to_bits();
+        }
+    }
+    #[inline]
+    fn read(words: &[u32]) -> Option<Self> {
+        match words {
+            [x, y, z, ..] => Some(Vec3::new(f32::from_bits(*x), f32::from_bits(*y), f32::from_bits(*z))),
+            _ => None,
+        }
+    }
+}
+
+/// Stored w, x, y, z. Refused when the norm is not within 1 % of one, so that a broken log cannot bring in a unit
+/// quaternion that is none.
+impl Field for Quat {
+    const KIND: FieldKind = FieldKind::F32;
+    const COUNT: usize = 4;
+    const SIZE: usize = 4;
+    #[inline]
+    fn initial() -> Self {
+        Self::default()
+    }
+    #[inline]
+    fn write(&self, words: &mut [u32]) {
+        if let [w, x, y, z, ..] = words {
+            *w = self.w.to_bits();
+            *x = self.i.to_bits();
+            *y = self.j.to_bits();
+            *z = self.k.to_bits();
+        }
+    }
+    #[inline]
+    fn read(words: &[u32]) -> Option<Self> {
+        let [w, x, y, z, ..] = words else { return None };
+        let [w, x, y, z] = [*w, *x, *y, *z].map(f32::from_bits);
+        let norm_squared = w * w + x * x + y * y + z * z;
+        (norm_squared - 1.0).abs().lt(&0.02).then(|| Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::fmt::Debug;
+    use proptest::prelude::*;
+    use std::vec;
+
+    /// Writes into words that are not zero before, reads back; one word less is refused.
+    fn round_trip<T: Field + PartialEq + Debug>(value: T) -> Result<(), TestCaseError> {
+        let mut words = vec![0xDEAD_BEEF; T::SIZE];
+        value.write(&mut words);
+        prop_assert_eq!(T::read(&words), Some(value));
+        if T::SIZE > 0 {
+            prop_assert_eq!(T::read(&words[1..]), None, "too few words");
+        }
+        let mut again = vec![0; T::SIZE];
+        value.write(&mut again);
+        prop_assert_eq!(words, again, "the same value has the same words");
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn every_kind_of_number_comes_back(
+            (a, b, c, d, e, f, g, h) in any::<(u8, i8, u16, i16, u32, i32, u64, i64)>(),
+            x in prop::num::f32::ANY.prop_filter("NaN is no equal", |x| !x.is_nan()),
+            y in prop::num::f64::ANY.prop_filter("NaN is no equal", |y| !y.is_nan()),
+            z: bool,
+        ) {
+            round_trip(a)?; round_trip(b)?; round_trip(c)?; round_trip(d)?; round_trip(e)?; round_trip(f)?;
+            round_trip(g)?; round_trip(h)?; round_trip(x)?; round_trip(y)?; round_trip(z)?;
+            round_trip(Instant::from_micros(g))?;
+            round_trip(Duration::from_micros(g))?;
+            round_trip(Vec3::new(x, -x, 1.0))?;
+        }
+
+        #[test]
+        fn arrays_and_options_of_anything_come_back(
+            bytes in prop::collection::vec(any::<u8>(), 64), pair: [Option<i64>; 2], nested: Option<[Option<u16>; 3]>,
+            rows: [[i8; 3]; 2], signed: Option<i8>,
+        ) {
+            round_trip(<[u8; 64]>::try_from(bytes).expect("64 bytes"))?;
+            round_trip(pair)?;
+            round_trip(nested)?;
+            round_trip(rows)?;
+            round_trip(signed)?;
+            round_trip::<[f32; 0]>([])?;
+        }
+
+        #[test]
+        fn integers_refuse_what_does_not_fit(word: u32) {
+            prop_assert_eq!(u8::read(&[word]).is_some(), word < 256);
+            prop_assert_eq!(bool::read(&[word]).is_some(), word < 2);
+            prop_assert_eq!(i16::read(&[word]), i16::try_from(word.cast_signed()).ok());
+            prop_assert_eq!(i8::read(&[word]), i8::try_from(word.cast_signed()).ok());
+            prop_assert_eq!(Option::<u32>::read(&[word, 5]), if word == 1 { Some(Some(5)) } else { None });
+        }
+    }
+
+    #[test]
+    fn an_absent_value_has_one_form() {
+        let mut words = [9; 3];
+        None::<u64>.write(&mut words);
+        assert_eq!(words, [0; 3]);
+        assert_eq!(Option::<u64>::read(&[0, 0, 1]), None);
+        assert_eq!(Option::<bool>::read(&[1, 2]), None, "a present value that is none");
+    }
+
+    #[test]
+    fn a_long_array_starts_as_its_elements_do() {
+        assert_eq!(<[Option<u8>; 40]>::initial(), [None; 40]);
+        assert_eq!(<[Quat; 2]>::initial(), [Quat::identity(); 2]);
+    }
+
+    #[test]
+    fn a_quaternion_is_a_unit_quaternion() {
+        assert_eq!(Quat::read(&[1.0f32.to_bits(), 0, 0, 0]), Some(Quat::identity()));
+        assert_eq!(Quat::read(&[3.0f32.to_bits(), 0, 0, 0]), None, "norm 3");
+    }
+}
