@@ -50,8 +50,8 @@ components! {
     SafetySupervisorSwc(SafetySupervisor);
     /// Operator, scenario or recorded log to the driver's input.
     DriverInputSwc(DriverSelector);
-    /// Throttle to acceleration. Remembers whether the engine is another process.
-    EngineSwc(bool);
+    /// Throttle to acceleration. Remembers what it did last if it is another process, as it is once that was heard.
+    EngineSwc(Option<f32>);
     /// Pedal to deceleration.
     BrakeSwc(());
     /// Wheel to steering angle, which it remembers, because it lags.
@@ -148,20 +148,16 @@ impl Runnable for EngineSwc {
     fn run(&mut self, activation: &mut Activation, ends: &mut EngineEnds<'_>) {
         let (now, parameters) = (activation.now(), ends.parameters.get());
         let estop = must_stop(now, &ends.safety_status, parameters);
-        let remote = &ends.remote_drive;
-        self.0 |= remote.is_new();
-        let acceleration = match self.0 {
-            false => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
-            true if remote.is_new() => {
-                if estop {
-                    0.0
-                } else {
-                    remote.get().acceleration
-                }
-            }
-            // Each command is a heartbeat; without one this component has none either.
-            true => return,
+        let remote = ends.remote_drive.is_new().then(|| ends.remote_drive.get().acceleration);
+        let acceleration = match (remote, self.0) {
+            (None, None) => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
+            (Some(acceleration), _) if !estop => acceleration,
+            (Some(_), _) => 0.0,
+            // Each command is a heartbeat; without one this component has none either. But what it holds, it lets go.
+            (None, Some(held)) if estop && held != 0.0 => 0.0,
+            (None, Some(_)) => return,
         };
+        self.0 = remote.or(self.0).map(|_| acceleration);
         ends.drive_command.publish(now, &DriveCommand { acceleration });
     }
 }
