@@ -9,7 +9,6 @@ use stampfly_log::csv;
 use stampfly_param::{ParameterAction, ParameterRequest, ParameterStatus};
 use stampfly_rover::Parameters;
 use stampfly_rover::messages::*;
-use stampfly_rover::safety::COMPONENTS;
 use stampfly_types::Message;
 
 fn operated(operator: OperatorCommand) -> Events {
@@ -210,7 +209,7 @@ fn every_component_stops_by_itself_when_the_supervisor_is_silent() {
 fn a_missing_heartbeat_of_two_components_is_an_emergency_stop_within_the_limit() {
     for (first, second) in [(0, 1), (0, 4), (2, 3), (4, 5)] {
         for died in 200..220 {
-            let dead = COMPONENTS[first] | COMPONENTS[second];
+            let dead = Components::EACH[first] | Components::EACH[second];
             let records = run(400, |tick, _| Events {
                 operator: Some(manual(0.5, 0.0, 0.0)),
                 dead: if tick >= died { dead } else { Components::NONE },
