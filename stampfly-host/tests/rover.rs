@@ -31,12 +31,12 @@ fn stampfly(folder: &Path, arguments: &[&str]) -> String {
 fn a_drive_is_replayed_from_both_its_logs() {
     let (first, again) = (folder("drive"), folder("drive_again"));
     for options in [&["--seed", "0"][..], &["--seed", "7"], &["--seed", "8", "--jitter", "3"]] {
-        stampfly(&first, &[&["fly", "--vehicle", "rover"], options].concat());
+        stampfly(&first, &[&["fly", "--vehicle", "rover"][..], options].concat());
         assert!(stampfly(&first, &["replay", "flight.ulg"]).contains("identical"));
         assert!(stampfly(&first, &["replay", "flight.ulg", "--from", "5"]).contains("identical"));
         let csv = first.join("flight.csv");
         let mission = ["--mission", csv.to_str().expect("a path")];
-        stampfly(&again, &[&["fly", "--vehicle", "rover"], options, &mission].concat());
+        stampfly(&again, &[&["fly", "--vehicle", "rover"][..], options, &mission].concat());
         let read = |folder: &Path| std::fs::read(folder.join("flight.csv")).expect("written");
         assert!(read(&first) == read(&again), "{options:?}: byte for byte");
         assert!(first.join("flight.html").exists());
@@ -47,7 +47,7 @@ fn a_drive_is_replayed_from_both_its_logs() {
 fn campaigns_succeed_and_a_check_that_does_not_hold_fails() {
     let folder = folder("campaign");
     for jitter in [&[][..], &["--jitter", "1"]] {
-        let printed = stampfly(&folder, &[&["campaign", "--vehicle", "rover", "--flights", "60"], jitter].concat());
+        let printed = stampfly(&folder, &[&["campaign", "--vehicle", "rover", "--flights", "60"][..], jitter].concat());
         assert!(printed.contains("60 of 60 flights succeeded"), "{printed}");
     }
     std::fs::write(folder.join("wrong.txt"), "0 throttle 1\n1 check v > 2.9\n1.5 end\n").expect("written");
