@@ -1,4 +1,4 @@
-//! The rover in the hands of other programs: `stampfly serve`, driven by the Python package over UDP.
+//! The rover as people meet it: drives, their logs, and `stampfly serve`, driven by the Python package over UDP.
 
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
@@ -11,6 +11,51 @@ use stampfly_rover::com::{Body, MAX};
 use stampfly_rover::messages::{LogRecord, OperatorCommand, Subscription, SystemState};
 use stampfly_types::Instant;
 
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rover").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    folder
+}
+
+/// Runs the program in a folder. Returns what it prints.
+fn stampfly(folder: &Path, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_stampfly")).current_dir(folder).args(arguments).output();
+    let output = output.expect("it runs");
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn a_drive_is_replayed_from_both_its_logs() {
+    let (first, again) = (folder("drive"), folder("drive_again"));
+    for options in [&["--seed", "0"][..], &["--seed", "7"], &["--seed", "8", "--jitter", "3"]] {
+        stampfly(&first, &[&["fly", "--vehicle", "rover"][..], options].concat());
+        assert!(stampfly(&first, &["replay", "flight.ulg"]).contains("identical"));
+        assert!(stampfly(&first, &["replay", "flight.ulg", "--from", "5"]).contains("identical"));
+        let csv = first.join("flight.csv");
+        let mission = ["--mission", csv.to_str().expect("a path")];
+        stampfly(&again, &[&["fly", "--vehicle", "rover"][..], options, &mission].concat());
+        let read = |folder: &Path| std::fs::read(folder.join("flight.csv")).expect("written");
+        assert!(read(&first) == read(&again), "{options:?}: byte for byte");
+        assert!(first.join("flight.html").exists());
+    }
+}
+
+#[test]
+fn campaigns_succeed_and_a_check_that_does_not_hold_fails() {
+    let folder = folder("campaign");
+    for jitter in [&[][..], &["--jitter", "1"]] {
+        let printed = stampfly(&folder, &[&["campaign", "--vehicle", "rover", "--flights", "60"][..], jitter].concat());
+        assert!(printed.contains("60 of 60 flights succeeded"), "{printed}");
+    }
+    std::fs::write(folder.join("wrong.txt"), "0 throttle 1\n1 check v > 2.9\n1.5 end\n").expect("written");
+    let mut wrong = Command::new(env!("CARGO_BIN_EXE_stampfly"));
+    let wrong = wrong.current_dir(&folder).args(["fly", "--vehicle", "rover", "--mission", "wrong.txt"]).output();
+    assert_eq!(wrong.expect("it runs").status.code(), Some(1));
+}
+
 /// A simulated rover in a process of its own.
 struct Rover {
     process: Child,
@@ -21,9 +66,7 @@ struct Rover {
 impl Rover {
     /// Serves for some seconds.
     fn start(name: &str, seconds: u32) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rover").join(name);
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(&folder).expect("the target folder can be written");
+        let folder = folder(name);
         // Port 0: the system chooses a free one. Seed 0: the document's vehicle.
         let mut process = Command::new(env!("CARGO_BIN_EXE_stampfly"))
             .args(["serve", "--vehicle", "rover", "--listen", "127.0.0.1:0", "--seed", "0"])
@@ -55,9 +98,7 @@ impl Rover {
     /// Waits for its end, and repeats the session from its log.
     fn end(mut self) {
         assert!(self.process.wait().expect("it ends").success(), "the vehicle did what it must not");
-        let log = self.folder.join("flight.ulg");
-        let replay = Command::new(env!("CARGO_BIN_EXE_stampfly")).arg("replay").arg(log).output().expect("it runs");
-        assert!(replay.status.success(), "{replay:?}");
+        stampfly(&self.folder, &["replay", "flight.ulg"]);
     }
 }
 

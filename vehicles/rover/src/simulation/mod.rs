@@ -28,10 +28,7 @@ const STREAM: u64 = 1_100;
 
 impl Vehicle for Rover {
     const NAME: &'static str = "rover";
-    const PAGE: Page = Page {
-        bands: &[("safety_status", "system_state", "State"), ("operator_command", "mode", "Input")],
-        ..Page::EMPTY
-    };
+    const PAGE: Page = Page { bands: &[("safety_status", "system_state", "State")], ..Page::EMPTY };
     type Runnables = Runnables;
     type Setup = Setup;
     type Surroundings = Scripted<Setup>;
