@@ -25,7 +25,7 @@ const POINTERS: &[Behind<'_>] = &[
     // Wherever in it the compiler puts estimation.
     Behind { callers: "FlightLoop>", targets: ESTIMATOR, nests: None },
     Behind { callers: "Scheduler", targets: &["AnyTopic>::"], nests: None },
-    Behind { callers: "drain", targets: &["FnOnce<(stampfly_board::topic_table::wiring::Id"], nests: None },
+    Behind { callers: "drain", targets: &["FnOnce<(usize, stampfly_types::time::Instant"], nests: None },
     // The deepest: the console's text has a storage error (1) whose text has the flash driver's error (2), whose number (3)
     // goes to the writer (4). A topic's fields are one less.
     Behind { callers: "core::fmt::", targets: &[" as core::fmt::"], nests: Some(4) },
