@@ -2,7 +2,7 @@
 //!
 //! For pictures that a command draws and a document shows: the same numbers give the same bytes. No scripts, no fonts of
 //! its own, a white ground, so that it reads the same on a light page and on a dark one. For looking into a flight use
-//! the interactive [`report`](crate::report).
+//! the interactive report of the program `stampfly`.
 
 use std::fmt::Write;
 

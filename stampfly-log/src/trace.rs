@@ -31,7 +31,7 @@ pub struct ActivationTopic {
     pub name: &'static str,
     /// Its place in the schedule.
     pub index: u8,
-    /// How many inputs it has, at most [`MAX_INPUTS`](stampfly_types::activation::MAX_INPUTS).
+    /// How many inputs it has, at most [`MAX_INPUTS`].
     pub inputs: usize,
 }
 

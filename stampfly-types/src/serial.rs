@@ -1,6 +1,6 @@
 //! Messages and their fields for [serde](https://serde.rs), behind the feature `serde`.
 //!
-//! A message is serialised as its words, so whatever [`Message::from_words`] refuses (an unknown variant, an unnamed bit,
+//! A message is serialised as its words, so whatever [`from_words`](crate::Message::from_words) refuses (an unknown variant, an unnamed bit,
 //! a quaternion that is none) is refused here, too. It is written by the macros that declare messages and asks nothing
 //! of the types of their fields, so another crate's messages compile with and without the feature, whether or not that
 //! crate knows serde. Not for a radio or between versions: there is no schema in it.

@@ -11,7 +11,7 @@
 //! The same filter with the same code as in flight; where nothing measures a position, the attitude filter. Its tuning differs between sensor suites (see [`suite`]), never
 //! between files of one. It is never told that the vehicle stands: that would be half the answer.
 //!
-//! Not for replaying a flight of this stack bit by bit: that is [`crate::replay`].
+//! Not for replaying a flight of this stack bit by bit: that is `stampfly_flight::replay`.
 
 mod accuracy;
 mod dead_reckoning;

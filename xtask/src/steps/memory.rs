@@ -23,7 +23,7 @@ const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
 const POINTERS: &[Behind<'_>] = &[
     Behind { callers: "runnables::estimation::Estimation", targets: ESTIMATOR, nests: None },
     // Wherever in it the compiler puts estimation.
-    Behind { callers: "FlightLoop>", targets: ESTIMATOR, nests: None },
+    Behind { callers: "FlightLoop<", targets: ESTIMATOR, nests: None },
     Behind { callers: "Scheduler", targets: &["AnyTopic>::"], nests: None },
     Behind { callers: "drain", targets: &["FnOnce<(usize, stampfly_types::time::Instant"], nests: None },
     // The deepest: the console's text has a storage error (1) whose text has the flash driver's error (2), whose number (3)
@@ -183,7 +183,7 @@ const TASKS: [Task; 8] = [
     ("console", &["TaskStorage<stampfly_esp32s3::console", ">::poll"], Core::OnTopOfAssembly),
     ("memory", &["TaskStorage<stampfly_esp32s3::memory", ">::poll"], Core::OnTopOfAssembly),
     // One after the other. Each holds a whole vehicle; the second runs the tasks when it has done so.
-    ("self_test", &["stampfly_esp32s3::self_test::run"], Core::Ground),
+    ("self_test", &["stampfly_board::golden::self_test"], Core::Ground),
     ("assembly", &["stampfly_esp32s3::start"], Core::Ground),
 ];
 
