@@ -89,7 +89,6 @@ pub struct ModeMachine {
     /// Arm switch of the pilot's last frame; `None` until it has been seen off.
     switch: Option<bool>,
     /// Armed by pilot or button, which take off by themselves in modes that hold height.
-    #[cfg_attr(feature = "serde", serde(skip))]
     takes_off: bool,
     crashed: bool,
     silent_since: Option<Instant>,
