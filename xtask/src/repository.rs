@@ -10,6 +10,9 @@ pub type Failure = String;
 /// Libraries for a PC. Every other one has to build for bare metal.
 const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab", "stampfly-sim"];
 
+/// Folder of the vehicles after the first.
+pub const VEHICLES: &str = "vehicles";
+
 /// The working copy.
 pub struct Repository {
     /// Its top folder.
@@ -18,8 +21,10 @@ pub struct Repository {
 
 /// A published library of this repository.
 pub struct Library {
-    /// Package name, which is its folder's, too.
+    /// Package name.
     pub name: String,
+    /// Its folder, from the top.
+    pub folder: PathBuf,
     /// Has it to build for bare metal?
     pub bare_metal: bool,
 }
@@ -43,17 +48,21 @@ impl Repository {
         self.root.join(folder).canonicalize().ok().filter(|folder| folder.is_dir())
     }
 
-    /// Every library crate: the folders `stampfly-*` with a `src/lib.rs`. A new crate is checked without being listed.
+    /// Every library crate: the folders `stampfly-*`, whose packages are called the same, and `vehicles/*`, whose packages
+    /// are called `stampfly-*`. A new crate is checked without being listed.
     pub fn libraries(&self) -> Result<Vec<Library>, Failure> {
-        let entries = std::fs::read_dir(&self.root).map_err(|e| format!("{}: {e}", self.root.display()))?;
-        let mut libraries: Vec<Library> = entries
-            .filter_map(|entry| {
-                let entry = entry.ok()?;
-                let name = entry.file_name().into_string().ok()?;
-                let is_library = name.starts_with("stampfly-") && entry.path().join("src/lib.rs").exists();
-                is_library.then(|| Library { bare_metal: !HOST_ONLY.contains(&name.as_str()), name })
-            })
-            .collect();
+        let mut libraries = Vec::new();
+        for parent in ["", VEHICLES] {
+            let path = self.root.join(parent);
+            let entries = std::fs::read_dir(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            libraries.extend(entries.filter_map(|entry| {
+                let folder = entry.ok()?.file_name().into_string().ok()?;
+                let name = if parent.is_empty() { folder.clone() } else { format!("stampfly-{folder}") };
+                let is_library = name.starts_with("stampfly-") && path.join(&folder).join("src/lib.rs").exists();
+                let bare_metal = !HOST_ONLY.contains(&name.as_str());
+                is_library.then(|| Library { name, folder: Path::new(parent).join(folder), bare_metal })
+            }));
+        }
         libraries.sort_by(|a, b| a.name.cmp(&b.name));
         if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
     }

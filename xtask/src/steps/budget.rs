@@ -15,15 +15,7 @@ const LONG: u64 = 8_000;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&VALGRIND])?;
-    run_program(repository.cargo().args([
-        "build",
-        "--quiet",
-        "--release",
-        "-p",
-        "stampfly-benches",
-        "--example",
-        "chain_steps",
-    ]))?;
+    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "chain_steps"]))?;
     let measured = (count(repository, LONG)? - count(repository, SHORT)?) as f64 / (LONG - SHORT) as f64;
 
     Budget::read(repository, "benches/budget.toml")?.hold(&["instructions_per_step"], measured, "instructions per step")
@@ -31,7 +23,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
 
 /// Instructions of one run.
 fn count(repository: &Repository, steps: u64) -> Result<u64, Failure> {
-    let program = repository.target("release/examples/chain_steps");
+    let program = repository.target("release/chain_steps");
     let mut valgrind = repository.command("valgrind");
     valgrind.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program).arg(steps.to_string());
     let (_, report) = capture(&mut valgrind)?;

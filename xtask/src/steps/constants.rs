@@ -6,7 +6,7 @@
 //! file; an entry that matches nothing fails as well, so the list can only shrink.
 
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, capture};
+use crate::repository::{Failure, Library, Repository, VEHICLES, capture};
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -19,13 +19,15 @@ const FOLDERS: [&str; 2] = ["src", "tests"];
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let text = fs::read_to_string(repository.root.join(LIST)).map_err(|e| format!("{LIST}: {e}"))?;
     let list = List::parse(&text).map_err(|e| format!("{LIST}: {e}"))?;
-    let libraries: BTreeSet<String> = repository.libraries()?.into_iter().map(|library| library.name).collect();
-    let crate_names: BTreeSet<String> = libraries.iter().map(|name| name.replace('-', "_")).collect();
+    let libraries = repository.libraries()?;
+    let crate_names: BTreeSet<String> = libraries.iter().map(|library| library.name.replace('-', "_")).collect();
+    let is_generic =
+        |library: &&Library| !library.folder.starts_with(VEHICLES) && !list.vehicles.contains(&library.name);
     let (mut files, mut found) = (0, BTreeMap::new());
-    for name in libraries.iter().filter(|name| !list.vehicles.contains(*name)) {
-        for folder in FOLDERS.map(|folder| format!("{name}/{folder}")) {
+    for library in libraries.iter().filter(is_generic) {
+        for folder in FOLDERS.map(|folder| library.folder.join(folder)) {
             let mut sources = repository.command("git");
-            sources.args(["ls-files", "--cached", "--others", "--exclude-standard", &folder]);
+            sources.args(["ls-files", "--cached", "--others", "--exclude-standard"]).arg(folder);
             let (sources, _) = capture(&mut sources)?;
             for file in sources.lines().filter(|file| file.ends_with(".rs")) {
                 // A file that was removed without telling git is no source.

@@ -5,7 +5,7 @@
 //! it, depending on that crate and on the vocabulary of `stampfly-types`, and run.
 
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, run as run_program};
+use crate::repository::{Failure, Library, Repository, run as run_program};
 use std::fs;
 use std::path::Path;
 
@@ -21,27 +21,28 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         .libraries()?
         .iter()
         .filter(|library| !NOT_ALONE.contains(&library.name.as_str()))
-        .try_for_each(|library| consume(repository, &library.name, &place));
+        .try_for_each(|library| consume(repository, library, &place));
     // Nothing depends on its removal.
     let _ = fs::remove_dir_all(&place);
     outcome
 }
 
-fn consume(repository: &Repository, name: &str, place: &Path) -> Result<(), Failure> {
+fn consume(repository: &Repository, library: &Library, place: &Path) -> Result<(), Failure> {
+    let name = library.name.as_str();
     let source = repository.root.join("xtask/consumers").join(format!("{name}.rs"));
     if !source.exists() {
         return Err(format!("`{name}` has no consumer: write {}", source.display()));
     }
     let folder = place.join(name);
-    let dependency = |name: &str| format!("{name} = {{ path = {:?} }}\n", repository.root.join(name));
+    let dependency = |name: &str, folder: &Path| format!("{name} = {{ path = {:?} }}\n", repository.root.join(folder));
     let mut manifest = format!("[package]\nname = \"consumer-of-{name}\"\nedition = \"2024\"\n\n[workspace]\n\n");
     manifest += "[dependencies]\n";
-    manifest += &dependency(name);
+    manifest += &dependency(name, &library.folder);
     if name != "stampfly-types" {
-        manifest += &dependency("stampfly-types");
+        manifest += &dependency("stampfly-types", Path::new("stampfly-types"));
     }
     let beside = BESIDE.iter().filter(|(library, _)| *library == name).flat_map(|(_, beside)| *beside);
-    manifest.extend(beside.map(|name| dependency(name)));
+    manifest.extend(beside.map(|name| dependency(name, Path::new(name))));
     let io = |e: std::io::Error| format!("{}: {e}", folder.display());
     fs::create_dir_all(folder.join("src")).map_err(io)?;
     fs::write(folder.join("Cargo.toml"), manifest).map_err(io)?;

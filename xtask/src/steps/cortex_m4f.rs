@@ -25,7 +25,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
 
     let there = emulate(repository)?;
     let mut host = repository.cargo();
-    host.args(["run", "--quiet", "--release", "-p", "stampfly-benches", "--example", "estimate_hash"]);
+    host.args(["run", "--quiet", "--release", "--bin", "estimate_hash"]);
     let (here, _) = capture(&mut host)?;
     let budget = Budget::read(repository, "benches/cortex-m4f.toml")?;
     let mut failures = Vec::new();

@@ -1,7 +1,7 @@
 //! `examples`: every example of the examples package still runs to its end.
 
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, capture};
+use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::fs;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
@@ -11,10 +11,12 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let programs = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file());
     let mut names: Vec<String> = programs.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
     names.sort();
+    // All of the workspace's at once, as `cargo test` has built them: for one package alone, features and with them all
+    // dependencies would be others.
+    run_program(repository.cargo().args(["build", "--quiet", "--examples"]))?;
     for name in &names {
-        let mut example = repository.cargo();
-        example.args(["run", "--quiet", "-p", "examples", "--example", name]);
-        let (printed, _) = capture(&mut example)?;
+        let program = repository.target("debug/examples").join(name);
+        let (printed, _) = capture(&mut repository.command(&program.to_string_lossy()))?;
         if printed.is_empty() {
             return Err(format!("the example `{name}` shows nothing"));
         }
