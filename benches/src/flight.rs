@@ -51,7 +51,7 @@ struct Vehicle<'b> {
 impl<'b> Vehicle<'b> {
     fn new(bus: &'b mut topics::Bus) -> Self {
         let Assembled { flight_loop: flight, outside, .. } =
-            Assembled::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+            Assembled::new(bus, None, &VehicleConfig::default(), Instant::ZERO);
         Self { flight, outside }
     }
 

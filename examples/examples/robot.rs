@@ -115,7 +115,7 @@ impl Sink for Memory {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut bus = topics::Bus::new();
     let Assembled { mut flight_loop, mut outside, mut taps } =
-        Assembled::<Robot>::new(bus.split(None), &0.5, Instant::ZERO);
+        Assembled::<Robot>::new(&mut bus, None, &0.5, Instant::ZERO);
     let mut head = Definitions::start(Memory(Vec::new()), Instant::ZERO)?;
     head.info("sys_name", "wall follower")?;
     let mut recorder = Recorder::<Robot, _>::new(head.data(LogSchema::new(&[]))?);

@@ -10,7 +10,7 @@ use stampfly_types::messages::{Alerts, ArmBlocks, SelfTest, SelfTestVerdict};
 /// What the ground station sees after a tenth of a second.
 fn after(verdict: SelfTestVerdict) -> TelemetryFrame {
     let mut bus = topics::Bus::new();
-    let vehicle = Assembled::<Runnables>::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+    let vehicle = Assembled::<Runnables>::new(&mut bus, None, &VehicleConfig::default(), Instant::ZERO);
     let (mut flight_loop, mut outside) = (vehicle.flight_loop, vehicle.outside);
     outside.self_test.self_test.publish(Instant::ZERO, &SelfTest { verdict, worst: 0.0 });
     for step in 1..=40 {

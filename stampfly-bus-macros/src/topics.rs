@@ -349,6 +349,7 @@ fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
             }
 
             /// Hands out every end once. `hook` is called after every publish.
+            #[inline(always)]
             pub fn split(&mut self, hook: Option<::stampfly_bus::Hook>) -> ::stampfly_bus::Split<'_, Self> {
                 let bus: &Self = self;
                 ::stampfly_bus::Split {
@@ -371,6 +372,7 @@ fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
                 Self::new()
             }
 
+            #[inline(always)]
             fn split(&mut self, hook: Option<::stampfly_bus::Hook>) -> ::stampfly_bus::Split<'_, Self> {
                 Self::split(self, hook)
             }

@@ -27,6 +27,7 @@ where
     T: Message<Words = [u32; W]> + Default,
 {
     #[doc(hidden)]
+    #[inline(always)]
     pub fn __new(end: Subscriber<'b, T, Latest, N, W>) -> Self {
         Self { end, sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() }, is_new: false }
     }
@@ -106,6 +107,7 @@ where
     P: Sequential,
 {
     #[doc(hidden)]
+    #[inline(always)]
     pub fn __new(end: Subscriber<'b, T, P, N, W>) -> Self {
         Self { end, samples: Vec::new() }
     }

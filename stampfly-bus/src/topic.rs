@@ -60,6 +60,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
         (publisher, core::array::from_fn(|index| topic.subscriber(index)))
     }
 
+    #[inline(always)]
     fn subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
         // A bus may have been in use before it was split: a reader starts with what is published from now on, or, where
         // nothing may be lost, with what was never taken.
@@ -77,12 +78,15 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
         }
     }
 
+    // Inlined with all that makes ends: a vehicle's are thousands of bytes, to be made in their place, not moved there.
     #[doc(hidden)]
+    #[inline(always)]
     pub fn __publisher(&self, hook: Option<Hook>, index: usize) -> Publisher<'_, T, P, N, W, R> {
         Publisher { topic: self, newest: self.ring.head(), hook: hook.map(|hook| (hook, index)) }
     }
 
     #[doc(hidden)]
+    #[inline(always)]
     pub fn __subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
         self.subscriber(index)
     }
@@ -382,6 +386,7 @@ pub struct Tap<'b, T, const N: usize, const W: usize>(Subscriber<'b, T, Every, N
 
 impl<'b, T: Message<Words = [u32; W]>, const N: usize, const W: usize> Tap<'b, T, N, W> {
     #[doc(hidden)]
+    #[inline(always)]
     pub fn __new<P, const R: usize>(topic: &'b Topic<T, P, N, W, R>) -> Self {
         Self(Subscriber { ring: &topic.ring, shared: None, cursor: topic.ring.head(), lost: 0, kind: PhantomData })
     }

@@ -4,7 +4,7 @@
 //! clock does; a replay and the golden flight call it with what was recorded. It reads no clock: the caller says what
 //! time it is.
 
-use stampfly_bus::{Activation, AnyTopic, Band, PublishWords, Schedule, Scheduler, Split, TopicTable};
+use stampfly_bus::{Activation, AnyTopic, Band, Hook, PublishWords, Schedule, Scheduler, Split, TopicTable};
 use stampfly_types::{ActivationRecord, Instant};
 
 /// Is told of activations: a log, a profiler.
@@ -80,10 +80,13 @@ pub struct Assembled<'b, R: Schedule> {
 }
 
 impl<'b, R: Schedule> Assembled<'b, R> {
-    /// Connects runnables to a fresh bus. The scheduler counts from `start`.
+    /// Connects runnables to a fresh bus. `hook` is called after every publish, the scheduler counts from `start`.
+    ///
+    /// Never inlined: what it needs on the stack beside its result is free again when the vehicle flies.
+    #[inline(never)]
     #[must_use]
-    pub fn new(split: Split<'b, R::Topics>, config: &R::Config, start: Instant) -> Self {
-        let Split { runnables: ends, outside, taps, heads } = split;
+    pub fn new(bus: &'b mut R::Topics, hook: Option<Hook>, config: &R::Config, start: Instant) -> Self {
+        let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
         let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
         Self { flight_loop: FlightLoop { runnables: R::new(config), ends, scheduler, heads }, outside, taps }
     }

@@ -10,10 +10,12 @@ use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 /// The tables of a vehicle in the hands of a test. Topics and runnables go by their names.
 ///
 /// ```
-/// # include!("../tests/common/mod.rs");
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
+/// use rover::{Rover, topics}; // the rover of `tests/common`, configured by a gain
 /// use stampfly_flight::Mock;
-/// use stampfly_types::{Instant, messages::TofData};
+/// use stampfly_types::{Instant, messages::{MotorOutput, SystemMode, TofData}};
 ///
+/// # fn main() {
 /// let (mut bus, now) = (topics::Bus::new(), Instant::from_millis(20));
 /// let mut mock = Mock::<Rover>::new(&mut bus, &0.5);
 /// mock.publish("sensor_range", now, &TofData { distance: 1.0, valid: true, ..TofData::default() }).expect("a topic");
@@ -21,6 +23,7 @@ use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 /// let output = mock.newest::<MotorOutput>("actuator_motor").expect("published");
 /// assert_eq!((output.at, output.data.duty[0]), (now, 0.5));
 /// assert_eq!(mock.newest::<SystemMode>("system_mode"), None, "the monitor has not run");
+/// # }
 /// ```
 pub struct Mock<'b, R: Schedule> {
     flight_loop: FlightLoop<'b, R>,
@@ -30,7 +33,7 @@ pub struct Mock<'b, R: Schedule> {
 impl<'b, R: Schedule> Mock<'b, R> {
     /// Every runnable at power-on, on an empty bus.
     pub fn new(bus: &'b mut R::Topics, config: &R::Config) -> Self {
-        let Assembled { flight_loop, outside, .. } = Assembled::new(bus.split(None), config, Instant::ZERO);
+        let Assembled { flight_loop, outside, .. } = Assembled::new(bus, None, config, Instant::ZERO);
         Self { flight_loop, outside }
     }
 

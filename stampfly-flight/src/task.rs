@@ -43,7 +43,7 @@ const IDLE: Duration = Duration::from_millis(10);
 ///
 /// # fn main() {
 /// let mut bus = topics::Bus::new();
-/// let Assembled { mut flight_loop, outside, .. } = Assembled::<Rover>::new(bus.split(None), &0.5, Instant::ZERO);
+/// let Assembled { mut flight_loop, outside, .. } = Assembled::<Rover>::new(&mut bus, None, &0.5, Instant::ZERO);
 /// let topics::Outside { mut range_finder, mut motors } = outside;
 ///
 /// let clock = || Instant::from_millis(21);

@@ -22,7 +22,7 @@ const TOLERANCE: f32 = 0.01;
 fn recorded() -> (Vec<u8>, FlightHash) {
     let start = Instant::from_secs(7);
     let mut bus = Bus::new();
-    let Assembled { mut flight_loop, mut outside, mut taps } = Assembled::<Rover>::new(bus.split(None), &GAIN, start);
+    let Assembled { mut flight_loop, mut outside, mut taps } = Assembled::<Rover>::new(&mut bus, None, &GAIN, start);
     let (mut hash, mut motors, mut entries) = (FlightHash::new(), None, Vec::new());
     let mut writer = Writer::new(tables::<Rover>(), start, MOTORS, |piece: &[u8]| entries.extend_from_slice(piece));
     let mut drain = |motors: &mut Option<Vec<u32>>| {

@@ -4,7 +4,7 @@
 use core::convert::Infallible;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
-use stampfly_bus::{Activation, Band, Duration, Instant, Runnable, Taps, TopicTable, message};
+use stampfly_bus::{Activation, Band, Duration, Instant, Runnable, Taps, message};
 use stampfly_flight::{Assembled, LogSchema, Recorder, Replay, ReplayError, ReplayOptions, key_frame, replay::replay};
 use stampfly_log::ulog::{Definitions, Sink};
 
@@ -123,7 +123,7 @@ impl Sink for Disk {
 fn record(ranges: &[f32], outage: core::ops::Range<usize>) -> Vec<u8> {
     let mut bus = topics::Bus::new();
     let Assembled { mut flight_loop, mut outside, mut taps } =
-        Assembled::<Robot>::new(TopicTable::split(&mut bus, None), &GAIN, Instant::ZERO);
+        Assembled::<Robot>::new(&mut bus, None, &GAIN, Instant::ZERO);
     let disk = Disk::default();
     let full = disk.full.clone();
     let mut head = Definitions::start(disk, Instant::ZERO).expect("room");
@@ -204,13 +204,13 @@ fn a_replay_goes_on_after_a_loss() {
 #[test]
 fn another_robots_key_frame_is_refused() {
     let mut bus = topics::Bus::new();
-    let Assembled { flight_loop, .. } = Assembled::<Robot>::new(bus.split(None), &GAIN, Instant::ZERO);
+    let Assembled { flight_loop, .. } = Assembled::<Robot>::new(&mut bus, None, &GAIN, Instant::ZERO);
     let mut frame = [0; 4096];
     let length = key_frame::encode(&flight_loop, Instant::from_millis(3), &mut frame).expect("room");
     assert_eq!(key_frame::encode(&flight_loop, Instant::ZERO, &mut [0; 16]), Err(key_frame::KeyFrameError::NoRoom));
     let mut again = topics::Bus::new();
     let Assembled { mut flight_loop, mut outside, .. } =
-        Assembled::<Robot>::new(again.split(None), &GAIN, Instant::ZERO);
+        Assembled::<Robot>::new(&mut again, None, &GAIN, Instant::ZERO);
     let mut restore = |bytes: &[u8]| key_frame::restore(bytes, &mut flight_loop, &mut outside);
     assert_eq!(restore(&frame[..length]), Ok(Instant::from_millis(3)));
     for cut in 0..length {

@@ -59,7 +59,7 @@ const MONITOR: usize = Id::monitor as usize;
 fn samples_and_deadlines_reach_the_motors_at_once() {
     let (clock, ran, duties) = (Clock::default(), RefCell::new(Vec::new()), RefCell::new(Vec::new()));
     let mut bus = topics::Bus::new();
-    let Assembled { mut flight_loop, outside, .. } = Assembled::<Rover>::new(bus.split(None), &0.5, Instant::ZERO);
+    let Assembled { mut flight_loop, outside, .. } = Assembled::<Rover>::new(&mut bus, None, &0.5, Instant::ZERO);
     let topics::Outside { mut range_finder, mut motors } = outside;
     // Two ranges, stamped half a millisecond before they arrive, then silence.
     let sensing = async {
@@ -95,7 +95,7 @@ fn samples_and_deadlines_reach_the_motors_at_once() {
 fn a_task_that_was_dropped_can_be_started_again() {
     let (clock, ran) = (Clock::default(), RefCell::new(Vec::new()));
     let mut bus = topics::Bus::new();
-    let Assembled { mut flight_loop, .. } = Assembled::<Rover>::new(bus.split(None), &0.5, Instant::ZERO);
+    let Assembled { mut flight_loop, .. } = Assembled::<Rover>::new(&mut bus, None, &0.5, Instant::ZERO);
     for until in [75, 120].map(Instant::from_millis) {
         let task = fly(pending(), &mut flight_loop, || clock.now(), Delay(&clock), Ran(&ran), |_| {});
         clock.run(pin!(task), until);

@@ -28,7 +28,7 @@ static ACCIDENT: LazyLock<(Box<BlackBox<WORDS>>, Instant)> = LazyLock::new(|| {
     let mut black_box = Box::new(BlackBox::new(RETENTION));
     let mut bus = Bus::new();
     let Assembled { mut flight_loop, mut outside, mut taps } =
-        Assembled::<Runnables>::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+        Assembled::<Runnables>::new(&mut bus, None, &VehicleConfig::default(), Instant::ZERO);
     let (mut armed_at, mut stopped_at, mut pilot) = (None, None, 0u32);
     for event in recorder.into_inputs() {
         match event {

@@ -43,7 +43,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
     let Sensors { mut imu, mut tof, mut flow, mut mag, mut baro, mut power, mut motors, .. } = sensors;
     let mut bus = Bus::new();
     let Assembled { mut flight_loop, outside, mut taps } =
-        Assembled::<Runnables>::new(bus.split(None), &setup.vehicle, setup.simulation.start);
+        Assembled::<Runnables>::new(&mut bus, None, &setup.vehicle, setup.simulation.start);
     let topics::Outside { link, button_pin, .. } = outside;
     let (mut to_imu, mut to_tof, mut to_flow) =
         (outside.imu.sensor_imu, outside.tof.sensor_tof, outside.flow.sensor_flow);

@@ -60,6 +60,7 @@ fn every_panel_is_there_and_every_channel_is_whole() {
         "Estimator/Test ratio",
         "Sensors/Angular rate",
         "Sensors/Specific force",
+        "Sensors/Range",
         "Battery/Voltage",
         "Battery/Current",
     ];

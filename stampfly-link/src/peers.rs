@@ -41,7 +41,7 @@ struct Peer<A, T> {
 /// let bytes = Datagram { sequence: 1, time: now, body: power }.write(&mut buffer)?;
 ///
 /// let mut peers = Peers::<u8, bool, 4>::new(Duration::from_secs(2));
-/// let (wants_all, body) = peers.hear(now, 7, bytes).expect("a datagram");
+/// let (wants_all, body) = peers.hear::<Charger>(now, 7, bytes).expect("a datagram");
 /// assert_eq!(body, power);
 /// *wants_all = true;
 /// assert!(peers.hear::<Charger>(now, 7, bytes).is_none(), "a repetition");

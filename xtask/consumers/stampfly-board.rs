@@ -8,7 +8,7 @@ use stampfly_types::{Instant, messages::ImuData};
 
 fn main() {
     let mut bus = topics::Bus::new();
-    let assembled = Assembled::<Runnables>::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+    let assembled = Assembled::<Runnables>::new(&mut bus, None, &VehicleConfig::default(), Instant::ZERO);
     let Assembled { flight_loop, mut outside, mut taps } = assembled;
     assert_eq!(flight_loop.next_tick(), Some(Instant::from_millis(5)), "the failsafe runs even when no sensor does");
 

@@ -47,7 +47,7 @@ schedule! {
 
 fn main() {
     let mut bus = topics::Bus::new();
-    let Assembled { mut flight_loop, mut outside, .. } = Assembled::<Robot>::new(bus.split(None), &1.0, Instant::ZERO);
+    let Assembled { mut flight_loop, mut outside, .. } = Assembled::<Robot>::new(&mut bus, None, &1.0, Instant::ZERO);
     let now = Instant::from_millis(1);
     outside.tof.range.publish(now, &TofData { distance: 0.25, ..Default::default() });
     assert!(flight_loop.run_band(Band::Flight, now, &mut ()));

@@ -80,8 +80,6 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
     motors::start_unit(chip.LEDC);
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
 
-    static BUS: StaticCell<topics::Bus> = StaticCell::new();
-    let split = BUS.init_with(topics::Bus::new).split(None);
     let mut storage = Storage::open(chip.FLASH);
     let mut config = VehicleConfig::default();
     let unusable = block_on(storage.load(&mut config));
@@ -89,15 +87,11 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         esp_println::println!("{unusable} stored parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
-    // Moved from here to where it stays, without a copy in between: there is not stack enough for two vehicles.
-    let assembled = Assembled::new(split, &config, Clock.now());
-    static FLIGHT_LOOP: StaticCell<FlightLoop<'static, Runnables>> = StaticCell::new();
-    let flight_loop = FLIGHT_LOOP.init(assembled.flight_loop);
-    let mut outside = assembled.outside;
+    let Assembly { flight_loop, mut outside, taps } = assemble(&config);
     let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
     outside.self_test.self_test.publish(Clock.now(), &tested.message());
     static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
-    let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(assembled.taps)));
+    let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
     static HEALTH: Healths = Healths::new();
     static PROFILE: Profile = Profile::new(&ACTIVATIONS);
     let pins: Pins<'static> = split_resources!(chip);
@@ -157,6 +151,24 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         fly(spawner);
         ground(spawner);
     })
+}
+
+/// A vehicle whose flight loop stays where it is.
+struct Assembly {
+    flight_loop: &'static mut FlightLoop<'static, Runnables>,
+    outside: topics::Outside<'static>,
+    taps: topics::Taps<'static>,
+}
+
+/// Makes the bus and the vehicle on it. Apart from [`start`], whose stack the tasks' is on top of.
+#[inline(never)]
+fn assemble(config: &VehicleConfig) -> Assembly {
+    static BUS: StaticCell<topics::Bus> = StaticCell::new();
+    static FLIGHT_LOOP: StaticCell<FlightLoop<'static, Runnables>> = StaticCell::new();
+    let assembled = Assembled::new(BUS.init_with(topics::Bus::new), None, config, Clock.now());
+    // `write`, other than `init`, is inlined: an argument would be a copy, and there is not stack enough for two vehicles.
+    let flight_loop = FLIGHT_LOOP.uninit().write(assembled.flight_loop);
+    Assembly { flight_loop, outside: assembled.outside, taps: assembled.taps }
 }
 
 /// Executors, one a core.

@@ -49,7 +49,7 @@ extern "C" fn flight() {
 fn vehicle() {
     let config: VehicleConfig = black_box(VehicleConfig::default());
     let mut bus = topics::Bus::new();
-    let vehicle = Assembled::<Runnables>::new(bus.split(None), &config, black_box(Instant::ZERO));
+    let vehicle = Assembled::<Runnables>::new(&mut bus, None, &config, black_box(Instant::ZERO));
     let Assembled { mut flight_loop, mut outside, mut taps } = vehicle;
     let topics::LinkEnds { command_pilot, command_guided: mut guided, system_mode, telemetry, link_peer } =
         outside.link;

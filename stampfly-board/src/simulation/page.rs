@@ -34,7 +34,6 @@ pub const PAGE: Page = Page {
         )
         .times(1e3)
         .picking(Pick::Mean),
-        PanelSpec::new("Position", "Range", "m", "sensor_tof", &[("distance", "range")]),
         status("Innovation, height", "m", &[("tof_innovation", "range"), ("baro_innovation", "barometer")]),
         status("Innovation, flow", "m/s", &[("flow_innovation[0]", "forward"), ("flow_innovation[1]", "right")]),
         status("Innovation, angles", "°", &[("mag_innovation", "heading"), ("accel_innovation", "gravity")])
@@ -68,6 +67,7 @@ pub const PAGE: Page = Page {
             &[("accel[0]", XYZ[0]), ("accel[1]", XYZ[1]), ("accel[2]", XYZ[2])],
         )
         .picking(Pick::Mean),
+        PanelSpec::new("Sensors", "Range", "m", "sensor_tof", &[("distance", "range")]),
         PanelSpec::new(
             "Sensors",
             "Magnetic field",

@@ -48,7 +48,7 @@ pub struct Bench<'b> {
 impl<'b> Bench<'b> {
     pub fn new(bus: &'b mut topics::Bus, peer: Option<Address>) -> Self {
         let Assembled { flight_loop: flight, outside, taps } =
-            Assembled::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+            Assembled::new(bus, None, &VehicleConfig::default(), Instant::ZERO);
         let topics::Outside { imu, tof, power, link, button_pin, console, storage, cutoff, supervisor, .. } = outside;
         let topics::LinkEnds { command_pilot, command_guided: guided, system_mode, telemetry, link_peer } = link;
         let link = Link::new(Session::new(VEHICLE, 1, peer), command_pilot, link_peer, system_mode, telemetry);

@@ -54,9 +54,9 @@ fn shown(runnables: &Runnables) -> String {
 fn goes_on(config: &VehicleConfig) {
     const FRAMES: [u64; 4] = [1, 700, 1_650, 1_900];
     let mut bus = topics::Bus::new();
-    let mut live = Assembled::<Runnables>::new(bus.split(None), config, Instant::ZERO);
+    let mut live = Assembled::<Runnables>::new(&mut bus, None, config, Instant::ZERO);
     let mut buses = FRAMES.map(|_| topics::Bus::new());
-    let mut restored = buses.each_mut().map(|bus| Assembled::<Runnables>::new(bus.split(None), config, Instant::ZERO));
+    let mut restored = buses.each_mut().map(|bus| Assembled::<Runnables>::new(bus, None, config, Instant::ZERO));
     let (mut numbers, mut frame, mut duty) = (Numbers::new(), vec![0; 1 << 16], 0.0f32);
     for k in 1..=2_400 {
         let same_numbers = numbers.clone();

@@ -142,7 +142,7 @@ pub fn play<R: Schedule>(
     let (header, entries) = format::open::<R>(record)?;
     let mut bus = R::Topics::new();
     // Not taken apart by value: a second copy of a vehicle is more than some stacks have room for.
-    let mut assembled = Assembled::<R>::new(bus.split(None), config, header.start);
+    let mut assembled = Assembled::<R>::new(&mut bus, None, config, header.start);
     let Assembled { flight_loop, outside, taps } = &mut assembled;
     let (mut hash, mut output) = (FlightHash::new(), Vec::<u32, MAX_MESSAGE>::new());
     let mut drain = |observer: &mut _, hash: &mut FlightHash, output: &mut Vec<u32, MAX_MESSAGE>| {

@@ -135,7 +135,7 @@ impl<R: Schedule + Serialize + DeserializeOwned> Player<R> {
         let topics = <R::Topics as TopicTable>::TOPICS;
         let mut bus = R::Topics::new();
         let Assembled { mut flight_loop, mut outside, mut taps } =
-            Assembled::<R>::new(bus.split(None), &self.config, self.start);
+            Assembled::<R>::new(&mut bus, None, &self.config, self.start);
         if let Some(frame) = frame {
             key_frame::restore(frame, &mut flight_loop, &mut outside).map_err(ReplayError::KeyFrame)?;
             // What was on the bus already has been published by nothing that is repeated here.

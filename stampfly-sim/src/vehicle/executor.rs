@@ -51,7 +51,7 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
     let (start, end) = (options.start, options.start + options.limit);
     let clock = surroundings.clock();
     let mut bus = R::Topics::new();
-    let Assembled { mut flight_loop, outside, mut taps } = Assembled::<R>::new(bus.split(None), config, start);
+    let Assembled { mut flight_loop, outside, mut taps } = Assembled::<R>::new(&mut bus, None, config, start);
     witness.begins(start);
     let mut tasks = Tasks::new(clock.clone());
     let mut around = surroundings.start(&mut tasks, outside);

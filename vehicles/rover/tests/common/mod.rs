@@ -83,7 +83,7 @@ pub fn manual(throttle: f32, brake: f32, steer: f32) -> OperatorCommand {
 pub fn run(ticks: usize, mut events: impl FnMut(usize, &mut LinkEnds<'_>) -> Events) -> Vec<LogRecord> {
     let mut bus = Bus::new();
     let Assembled { mut flight_loop, outside: Outside { mut link }, .. } =
-        Assembled::<Mortal>::new(bus.split(None), &Parameters::default(), Instant::ZERO);
+        Assembled::<Mortal>::new(&mut bus, None, &Parameters::default(), Instant::ZERO);
     let mut log = Vec::new();
     for tick in 0..ticks {
         let now = instant(tick);
