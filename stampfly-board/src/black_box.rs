@@ -55,7 +55,7 @@ fn rate(topic: usize) -> LogRate {
         Id::estimator_command => LogRate::EverySample,
         Id::system_alert => LogRate::OnChange,
         Id::system_mode => LogRate::OnChange,
-        Id::vehicle_status => LogRate::hertz(5),
+        Id::land_detected => LogRate::hertz(5),
         Id::setpoint => LogRate::hertz(10),
         Id::control_output => LogRate::hertz(10),
         Id::actuator_motor => LogRate::hertz(20),

@@ -8,8 +8,8 @@ use stampfly_control::{
     CascadeController, ControlInput, Controller, GeometricController, Mixer, MotorStage, MultirotorMixer,
 };
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, Setpoint,
-    SetpointAxes, StateEstimate, SystemMode, Validity, VehicleStatus,
+    CommandSetpoint, CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, LandDetected,
+    Setpoint, SetpointAxes, StateEstimate, SystemMode, Validity,
 };
 use stampfly_types::{Duration, Instant, Quat, Vec3};
 
@@ -17,7 +17,7 @@ struct Situation {
     estimate: StateEstimate,
     setpoint: Setpoint,
     mode: SystemMode,
-    status: VehicleStatus,
+    land_detected: LandDetected,
     command: CommandSetpoint,
 }
 
@@ -45,7 +45,7 @@ fn situation() -> Situation {
             armed: true,
             ..SystemMode::default()
         },
-        status: VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..VehicleStatus::default() },
+        land_detected: LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..LandDetected::default() },
         command: CommandSetpoint { source: CommandSource::Guided, ..CommandSetpoint::default() },
     }
 }
@@ -65,7 +65,7 @@ fn control(c: &mut Criterion) {
         command: &s.command,
         setpoint: &s.setpoint,
         mode: &s.mode,
-        status: &s.status,
+        land_detected: &s.land_detected,
         unmet,
     };
     let mut cascade = CascadeController::default();
@@ -107,7 +107,12 @@ fn guidance(c: &mut Criterion) {
     c.bench_function("navigator on a route", |b| {
         b.iter(|| {
             now += Duration::from_micros(2_500);
-            let input = NavigatorInput { mode: &s.mode, estimate: &estimate, status: &s.status, command: &s.command };
+            let input = NavigatorInput {
+                mode: &s.mode,
+                estimate: &estimate,
+                land_detected: &s.land_detected,
+                command: &s.command,
+            };
             let setpoint = navigator.step(now, &input);
             estimate.position = setpoint.position;
             if setpoint.remaining == 0 {

@@ -68,14 +68,14 @@ const THROTTLE_OFF: f32 = 0.03;
 /// let mut controller = CascadeController::default();
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
 /// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
-/// let status = VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
+/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
 /// let setpoint = Setpoint {
 ///     position: Vec3::new(1.0, 0.0, 0.0),
 ///     axes: SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW,
 ///     ..Default::default()
 /// };
 /// let input = ControlInput {
-///     estimate: &estimate, command: &CommandSetpoint::default(), setpoint: &setpoint, mode: &mode, status: &status,
+///     estimate: &estimate, command: &CommandSetpoint::default(), setpoint: &setpoint, mode: &mode, land_detected: &land_detected,
 ///     unmet: [0.0; 4],
 /// };
 /// let output = controller.step(Instant::from_micros(2_500), &input);
@@ -130,9 +130,9 @@ impl CascadeController {
 
     fn thrust(&mut self, intent: &Intent, input: &ControlInput<'_>, cos_tilt: f32, dt: f32) -> f32 {
         let limits = ThrustLimits {
-            ceiling: input.status.thrust_ceiling,
+            ceiling: input.land_detected.thrust_ceiling,
             unmet: input.unmet[3],
-            learn: !intent.grounded && input.status.thrust_ceiling > 1.0,
+            learn: !intent.grounded && input.land_detected.thrust_ceiling > 1.0,
             // While taking off the ground carries what thrust does not: the integral must be free to find the weight.
             hold: intent.grounded && input.mode.state != FlightState::TakeOff,
         };

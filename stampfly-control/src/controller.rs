@@ -6,7 +6,7 @@
 //! [`GeometricController`](crate::GeometricController) the proof that another law fits the same socket.
 
 use stampfly_types::Instant;
-use stampfly_types::messages::{CommandSetpoint, ControlOutput, Setpoint, StateEstimate, SystemMode, VehicleStatus};
+use stampfly_types::messages::{CommandSetpoint, ControlOutput, LandDetected, Setpoint, StateEstimate, SystemMode};
 
 /// All a controller may look at in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct ControlInput<'a> {
     /// Flight state and mode. A change of `control_resets` resets the controller.
     pub mode: &'a SystemMode,
     /// Contact with the ground and the thrust ceiling while landing.
-    pub status: &'a VehicleStatus,
+    pub land_detected: &'a LandDetected,
     /// What the mixer could not deliver in the previous step ([`Mixed::unmet`](crate::Mixed)).
     pub unmet: [f32; 4],
 }

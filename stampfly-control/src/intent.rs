@@ -139,7 +139,7 @@ impl Intent {
         } else {
             Heading::Stick(stick(input.command.yaw))
         };
-        Some(Self { horizontal, vertical, heading, grounded: input.status.contact == GroundContact::Ground })
+        Some(Self { horizontal, vertical, heading, grounded: input.land_detected.contact == GroundContact::Ground })
     }
 }
 
@@ -231,7 +231,7 @@ fn is_rotation(attitude: &Quat) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{CommandSetpoint, SystemMode, VehicleStatus};
+    use stampfly_types::messages::{CommandSetpoint, LandDetected, SystemMode};
 
     /// A vehicle in position hold with everything known and commanded, for tests to take something away.
     struct Case {
@@ -255,13 +255,13 @@ mod tests {
     }
 
     fn read(case: &Case) -> Option<Intent> {
-        let status = VehicleStatus { contact: GroundContact::Air, ..VehicleStatus::default() };
+        let land_detected = LandDetected { contact: GroundContact::Air, ..LandDetected::default() };
         Intent::read(&ControlInput {
             estimate: &case.estimate,
             command: &case.command,
             setpoint: &case.setpoint,
             mode: &case.mode,
-            status: &status,
+            land_detected: &land_detected,
             unmet: [0.0; 4],
         })
     }

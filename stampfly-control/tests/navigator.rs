@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use stampfly_control::guidance::{Navigator, NavigatorInput, Refusal, Route};
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
-    StateEstimate, SystemMode, Validity, VehicleStatus,
+    CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, LandDetected, Setpoint,
+    SetpointAxes, StateEstimate, SystemMode, Validity,
 };
 use stampfly_types::{Duration, Instant, Quat, Vec3};
 
@@ -15,7 +15,7 @@ struct Bench {
     now: Instant,
     mode: SystemMode,
     estimate: StateEstimate,
-    status: VehicleStatus,
+    land_detected: LandDetected,
     command: CommandSetpoint,
     setpoint: Setpoint,
 }
@@ -28,7 +28,7 @@ impl Bench {
             now: Instant::ZERO,
             mode: SystemMode { state: FlightState::IdleGround, mode: FlightMode::PosHold, ..SystemMode::default() },
             estimate: StateEstimate { valid: Validity::ALL, ..StateEstimate::default() },
-            status: VehicleStatus { descent_rate: 0.3, ..VehicleStatus::default() },
+            land_detected: LandDetected { descent_rate: 0.3, ..LandDetected::default() },
             command: CommandSetpoint { source: CommandSource::Guided, ..CommandSetpoint::default() },
             setpoint: Setpoint::default(),
         };
@@ -58,7 +58,7 @@ impl Bench {
             &NavigatorInput {
                 mode: &self.mode,
                 estimate: &self.estimate,
-                status: &self.status,
+                land_detected: &self.land_detected,
                 command: &self.command,
             },
         );
@@ -247,7 +247,7 @@ fn landing_sinks_as_told_and_does_not_dig() {
         assert!(bench.setpoint.position.z <= 0.25 + 1e-5);
         assert_eq!(bench.setpoint.position.xy(), place);
     }
-    bench.status.descent_rate = f32::NAN;
+    bench.land_detected.descent_rate = f32::NAN;
     bench.step();
     assert!(bench.setpoint.position.z.is_finite() && bench.setpoint.velocity.z.is_finite());
 }
@@ -322,7 +322,7 @@ proptest! {
             bench.enter(FlightState::ALL[state]);
             bench.mode.mode = FlightMode::ALL[mode];
             bench.command = CommandSetpoint { source: CommandSource::Pilot, roll, pitch, yaw, throttle };
-            bench.status.descent_rate = rate;
+            bench.land_detected.descent_rate = rate;
             bench.estimate.position = Vec3::new(x, y, z);
             bench.estimate.velocity = Vec3::new(u, v, w);
             bench.estimate.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(q0, q1, q2, q3));

@@ -59,7 +59,7 @@ pub fn blocks(mode: &SystemMode, crashed: bool, stale_switch: bool, input: &Mode
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{CalibrationResult, GuidedKind, PilotInput, StateEstimate, VehicleStatus};
+    use stampfly_types::messages::{CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
 
     /// What blocks a vehicle that stands ready.
     fn ready(mode: FlightMode, alerts: Alerts, pilot: Option<&PilotInput>, commands: &[GuidedKind]) -> ArmBlocks {
@@ -67,7 +67,7 @@ mod tests {
             alerts,
             estimate: &StateEstimate { valid: Validity::ALL, ..Default::default() },
             calibration: &CalibrationResult { complete: true, ..Default::default() },
-            status: &VehicleStatus::default(),
+            land_detected: &LandDetected::default(),
             pilot,
             commands,
             button: None,

@@ -10,7 +10,7 @@
 
 use stampfly_types::Instant;
 use stampfly_types::messages::{
-    ControlOutput, FlightState, GroundContact, Setpoint, StateEstimate, Validity, VehicleStatus,
+    ControlOutput, FlightState, GroundContact, LandDetected, Setpoint, StateEstimate, Validity,
 };
 
 /// Limits of take-off and landing.
@@ -82,11 +82,11 @@ pub struct LandingInput<'a> {
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let mut landed_at = None;
 /// for k in 0..1000u64 {
-///     let status = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
+///     let land_detected = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
 ///         estimate: &estimate, state: FlightState::Landing, setpoint: &Setpoint::default(),
 ///         demand: &ControlOutput { thrust: 0.2, ..Default::default() },
 ///     });
-///     if status.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
+///     if land_detected.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
 /// }
 /// assert!(landed_at.is_some_and(|t| t > 0.3 && t < 1.5));
 /// ```
@@ -147,15 +147,15 @@ impl TakeoffLanding {
     }
 
     /// One step, at the control rate.
-    pub fn step(&mut self, now: Instant, input: &LandingInput<'_>) -> VehicleStatus {
+    pub fn step(&mut self, now: Instant, input: &LandingInput<'_>) -> LandDetected {
         if input.state != self.state {
             self.enter(now, input);
         }
         let config = self.config;
         let estimate = input.estimate;
         let height_known = estimate.valid.contains(Validity::HEIGHT);
-        let mut status =
-            VehicleStatus { thrust_ceiling: 2.0, descent_rate: config.descent, ..VehicleStatus::default() };
+        let mut land_detected =
+            LandDetected { thrust_ceiling: 2.0, descent_rate: config.descent, ..LandDetected::default() };
         match self.state {
             FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => {
                 self.contact = GroundContact::Ground;
@@ -172,12 +172,12 @@ impl TakeoffLanding {
                     && estimate.velocity.z.abs() < 2.0 * config.still_speed;
                 let in_band = lasting(&mut self.in_band, now, arrived);
                 let [settle, limit] = config.takeoff_time;
-                status.takeoff_complete = in_band >= settle || now.since(self.entered).seconds() > limit;
+                land_detected.takeoff_complete = in_band >= settle || now.since(self.entered).seconds() > limit;
             }
             FlightState::Flying => self.contact = GroundContact::Air,
             FlightState::Landing => {
                 let flare = (estimate.height / config.flare_height).clamp(0.0, 1.0);
-                status.descent_rate = if height_known {
+                land_detected.descent_rate = if height_known {
                     config.touchdown + (config.descent - config.touchdown) * flare
                 } else {
                     config.touchdown
@@ -188,19 +188,19 @@ impl TakeoffLanding {
                 let [share, ramp] = config.ceiling;
                 let falling = lasting(&mut self.ceiling, now, low || stalled);
                 if self.ceiling.is_some() {
-                    status.thrust_ceiling = 1.0 - (1.0 - share) * (falling / ramp).min(1.0);
+                    land_detected.thrust_ceiling = 1.0 - (1.0 - share) * (falling / ramp).min(1.0);
                 }
-                let unloaded = input.demand.thrust < 0.8 * config.hover_thrust && status.thrust_ceiling < 0.85;
+                let unloaded = input.demand.thrust < 0.8 * config.hover_thrust && land_detected.thrust_ceiling < 0.85;
                 // Rising counts: with so little thrust nothing can, but strong vibration makes the estimate believe so.
                 let still = lasting(&mut self.still, now, unloaded && !sinking);
-                status.landed = still >= config.touchdown_time;
-                if status.landed {
+                land_detected.landed = still >= config.touchdown_time;
+                if land_detected.landed {
                     self.contact = GroundContact::Ground;
                 }
             }
         }
-        status.contact = self.contact;
-        status
+        land_detected.contact = self.contact;
+        land_detected
     }
 }
 

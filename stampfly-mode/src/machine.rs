@@ -9,7 +9,7 @@ use crate::touch::Touch;
 use crate::transitions::{Event, is_armed, next};
 use stampfly_types::messages::{
     Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightState, GroundContact, GuidedKind,
-    PilotInput, StateEstimate, SystemMode, Validity, VehicleStatus,
+    LandDetected, PilotInput, StateEstimate, SystemMode, Validity,
 };
 use stampfly_types::{Duration, Instant};
 
@@ -26,7 +26,7 @@ pub struct ModeInput<'a> {
     /// The still-calibration.
     pub calibration: &'a CalibrationResult,
     /// Take-off and landing.
-    pub status: &'a VehicleStatus,
+    pub land_detected: &'a LandDetected,
     /// The pilot's newest frame, if it is fresh.
     pub pilot: Option<&'a PilotInput>,
     /// Commands since the last step, in order.
@@ -68,9 +68,9 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 /// let mut machine = ModeMachine::default();
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let calibration = CalibrationResult { complete: true, ..Default::default() };
-/// let status = VehicleStatus::default();
+/// let land_detected = LandDetected::default();
 /// let mut input = ModeInput {
-///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, status: &status,
+///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, land_detected: &land_detected,
 ///     pilot: None, commands: &[], button: None,
 /// };
 /// assert_eq!(machine.step(Instant::ZERO, &input).mode.state, FlightState::IdleGround);
@@ -158,16 +158,16 @@ impl ModeMachine {
         let manual = matches!(mode.mode, FlightMode::Acro | FlightMode::Stabilize);
         let throttle_up = input.pilot.is_some_and(|pilot| pilot.throttle > THROTTLE_TAKE_OFF);
         let lifts_off = if manual { throttle_up } else { self.takes_off && waited >= SPOOL };
-        let airborne_by_hand = manual && input.status.contact == GroundContact::Air;
+        let airborne_by_hand = manual && input.land_detected.contact == GroundContact::Air;
         [
             input.alerts.intersects(CUT)
                 || commanded(Command::Kill)
                 || grabbed
                 || input.pilot.is_some_and(|pilot| pilot.kill),
             commanded(Command::Disarm) || switch.falls || (mode.state == FlightState::Armed && waited >= ARMED_TIMEOUT),
-            input.status.landed,
+            input.land_detected.landed,
             commanded(Command::Land) || abandoned || input.alerts.intersects(LAND),
-            input.status.takeoff_complete || airborne_by_hand,
+            input.land_detected.takeoff_complete || airborne_by_hand,
             commanded(Command::TakeOff) || lifts_off,
             (commanded(Command::Arm) || switch.rises || clicked) && mode.blocks.is_empty(),
             height_known && input.estimate.height < standing,
@@ -277,7 +277,7 @@ mod tests {
     struct World {
         estimate: StateEstimate,
         calibration: CalibrationResult,
-        status: VehicleStatus,
+        land_detected: LandDetected,
         alerts: Alerts,
         pilot: Option<PilotInput>,
         /// Happens in the next step, and not again.
@@ -290,7 +290,7 @@ mod tests {
             Self {
                 estimate: StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() },
                 calibration: CalibrationResult { complete: true, ..Default::default() },
-                status: VehicleStatus::default(),
+                land_detected: LandDetected::default(),
                 alerts: Alerts::NONE,
                 pilot: None,
                 button: None,
@@ -304,7 +304,7 @@ mod tests {
                 alerts: self.alerts,
                 estimate: &self.estimate,
                 calibration: &self.calibration,
-                status: &self.status,
+                land_detected: &self.land_detected,
                 pilot: self.pilot.as_ref(),
                 commands,
                 button: self.button.take(),
@@ -347,8 +347,8 @@ mod tests {
             (Command::None, |_| {}),
             (Command::Arm, |_| {}),
             (Command::TakeOff, |_| {}),
-            (Command::None, |world| world.status.takeoff_complete = true),
-            (Command::Land, |world| world.status.takeoff_complete = false),
+            (Command::None, |world| world.land_detected.takeoff_complete = true),
+            (Command::Land, |world| world.land_detected.takeoff_complete = false),
         ];
         for (command, change) in path {
             if machine.output.mode.state == state {
@@ -362,7 +362,7 @@ mod tests {
             world.estimate.height = 0.5;
             world.step(&mut machine, &[]);
         }
-        world.status.takeoff_complete = false;
+        world.land_detected.takeoff_complete = false;
         assert_eq!(machine.output.mode.state, state);
         (machine, world)
     }
@@ -371,7 +371,7 @@ mod tests {
     fn every_state_can_be_reached_and_every_armed_one_ends_on_the_ground() {
         for &state in FlightState::ALL {
             let (mut machine, mut world) = in_state(state);
-            world.status.landed = state == FlightState::Landing;
+            world.land_detected.landed = state == FlightState::Landing;
             for command in [Command::Kill, Command::None] {
                 world.step(&mut machine, &[command]);
             }

@@ -11,7 +11,7 @@ fn main() {
         alerts: Alerts::NONE,
         estimate: &estimate,
         calibration: &calibration,
-        status: &VehicleStatus::default(),
+        land_detected: &LandDetected::default(),
         pilot: None,
         commands: &[],
         button: None,

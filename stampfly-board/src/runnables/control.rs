@@ -44,7 +44,7 @@ impl Runnable for Control {
             command: ends.command_setpoint.get(),
             setpoint: ends.setpoint.get(),
             mode: ends.system_mode.get(),
-            status: ends.vehicle_status.get(),
+            land_detected: ends.land_detected.get(),
             unmet: ends.actuator_motor.get().unmet,
         };
         let output = match &mut self.controller {

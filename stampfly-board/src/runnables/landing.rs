@@ -30,7 +30,7 @@ impl Runnable for Landing {
             setpoint: ends.setpoint.get(),
             demand: ends.control_output.get(),
         };
-        let status = self.manager.step(activation.now(), &input);
-        ends.vehicle_status.publish(activation.now(), &status);
+        let land_detected = self.manager.step(activation.now(), &input);
+        ends.land_detected.publish(activation.now(), &land_detected);
     }
 }

@@ -47,7 +47,7 @@ impl Runnable for Mode {
             alerts: ends.system_alert.get().active,
             estimate: ends.estimate_state.get(),
             calibration: ends.calibration.get(),
-            status: ends.vehicle_status.get(),
+            land_detected: ends.land_detected.get(),
             pilot: self.pilot.as_ref().filter(|frame| frame.age(now) < STALE_PILOT).map(|frame| &frame.data),
             commands: &commands,
             button,

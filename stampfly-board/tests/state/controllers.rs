@@ -57,13 +57,13 @@ fn fly<C: Controller>(controller: &mut C, k: u64, n: &mut Numbers) -> ControlOut
         axes: SetpointAxes::ALL,
         ..Default::default()
     };
-    let status = VehicleStatus { thrust_ceiling: 2.0, ..Default::default() };
+    let land_detected = LandDetected { thrust_ceiling: 2.0, ..Default::default() };
     let input = ControlInput {
         estimate: &estimate(n),
         command: &sticks(n),
         setpoint: &setpoint,
         mode: &mode_of(k),
-        status: &status,
+        land_detected: &land_detected,
         unmet: [0.0, 0.0, n.number(0.2), n.number(0.2)],
     };
     controller.step(at(k), &input)
@@ -84,11 +84,14 @@ fn navigator_goes_on() {
             let _ = navigator.accept(&GuidedCommand { kind, position, yaw, speed: 0.5, dwell: 0.1 });
         }
         let mode = SystemMode { mode: if k < 1_000 { FlightMode::PosHold } else { FlightMode::AltHold }, ..mode_of(k) };
-        let status = VehicleStatus { descent_rate: 0.3, ..Default::default() };
+        let land_detected = LandDetected { descent_rate: 0.3, ..Default::default() };
         let estimate = StateEstimate { valid: Validity::ALL, ..estimate(n) };
         let command = CommandSetpoint { source: CommandSource::Guided, ..sticks(n) };
         let command = if (700..760).contains(&k) { sticks(n) } else { command };
-        navigator.step(at(k), &NavigatorInput { mode: &mode, estimate: &estimate, status: &status, command: &command })
+        navigator.step(
+            at(k),
+            &NavigatorInput { mode: &mode, estimate: &estimate, land_detected: &land_detected, command: &command },
+        )
     });
     assert!(navigator.refused() > 0, "the route was full once");
 }

@@ -33,7 +33,7 @@ fn mode_machine_goes_on() {
         let estimate = StateEstimate { height, valid: Validity::ALL, ..Default::default() };
         let calibration = CalibrationResult { complete: k > 20, ..Default::default() };
         let contact = if flies { GroundContact::Air } else { GroundContact::Ground };
-        let status = VehicleStatus {
+        let land_detected = LandDetected {
             contact,
             takeoff_complete: flies && k % 400 > 260,
             landed: k % 400 > 390,
@@ -46,7 +46,7 @@ fn mode_machine_goes_on() {
             alerts: if k % 400 > 330 { Alerts::COMM_LOST | Alerts::LOW_BATTERY } else { Alerts::NONE },
             estimate: &estimate,
             calibration: &calibration,
-            status: &status,
+            land_detected: &land_detected,
             pilot: Some(&pilot).filter(|_| k % 400 < 330),
             commands,
             button: n.once_in(150).then_some(ButtonGesture::Click),

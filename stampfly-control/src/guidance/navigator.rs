@@ -15,8 +15,8 @@
 //! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it.
 
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
-    StateEstimate, SystemMode, Validity, VehicleStatus,
+    CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, LandDetected, Setpoint,
+    SetpointAxes, StateEstimate, SystemMode, Validity,
 };
 use stampfly_types::{Duration, Instant, Vec3, frame, math};
 
@@ -81,7 +81,7 @@ pub struct NavigatorInput<'a> {
     /// Where the vehicle is.
     pub estimate: &'a StateEstimate,
     /// The rate of descent asked for while landing.
-    pub status: &'a VehicleStatus,
+    pub land_detected: &'a LandDetected,
     /// Who commands, and the sticks.
     pub command: &'a CommandSetpoint,
 }
@@ -102,7 +102,7 @@ pub struct NavigatorInput<'a> {
 /// let command = CommandSetpoint { source: CommandSource::Guided, ..Default::default() };
 /// let mut now = Instant::ZERO;
 /// let setpoint = loop {
-///     let input = NavigatorInput { mode: &mode, estimate: &estimate, status: &Default::default(), command: &command };
+///     let input = NavigatorInput { mode: &mode, estimate: &estimate, land_detected: &Default::default(), command: &command };
 ///     let setpoint = navigator.step(now, &input);
 ///     if setpoint.arrived {
 ///         break setpoint;
@@ -340,7 +340,7 @@ impl Navigator {
             self.forget_route();
         }
         self.steer_heading(input, dt);
-        let rate = input.status.descent_rate;
+        let rate = input.land_detected.descent_rate;
         self.path.sink(if rate.is_finite() { rate.max(0.0) } else { 0.0 }, dt);
         // Once the ground holds the vehicle, the path must not run away below it.
         let lowest = input.estimate.position.z + self.config.landing_lead;

@@ -42,11 +42,15 @@ fn variations() -> Vec<(&'static str, Airframe)> {
 
 fn navigate<C: Controller>(flight: &mut Flight<C>, navigator: &mut Navigator) {
     let estimate = flight.estimate();
-    let input =
-        NavigatorInput { mode: &flight.mode, estimate: &estimate, status: &flight.status, command: &flight.command };
+    let input = NavigatorInput {
+        mode: &flight.mode,
+        estimate: &estimate,
+        land_detected: &flight.land_detected,
+        command: &flight.command,
+    };
     flight.setpoint = navigator.step(flight.now, &input);
     let in_air = flight.state.position.z < -0.04;
-    flight.status.contact = if in_air { GroundContact::Air } else { GroundContact::Ground };
+    flight.land_detected.contact = if in_air { GroundContact::Air } else { GroundContact::Ground };
 }
 
 fn command(kind: GuidedKind, position: Vec3) -> GuidedCommand {
@@ -275,14 +279,14 @@ fn lands_softly_and_stays_down() {
     let (mut flight, mut navigator) = aloft(CascadeController::default(), noisy());
     flight.fly(1.0, |f| navigate(f, &mut navigator));
     flight.mode.state = FlightState::Landing;
-    flight.status.descent_rate = 0.3;
+    flight.land_detected.descent_rate = 0.3;
     let mut touchdown = None;
     flight.fly(6.0, |f| {
         navigate(f, &mut navigator);
         let height = -f.state.position.z;
         // Once it no longer sinks close to the ground, the landing manager lowers the ceiling over a second.
         if height < 0.15 && f.state.velocity.z < 0.1 {
-            f.status.thrust_ceiling = (f.status.thrust_ceiling.min(1.0) - 0.3 * 0.0025).max(0.7);
+            f.land_detected.thrust_ceiling = (f.land_detected.thrust_ceiling.min(1.0) - 0.3 * 0.0025).max(0.7);
         }
         if height > 0.0 {
             touchdown = Some(f.state.velocity.z);
@@ -350,7 +354,7 @@ fn poison_never_reaches_the_output() {
                                 command: &stick,
                                 setpoint: &setpoint,
                                 mode: &mode,
-                                status: &f.status,
+                                land_detected: &f.land_detected,
                                 unmet: [0.0; 4],
                             },
                         );
@@ -384,7 +388,7 @@ fn both_quaternions_of_an_attitude_give_the_same_torque() {
                 command: &flight.command,
                 setpoint: &flight.setpoint,
                 mode: &flight.mode,
-                status: &flight.status,
+                land_detected: &flight.land_detected,
                 unmet: [0.0; 4],
             },
         )

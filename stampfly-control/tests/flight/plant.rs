@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 
 use stampfly_control::{ControlInput, Controller, Mixed, Mixer, MultirotorMixer, Spin};
 use stampfly_types::messages::{
-    CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, Setpoint, StateEstimate, SystemMode,
-    Validity, VehicleStatus,
+    CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, LandDetected, Setpoint, StateEstimate,
+    SystemMode, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
@@ -56,7 +56,7 @@ pub struct Flight<C> {
     pub state: State,
     pub now: Instant,
     pub mode: SystemMode,
-    pub status: VehicleStatus,
+    pub land_detected: LandDetected,
     pub command: CommandSetpoint,
     pub setpoint: Setpoint,
     pub valid: Validity,
@@ -80,7 +80,7 @@ impl<C: Controller> Flight<C> {
         flight.state.position.z = -1.0;
         flight.state.thrust = thrust;
         flight.mode.state = FlightState::Flying;
-        flight.status.contact = GroundContact::Air;
+        flight.land_detected.contact = GroundContact::Air;
         flight.setpoint.position.z = -1.0;
         flight
     }
@@ -105,7 +105,7 @@ impl<C: Controller> Flight<C> {
                 armed: true,
                 ..SystemMode::default()
             },
-            status: VehicleStatus { thrust_ceiling: 2.0, ..VehicleStatus::default() },
+            land_detected: LandDetected { thrust_ceiling: 2.0, ..LandDetected::default() },
             command: CommandSetpoint::default(),
             setpoint: Setpoint { axes: Axes::POSITION_XY | Axes::POSITION_Z | Axes::YAW, ..Setpoint::default() },
             valid: Validity::ALL,
@@ -137,7 +137,7 @@ impl<C: Controller> Flight<C> {
             command: &self.command,
             setpoint: &self.setpoint,
             mode: &self.mode,
-            status: &self.status,
+            land_detected: &self.land_detected,
             unmet: self.mixed.unmet,
         };
         self.output = self.controller.step(self.now, &input);

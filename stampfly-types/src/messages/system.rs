@@ -178,8 +178,8 @@ message_enum! {
 }
 
 message! {
-    /// What the take-off and landing manager sees, and what it asks of the vertical controller.
-    pub struct VehicleStatus {
+    /// What the land detector sees, and what take-off and landing ask of the vertical controller.
+    pub struct LandDetected {
         /// Contact with the ground.
         contact: GroundContact,
         /// Take-off has reached its height and settled.
