@@ -2,7 +2,7 @@
 
 use crate::Input;
 use stampfly_board::console::{Command, Console, Newest, Profile};
-use stampfly_board::topics::Id;
+use stampfly_board::topics::{Id, TOPICS};
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
 use stampfly_flight::parameters::Parameters;
@@ -27,14 +27,21 @@ pub fn console_line(data: &[u8]) {
         let Some(line) = editor.feed(input.byte(), &mut echo) else { continue };
         assert!(line.len() <= LINE && line.bytes().all(|byte| (b' '..=b'~').contains(&byte)), "{line:?}");
         let mut reply = String::new();
-        let mut console =
-            Console { version: "stampfly 9.9", newest: &newest, sensors: &sensors, profile: &profile, config: &mut config };
+        let mut console = Console {
+            version: "stampfly 9.9",
+            newest: &newest,
+            sensors: &sensors,
+            profile: &profile,
+            config: &mut config,
+        };
         let request = answer(line, Instant::from_secs(5), &mut console, &mut reply).expect("a String takes everything");
         assert!(reply.len() <= REPLY, "{line:?} is answered with {} bytes", reply.len());
         assert!(reply.is_empty() || reply.ends_with("\r\n"), "{line:?}: {reply:?}");
-        let is_disarmed = state == DISARMED;
-        let harmless = matches!(request, Request::Nothing | Request::Vehicle(Command::StopMotor));
-        assert!(is_disarmed || harmless, "{line:?}: {request:?}");
+        let is_harmless = matches!(request, Request::Nothing | Request::Vehicle(Command::StopMotor));
+        assert!(is_harmless || state == DISARMED, "{line:?}: {request:?}");
+        if let Request::Vehicle(Command::TestMotor { motor, duty }) = request {
+            assert!((1..=4).contains(&motor) && (0.0..=0.3).contains(&duty), "{line:?}: {request:?}");
+        }
         for (index, parameter) in (0..).map_while(|index| Some((index, config.describe(index)?))) {
             let value = config.get(index).expect("it has a value");
             assert!((parameter.min..=parameter.max).contains(&value), "{line:?}: {} is {value}", parameter.name);
@@ -45,28 +52,12 @@ pub fn console_line(data: &[u8]) {
 const DISARMED: u8 = 1;
 const ARMED: u8 = 2;
 
-/// Topics whose samples the console shows or reads, with fields of every kind.
-const TOPICS: [Id; 10] = [
-    Id::sensor_imu,
-    Id::sensor_tof,
-    Id::sensor_flow,
-    Id::sensor_power,
-    Id::command_pilot,
-    Id::command_guided,
-    Id::estimate_state,
-    Id::estimate_status,
-    Id::system_alert,
-    Id::signal,
-];
-
 /// What the console has heard of: the state, and unless the byte is zero, a sample of every other topic.
 fn known(state: u8, fill: u8) -> Newest {
     let mut newest = Newest::new();
-    if fill != 0 {
-        let words = [u32::from_le_bytes([fill; 4]); 64];
-        for id in TOPICS {
-            newest.note(id as usize, Instant::from_secs(u64::from(fill)), &words);
-        }
+    let word = u32::from_le_bytes([fill; 4]);
+    for (index, topic) in TOPICS.iter().enumerate().filter(|_| fill != 0) {
+        newest.note(index, Instant::from_secs(u64::from(fill)), &vec![word; topic.words]);
     }
     if matches!(state, DISARMED | ARMED) {
         let armed = state == ARMED;
@@ -75,7 +66,7 @@ fn known(state: u8, fill: u8) -> Newest {
         newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
     } else {
         // Words that are no state: what is not known to be disarmed counts as armed.
-        newest.note(Id::system_mode as usize, Instant::ZERO, &[!0; 8]);
+        newest.note(Id::system_mode as usize, Instant::ZERO, &[!0; SystemMode::WORDS]);
     }
     newest
 }

@@ -61,6 +61,12 @@ fn rate(topic: usize) -> LogRate {
         Id::actuator_motor => LogRate::hertz(20),
         Id::signal => LogRate::Never,
         Id::telemetry => LogRate::Never,
+        Id::motor_test => LogRate::EverySample,
+        Id::storage_busy => LogRate::EverySample,
+        Id::pairing_request => LogRate::EverySample,
+        Id::link_peer => LogRate::EverySample,
+        Id::restart_request => LogRate::EverySample,
+        Id::cutoff_state => LogRate::EverySample,
     }
 }
 

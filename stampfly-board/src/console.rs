@@ -2,13 +2,14 @@
 //!
 //! | command | does |
 //! |---|---|
-//! | `pair` | looks for a transmitter |
+//! | `pair`, `pair stop` | looks for a transmitter, stops looking |
 //! | `motor test N PERCENT` | turns one motor for [`TEST_TIME`], to see which one it is and which way it turns |
 //! | `motor stop` | stops it |
 //!
-//! [`stampfly_flight::console::answer`] does the rest.
+//! [`stampfly_flight::console::answer`] does the rest, and [`Command::publish`] carries them out.
 
-use crate::topics::{COUNT, Id, TOPICS};
+use crate::messages::{CutoffState, MotorTest, PairingRequest};
+use crate::topics::{COUNT, ConsoleEnds, Id, TOPICS};
 use crate::{VehicleConfig, schedule};
 use core::fmt;
 use stampfly_bus::TopicInfo;
@@ -32,11 +33,11 @@ pub type Newest = stampfly_flight::NewestSamples<COUNT, { longest_message(&TOPIC
 /// Execution times of every runnable of this vehicle.
 pub type Profile = stampfly_flight::Profile<{ schedule::COUNT }>;
 
-/// A command of this vehicle, and what the board does for it.
+/// A command of this vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// Look for a transmitter.
-    Pair,
+    /// Look for a transmitter, or stop looking.
+    Pair(bool),
     /// Turn one motor.
     TestMotor {
         /// 1 to 4.
@@ -46,6 +47,24 @@ pub enum Command {
     },
     /// Stop the motor test.
     StopMotor,
+}
+
+impl Command {
+    /// Carries it out, by topic. A test ends [`TEST_TIME`] after `now`.
+    pub fn publish(self, now: Instant, ends: &mut ConsoleEnds<'_>) {
+        match self {
+            Self::Pair(wanted) => {
+                ends.pairing_request.publish(now, &PairingRequest { wanted });
+            }
+            Self::TestMotor { motor, duty } => {
+                let until = (now + TEST_TIME).as_micros();
+                ends.motor_test.publish(now, &MotorTest { motor: motor.into(), duty, until });
+            }
+            Self::StopMotor => {
+                ends.motor_test.publish(now, &MotorTest::default());
+            }
+        }
+    }
 }
 
 /// What the console knows, borrowed for one answer.
@@ -77,6 +96,7 @@ pub struct Console<'c> {
     pub config: &'c mut VehicleConfig,
 }
 
+const PAIR: &str = "pair [stop]";
 const MOTOR: &str = "motor test N PERCENT | stop";
 
 impl Vehicle for Console<'_> {
@@ -84,6 +104,7 @@ impl Vehicle for Console<'_> {
     type Request = Command;
     const COMMANDS: &'static [(&'static str, &'static str)] = &[
         ("pair", "look for a transmitter"),
+        ("pair stop", "stop looking"),
         ("motor test N PERCENT", "turn motor N (1 front right, 2 rear right, 3 rear left, 4 front left) for 2 s"),
         ("motor stop", "stop it"),
     ];
@@ -105,6 +126,9 @@ impl Vehicle for Console<'_> {
         write!(reply, "mode     {}\r\n", mode.mode.name())?;
         list(reply, "blocks", mode.blocks.names())?;
         list(reply, "alerts", alert.active.names())?;
+        if newest.get::<CutoffState>(Id::cutoff_state as usize).is_some_and(|(_, cutoff)| cutoff.tripped) {
+            reply.write_str("motors   CUT OFF, until the vehicle is disarmed\r\n")?;
+        }
         if let Some((_, power)) = newest.get::<PowerData>(Id::sensor_power as usize) {
             write!(reply, "battery  {:.2} V, {:.2} A\r\n", power.voltage, power.current)?;
         }
@@ -136,7 +160,9 @@ impl Vehicle for Console<'_> {
 
     fn parse(words: &[&str]) -> Result<Command, CommandError> {
         match words {
-            ["pair"] => Ok(Command::Pair),
+            ["pair"] => Ok(Command::Pair(true)),
+            ["pair", "stop"] => Ok(Command::Pair(false)),
+            ["pair", ..] => Err(CommandError::Usage(PAIR)),
             ["motor", "test", motor, percent] => {
                 let motor = motor.parse().map_err(|_| CommandError::Usage(MOTOR))?;
                 let percent = percent.strip_suffix('%').unwrap_or(percent);

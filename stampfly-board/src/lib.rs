@@ -13,6 +13,7 @@ mod config;
 pub mod console;
 pub mod devices;
 pub mod golden;
+pub mod link;
 pub mod messages;
 pub mod parameters;
 pub mod runnables;

@@ -4,11 +4,11 @@
 //! reads every topic through its tap and is not named.
 //! `docs/topics.md` and `stampfly topics` are printed from this table.
 
-use crate::messages::{ButtonContact, TelemetryFrame};
+use crate::messages::*;
 use stampfly_types::messages::*;
 
 stampfly_bus::topics! {
-    outside imu, tof, tof_front, flow, mag, baro, cameras, power, self_test, link, button_pin, motors, indicator;
+    outside imu, tof, tof_front, flow, mag, baro, cameras, power, self_test, link, button_pin, motors, indicator, console, storage, cutoff, supervisor;
 
     // Sensing.
     /// Inertial sample, body FRD, specific force; every sample.
@@ -57,7 +57,7 @@ stampfly_bus::topics! {
     /// Conditions the failsafe has found.
     system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, notification, telemetry];
     /// State, mode, armed.
-    system_mode: SystemMode = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry];
+    system_mode: SystemMode = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
     /// Contact with the ground, and what take-off and landing ask for.
     land_detected: LandDetected = latest @ 400 Hz from landing => [mode, navigation, control];
 
@@ -74,4 +74,18 @@ stampfly_bus::topics! {
     signal: Signal = latest @ 30 Hz from notification => [indicator];
     /// What the ground station sees.
     telemetry: TelemetryFrame = latest @ 50 Hz from telemetry => [link];
+
+    // The board. Published when something changes.
+    /// One motor to turn on the disarmed vehicle.
+    motor_test: MotorTest = latest @ on event from console => [actuation];
+    /// Is flash being written?
+    storage_busy: StorageBusy = latest @ on event from storage => [actuation];
+    /// Pairing, as the console asks for it.
+    pairing_request: PairingRequest = latest @ on event from console => [mode];
+    /// The transmitter that the vehicle was paired with.
+    link_peer: LinkPeer = latest @ on event from link => [storage];
+    /// The button asks for a restart.
+    restart_request: RestartRequest = latest @ on event from mode => [supervisor];
+    /// Has the cut-off stopped the motors?
+    cutoff_state: CutoffState = latest @ on event from cutoff => [mode];
 }

@@ -48,7 +48,11 @@ fn status_says_what_blocks_arming() {
 
 #[test]
 fn its_own_commands_are_refused_in_flight_and_before_anything_is_known() {
-    let requests = [("pair", Command::Pair), ("motor test 3 10%", Command::TestMotor { motor: 3, duty: 0.1 })];
+    let requests = [
+        ("pair", Command::Pair(true)),
+        ("pair stop", Command::Pair(false)),
+        ("motor test 3 10%", Command::TestMotor { motor: 3, duty: 0.1 }),
+    ];
     for (line, command) in requests {
         assert_eq!(ask(&vehicle(Some(false)), line), (String::new(), Request::Vehicle(command)), "{line}");
         for armed in [None, Some(true)] {

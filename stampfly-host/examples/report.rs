@@ -4,8 +4,8 @@
 //! cargo run -p stampfly-host --example report -- out.html [FILE]
 //! ```
 
-use stampfly_host::report::Metric;
-use stampfly_host::{Flight, Report, dataset, flight_log};
+use stampfly_host::{Report, report::Metric};
+use stampfly_lab::{Flight, dataset, flight_log};
 
 #[path = "../tests/made_up/mod.rs"]
 mod made_up;
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         },
     };
     let metrics = metrics(&flight);
-    Report { title, subtitle, metrics, flight: &flight }.write(&out)?;
+    Report { title, subtitle, metrics, page: &stampfly_board::simulation::PAGE, flight: &flight }.write(&out)?;
     println!("{out}");
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The vehicles there are. This list is the only place in the programs that names one.
 
 use stampfly_board::simulation::StampFly;
+use stampfly_rover::simulation::Rover;
 use stampfly_sim::vehicle::Vehicle;
 use std::fmt;
 
@@ -8,7 +9,7 @@ use std::fmt;
 pub const DEFAULT: &str = StampFly::NAME;
 
 /// Names of all vehicles, as `--vehicle` takes them.
-pub const NAMES: &[&str] = &[StampFly::NAME];
+pub const NAMES: &[&str] = &[StampFly::NAME, Rover::NAME];
 
 /// Something to do for one vehicle, whichever it is.
 pub trait ForVehicle {
@@ -26,6 +27,7 @@ pub trait ForVehicle {
 pub fn with<T: ForVehicle>(name: &str, task: T) -> Result<T::Output, UnknownVehicle> {
     match name {
         StampFly::NAME => Ok(task.run::<StampFly>()),
+        Rover::NAME => Ok(task.run::<Rover>()),
         _ => Err(UnknownVehicle(name.to_owned())),
     }
 }

@@ -1,14 +1,17 @@
 //! What the firmware's black box tells of an accident, from the arming to the text on the terminal.
 
-use stampfly_board::black_box::{BlackBox, DumpError, HASTE, ROOM, Refused, dump};
-use stampfly_board::vehicle::{Assembled, assemble};
-use stampfly_board::{VehicleConfig, parameters, wiring};
-use stampfly_bus::Band;
+use stampfly_board::VehicleConfig;
+use stampfly_board::black_box::{BlackBox, RETENTION, WORDS, open};
+use stampfly_board::schedule::Runnables;
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_board::topics::{Bus, Id};
+use stampfly_bus::{Band, PublishWords, Taps};
 use stampfly_drivers::blocking::block_on;
+use stampfly_flight::black_box::{DumpError, MIN_INTERVAL, Refused, dump};
+use stampfly_flight::{Assembled, parameters};
+use stampfly_host::flown::fly;
 use stampfly_host::golden::Event;
-use stampfly_host::mission::{Mission, REFERENCE};
 use stampfly_host::recorder::Recorder;
-use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_lab::flight_log;
 use stampfly_types::messages::{ImuData, PilotInput, SystemMode};
 use stampfly_types::{Duration, Instant, Message};
@@ -18,27 +21,26 @@ use std::sync::LazyLock;
 const FLIGHT: Duration = Duration::from_secs(20);
 
 /// A flight that ends with a blow, as the firmware remembers it; and when the motors stopped.
-static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Instant)> = LazyLock::new(|| {
-    let mut recorder = Recorder::hash_only().with_inputs();
-    let mission = Mission::parse(REFERENCE).expect("the reference mission");
-    fly(&FlightConfig { mission, ..FlightConfig::reference(7) }, &mut recorder, &mut |_, _| {});
+static ACCIDENT: LazyLock<(Box<BlackBox<WORDS>>, Instant)> = LazyLock::new(|| {
+    let mut recorder = Recorder::<StampFly>::hash_only().with_inputs();
+    fly::<StampFly>(&Setup::reference(7), &mut recorder, &mut |_, _| {});
 
-    let mut black_box = Box::new(BlackBox::new());
-    let mut bus = wiring::Bus::new();
-    let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let Assembled { mut flight_loop, mut outside } = assemble(ports, heads, &VehicleConfig::default(), Instant::ZERO);
+    let mut black_box = Box::new(BlackBox::new(RETENTION));
+    let mut bus = Bus::new();
+    let Assembled { mut flight_loop, mut outside, mut taps } =
+        Assembled::<Runnables>::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
     let (mut armed_at, mut stopped_at, mut pilot) = (None, None, 0u32);
     for event in recorder.into_inputs() {
         match event {
             Event::Sample { topic, at, mut words } => {
                 let crashed = armed_at.is_some_and(|armed_at| at >= armed_at + FLIGHT);
-                if topic == wiring::Id::sensor_imu && crashed {
+                if topic == Id::sensor_imu as usize && crashed {
                     let mut imu =
                         ImuData::from_words(words.as_slice().try_into().expect("its words")).expect("a sample");
                     imu.accel.x += 90.0;
                     words = imu.to_words().to_vec();
                 }
-                outside.publish_words(topic as usize, at, &words).expect("a topic from outside");
+                outside.publish_words(topic, at, &words).expect("a topic from outside");
             }
             Event::Turn(now) => {
                 for band in [Band::Flight, Band::Background] {
@@ -46,7 +48,7 @@ static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Instant)> = LazyLock::new(|| {
                 }
                 taps.drain(&mut |topic, at, generation, words| {
                     black_box.note(topic, at, generation, words);
-                    if topic == wiring::Id::system_mode {
+                    if topic == Id::system_mode as usize {
                         let mode = SystemMode::from_words(words.try_into().expect("its words")).expect("a mode");
                         match (mode.armed, armed_at) {
                             (true, None) => armed_at = Some(at),
@@ -59,7 +61,7 @@ static ACCIDENT: LazyLock<(Box<BlackBox<ROOM>>, Instant)> = LazyLock::new(|| {
                 if now >= Instant::from_millis(20 * u64::from(pilot)) {
                     pilot += 1;
                     let sticks = PilotInput { roll: 1e-3 * pilot as f32, ..Default::default() };
-                    black_box.note(wiring::Id::command_pilot, now, pilot, &sticks.to_words());
+                    black_box.note(Id::command_pilot as usize, now, pilot, &sticks.to_words());
                 }
                 if stopped_at.is_some_and(|stopped| now >= stopped + Duration::from_secs(3)) {
                     break;
@@ -81,7 +83,7 @@ fn dumped(config: &VehicleConfig, takes: usize) -> (Vec<String>, Result<(), Dump
         lines.push(line.strip_suffix("\r\n").expect("a whole line").to_owned());
         Ok(())
     };
-    let outcome = block_on(dump(|| black_box.next(&mut cursor), config, "the test", show));
+    let outcome = block_on(dump(|| black_box.next(&mut cursor), |sink, at| open(sink, at, config, "the test"), show));
     (lines, outcome)
 }
 
@@ -95,7 +97,7 @@ fn five_seconds_of_flight_are_kept() {
     let (black_box, stopped) = &*ACCIDENT;
     let oldest = black_box.records().map(|record| record.at).min().expect("records");
     let span = stopped.since(oldest);
-    println!("{:.2} s of flight in {} kB", span.seconds_f64(), ROOM * 4 / 1024);
+    println!("{:.2} s of flight in {} kB", span.seconds_f64(), WORDS * 4 / 1024);
     assert!(span >= Duration::from_secs(5), "{span}");
     assert!(span < FLIGHT, "the flight was longer than the memory");
 }
@@ -142,7 +144,7 @@ fn the_dump_is_a_log_that_shows_the_last_second() {
     let modes = &flight.topics["system_mode"];
     let armed = modes.column("armed").expect("a column");
     let ended = armed.iter().position(|armed| *armed == 0.0).expect("how it ended");
-    assert!(modes.at[ended].since(stopped) <= HASTE, "kept at {}, was at {stopped}", modes.at[ended]);
+    assert!(modes.at[ended].since(stopped) <= MIN_INTERVAL, "kept at {}, was at {stopped}", modes.at[ended]);
     let accel = flight.topics["sensor_imu"].columns_of::<3>("accel").expect("three")[0];
     assert!(accel.iter().any(|x| *x > 80.0), "the blow itself");
     for nobody_needs in ["sensor_tof_front", "telemetry", "signal", "button_contact"] {
@@ -166,19 +168,21 @@ fn a_dump_that_is_cut_off_says_so() {
 
 #[test]
 fn a_flight_that_begins_while_the_last_is_told_ends_it() {
-    let mut black_box = BlackBox::<256>::new();
+    let mut black_box = BlackBox::<256>::new(RETENTION);
     let armed = SystemMode { armed: true, ..Default::default() }.to_words();
-    let nothing = block_on(dump(|| Ok(black_box.records().next()), &VehicleConfig::default(), "", async |_| Ok(())));
+    let config = VehicleConfig::default();
+    let nothing =
+        block_on(dump(|| Ok(black_box.records().next()), |sink, at| open(sink, at, &config, ""), async |_| Ok(())));
     assert_eq!(nothing, Err(DumpError::Empty));
-    black_box.note(wiring::Id::system_mode, Instant::from_micros(1), 1, &armed);
+    black_box.note(Id::system_mode as usize, Instant::from_micros(1), 1, &armed);
     let (mut cursor, mut asked) = (black_box.begin(), 0);
     let next = || {
         asked += 1;
         if asked == 2 {
-            black_box.note(wiring::Id::system_mode, Instant::from_secs(9), 2, &armed);
+            black_box.note(Id::system_mode as usize, Instant::from_secs(9), 2, &armed);
         }
         black_box.next(&mut cursor)
     };
-    let outcome = block_on(dump(next, &VehicleConfig::default(), "", async |_| Ok(())));
+    let outcome = block_on(dump(next, |sink, at| open(sink, at, &config, ""), async |_| Ok(())));
     assert!(matches!(outcome, Err(DumpError::Changed(_))), "{outcome:?}");
 }

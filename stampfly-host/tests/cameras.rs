@@ -1,14 +1,14 @@
 //! A room with cameras: late poses, some lost, make the position a matter of millimetres.
 
+use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_host::campaign::run;
-use stampfly_host::simulate::FlightConfig;
 
 /// Position errors of the estimate on ten seeds, m.
 fn errors(cameras: bool) -> Vec<f64> {
-    let configs: Vec<_> = (1..=10).map(|seed| FlightConfig { cameras, ..FlightConfig::reference(seed) }).collect();
-    let flights = run(&configs, &|_| {});
+    let setups: Vec<_> = (1..=10).map(|seed| (seed, Setup { cameras, ..Setup::reference(seed) })).collect();
+    let flights = run::<StampFly, ()>(&setups, &|_, _| (), &|_| {});
     assert!(flights.iter().all(|flight| flight.succeeded()));
-    flights.iter().map(|flight| flight.outcome.metrics.est_pos_rms_m.expect("it flew")).collect()
+    flights.iter().map(|flight| flight.flown.outcome.metrics.est_pos_rms_m.expect("it flew")).collect()
 }
 
 #[test]

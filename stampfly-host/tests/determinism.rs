@@ -1,47 +1,53 @@
-//! The same configuration is the same flight, bit for bit, whoever watches and whatever else flies in the process.
+//! The same setup is the same flight, bit for bit, whoever watches and whatever else flies in the process.
 //!
 //! The hash covers every sample of every topic with its instant and number, so one different bit anywhere shows.
 
-use stampfly_host::mission::Mission;
+use stampfly_board::simulation::mission::Mission;
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
-use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_types::Instant;
 
 const SEEDS: [u64; 8] = [1, 2, 3, 5, 8, 13, 21, 34];
 
 /// A short flight: up, a step aside with a turn, down.
-fn config(seed: u64) -> FlightConfig {
+fn setup(seed: u64) -> Setup {
     let mission = Mission::parse("arm\ntakeoff 0.4\ngoto 0.5 -0.3 0.6 yaw 60\nland").expect("a mission");
-    FlightConfig { mission, ..FlightConfig::reference(seed) }
+    Setup { mission, ..Setup::reference(seed) }
 }
 
-fn hash_with(config: &FlightConfig, mut recorder: Recorder) -> u64 {
-    let outcome = fly(config, &mut recorder, &mut |_, _| {});
-    assert!(outcome.finished && outcome.metrics.landed, "seed {}", config.simulation.seed);
-    outcome.log_hash
+fn hash_with(setup: &Setup, mut recorder: Recorder<StampFly>) -> u64 {
+    let outcome = fly::<StampFly>(setup, &mut recorder, &mut |_, _| {}).outcome;
+    assert!(outcome.finished && outcome.metrics.landed, "seed {}", setup.simulation.seed);
+    recorder.hash()
 }
 
-fn hash(config: &FlightConfig) -> u64 {
-    hash_with(config, Recorder::hash_only())
+fn hash(setup: &Setup) -> u64 {
+    hash_with(setup, Recorder::<StampFly>::hash_only())
 }
 
 #[test]
 fn watching_changes_nothing() {
-    let config = config(1);
-    let expected = hash(&config);
-    assert_eq!(hash(&config), expected, "flown again");
-    assert_eq!(hash_with(&config, Recorder::with_log(Vec::new())), expected, "with a log");
-    assert_eq!(hash_with(&config, Recorder::hash_only().with_timing()), expected, "with timing");
-    let facts = vec![("who".to_owned(), "somebody".to_owned())];
-    assert_eq!(hash_with(&config, Recorder::with_log(facts).with_timing()), expected, "with both, and facts");
+    let setup = setup(1);
+    let expected = hash(&setup);
+    assert_eq!(hash(&setup), expected, "flown again");
+    assert_eq!(hash_with(&setup, Recorder::<StampFly>::with_log(&setup, &[])), expected, "with a log");
+    assert_eq!(hash_with(&setup, Recorder::<StampFly>::hash_only().with_timing()), expected, "with timing");
+    let facts = [("who".to_owned(), "somebody".to_owned())];
+    assert_eq!(
+        hash_with(&setup, Recorder::<StampFly>::with_log(&setup, &facts).with_timing()),
+        expected,
+        "with both, and facts"
+    );
 }
 
 #[test]
 fn the_log_and_the_figures_are_the_same_too() {
     let once = || {
-        let mut recorder = Recorder::with_log(Vec::new());
-        let outcome = fly(&config(3), &mut recorder, &mut |_, _| {});
-        (recorder.log().to_vec(), outcome.metrics, outcome.phases, outcome.duration)
+        let setup = setup(3);
+        let mut recorder = Recorder::<StampFly>::with_log(&setup, &[]);
+        let flown = fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {});
+        (recorder.log().to_vec(), flown.outcome.metrics, flown.outcome.phases, flown.duration)
     };
     let (first, second) = (once(), once());
     assert!(first.0.len() > 1_000_000, "a whole flight");
@@ -50,22 +56,22 @@ fn the_log_and_the_figures_are_the_same_too() {
 
 #[test]
 fn whatever_decides_a_flight_changes_its_hash() {
-    let reference = config(1);
-    let changed = |change: fn(&mut FlightConfig)| {
-        let mut config = reference.clone();
-        change(&mut config);
-        hash(&config)
+    let reference = setup(1);
+    let changed = |change: fn(&mut Setup)| {
+        let mut setup = reference.clone();
+        change(&mut setup);
+        hash(&setup)
     };
     let mut hashes = vec![
         ("nothing", hash(&reference)),
-        ("seed", changed(|config| config.simulation.seed = 2)),
-        ("start", changed(|config| config.simulation.start = Instant::from_micros(1))),
-        ("mass", changed(|config| config.simulation.plant.mass *= 1.000_001)),
-        ("vibration", changed(|config| config.simulation.vibration = 0.999)),
-        ("gust", changed(|config| config.simulation.wind.gust = 0.499)),
-        ("a gain", changed(|config| config.vehicle.cascade.altitude.height_gain *= 1.000_01)),
-        ("jitter", changed(|config| config.jitter = Some(1))),
-        ("other jitter", changed(|config| config.jitter = Some(2))),
+        ("seed", changed(|setup| setup.simulation.seed = 2)),
+        ("start", changed(|setup| setup.simulation.start = Instant::from_micros(1))),
+        ("mass", changed(|setup| setup.simulation.plant.mass *= 1.000_001)),
+        ("vibration", changed(|setup| setup.simulation.vibration = 0.999)),
+        ("gust", changed(|setup| setup.simulation.wind.gust = 0.499)),
+        ("a gain", changed(|setup| setup.vehicle.cascade.altitude.height_gain *= 1.000_01)),
+        ("jitter", changed(|setup| setup.jitter = Some(1))),
+        ("other jitter", changed(|setup| setup.jitter = Some(2))),
     ];
     hashes.sort_by_key(|(_, hash)| *hash);
     for pair in hashes.windows(2) {
@@ -75,15 +81,15 @@ fn whatever_decides_a_flight_changes_its_hash() {
 
 #[test]
 fn a_late_executor_is_late_in_the_same_way_again() {
-    let config = FlightConfig { jitter: Some(7), ..config(1) };
-    assert_eq!(hash(&config), hash(&config));
+    let setup = Setup { jitter: Some(7), ..setup(1) };
+    assert_eq!(hash(&setup), hash(&setup));
 }
 
 #[test]
 fn vehicles_on_other_threads_do_not_matter() {
-    let alone: Vec<u64> = SEEDS.iter().map(|seed| hash(&config(*seed))).collect();
+    let alone: Vec<u64> = SEEDS.iter().map(|seed| hash(&setup(*seed))).collect();
     let together: Vec<u64> = std::thread::scope(|scope| {
-        let threads: Vec<_> = SEEDS.iter().map(|seed| scope.spawn(|| hash(&config(*seed)))).collect();
+        let threads: Vec<_> = SEEDS.iter().map(|seed| scope.spawn(|| hash(&setup(*seed)))).collect();
         threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
     });
     assert_eq!(alone, together);
@@ -93,20 +99,21 @@ fn vehicles_on_other_threads_do_not_matter() {
 fn nested(seeds: &[u64]) -> Vec<u64> {
     let Some((seed, others)) = seeds.split_first() else { return Vec::new() };
     let (mut looks, mut inner) = (0, Vec::new());
-    let outcome = fly(&config(*seed), &mut Recorder::hash_only(), &mut |_, _| {
+    let mut recorder = Recorder::<StampFly>::hash_only();
+    fly::<StampFly>(&setup(*seed), &mut recorder, &mut |_, _| {
         looks += 1;
         if looks == 60 {
             inner = nested(others);
         }
     });
     assert!(looks > 60, "the others were flown in the middle");
-    inner.insert(0, outcome.log_hash);
+    inner.insert(0, recorder.hash());
     inner
 }
 
 /// Eight vehicles in the air at once on one thread: there is nothing they could share.
 #[test]
 fn vehicles_on_the_same_thread_do_not_matter() {
-    let alone: Vec<u64> = SEEDS.iter().map(|seed| hash(&config(*seed))).collect();
+    let alone: Vec<u64> = SEEDS.iter().map(|seed| hash(&setup(*seed))).collect();
     assert_eq!(nested(&SEEDS), alone);
 }

@@ -2,11 +2,12 @@
 //!
 //! Works on the columns a plot would show: `truth`, `setpoint`, `estimate_state` and `system_mode` of the parsed ULog.
 
-use stampfly_host::mission::{HOVER, Mission, REFERENCE};
+use stampfly_board::simulation::metrics::FIGURES;
+use stampfly_board::simulation::mission::{HOVER, Mission, REFERENCE};
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
-use stampfly_host::simulate::{FlightConfig, fly};
-use stampfly_host::{Flight, flight::Series};
-use stampfly_lab::flight_log;
+use stampfly_lab::{Flight, flight::Series, flight_log};
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 
@@ -130,20 +131,21 @@ fn recompute(rows: &[Row]) -> BTreeMap<&'static str, f64> {
     figures
 }
 
-fn check(mission: &str, seed: u64, change: impl Fn(&mut FlightConfig)) {
-    let mut config = FlightConfig::reference(seed);
-    config.mission = Mission::parse(mission).expect("a mission");
-    change(&mut config);
-    let mut recorder = Recorder::with_log(Vec::new());
-    let outcome = fly(&config, &mut recorder, &mut |_, _| {});
-    assert!(outcome.metrics.landed && outcome.metrics.disarmed && outcome.log_lost == 0);
+fn check(mission: &str, seed: u64, change: impl Fn(&mut Setup)) {
+    let mut setup = Setup::reference(seed);
+    setup.mission = Mission::parse(mission).expect("a mission");
+    change(&mut setup);
+    let mut recorder = Recorder::<StampFly>::with_log(&setup, &[]);
+    let flown = fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {});
+    let metrics = flown.outcome.metrics;
+    assert!(metrics.landed && metrics.disarmed && flown.log_lost == 0);
 
     let log = flight_log::parse(recorder.log()).expect("a log");
     assert_eq!(log.omissions, []);
     let again = recompute(&rows(&log.flight));
-    assert_eq!(again.len(), stampfly_host::metrics::FIGURES.len(), "no figure is left out");
-    for (name, _, printed) in stampfly_host::metrics::FIGURES {
-        let (printed, again) = (printed(&outcome.metrics).expect("the flight has it"), again[name]);
+    assert_eq!(again.len(), FIGURES.len(), "no figure is left out");
+    for (name, _, printed) in FIGURES {
+        let (printed, again) = (printed(&metrics).expect("the flight has it"), again[name]);
         assert!(
             (printed - again).abs() <= 1e-5 * again.abs().max(1e-3),
             "seed {seed}: {name} is printed as {printed}, the log says {again}"
@@ -160,10 +162,10 @@ fn figures_of_the_square_are_what_the_log_says() {
 
 #[test]
 fn figures_of_a_hover_are_what_the_log_says() {
-    check(HOVER, 5, |config| config.simulation.wind.gust = 0.8);
+    check(HOVER, 5, |setup| setup.simulation.wind.gust = 0.8);
 }
 
 #[test]
 fn figures_of_a_late_executor_are_what_the_log_says() {
-    check(REFERENCE, 6, |config| config.jitter = Some(6));
+    check(REFERENCE, 6, |setup| setup.jitter = Some(6));
 }

@@ -6,10 +6,11 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use stampfly_board::simulation::mission::{Mission, Step};
+use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_host::campaign::{Flight, run};
-use stampfly_host::mission::{Mission, Step};
+use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
-use stampfly_host::simulate::{FlightConfig, fly};
 use stampfly_mode::transitions::{Event, next};
 use stampfly_sim::plant::Pose;
 use stampfly_types::Instant;
@@ -62,10 +63,10 @@ fn random_route(draw: &mut Draw) -> Mission {
 }
 
 /// Mission `number`, and everything it is flown with.
-fn random_mission(number: u64) -> FlightConfig {
+fn random_mission(number: u64) -> Setup {
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(number));
-    let mut config = FlightConfig { mission: random_route(&mut draw), ..FlightConfig::reference(number) };
-    let scene = &mut config.simulation;
+    let mut setup = Setup { mission: random_route(&mut draw), ..Setup::reference(number) };
+    let scene = &mut setup.simulation;
     scene.wind.gust = draw.within(0.0, 0.8) as f32;
     let (speed, towards) = (draw.within(0.0, 0.5), draw.within(0.0, core::f64::consts::TAU));
     scene.wind.mean = [(speed * libm::cos(towards)) as f32, (speed * libm::sin(towards)) as f32, 0.0].into();
@@ -82,8 +83,8 @@ fn random_mission(number: u64) -> FlightConfig {
         1 => Instant::from_micros(draw.within(0.0, 1e13) as u64),
         _ => Instant::ZERO,
     };
-    config.jitter = number.is_multiple_of(6).then_some(number);
-    config
+    setup.jitter = number.is_multiple_of(6).then_some(number);
+    setup
 }
 
 /// How much farther or nearer than the last way-point a vehicle stands that is this far from where it took off.
@@ -96,9 +97,9 @@ fn how_far_off(mission: &Mission, from_take_off: Option<f64>) -> Option<f64> {
 }
 
 /// Everything that is wrong with a flight of this mission.
-fn complaints(mission: &Mission, flight: &Flight) -> Vec<String> {
+fn complaints(mission: &Mission, flight: &Flight<StampFly, ()>) -> Vec<String> {
     let mut found = Vec::new();
-    let outcome = &flight.outcome;
+    let outcome = &flight.flown.outcome;
     let mut check = |holds: bool, what: String| {
         if !holds {
             found.push(what);
@@ -108,7 +109,7 @@ fn complaints(mission: &Mission, flight: &Flight) -> Vec<String> {
     check(outcome.metrics.landed, "did not land".into());
     check(outcome.metrics.disarmed, "did not disarm".into());
     check(outcome.motors_sane, "a motor was sent nonsense".into());
-    check(outcome.log_lost == 0, format!("the log missed {} samples", outcome.log_lost));
+    check(flight.flown.log_lost == 0, format!("the log missed {} samples", flight.flown.log_lost));
     let bounds = [
         ("estimate to truth", outcome.metrics.est_pos_rms_m, 0.2),
         ("truth to set-point", outcome.metrics.pos_rms_m, 0.2),
@@ -133,12 +134,12 @@ fn complaints(mission: &Mission, flight: &Flight) -> Vec<String> {
 
 /// Flies mission `number` again, with a log.
 fn investigate(number: u64) {
-    let config = random_mission(number);
-    let mut recorder = Recorder::with_log(vec![("mission".to_owned(), number.to_string())]);
-    let outcome = fly(&config, &mut recorder, &mut |_, _| {});
+    let setup = random_mission(number);
+    let mut recorder = Recorder::<StampFly>::with_log(&setup, &[("mission".to_owned(), number.to_string())]);
+    let flown = fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {});
     let log = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mission_{number}.ulg"));
     std::fs::write(&log, recorder.log()).expect("the target folder can be written");
-    println!("{config:#?}\n{outcome:#?}\nlog: {}", log.display());
+    println!("{setup:#?}\n{flown:#?}\nlog: {}", log.display());
 }
 
 #[test]
@@ -147,14 +148,14 @@ fn every_random_mission_ends_on_the_ground_and_disarmed() {
     let numbers = alone.map_or(1..=300, |number| number..=number);
     alone.into_iter().for_each(investigate);
 
-    let configs: Vec<FlightConfig> = numbers.map(random_mission).collect();
-    let flights = run(&configs, &|_| {});
-    assert_eq!(flights.len(), configs.len());
+    let setups: Vec<(u64, Setup)> = numbers.map(|number| (number, random_mission(number))).collect();
+    let flights = run::<StampFly, ()>(&setups, &|_, _| (), &|_| {});
+    assert_eq!(flights.len(), setups.len());
     let failed: Vec<String> = flights
         .iter()
-        .zip(&configs)
-        .filter_map(|(flight, config)| {
-            let complaints = complaints(&config.mission, flight);
+        .zip(&setups)
+        .filter_map(|(flight, (_, setup))| {
+            let complaints = complaints(&setup.mission, flight);
             (!complaints.is_empty()).then(|| format!("MISSION={}: {}", flight.seed, complaints.join("; ")))
         })
         .collect();
@@ -163,13 +164,13 @@ fn every_random_mission_ends_on_the_ground_and_disarmed() {
 
 #[test]
 fn the_missions_differ_in_what_they_should_differ_in() {
-    let configs: Vec<FlightConfig> = (1..=300).map(random_mission).collect();
-    let count = |what: &dyn Fn(&FlightConfig) -> bool| configs.iter().filter(|config| what(config)).count();
-    assert!(count(&|config| config.jitter.is_some()) >= 40, "executors that are late");
-    assert!(count(&|config| config.simulation.start.as_micros() == (1 << 32) - 10_000_000) >= 60, "32 bits overflow");
+    let setups: Vec<Setup> = (1..=300).map(random_mission).collect();
+    let count = |what: &dyn Fn(&Setup) -> bool| setups.iter().filter(|setup| what(setup)).count();
+    assert!(count(&|setup| setup.jitter.is_some()) >= 40, "executors that are late");
+    assert!(count(&|setup| setup.simulation.start.as_micros() == (1 << 32) - 10_000_000) >= 60, "32 bits overflow");
     for steps in 4..=7 {
-        assert!(count(&|config| config.mission.steps.len() == steps) >= 40, "{steps} steps");
+        assert!(count(&|setup| setup.mission.steps.len() == steps) >= 40, "{steps} steps");
     }
-    assert!(count(&|config| config.simulation.plant.mass > 0.0386) >= 40, "heavy vehicles");
-    assert!(count(&|config| config.simulation.wind.mean.norm() > 0.3) >= 60, "wind");
+    assert!(count(&|setup| setup.simulation.plant.mass > 0.0386) >= 40, "heavy vehicles");
+    assert!(count(&|setup| setup.simulation.wind.mean.norm() > 0.3) >= 60, "wind");
 }

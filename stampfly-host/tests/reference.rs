@@ -3,25 +3,28 @@
 //! The bars are promises to whoever reads the figures in the documentation, not the best that was ever seen. A change
 //! that breaks one has made the vehicle fly worse; see `stampfly fly --seed N` for the flight it names.
 
-use stampfly_host::campaign::{Flight, run};
-use stampfly_host::metrics::FIGURES;
-use stampfly_host::mission::{HOVER, Mission};
-use stampfly_host::simulate::FlightConfig;
+use stampfly_board::simulation::metrics::FIGURES;
+use stampfly_board::simulation::mission::{HOVER, Mission};
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_host::campaign::{self, run};
 
 /// Mission, figure, statistic, bar.
 const BARS: [(&str, &str, &str, f64); 7] = include!("../bars.rs");
+/// A flight that was not watched.
+type Flight = campaign::Flight<StampFly, ()>;
+
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
 
-fn campaign(change: impl Fn(&mut FlightConfig)) -> Vec<Flight> {
-    let configs: Vec<FlightConfig> = SEEDS
+fn campaign(change: impl Fn(&mut Setup)) -> Vec<Flight> {
+    let setups: Vec<(u64, Setup)> = SEEDS
         .map(|seed| {
-            let mut config = FlightConfig::reference(seed);
-            change(&mut config);
-            config
+            let mut setup = Setup::reference(seed);
+            change(&mut setup);
+            (seed, setup)
         })
         .collect();
-    let flights = run(&configs, &|_| {});
-    assert_eq!(flights.len(), configs.len());
+    let flights = run(&setups, &|_, _| (), &|_| {});
+    assert_eq!(flights.len(), setups.len());
     flights
 }
 
@@ -36,11 +39,11 @@ fn expect(flights: &[Flight], bars: &[(&str, f64)]) {
     for flight in flights {
         let seed = flight.seed;
         if !flight.succeeded() {
-            broken.push(format!("seed {seed}: did not land, disarm and finish: {:?}", flight.outcome.phases));
+            broken.push(format!("seed {seed}: did not land, disarm and finish: {:?}", flight.flown.outcome.phases));
         }
         for (name, bar) in bars {
             let (.., figure) = FIGURES.iter().find(|(figure, ..)| figure == name).expect("a figure of that name");
-            match figure(&flight.outcome.metrics) {
+            match figure(&flight.flown.outcome.metrics) {
                 Some(value) if value <= *bar => {}
                 other => broken.push(format!("seed {seed}: {name} is {other:?}, the bar is {bar}")),
             }
@@ -57,31 +60,36 @@ fn the_square_is_flown_within_the_bars() {
 #[test]
 fn a_minute_of_hovering_stays_in_place() {
     let mission = Mission::parse(HOVER).expect("a mission");
-    let flights = campaign(|config| config.mission = mission.clone());
+    let flights = campaign(|setup| setup.mission = mission.clone());
     expect(&flights, &[bars("hover"), vec![("alt_rms_m", 0.03)]].concat());
     for flight in &flights {
-        assert!(flight.outcome.duration.seconds_f64() > 60.0, "it did hover for a minute");
+        assert!(flight.flown.duration.seconds_f64() > 60.0, "it did hover for a minute");
     }
 }
 
 /// A badly bent propeller: nobody asks for grace, but the vehicle must come down and know that it has.
 #[test]
 fn four_times_the_vibration_still_lands() {
-    let flights = campaign(|config| config.simulation.vibration = 4.0);
+    let flights = campaign(|setup| setup.simulation.vibration = 4.0);
     expect(&flights, &[("touchdown_speed_mps", 1.0), ("land_error_m", 1.0)]);
     for flight in &flights {
-        assert!(flight.outcome.worst_tilt_deg < 35.0, "seed {}: {}°", flight.seed, flight.outcome.worst_tilt_deg);
+        assert!(
+            flight.flown.outcome.worst_tilt_deg < 35.0,
+            "seed {}: {}°",
+            flight.seed,
+            flight.flown.outcome.worst_tilt_deg
+        );
     }
 }
 
 /// The figures can tell a bad flight from a good one; if they could not, the bars above would prove nothing.
 #[test]
 fn four_times_the_gusts_break_the_bars() {
-    let flights = campaign(|config| config.simulation.wind.gust = 2.0);
+    let flights = campaign(|setup| setup.simulation.wind.gust = 2.0);
     for flight in &flights {
-        let metrics = &flight.outcome.metrics;
+        let metrics = &flight.flown.outcome.metrics;
         assert!(metrics.hover_tilt_max_deg.is_some_and(|tilt| tilt > 5.0), "seed {}: {metrics:?}", flight.seed);
     }
-    let off_path = |flight: &&Flight| flight.outcome.metrics.pos_rms_m.is_some_and(|value| value > 0.10);
+    let off_path = |flight: &&Flight| flight.flown.outcome.metrics.pos_rms_m.is_some_and(|value| value > 0.10);
     assert!(flights.iter().filter(off_path).count() >= 15);
 }

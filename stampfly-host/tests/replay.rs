@@ -1,33 +1,89 @@
 //! A log replays bit for bit, and whatever is not bit for bit is found and named.
 
 use proptest::prelude::*;
-use stampfly_board::plan;
-use stampfly_host::mission::Mission;
-use stampfly_host::recorder::{Recorder, TOPICS};
-use stampfly_host::replay::{Difference, ReplayError, replay};
-use stampfly_host::simulate::{FlightConfig, fly};
+use stampfly_board::schedule::{ACTIVATIONS, Runnables};
+use stampfly_board::simulation::mission::Mission;
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_board::{VehicleConfig, topics};
+use stampfly_flight::replay::{self, Difference, Replay, ReplayError, ReplayOptions};
+use stampfly_host::flown::fly;
+use stampfly_host::recorder::{Memory, Recorder};
 use stampfly_log::ActivationTopic;
-use stampfly_log::ulog::{Definitions, Message, ReadErrorKind, Reader, Sample, Sink, Topic};
+use stampfly_log::ulog::{Definitions, Message, ReadErrorKind, Reader, Sample, Topic, Writer};
+use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::{ImuData, PowerData};
-use stampfly_types::{Duration, Instant, Message as _};
+use stampfly_types::{ActivationRecord, Duration, InputRecord, Instant, Message as _};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::LazyLock;
 
 /// Everything in the mission that makes the stack do something.
-fn config(seed: u64, jitter: Option<u64>) -> FlightConfig {
+fn setup(seed: u64, jitter: Option<u64>) -> Setup {
     let mission = Mission::parse("arm\ntakeoff 0.4\ngoto 0.5 -0.3 0.6 yaw 60\nland").expect("a mission");
-    FlightConfig { mission, jitter, ..FlightConfig::reference(seed) }
+    Setup { mission, jitter, ..Setup::reference(seed) }
 }
 
-fn record(config: &FlightConfig) -> Vec<u8> {
-    let mut recorder = Recorder::with_log(vec![("seed".to_owned(), config.simulation.seed.to_string())]);
-    fly(config, &mut recorder, &mut |_, _| {});
+fn record(setup: &Setup) -> Vec<u8> {
+    let mut recorder = Recorder::<StampFly>::with_log(setup, &[("seed".to_owned(), setup.simulation.seed.to_string())]);
+    fly::<StampFly>(setup, &mut recorder, &mut |_, _| {});
     recorder.log().to_vec()
 }
 
+fn replay(log: &[u8]) -> Result<Replay, ReplayError> {
+    replay_from(log, None)
+}
+
+fn replay_from(log: &[u8], from: Option<Instant>) -> Result<Replay, ReplayError> {
+    let set = |config: &mut VehicleConfig, name: &str, value| StampFly::set_parameter(config, name, value).is_ok();
+    replay::replay::<Runnables>(log, VehicleConfig::default(), set, ReplayOptions { from })
+}
+
 /// A flight that landed, once for all tests that damage it.
-static FLIGHT: LazyLock<Vec<u8>> = LazyLock::new(|| record(&config(1, None)));
+static FLIGHT: LazyLock<Vec<u8>> = LazyLock::new(|| record(&setup(1, None)));
+
+/// The topics of a log of ours.
+static TOPICS: LazyLock<Vec<Topic>> = LazyLock::new(|| {
+    let of_the_bus = topics::TOPICS.iter().map(|info| Topic { name: info.name, fields: info.fields });
+    of_the_bus.chain(StampFly::BESIDE.iter().copied()).collect()
+});
+
+/// Every message of a log, in file order: its type and where its bytes are.
+fn messages(log: &[u8]) -> Vec<(u8, Range<usize>)> {
+    let mut messages = Vec::new();
+    // The file begins with 16 bytes of magic and time; a message with its size, less its head of three bytes, and type.
+    let mut at = 16;
+    while let Some(&[low, high, kind]) = log.get(at..at + 3) {
+        let end = at + 3 + usize::from(u16::from_le_bytes([low, high]));
+        messages.push((kind, at..end));
+        at = end;
+    }
+    assert_eq!(at, log.len(), "whole messages");
+    messages
+}
+
+/// Where the bytes of the parts of key frames are.
+fn key_frame_parts(log: &[u8]) -> Vec<Range<usize>> {
+    let parts = messages(log).into_iter().filter(|(kind, bytes)| {
+        *kind == b'M' && log[bytes.clone()].windows(9).take(32).any(|window| window == b"key_frame")
+    });
+    parts.map(|(_, bytes)| bytes).collect()
+}
+
+/// The log of a program that makes no key frames.
+fn without_key_frames(log: &[u8]) -> Vec<u8> {
+    let parts = key_frame_parts(log);
+    assert!(!parts.is_empty());
+    let mut end = 0;
+    let kept: Vec<&[u8]> = parts
+        .iter()
+        .map(|part| {
+            let kept = &log[end..part.start];
+            end = part.end;
+            kept
+        })
+        .collect();
+    [&kept.concat(), &log[end..]].concat()
+}
 
 /// One message of a log that carries a sample: which topic, when, and where its bytes are.
 struct Place {
@@ -89,23 +145,47 @@ fn difference(log: &[u8]) -> Difference {
 #[test]
 fn flights_replay_bit_for_bit() {
     for (seed, jitter) in [(1, None), (2, None), (3, Some(1)), (4, Some(2)), (5, Some(3)), (6, Some(4))] {
-        let mut config = config(seed, jitter);
+        let mut setup = setup(seed, jitter);
         // Stamps beyond 32 bits, too.
-        config.simulation.start = Instant::from_micros(if seed % 2 == 0 { (1 << 32) - 6_000_000 } else { 0 });
-        let log = record(&config);
+        setup.simulation.start = Instant::from_micros(if seed % 2 == 0 { (1 << 32) - 6_000_000 } else { 0 });
+        let log = record(&setup);
         let result = replay(&log).expect("a log that can be replayed");
         assert_eq!(result.difference, None, "seed {seed}, jitter {jitter:?}");
         assert!(result.activations > 20_000 && result.samples > 20_000, "{result:?}");
+        assert_eq!((result.gaps, result.skipped), (0, 0));
+        // One a second, and a moment later where an activation is pending.
+        assert!(result.key_frames as f32 > 0.95 * result.duration.seconds(), "{result:?}");
+    }
+}
+
+#[test]
+fn a_replay_begins_at_any_key_frame() {
+    for jitter in [None, Some(1)] {
+        let log = record(&setup(1, jitter));
+        let whole = replay(&log).expect("a log that can be replayed");
+        for from in [0.5, 3.0, 5.7, 7.3] {
+            let result = replay_from(&log, Some(Instant::ZERO + Duration::from_seconds(from)));
+            let result = result.unwrap_or_else(|error| panic!("from {from} s of {}: {error}", whole.duration));
+            assert_eq!((&result.difference, result.gaps), (&None, 0), "from {from} s, jitter {jitter:?}");
+            assert_eq!(result.activations + result.skipped, whole.activations, "{result:?}");
+            let left_out = whole.duration.seconds() - result.duration.seconds();
+            assert!((from - 0.1..from + 1.1).contains(&left_out), "from {from} s: {result:?}");
+        }
+        assert_eq!(replay_from(&log, Some(Instant::from_secs(3_600))), Err(ReplayError::NoKeyFrame));
+        let none = without_key_frames(&log);
+        assert_eq!(replay_from(&none, Some(Instant::from_secs(3))), Err(ReplayError::NoKeyFrame));
+        let result = replay(&none).expect("from power-on");
+        assert_eq!(result, Replay { key_frames: 0, ..whole });
     }
 }
 
 #[test]
 fn parameters_come_from_the_log() {
-    let mut config = config(1, None);
-    config.vehicle.cascade.altitude.height_gain *= 1.5;
-    config.vehicle.estimator = 1.0;
-    config.limit = Duration::from_secs(8);
-    let result = replay(&record(&config)).expect("a log that can be replayed");
+    let mut setup = setup(1, None);
+    setup.vehicle.cascade.altitude.height_gain *= 1.5;
+    setup.vehicle.estimator = 1.0;
+    setup.limit = Duration::from_secs(8);
+    let result = replay(&record(&setup)).expect("a log that can be replayed");
     assert_eq!(result.difference, None);
 }
 
@@ -142,7 +222,7 @@ fn disorder(log: &[u8]) -> (usize, usize) {
 fn jitter_does_disturb() {
     let (waited, interrupted) = disorder(&FLIGHT);
     assert!(interrupted == 0 && waited < 5, "an executor that is never late: {waited} {interrupted}");
-    let (waited, interrupted) = disorder(&record(&config(1, Some(1))));
+    let (waited, interrupted) = disorder(&record(&setup(1, Some(1))));
     assert!(waited > 50, "estimation was late {waited} times");
     assert!(interrupted > 20, "telemetry was interrupted {interrupted} times");
 }
@@ -167,6 +247,24 @@ fn one_flipped_bit_is_found_and_named() {
     for part in ["estimation", "estimate_state", &found.field, &found.recorded, &found.replayed] {
         assert!(found.to_string().contains(part), "{found}");
     }
+
+    // From a key frame before it, it is found as well; from one behind it, it was never read.
+    let late = replay_from(&changed, Some(Instant::from_secs(5))).expect("a key frame");
+    assert_eq!(late.difference, Some(found));
+    let later = replay_from(&changed, Some(Instant::from_secs(8))).expect("a key frame");
+    assert_eq!(later.difference, None);
+}
+
+/// What a component has learned shows in its state before it shows in what it publishes.
+#[test]
+fn another_state_is_found_too() {
+    let log = &*FLIGHT;
+    let parts = key_frame_parts(log);
+    let part = &parts[parts.len() / 2];
+    let mut changed = log.clone();
+    changed[part.end - 1] ^= 1;
+    let found = difference(&changed);
+    assert_eq!((found.activation.as_str(), found.field.as_str()), ("(key frame)", "(bytes)"), "{found}");
 }
 
 #[test]
@@ -185,13 +283,39 @@ fn a_changed_parameter_or_output_is_found_too() {
     assert_eq!((found.activation.as_str(), found.field.as_str()), ("actuation", "duty[2]"), "{found}");
 }
 
+/// Something is missing: the replay passes over it, says so, and goes on at the next key frame.
+fn goes_on(lossy: &[u8], what: &str) {
+    let result = replay(lossy).expect("key frames follow");
+    assert_eq!((&result.difference, result.gaps), (&None, 1), "without {what}");
+    assert!(result.skipped > 0 && result.skipped < 5_000 && result.activations > 20_000, "{result:?}");
+}
+
+/// A log that lost something says so with a mark.
+#[test]
+fn a_loss_that_is_marked_is_passed_over() {
+    let log = &*FLIGHT;
+    let place = find(log, "sensor_imu", Instant::from_secs(7)).message();
+    // Size, type and milliseconds.
+    let mark = [2, 0, b'O', 5, 0];
+    let lossy = [&log[..place.start], &mark, &log[place.start..]].concat();
+    goes_on(&lossy, "what the mark stands for");
+    match replay(&without_key_frames(&lossy)) {
+        Err(ReplayError::Dropout { at }) => {
+            assert!(at >= Instant::from_millis(6_990) && at <= Instant::from_millis(7_010), "{at}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn what_is_missing_is_found() {
     let log = &*FLIGHT;
     let at = Instant::from_secs(7);
     for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "command")] {
         let place = find(log, topic, at);
-        match replay(&without(log, place.message())) {
+        let lossy = without(log, place.message());
+        goes_on(&lossy, topic);
+        match replay(&without_key_frames(&lossy)) {
             Err(ReplayError::Gap { activation, now }) => {
                 assert_eq!(activation, reader, "{topic}");
                 let late = now.since(place.at).as_micros().max(place.at.since(now).as_micros());
@@ -206,7 +330,9 @@ fn what_is_missing_is_found() {
 
     // Without its activation there is no set-point, and the next to read it is in want of it.
     let activation = find(log, "activation_navigation", at);
-    match replay(&without(log, activation.message())) {
+    let lossy = without(log, activation.message());
+    goes_on(&lossy, "the activation of navigation");
+    match replay(&without_key_frames(&lossy)) {
         Err(ReplayError::Gap { activation, .. }) => assert_eq!(activation, "control"),
         other => panic!("{other:?}"),
     }
@@ -233,14 +359,32 @@ fn a_log_that_was_cut_off_is_refused_with_the_place() {
     }
 }
 
-#[derive(Default)]
-struct Memory(Vec<u8>);
+/// The vehicle was switched off while it wrote: every whole message is worth replaying.
+#[test]
+fn a_log_that_was_cut_between_two_messages_is_no_difference() {
+    let log = &*FLIGHT;
+    let messages = messages(log);
+    let middle = find(log, "sensor_imu", Instant::from_secs(7)).message().start;
+    let first = messages.iter().position(|(_, bytes)| bytes.start == middle).expect("a message");
+    for (kind, bytes) in &messages[first..first + 40] {
+        let result = replay(&log[..bytes.end]).expect("a log that can be replayed");
+        assert_eq!(result.difference, None, "cut behind a message '{}' at {}", char::from(*kind), bytes.end);
+        assert!(result.activations > 10_000 && result.gaps == 0, "{result:?}");
+    }
+}
 
-impl Sink for Memory {
-    type Error = std::convert::Infallible;
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.extend_from_slice(bytes);
-        Ok(())
+/// The same where a key frame, which is several messages, is written.
+#[test]
+fn a_log_that_was_cut_in_a_key_frame_is_no_difference() {
+    let log = &*FLIGHT;
+    let parts = key_frame_parts(log);
+    let frames: Vec<_> = parts.chunk_by(|a, b| a.end == b.start).collect();
+    let frame = frames[frames.len() / 2];
+    assert!(frame.len() > 1, "{frame:?}");
+    for part in frame {
+        let result = replay(&log[..part.end]).expect("a log that can be replayed");
+        assert_eq!(result.difference, None, "cut at {}", part.end);
+        assert!(result.activations > 5_000 && result.gaps == 0, "{result:?}");
     }
 }
 
@@ -248,13 +392,13 @@ fn written(
     topics: &[Topic],
     activations: &[ActivationTopic],
     parameter: Option<(&str, f32)>,
-    write: impl FnOnce(&mut stampfly_log::ulog::Writer<'_, Memory>),
+    write: impl FnOnce(&mut Writer<Memory, (&[Topic], &[ActivationTopic])>),
 ) -> Vec<u8> {
     let mut head = Definitions::start(Memory::default(), Instant::ZERO).expect("memory");
     if let Some((name, value)) = parameter {
         head.parameter(name, value.into()).expect("memory");
     }
-    let mut log = head.data(topics, activations).expect("memory");
+    let mut log = head.data((topics, activations)).expect("memory");
     write(&mut log);
     log.into_sink().0
 }
@@ -301,13 +445,13 @@ fn logs_of_others_are_refused_with_a_reason() {
 /// A runnable that reads more than this program's is another version's.
 #[test]
 fn activations_with_other_inputs_are_refused() {
-    let name = plan::ACTIVATIONS[0].name;
+    let name = ACTIVATIONS[0].name;
     for inputs in [0, 1, 16] {
         let activations = [ActivationTopic { name, index: 0, inputs }];
         let log = written(&TOPICS, &activations, None, |log| {
-            let mut record = stampfly_log::Activation::new(0, Instant::from_micros(2_500));
+            let mut record = ActivationRecord::new(0, Instant::from_micros(2_500));
             for _ in 0..inputs {
-                record.read(stampfly_log::Input::default()).expect("room");
+                record.push(InputRecord::default()).expect("room");
             }
             log.activation(&record).expect("memory");
         });
@@ -317,7 +461,7 @@ fn activations_with_other_inputs_are_refused() {
 
 /// The first second of a flight: small enough to be damaged many times.
 static SECOND: LazyLock<Vec<u8>> =
-    LazyLock::new(|| record(&FlightConfig { limit: Duration::from_secs(1), ..config(1, Some(1)) }));
+    LazyLock::new(|| record(&Setup { limit: Duration::from_secs(1), ..setup(1, Some(1)) }));
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
@@ -351,5 +495,20 @@ proptest! {
             payload[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
         }
         let _ = replay(&log);
+    }
+
+    /// Damage inside key frames, from which the replay starts.
+    #[test]
+    fn damaged_key_frames_never_panic(damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 1..8)) {
+        static PARTS: LazyLock<Vec<Range<usize>>> = LazyLock::new(|| key_frame_parts(&SECOND));
+        let mut log = SECOND.clone();
+        for (index, value) in damage {
+            // Behind the head of the message and the key.
+            let part = PARTS[index.index(PARTS.len())].clone();
+            let bytes = &mut log[part.start + 40..part.end];
+            let start = value as usize % bytes.len();
+            bytes[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
+        }
+        let _ = replay_from(&log, Some(Instant::ZERO));
     }
 }

@@ -3,12 +3,19 @@
 mod made_up;
 
 use serde_json::Value;
-use stampfly_host::report::Metric;
-use stampfly_host::{Flight, Report};
+use stampfly_host::{Report, report::Metric};
+use stampfly_lab::Flight;
 use stampfly_types::{Instant, messages::PowerData};
 
 fn page(flight: &Flight) -> String {
-    Report { title: "A flight".to_owned(), subtitle: String::new(), metrics: Vec::new(), flight }.html()
+    Report {
+        title: "A flight".to_owned(),
+        subtitle: String::new(),
+        metrics: Vec::new(),
+        page: &stampfly_board::simulation::PAGE,
+        flight,
+    }
+    .html()
 }
 
 /// The data the page's script reads.
@@ -103,7 +110,14 @@ fn no_text_can_become_markup() {
     let mut flight = made_up::flight();
     flight.events[0].text = "</script><script>alert(1)".to_owned();
     let metrics = vec![Metric::new("<b>name", "1 < 2", "\"unit\"").judged(false)];
-    let html = Report { title: "{data} <i>".to_owned(), subtitle: "a & b".to_owned(), metrics, flight: &flight }.html();
+    let html = Report {
+        title: "{data} <i>".to_owned(),
+        subtitle: "a & b".to_owned(),
+        metrics,
+        page: &stampfly_board::simulation::PAGE,
+        flight: &flight,
+    }
+    .html();
     assert!(!html.contains("alert(1)</") && html.matches("</script>").count() == 2);
     assert_eq!(data(&html)["events"][0][1], "</script><script>alert(1)");
     assert!(html.contains("<title>{data} &lt;i&gt;</title>") && html.contains("a &amp; b"));

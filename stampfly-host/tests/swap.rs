@@ -1,24 +1,30 @@
 //! Another estimator and another controller fly the same mission: the sockets are real.
 
-use stampfly_board::parameters;
-use stampfly_host::campaign;
-use stampfly_host::simulate::FlightConfig;
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_flight::parameters;
+use stampfly_host::campaign::{self, Flight};
+use stampfly_host::recorder::Recorder;
+
+/// Flies these, with a hash of each flight.
+fn fly(setups: &[(u64, Setup)]) -> Vec<Flight<StampFly, Recorder<StampFly>>> {
+    campaign::run(setups, &|_, _| Recorder::<StampFly>::hash_only(), &|_| {})
+}
 
 /// Flies the reference mission on some seeds with one parameter changed.
 fn fly_with(parameter: &str) {
-    let configs: Vec<FlightConfig> = (1..=6)
+    let setups: Vec<(u64, Setup)> = (1..=6)
         .map(|seed| {
-            let mut config = FlightConfig::reference(seed);
-            parameters::set(&mut config.vehicle, parameter, 1.0).expect("a parameter");
-            config
+            let mut setup = Setup::reference(seed);
+            parameters::set(&mut setup.vehicle, parameter, 1.0).expect("a parameter");
+            (seed, setup)
         })
         .collect();
-    let usual = campaign::run(&[FlightConfig::reference(1)], &|_| {});
-    let flights = campaign::run(&configs, &|_| {});
+    let usual = fly(&[(1, Setup::reference(1))]);
+    let flights = fly(&setups);
     for flight in &flights {
-        assert!(flight.succeeded(), "{parameter}=1, seed {}: {:?}", flight.seed, flight.outcome.metrics);
+        assert!(flight.succeeded(), "{parameter}=1, seed {}: {:?}", flight.seed, flight.flown.outcome.metrics);
     }
-    assert_ne!(flights[0].outcome.log_hash, usual[0].outcome.log_hash, "{parameter} changes the flight");
+    assert_ne!(flights[0].witness.hash(), usual[0].witness.hash(), "{parameter} changes the flight");
 }
 
 #[test]

@@ -122,7 +122,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<FlightLog, LogError> {
 ///
 /// let mut memory = [0; 4096];
 /// let topics = [Topic { name: "sensor_power", fields: PowerData::FIELDS }];
-/// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(&topics, &[])?;
+/// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(&topics[..])?;
 /// let words = PowerData { voltage: 3.5, current: 2.0, power: 7.0 }.to_words();
 /// log.sample(0, &Sample { at: Instant::from_micros(10), generation: 1, words: &words })?;
 ///

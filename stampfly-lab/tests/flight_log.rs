@@ -24,7 +24,7 @@ fn log() -> Vec<u8> {
     let mut log = Definitions::start(Bytes(Vec::new()), Instant::from_micros(500)).unwrap();
     log.info("sys_name", "StampFly").unwrap();
     log.parameter("gain", 1.5.into()).unwrap();
-    let mut log = log.data(&topics, &[]).unwrap();
+    let mut log = log.data(&topics[..]).unwrap();
     for n in 0..50u32 {
         let at = Instant::from_micros(1_000 * u64::from(n + 1));
         let estimate = StateEstimate { height: n as f32, ..Default::default() };
@@ -81,7 +81,7 @@ fn errors_name_the_file() {
 
 /// A log with one topic whose format and data are given.
 fn foreign(format: &str, samples: &[&[u8]]) -> Vec<u8> {
-    let mut log = Definitions::start(Bytes(Vec::new()), Instant::ZERO).unwrap().data(&[], &[]).unwrap().into_sink().0;
+    let mut log = Definitions::start(Bytes(Vec::new()), Instant::ZERO).unwrap().data(&[][..]).unwrap().into_sink().0;
     let mut message = |kind: u8, parts: &[&[u8]]| {
         let payload = parts.concat();
         log.extend((payload.len() as u16).to_le_bytes());

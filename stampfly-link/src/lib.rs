@@ -7,6 +7,7 @@
 //! | [`PairingPacket`] | the vehicle's call for a transmitter, 11 bytes | in a transmitter |
 //! | [`TelemetryPacket`] | what the vehicle tells its pilot, 22 bytes | at either end |
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
+//! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
@@ -41,6 +42,7 @@ mod control;
 pub mod datagram;
 pub mod json;
 mod pairing;
+mod peers;
 mod sequence;
 mod session;
 mod telemetry;
@@ -49,6 +51,7 @@ pub use address::Address;
 pub use control::{ControlError, ControlPacket};
 pub use datagram::{Datagram, DatagramError};
 pub use pairing::{PairingError, PairingPacket};
+pub use peers::{MAX_DATAGRAM, Peers};
 pub use sequence::SequenceFilter;
 pub use session::{Counters, PairingRefused, Rejected, Session};
 pub use telemetry::{LinkState, TelemetryError, TelemetryPacket};

@@ -70,6 +70,7 @@ message! {
 /// # Ok::<(), stampfly_param::ParameterError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ParameterSet<P> {
     active: P,
     previous: P,
@@ -80,6 +81,13 @@ pub struct ParameterSet<P> {
     status: ParameterStatus,
 }
 
+/// The values of the table, without probation.
+impl<P: ParameterTable> Default for ParameterSet<P> {
+    fn default() -> Self {
+        Self::holding(P::default(), Duration::ZERO)
+    }
+}
+
 impl<P: ParameterTable> ParameterSet<P> {
     /// A set that starts with these values. A fault within `probation` after a change rolls it back.
     ///
@@ -87,9 +95,13 @@ impl<P: ParameterTable> ParameterSet<P> {
     /// When the values are not [valid](ParameterTable::validate).
     pub fn new(parameters: P, probation: Duration) -> Result<Self, ParameterError> {
         parameters.validate()?;
+        Ok(Self::holding(parameters, probation))
+    }
+
+    fn holding(parameters: P, probation: Duration) -> Self {
         let [active, previous, candidate] = [parameters; 3];
         let status = ParameterStatus::default();
-        Ok(Self { active, previous, candidate, pending: false, on_probation: false, probation, status })
+        Self { active, previous, candidate, pending: false, on_probation: false, probation, status }
     }
 
     /// Changes one value of the candidate.

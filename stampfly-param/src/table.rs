@@ -20,6 +20,8 @@ pub struct Parameter<P> {
     pub max: f32,
     /// SI unit, `"1"` where there is none.
     pub unit: &'static str,
+    /// What it does: its documentation in the table.
+    pub meaning: &'static str,
     #[doc(hidden)]
     pub __field: fn(&mut P) -> &mut f32,
 }
@@ -133,13 +135,13 @@ macro_rules! parameters {
     (
         $(#[$set_doc:meta])* $vis:vis struct $Set:ident, consistent if |$set:ident| $consistent:expr;
         $($(#[$group_doc:meta])* $group:ident: $Group:ident {
-            $($(#[$doc:meta])* $name:ident = $default:literal in [$min:literal, $max:literal] $unit:literal;)+
+            $($(#[doc = $doc:literal])* $name:ident = $default:literal in [$min:literal, $max:literal] $unit:literal;)+
         })+
     ) => {
         $(
             $(#[$group_doc])*
             #[derive(Clone, Copy, Debug, PartialEq)]
-            $vis struct $Group { $($(#[$doc])* pub $name: f32),+ }
+            $vis struct $Group { $($(#[doc = $doc])* pub $name: f32),+ }
 
             impl Default for $Group {
                 fn default() -> Self { Self { $($name: $default),+ } }
@@ -171,7 +173,7 @@ macro_rules! parameters {
         impl $crate::ParameterTable for $Set {
             const TABLE: &'static [$crate::Parameter<Self>] = &[$($($crate::Parameter {
                 name: concat!(stringify!($group), ".", stringify!($name)),
-                min: $min, max: $max, unit: $unit, __field: |parameters| &mut parameters.$group.$name,
+                min: $min, max: $max, unit: $unit, meaning: concat!($($doc),*).trim_ascii(), __field: |parameters| &mut parameters.$group.$name,
             }),+),+];
 
             fn is_consistent(&self) -> bool {

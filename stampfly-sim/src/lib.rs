@@ -7,7 +7,7 @@
 //! * [`vehicle`]: a whole vehicle with its flight stack, on virtual time;
 //! * [`Simulation`]: all of it from one [`SimulationConfig`].
 //!
-//! Everything is a value: no global, no wall clock, no thread. A process can hold as many vehicles as memory allows,
+//! Everything is a value: no global, no thread, and no wall clock but in [`vehicle::Live`]. A process can hold as many vehicles as memory allows,
 //! and the same seed gives the same bits, in debug and release builds and on every machine.
 //!
 //! Not for other vehicles yet: the plant is a quadcopter with the StampFly's layout, though every number of it can be

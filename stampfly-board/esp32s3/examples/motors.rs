@@ -15,7 +15,7 @@ use stampfly_drivers::{Button, PinButton};
 async fn main(_spawner: Spawner) {
     let board = Board::start();
     let mut button = PinButton(Input::new(board.people.button, InputConfig::default().with_pull(Pull::Up)));
-    let mut motors = Motors::new(board.motors);
+    let mut motors = Motors::new(board.motors, board.watchdog);
     esp_println::println!("Take the propellers off. Then press the button, and keep your fingers away.");
     while !button.is_pressed() {
         Clock.delay_ms(10).await;

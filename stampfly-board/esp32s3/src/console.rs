@@ -1,26 +1,25 @@
-//! The console on USB: a terminal at one end, [`stampfly_board::console`] at the other.
+//! The console on USB: a terminal at one end, [`stampfly_board::console`] at the other. Also stores what was asked for
+//! here or by the radio.
 
 use crate::clock::Clock;
-use crate::flight::PROFILE;
-use crate::memory::Memory;
-use crate::motors;
-use crate::radio;
-use crate::self_test::Outcome;
-use crate::sensors::HEALTH;
+use crate::memory::{Memory, restart};
+use crate::sensors::Healths;
 use crate::storage::{Storage, StorageError};
 use core::cell::RefCell;
-use core::fmt::Write as _;
-use embassy_futures::select::{Either3, select3};
-use embassy_time::{Duration, Timer, with_timeout};
+use core::fmt::{Display, Write as _};
+use embassy_futures::select::{Either, select};
+use embassy_time::{Duration, Ticker, with_timeout};
 use embedded_io_async::{Read, Write};
 use esp_hal::Async;
 use esp_hal::peripherals::USB_DEVICE;
 use esp_hal::usb::usb_serial_jtag::{UsbSerialJtag, UsbSerialJtagTx};
 use heapless::String;
-use stampfly_board::VehicleConfig;
-use stampfly_board::black_box::{DumpError, Refused, dump};
-use stampfly_board::console::{Context, LineEditor, MotorTest, Request, SensorLine, answer};
+use stampfly_board::console::{self, Command, Profile};
+use stampfly_board::golden::Outcome;
+use stampfly_board::{VehicleConfig, black_box, topics};
 use stampfly_drivers::Timebase;
+use stampfly_flight::black_box::{DumpError, Refused, dump};
+use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
 use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
@@ -30,50 +29,54 @@ const REPLY: usize = 4 * 1024;
 const PATIENCE: Duration = Duration::from_millis(200);
 /// A terminal in the middle of a log is one, and may be busy.
 const PATIENCE_WITH_LOG: Duration = Duration::from_secs(3);
-/// How often it is tried again to keep the transmitter that was paired.
-const AGAIN: Duration = Duration::from_secs(1);
-
-/// The motor test, asked for here and applied where duties go to the motors.
-pub static MOTOR_TEST: MotorTest = MotorTest::new();
+/// How often the console looks for a transmitter that was paired and is not stored yet.
+const STORE_PERIOD: Duration = Duration::from_secs(1);
 
 /// What the console needs.
 pub struct Parts {
     pub usb: USB_DEVICE<'static>,
     pub memory: &'static RefCell<Memory>,
+    pub health: &'static Healths,
+    pub profile: &'static Profile,
+    pub ends: topics::ConsoleEnds<'static>,
     pub storage: Storage,
+    pub storage_ends: topics::StorageEnds<'static>,
     /// The configuration the vehicle flies with.
     pub config: VehicleConfig,
     /// How the self test went.
     pub tested: Outcome,
 }
 
-/// Answers for ever.
+/// Answers until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { usb, memory, storage, config, tested } = parts;
+    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested } = parts;
     let (mut keys, screen) = UsbSerialJtag::new(usb).into_async().split();
     let mut version = String::new();
     // A version that is too long ends early.
     let _ = write!(version, concat!("stampfly-esp32s3 ", env!("CARGO_PKG_VERSION"), ", {}"), tested);
-    let flown = config.clone();
-    let mut console = Console { screen: Screen(screen), memory, storage, config, flown, version, unkept: None };
+    let (flown, screen) = (config.clone(), Screen(screen));
+    let mut console = Console {
+        screen,
+        memory,
+        health,
+        profile,
+        ends,
+        storage,
+        storage_ends,
+        config,
+        flown,
+        version,
+        unstored: None,
+    };
     let mut editor = LineEditor::<80>::new();
     let mut typed = [0; 64];
+    let mut ticker = Ticker::every(STORE_PERIOD);
     loop {
-        let again = async {
-            match console.unkept {
-                Some(_) => Timer::after(AGAIN).await,
-                None => core::future::pending().await,
-            }
-        };
-        let count = match select3(keys.read(&mut typed), radio::PAIRED.wait(), again).await {
-            Either3::First(count) => count.unwrap_or_default(),
-            Either3::Second(peer) => {
-                console.paired(peer).await;
-                continue;
-            }
-            Either3::Third(()) => {
-                console.keep_peer().await;
+        let count = match select(keys.read(&mut typed), ticker.next()).await {
+            Either::First(count) => count.unwrap_or_default(),
+            Either::Second(()) => {
+                console.store_peer().await;
                 continue;
             }
         };
@@ -99,72 +102,75 @@ fn newest_mode(memory: &RefCell<Memory>) -> Option<stampfly_types::messages::Sys
 struct Console {
     screen: Screen,
     memory: &'static RefCell<Memory>,
+    health: &'static Healths,
+    profile: &'static Profile,
+    ends: topics::ConsoleEnds<'static>,
     storage: Storage,
+    storage_ends: topics::StorageEnds<'static>,
     /// What the vehicle flies with after the next start.
     config: VehicleConfig,
     /// What it has flown with since the last.
     flown: VehicleConfig,
     /// Which firmware this is, and how its self test went.
     version: String<128>,
-    /// A transmitter that was paired and is still to be kept.
-    unkept: Option<Address>,
+    /// A transmitter that was paired and is still to be stored.
+    unstored: Option<Address>,
 }
 
 impl Console {
     async fn obey(&mut self, line: &str) {
         let mut reply = String::<REPLY>::new();
-        let request = {
-            let mut memory = self.memory.borrow_mut();
-            memory.catch_up();
-            let mut context = Context {
-                now: Clock.now(),
-                version: &self.version,
-                newest: &memory.newest,
-                sensors: &[
-                    SensorLine { name: "imu", health: &HEALTH.imu },
-                    SensorLine { name: "flow", health: &HEALTH.flow },
-                    SensorLine { name: "tof", health: &HEALTH.tof },
-                    SensorLine { name: "tof_front", health: &HEALTH.tof_front },
-                    SensorLine { name: "mag", health: &HEALTH.mag },
-                    SensorLine { name: "baro", health: &HEALTH.baro },
-                    SensorLine { name: "power", health: &HEALTH.power },
-                ],
-                profile: &PROFILE,
-                config: &mut self.config,
-            };
-            // A reply that is too long ends early.
-            answer(line, &mut context, &mut reply).unwrap_or(Request::Nothing)
-        };
+        // A reply that is too long ends early.
+        let request = self.answer(line, &mut reply).unwrap_or(Request::Nothing);
         self.screen.show(&reply).await;
         let memory = self.memory;
         let mode = || newest_mode(memory);
+        let busy = &mut self.storage_ends.storage_busy;
         match request {
             Request::Nothing => {}
             Request::SaveParameters => {
-                let outcome = self.storage.save(&self.config, mode).await;
-                self.report(outcome, "kept; they apply after a reboot").await;
+                let outcome = self.storage.save(&self.config, busy, mode).await;
+                self.report(outcome, "saved; they apply after a reboot").await;
             }
             Request::ResetParameters => {
-                let outcome = self.storage.reset(mode).await;
-                self.unkept = self.unkept.filter(|_| outcome.is_err());
-                self.report(outcome, "forgotten, the transmitter, too; defaults apply after a reboot").await;
+                let outcome = self.storage.reset(busy, mode).await;
+                self.unstored = self.unstored.filter(|_| outcome.is_err());
+                self.report(outcome, "erased, the transmitter, too; defaults apply after a reboot").await;
             }
-            Request::Pair => {
-                radio::PAIR.signal(());
-                self.screen.show("looking for a transmitter\r\n").await;
+            Request::Vehicle(command) => {
+                command.publish(Clock.now(), &mut self.ends);
+                self.screen
+                    .show(match command {
+                        Command::Pair(true) => "looking for a transmitter\r\n",
+                        Command::TestMotor { .. } => "turning for two seconds\r\n",
+                        Command::Pair(false) | Command::StopMotor => "stopped\r\n",
+                    })
+                    .await;
             }
-            Request::TestMotor { motor, duty } => {
-                let armed = mode().is_none_or(|mode| mode.armed);
-                let outcome = MOTOR_TEST.start(Clock.now(), armed, motor, duty);
-                self.report(outcome, "turning for two seconds").await;
-            }
-            Request::StopMotor => MOTOR_TEST.stop(),
             Request::DumpLog => self.dump().await,
-            Request::Reboot => {
-                motors::cut();
-                esp_hal::system::software_reset();
-            }
+            Request::Reboot => restart(),
         }
+    }
+
+    /// Answers a line with what is known now.
+    fn answer(&mut self, line: &str, reply: &mut String<REPLY>) -> Result<Request<Command>, core::fmt::Error> {
+        let sensors = self.health.all();
+        let errors = sensors.map(|(_, health)| health.last_error());
+        let lines: [SensorLine<'_>; 7] = core::array::from_fn(|index| {
+            let (name, health) = sensors[index];
+            let last_error = errors[index].as_ref().map(|error| error as &dyn Display);
+            SensorLine { name, samples: health.samples(), errors: health.errors(), last_error }
+        });
+        let mut memory = self.memory.borrow_mut();
+        memory.catch_up();
+        let mut vehicle = console::Console {
+            version: &self.version,
+            newest: &memory.newest,
+            sensors: &lines,
+            profile: self.profile,
+            config: &mut self.config,
+        };
+        answer(line, Clock.now(), &mut vehicle, reply)
     }
 
     async fn report<E: core::fmt::Display>(&mut self, outcome: Result<(), E>, good: &str) {
@@ -183,28 +189,30 @@ impl Console {
         // Borrowed for one record at a time, so that nothing is while the terminal takes its time.
         let next = || memory.borrow().black_box.next(&mut cursor);
         let show = async |line: &str| screen.offer(line, PATIENCE_WITH_LOG).await;
-        if let Err(error) = dump(next, flown, version, show).await {
+        let dumped = dump(next, |sink, at| black_box::open(sink, at, flown, version), show).await;
+        if let Err(error) = dumped {
             self.report(Err::<(), DumpError>(error), "").await;
         }
     }
 
-    /// The vehicle belongs to this transmitter now.
-    async fn paired(&mut self, peer: Address) {
-        let mut said = String::<96>::new();
-        let _ = write!(said, "paired with {peer}\r\n");
-        self.screen.show(&said).await;
-        self.unkept = Some(peer);
-        self.keep_peer().await;
-    }
-
-    /// Keeps the transmitter. On an armed vehicle nothing is kept; then it is for later.
-    async fn keep_peer(&mut self) {
-        let Some(peer) = self.unkept else { return };
+    /// Stores a transmitter that the vehicle was paired with. Nothing is stored on an armed vehicle; then it is for later.
+    async fn store_peer(&mut self) {
+        if self.storage_ends.link_peer.has_new()
+            && let Some(peer) = self.storage_ends.link_peer.latest()
+        {
+            let peer = Address::from(peer.data);
+            let mut said = String::<96>::new();
+            let _ = write!(said, "paired with {peer}\r\n");
+            self.screen.show(&said).await;
+            self.unstored = Some(peer);
+        }
+        let Some(peer) = self.unstored else { return };
         let memory = self.memory;
-        let outcome = self.storage.save_peer(peer, || newest_mode(memory)).await;
+        let busy = &mut self.storage_ends.storage_busy;
+        let outcome = self.storage.save_peer(peer, busy, || newest_mode(memory)).await;
         if !matches!(outcome, Err(StorageError::Armed)) {
-            self.unkept = None;
-            self.report(outcome, "transmitter kept").await;
+            self.unstored = None;
+            self.report(outcome, "transmitter stored").await;
         }
     }
 }

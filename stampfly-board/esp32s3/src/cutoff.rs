@@ -8,7 +8,7 @@
 //! tenth of a second in flight. A chip that starts has its motors off.
 
 use crate::clock::Clock;
-use crate::motors;
+use crate::safe_state;
 use core::ptr::null_mut;
 use core::sync::atomic::{AtomicPtr, Ordering};
 use embassy_sync::blocking_mutex::raw::{CriticalSectionRawMutex, RawMutex};
@@ -19,37 +19,44 @@ use esp_hal::peripherals::TIMG1;
 use esp_hal::time::Duration;
 use esp_hal::timer::PeriodicTimer;
 use esp_hal::timer::timg::{MwdtStage, MwdtStageAction, TimerGroup, Wdt};
-use stampfly_board::tasks::DeadMan;
+use stampfly_board::messages::CutoffState;
+use stampfly_board::topics::CutoffStateTx;
 use stampfly_drivers::Timebase;
+use stampfly_flight::Watchdog;
 use static_cell::StaticCell;
 
-/// Motors that nobody has confirmed for this long are stopped.
-const PATIENCE: stampfly_types::Duration = stampfly_types::Duration::from_millis(25);
-/// How often the timer looks. Motors turn for at most `PATIENCE` and this after the last confirmation.
+/// Motors that are not confirmed for this long are stopped.
+const TIMEOUT: stampfly_types::Duration = stampfly_types::Duration::from_millis(25);
+/// How often the timer looks. Motors turn for at most `TIMEOUT` and this after the last confirmation.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// The watchdog's patience while motors may turn.
+/// Timeout of the chip's watchdog while motors may turn.
 const IN_FLIGHT: Duration = Duration::from_millis(100);
 /// And while they may not: longer than any write to flash, which stops both cores.
 const ON_THE_GROUND: Duration = Duration::from_secs(4);
 
-/// Shared by the flight task and the timer's interrupt.
-static SWITCH: DeadMan = DeadMan::new(PATIENCE);
+/// Shared by the motors, which feed it, the timer's interrupt and the panic handler.
+static WATCHDOG: Watchdog = Watchdog::new(TIMEOUT);
 /// For the interrupt only.
 static WATCH: AtomicPtr<Watch> = AtomicPtr::new(null_mut());
 
 struct Watch {
     timer: PeriodicTimer<'static, Blocking>,
     watchdog: Wdt<TIMG1<'static>>,
-    /// Which patience the watchdog has.
+    /// Which timeout the chip's watchdog has.
     in_flight: bool,
+    /// Where the bus is told, and what it was told last.
+    report: Option<CutoffStateTx<'static>>,
+    reported: bool,
 }
 
-/// Starts to watch. Called on the core that does not fly.
-pub fn start(group: TIMG1<'static>) {
+/// Starts to watch, and returns what the motors are to feed. Called on the core that does not fly. `report` is told when
+/// the cut-off acts and when it is over.
+pub fn start(group: TIMG1<'static>, report: Option<CutoffStateTx<'static>>) -> &'static Watchdog {
     static CELL: StaticCell<Watch> = StaticCell::new();
     let group = TimerGroup::new(group);
-    let watch = CELL.init(Watch { timer: PeriodicTimer::new(group.timer0), watchdog: group.wdt, in_flight: false });
+    let timer = PeriodicTimer::new(group.timer0);
+    let watch = CELL.init(Watch { timer, watchdog: group.wdt, in_flight: false, report, reported: false });
     watch.timer.set_interrupt_handler(look);
     watch.timer.start(PERIOD).expect("a millisecond is within the timer's range");
     watch.watchdog.set_timeout(MwdtStage::Stage0, ON_THE_GROUND);
@@ -60,27 +67,13 @@ pub fn start(group: TIMG1<'static>) {
         watch.timer.listen();
         WATCH.store(watch, Ordering::Release);
     });
+    &WATCHDOG
 }
 
-/// The flight task controls the motors: to be said with every output. `armed` says whether they may turn.
-pub fn confirm(armed: bool) {
-    SWITCH.confirm(Clock.now(), armed);
-}
-
-/// Has the cut-off acted, and nobody reset it since?
-pub fn has_tripped() -> bool {
-    SWITCH.has_tripped()
-}
-
-/// Lets the motors turn again. Returns whether they may.
-pub fn reset() -> bool {
-    SWITCH.reset()
-}
-
-/// Stops the motors until the vehicle is switched off.
-pub fn trip_for_good() {
-    SWITCH.trip_for_good();
-    motors::cut();
+/// Stops the motors until the next power-on.
+pub fn lock_out() {
+    WATCHDOG.lock_out();
+    safe_state::cut();
 }
 
 /// Keeps the watchdog from restarting a vehicle that has stopped on purpose.
@@ -90,19 +83,25 @@ pub fn stand_down() {
 
 #[handler(priority = Priority::Priority3)]
 fn look() {
+    let expired = WATCHDOG.expired(|| Clock.now());
+    // Every time: whatever gave the pins back, expired means off.
+    if expired {
+        safe_state::cut();
+    }
     // SAFETY: the pointer is null or leads to the static, which `start` has handed over to this function and does not
     // touch again; an interrupt does not interrupt itself.
-    if let Some(watch) = unsafe { WATCH.load(Ordering::Acquire).as_mut() } {
-        watch.timer.clear_interrupt();
-        watch.watchdog.feed();
-        let armed = SWITCH.is_armed();
-        if watch.in_flight != armed {
-            watch.in_flight = armed;
-            watch.watchdog.set_timeout(MwdtStage::Stage0, if armed { IN_FLIGHT } else { ON_THE_GROUND });
-        }
+    let Some(watch) = (unsafe { WATCH.load(Ordering::Acquire).as_mut() }) else { return };
+    watch.timer.clear_interrupt();
+    watch.watchdog.feed();
+    let armed = WATCHDOG.is_armed();
+    if watch.in_flight != armed {
+        watch.in_flight = armed;
+        watch.watchdog.set_timeout(MwdtStage::Stage0, if armed { IN_FLIGHT } else { ON_THE_GROUND });
     }
-    // Again and again: whatever gave the pins back, tripped means off.
-    if SWITCH.must_cut(|| Clock.now()) {
-        motors::cut();
+    if watch.reported != expired
+        && let Some(report) = &mut watch.report
+    {
+        report.publish(Clock.now(), &CutoffState { tripped: expired });
+        watch.reported = expired;
     }
 }

@@ -3,55 +3,65 @@
 use crate::clock::Clock;
 use crate::motors::Motors;
 use crate::pins::MotorPins;
-use crate::sensors::HEALTH;
+use crate::sensors::Healths;
 use crate::{imu_config, spi};
 use embassy_futures::join::join;
-use stampfly_board::profile::{Profile, Stopwatch};
-use stampfly_board::tasks::{Retry, fly, pump};
-use stampfly_board::{FlightLoop, devices, wiring};
+use stampfly_board::console::Profile;
+use stampfly_board::schedule::Runnables;
+use stampfly_board::{devices, topics};
 use stampfly_drivers::slot::Slots;
-use stampfly_drivers::{Imu, OpticalFlow};
-
-/// How long every runnable takes, for whoever reports.
-pub static PROFILE: Profile = Profile::new();
+use stampfly_drivers::task::{Backoff, run_sensor};
+use stampfly_drivers::{Imu, MotorOutputs, OpticalFlow, Timebase};
+use stampfly_flight::task::fly;
+use stampfly_flight::{FlightLoop, Stopwatch, Watchdog};
 
 /// What flies.
 pub struct Parts {
-    pub flight_loop: &'static mut FlightLoop<'static>,
-    pub imu: wiring::sensor_imu::Tx<'static>,
-    pub flow: wiring::sensor_flow::Tx<'static>,
-    pub duties: wiring::actuator_motor::Rx<'static>,
+    pub flight_loop: &'static mut FlightLoop<'static, Runnables>,
+    pub imu: topics::ImuEnds<'static>,
+    pub flow: topics::FlowEnds<'static>,
+    pub duties: topics::MotorsEnds<'static>,
     pub motors: MotorPins<'static>,
     pub spi: spi::Parts,
+    pub watchdog: &'static Watchdog,
+    pub health: &'static Healths,
+    pub profile: &'static Profile,
 }
 
-/// Flies for ever.
+/// Flies until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { flight_loop, mut imu, mut flow, duties, motors, spi } = parts;
-    let motors = Motors::new(motors);
+    let Parts { flight_loop, mut imu, mut flow, mut duties, motors, spi, watchdog, health, profile } = parts;
+    let mut motors = Motors::new(motors, watchdog);
     let mut bus = spi::Bus::start(spi);
     let mut slots = Slots::new(Clock, devices::RHYTHM);
     let (imu_chip, flow_chip, ready) = bus.devices();
     let (imu_chip, flow_chip, _) = slots.split(imu_chip, flow_chip, devices::LONGEST_FLOW);
     let mut imu_chip = devices::imu(imu_chip, Clock, imu_config::FILE).with_interrupt(ready);
     let mut flow_chip = devices::flow(flow_chip, Clock);
-    let sensing = pump(
+    let sensing = run_sensor(
         async || imu_chip.next().await,
-        |at, sample| _ = imu.publish(at, sample),
+        |at, sample| _ = imu.sensor_imu.publish(at, sample),
         Clock,
-        Retry::PROMPT,
-        &HEALTH.imu,
+        Backoff::CRITICAL,
+        &health.imu,
     );
-    let looking_down = pump(
+    let looking_down = run_sensor(
         async || flow_chip.next().await,
-        |at, sample| _ = flow.publish(at, sample),
+        |at, sample| _ = flow.sensor_flow.publish(at, sample),
         Clock,
-        Retry::PATIENT,
-        &HEALTH.flow,
+        Backoff::SHARED,
+        &health.flow,
     );
-    let mut stopwatch = Stopwatch::new(&PROFILE, Clock);
-    // A motor channel that refuses has nobody to tell in flight; the cut-off remains.
-    let flying = fly(sensing, flight_loop, duties, motors, Clock, &mut stopwatch, |_| {});
+    let clock = || Clock.now();
+    let write = |_| {
+        if duties.actuator_motor.has_new()
+            && let Some(output) = duties.actuator_motor.latest()
+        {
+            // An error has no receiver in flight; the cut-off remains.
+            let _ = motors.write(&output.data);
+        }
+    };
+    let flying = fly(sensing, flight_loop, clock, Clock, Stopwatch::new(profile, clock), write);
     join(flying, looking_down).await;
 }

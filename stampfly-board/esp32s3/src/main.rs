@@ -26,7 +26,7 @@ mod panic;
 mod people;
 mod pins;
 mod radio;
-mod self_test;
+mod safe_state;
 mod sensors;
 #[cfg_attr(feature = "esp32c6", allow(dead_code, reason = "it has one core"))]
 mod sizes;
@@ -43,9 +43,13 @@ use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
 use memory::Memory;
 use pins::*;
-use self_test::Outcome;
-use stampfly_board::{FlightLoop, VehicleConfig, vehicle, wiring};
+use sensors::Healths;
+use stampfly_board::console::Profile;
+use stampfly_board::golden::{Outcome, self_test};
+use stampfly_board::schedule::{ACTIVATIONS, Runnables};
+use stampfly_board::{VehicleConfig, topics};
 use stampfly_drivers::Timebase;
+use stampfly_flight::{Assembled, FlightLoop};
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -53,7 +57,7 @@ esp_bootloader_esp_idf::esp_app_desc!();
 
 #[esp_hal::main]
 fn main() -> ! {
-    motors::hold_low();
+    safe_state::hold_low();
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
     // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
     esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
@@ -61,10 +65,10 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
     #[cfg(feature = "esp32c6")]
     esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
-    let tested = self_test::run();
+    let tested = self_test();
     esp_println::println!("{tested}");
     if !tested.may_fly() {
-        cutoff::trip_for_good();
+        cutoff::lock_out();
     }
     start(chip, tested)
 }
@@ -75,25 +79,27 @@ fn main() -> ! {
 fn start(chip: Peripherals, tested: Outcome) -> ! {
     motors::start_unit(chip.LEDC);
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
-    cutoff::start(chip.TIMG1);
 
-    static BUS: StaticCell<wiring::Bus> = StaticCell::new();
-    let wiring::Split { ports, taps, heads } = BUS.init_with(wiring::Bus::new).split(None);
+    static BUS: StaticCell<topics::Bus> = StaticCell::new();
+    let split = BUS.init_with(topics::Bus::new).split(None);
     let mut storage = Storage::open(chip.FLASH);
     let mut config = VehicleConfig::default();
     let unusable = block_on(storage.load(&mut config));
     if unusable > 0 {
-        esp_println::println!("{unusable} kept parameters cannot be used; their defaults apply");
+        esp_println::println!("{unusable} stored parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
     // Moved from here to where it stays, without a copy in between: there is not stack enough for two vehicles.
-    let assembled = vehicle::assemble(ports, heads, &config, Clock.now());
-    static FLIGHT_LOOP: StaticCell<FlightLoop<'static>> = StaticCell::new();
+    let assembled = Assembled::new(split, &config, Clock.now());
+    static FLIGHT_LOOP: StaticCell<FlightLoop<'static, Runnables>> = StaticCell::new();
     let flight_loop = FLIGHT_LOOP.init(assembled.flight_loop);
     let mut outside = assembled.outside;
-    outside.self_test.publish(Clock.now(), &tested.message());
+    let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
+    outside.self_test.self_test.publish(Clock.now(), &tested.message());
     static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
-    let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
+    let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(assembled.taps)));
+    static HEALTH: Healths = Healths::new();
+    static PROFILE: Profile = Profile::new(&ACTIVATIONS);
     let pins: Pins<'static> = split_resources!(chip);
     let flight = flight::Parts {
         flight_loop,
@@ -102,6 +108,9 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         duties: outside.motors,
         motors: pins.motors,
         spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi, interrupts: chip.IO_MUX },
+        watchdog,
+        health: &HEALTH,
+        profile: &PROFILE,
     };
     let sensors = sensors::Parts {
         unit: chip.I2C0,
@@ -112,15 +121,27 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         mag: outside.mag,
         baro: outside.baro,
         power: outside.power,
+        health: &HEALTH,
     };
     let people =
-        people::Parts { pulses: chip.RMT, pins: pins.people, signal: outside.indicator, button: outside.button };
-    let radio = radio::Parts { unit: chip.WIFI, peer, pilot: outside.pilot, telemetry: outside.telemetry };
-    let console = console::Parts { usb: chip.USB_DEVICE, memory, storage, config, tested };
+        people::Parts { pulses: chip.RMT, pins: pins.people, indicator: outside.indicator, button: outside.button_pin };
+    let radio = radio::Parts { unit: chip.WIFI, peer, ends: outside.link };
+    let console = console::Parts {
+        usb: chip.USB_DEVICE,
+        memory,
+        health: &HEALTH,
+        profile: &PROFILE,
+        ends: outside.console,
+        storage,
+        storage_ends: outside.storage,
+        config,
+        tested,
+    };
+    let supervisor = outside.supervisor;
     let ground = move |spawner: Spawner| {
         spawner.spawn(sensors::run(sensors).expect("spawned once"));
         spawner.spawn(people::run(people).expect("spawned once"));
-        spawner.spawn(memory::run(memory).expect("spawned once"));
+        spawner.spawn(memory::run(memory, supervisor).expect("spawned once"));
         spawner.spawn(console::run(console).expect("spawned once"));
         spawner.spawn(radio::run(radio).expect("spawned once"));
     };

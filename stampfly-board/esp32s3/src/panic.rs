@@ -8,7 +8,7 @@ use core::panic::PanicInfo;
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    cutoff::trip_for_good();
+    cutoff::lock_out();
     // Before the message, which takes its time: a restart would lose it.
     cutoff::stand_down();
     esp_println::println!("\n{info}\nMotors are off. Switch off and on again.");

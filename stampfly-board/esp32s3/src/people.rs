@@ -12,7 +12,7 @@ use esp_hal::time::Rate;
 use esp_hal_smartled::{RmtSmartLeds, WS2812B_TIMING, buffer_size, color_order};
 use smart_leds_trait::RGB8;
 use stampfly_board::messages::ButtonContact;
-use stampfly_board::wiring;
+use stampfly_board::topics;
 use stampfly_drivers::{Button, Buzzer, Indicator, Lights, PinButton, Timebase};
 
 /// The clock of the unit that makes the lights' pulses.
@@ -25,14 +25,14 @@ type Chain<const N: usize> = RmtSmartLeds<'static, N, Blocking, RGB8, color_orde
 pub struct Parts {
     pub pulses: RMT<'static>,
     pub pins: PeoplePins<'static>,
-    pub signal: wiring::signal::Rx<'static>,
-    pub button: wiring::button_contact::Tx<'static>,
+    pub indicator: topics::IndicatorEnds<'static>,
+    pub button: topics::ButtonPinEnds<'static>,
 }
 
 /// Shows, sounds and listens for ever.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { pulses, pins, mut signal, mut button } = parts;
+    let Parts { pulses, pins, mut indicator, mut button } = parts;
     let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
     let status: Chain<{ buffer_size::<RGB8>(1) }> =
         Chain::new(WS2812B_TIMING, pulses.channel0, pins.status_light, PULSE_CLOCK).expect("possible pulses");
@@ -49,9 +49,9 @@ pub async fn run(parts: Parts) {
         ticker.next().await;
         let now = Clock.now();
         if look {
-            button.publish(now, &ButtonContact { pressed: contact.is_pressed() });
+            button.button_contact.publish(now, &ButtonContact { pressed: contact.is_pressed() });
         }
-        if let Some(sample) = signal.latest() {
+        if let Some(sample) = indicator.signal.latest() {
             status.show(&sample.data);
             body.show(&sample.data);
             buzzer.show(&sample.data);

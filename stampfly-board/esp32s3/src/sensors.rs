@@ -10,50 +10,69 @@ use embassy_futures::join::join5;
 use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
 use esp_hal::peripherals::I2C0;
 use stampfly_board::devices;
-use stampfly_board::tasks::{Health, Retry, pump};
-use stampfly_board::wiring;
+use stampfly_board::topics;
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
+use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Magnetometer, PowerMonitor, RangeFinder};
 
-/// How each driver fares.
-pub struct SensorHealth {
-    pub imu: Health,
-    pub flow: Health,
-    pub tof: Health,
-    pub tof_front: Health,
-    pub mag: Health,
-    pub baro: Health,
-    pub power: Health,
+/// How each driver does.
+pub struct Healths {
+    pub imu: SensorHealth,
+    pub flow: SensorHealth,
+    pub tof: SensorHealth,
+    pub tof_front: SensorHealth,
+    pub mag: SensorHealth,
+    pub baro: SensorHealth,
+    pub power: SensorHealth,
 }
 
-/// How each driver fares, for whoever reports.
-pub static HEALTH: SensorHealth = SensorHealth {
-    imu: Health::new(),
-    flow: Health::new(),
-    tof: Health::new(),
-    tof_front: Health::new(),
-    mag: Health::new(),
-    baro: Health::new(),
-    power: Health::new(),
-};
+impl Healths {
+    /// No sample and no error yet.
+    pub const fn new() -> Self {
+        Self {
+            imu: SensorHealth::new(),
+            flow: SensorHealth::new(),
+            tof: SensorHealth::new(),
+            tof_front: SensorHealth::new(),
+            mag: SensorHealth::new(),
+            baro: SensorHealth::new(),
+            power: SensorHealth::new(),
+        }
+    }
+
+    /// Each with the name of its topic without `sensor_`.
+    pub const fn all(&self) -> [(&'static str, &SensorHealth); 7] {
+        let Self { imu, flow, tof, tof_front, mag, baro, power } = self;
+        [
+            ("imu", imu),
+            ("flow", flow),
+            ("tof", tof),
+            ("tof_front", tof_front),
+            ("mag", mag),
+            ("baro", baro),
+            ("power", power),
+        ]
+    }
+}
 
 /// What the slow sensors need.
 pub struct Parts {
     pub unit: I2C0<'static>,
     pub pins: I2cPins<'static>,
     pub range: RangePins<'static>,
-    pub tof: wiring::sensor_tof::Tx<'static>,
-    pub tof_front: wiring::sensor_tof_front::Tx<'static>,
-    pub mag: wiring::sensor_mag::Tx<'static>,
-    pub baro: wiring::sensor_baro::Tx<'static>,
-    pub power: wiring::sensor_power::Tx<'static>,
+    pub tof: topics::TofEnds<'static>,
+    pub tof_front: topics::TofFrontEnds<'static>,
+    pub mag: topics::MagEnds<'static>,
+    pub baro: topics::BaroEnds<'static>,
+    pub power: topics::PowerEnds<'static>,
+    pub health: &'static Healths,
 }
 
-/// Reads them for ever.
+/// Reads them until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power } = parts;
+    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power, health } = parts;
     let mut bus = SharedI2c::new(i2c::Bus::start(unit, pins).await);
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = bus.split();
     let asleep = |pin: AnyPin<'static>| Output::new(pin, Level::Low, OutputConfig::default());
@@ -64,34 +83,40 @@ pub async fn run(parts: Parts) {
     let mut baro_chip = devices::barometer(to_baro, Clock);
     let mut power_chip = devices::power(to_power, Clock);
     join5(
-        pump(async || down.next().await, |at, sample| _ = tof.publish(at, sample), Clock, Retry::PATIENT, &HEALTH.tof),
-        pump(
+        run_sensor(
+            async || down.next().await,
+            |at, sample| _ = tof.sensor_tof.publish(at, sample),
+            Clock,
+            Backoff::SHARED,
+            &health.tof,
+        ),
+        run_sensor(
             async || ahead.next().await,
-            |at, sample| _ = tof_front.publish(at, sample),
+            |at, sample| _ = tof_front.sensor_tof_front.publish(at, sample),
             Clock,
-            Retry::PATIENT,
-            &HEALTH.tof_front,
+            Backoff::SHARED,
+            &health.tof_front,
         ),
-        pump(
+        run_sensor(
             async || mag_chip.next().await,
-            |at, sample| _ = mag.publish(at, sample),
+            |at, sample| _ = mag.sensor_mag.publish(at, sample),
             Clock,
-            Retry::PATIENT,
-            &HEALTH.mag,
+            Backoff::SHARED,
+            &health.mag,
         ),
-        pump(
+        run_sensor(
             async || baro_chip.next().await,
-            |at, sample| _ = baro.publish(at, sample),
+            |at, sample| _ = baro.sensor_baro.publish(at, sample),
             Clock,
-            Retry::PATIENT,
-            &HEALTH.baro,
+            Backoff::SHARED,
+            &health.baro,
         ),
-        pump(
+        run_sensor(
             async || power_chip.next().await,
-            |at, sample| _ = power.publish(at, sample),
+            |at, sample| _ = power.sensor_power.publish(at, sample),
             Clock,
-            Retry::PATIENT,
-            &HEALTH.power,
+            Backoff::SHARED,
+            &health.power,
         ),
     )
     .await;

@@ -1,10 +1,11 @@
 //! What survives a power cut: parameters and the transmitter the vehicle belongs to, in the partition `nvs`.
 //!
-//! A write stops both cores for up to 200 ms. It takes the mode machine's word that the vehicle is disarmed, and from
-//! before that word is asked for until the write is done the motors stay still, whatever happens in between.
+//! A write stops both cores for up to 200 ms. It needs the mode machine's word that the vehicle is disarmed. From before
+//! that word is asked for until the write is done, `storage_busy` keeps the motors still, even if the vehicle is armed in
+//! between.
 
+use crate::clock::Clock;
 use crate::flash::Flash;
-use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::block_on;
 use embassy_time::{Duration, Timer};
@@ -14,38 +15,38 @@ use esp_bootloader_esp_idf::partitions::{
 use esp_hal::peripherals::FLASH;
 use esp_storage::{FlashStorage, FlashStorageError};
 use stampfly_board::VehicleConfig;
-use stampfly_board::parameters::{PARAMETERS, PEER};
+use stampfly_board::messages::StorageBusy;
+use stampfly_board::parameters::{self, PEER};
+use stampfly_board::topics::StorageBusyTx;
+use stampfly_drivers::Timebase;
+use stampfly_flight::parameters::Parameters;
 use stampfly_link::Address;
 use stampfly_param::{Disarmed, EraseError, ParameterStore, SaveError};
 use stampfly_types::messages::SystemMode;
 
-/// Several periods of the motors' duties and of the cut-off.
+/// Several periods of the motors' duties.
 const NOTICE: Duration = Duration::from_millis(20);
 
-static WRITING: AtomicBool = AtomicBool::new(false);
+/// Flash is being written as long as this lives, and the bus knows.
+struct Writing<'t>(&'t mut StorageBusyTx<'static>);
 
-/// Is flash being written? Then no motor turns.
-pub fn is_writing() -> bool {
-    WRITING.load(Ordering::Acquire)
-}
-
-/// True while it lives.
-struct Writing;
-
-impl Writing {
-    /// Returns when the motors and the cut-off have taken notice. A vehicle that is armed already notices nothing.
-    async fn begin(mode: &mut impl FnMut() -> Option<SystemMode>) -> Result<Self, StorageError> {
+impl<'t> Writing<'t> {
+    /// Returns when the motors are still. On an armed vehicle nothing begins.
+    async fn begin(
+        busy: &'t mut StorageBusyTx<'static>,
+        mode: &mut impl FnMut() -> Option<SystemMode>,
+    ) -> Result<Self, StorageError> {
         let _ = proven(mode)?;
-        WRITING.store(true, Ordering::Release);
-        let writing = Self;
+        busy.publish(Clock.now(), &StorageBusy { busy: true });
+        let writing = Self(busy);
         Timer::after(NOTICE).await;
         Ok(writing)
     }
 }
 
-impl Drop for Writing {
+impl Drop for Writing<'_> {
     fn drop(&mut self) {
-        WRITING.store(false, Ordering::Release);
+        self.0.publish(Clock.now(), &StorageBusy { busy: false });
     }
 }
 
@@ -89,10 +90,10 @@ impl Storage {
     pub async fn load(&mut self, config: &mut VehicleConfig) -> usize {
         let Some(store) = &mut self.store else { return 0 };
         let mut unusable = 0;
-        for parameter in PARAMETERS {
-            match store.load(parameter.name, parameter.min..=parameter.max).await {
+        for (index, info) in parameters::all().enumerate() {
+            match store.load(info.name, info.min..=info.max).await {
                 Ok(None) => {}
-                Ok(Some(value)) => unusable += usize::from(parameter.set(config, value).is_err()),
+                Ok(Some(value)) => unusable += usize::from(config.set(index, value).is_err()),
                 Err(_) => unusable += 1,
             }
         }
@@ -109,14 +110,15 @@ impl Storage {
     pub async fn save(
         &mut self,
         config: &VehicleConfig,
+        busy: &mut StorageBusyTx<'static>,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
-        let _still = Writing::begin(&mut mode).await?;
+        let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
-        for parameter in PARAMETERS {
+        for (index, info) in parameters::all().enumerate() {
             let disarmed = proven(&mut mode)?;
-            let (name, value) = (parameter.name, parameter.get(config));
-            store.save(disarmed, name, value, parameter.min..=parameter.max).await.map_err(StorageError::Save)?;
+            let Some(value) = config.get(index) else { break };
+            store.save(disarmed, info.name, value, info.min..=info.max).await.map_err(StorageError::Save)?;
         }
         Ok(())
     }
@@ -125,16 +127,21 @@ impl Storage {
     pub async fn save_peer(
         &mut self,
         peer: Address,
+        busy: &mut StorageBusyTx<'static>,
         mut mode: impl FnMut() -> Option<SystemMode>,
     ) -> Result<(), StorageError> {
-        let _still = Writing::begin(&mut mode).await?;
+        let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         store.save_bytes(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
     }
 
     /// Forgets everything that was kept, the transmitter included.
-    pub async fn reset(&mut self, mut mode: impl FnMut() -> Option<SystemMode>) -> Result<(), StorageError> {
-        let _still = Writing::begin(&mut mode).await?;
+    pub async fn reset(
+        &mut self,
+        busy: &mut StorageBusyTx<'static>,
+        mut mode: impl FnMut() -> Option<SystemMode>,
+    ) -> Result<(), StorageError> {
+        let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         store.erase(proven(&mut mode)?).await.map_err(StorageError::Erase)
     }

@@ -15,6 +15,7 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use stampfly_board::black_box::{BlackBox, RETENTION};
+use stampfly_board::link::Link;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::{VehicleConfig, golden, topics};
 use stampfly_bus::{Band, Taps};
@@ -38,19 +39,22 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 #[unsafe(no_mangle)]
 extern "C" fn flight() {
     vehicle();
-    radio();
     chips();
     let _ = black_box(golden::self_test());
     #[cfg(feature = "control")]
     black_box(black_box([1u32, 2, 3])[black_box(1usize)]);
 }
 
-/// Everything between the sensors' topics and the motors'.
+/// Everything between the sensors' topics and the motors', and the radio's end of the bus.
 fn vehicle() {
     let config: VehicleConfig = black_box(VehicleConfig::default());
     let mut bus = topics::Bus::new();
     let vehicle = Assembled::<Runnables>::new(bus.split(None), &config, black_box(Instant::ZERO));
     let Assembled { mut flight_loop, mut outside, mut taps } = vehicle;
+    let topics::LinkEnds { command_pilot, command_guided: mut guided, system_mode, telemetry, link_peer } =
+        outside.link;
+    let session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
+    let mut link = Link::new(session, command_pilot, link_peer, system_mode, telemetry);
     let mut memory = BlackBox::<1024>::new(RETENTION);
     while black_box(true) {
         let at: Instant = black_box(Instant::ZERO);
@@ -61,28 +65,24 @@ fn vehicle() {
         outside.baro.sensor_baro.publish(at, &black_box(Default::default()));
         outside.cameras.external_pose.publish(at, &black_box(Default::default()));
         outside.power.sensor_power.publish(at, &black_box(Default::default()));
-        outside.link.command_pilot.publish(at, &black_box(Default::default()));
         outside.button_pin.button_contact.publish(at, &black_box(Default::default()));
-        let _ = outside.link.command_guided.publish(at, black_box(Default::default()));
+        let _ = guided.publish(at, black_box(Default::default()));
+        outside.console.motor_test.publish(at, &black_box(Default::default()));
+        outside.console.pairing_request.publish(at, &black_box(Default::default()));
+        outside.storage.storage_busy.publish(at, &black_box(Default::default()));
+        outside.cutoff.cutoff_state.publish(at, &black_box(Default::default()));
+        // Every byte that strangers can send.
+        let bytes = black_box(&[0u8; 32][..]);
+        let _ = black_box(link.receive(at, black_box(Address([0; 6])), bytes));
+        let _ = black_box((PairingPacket::decode(bytes), TelemetryPacket::decode(bytes)));
+        black_box((link.transmit(at), link.session().age(at)));
         flight_loop.run_band(Band::Flight, black_box(at), &mut ());
         flight_loop.run_band(Band::Background, black_box(at), &mut ());
         black_box(outside.motors.actuator_motor.latest());
-        black_box((outside.indicator.signal.latest(), outside.link.telemetry.latest()));
+        black_box((outside.indicator.signal.latest(), outside.supervisor.restart_request.latest()));
+        black_box(outside.storage.link_peer.latest());
         taps.drain(&mut |topic, at, generation, words| memory.note(topic, at, generation, words));
         black_box(memory.records().count());
-    }
-}
-
-/// Every byte that strangers can send.
-fn radio() {
-    let mut session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
-    while black_box(true) {
-        let (at, bytes) = (black_box(Instant::ZERO), black_box(&[0u8; 32][..]));
-        session.set_armed(black_box(false));
-        let _ = black_box(session.start_pairing(at));
-        black_box((session.beacon(at), session.age(at)));
-        let _ = black_box(session.receive(at, black_box(Address([0; 6])), bytes));
-        let _ = black_box((PairingPacket::decode(bytes), TelemetryPacket::decode(bytes)));
     }
 }
 

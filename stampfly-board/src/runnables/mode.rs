@@ -1,12 +1,13 @@
 //! State management: alerts, commands and facts in, the vehicle's state out.
 
 use crate::config::VehicleConfig;
+use crate::messages::RestartRequest;
 use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::{ModeInput, ModeMachine};
-use stampfly_types::Duration;
-use stampfly_types::messages::{ButtonGesture, EstimatorCommand, GuidedKind, PilotInput};
+use stampfly_types::messages::{ButtonGesture, EstimatorCommand, GuidedKind, PilotInput, SystemMode};
+use stampfly_types::{Duration, Instant};
 
 /// A pilot's frame as old as this counts as none.
 const STALE_PILOT: Duration = Duration::from_millis(500);
@@ -18,6 +19,10 @@ pub struct Mode {
     machine: ModeMachine,
     pilot: Option<Stamped<PilotInput>>,
     published: Option<EstimatorCommand>,
+    /// The decision of the step before.
+    last: SystemMode,
+    /// When the vehicle was last armed.
+    armed_at: Instant,
 }
 
 impl Mode {
@@ -34,15 +39,23 @@ impl Runnable for Mode {
     fn run(&mut self, activation: &mut Activation, ends: &mut ModeEnds<'_>) {
         let now = activation.now();
         self.pilot = ends.command_pilot.last().copied().or(self.pilot);
-        let mut commands = Vec::<GuidedKind, 16>::new();
+        // As many as the queue holds, and one of the cut-off's.
+        let mut commands = Vec::<GuidedKind, 17>::new();
         for command in ends.command_guided.iter() {
-            // As many as the queue holds.
             let _ = commands.push(command.data.kind);
+        }
+        // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on without them.
+        if self.last.armed && ends.cutoff_state.get().tripped {
+            let _ = commands.push(GuidedKind::Kill);
         }
         // There is one event in a step, unless the loop was held up. Then the one that stops the motors counts.
         let newest = ends.button_event.last().map(|event| event.data.gesture);
         let mut gestures = ends.button_event.iter().map(|event| event.data.gesture);
         let button = gestures.find(|gesture| *gesture == ButtonGesture::Press).or(newest);
+        // The console asks for what a long press toggles. Not in flight: there the link keeps its transmitter.
+        let pairing = Some(ends.pairing_request.get().wanted).filter(|_| ends.pairing_request.is_new());
+        let pairing = pairing.filter(|wanted| *wanted != self.last.pairing && !self.last.armed);
+        let button = button.or(pairing.map(|_| ButtonGesture::HoldPair));
         let input = ModeInput {
             alerts: ends.system_alert.get().active,
             estimate: ends.estimate_state.get(),
@@ -54,6 +67,15 @@ impl Runnable for Mode {
         };
         let output = self.machine.step(now, &input);
         ends.system_mode.publish(now, &output.mode);
+        self.last = output.mode;
+        if output.mode.armed {
+            self.armed_at = now;
+        }
+        // A press that stopped the motors and was held on does not count: a restart would lose the black box.
+        let reset = ends.button_event.iter().find(|event| event.data.gesture == ButtonGesture::HoldReset);
+        if reset.is_some_and(|event| event.at.since(self.armed_at).seconds() > event.data.held) {
+            ends.restart_request.publish(now, &RestartRequest { requested: true });
+        }
         // The command holds until it changes, so only a change is published.
         if self.published != Some(output.estimator) {
             ends.estimator_command.publish(now, &output.estimator);

@@ -175,7 +175,7 @@ impl vehicle::Surroundings for Surroundings {
         let cameras = setup.cameras;
         let Others { motors, indicator, button, link } = match setup.sensing {
             Sensing::Models => sensing::start_models(tasks, clock, sensors, outside, cameras, health),
-            Sensing::Chips => sensing::start_drivers(tasks, clock, board, shared, sensors, outside, cameras, health),
+            Sensing::Chips => sensing::start_drivers(tasks, clock, (board, shared), sensors, outside, cameras, health),
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
         let station = ground_station::fly(clock.clone(), &setup.mission, link.command_guided, link.telemetry, progress);

@@ -48,6 +48,9 @@ impl Vehicle for StampFly {
     type Outcome = Outcome;
 
     fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
+        if options.live.is_some() {
+            return Err("the StampFly is not flown by other programs".into());
+        }
         let mut setup = Setup::reference(seed);
         setup.mission = match options.mission.as_deref().unwrap_or("square") {
             "square" => Mission::parse(mission::REFERENCE),

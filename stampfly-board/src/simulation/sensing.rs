@@ -100,8 +100,7 @@ pub(super) fn start_models<'a>(
 pub(super) fn start_drivers<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
-    board: chips::Board,
-    shared: &'a mut Shared,
+    (board, shared): (chips::Board, &'a mut Shared),
     models: Sensors,
     ends: topics::Outside<'a>,
     cameras: bool,

@@ -78,9 +78,9 @@ fn controllers_go_on() {
 #[test]
 fn navigator_goes_on() {
     let navigator = goes_on(Navigator::default(), 600, |navigator, k, n| {
-        if k % 10 == 0 {
+        if k.is_multiple_of(10) {
             let (position, yaw) = (n.vector(1.0), n.number(3.0));
-            let kind = if k % 400 == 0 { GuidedKind::Hold } else { GuidedKind::WayPoint };
+            let kind = if k.is_multiple_of(400) { GuidedKind::Hold } else { GuidedKind::WayPoint };
             let _ = navigator.accept(&GuidedCommand { kind, position, yaw, speed: 0.5, dwell: 0.1 });
         }
         let mode = SystemMode { mode: if k < 1_000 { FlightMode::PosHold } else { FlightMode::AltHold }, ..mode_of(k) };
@@ -123,7 +123,7 @@ where
     F: Serialize + DeserializeOwned + PartialEq + core::fmt::Debug,
 {
     goes_on(filter, 500, |filter, k, n| {
-        step(filter, (k as f32 * 117.0 / 400.0 * core::f32::consts::TAU).sin() + n.number(0.1))
+        step(filter, stampfly_types::math::sin(k as f32 * 117.0 / 400.0 * core::f32::consts::TAU) + n.number(0.1))
     });
 }
 

@@ -34,7 +34,7 @@ fn fly<E: Estimator>(estimator: &mut E, k: u64, n: &mut Numbers) -> (StateEstima
     let imu = ImuData { accel: STILL + n.vector(1.0), gyro: n.vector(0.4), temperature: 25.0 };
     estimator.predict(at(k), &imu);
     let (distance, quality) = (0.4 + n.number(0.02), 150 + n.number(100.0) as u8);
-    if k % 13 == 0 {
+    if k.is_multiple_of(13) {
         estimator.fuse_tof(at(k), &TofData { distance, sigma: 0.01, status: 0, valid: !n.once_in(8) });
     }
     if k % 4 == 1 {
@@ -94,7 +94,7 @@ fn still(n: &mut Numbers) -> ImuData {
 fn calibrations_go_on() {
     // Restored half way through its stretch, complete at the end.
     let calibration = goes_on(StillCalibration::default(), 900, |calibration, k, n| {
-        if k % 16 == 0 {
+        if k.is_multiple_of(16) {
             calibration.add_mag(&MagData { field: EARTH + n.vector(1.0) });
             calibration.add_baro(&BaroData { altitude: 100.0 + n.number(0.5), ..Default::default() });
         }

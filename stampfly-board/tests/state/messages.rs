@@ -12,7 +12,10 @@ struct Percent(u8);
 impl Field for Percent {
     const KIND: stampfly_types::FieldKind = stampfly_types::FieldKind::U8;
     const COUNT: usize = 1;
-    const WORDS: usize = 1;
+    const SIZE: usize = 1;
+    fn initial() -> Self {
+        Self(0)
+    }
     fn write(&self, words: &mut [u32]) {
         self.0.write(words);
     }
@@ -24,9 +27,9 @@ impl Field for Percent {
 stampfly_types::message! {
     struct Own {
         /// An array.
-        many: [u16; 3] ["1"],
+        many: [u16; 3],
         /// A field of its own kind.
-        share: Percent ["1"],
+        share: Percent,
     }
 }
 

@@ -40,7 +40,7 @@ fn mode_machine_goes_on() {
             thrust_ceiling: 2.0,
             descent_rate: 0.3,
         };
-        let commands = if k % 230 == 0 { &[GuidedKind::Arm, GuidedKind::TakeOff][..] } else { &[] };
+        let commands = if k.is_multiple_of(230) { &[GuidedKind::Arm, GuidedKind::TakeOff][..] } else { &[] };
         let pilot = pilot(k, n);
         let input = ModeInput {
             alerts: if k % 400 > 330 { Alerts::COMM_LOST | Alerts::LOW_BATTERY } else { Alerts::NONE },
@@ -72,7 +72,7 @@ fn failsafe_goes_on() {
             imu: (k % 200 > 15).then_some((at(k), &imu)),
             estimate: &estimate,
             status: &status,
-            power: (k % 28 == 0).then_some((at(k), &power)),
+            power: (k.is_multiple_of(28)).then_some((at(k), &power)),
             command: Some(at(k - k % 250)),
             tof: Some(at(k - k % 350)),
             flow: None,
@@ -86,7 +86,7 @@ fn failsafe_goes_on() {
 #[test]
 fn landing_goes_on() {
     goes_on(TakeoffLanding::default(), 600, |manager, k, n| {
-        let height = 0.5 * (k as f32 * 0.02).sin().abs();
+        let height = 0.5 * stampfly_types::math::sin(k as f32 * 0.02).abs();
         let estimate = StateEstimate { height, velocity: n.vector(0.05), valid: Validity::ALL, ..Default::default() };
         let setpoint = Setpoint { position: Vec3::new(0.0, 0.0, -0.5), ..Default::default() };
         let demand = ControlOutput { thrust: 0.25 + n.number(0.1), ..Default::default() };
@@ -98,10 +98,10 @@ fn landing_goes_on() {
 #[test]
 fn authority_goes_on() {
     goes_on(Authority::default(), 600, |authority, k, n| {
-        if k % 8 == 0 && k % 300 < 200 {
+        if k.is_multiple_of(8) && k % 300 < 200 {
             authority.pilot(at(k), &pilot(k, n));
         }
-        if k % 50 == 0 {
+        if k.is_multiple_of(50) {
             authority.guided(at(k));
         }
         authority.step(at(k))

@@ -24,17 +24,17 @@ impl Observer for Records {
 fn publish(outside: &mut topics::Outside<'_>, k: u64, n: &mut Numbers) {
     let accel = Vec3::new(0.0, 0.0, -9.80665) + n.vector(0.02);
     outside.imu.sensor_imu.publish(at(k), &ImuData { accel, gyro: n.vector(0.003), temperature: 25.0 });
-    if k % 13 == 0 {
+    if k.is_multiple_of(13) {
         outside.tof.sensor_tof.publish(at(k), &TofData { distance: 0.03, sigma: 0.005, status: 0, valid: true });
     }
-    if k % 4 == 0 {
+    if k.is_multiple_of(4) {
         let flow = FlowData { delta_x: n.number(1e-3), delta_y: 0.0, interval: 0.01, quality: 200, valid: true };
         outside.flow.sensor_flow.publish(at(k), &flow);
     }
-    if k % 28 == 0 {
+    if k.is_multiple_of(28) {
         outside.power.sensor_power.publish(at(k), &PowerData { voltage: 4.0 + n.number(0.01), ..Default::default() });
     }
-    if k % 8 == 0 {
+    if k.is_multiple_of(8) {
         let pilot = PilotInput { arm: k > 1_600, mode: FlightMode::AltHold, roll: n.number(0.1), ..Default::default() };
         outside.link.command_pilot.publish(at(k), &pilot);
         outside.button_pin.button_contact.publish(at(k), &ButtonContact { pressed: k % 2_300 < 40 });

@@ -2,10 +2,10 @@
 
 use core::cell::RefCell;
 use stampfly_board::devices;
-use stampfly_board::tasks::{Health, Retry, pump};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
+use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{
     Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Sample, SensorError, SensorErrorKind,
 };
@@ -57,10 +57,10 @@ pub fn run_with(seed: u64, end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7]
     let (imu, flow, _) = slots.split(imu, flow, devices::LONGEST_FLOW);
     let time = || clock.clone();
     let notes: [RefCell<Vec<Said>>; 7] = Default::default();
-    let healths: [Health; 7] = Default::default();
+    let healths: [SensorHealth; 7] = Default::default();
     let mut tasks = Tasks::new(clock.clone());
     macro_rules! watch {
-        ($index:literal, $retry:ident, $driver:expr, $figure:expr) => {{
+        ($index:literal, $backoff:ident, $driver:expr, $figure:expr) => {{
             let (mut driver, clock, note) = ($driver, clock.clone(), &notes[$index]);
             let health = &healths[$index];
             tasks.spawn(async move {
@@ -70,7 +70,7 @@ pub fn run_with(seed: u64, end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7]
                     note.borrow_mut().push((clock.now(), said));
                     outcome
                 };
-                match pump(noted, |_, _| {}, clock.clone(), Retry::$retry, health).await {}
+                match run_sensor(noted, |_, _| {}, clock.clone(), Backoff::$backoff, health).await {}
             });
         }};
     }
@@ -78,13 +78,13 @@ pub fn run_with(seed: u64, end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7]
     let share = |good: bool| f32::from(u8::from(good));
     let down = devices::range_down(to_down, shutdown_bottom, &boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &boot, time());
-    watch!(0, PROMPT, devices::imu(imu, time(), &image), |data: &ImuData| data.accel.norm());
-    watch!(1, PATIENT, devices::flow(flow, time()), |data: &FlowData| share(data.valid && data.quality > 0));
-    watch!(2, PATIENT, devices::magnetometer(to_mag, time()), |data: &MagData| data.field.norm());
-    watch!(3, PATIENT, devices::barometer(to_baro, time()), |data: &BaroData| data.pressure);
-    watch!(4, PATIENT, devices::power(to_power, time()), |data: &PowerData| data.voltage);
-    watch!(5, PATIENT, down, |data: &TofData| data.distance);
-    watch!(6, PATIENT, ahead, |data: &TofData| share(data.valid));
+    watch!(0, CRITICAL, devices::imu(imu, time(), &image), |data: &ImuData| data.accel.norm());
+    watch!(1, SHARED, devices::flow(flow, time()), |data: &FlowData| share(data.valid && data.quality > 0));
+    watch!(2, SHARED, devices::magnetometer(to_mag, time()), |data: &MagData| data.field.norm());
+    watch!(3, SHARED, devices::barometer(to_baro, time()), |data: &BaroData| data.pressure);
+    watch!(4, SHARED, devices::power(to_power, time()), |data: &PowerData| data.voltage);
+    watch!(5, SHARED, down, |data: &TofData| data.distance);
+    watch!(6, SHARED, ahead, |data: &TofData| share(data.valid));
     for (instant, action) in events {
         tasks.run_until(*instant);
         action(&access);

@@ -1,22 +1,24 @@
 //! A vehicle in simulation with a script in place of the ground station, and hands on what may fail.
 //!
-//! The same stack as `simulate::fly` runs, without mission, log and figures; in exchange a script may use every
-//! command there is, press the button and silence the inertial sensor.
+//! The simulator's executor flies the stack as in every mission, in surroundings of this test's own: without mission, log
+//! and figures; in exchange a script may use every command there is, press the button and silence the inertial sensor.
 
+use stampfly_board::VehicleConfig;
 use stampfly_board::messages::{ButtonContact, TelemetryFrame};
-use stampfly_board::vehicle::{Assembled, assemble};
-use stampfly_board::{VehicleConfig, wiring};
-use stampfly_bus::Band;
+use stampfly_board::schedule::Runnables;
+use stampfly_board::topics::{self, Id};
 use stampfly_drivers::{
     Barometer, Button, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
 };
-use stampfly_sim::sensors::{ButtonModel, Sensors};
+use stampfly_flight::newest::message;
+use stampfly_sim::sensors::{ButtonModel, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_sim::{Simulation, SimulationConfig, Truth};
+use stampfly_sim::vehicle::{self, FlightOptions};
+use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{
     Alerts, FlightState, GuidedCommand, GuidedKind, MotorOutput, PilotInput, SystemAlert, SystemMode,
 };
-use stampfly_types::{Duration, Instant, Message, Vec3};
+use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -24,9 +26,9 @@ use std::pin::Pin;
 /// What a script can do.
 pub struct Hands<'b> {
     pub clock: Clock,
-    guided: wiring::command_guided::Tx<'b>,
-    pilot: wiring::command_pilot::Tx<'b>,
-    telemetry: wiring::telemetry::Rx<'b>,
+    guided: topics::CommandGuidedTx<'b>,
+    pilot: topics::CommandPilotTx<'b>,
+    telemetry: topics::TelemetryRx<'b>,
     pub button: ButtonModel,
     pub imu_silent: &'b Cell<bool>,
 }
@@ -140,70 +142,113 @@ macro_rules! pump {
     }};
 }
 
+/// A world with a script in it.
+struct Stage<S> {
+    clock: Clock,
+    world: World,
+    sensors: Option<Sensors>,
+    imu_silent: Cell<bool>,
+    script: Option<S>,
+    end: Instant,
+}
+
+impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage<S> {
+    type Runnables = Runnables;
+    type Outcome = Seen;
+    type Around<'a>
+        = Watch<'a>
+    where
+        S: 'a;
+
+    fn clock(&self) -> Clock {
+        self.clock.clone()
+    }
+
+    fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Watch<'a> {
+        let Self { clock, world, sensors, imu_silent, script, end } = self;
+        let imu_silent: &Cell<bool> = imu_silent;
+        let (sensors, script) = sensors.take().zip(script.take()).expect("started once");
+        let Sensors { imu, tof, flow, mag, baro, power, motors, button, .. } = sensors;
+        tasks.spawn(pump!(imu, outside.imu.sensor_imu, imu_silent.get()));
+        tasks.spawn(pump!(tof, outside.tof.sensor_tof, false));
+        tasks.spawn(pump!(flow, outside.flow.sensor_flow, false));
+        tasks.spawn(pump!(mag, outside.mag.sensor_mag, false));
+        tasks.spawn(pump!(baro, outside.baro.sensor_baro, false));
+        tasks.spawn(pump!(power, outside.power.sensor_power, false));
+        let (mut pin, mut contact, watch) = (button.clone(), outside.button_pin.button_contact, clock.clone());
+        tasks.spawn(async move {
+            loop {
+                contact.publish(watch.now(), &ButtonContact { pressed: pin.is_pressed() });
+                watch.sleep_until(watch.now() + Duration::from_millis(20)).await;
+            }
+        });
+        tasks.spawn(script(Hands {
+            clock: clock.clone(),
+            guided: outside.link.command_guided,
+            pilot: outside.link.command_pilot,
+            telemetry: outside.link.telemetry,
+            button,
+            imu_silent,
+        }));
+        let (duties, world, end) = (outside.motors.actuator_motor, world.clone(), *end);
+        Watch { world, duties, motors, end, seen: Seen::default() }
+    }
+}
+
+/// Drives the motors, and notes what there is to see.
+struct Watch<'a> {
+    world: World,
+    duties: topics::ActuatorMotorRx<'a>,
+    motors: MotorModel,
+    end: Instant,
+    seen: Seen,
+}
+
+impl vehicle::Around for Watch<'_> {
+    type Outcome = Seen;
+
+    fn drive(&mut self, now: Instant) {
+        if self.duties.has_new()
+            && let Some(output) = self.duties.latest()
+        {
+            let Ok(()) = self.motors.write(&output.data);
+            self.seen.truths.push((now, self.world.truth_at(now)));
+        }
+    }
+
+    fn published(&mut self, topic: usize, at: Instant, words: &[u32]) {
+        let what = "what was published";
+        match Id::ALL[topic] {
+            Id::system_mode => self.seen.modes.push((at, message(words).expect(what))),
+            Id::system_alert => self.seen.alerts.push((at, message::<SystemAlert>(words).expect(what).active)),
+            Id::actuator_motor => self.seen.motors.push((at, message(words).expect(what))),
+            _ => {}
+        }
+    }
+
+    fn progress(&self) -> (f32, &'static str) {
+        (0.0, "")
+    }
+
+    fn is_over(&mut self, now: Instant) -> bool {
+        now >= self.end
+    }
+
+    fn finish(self) -> Seen {
+        self.seen
+    }
+}
+
 /// Runs a vehicle for this long with this script.
 pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Script<'b>) -> Seen {
     let config = SimulationConfig { seed, ..Default::default() };
     let Simulation { clock, world, sensors } = Simulation::new(&config);
-    let Sensors { imu, tof, flow, mag, baro, power, mut motors, button, .. } = sensors;
-    let mut bus = wiring::Bus::new();
-    let imu_silent = &Cell::new(false);
-    let wiring::Split { ports, mut taps, heads } = bus.split(None);
-    let Assembled { mut flight_loop, outside } = assemble(ports, heads, &VehicleConfig::default(), config.start);
-    let mut duties = outside.motors;
-
-    let mut tasks = Tasks::new(clock.clone());
-    tasks.spawn(pump!(imu, outside.imu, imu_silent.get()));
-    tasks.spawn(pump!(tof, outside.tof, false));
-    tasks.spawn(pump!(flow, outside.flow, false));
-    tasks.spawn(pump!(mag, outside.mag, false));
-    tasks.spawn(pump!(baro, outside.baro, false));
-    tasks.spawn(pump!(power, outside.power, false));
-    let (mut pin, mut contact, watch) = (button.clone(), outside.button, clock.clone());
-    tasks.spawn(async move {
-        loop {
-            contact.publish(watch.now(), &ButtonContact { pressed: pin.is_pressed() });
-            watch.sleep_until(watch.now() + Duration::from_millis(20)).await;
-        }
-    });
-    tasks.spawn(script(Hands {
-        clock: clock.clone(),
-        guided: outside.guided,
-        pilot: outside.pilot,
-        telemetry: outside.telemetry,
-        button,
-        imu_silent,
-    }));
-
-    let mut seen = Seen::default();
-    let end = config.start + Duration::from_seconds(seconds);
-    while clock.now() < end {
-        let tick = flight_loop.next_tick().filter(|tick| *tick > clock.now());
-        let next = tasks.next_deadline().into_iter().chain(tick).min().expect("sensors never end");
-        tasks.run_until(next.max(clock.now()));
-        let now = clock.now();
-        flight_loop.run_band(Band::Flight, now, &mut ());
-        if duties.has_new()
-            && let Some(output) = duties.latest()
-        {
-            let Ok(()) = motors.write(&output.data);
-            seen.truths.push((now, world.truth_at(now)));
-        }
-        flight_loop.run_band(Band::Background, now, &mut ());
-        taps.drain(&mut |id, at, _, words| match id {
-            wiring::Id::system_mode => seen.modes.push((at, message(words))),
-            wiring::Id::system_alert => seen.alerts.push((at, message::<SystemAlert>(words).active)),
-            wiring::Id::actuator_motor => seen.motors.push((at, message(words))),
-            _ => {}
-        });
-    }
-    assert_eq!(taps.lost(), 0);
-    drop(tasks);
-    seen
-}
-
-fn message<M: Message>(words: &[u32]) -> M
-where
-    M::Words: for<'w> TryFrom<&'w [u32]>,
-{
-    M::Words::try_from(words).ok().and_then(|words| M::from_words(&words)).expect("what was published")
+    let limit = Duration::from_seconds(seconds);
+    let end = config.start + limit;
+    let (sensors, script, imu_silent) = (Some(sensors), Some(script), Cell::new(false));
+    let mut stage = Stage { clock, world, sensors, imu_silent, script, end };
+    let options = FlightOptions { start: config.start, limit, jitter: None };
+    let ended = vehicle::fly(&VehicleConfig::default(), &options, &mut stage, &mut (), &mut |_, _| {});
+    assert_eq!(ended.log_lost, 0);
+    ended.outcome
 }

@@ -1,7 +1,6 @@
 //! A flight that never was, to develop and to test the page with.
 
-use stampfly_host::flight::Event;
-use stampfly_lab::Flight;
+use stampfly_lab::{Flight, flight::Event};
 use stampfly_types::messages::{
     Alerts, ControlOutput, EstimatorStatus, FlightMode, FlightState, ImuData, MotorOutput, PowerData, Setpoint,
     SetpointAxes, StateEstimate, SystemAlert, SystemMode, TofData,

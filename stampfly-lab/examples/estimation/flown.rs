@@ -1,10 +1,13 @@
 //! A simulated flight from the estimator's side: what each of its activations was given, and what was really the case.
 
+use stampfly_board::schedule::{self, Runnables};
+use stampfly_board::simulation::{Setup, StampFly};
+use stampfly_board::topics::Id;
+use stampfly_bus::Activation;
 use stampfly_eskf::Estimator;
-use stampfly_host::recorder::{Recorder, TOPICS};
-use stampfly_host::simulate::{FlightConfig, fly};
-use stampfly_log::ulog::{Message as Entry, Reader};
+use stampfly_flight::{Observer, newest::message};
 use stampfly_sim::Truth;
+use stampfly_sim::vehicle::{Vehicle, Witness, fly};
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, StateEstimate, TofData,
 };
@@ -28,6 +31,7 @@ pub struct Given {
 }
 
 /// One flight.
+#[derive(Default)]
 pub struct Flown {
     pub given: Vec<Given>,
     pub truth: BTreeMap<Instant, Truth>,
@@ -65,64 +69,56 @@ impl Given {
 }
 
 impl Flown {
-    /// Flies, and reads the log of it.
-    pub fn new(config: &FlightConfig) -> Result<Self, Box<dyn Error>> {
-        let mut recorder = Recorder::with_log(Vec::new());
-        let outcome = fly(config, &mut recorder, &mut |_, _| {});
-        if !outcome.finished {
-            return Err("the mission was not flown to its end".into());
-        }
-        let mut flown = Self { given: Vec::new(), truth: BTreeMap::new(), published: BTreeMap::new() };
-        let mut pending = Given::default();
-        let mut names = BTreeMap::new();
-        for entry in Reader::new(recorder.log()).map_err(|error| error.to_string())? {
-            match entry.map_err(|error| error.to_string())? {
-                Entry::Subscription { id, topic, .. } => {
-                    names.insert(id, topic.to_owned());
-                }
-                Entry::Data { id, payload } => match names.get(&id).map(String::as_str) {
-                    Some("activation_estimation") => {
-                        // An activation begins with its instant.
-                        let now = payload.first_chunk().map(|bytes| Instant::from_micros(u64::from_le_bytes(*bytes)));
-                        pending.now = now.ok_or("an activation without an instant")?;
-                        let Given { calibration, command, .. } = pending;
-                        flown.given.push(std::mem::take(&mut pending));
-                        // What is not a stream stays.
-                        (pending.calibration, pending.command) = (calibration, command);
-                    }
-                    Some(name) => flown.take(name, payload, &mut pending),
-                    None => {}
-                },
-                _ => {}
-            }
-        }
-        Ok(flown)
+    /// Flies, and takes down what the estimation read.
+    pub fn new(setup: &Setup) -> Result<Self, Box<dyn Error>> {
+        let mut notes = Notes::default();
+        let (options, mut surroundings) = (StampFly::options(setup), StampFly::surroundings(setup));
+        let ended = fly(&setup.vehicle, &options, &mut surroundings, &mut notes, &mut |_, _| {});
+        if ended.outcome.finished { Ok(notes.flown) } else { Err("the mission was not flown to its end".into()) }
     }
+}
 
-    fn take(&mut self, topic: &str, payload: &[u8], pending: &mut Given) {
-        match topic {
-            "sensor_imu" => pending.imu.extend(decode(topic, payload)),
-            "sensor_tof" => pending.tof.extend(decode(topic, payload)),
-            "sensor_flow" => pending.flow.extend(decode(topic, payload)),
-            "sensor_mag" => pending.mag.extend(decode(topic, payload)),
-            "sensor_baro" => pending.baro.extend(decode(topic, payload)),
-            "calibration" => pending.calibration = decode(topic, payload).map(|(_, data)| data),
-            "estimator_command" => pending.command = decode(topic, payload).map(|(_, data)| data),
-            "truth" => self.truth.extend(decode::<Truth>(topic, payload)),
-            "estimate_state" => self.published.extend(decode::<StateEstimate>(topic, payload)),
-            _ => {}
+/// Takes down what the estimation reads while a flight is flown.
+#[derive(Default)]
+struct Notes {
+    flown: Flown,
+    pending: Given,
+}
+
+impl Observer for Notes {
+    fn has_read(&mut self, activation: &Activation) {
+        if usize::from(activation.record().index) == schedule::Id::estimation as usize {
+            self.pending.now = activation.record().now;
+            let Given { calibration, command, .. } = self.pending;
+            self.flown.given.push(std::mem::take(&mut self.pending));
+            // What is not a stream stays.
+            (self.pending.calibration, self.pending.command) = (calibration, command);
         }
     }
 }
 
-/// A message of the log; `None` for one that is not as this program writes it.
-fn decode<M: Message>(name: &str, payload: &[u8]) -> Option<(Instant, M)>
-where
-    M::Words: for<'w> TryFrom<&'w [u32]>,
-{
-    let topic = TOPICS.iter().find(|topic| topic.name == name)?;
-    let mut words = vec![0; topic.words()];
-    let stamp = topic.decode(payload, &mut words)?;
-    let words = M::Words::try_from(&words).ok()?;
-    Some((stamp.at, M::from_words(&words)?))
+impl Witness<Runnables> for Notes {
+    fn published(&mut self, topic: usize, at: Instant, _: u32, words: &[u32]) {
+        let pending = &mut self.pending;
+        match Id::ALL.get(topic) {
+            Some(Id::sensor_imu) => pending.imu.extend(sample(at, words)),
+            Some(Id::sensor_tof) => pending.tof.extend(sample(at, words)),
+            Some(Id::sensor_flow) => pending.flow.extend(sample(at, words)),
+            Some(Id::sensor_mag) => pending.mag.extend(sample(at, words)),
+            Some(Id::sensor_baro) => pending.baro.extend(sample(at, words)),
+            Some(Id::calibration) => pending.calibration = message(words),
+            Some(Id::estimator_command) => pending.command = message(words),
+            Some(Id::estimate_state) => self.flown.published.extend(sample::<StateEstimate>(at, words)),
+            _ => {}
+        }
+    }
+
+    fn beside(&mut self, _: usize, at: Instant, _: u32, words: &[u32]) {
+        self.flown.truth.extend(sample::<Truth>(at, words));
+    }
+}
+
+/// A sample as its message; `None` for words that are none.
+fn sample<M: Message>(at: Instant, words: &[u32]) -> Option<(Instant, M)> {
+    Some((at, message(words)?))
 }

@@ -1,7 +1,7 @@
 //! The pictures of `docs/estimation.md`: how the estimator does, on simulated and on recorded flights.
 //!
 //! ```sh
-//! cargo run --release -p stampfly-host --example estimation
+//! cargo run --release -p stampfly-lab --example estimation
 //! ```
 //!
 //! Draws `docs/images/estimation_*.svg` and prints the figures that the document quotes. The recorded ones need the
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Writes a picture.
 fn draw(name: &str, chart: &Chart) -> Result<(), Box<dyn Error>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/images").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/images").join(name);
     std::fs::write(&path, chart.to_svg()).map_err(|error| format!("{}: {error}", path.display()))?;
     println!("  drawn: docs/images/{name}");
     Ok(())

@@ -5,10 +5,9 @@ use crate::{draw, range};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stampfly_board::VehicleConfig;
+use stampfly_board::simulation::{Setup, mission::Mission};
 use stampfly_eskf::filter::{ATTITUDE, POSITION, VELOCITY};
 use stampfly_eskf::{Eskf, Estimator};
-use stampfly_host::mission::Mission;
-use stampfly_host::simulate::FlightConfig;
 use stampfly_lab::chart::{Axis, BLUE, Chart, Mark, ORANGE, Panel, Shape};
 use stampfly_sim::Truth;
 use stampfly_types::{Duration, Instant, Vec3};
@@ -27,7 +26,7 @@ const CAMERA_SIGMA: f32 = 0.005;
 /// Errors beside what the filter believes of them: the reference mission.
 pub fn consistency() -> Result<(), Box<dyn Error>> {
     println!("the reference mission, seed 1: errors and the filter's own three standard deviations");
-    let flown = Flown::new(&FlightConfig::reference(1))?;
+    let flown = Flown::new(&Setup::reference(1))?;
     let mut eskf = Eskf::new(VehicleConfig::default().eskf);
     let mut started = false;
     // Per panel: time, error, three standard deviations.
@@ -124,9 +123,9 @@ fn on_cameras(flown: &Flown, delay: Duration, tell: bool) -> [f64; 2] {
 /// What a late measurement costs, with its time and without.
 pub fn late() -> Result<(), Box<dyn Error>> {
     println!("a simulated flight of 2 m/s on camera positions alone, 50 a second, late: RMS, largest error, m");
-    let mut config = FlightConfig::reference(1);
-    config.mission = Mission::parse(FAST)?;
-    let flown = Flown::new(&config)?;
+    let mut setup = Setup::reference(1);
+    setup.mission = Mission::parse(FAST)?;
+    let flown = Flown::new(&setup)?;
     println!("  {:>5}  {:>18}  {:>18}", "", "with true stamps", "stamped on arrival");
     let mut lines: BTreeMap<bool, [Vec<[f64; 2]>; 2]> = BTreeMap::new();
     for millis in (0..=90).step_by(10) {

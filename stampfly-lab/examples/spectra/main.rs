@@ -1,6 +1,6 @@
 //! Does the simulated inertial sensor shake like the real one?
 //!
-//! `cargo run --release -p stampfly-host --example spectra` reads recordings of a real StampFly, simulates the same
+//! `cargo run --release -p stampfly-lab --example spectra` reads recordings of a real StampFly, simulates the same
 //! situations, prints the power in bands side by side, draws `docs/images/spectra.svg`, and fails when a band is off
 //! by more than the stated factor. `STAMPFLY_DATA` names the folder of the recordings (default `../shared/data`).
 //!
@@ -10,7 +10,7 @@
 //! record, where white noise goes in and the chain's own shape comes out. The flight holds manoeuvres, so it is
 //! compared above 10 Hz for the accelerometer and above 30 Hz for the gyroscope.
 
-#[path = "../../../../stampfly-sim/tests/hover/pilot.rs"]
+#[path = "../../../stampfly-sim/tests/hover/pilot.rs"]
 mod pilot;
 mod plot;
 mod recording;

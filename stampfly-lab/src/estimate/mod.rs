@@ -103,7 +103,7 @@ pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
 /// Runs the estimator over a recording.
 ///
 /// ```
-/// use stampfly_host::{dataset, estimate};
+/// use stampfly_lab::{dataset, estimate};
 ///
 /// let mut text = "timestamp_ms,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n".to_owned();
 /// for row in 0..200 {

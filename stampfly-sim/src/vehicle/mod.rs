@@ -5,6 +5,8 @@
 //! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
 //! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
 //! | [`fly`] | one flight on virtual time |
+//! | [`Scenario`] | what to command and what must be true, as text |
+//! | [`Live`] | other programs fly it, in real time |
 //! | [`Witness`] | is told everything that happens: a log, a hash, a test |
 //!
 //! A program that flies vehicles (missions, campaigns, replay, report) knows them through [`Vehicle`] alone, so a new
@@ -12,11 +14,15 @@
 
 mod executor;
 mod jitter;
+mod live;
 mod page;
+mod scenario;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, fly};
+pub use live::Live;
 pub use page::{Body, Observer, Page, PanelSpec, Pick};
+pub use scenario::Scenario;
 pub use witness::Witness;
 
 use crate::time::{Clock, Tasks};
@@ -101,13 +107,18 @@ pub trait Verdict {
 
     /// One sentence.
     fn sentence(&self) -> String;
+
+    /// Files that belong to the flight beside its log and report: name and contents. None by default.
+    fn files(&self) -> Vec<(&'static str, String)> {
+        Vec::new()
+    }
 }
 
 /// Why a flight cannot be set up: a sentence for whoever typed the options.
 pub type SetupError = String;
 
 /// Options of a flight as they are typed. A vehicle refuses what it has no use for.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// A mission: a built-in name or a file.
     pub mission: Option<String>,
@@ -127,6 +138,8 @@ pub struct Options {
     pub cameras: bool,
     /// Seed of the executor's delays.
     pub jitter: Option<u64>,
+    /// Fly what other programs ask for.
+    pub live: Option<Live>,
 }
 
 /// One number that options can change.

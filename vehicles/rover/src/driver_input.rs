@@ -56,7 +56,7 @@ pub struct DriverSources {
 }
 
 /// Selects and limits the driver's input.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DriverSelector {
     demo_started: Option<Instant>,
 }

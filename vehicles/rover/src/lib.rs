@@ -1,11 +1,12 @@
 //! A rover made from the StampFly flight stack: the second vehicle of the family, a software-defined vehicle in the
 //! architecture of AUTOSAR (software components over a runtime environment, pure models below).
 //!
+//! * [`topics`] and [`schedule`]: the two tables, which are the runtime environment; [`runnables`]: its components;
 //! * [`models`]: engine, brake, steering, vehicle dynamics as pure functions;
 //! * [`driver_input`], [`safety`], [`diag`]: the components with state or decisions;
 //! * [`parameters`]: the table of parameters, in one group per component;
 //! * [`messages`]: what travels on the rover's topics;
-//! * [`com`]: what travels over UDP.
+//! * [`com`]: what travels over UDP; `simulation` (a feature): the rover for `stampfly fly`, `campaign` and `serve`.
 //!
 //! # Frame
 //! This vehicle follows its own architecture document, not the FRD/NED of the aircraft: **x forward at the start,
@@ -18,15 +19,24 @@
 //! to the centre, and the dynamics subtract a further deceleration. It is latched by [`safety`].
 #![no_std]
 
+#[cfg(feature = "simulation")]
+extern crate std;
+
 pub mod com;
 pub mod diag;
 pub mod driver_input;
 pub mod messages;
 pub mod models;
 pub mod parameters;
+pub mod runnables;
 pub mod safety;
+pub mod schedule;
+#[cfg(feature = "simulation")]
+pub mod simulation;
+pub mod topics;
 
 pub use parameters::Parameters;
+pub use schedule::Runnables;
 
 /// The README's example, compiled.
 #[cfg(doctest)]

@@ -164,6 +164,14 @@ message! {
 }
 
 message! {
+    /// Com works, and hears every component that is another process.
+    pub struct ComStatus {
+        /// Those heard since the last time.
+        heard: Components,
+    }
+}
+
+message! {
     /// What the diagnosis has found.
     pub struct DiagStatus {
         /// Faults in this period.

@@ -59,7 +59,7 @@ pub struct SafetyInput {
 }
 
 /// Supervises the heartbeats and latches the state.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SafetySupervisor {
     /// Last counter and when it was first seen.
     seen: [Option<(u32, Instant)>; COMPONENTS.len()],

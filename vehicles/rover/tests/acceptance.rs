@@ -1,20 +1,19 @@
-//! The acceptance list of the architecture document, line by line, on the components together.
+//! The acceptance list of the architecture document, line by line, on the assembled vehicle.
 
 mod common;
 
-use common::{Events, Rover, manual, run};
+use common::{Events, instant, manual, run};
 use proptest::prelude::*;
 use serde_json::Value;
 use stampfly_log::csv;
-use stampfly_param::{ParameterAction, ParameterRequest, ParameterSet};
+use stampfly_param::{ParameterAction, ParameterRequest, ParameterStatus};
 use stampfly_rover::Parameters;
 use stampfly_rover::messages::*;
-use stampfly_rover::parameters::PROBATION;
 use stampfly_rover::safety::COMPONENTS;
 use stampfly_types::Message;
 
 fn operated(operator: OperatorCommand) -> Events {
-    Events { operator, ..Events::default() }
+    Events { operator: Some(operator), ..Events::default() }
 }
 
 fn last(records: &[LogRecord]) -> LogRecord {
@@ -129,39 +128,69 @@ fn request(action: ParameterAction, name: &str, value: f32) -> ParameterRequest 
 
 #[test]
 fn a_change_of_parameters_alters_behaviour_and_can_be_rolled_back() {
-    let mut set = ParameterSet::new(Parameters::default(), PROBATION).expect("the defaults are valid");
-    let mut accelerations = Vec::new();
-    run(50, |tick, rover: &mut Rover| {
-        match tick {
-            10 => set.request(&request(ParameterAction::Set, "engine.max_accel", 1.0)).expect("in range"),
-            20 => set.request(&request(ParameterAction::Apply, "engine.max_accel", 0.0)).expect("valid"),
-            30 => set.request(&request(ParameterAction::RollBack, "engine.max_accel", 0.0)).expect("there is one"),
-            _ => {}
-        }
-        accelerations.push(rover.signals.drive.acceleration);
-        rover.parameters = set.step(rover.now, true);
+    let mut status = ParameterStatus::default();
+    let records = run(50, |tick, link| {
+        let request = match tick {
+            10 => Some(request(ParameterAction::Set, "engine.max_accel", 1.0)),
+            15 => Some(request(ParameterAction::Set, "engine.max_accel", 99.0)),
+            20 => Some(request(ParameterAction::Apply, "engine.max_accel", 0.0)),
+            30 => Some(request(ParameterAction::RollBack, "engine.max_accel", 0.0)),
+            _ => None,
+        };
+        request.map(|request| link.parameter_request.publish(instant(tick), request).expect("room"));
+        status = link.parameter_status.latest().map_or(status, |sample| sample.data);
         operated(manual(1.0, 0.0, 0.0))
     });
-    assert_eq!(accelerations[20], 2.0, "nothing changes before it is applied");
-    assert_eq!(accelerations[21..31], [1.0; 10], "and then from the next period on");
-    assert_eq!(accelerations[31..], [2.0; 19]);
-    assert_eq!(set.status().version, 2);
+    let acceleration = |from: usize, to: usize, expected: f32| {
+        records[from..to].iter().for_each(|record| assert_eq!(record.drive_accel_cmd, expected, "{}", record.t));
+    };
+    acceleration(0, 20, 2.0);
+    acceleration(20, 30, 1.0);
+    acceleration(30, 50, 2.0);
+    assert_eq!((status.version, status.applied_at, status.refused), (2, instant(30), 1));
 }
 
 #[test]
-fn parameters_that_break_the_vehicle_are_rolled_back_by_the_diagnosis() {
-    let mut set = ParameterSet::new(Parameters::default(), PROBATION).expect("the defaults are valid");
-    let mut rover = Rover::default();
-    rover.parameters = set.step(rover.now, true);
-    set.set(index_of("engine.max_accel") as usize, 1.0).expect("in range");
-    set.apply().expect("valid");
-    rover.parameters = set.step(rover.now, true);
-    // An engine that does not keep to the new limit.
-    rover.signals.drive.acceleration = 1.7;
-    let healthy = stampfly_rover::diag::check(&rover.signals, &rover.parameters).is_empty();
-    assert!(!healthy);
-    assert_eq!(set.step(rover.now, healthy), Parameters::default());
-    assert_eq!(set.status().version, 2);
+fn parameters_that_do_not_fit_the_vehicle_are_rolled_back_by_the_diagnosis() {
+    let mut version = 0;
+    let records = run(200, |tick, link| {
+        let request = match tick {
+            50 => Some(request(ParameterAction::Set, "engine.max_accel", 1.0)),
+            51 => Some(request(ParameterAction::Apply, "engine.max_accel", 0.0)),
+            _ => None,
+        };
+        request.map(|request| link.parameter_request.publish(instant(tick), request).expect("room"));
+        version = link.parameter_status.latest().map_or(0, |sample| sample.data.version);
+        // An engine that does not keep to the new limit.
+        let remote_drive = Some(DriveCommand { acceleration: 1.7 });
+        Events { remote_drive, ..operated(manual(1.0, 0.0, 0.0)) }
+    });
+    assert_eq!(version, 2, "applied, and rolled back");
+    assert_eq!(records[51].system_state, SystemState::Normal);
+    assert_eq!(records[52].system_state, SystemState::Degraded, "the fault");
+}
+
+#[test]
+fn an_engine_in_another_process_drives_and_its_death_is_an_emergency_stop() {
+    for (died, silent) in (200..220).flat_map(|died| [(died, false), (died, true)]) {
+        let records = run(died + 70, |tick, _| Events {
+            remote_drive: (tick < died).then_some(DriveCommand { acceleration: 1.5 }),
+            // Without an operator the supervisor runs every 100 ms only.
+            operator: (!silent || tick == 0).then_some(manual(1.0, 0.0, 0.0)),
+            ..Events::default()
+        });
+        assert!(records[..died].iter().all(|record| record.drive_accel_cmd == 1.5 && !record.estop));
+        let stop = records.iter().position(|record| record.system_state == SystemState::EStop).expect("a stop");
+        assert!((died..died + 30).contains(&stop), "{} ticks after the last command", stop - (died - 1));
+        assert_eq!(last(&records).v, 0.0);
+    }
+}
+
+#[test]
+fn a_dead_supervisor_is_an_emergency_stop_of_every_component() {
+    // Nothing runs without its supervisor's word: before the first there is none.
+    let records = run(9, |_, _| Events::default());
+    assert!(records.iter().all(|record| record.brake_decel_cmd == 4.0 && record.drive_accel_cmd == 0.0));
 }
 
 #[test]
@@ -170,7 +199,7 @@ fn a_missing_heartbeat_of_two_components_is_an_emergency_stop_within_the_limit()
         for died in 200..220 {
             let dead = COMPONENTS[first] | COMPONENTS[second];
             let records = run(400, |tick, _| Events {
-                operator: manual(0.5, 0.0, 0.0),
+                operator: Some(manual(0.5, 0.0, 0.0)),
                 dead: if tick >= died { dead } else { Components::NONE },
                 ..Events::default()
             });
@@ -187,7 +216,7 @@ fn a_missing_heartbeat_of_two_components_is_an_emergency_stop_within_the_limit()
 #[test]
 fn a_missing_heartbeat_of_one_component_limits_speed_and_steering_and_the_log_continues() {
     let records = run(800, |tick, _| Events {
-        operator: manual(1.0, 0.0, 1.0),
+        operator: Some(manual(1.0, 0.0, 1.0)),
         dead: if tick >= 200 { Components::COM } else { Components::NONE },
         ..Events::default()
     });
@@ -225,9 +254,9 @@ fn eventful() -> Vec<LogRecord> {
             ..manual(0.7, 0.0, if tick % 200 < 100 { 1.0 / 3.0 } else { -0.9 })
         };
         Events {
-            operator,
+            operator: Some(operator),
             dead: if (700..900).contains(&tick) { Components::COM } else { Components::NONE },
-            replay: None,
+            ..Events::default()
         }
     })
 }
@@ -249,18 +278,16 @@ fn a_replay_of_the_csv_log_reproduces_it() {
     assert_eq!(text.lines().next(), Some(header));
     let lines: Vec<LogRecord> = text.lines().skip(1).map(|line| csv::read_line(line).expect("our own line")).collect();
     let replayed = run(lines.len(), |tick, _| Events {
-        operator: OperatorCommand { mode: InputMode::Replay, ..OperatorCommand::default() },
         replay: lines.get(tick).copied(),
-        dead: Components::NONE,
+        ..operated(OperatorCommand { mode: InputMode::Replay, ..OperatorCommand::default() })
     });
     assert_eq!(log(&replayed), text, "byte for byte");
     // The public logs' three decimals would not do.
     let coarse: Vec<LogRecord> =
         lines.iter().map(|line| LogRecord { steer: (line.steer * 1e3).round() / 1e3, ..*line }).collect();
     let replayed = run(coarse.len(), |tick, _| Events {
-        operator: OperatorCommand { mode: InputMode::Replay, ..OperatorCommand::default() },
         replay: coarse.get(tick).copied(),
-        dead: Components::NONE,
+        ..operated(OperatorCommand { mode: InputMode::Replay, ..OperatorCommand::default() })
     });
     assert_ne!(log(&replayed), text);
 }

@@ -22,6 +22,8 @@ mod panic;
 #[macro_use]
 #[path = "../../src/pins.rs"]
 pub mod pins;
+#[path = "../../src/safe_state.rs"]
+pub mod safe_state;
 #[path = "../../src/spi.rs"]
 pub mod spi;
 
@@ -35,22 +37,9 @@ use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
 use examples::drivers::Failure;
 use pins::*;
+use stampfly_flight::Watchdog;
 
 esp_bootloader_esp_idf::esp_app_desc!();
-
-/// The motors ask for the console's motor test; there is no console.
-pub mod console {
-    use stampfly_board::console::MotorTest;
-
-    pub static MOTOR_TEST: MotorTest = MotorTest::new();
-}
-
-/// The motors ask whether flash is being written; nobody does.
-pub mod storage {
-    pub const fn is_writing() -> bool {
-        false
-    }
-}
 
 /// The pins and units, each with what it is for.
 pub struct Board {
@@ -63,18 +52,20 @@ pub struct Board {
     pub people: PeoplePins<'static>,
     /// The unit that makes the lights' pulses.
     pub pulses: RMT<'static>,
+    /// What the motors feed.
+    pub watchdog: &'static Watchdog,
 }
 
 impl Board {
     /// Stops the motors, then starts the processor, the clock and the cut-off. The first thing a program does.
     pub fn start() -> Self {
-        motors::hold_low();
+        safe_state::hold_low();
         let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
         // Memory the boot loader has done with.
         esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
         motors::start_unit(chip.LEDC);
         esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
-        cutoff::start(chip.TIMG1);
+        let watchdog = cutoff::start(chip.TIMG1, None);
         let pins: Pins<'static> = split_resources!(chip);
         Self {
             motors: pins.motors,
@@ -84,6 +75,7 @@ impl Board {
             range: pins.range,
             people: pins.people,
             pulses: chip.RMT,
+            watchdog,
         }
     }
 }

@@ -7,7 +7,8 @@ use stampfly_board::simulation::StampFly;
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
 use stampfly_lab::estimate::{ATTITUDE, suite};
-use stampfly_sim::vehicle::{Options, Vehicle};
+use stampfly_sim::vehicle::{Live, Options, Vehicle};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
@@ -28,6 +29,8 @@ pub struct Arguments {
 pub enum Command {
     /// Fly a mission in simulation and write its log and report.
     Fly(FlyOptions),
+    /// Simulate a vehicle in real time for other programs, which fly it over UDP.
+    Serve(ServeOptions),
     /// Fly a log again, bit for bit, from what came from outside.
     Replay(ReplayOptions),
     /// List the topics: type, policy, rate, publisher, readers.
@@ -67,7 +70,8 @@ impl Default for VehicleOption {
 pub struct SceneOptions {
     #[command(flatten)]
     pub vehicle: VehicleOption,
-    /// Mission to fly: a file, or one that the vehicle knows by name (StampFly: `square`, `hover`, `random`).
+    /// Mission to fly: a file, or one that the vehicle knows by name (StampFly: `square`, `hover`,
+    /// `random`; rover: `course`, and its CSV logs).
     #[arg(long, value_name = "FILE")]
     pub mission: Option<String>,
     /// Change a number of the simulated vehicle or its surroundings (see `--list`).
@@ -119,6 +123,19 @@ impl Default for FlyOptions {
     fn default() -> Self {
         Self { scene: SceneOptions::default(), seed: 1, out: ".".into() }
     }
+}
+
+/// Options of `serve`.
+#[derive(Clone, Debug, Args)]
+pub struct ServeOptions {
+    #[command(flatten)]
+    pub fly: FlyOptions,
+    /// Where to hear other programs. They are not authenticated: leave it on this machine, or in a network of your own.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:47003")]
+    pub listen: SocketAddr,
+    /// For how long.
+    #[arg(long = "for", value_name = "SECONDS", default_value_t = 600.0, value_parser = seconds)]
+    pub seconds: f32,
 }
 
 /// Options of `golden`.
@@ -238,6 +255,12 @@ fn set_parameters(config: &mut VehicleConfig, texts: &[String]) -> Result<(), Fa
     Ok(())
 }
 
+/// Reads a time up to a day.
+fn seconds(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| format!("'{text}' is no number"))?;
+    if (0.0..=86_400.0).contains(&value) { Ok(value) } else { Err("0 to 86400 seconds".into()) }
+}
+
 /// Reads `N,E`.
 fn north_and_east(text: &str) -> Result<[f32; 2], String> {
     let parse = |part: &str| part.trim().parse().map_err(|_| format!("'{part}' is no number"));
@@ -247,15 +270,15 @@ fn north_and_east(text: &str) -> Result<[f32; 2], String> {
 
 impl SceneOptions {
     /// The flight these options describe.
-    pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>) -> Result<V::Setup, Failure> {
+    pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>, live: Option<Live>) -> Result<V::Setup, Failure> {
         let Self { mission, plant, param, vibration, gust, wind, chips, cameras, .. } = self.clone();
-        let options = Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter };
+        let options = Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, live };
         Ok(V::setup(&options, seed)?)
     }
 
     /// Prints what can be changed.
     pub fn print_list<V: Vehicle>(&self, seed: u64) -> Result<(), Failure> {
-        let setup = self.setup::<V>(seed, self.jitter)?;
+        let setup = self.setup::<V>(seed, self.jitter, None)?;
         for (title, settings) in [("--param", V::parameters(V::config(&setup))), ("\n--plant", V::plant(&setup))] {
             outln!("{title}");
             for row in settings {

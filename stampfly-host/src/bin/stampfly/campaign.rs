@@ -68,7 +68,7 @@ fn fly_all<V: Vehicle, W: Witness<V::Runnables> + Send>(
             let seed = nth("--seed", options.seed)?;
             // Every flight has its own delays, too.
             let jitter = options.scene.jitter.map(|seed| nth("--jitter", seed)).transpose()?;
-            Ok((seed, options.scene.setup::<V>(seed, jitter)?))
+            Ok((seed, options.scene.setup::<V>(seed, jitter, None)?))
         })
         .collect();
     let bar = terminal::bar(options.flights, "flying {wide_bar:.cyan} {pos}/{len} flights, {eta} left");

@@ -1,7 +1,8 @@
-//! `stampfly fly`: one flight, its log and its report, and one screen about it.
+//! `stampfly fly`: one flight, its log and its report, and one screen about it. `stampfly serve`: the same, flown by other
+//! programs.
 
 use crate::Failure;
-use crate::arguments::FlyOptions;
+use crate::arguments::{FlyOptions, ServeOptions};
 use crate::terminal;
 use serde_json::{Map, json};
 use stampfly_bus::Schedule;
@@ -10,26 +11,35 @@ use stampfly_host::recorder::{Recorder, Timing};
 use stampfly_host::report::{Metric, Report};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::flight_log;
-use stampfly_sim::vehicle::{Vehicle, Verdict};
+use stampfly_sim::vehicle::{Live, Vehicle, Verdict};
+use stampfly_types::Duration;
+use std::net::UdpSocket;
 use std::path::Path;
 use std::process::ExitCode;
 
 pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
-    vehicles::with(&options.scene.vehicle.name, Fly(options))?
+    vehicles::with(&options.scene.vehicle.name, Fly(options, None))?
 }
 
-struct Fly<'o>(&'o FlyOptions);
+pub fn serve(options: &ServeOptions) -> Result<ExitCode, Failure> {
+    let socket = UdpSocket::bind(options.listen).map_err(|error| format!("--listen {}: {error}", options.listen))?;
+    outln!("listening on {}", socket.local_addr()?);
+    let limit = Duration::from_seconds(options.seconds);
+    vehicles::with(&options.fly.scene.vehicle.name, Fly(&options.fly, Some(Live { socket: socket.into(), limit })))?
+}
+
+struct Fly<'o>(&'o FlyOptions, Option<Live>);
 
 impl ForVehicle for Fly<'_> {
     type Output = Result<ExitCode, Failure>;
 
     fn run<V: Vehicle>(self) -> Self::Output {
-        let options = self.0;
+        let Self(options, live) = self;
         if options.scene.list {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
         }
-        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter)?;
+        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, live)?;
         std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
         let facts = [
             ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
@@ -48,6 +58,10 @@ impl ForVehicle for Fly<'_> {
         std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
         let page = options.out.join("flight.html");
         write_report::<V>(&flown, &recorder, options, &page)?;
+        for (name, contents) in flown.outcome.files() {
+            let path = options.out.join(name);
+            std::fs::write(&path, contents).map_err(|error| format!("{}: {error}", path.display()))?;
+        }
 
         if options.scene.json {
             print_json(&flown, recorder.hash());

@@ -1,95 +1,70 @@
-//! The rover's components in the order of the document, without topics: what a test needs to drive a whole vehicle.
+//! The assembled vehicle: its tables under the flight loop, tick by tick, with components that can die.
 
-use stampfly_rover::diag::{self, Signals};
-use stampfly_rover::driver_input::{DriverSelector, DriverSources};
+use stampfly_bus::{Activation, ActivationInfo, Band, Schedule, TopicTable};
+use stampfly_flight::Assembled;
 use stampfly_rover::messages::*;
-use stampfly_rover::safety::{COMPONENTS, PERIOD, SafetyInput, SafetySupervisor};
-use stampfly_rover::{Parameters, models};
-use stampfly_types::{Duration, Instant};
-
-pub const TICK: Duration = Duration::from_millis(10);
+use stampfly_rover::schedule::{Id, TICK};
+use stampfly_rover::topics::{Bus, LinkEnds, Outside};
+use stampfly_rover::{Parameters, Runnables};
+use stampfly_types::Instant;
 
 /// What happens to a vehicle in one tick.
 #[derive(Clone, Copy, Default)]
 pub struct Events {
-    pub operator: OperatorCommand,
+    /// `None`: the operator says nothing.
+    pub operator: Option<OperatorCommand>,
     /// A line of a log.
     pub replay: Option<LogRecord>,
+    /// What an engine in another process says.
+    pub remote_drive: Option<DriveCommand>,
     /// Components that do not run.
     pub dead: Components,
 }
 
-/// All components with what they remember.
-#[derive(Clone, Default)]
-pub struct Rover {
-    pub parameters: Parameters,
-    pub signals: Signals,
-    pub safety: SafetyStatus,
-    pub now: Instant,
-    selector: DriverSelector,
-    supervisor: SafetySupervisor,
-    heartbeats: [u32; COMPONENTS.len()],
-    last_check: Option<Instant>,
-    heard: SafetyInput,
-    faulty: bool,
+/// The rover's runnables, some of which return without doing anything.
+struct Mortal {
+    runnables: Runnables,
+    dead: Components,
 }
 
-impl Rover {
-    /// One tick of 10 ms. The supervisor runs every 100 ms and whenever the operator's buttons or the log change.
-    pub fn tick(&mut self, events: &Events) -> LogRecord {
-        let Self { parameters, signals, .. } = self;
-        let runs = |component| !events.dead.contains(component);
-        for (beats, component) in self.heartbeats.iter_mut().zip(COMPONENTS) {
-            *beats += u32::from(runs(component));
-        }
-        let replayed = events.replay.map_or_else(Default::default, |record| (record.estop, record.system_state));
-        let heard = SafetyInput {
-            heartbeats: self.heard.heartbeats,
-            faulty: self.faulty,
-            estop: events.operator.estop,
-            reset: events.operator.reset,
-            replayed,
-        };
-        let due = self.last_check.is_none_or(|last| self.now.since(last) >= PERIOD);
-        if due || heard != self.heard {
-            self.heard = heard;
-            self.last_check = Some(self.now);
-            let input = SafetyInput { heartbeats: self.heartbeats, ..heard };
-            self.safety = self.supervisor.step(self.now, &input, &parameters.safety);
-        }
-        let estop = self.safety.must_stop(self.last_check.map(|at| self.now.since(at)), &parameters.safety);
-        let sources = DriverSources {
-            operator: events.operator,
-            operator_age: Some(Duration::ZERO),
-            replay: events.replay.as_ref().map(LogRecord::driver_input),
-            speed: signals.state.v,
-            system_state: self.safety.system_state,
-        };
-        signals.input = self.selector.step(self.now, &sources, &parameters.input);
-        if runs(Components::ENGINE) {
-            let acceleration = models::drive_acceleration(signals.input.throttle, estop, &parameters.engine);
-            signals.drive = DriveCommand { acceleration };
-        }
-        if runs(Components::BRAKE) {
-            let deceleration = models::brake_deceleration(signals.input.brake, estop, &parameters.brake);
-            signals.brake = BrakeCommand { deceleration };
-        }
-        if runs(Components::STEERING) {
-            let target = models::steering_target(signals.input.steer, estop, &parameters.steering);
-            let angle = models::step_steering(signals.steering.angle, target, TICK, &parameters.steering);
-            signals.steering = SteeringCommand { angle };
-        }
-        self.now += TICK;
-        if runs(Components::DYNAMICS) {
-            let (drive, brake) = (signals.drive.acceleration, signals.brake.deceleration);
-            let state = models::step_longitudinal(&signals.state, TICK, drive, brake, estop, &parameters.vehicle);
-            let state = models::step_lateral(&state, TICK, signals.steering.angle, &parameters.vehicle);
-            signals.state = VehicleState { t: self.now.seconds_f64() as f32, ..state };
-        }
-        self.faulty = !diag::check(signals, parameters).is_empty();
-        let commands = (&signals.drive, &signals.brake, &signals.steering);
-        LogRecord::new(&signals.input, commands, &signals.state, &self.safety)
+impl Schedule for Mortal {
+    type Topics = Bus;
+    type Config = Parameters;
+    type States = <Runnables as Schedule>::States;
+    const ACTIVATIONS: &'static [ActivationInfo] = Runnables::ACTIVATIONS;
+    const INPUTS: &'static [usize] = <Runnables as Schedule>::INPUTS;
+
+    fn new(parameters: &Parameters) -> Self {
+        Self { runnables: Runnables::new(parameters), dead: Components::NONE }
     }
+
+    fn states(start: Instant) -> Self::States {
+        Runnables::states(start)
+    }
+
+    fn read(ends: &mut <Bus as TopicTable>::Ends<'_>, index: usize, activation: &mut Activation) {
+        Runnables::read(ends, index, activation);
+    }
+
+    fn run(&mut self, ends: &mut <Bus as TopicTable>::Ends<'_>, index: usize, activation: &mut Activation) {
+        let component = [
+            (Id::engine, Components::ENGINE),
+            (Id::brake, Components::BRAKE),
+            (Id::steering, Components::STEERING),
+            (Id::vehicle_dynamics, Components::DYNAMICS),
+            (Id::com, Components::COM),
+            (Id::driver_input, Components::TIME_BASE),
+        ];
+        let component = component.iter().find(|(id, _)| *id as usize == index).map(|(_, component)| *component);
+        if !component.is_some_and(|component| self.dead.contains(component)) {
+            self.runnables.run(ends, index, activation);
+        }
+    }
+}
+
+/// The instant of a tick, counted from zero.
+pub fn instant(tick: usize) -> Instant {
+    Instant::from_micros(TICK.as_micros() * (tick as u64 + 1))
 }
 
 /// The operator's command with these pedals and this wheel.
@@ -97,13 +72,29 @@ pub fn manual(throttle: f32, brake: f32, steer: f32) -> OperatorCommand {
     OperatorCommand { throttle, brake, steer, ..OperatorCommand::default() }
 }
 
-/// A fresh vehicle, driven by `events` for a number of ticks.
-pub fn run(ticks: usize, mut events: impl FnMut(usize, &mut Rover) -> Events) -> Vec<LogRecord> {
-    let mut rover = Rover::default();
-    (0..ticks)
-        .map(|tick| {
-            let events = events(tick, &mut rover);
-            rover.tick(&events)
-        })
-        .collect()
+/// A fresh vehicle, driven by `events` for a number of ticks. Returns the log.
+pub fn run(ticks: usize, mut events: impl FnMut(usize, &mut LinkEnds<'_>) -> Events) -> Vec<LogRecord> {
+    let mut bus = Bus::new();
+    let Assembled { mut flight_loop, outside: Outside { mut link }, .. } =
+        Assembled::<Mortal>::new(bus.split(None), &Parameters::default(), Instant::ZERO);
+    let mut log = Vec::new();
+    for tick in 0..ticks {
+        let now = instant(tick);
+        let Events { operator, replay, remote_drive, dead } = events(tick, &mut link);
+        flight_loop.set_runnables(Mortal { runnables: flight_loop.runnables().runnables.clone(), dead });
+        if let Some(command) = operator {
+            link.operator_command.publish(now, &command);
+        }
+        if let Some(line) = replay {
+            link.replay_record.publish(now, &line);
+        }
+        if let Some(command) = remote_drive {
+            link.remote_drive.publish(now, &command);
+        }
+        flight_loop.run_band(Band::Flight, now, &mut ());
+        flight_loop.run_band(Band::Background, now, &mut ());
+        log.extend(core::iter::from_fn(|| link.log_record.next()).map(|line| line.data));
+        assert_eq!(log.len(), tick + 1, "one line a tick");
+    }
+    log
 }

@@ -1,0 +1,120 @@
+//! A vehicle on a table, with its end of the radio and stations in the air, as the firmware joins them.
+
+use stampfly_board::console::Newest;
+use stampfly_board::link::{self, Link};
+use stampfly_board::messages::ButtonContact;
+use stampfly_board::schedule::Runnables;
+use stampfly_board::topics::{self, Id};
+use stampfly_board::{VehicleConfig, console::Command};
+use stampfly_bus::{Band, Taps};
+use stampfly_flight::{Assembled, FlightLoop};
+use stampfly_link::{Address, ControlPacket, Rejected, Session};
+use stampfly_types::messages::{
+    ArmBlocks, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput, PowerData, SystemMode, TofData,
+};
+use stampfly_types::{Duration, GRAVITY, Instant, Message, Vec3};
+
+pub const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
+pub const OLD: Address = Address([2, 0, 0, 0, 0, 1]);
+pub const NEW: Address = Address([2, 0, 0, 0, 0, 2]);
+
+/// The ends that a test uses itself.
+pub struct Ends<'b> {
+    imu: topics::ImuEnds<'b>,
+    tof: topics::TofEnds<'b>,
+    power: topics::PowerEnds<'b>,
+    button: topics::ButtonPinEnds<'b>,
+    guided: topics::CommandGuidedTx<'b>,
+    pub console: topics::ConsoleEnds<'b>,
+    pub storage: topics::StorageEnds<'b>,
+    pub cutoff: topics::CutoffEnds<'b>,
+    pub supervisor: topics::SupervisorEnds<'b>,
+}
+
+/// A vehicle on a table.
+pub struct Bench<'b> {
+    flight: FlightLoop<'b, Runnables>,
+    pub ends: Ends<'b>,
+    pub link: Link<'b>,
+    taps: topics::Taps<'b>,
+    newest: Newest,
+    /// Does the battery monitor answer?
+    pub monitor: bool,
+    /// Does a program say that it is there?
+    pub program: bool,
+    pub now: Instant,
+}
+
+impl<'b> Bench<'b> {
+    pub fn new(bus: &'b mut topics::Bus, peer: Option<Address>) -> Self {
+        let Assembled { flight_loop: flight, outside, taps } =
+            Assembled::new(bus.split(None), &VehicleConfig::default(), Instant::ZERO);
+        let topics::Outside { imu, tof, power, link, button_pin, console, storage, cutoff, supervisor, .. } = outside;
+        let topics::LinkEnds { command_pilot, command_guided: guided, system_mode, telemetry, link_peer } = link;
+        let link = Link::new(Session::new(VEHICLE, 1, peer), command_pilot, link_peer, system_mode, telemetry);
+        let ends = Ends { imu, tof, power, button: button_pin, guided, console, storage, cutoff, supervisor };
+        let newest = Newest::new();
+        Self { flight, ends, link, taps, newest, monitor: true, program: false, now: Instant::ZERO }
+    }
+
+    /// The newest sample of a topic.
+    pub fn newest<M: Message + Default>(&self, topic: Id) -> M {
+        self.newest.get(topic as usize).map(|(_, data)| data).unwrap_or_default()
+    }
+
+    pub fn blocks(&self) -> ArmBlocks {
+        self.newest::<SystemMode>(Id::system_mode).blocks
+    }
+
+    pub fn armed(&self) -> bool {
+        self.newest::<SystemMode>(Id::system_mode).armed
+    }
+
+    pub fn motors(&self) -> MotorOutput {
+        self.newest(Id::actuator_motor)
+    }
+
+    pub fn command(&mut self, kind: GuidedKind) {
+        let command = GuidedCommand { kind, ..Default::default() };
+        self.ends.guided.publish(self.now, command).expect("room in the queue");
+    }
+
+    /// At the console.
+    pub fn console(&mut self, command: Command) {
+        command.publish(self.now, &mut self.ends.console);
+    }
+
+    /// Lets time pass. Every transmitter sends its packet every 20 ms; returns what became of the last one's.
+    pub fn pass(&mut self, millis: u64, pressed: bool, air: &[(Address, bool)]) -> Option<Result<(), Rejected>> {
+        let mut last = None;
+        let end = self.now + Duration::from_millis(millis);
+        while self.now < end {
+            self.now += Duration::from_micros(2_500);
+            let now = self.now;
+            let still = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };
+            self.ends.imu.sensor_imu.publish(now, &still);
+            if now.as_micros().is_multiple_of(link::PERIOD.as_micros()) {
+                self.ends.button.button_contact.publish(now, &ButtonContact { pressed });
+                let range = TofData { distance: 0.03, valid: true, ..Default::default() };
+                self.ends.tof.sensor_tof.publish(now, &range);
+                if self.monitor {
+                    self.ends.power.sensor_power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
+                }
+                if self.program {
+                    self.command(GuidedKind::None);
+                }
+                for (source, arm) in air {
+                    let sticks = PilotInput { arm: *arm, ..Default::default() };
+                    let bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
+                    last = Some(self.link.receive(now, *source, &bytes));
+                }
+                self.link.transmit(now);
+            }
+            for band in [Band::Flight, Band::Background] {
+                self.flight.run_band(band, now, &mut ());
+            }
+            self.taps.drain(&mut |topic, at, _, words| self.newest.note(topic, at, words));
+        }
+        last
+    }
+}
