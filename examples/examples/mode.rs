@@ -40,7 +40,7 @@ const STORY: &[Event] = &[
 fn main() {
     let mut machine = ModeMachine::default();
     let mut world = World::default();
-    let mut before = SystemMode::default();
+    let mut before = FlightStatus::default();
     let mut story = STORY.iter().peekable();
 
     for step in 0..14 * 400u64 {
@@ -53,12 +53,12 @@ fn main() {
         let input =
             ModeInput { alerts: *alerts, estimate, calibration, land_detected, pilot: None, commands, button: None };
         let mode = machine.step(now, &input).mode;
-        if mode.state != before.state {
+        if mode.phase != before.phase {
             println!(
                 "{:>9} {:?} → {:?}, motors {}",
                 "",
-                before.state,
-                mode.state,
+                before.phase,
+                mode.phase,
                 if mode.armed { "may turn" } else { "off" }
             );
         } else if world.commands.contains(&GuidedKind::Arm) {

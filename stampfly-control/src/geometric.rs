@@ -80,12 +80,12 @@ impl Default for GeometricConfig {
 /// // Any controller, behind the same trait.
 /// let mut controller: Box<dyn Controller> = Box::new(GeometricController::default());
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
-/// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
+/// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
 /// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
 /// let setpoint = Setpoint { axes: SetpointAxes::POSITION_Z | SetpointAxes::YAW, ..Default::default() };
 /// let output = controller.step(Instant::from_micros(2_500), &ControlInput {
 ///     estimate: &estimate, command: &CommandSetpoint { roll: 0.5, ..Default::default() }, setpoint: &setpoint,
-///     mode: &mode, land_detected: &land_detected, unmet: [0.0; 4],
+///     flight_status: &mode, land_detected: &land_detected, unmet: [0.0; 4],
 /// });
 /// assert!(output.torque.x > 0.0, "stick right, right wing down");
 /// ```
@@ -179,8 +179,8 @@ impl GeometricController {
 impl Controller for GeometricController {
     fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
-        if input.mode.control_resets != self.resets {
-            self.resets = input.mode.control_resets;
+        if input.flight_status.control_resets != self.resets {
+            self.resets = input.flight_status.control_resets;
             self.reset();
         }
         let Some(intent) = Intent::read(input) else {

@@ -16,5 +16,5 @@ fn main() {
         commands: &[],
         button: None,
     };
-    assert_eq!(ModeMachine::default().step(Instant::from_micros(2_500), &input).mode.state, FlightState::IdleGround);
+    assert_eq!(ModeMachine::default().step(Instant::from_micros(2_500), &input).flight_status.phase, FlightPhase::IdleGround);
 }

@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 
 use stampfly_control::{ControlInput, Controller, Mixed, Mixer, MultirotorMixer, Spin};
 use stampfly_types::messages::{
-    CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, LandDetected, Setpoint, StateEstimate,
-    SystemMode, Validity,
+    CommandSetpoint, ControlOutput, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, Setpoint,
+    StateEstimate, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
@@ -55,7 +55,7 @@ pub struct Flight<C> {
     pub controller: C,
     pub state: State,
     pub now: Instant,
-    pub mode: SystemMode,
+    pub flight_status: FlightStatus,
     pub land_detected: LandDetected,
     pub command: CommandSetpoint,
     pub setpoint: Setpoint,
@@ -79,7 +79,7 @@ impl<C: Controller> Flight<C> {
         let mut flight = Self::standing(controller, airframe);
         flight.state.position.z = -1.0;
         flight.state.thrust = thrust;
-        flight.mode.state = FlightState::Flying;
+        flight.flight_status.phase = FlightPhase::Flying;
         flight.land_detected.contact = GroundContact::Air;
         flight.setpoint.position.z = -1.0;
         flight
@@ -99,11 +99,11 @@ impl<C: Controller> Flight<C> {
                 thrust: [0.0; 4],
             },
             now: Instant::from_secs(5),
-            mode: SystemMode {
-                state: FlightState::TakeOff,
+            flight_status: FlightStatus {
+                phase: FlightPhase::TakeOff,
                 mode: FlightMode::PosHold,
                 armed: true,
-                ..SystemMode::default()
+                ..FlightStatus::default()
             },
             land_detected: LandDetected { thrust_ceiling: 2.0, ..LandDetected::default() },
             command: CommandSetpoint::default(),
@@ -136,7 +136,7 @@ impl<C: Controller> Flight<C> {
             estimate: &estimate,
             command: &self.command,
             setpoint: &self.setpoint,
-            mode: &self.mode,
+            flight_status: &self.flight_status,
             land_detected: &self.land_detected,
             unmet: self.mixed.unmet,
         };
