@@ -9,18 +9,21 @@
 //! | [`console_line`] | the serial port | lines stay short and printable, parameters in range, an armed vehicle does nothing |
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
+//! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |
 //!
 //! With a nightly compiler and cargo-fuzz: `cargo +nightly fuzz run console_line`. A file that fails goes into
 //! `fuzz/corpus/TARGET`, so that the test keeps it.
 
 mod console;
+mod datagrams;
 mod flash;
 mod packets;
 mod parameters;
 mod ulog_file;
 
 pub use console::console_line;
+pub use datagrams::rover_datagrams;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;
 pub use ulog_file::ulog;

@@ -1,6 +1,6 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
-use crate::{console_line, parameter_image, radio_packets, ulog};
+use crate::{console_line, parameter_image, radio_packets, rover_datagrams, ulog};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -95,6 +95,11 @@ fn parameters() {
 #[test]
 fn packets() {
     smoke("radio_packets", radio_packets, 400_000);
+}
+
+#[test]
+fn datagrams() {
+    smoke("rover_datagrams", rover_datagrams, 200_000);
 }
 
 #[test]

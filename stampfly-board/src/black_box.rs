@@ -96,7 +96,7 @@ pub fn open<S: Sink>(
     version: &str,
 ) -> Result<Writer<S, LogSchema<Runnables>>, WriteError<S::Error>> {
     let mut head = Definitions::start(sink, at)?;
-    head.info("sys_name", "StampFly")?;
+    head.info("sys_name", "stampfly")?;
     for (index, info) in parameters::all().enumerate() {
         if let Some(value) = config.get(index) {
             head.parameter(info.name, ParameterValue::Float(value))?;

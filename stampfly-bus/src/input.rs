@@ -45,6 +45,20 @@ where
         (self.sample.generation != 0).then_some(&self.sample)
     }
 
+    /// Generation of the newest sample; zero before the first.
+    #[inline]
+    #[must_use]
+    pub const fn generation(&self) -> u32 {
+        self.sample.generation
+    }
+
+    /// How old the newest sample is at `now`; `None` before the first.
+    #[inline]
+    #[must_use]
+    pub fn age(&self, now: Instant) -> Option<Duration> {
+        self.sample().map(|sample| sample.age(now))
+    }
+
     /// The newest message, if there is one and it is at most so old at `now`.
     #[inline]
     #[must_use]

@@ -154,6 +154,18 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         self.complete(usize::from(activation.record().index), &mut activation, observer);
     }
 
+    /// Runs one line, due or not.
+    pub(crate) fn activate(&mut self, index: usize, now: Instant) -> ActivationRecord {
+        let mut activation = Activation::live(index as u8, now);
+        R::read(&mut self.ends, index, &mut activation);
+        self.runnables.run(&mut self.ends, index, &mut activation);
+        *activation.record()
+    }
+
+    pub(crate) fn ends_mut(&mut self) -> &mut <R::Topics as TopicTable>::Ends<'b> {
+        &mut self.ends
+    }
+
     /// Repeats a recorded activation. Returns it as it went this time.
     pub fn replay(&mut self, record: ActivationRecord) -> Activation {
         let index = usize::from(record.index);

@@ -7,6 +7,7 @@
 //! | part | bytes |
 //! |---|---|
 //! | magic | 4, `SFK1` |
+//! | length | 4, of everything, so that a part of a key frame is none |
 //! | tables | 8, [`tables`] of the program that made it |
 //! | clock | 8, µs |
 //! | per topic | newest generation 4, number of samples 2, then each: generation 4, instant 8, words |
@@ -22,6 +23,8 @@ use stampfly_bus::{PublishWords, Schedule, TopicTable};
 use stampfly_types::Instant;
 
 const MAGIC: [u8; 4] = *b"SFK1";
+/// Bytes of the length.
+const LENGTH: usize = 4;
 
 /// Why a key frame cannot be made or used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,8 +76,9 @@ pub fn encode<R: Schedule + Serialize>(
     clock: Instant,
     buffer: &mut [u8],
 ) -> Result<usize, KeyFrameError> {
-    let mut put = Put { rest: buffer, written: 0 };
+    let mut put = Put { rest: &mut *buffer, written: 0 };
     put.bytes(&MAGIC)?;
+    put.bytes(&[0; LENGTH])?;
     put.bytes(&tables::<R>().to_le_bytes())?;
     put.bytes(&clock.as_micros().to_le_bytes())?;
     for topic in flight_loop.heads() {
@@ -95,7 +99,12 @@ pub fn encode<R: Schedule + Serialize>(
     }
     let Put { rest, written } = put;
     let state = postcard::to_slice(flight_loop.runnables(), rest).map_err(|_| KeyFrameError::NoRoom)?;
-    Ok(written + state.len())
+    let length = written + state.len();
+    // Known only now.
+    if let Some(place) = buffer.get_mut(MAGIC.len()..MAGIC.len() + LENGTH) {
+        place.copy_from_slice(&(length as u32).to_le_bytes());
+    }
+    Ok(length)
 }
 
 /// Reads from the front of a slice.
@@ -109,6 +118,13 @@ impl Take<'_> {
     }
 }
 
+/// Are these all the bytes of a key frame, and not a part of one?
+#[must_use]
+pub fn is_whole(frame: &[u8]) -> bool {
+    let mut take = Take(frame);
+    take.array() == Ok(MAGIC) && take.array().is_ok_and(|length| u32::from_le_bytes(length) as usize == frame.len())
+}
+
 /// The instant a key frame was made.
 ///
 /// # Errors
@@ -119,7 +135,8 @@ pub fn clock_of<R: Schedule>(frame: &[u8]) -> Result<Instant, KeyFrameError> {
 }
 
 fn begin<R: Schedule>(take: &mut Take<'_>) -> Result<Instant, KeyFrameError> {
-    if take.array()? != MAGIC {
+    let size = take.0.len();
+    if take.array()? != MAGIC || u32::from_le_bytes(take.array()?) as usize != size {
         return Err(KeyFrameError::NotAKeyFrame);
     }
     if u64::from_le_bytes(take.array()?) != tables::<R>() {

@@ -13,6 +13,7 @@
 //! | [`replay`](mod@replay) | the flight again, compared bit for bit (feature `replay`) |
 //! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
 //! | [`golden`] | a recorded flight that every machine must compute alike |
+//! | [`mock`] | one runnable by itself, for tests |
 //! | [`newest`] | the newest sample of every topic, shown without its type |
 //! | [`parameters`] | parameters by name |
 //! | [`profile`] | execution times against their budgets |
@@ -32,6 +33,7 @@ pub mod golden;
 #[cfg(feature = "key-frame")]
 pub mod key_frame;
 pub mod log_schema;
+pub mod mock;
 pub mod newest;
 pub mod parameters;
 pub mod profile;
@@ -44,6 +46,7 @@ pub mod watchdog;
 pub use black_box::BlackBox;
 pub use flight_loop::{Assembled, FlightLoop, Observer, Pending};
 pub use log_schema::LogSchema;
+pub use mock::Mock;
 pub use newest::{NewestSamples, longest_message};
 pub use profile::{Profile, Stopwatch};
 pub use recorder::Recorder;

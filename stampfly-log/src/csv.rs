@@ -9,10 +9,9 @@
 //! use stampfly_types::messages::PowerData;
 //! let power = PowerData { voltage: 3.9, current: 0.1, power: 0.39 };
 //! let mut log = String::new();
-//! csv::write_header::<PowerData>(&mut log)?;
-//! csv::write_line(&power, &mut log)?;
+//! csv::write(&[power], &mut log)?;
 //! assert_eq!(log, "voltage,current,power\n3.9,0.1,0.39\n");
-//! assert_eq!(log.lines().skip(1).map(csv::read_line).collect::<Result<Vec<PowerData>, _>>(), Ok(vec![power]));
+//! assert_eq!(csv::read(&log).expect("the header").collect::<Result<Vec<PowerData>, _>>(), Ok(vec![power]));
 //! # Ok::<(), core::fmt::Error>(())
 //! ```
 
@@ -62,6 +61,21 @@ pub fn write_line<M: Message>(message: &M, out: &mut impl Write) -> Written {
         text::write(field, words, text::Style::Numbers, out)?;
     }
     out.write_str("\n")
+}
+
+/// Writes a whole log: the header, and a line for each message.
+///
+/// # Errors
+/// As [`write_line`].
+pub fn write<'m, M: Message>(messages: impl IntoIterator<Item = &'m M>, out: &mut impl Write) -> Written {
+    write_header::<M>(out)?;
+    messages.into_iter().try_for_each(|message| write_line(message, out))
+}
+
+/// Reads a whole log. `None` when it does not begin with the header of such messages.
+pub fn read<M: Message>(text: &str) -> Option<impl Iterator<Item = Result<M, CsvError>>> {
+    let mut lines = text.lines();
+    lines.next().is_some_and(is_header::<M>).then(|| lines.map(read_line))
 }
 
 /// Is this the header of messages of this type, with or without its line feed?

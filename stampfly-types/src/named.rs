@@ -105,6 +105,8 @@ macro_rules! message_flags {
             pub const NONE: Self = Self(0);
             /// Every named bit.
             pub const ALL: Self = Self(0 $(| 1 << $bit)*);
+            /// Every named bit by itself, in declaration order.
+            pub const EACH: &'static [Self] = &[$(Self::$FLAG),*];
             /// Names and bit masks.
             pub const NAMES: &'static [(&'static str, u32)] = &[$((stringify!($FLAG), 1 << $bit)),*];
 

@@ -1,8 +1,8 @@
 """The rover's engine in a process of its own: driver's input in, acceleration out, over UDP.
 
 It is the Engine component of the vehicle, replaced without touching the vehicle. Every 10 ms it sends a
-``DriveCommand``, which is its heartbeat; when the process dies the safety supervisor stops the vehicle within the
-heartbeat's limit. Start the rover so that it expects its engine here, then::
+``DriveCommand``, which is its heartbeat. From the first one on the rover's own engine is silent; when the process dies the
+safety supervisor stops the vehicle within the heartbeat's limit::
 
     python3 -m stampfly_rover engine --max-accel 2.0
 """

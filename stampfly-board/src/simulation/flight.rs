@@ -85,10 +85,6 @@ pub struct Outcome {
 }
 
 impl Verdict for Outcome {
-    fn succeeded(&self) -> bool {
-        self.metrics.landed && self.metrics.disarmed && self.finished && self.motors_sane
-    }
-
     fn facts(&self) -> Vec<(&'static str, bool)> {
         vec![
             ("landed", self.metrics.landed),

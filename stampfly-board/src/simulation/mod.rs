@@ -77,10 +77,8 @@ impl Vehicle for StampFly {
             let (name, value) = assignment(text)?;
             setup.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
-        for text in &options.param {
-            let (name, value) = assignment(text)?;
-            parameters::set(&mut setup.vehicle, name, value as f32)
-                .map_err(|error| format!("--param {text}: {error}"))?;
+        for (name, value) in options.parameters()? {
+            parameters::set(&mut setup.vehicle, name, value).map_err(|error| format!("--param {name}: {error}"))?;
         }
         setup.sensing = if options.chips { Sensing::Chips } else { Sensing::Models };
         setup.cameras = options.cameras;

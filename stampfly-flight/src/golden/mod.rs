@@ -20,7 +20,7 @@ use format::Entry;
 use heapless::Vec;
 use stampfly_bus::{Band, PublishWords, Schedule, Taps, TopicTable};
 use stampfly_log::FlightHash;
-use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, Leaf, leaves};
+use stampfly_types::{Duration, FieldInfo, FieldKind, Instant, leaves};
 
 /// What a machine made of a golden flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,12 +197,14 @@ struct Deviation {
 impl Deviation {
     /// Compares the numbers in two samples. An output that was never published is empty.
     fn add(&mut self, clock: Instant, info: &'static [FieldInfo], expected: &[u32], output: &[u32]) {
-        let is_real = |leaf: &Leaf| matches!(leaf.kind, FieldKind::F32 | FieldKind::F64);
-        for leaf in leaves(info).filter(is_real) {
+        for leaf in leaves(info) {
             let number =
                 |words: &[u32], element| leaf.value(words, element).map_or(f32::NAN, |value| value.as_f64() as f32);
             for element in 0..leaf.count {
                 let deviation = (number(output, element) - number(expected, element)).abs();
+                // Rounding changes nothing but real numbers.
+                let is_real = matches!(leaf.kind, FieldKind::F32 | FieldKind::F64);
+                let deviation = if is_real || deviation == 0.0 { deviation } else { f32::INFINITY };
                 let deviation = if deviation.is_nan() { f32::INFINITY } else { deviation };
                 self.worst = self.worst.max(deviation);
                 if deviation > self.tolerance {

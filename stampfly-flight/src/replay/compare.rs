@@ -1,9 +1,9 @@
 //! What a replay publishes beside what the log says was published.
 
-use super::Words;
 use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 use core::fmt;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
 use stampfly_types::{ActivationRecord, Instant, Value, leaves};
@@ -55,7 +55,7 @@ impl fmt::Display for Difference {
 /// A sample of the replay that the log has yet to confirm.
 struct Published {
     at: Instant,
-    words: Words,
+    words: Vec<u32>,
     activation: u8,
     now: Instant,
 }

@@ -19,7 +19,6 @@ pub use script::{ReplayError, vehicle_name};
 use crate::flight_loop::Assembled;
 use crate::key_frame;
 use alloc::vec;
-use alloc::vec::Vec;
 use compare::Comparison;
 use script::{Entry, Script};
 use serde::{Serialize, de::DeserializeOwned};
@@ -72,7 +71,7 @@ pub fn replay<R: Schedule + Serialize + DeserializeOwned>(
 ) -> Result<Replay, ReplayError> {
     let mut config = config;
     let script = Script::read::<R>(log, |name, value| set(&mut config, name, value))?;
-    let mut player = Player::<R> { config, start: script.start, outcome: Replay::default(), first: None };
+    let mut player = Player::<R> { config, start: script.start, outcome: Replay::default(), first: None, state: None };
     let mut place = match options.from {
         None => Some((0, None)),
         Some(from) => player.next_key_frame(&script.entries, 0, Some(from))?,
@@ -88,7 +87,8 @@ pub fn replay<R: Schedule + Serialize + DeserializeOwned>(
             return Err(why);
         }
     }
-    Ok(player.outcome)
+    let Player { outcome, state, .. } = player;
+    Ok(Replay { difference: outcome.difference.or(state), ..outcome })
 }
 
 /// Plays the stretches of a log between its gaps.
@@ -97,6 +97,8 @@ struct Player<R: Schedule> {
     start: Instant,
     outcome: Replay,
     first: Option<Instant>,
+    /// The first key frame that differed.
+    state: Option<Difference>,
 }
 
 impl<R: Schedule + Serialize + DeserializeOwned> Player<R> {
@@ -178,7 +180,8 @@ impl<R: Schedule + Serialize + DeserializeOwned> Player<R> {
                     let mut now = vec![0; frame.len().max(KEY_FRAME_ROOM)];
                     let length = key_frame::encode(&flight_loop, clock, &mut now).map_err(ReplayError::KeyFrame)?;
                     if now.get(..length) != Some(frame) {
-                        self.outcome.difference = Some(Difference::of_state(clock));
+                        // What it published says more; a state that differs and never shows is told at the end.
+                        self.state.get_or_insert_with(|| Difference::of_state(clock));
                     }
                 }
                 Entry::Lost(at) => return Ok(Some((place + 1, ReplayError::Dropout { at: *at }))),
@@ -201,6 +204,3 @@ fn with_refusals(record: &ActivationRecord, later: &[Entry]) -> ActivationRecord
     });
     next.flatten().filter(|amended| amended.now == record.now).unwrap_or(*record)
 }
-
-/// Words of samples, as entries keep them.
-type Words = Vec<u32>;

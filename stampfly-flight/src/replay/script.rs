@@ -1,7 +1,6 @@
 //! A log as a list of what to do and what to expect.
 
-use super::Words;
-use crate::key_frame::KeyFrameError;
+use crate::key_frame::{KeyFrameError, is_whole};
 use crate::log_schema::LogSchema;
 use crate::recorder::KEY_FRAME;
 use alloc::borrow::ToOwned;
@@ -78,9 +77,9 @@ impl core::error::Error for ReplayError {}
 /// One entry of a log that matters to a replay.
 pub(super) enum Entry {
     /// A sample from outside.
-    Outside { topic: usize, at: Instant, generation: u32, words: Words },
+    Outside { topic: usize, at: Instant, generation: u32, words: Vec<u32> },
     /// A sample that a runnable published.
-    Inside { topic: usize, at: Instant, generation: u32, words: Words },
+    Inside { topic: usize, at: Instant, generation: u32, words: Vec<u32> },
     /// A runnable has read its inputs.
     Activation(ActivationRecord),
     /// A runnable has finished, and was refused something.
@@ -184,13 +183,15 @@ impl Script {
                         frame.clear();
                     }
                     frame.extend_from_slice(value);
-                    // Parts of one frame follow each other; the newest collection takes the place of the one before.
-                    if continued && matches!(entries.last(), Some(Entry::KeyFrame(_))) {
-                        entries.pop();
+                    // A frame whose other parts are missing cannot be used.
+                    if is_whole(&frame) {
+                        entries.push(Entry::KeyFrame(core::mem::take(&mut frame)));
                     }
-                    entries.push(Entry::KeyFrame(frame.clone()));
                 }
-                Message::Dropout { .. } => entries.push(Entry::Lost(last)),
+                Message::Dropout { .. } => {
+                    frame.clear();
+                    entries.push(Entry::Lost(last));
+                }
                 _ => {}
             }
         }

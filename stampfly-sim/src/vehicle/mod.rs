@@ -5,6 +5,7 @@
 //! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
 //! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
 //! | [`fly`] | one flight on virtual time |
+//! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
 //! | [`Scenario`] | what to command and what must be true, as text |
 //! | [`Live`] | other programs fly it, in real time |
 //! | [`Witness`] | is told everything that happens: a log, a hash, a test |
@@ -17,12 +18,14 @@ mod jitter;
 mod live;
 mod page;
 mod scenario;
+mod scripted;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, fly};
-pub use live::Live;
+pub use live::{Link, Live};
 pub use page::{Body, Observer, Page, PanelSpec, Pick};
 pub use scenario::Scenario;
+pub use scripted::{Following, Script, Scripted};
 pub use witness::Witness;
 
 use crate::time::{Clock, Tasks};
@@ -94,9 +97,11 @@ pub struct Figure {
 /// How a flight of a vehicle went, as programs report it.
 pub trait Verdict {
     /// Did the vehicle do what it was to do, without ever doing what it must not?
-    fn succeeded(&self) -> bool;
+    fn succeeded(&self) -> bool {
+        self.facts().iter().all(|(_, holds)| *holds)
+    }
 
-    /// Yes-or-no results by name, for scripts: `landed`, `disarmed`.
+    /// Yes-or-no results by name, for scripts: `landed`, `disarmed`. All hold in a flight that succeeded.
     fn facts(&self) -> Vec<(&'static str, bool)>;
 
     /// The figures, the same names in the same order for every flight of the vehicle.
@@ -142,6 +147,20 @@ pub struct Options {
     pub live: Option<Live>,
 }
 
+impl Options {
+    /// Names and values of [`param`](Self::param).
+    ///
+    /// # Errors
+    /// When one is not `NAME=VALUE`.
+    pub fn parameters(&self) -> Result<Vec<(&str, f32)>, SetupError> {
+        let pairs = self.param.iter().map(|text| {
+            let pair = text.split_once('=').and_then(|(name, value)| Some((name.trim(), value.trim().parse().ok()?)));
+            pair.ok_or_else(|| format!("--param '{text}' is not NAME=VALUE"))
+        });
+        pairs.collect()
+    }
+}
+
 /// One number that options can change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
@@ -177,10 +196,10 @@ pub struct Golden<V: Vehicle + ?Sized> {
 pub trait Vehicle: 'static {
     /// Its name on the command line, and as `sys_name` in its logs.
     const NAME: &'static str;
-    /// Topics that its surroundings add to the log.
-    const BESIDE: &'static [Topic];
+    /// Topics that its surroundings add to the log. None by default.
+    const BESIDE: &'static [Topic] = &[];
     /// What a page about a flight shows of it. By default a plot per topic and unit.
-    const PAGE: Page = Page { observers: &[], setpoint: None, panels: &[], bands: &[], alerts: None, body: Body::NONE };
+    const PAGE: Page = Page::EMPTY;
     /// Its runnables. Serialisable, so that a log can hold key frames.
     type Runnables: Schedule + Serialize + DeserializeOwned;
     /// All that decides a flight.
@@ -226,6 +245,8 @@ pub trait Vehicle: 'static {
         None
     }
 
-    /// Every number of the simulated vehicle and its surroundings that options can change.
-    fn plant(setup: &Self::Setup) -> Vec<Setting>;
+    /// Every number of the simulated vehicle and its surroundings that options can change. None by default.
+    fn plant(_setup: &Self::Setup) -> Vec<Setting> {
+        Vec::new()
+    }
 }

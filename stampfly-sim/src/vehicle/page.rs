@@ -20,6 +20,12 @@ pub struct Page {
     pub body: Body,
 }
 
+impl Page {
+    /// A plot per topic and unit.
+    pub const EMPTY: Self =
+        Self { observers: &[], setpoint: None, panels: &[], bands: &[], alerts: None, body: Body::NONE };
+}
+
 /// A topic that says where the vehicle is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observer {

@@ -20,6 +20,7 @@
 #![no_std]
 
 #[cfg(feature = "simulation")]
+#[macro_use]
 extern crate std;
 
 pub mod com;

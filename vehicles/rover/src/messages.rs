@@ -228,28 +228,15 @@ impl LogRecord {
     pub fn new(
         input: &DriverInput,
         (drive, brake, steering): (&DriveCommand, &BrakeCommand, &SteeringCommand),
-        state: &VehicleState,
-        safety: &SafetyStatus,
+        &VehicleState { t, v, x, y, yaw, yaw_rate, wheel_omega }: &VehicleState,
+        &SafetyStatus { estop, system_state, .. }: &SafetyStatus,
     ) -> Self {
-        let DriverInput { throttle, brake: brake_input, steer } = *input;
-        let VehicleState { t, v, x, y, yaw, yaw_rate, wheel_omega } = *state;
-        Self {
-            t,
-            throttle,
-            brake: brake_input,
-            steer,
-            drive_accel_cmd: drive.acceleration,
-            brake_decel_cmd: brake.deceleration,
-            steer_angle_cmd: steering.angle,
-            x,
-            y,
-            yaw,
-            v,
-            yaw_rate,
-            wheel_omega,
-            estop: safety.estop,
-            system_state: safety.system_state,
-        }
+        let &DriverInput { throttle, brake: brake_input, steer } = input;
+        let [drive_accel_cmd, brake_decel_cmd, steer_angle_cmd] =
+            [drive.acceleration, brake.deceleration, steering.angle];
+        let motion = Self { t, x, y, yaw, v, yaw_rate, wheel_omega, ..Self::default() };
+        let commands = Self { drive_accel_cmd, brake_decel_cmd, steer_angle_cmd, ..motion };
+        Self { throttle, brake: brake_input, steer, estop, system_state, ..commands }
     }
 
     /// The driver's input of this line.

@@ -12,23 +12,12 @@ use crate::schedule::TICK;
 use crate::topics::*;
 use crate::{Parameters, diag, models};
 use serde::{Deserialize, Serialize};
-use stampfly_bus::{Activation, LATEST_DEPTH, NewestInput, Runnable};
-use stampfly_param::{ParameterSet, ParameterStatus};
-use stampfly_types::{Duration, Instant, Message};
+use stampfly_bus::{Activation, Runnable};
+use stampfly_param::ParameterSet;
+use stampfly_types::Duration;
 
 /// A line of a replay is for one tick: it is too old for the next.
 const LINE_AGE: Duration = Duration::from_millis(5);
-
-/// How often a component has published: its heartbeat.
-fn beats<T: Message<Words = [u32; W]> + Default, const W: usize>(of: &NewestInput<'_, T, LATEST_DEPTH, W>) -> u32 {
-    of.sample().map_or(0, |sample| sample.generation)
-}
-
-type SafetyStatusInput<'b> = NewestInput<'b, SafetyStatus, LATEST_DEPTH, { SafetyStatus::WORDS }>;
-
-fn must_stop(now: Instant, status: &SafetyStatusInput<'_>, parameters: &Parameters) -> bool {
-    status.get().must_stop(status.sample().map(|sample| sample.age(now)), &parameters.safety)
-}
 
 /// Components that begin with nothing but their default.
 macro_rules! components {
@@ -50,8 +39,8 @@ components! {
     SafetySupervisorSwc(SafetySupervisor);
     /// Operator, scenario or recorded log to the driver's input.
     DriverInputSwc(DriverSelector);
-    /// Throttle to acceleration. Remembers whether the engine is another process.
-    EngineSwc(bool);
+    /// Throttle to acceleration. Remembers what it did last if it is another process, as it is once that was heard.
+    EngineSwc(Option<f32>);
     /// Pedal to deceleration.
     BrakeSwc(());
     /// Wheel to steering angle, which it remembers, because it lags.
@@ -75,12 +64,12 @@ impl Runnable for SafetySupervisorSwc {
         let line = ends.replay_record.fresh(now, LINE_AGE).filter(|_| operator.mode == InputMode::Replay);
         let input = SafetyInput {
             heartbeats: [
-                beats(&ends.drive_command),
-                beats(&ends.brake_command),
-                beats(&ends.steering_command),
-                beats(&ends.vehicle_state),
-                beats(&ends.com_status),
-                beats(&ends.driver_input),
+                ends.drive_command.generation(),
+                ends.brake_command.generation(),
+                ends.steering_command.generation(),
+                ends.vehicle_state.generation(),
+                ends.com_status.generation(),
+                ends.driver_input.generation(),
             ],
             faulty: ends.diag_status.iter().any(|status| !status.data.faults.is_empty()),
             estop: operator.estop,
@@ -94,15 +83,12 @@ impl Runnable for SafetySupervisorSwc {
 
 /// Requests to the parameters in use.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct NvmSwc {
-    set: ParameterSet<Parameters>,
-    published: Option<ParameterStatus>,
-}
+pub struct NvmSwc(ParameterSet<Parameters>);
 
 impl NvmSwc {
     pub(crate) fn new(parameters: &Parameters) -> Self {
         // A vehicle that is given values it would refuse starts with the table's.
-        Self { set: ParameterSet::new(*parameters, PROBATION).unwrap_or_default(), published: None }
+        Self(ParameterSet::new(*parameters, PROBATION).unwrap_or_default())
     }
 }
 
@@ -110,17 +96,17 @@ impl Runnable for NvmSwc {
     type Ends<'b> = NvmEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut NvmEnds<'_>) {
+        let (now, before) = (activation.now(), self.0.status());
         for request in ends.parameter_request.iter() {
             // A refusal is in the status.
-            let _ = self.set.request(&request.data);
+            let _ = self.0.request(&request.data);
         }
         let healthy = ends.diag_status.iter().all(|status| status.data.faults.is_empty());
-        let parameters = self.set.step(activation.now(), healthy);
-        let status = self.set.status();
-        if self.published != Some(status) {
-            ends.parameters.publish(activation.now(), &parameters);
-            ends.parameter_status.publish(activation.now(), &status);
-            self.published = Some(status);
+        let parameters = self.0.step(now, healthy);
+        let status = self.0.status();
+        if status != before || ends.parameters.generation() == 0 {
+            ends.parameters.publish(now, &parameters);
+            ends.parameter_status.publish(now, &status);
         }
     }
 }
@@ -132,7 +118,7 @@ impl Runnable for DriverInputSwc {
         let now = activation.now();
         let sources = DriverSources {
             operator: *ends.operator_command.get(),
-            operator_age: ends.operator_command.sample().map(|sample| sample.age(now)),
+            operator_age: ends.operator_command.age(now),
             replay: ends.replay_record.fresh(now, LINE_AGE).map(LogRecord::driver_input),
             speed: ends.vehicle_state.get().v,
             system_state: ends.safety_status.get().system_state,
@@ -147,21 +133,17 @@ impl Runnable for EngineSwc {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut EngineEnds<'_>) {
         let (now, parameters) = (activation.now(), ends.parameters.get());
-        let estop = must_stop(now, &ends.safety_status, parameters);
-        let remote = &ends.remote_drive;
-        self.0 |= remote.is_new();
-        let acceleration = match self.0 {
-            false => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
-            true if remote.is_new() => {
-                if estop {
-                    0.0
-                } else {
-                    remote.get().acceleration
-                }
-            }
-            // Each command is a heartbeat; without one this component has none either.
-            true => return,
+        let estop = ends.safety_status.get().must_stop(ends.safety_status.age(now), &parameters.safety);
+        let remote = ends.remote_drive.is_new().then(|| ends.remote_drive.get().acceleration);
+        let acceleration = match (remote, self.0) {
+            (None, None) => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
+            (Some(acceleration), _) if !estop => acceleration,
+            (Some(_), _) => 0.0,
+            // Each command is a heartbeat; without one this component has none either. But what it holds, it lets go.
+            (None, Some(held)) if estop && held != 0.0 => 0.0,
+            (None, Some(_)) => return,
         };
+        self.0 = remote.or(self.0).map(|_| acceleration);
         ends.drive_command.publish(now, &DriveCommand { acceleration });
     }
 }
@@ -171,7 +153,7 @@ impl Runnable for BrakeSwc {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut BrakeEnds<'_>) {
         let (now, parameters) = (activation.now(), ends.parameters.get());
-        let estop = must_stop(now, &ends.safety_status, parameters);
+        let estop = ends.safety_status.get().must_stop(ends.safety_status.age(now), &parameters.safety);
         let deceleration = models::brake_deceleration(ends.driver_input.get().brake, estop, &parameters.brake);
         ends.brake_command.publish(now, &BrakeCommand { deceleration });
     }
@@ -182,7 +164,7 @@ impl Runnable for SteeringSwc {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut SteeringEnds<'_>) {
         let (now, parameters) = (activation.now(), ends.parameters.get());
-        let estop = must_stop(now, &ends.safety_status, parameters);
+        let estop = ends.safety_status.get().must_stop(ends.safety_status.age(now), &parameters.safety);
         let target = models::steering_target(ends.driver_input.get().steer, estop, &parameters.steering);
         self.0 = models::step_steering(self.0, target, TICK, &parameters.steering);
         ends.steering_command.publish(now, &SteeringCommand { angle: self.0 });
@@ -194,7 +176,7 @@ impl Runnable for VehicleDynamicsSwc {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut VehicleDynamicsEnds<'_>) {
         let (now, parameters) = (activation.now(), &ends.parameters.get().vehicle);
-        let estop = must_stop(now, &ends.safety_status, ends.parameters.get());
+        let estop = ends.safety_status.get().must_stop(ends.safety_status.age(now), &ends.parameters.get().safety);
         // Also here: an emergency stop does not depend on the components above.
         let drive = if estop { 0.0 } else { ends.drive_command.get().acceleration };
         let brake = ends.brake_command.get().deceleration;

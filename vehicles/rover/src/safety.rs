@@ -32,21 +32,14 @@ use stampfly_types::{Duration, Instant};
 /// Longest time between two steps of the supervisor.
 pub const PERIOD: Duration = Duration::from_millis(100);
 
-/// The supervised components, in the order of [`SafetyInput::heartbeats`].
-pub const COMPONENTS: [Components; 6] = [
-    Components::ENGINE,
-    Components::BRAKE,
-    Components::STEERING,
-    Components::DYNAMICS,
-    Components::COM,
-    Components::TIME_BASE,
-];
+/// Number of supervised components.
+const COUNT: usize = Components::EACH.len();
 
 /// What the supervisor looks at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SafetyInput {
-    /// Heartbeat counters, in the order of [`COMPONENTS`]. Any change is a heartbeat.
-    pub heartbeats: [u32; COMPONENTS.len()],
+    /// Heartbeat counters, in the order of [`Components::EACH`]. Any change is a heartbeat.
+    pub heartbeats: [u32; COUNT],
     /// Has the diagnosis found a fault in the last period?
     pub faulty: bool,
     /// Emergency stop from outside.
@@ -62,7 +55,7 @@ pub struct SafetyInput {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SafetySupervisor {
     /// Last counter and when it was first seen.
-    seen: [Option<(u32, Instant)>; COMPONENTS.len()],
+    seen: [Option<(u32, Instant)>; COUNT],
     latched: SystemState,
     reset_held: bool,
 }
@@ -71,13 +64,13 @@ impl SafetySupervisor {
     /// One check, at most [`PERIOD`] after the one before. Components have their timeout to start in.
     pub fn step(&mut self, now: Instant, input: &SafetyInput, parameters: &SafetyParameters) -> SafetyStatus {
         let mut stalled = Components::NONE;
-        let expected = input.heartbeats.into_iter().zip(parameters.timeouts()).zip(COMPONENTS);
+        let expected = input.heartbeats.into_iter().zip(parameters.timeouts()).zip(Components::EACH);
         for (seen, ((count, timeout), component)) in self.seen.iter_mut().zip(expected) {
             let (_, since) = *match seen {
                 Some(last) if last.0 == count => last,
                 _ => seen.insert((count, now)),
             };
-            stalled = stalled.set(component, now.since(since) + PERIOD >= timeout);
+            stalled = stalled.set(*component, now.since(since) + PERIOD >= timeout);
         }
         let present = match stalled.bits().count_ones() {
             _ if input.estop => SystemState::EStop,
@@ -94,17 +87,11 @@ impl SafetySupervisor {
 }
 
 impl SafetyParameters {
-    /// Heartbeat timeouts, in the order of [`COMPONENTS`].
-    fn timeouts(&self) -> [Duration; COMPONENTS.len()] {
-        [
-            self.engine_timeout,
-            self.brake_timeout,
-            self.steering_timeout,
-            self.dynamics_timeout,
-            self.com_timeout,
-            self.time_base_timeout,
-        ]
-        .map(Duration::from_seconds)
+    /// Heartbeat timeouts, in the order of [`Components::EACH`].
+    fn timeouts(&self) -> [Duration; COUNT] {
+        let (engine, brake, steering) = (self.engine_timeout, self.brake_timeout, self.steering_timeout);
+        let (dynamics, com, time_base) = (self.dynamics_timeout, self.com_timeout, self.time_base_timeout);
+        [engine, brake, steering, dynamics, com, time_base].map(Duration::from_seconds)
     }
 }
 

@@ -34,7 +34,6 @@ stampfly_bus::schedule! {
     logging = LoggingSwc: after vehicle_dynamics, flight, 20 us;
     /// Do the signals make sense?
     diag = DiagSwc: after logging, flight, 20 us;
-
     /// Are all components in other processes heard?
     com = ComSwc: every 20 ms, background, 10 us;
 }

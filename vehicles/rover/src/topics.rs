@@ -1,7 +1,6 @@
 //! Who publishes what for whom: the runtime environment's global signal buffer, one line a signal.
 //!
-//! The document's `ActuatorCmd` is three topics and its `Safety` one. Everything from outside comes through Com's `link`,
-//! whether it was sent in this process or over UDP.
+//! Everything from outside comes through Com's `link`, whether it was sent in this process or over UDP.
 
 use crate::Parameters;
 use crate::messages::*;

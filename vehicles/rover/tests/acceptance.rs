@@ -9,7 +9,6 @@ use stampfly_log::csv;
 use stampfly_param::{ParameterAction, ParameterRequest, ParameterStatus};
 use stampfly_rover::Parameters;
 use stampfly_rover::messages::*;
-use stampfly_rover::safety::COMPONENTS;
 use stampfly_types::Message;
 
 fn operated(operator: OperatorCommand) -> Events {
@@ -182,22 +181,35 @@ fn an_engine_in_another_process_drives_and_its_death_is_an_emergency_stop() {
         assert!(records[..died].iter().all(|record| record.drive_accel_cmd == 1.5 && !record.estop));
         let stop = records.iter().position(|record| record.system_state == SystemState::EStop).expect("a stop");
         assert!((died..died + 30).contains(&stop), "{} ticks after the last command", stop - (died - 1));
+        assert!(records[stop..].iter().all(|record| record.drive_accel_cmd == 0.0));
         assert_eq!(last(&records).v, 0.0);
     }
 }
 
 #[test]
-fn a_dead_supervisor_is_an_emergency_stop_of_every_component() {
-    // Nothing runs without its supervisor's word: before the first there is none.
-    let records = run(9, |_, _| Events::default());
-    assert!(records.iter().all(|record| record.brake_decel_cmd == 4.0 && record.drive_accel_cmd == 0.0));
+fn every_component_stops_by_itself_when_the_supervisor_is_silent() {
+    for silent_from in [0, 200, 205] {
+        let records = run(silent_from + 70, |tick, _| Events {
+            is_unsupervised: tick >= silent_from,
+            ..operated(manual(1.0, 0.0, 1.0))
+        });
+        let end = last(&records);
+        assert_eq!((end.drive_accel_cmd, end.brake_decel_cmd, end.v), (0.0, 4.0, 0.0));
+        let stop = records.iter().position(|record| record.drive_accel_cmd == 0.0).expect("a stop");
+        assert_eq!(
+            stop,
+            if silent_from == 0 { 0 } else { silent_from + 30 },
+            "the watchdog's 0.3 s after its last word"
+        );
+        assert!(end.steer_angle_cmd < 0.1 && end.steer == 1.0, "the log keeps what was asked for");
+    }
 }
 
 #[test]
 fn a_missing_heartbeat_of_two_components_is_an_emergency_stop_within_the_limit() {
     for (first, second) in [(0, 1), (0, 4), (2, 3), (4, 5)] {
         for died in 200..220 {
-            let dead = COMPONENTS[first] | COMPONENTS[second];
+            let dead = Components::EACH[first] | Components::EACH[second];
             let records = run(400, |tick, _| Events {
                 operator: Some(manual(0.5, 0.0, 0.0)),
                 dead: if tick >= died { dead } else { Components::NONE },

@@ -6,7 +6,7 @@ use stampfly_rover::Parameters;
 use stampfly_rover::diag::{Signals, check};
 use stampfly_rover::driver_input::{DriverSelector, DriverSources, demo};
 use stampfly_rover::messages::*;
-use stampfly_rover::safety::{COMPONENTS, SafetyInput, SafetySupervisor};
+use stampfly_rover::safety::{SafetyInput, SafetySupervisor};
 use stampfly_types::{Duration, Instant};
 
 fn at(millis: u64) -> Instant {
@@ -28,8 +28,8 @@ impl Bench {
     }
 
     fn check(&mut self, dead: Components, input: SafetyInput) -> SafetyStatus {
-        for (beats, component) in self.beats.iter_mut().zip(COMPONENTS) {
-            *beats = beats.wrapping_add(u32::from(!dead.contains(component)));
+        for (beats, component) in self.beats.iter_mut().zip(Components::EACH) {
+            *beats = beats.wrapping_add(u32::from(!dead.contains(*component)));
         }
         self.checks += 1;
         let input = SafetyInput { heartbeats: self.beats, ..input };
@@ -51,7 +51,7 @@ const RESET: SafetyInput = SafetyInput {
 
 #[test]
 fn each_component_is_supervised() {
-    for component in COMPONENTS {
+    for component in Components::EACH.iter().copied() {
         let mut bench = Bench::new();
         assert_eq!(bench.checks(20, Components::NONE), SafetyStatus::default());
         let status = bench.checks(3, component);

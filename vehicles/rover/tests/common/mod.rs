@@ -19,12 +19,15 @@ pub struct Events {
     pub remote_drive: Option<DriveCommand>,
     /// Components that do not run.
     pub dead: Components,
+    /// Nor does the supervisor.
+    pub is_unsupervised: bool,
 }
 
 /// The rover's runnables, some of which return without doing anything.
 struct Mortal {
     runnables: Runnables,
     dead: Components,
+    is_unsupervised: bool,
 }
 
 impl Schedule for Mortal {
@@ -35,7 +38,7 @@ impl Schedule for Mortal {
     const INPUTS: &'static [usize] = <Runnables as Schedule>::INPUTS;
 
     fn new(parameters: &Parameters) -> Self {
-        Self { runnables: Runnables::new(parameters), dead: Components::NONE }
+        Self { runnables: Runnables::new(parameters), dead: Components::NONE, is_unsupervised: false }
     }
 
     fn states(start: Instant) -> Self::States {
@@ -56,7 +59,11 @@ impl Schedule for Mortal {
             (Id::driver_input, Components::TIME_BASE),
         ];
         let component = component.iter().find(|(id, _)| *id as usize == index).map(|(_, component)| *component);
-        if !component.is_some_and(|component| self.dead.contains(component)) {
+        let is_dead = match component {
+            Some(component) => self.dead.contains(component),
+            None => self.is_unsupervised && index == Id::safety_supervisor as usize,
+        };
+        if !is_dead {
             self.runnables.run(ends, index, activation);
         }
     }
@@ -80,8 +87,9 @@ pub fn run(ticks: usize, mut events: impl FnMut(usize, &mut LinkEnds<'_>) -> Eve
     let mut log = Vec::new();
     for tick in 0..ticks {
         let now = instant(tick);
-        let Events { operator, replay, remote_drive, dead } = events(tick, &mut link);
-        flight_loop.set_runnables(Mortal { runnables: flight_loop.runnables().runnables.clone(), dead });
+        let Events { operator, replay, remote_drive, dead, is_unsupervised } = events(tick, &mut link);
+        let runnables = flight_loop.runnables().runnables.clone();
+        flight_loop.set_runnables(Mortal { runnables, dead, is_unsupervised });
         if let Some(command) = operator {
             link.operator_command.publish(now, &command);
         }

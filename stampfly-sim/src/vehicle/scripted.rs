@@ -1,0 +1,94 @@
+//! Surroundings without a world, for a vehicle whose dynamics are one of its own components (software in the loop).
+//!
+//! Around it is only who drives it, and what there is to say of a flight is in its log: implement [`Script`] and use
+//! [`Scripted`] as the vehicle's surroundings. A vehicle with sensors and a plant needs surroundings of its own.
+
+use super::{Around, Outside, Surroundings};
+use crate::time::{Clock, Tasks};
+use stampfly_bus::Schedule;
+use stampfly_types::{Instant, Message};
+
+/// Who drives a vehicle, for how long, and how well it did.
+pub trait Script: Clone {
+    /// The vehicle's runnables.
+    type Runnables: Schedule;
+    /// A line of the vehicle's log.
+    type Line: Message;
+    /// How a flight went.
+    type Outcome;
+    /// The topic of the log.
+    const LOG: usize;
+
+    /// Starts what drives the vehicle, and hands it the ends it owns. The clock begins at zero.
+    fn start<'a>(&'a self, clock: &Clock, tasks: &mut Tasks<'a>, outside: Outside<'a, Self::Runnables>);
+
+    /// The flight is over after this many lines.
+    fn length(&self) -> usize;
+
+    /// How a flight with this log went.
+    fn judge(&self, lines: Vec<Self::Line>) -> Self::Outcome;
+}
+
+/// What is around a vehicle that follows a script.
+pub struct Scripted<S> {
+    script: S,
+    clock: Clock,
+}
+
+impl<S: Script> Scripted<S> {
+    /// Surroundings for one flight.
+    #[must_use]
+    pub fn new(script: &S) -> Self {
+        Self { script: script.clone(), clock: Clock::new(Instant::ZERO) }
+    }
+}
+
+impl<S: Script> Surroundings for Scripted<S> {
+    type Runnables = S::Runnables;
+    type Outcome = S::Outcome;
+    type Around<'a>
+        = Following<'a, S>
+    where
+        S: 'a;
+
+    fn clock(&self) -> Clock {
+        self.clock.clone()
+    }
+
+    fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: Outside<'a, S::Runnables>) -> Following<'a, S> {
+        self.script.start(&self.clock, tasks, outside);
+        Following { script: &self.script, lines: Vec::new() }
+    }
+}
+
+/// A script during a flight.
+pub struct Following<'a, S: Script> {
+    script: &'a S,
+    lines: Vec<S::Line>,
+}
+
+impl<S: Script> Around for Following<'_, S> {
+    type Outcome = S::Outcome;
+
+    fn drive(&mut self, _: Instant) {}
+
+    fn published(&mut self, topic: usize, _: Instant, words: &[u32]) {
+        if topic == S::LOG && words.len() == S::Line::WORDS {
+            let mut copied = S::Line::ZERO;
+            copied.as_mut().copy_from_slice(words);
+            self.lines.extend(S::Line::from_words(&copied));
+        }
+    }
+
+    fn progress(&self) -> (f32, &'static str) {
+        (self.lines.len() as f32 / self.script.length().max(1) as f32, "driving")
+    }
+
+    fn is_over(&mut self, _: Instant) -> bool {
+        self.lines.len() >= self.script.length()
+    }
+
+    fn finish(self) -> S::Outcome {
+        self.script.judge(self.lines)
+    }
+}
