@@ -25,7 +25,7 @@ pub mod failsafe;
 pub mod landing;
 pub mod machine;
 pub mod signal;
-mod touch;
+mod stop_button;
 pub mod transitions;
 
 pub use authority::{Authority, AuthorityConfig};

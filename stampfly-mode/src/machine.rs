@@ -5,7 +5,7 @@
 //! estimator). The failsafe is an event, never a phase.
 
 use crate::arming;
-use crate::touch::Touch;
+use crate::stop_button::StopButton;
 use crate::transitions::{Event, is_armed, next};
 use stampfly_types::messages::{
     Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightPhase, FlightStatus, GroundContact,
@@ -94,7 +94,7 @@ pub struct ModeMachine {
     crashed: bool,
     silent_since: Option<Instant>,
     was_diverged: bool,
-    touch: Touch,
+    stop_button: StopButton,
     /// While pairing: has the transmitter of before fallen silent?
     unheard: bool,
 }
@@ -103,9 +103,9 @@ impl ModeMachine {
     /// One step, at the control rate.
     pub fn step(&mut self, now: Instant, input: &ModeInput<'_>) -> ModeOutput {
         let switch = self.pilot_switch(input);
-        // Nobody can touch the button of an armed vehicle without holding it.
-        let grabbed = self.touch.grabs(now, input.button, is_armed(self.output.flight_status.phase));
-        let input = &ModeInput { button: self.touch.meaning(input.button), ..*input };
+        // The button is on the vehicle: a gesture on an armed one means that it is held in a hand.
+        let stopped_by_button = self.stop_button.stops(now, input.button, is_armed(self.output.flight_status.phase));
+        let input = &ModeInput { button: self.stop_button.unused(input.button), ..*input };
         self.choose_mode(input);
         let mode = &mut self.output.flight_status;
         if input.button == Some(ButtonGesture::HoldPair) {
@@ -120,7 +120,7 @@ impl ModeMachine {
         }
         self.unheard = mode.pairing && (self.unheard || input.pilot.is_none());
         mode.blocks = arming::blocks(mode, self.crashed, switch.is_stale, input);
-        let happened = self.happened(now, input, &switch, grabbed);
+        let happened = self.happened(now, input, &switch, stopped_by_button);
         if self.acknowledges(input, &switch) {
             self.crashed = false;
         }
@@ -140,7 +140,7 @@ impl ModeMachine {
     }
 
     /// Which of [`Event::ALL`] have happened, in the same order.
-    fn happened(&mut self, now: Instant, input: &ModeInput<'_>, switch: &Switch, grabbed: bool) -> [bool; 10] {
+    fn happened(&mut self, now: Instant, input: &ModeInput<'_>, switch: &Switch, stopped_by_button: bool) -> [bool; 10] {
         let mode = &self.output.flight_status;
         let commanded = |kind: Command| input.commands.contains(&kind);
         let clicked = input.button == Some(ButtonGesture::Click);
@@ -162,7 +162,7 @@ impl ModeMachine {
         [
             input.alerts.intersects(CUT)
                 || commanded(Command::Kill)
-                || grabbed
+                || stopped_by_button
                 || input.pilot.is_some_and(|pilot| pilot.kill),
             commanded(Command::Disarm) || switch.falls || (mode.phase == FlightPhase::Armed && waited >= ARMED_TIMEOUT),
             input.land_detected.landed,
@@ -251,8 +251,8 @@ impl ModeMachine {
     fn acknowledges(&self, input: &ModeInput<'_>, switch: &Switch) -> bool {
         let idle = !is_armed(self.output.flight_status.phase);
         // A press alone is none: what it becomes may be a click, which must not find the crash acknowledged and arm.
-        let touched = input.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
-        idle && (switch.falls || touched || input.commands.contains(&Command::Disarm))
+        let gesture = input.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
+        idle && (switch.falls || gesture || input.commands.contains(&Command::Disarm))
     }
 }
 
@@ -380,7 +380,7 @@ mod tests {
     }
 
     /// Every phase × every single alert and pair of alerts × every command and gesture: motors never start unasked, a
-    /// cutting alert or a touch always stops them within the step, and only transitions of the table are taken.
+    /// cutting alert or a gesture always stops them within the step, and only transitions of the table are taken.
     #[test]
     fn exhaustive_single_step() {
         let bits: Vec<Alerts> = Alerts::NAMES.iter().map(|(_, bit)| bits_to_alerts(*bit)).collect();
@@ -476,7 +476,7 @@ mod tests {
     }
 
     /// Lets time pass without a gesture, then one.
-    fn touch(world: &mut World, machine: &mut ModeMachine, after: Duration, gesture: ButtonGesture) -> FlightStatus {
+    fn press(world: &mut World, machine: &mut ModeMachine, after: Duration, gesture: ButtonGesture) -> FlightStatus {
         world.now += after;
         world.button = Some(gesture);
         world.step(machine, &[]).flight_status
@@ -489,43 +489,43 @@ mod tests {
         for phase in [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing] {
             for rest in [Click, DoubleClick, HoldPair, HoldReset] {
                 let (mut machine, mut world) = in_phase(phase);
-                let stopped = touch(&mut world, &mut machine, Duration::ZERO, Press);
+                let stopped = press(&mut world, &mut machine, Duration::ZERO, Press);
                 assert_eq!((stopped.phase, stopped.armed), (FlightPhase::IdleGround, false), "{phase:?}");
-                let later = touch(&mut world, &mut machine, millis(3_000), rest);
+                let later = press(&mut world, &mut machine, millis(3_000), rest);
                 assert!(!later.armed && !later.pairing, "{phase:?} {rest:?}");
                 // A hand in a hurry presses again.
                 for (after, gesture) in [(300, Press), (500, Click), (1_500, Press), (500, Click), (900, Press)] {
-                    assert!(!touch(&mut world, &mut machine, millis(after), gesture).armed, "{phase:?} {rest:?}");
+                    assert!(!press(&mut world, &mut machine, millis(after), gesture).armed, "{phase:?} {rest:?}");
                 }
-                assert!(!touch(&mut world, &mut machine, millis(3_000), HoldPair).pairing, "{phase:?} {rest:?}");
+                assert!(!press(&mut world, &mut machine, millis(3_000), HoldPair).pairing, "{phase:?} {rest:?}");
                 // Left alone for a while, it is a button again.
-                assert!(!touch(&mut world, &mut machine, millis(2_000), Press).armed);
-                assert!(touch(&mut world, &mut machine, millis(500), Click).armed, "{phase:?} {rest:?}");
+                assert!(!press(&mut world, &mut machine, millis(2_000), Press).armed);
+                assert!(press(&mut world, &mut machine, millis(500), Click).armed, "{phase:?} {rest:?}");
             }
         }
     }
 
     #[test]
-    fn who_touches_the_button_while_somebody_else_arms_stops_the_motors() {
+    fn a_press_while_a_command_arms_stops_the_motors() {
         let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-        assert!(!touch(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Press).armed);
+        assert!(!press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Press).armed);
         assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
-        assert!(!touch(&mut world, &mut machine, Duration::from_millis(500), ButtonGesture::Click).armed);
+        assert!(!press(&mut world, &mut machine, Duration::from_millis(500), ButtonGesture::Click).armed);
     }
 
     #[test]
-    fn a_touch_that_acknowledges_a_crash_does_not_arm() {
+    fn a_press_that_acknowledges_a_crash_does_not_arm() {
         let (mut machine, mut world) = in_phase(FlightPhase::Flying);
         world.alerts = Alerts::IMPACT;
         world.step(&mut machine, &[]);
         world.alerts = Alerts::NONE;
         let millis = Duration::from_millis;
-        touch(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
+        press(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
         assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::CRASHED, "not yet");
-        assert!(!touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed);
+        assert!(!press(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed);
         assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::NONE);
-        touch(&mut world, &mut machine, millis(500), ButtonGesture::Press);
-        assert!(touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed, "the next touch does");
+        press(&mut world, &mut machine, millis(500), ButtonGesture::Press);
+        assert!(press(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed, "the next press does");
     }
 
     #[test]
@@ -550,7 +550,7 @@ mod tests {
     fn a_click_takes_off_and_holds_the_place() {
         let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         machine.wanted = FlightMode::Stabilize;
-        let clicked = touch(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
+        let clicked = press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
         assert_eq!((clicked.phase, clicked.mode), (FlightPhase::Armed, FlightMode::PosHold));
         world.now += SPOOL;
         let later = world.step(&mut machine, &[]).flight_status;
