@@ -100,7 +100,7 @@ fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
         height: -frame.position.z,
         velocity: frame.velocity,
         attitude: frame.attitude,
-        state: frame.state.into(),
+        state: frame.phase.into(),
         low_battery: frame.alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY),
         sensor_error: frame.alerts.intersects(SENSOR_ERROR),
         link_lost: frame.alerts.intersects(Alerts::COMM_LOST),

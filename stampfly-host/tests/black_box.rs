@@ -13,7 +13,7 @@ use stampfly_host::flown::fly;
 use stampfly_host::golden::Event;
 use stampfly_host::recorder::Recorder;
 use stampfly_lab::flight_log;
-use stampfly_types::messages::{ImuData, PilotInput, SystemMode};
+use stampfly_types::messages::{FlightStatus, ImuData, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 use std::sync::LazyLock;
 
@@ -49,7 +49,7 @@ static ACCIDENT: LazyLock<(Box<BlackBox<WORDS>>, Instant)> = LazyLock::new(|| {
                 taps.drain(&mut |topic, at, generation, words| {
                     black_box.note(topic, at, generation, words);
                     if topic == Id::system_mode as usize {
-                        let mode = SystemMode::from_words(words.try_into().expect("its words")).expect("a mode");
+                        let mode = FlightStatus::from_words(words.try_into().expect("its words")).expect("a mode");
                         match (mode.armed, armed_at) {
                             (true, None) => armed_at = Some(at),
                             (false, Some(_)) if stopped_at.is_none() => stopped_at = Some(at),
@@ -169,7 +169,7 @@ fn a_dump_that_is_cut_off_says_so() {
 #[test]
 fn a_flight_that_begins_while_the_last_is_told_ends_it() {
     let mut black_box = BlackBox::<256>::new(RETENTION);
-    let armed = SystemMode { armed: true, ..Default::default() }.to_words();
+    let armed = FlightStatus { armed: true, ..Default::default() }.to_words();
     let config = VehicleConfig::default();
     let nothing =
         block_on(dump(|| Ok(black_box.records().next()), |sink, at| open(sink, at, &config, ""), async |_| Ok(())));

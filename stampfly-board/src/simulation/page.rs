@@ -89,7 +89,7 @@ pub const PAGE: Page = Page {
         PanelSpec::new("Battery", "Current", "A", "sensor_power", &[("current", "current")]),
     ],
     bands: &[
-        ("system_mode", "state", "State"),
+        ("system_mode", "phase", "Phase"),
         ("system_mode", "mode", "Mode"),
         ("command_setpoint", "source", "Command"),
     ],

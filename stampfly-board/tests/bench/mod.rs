@@ -10,7 +10,7 @@ use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
 use stampfly_types::messages::{
-    ArmBlocks, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput, PowerData, SystemMode, TofData,
+    ArmBlocks, FlightStatus, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput, PowerData, TofData,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Message, Vec3};
 
@@ -63,11 +63,11 @@ impl<'b> Bench<'b> {
     }
 
     pub fn blocks(&self) -> ArmBlocks {
-        self.newest::<SystemMode>(Id::system_mode).blocks
+        self.newest::<FlightStatus>(Id::system_mode).blocks
     }
 
     pub fn armed(&self) -> bool {
-        self.newest::<SystemMode>(Id::system_mode).armed
+        self.newest::<FlightStatus>(Id::system_mode).armed
     }
 
     pub fn motors(&self) -> MotorOutput {
