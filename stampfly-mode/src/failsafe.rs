@@ -213,10 +213,13 @@ impl Failsafe {
 
     fn inspect_attitude(&mut self, active: Alerts, now: Instant, input: &FailsafeInput<'_>) -> Alerts {
         let known = input.estimate.valid.contains(Validity::TILT);
-        let flying = matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
+        let flying =
+            matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
         let [tilt, time] = self.config.tumble;
-        let over =
-            flying && known && input.flight_status.mode != FlightMode::Acro && frame::tilt(&input.estimate.attitude) > tilt;
+        let over = flying
+            && known
+            && input.flight_status.mode != FlightMode::Acro
+            && frame::tilt(&input.estimate.attitude) > tilt;
         let tumbled = lasts(&mut self.tumbled, now, over, time);
         let [angle, time] = self.config.tilt_mismatch;
         let standing = input.flight_status.phase == FlightPhase::IdleGround && known;

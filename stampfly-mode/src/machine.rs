@@ -126,7 +126,9 @@ impl ModeMachine {
         let holds_height = matches!(self.output.flight_status.mode, FlightMode::AltHold | FlightMode::PosHold);
         let transition = Event::ALL.into_iter().zip(happened).filter(|(_, happened)| *happened);
         if let Some((event, phase)) = transition
-            .filter_map(|(event, _)| next(self.output.flight_status.phase, event, holds_height).map(|phase| (event, phase)))
+            .filter_map(|(event, _)| {
+                next(self.output.flight_status.phase, event, holds_height).map(|phase| (event, phase))
+            })
             .next()
         {
             self.leave_and_enter(now, event, phase, input);
@@ -139,7 +141,13 @@ impl ModeMachine {
     }
 
     /// Which of [`Event::ALL`] have happened, in the same order.
-    fn happened(&mut self, now: Instant, input: &ModeInput<'_>, switch: &Switch, stopped_by_button: bool) -> [bool; 10] {
+    fn happened(
+        &mut self,
+        now: Instant,
+        input: &ModeInput<'_>,
+        switch: &Switch,
+        stopped_by_button: bool,
+    ) -> [bool; 10] {
         let mode = &self.output.flight_status;
         let commanded = |kind: Command| input.commands.contains(&kind);
         let clicked = input.button == Some(ButtonGesture::Click);
@@ -560,7 +568,8 @@ mod tests {
     fn a_lost_link_hovers_then_lands() {
         let (mut machine, mut world) = in_phase(FlightPhase::Flying);
         world.alerts = Alerts::COMM_LOST;
-        let landed_after = (0..2_000).find(|_| world.step(&mut machine, &[]).flight_status.phase == FlightPhase::Landing);
+        let landed_after =
+            (0..2_000).find(|_| world.step(&mut machine, &[]).flight_status.phase == FlightPhase::Landing);
         assert_eq!(landed_after, Some(1_200), "3 s at 400 Hz");
         world.alerts = Alerts::NONE;
         assert_eq!(

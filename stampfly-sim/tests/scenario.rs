@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use stampfly_sim::vehicle::Scenario;
-use stampfly_types::messages::{PowerData, FlightStatus};
+use stampfly_types::messages::{FlightStatus, PowerData};
 
 /// A voltage is commanded, a mode is watched.
 fn parse(text: &str) -> Result<Scenario<PowerData, FlightStatus>, String> {

@@ -15,14 +15,14 @@ const MODES: [FlightMode; 4] = [FlightMode::PosHold, FlightMode::AltHold, Flight
 
 /// Stands, takes off, flies in one mode after the other, lands.
 fn mode_of(k: u64) -> FlightStatus {
-    let state = match k {
+    let phase = match k {
         0..50 => FlightPhase::Armed,
         50..150 => FlightPhase::TakeOff,
         150..1_050 => FlightPhase::Flying,
         _ => FlightPhase::Landing,
     };
     FlightStatus {
-        state,
+        phase,
         mode: MODES[(k / 130) as usize % MODES.len()],
         armed: true,
         control_resets: u32::from(k > 300) + u32::from(k > 850),
@@ -91,7 +91,12 @@ fn navigator_goes_on() {
         let command = if (700..760).contains(&k) { sticks(n) } else { command };
         navigator.step(
             at(k),
-            &NavigatorInput { flight_status: &mode, estimate: &estimate, land_detected: &land_detected, command: &command },
+            &NavigatorInput {
+                flight_status: &mode,
+                estimate: &estimate,
+                land_detected: &land_detected,
+                command: &command,
+            },
         )
     });
     assert!(navigator.refused() > 0, "the route was full once");

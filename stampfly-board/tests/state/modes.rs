@@ -7,10 +7,10 @@ use stampfly_mode::{
 use stampfly_types::Vec3;
 use stampfly_types::messages::*;
 
-const STATES: [FlightPhase; 4] = [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing];
+const PHASES: [FlightPhase; 4] = [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing];
 
-fn state_of(k: u64) -> FlightPhase {
-    STATES[(k / 90) as usize % STATES.len()]
+fn phase_of(k: u64) -> FlightPhase {
+    PHASES[(k / 90) as usize % PHASES.len()]
 }
 
 fn pilot(k: u64, n: &mut Numbers) -> PilotInput {
@@ -52,7 +52,7 @@ fn mode_machine_goes_on() {
             button: n.once_in(150).then_some(ButtonGesture::Click),
         };
         let output = machine.step(at(k), &input);
-        (output.mode, output.estimator)
+        (output.flight_status, output.estimator)
     });
     assert!(format!("{machine:?}").contains("transitions"), "{machine:?}");
 }
@@ -90,7 +90,7 @@ fn landing_goes_on() {
         let estimate = StateEstimate { height, velocity: n.vector(0.05), valid: Validity::ALL, ..Default::default() };
         let setpoint = Setpoint { position: Vec3::new(0.0, 0.0, -0.5), ..Default::default() };
         let demand = ControlOutput { thrust: 0.25 + n.number(0.1), ..Default::default() };
-        let input = LandingInput { estimate: &estimate, state: state_of(k), setpoint: &setpoint, demand: &demand };
+        let input = LandingInput { estimate: &estimate, phase: phase_of(k), setpoint: &setpoint, demand: &demand };
         manager.step(at(k), &input)
     });
 }
@@ -111,7 +111,7 @@ fn authority_goes_on() {
 #[test]
 fn signals_go_on() {
     goes_on(Signaller::default(), 600, |signaller, k, n| {
-        let mode = FlightStatus { phase: state_of(k), armed: k % 90 > 45, ..Default::default() };
+        let mode = FlightStatus { phase: phase_of(k), armed: k % 90 > 45, ..Default::default() };
         let alerts = if n.once_in(20) { Alerts::NONE } else { Alerts::LOW_BATTERY };
         signaller.step(at(k), &mode, alerts)
     });

@@ -1,10 +1,10 @@
 //! The whole vehicle: a key frame in the middle of a flight, and the rest of the flight from there.
 
 use super::{Numbers, at, bytes};
-use stampfly_board::{ControllerKind, EstimatorKind, VehicleConfig};
 use stampfly_board::messages::ButtonContact;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics;
+use stampfly_board::{ControllerKind, EstimatorKind, VehicleConfig};
 use stampfly_bus::{Activation, Band};
 use stampfly_flight::{Assembled, Observer, key_frame};
 use stampfly_types::messages::*;

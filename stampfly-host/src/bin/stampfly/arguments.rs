@@ -2,8 +2,8 @@
 
 use crate::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use stampfly_board::{EstimatorKind, VehicleConfig};
 use stampfly_board::simulation::StampFly;
+use stampfly_board::{EstimatorKind, VehicleConfig};
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
 use stampfly_lab::estimate::{Method, Suite, suite};
