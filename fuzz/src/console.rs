@@ -63,10 +63,10 @@ fn known(state: u8, fill: u8) -> Newest {
         let armed = state == ARMED;
         let phase = if armed { FlightPhase::Flying } else { FlightPhase::IdleGround };
         let mode = FlightStatus { phase, armed, mode: FlightMode::AltHold, ..FlightStatus::default() };
-        newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
+        newest.note(Id::flight_status as usize, Instant::ZERO, &mode.to_words());
     } else {
         // Words that are no state: what is not known to be disarmed counts as armed.
-        newest.note(Id::system_mode as usize, Instant::ZERO, &[!0; FlightStatus::WORDS]);
+        newest.note(Id::flight_status as usize, Instant::ZERO, &[!0; FlightStatus::WORDS]);
     }
     newest
 }

@@ -27,7 +27,7 @@ pub type BlackBox<const WORDS: usize> = stampfly_flight::BlackBox<WORDS, COUNT>;
 /// use stampfly_types::{Instant, Message, messages::FlightStatus};
 /// let mut black_box = BlackBox::<256>::new(RETENTION);
 /// let armed = FlightStatus { armed: true, ..Default::default() };
-/// black_box.note(Id::system_mode as usize, Instant::from_millis(1), 1, &armed.to_words());
+/// black_box.note(Id::flight_status as usize, Instant::from_millis(1), 1, &armed.to_words());
 /// assert_eq!(black_box.records().count(), 1);
 /// ```
 pub const RETENTION: Retention = Retention { topics: &TOPICS, rate, armed };
@@ -54,7 +54,7 @@ fn rate(topic: usize) -> LogRate {
         Id::estimate_status => LogRate::hertz(2),
         Id::estimator_command => LogRate::EverySample,
         Id::system_alert => LogRate::OnChange,
-        Id::system_mode => LogRate::OnChange,
+        Id::flight_status => LogRate::OnChange,
         Id::land_detected => LogRate::hertz(5),
         Id::setpoint => LogRate::hertz(10),
         Id::control_output => LogRate::hertz(10),
@@ -71,7 +71,7 @@ fn rate(topic: usize) -> LogRate {
 }
 
 fn armed(topic: usize, words: &[u32]) -> Option<bool> {
-    (topic == Id::system_mode as usize).then(|| message::<FlightStatus>(words).is_some_and(|mode| mode.armed))
+    (topic == Id::flight_status as usize).then(|| message::<FlightStatus>(words).is_some_and(|mode| mode.armed))
 }
 
 /// Starts the log of a flight with these parameters: name of the vehicle, parameters, every topic, and a line of text

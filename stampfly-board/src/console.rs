@@ -111,7 +111,7 @@ impl Vehicle for Console<'_> {
     const TOPICS: &'static [TopicInfo] = &TOPICS;
 
     fn is_armed(&self) -> Option<bool> {
-        self.newest.get::<FlightStatus>(Id::system_mode as usize).map(|(_, mode)| mode.armed)
+        self.newest.get::<FlightStatus>(Id::flight_status as usize).map(|(_, mode)| mode.armed)
     }
 
     fn version(&self) -> &str {
@@ -120,7 +120,7 @@ impl Vehicle for Console<'_> {
 
     fn status(&self, now: Instant, reply: &mut dyn fmt::Write) -> fmt::Result {
         let newest = self.newest;
-        let mode = newest.get::<FlightStatus>(Id::system_mode as usize).map(|(_, mode)| mode).unwrap_or_default();
+        let mode = newest.get::<FlightStatus>(Id::flight_status as usize).map(|(_, mode)| mode).unwrap_or_default();
         let alert = newest.get::<SystemAlert>(Id::system_alert as usize).map(|(_, alert)| alert).unwrap_or_default();
         write!(reply, "state    {}, {}\r\n", mode.phase.name(), if mode.armed { "ARMED" } else { "disarmed" })?;
         write!(reply, "mode     {}\r\n", mode.mode.name())?;

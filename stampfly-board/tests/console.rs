@@ -16,7 +16,7 @@ fn vehicle(armed: Option<bool>) -> Newest {
         let phase = if armed { FlightPhase::Flying } else { FlightPhase::IdleGround };
         let blocks = ArmBlocks::LOW_BATTERY | ArmBlocks::THROTTLE;
         let mode = FlightStatus { phase, armed, mode: FlightMode::AltHold, blocks, ..Default::default() };
-        newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
+        newest.note(Id::flight_status as usize, Instant::ZERO, &mode.to_words());
     }
     newest
 }

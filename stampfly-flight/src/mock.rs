@@ -22,7 +22,7 @@ use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 /// mock.run("drive", now).expect("a runnable");
 /// let output = mock.newest::<MotorOutput>("actuator_motor").expect("published");
 /// assert_eq!((output.at, output.data.duty[0]), (now, 0.5));
-/// assert_eq!(mock.newest::<FlightStatus>("system_mode"), None, "the monitor has not run");
+/// assert_eq!(mock.newest::<FlightStatus>("flight_status"), None, "the monitor has not run");
 /// # }
 /// ```
 pub struct Mock<'b, R: Schedule> {

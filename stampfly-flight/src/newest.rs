@@ -152,11 +152,11 @@ mod tests {
         let mut newest = NewestSamples::<COUNT, { longest_message(&TOPICS) }>::new();
         let blocks = ArmBlocks::LOW_BATTERY | ArmBlocks::THROTTLE;
         let mode = FlightStatus { phase: FlightPhase::Landing, blocks, ..Default::default() };
-        newest.note(Id::system_mode as usize, Instant::from_millis(4), &mode.to_words());
+        newest.note(Id::flight_status as usize, Instant::from_millis(4), &mode.to_words());
         let show = |newest: &NewestSamples<_, _>, topic: Id| {
             newest.show(topic as usize, topic.info(), Instant::from_millis(9)).map(|shown| shown.to_string())
         };
-        let text = show(&newest, Id::system_mode).expect("noted");
+        let text = show(&newest, Id::flight_status).expect("noted");
         for part in ["5 ms old", "state Landing", "armed false", "blocks LOW_BATTERY THROTTLE"] {
             assert!(text.contains(part), "{part} is missing:\n{text}");
         }

@@ -55,7 +55,7 @@ impl Vehicle for Rover<'_> {
     const TOPICS: &'static [TopicInfo] = &topics::TOPICS;
 
     fn is_armed(&self) -> Option<bool> {
-        self.newest.get::<FlightStatus>(Id::system_mode as usize).map(|(_, mode)| mode.armed)
+        self.newest.get::<FlightStatus>(Id::flight_status as usize).map(|(_, mode)| mode.armed)
     }
 
     fn version(&self) -> &str {
@@ -107,7 +107,7 @@ impl Rover<'_> {
         let mut newest = NewestSamples::new();
         if let Some(armed) = armed {
             let mode = FlightStatus { armed, ..Default::default() };
-            newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
+            newest.note(Id::flight_status as usize, Instant::ZERO, &mode.to_words());
         }
         const SENSORS: &[SensorLine<'static>] = &[
             SensorLine { name: "range", samples: 70, errors: 2, last_error: Some(&"no echo") },

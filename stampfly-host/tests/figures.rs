@@ -1,6 +1,6 @@
 //! The printed figures, computed again from the log, by their documentation and nothing else.
 //!
-//! Works on the columns a plot would show: `truth`, `setpoint`, `estimate_state` and `system_mode` of the parsed ULog.
+//! Works on the columns a plot would show: `truth`, `setpoint`, `estimate_state` and `flight_status` of the parsed ULog.
 
 use stampfly_board::simulation::metrics::FIGURES;
 use stampfly_board::simulation::mission::{HOVER, Mission, REFERENCE};
@@ -53,7 +53,7 @@ fn vector(series: &Series, field: &str, index: usize) -> [f64; 3] {
 /// One row per sample of the truth, which is taken whenever there is a new set-point.
 fn rows(flight: &Flight) -> Vec<Row> {
     let [truth, setpoint, estimate, mode] =
-        ["truth", "setpoint", "estimate_state", "system_mode"].map(|topic| &flight.topics[topic]);
+        ["truth", "setpoint", "estimate_state", "flight_status"].map(|topic| &flight.topics[topic]);
     let row = |(index, at): (usize, &Instant)| {
         let [s, e, m] = [setpoint, estimate, mode].map(|series| series.index_at(*at).expect("published before"));
         // The angle between body z and world z, from the third diagonal element of the rotation matrix.

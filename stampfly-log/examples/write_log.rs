@@ -16,7 +16,7 @@ use std::io::{BufWriter, Write};
 const TOPICS: &[Topic] = &[
     Topic { name: "sensor_imu", fields: ImuData::FIELDS },
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
-    Topic { name: "system_mode", fields: FlightStatus::FIELDS },
+    Topic { name: "flight_status", fields: FlightStatus::FIELDS },
 ];
 const IMU: usize = 0;
 const POWER: usize = 1;

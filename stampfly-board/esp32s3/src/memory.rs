@@ -42,7 +42,7 @@ impl Memory {
 
     /// The mode machine's newest decision.
     pub fn mode(&self) -> Option<FlightStatus> {
-        self.newest.get(Id::system_mode as usize).map(|(_, mode)| mode)
+        self.newest.get(Id::flight_status as usize).map(|(_, mode)| mode)
     }
 }
 

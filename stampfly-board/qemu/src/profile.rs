@@ -168,7 +168,7 @@ impl PlayObserver for Profile<'_> {
     }
 
     fn published(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
-        if topic == topics::Id::system_mode as usize
+        if topic == topics::Id::flight_status as usize
             && let Some(mode) = message::<FlightStatus>(words)
         {
             self.armed = mode.armed;

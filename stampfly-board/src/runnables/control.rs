@@ -42,7 +42,7 @@ impl Runnable for Control {
             estimate: ends.estimate_state.get(),
             command: ends.command_setpoint.get(),
             setpoint: ends.setpoint.get(),
-            flight_status: ends.system_mode.get(),
+            flight_status: ends.flight_status.get(),
             land_detected: ends.land_detected.get(),
             unmet: ends.actuator_motor.get().unmet,
         };

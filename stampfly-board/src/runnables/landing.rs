@@ -26,7 +26,7 @@ impl Runnable for Landing {
     fn run(&mut self, activation: &mut Activation, ends: &mut LandingEnds<'_>) {
         let input = LandingInput {
             estimate: ends.estimate_state.get(),
-            phase: ends.system_mode.get().phase,
+            phase: ends.flight_status.get().phase,
             setpoint: ends.setpoint.get(),
             demand: ends.control_output.get(),
         };

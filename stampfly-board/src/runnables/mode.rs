@@ -66,7 +66,7 @@ impl Runnable for Mode {
             button,
         };
         let output = self.machine.step(now, &input);
-        ends.system_mode.publish(now, &output.flight_status);
+        ends.flight_status.publish(now, &output.flight_status);
         self.last = output.flight_status;
         if output.flight_status.armed {
             self.armed_at = now;

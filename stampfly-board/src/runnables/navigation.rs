@@ -29,7 +29,7 @@ impl Runnable for Navigation {
             let _ = self.navigator.accept(&command.data);
         }
         let input = NavigatorInput {
-            flight_status: ends.system_mode.get(),
+            flight_status: ends.flight_status.get(),
             estimate: ends.estimate_state.get(),
             land_detected: ends.land_detected.get(),
             command: ends.command_setpoint.get(),

@@ -243,7 +243,7 @@ impl Watch {
                 self.due = Some(at);
             }
             Id::estimate_state => read(words, &mut self.estimate),
-            Id::system_mode => {
+            Id::flight_status => {
                 read(words, &mut self.mode);
                 let (phase, mode) = (self.mode.phase, self.mode.mode);
                 if self.phases.last().is_none_or(|last| (last.phase, last.mode) != (phase, mode)) {

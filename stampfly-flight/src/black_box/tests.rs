@@ -10,14 +10,14 @@ use std::vec::Vec;
 
 const RETENTION: Retention = Retention {
     topics: &TOPICS,
-    rate: |topic| if topic == Id::system_mode as usize { LogRate::OnChange } else { LogRate::EverySample },
+    rate: |topic| if topic == Id::flight_status as usize { LogRate::OnChange } else { LogRate::EverySample },
     armed: |topic, words| {
-        let mode = (topic == Id::system_mode as usize).then(|| message::<FlightStatus>(words));
+        let mode = (topic == Id::flight_status as usize).then(|| message::<FlightStatus>(words));
         mode.map(|mode| mode.is_some_and(|mode| mode.armed))
     },
 };
 const RANGE: usize = Id::sensor_range as usize;
-const MODE: usize = Id::system_mode as usize;
+const MODE: usize = Id::flight_status as usize;
 
 type Small = BlackBox<257, COUNT>;
 

@@ -17,7 +17,7 @@ pub mod topics {
         /// Duty of the two wheels.
         actuator_motor: MotorOutput = latest @ 50 Hz from drive => [motors, monitor];
         /// Moving or not.
-        system_mode: FlightStatus = latest @ 10 Hz from monitor => [];
+        flight_status: FlightStatus = latest @ 10 Hz from monitor => [];
     }
 }
 
@@ -72,6 +72,6 @@ impl Runnable for Monitor {
     fn run(&mut self, activation: &mut Activation, ends: &mut Self::Ends<'_>) {
         let moving = ends.actuator_motor.fresh(activation.now(), Duration::from_millis(100)).is_some_and(|m| m.armed);
         let phase = if moving { FlightPhase::Armed } else { FlightPhase::IdleGround };
-        ends.system_mode.publish(activation.now(), &FlightStatus { phase, armed: moving, ..Default::default() });
+        ends.flight_status.publish(activation.now(), &FlightStatus { phase, armed: moving, ..Default::default() });
     }
 }

@@ -219,7 +219,7 @@ impl vehicle::Around for Watch<'_> {
     fn published(&mut self, topic: usize, at: Instant, words: &[u32]) {
         let what = "what was published";
         match Id::ALL[topic] {
-            Id::system_mode => self.seen.modes.push((at, message(words).expect(what))),
+            Id::flight_status => self.seen.modes.push((at, message(words).expect(what))),
             Id::system_alert => self.seen.alerts.push((at, message::<SystemAlert>(words).expect(what).active)),
             Id::actuator_motor => self.seen.motors.push((at, message(words).expect(what))),
             _ => {}

@@ -119,7 +119,7 @@ pub fn flight() -> Flight {
         }
         if step % 40 == 0 {
             let armed = (3.0..57.5).contains(&t);
-            flight.push("system_mode", at, &FlightStatus { phase, mode: flight_mode, armed, ..Default::default() });
+            flight.push("flight_status", at, &FlightStatus { phase, mode: flight_mode, armed, ..Default::default() });
             let active = if t > 49.0 { Alerts::LOW_BATTERY } else { Alerts::NONE };
             let active = active.set(Alerts::FLOW_LOST, (31.0..31.4).contains(&t));
             flight.push("system_alert", at, &SystemAlert { active, seen: active });

@@ -116,7 +116,7 @@ impl Observation {
     /// Takes a sample off the bus.
     fn sample(&mut self, id: Id, at: Instant, generation: u32, words: &[u32]) {
         self.shadow.sample(id, at, generation, words);
-        if id == Id::system_mode
+        if id == Id::flight_status
             && let Ok(words) = words.try_into()
             && let Some(mode) = FlightStatus::from_words(&words)
         {

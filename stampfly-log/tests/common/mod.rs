@@ -69,7 +69,7 @@ pub const TOPICS: &[Topic] = &[
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
     Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
     Topic { name: "estimate_status", fields: EstimatorStatus::FIELDS },
-    Topic { name: "system_mode", fields: FlightStatus::FIELDS },
+    Topic { name: "flight_status", fields: FlightStatus::FIELDS },
     Topic { name: "system_alert", fields: SystemAlert::FIELDS },
     Topic { name: "signal", fields: Signal::FIELDS },
     Topic { name: "odd", fields: Odd::FIELDS },
