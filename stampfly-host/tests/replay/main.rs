@@ -17,7 +17,6 @@ use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::{ImuData, PowerData};
 use stampfly_types::{ActivationRecord, Duration, InputRecord, Instant, Message as _};
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::LazyLock;
 
 /// Everything in the mission that makes the stack do something.
