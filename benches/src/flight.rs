@@ -203,7 +203,7 @@ impl Recorder<'_> {
         let output = self.vehicle.motors();
         self.motors.push(output);
         let telemetry = self.vehicle.outside.link.telemetry.latest();
-        if telemetry.is_some_and(|frame| frame.data.state == FlightState::Flying) {
+        if telemetry.is_some_and(|frame| frame.data.phase == FlightPhase::Flying) {
             self.flying_since.get_or_insert(self.motors.len());
         } else {
             self.flying_since = None;

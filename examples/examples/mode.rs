@@ -10,7 +10,7 @@ struct World {
     alerts: Alerts,
     estimate: StateEstimate,
     calibration: CalibrationResult,
-    status: VehicleStatus,
+    land_detected: LandDetected,
     commands: Vec<GuidedKind>,
 }
 
@@ -27,12 +27,12 @@ const STORY: &[Event] = &[
     (2_500, "take off", |w| w.commands.push(GuidedKind::TakeOff)),
     (5_000, "the height is reached", |w| {
         w.estimate.height = 0.6;
-        w.status = VehicleStatus { contact: GroundContact::Air, takeoff_complete: true, ..w.status };
+        w.land_detected = LandDetected { contact: GroundContact::Air, takeoff_complete: true, ..w.land_detected };
     }),
     (9_000, "the battery is critical", |w| w.alerts = Alerts::CRITICAL_BATTERY),
     (12_000, "touchdown", |w| {
         w.estimate.height = 0.02;
-        w.status = VehicleStatus { contact: GroundContact::Ground, landed: true, ..Default::default() };
+        w.land_detected = LandDetected { contact: GroundContact::Ground, landed: true, ..Default::default() };
     }),
     (13_000, "arm", |w| w.commands.push(GuidedKind::Arm)),
 ];
@@ -40,7 +40,7 @@ const STORY: &[Event] = &[
 fn main() {
     let mut machine = ModeMachine::default();
     let mut world = World::default();
-    let mut before = SystemMode::default();
+    let mut before = FlightStatus::default();
     let mut story = STORY.iter().peekable();
 
     for step in 0..14 * 400u64 {
@@ -49,15 +49,16 @@ fn main() {
             println!("{:5.1} s  {text}", now.seconds_f64());
             change(&mut world);
         }
-        let World { alerts, estimate, calibration, status, commands } = &world;
-        let input = ModeInput { alerts: *alerts, estimate, calibration, status, pilot: None, commands, button: None };
-        let mode = machine.step(now, &input).mode;
-        if mode.state != before.state {
+        let World { alerts, estimate, calibration, land_detected, commands } = &world;
+        let input =
+            ModeInput { alerts: *alerts, estimate, calibration, land_detected, pilot: None, commands, button: None };
+        let mode = machine.step(now, &input).flight_status;
+        if mode.phase != before.phase {
             println!(
                 "{:>9} {:?} → {:?}, motors {}",
                 "",
-                before.state,
-                mode.state,
+                before.phase,
+                mode.phase,
                 if mode.armed { "may turn" } else { "off" }
             );
         } else if world.commands.contains(&GuidedKind::Arm) {

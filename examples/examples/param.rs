@@ -3,7 +3,7 @@
 use embassy_futures::block_on;
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use stampfly_param::{Disarmed, ParameterStore};
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 const PAGE: usize = 256;
 const NAME: &str = "rate.roll.kp";
@@ -56,7 +56,7 @@ impl NorFlash for Flash {
 async fn life(mut writes: usize) -> bool {
     let flash = Flash { bytes: vec![0xFF; 4 * PAGE], writes_left: usize::MAX };
     let mut store = ParameterStore::open(flash, 0..4 * PAGE as u32).await.expect("four pages");
-    let mode = SystemMode::default();
+    let mode = FlightStatus::default();
     let disarmed = || Disarmed::proven_by(&mode).expect("standing on a table");
     store.save(disarmed(), NAME, 0.0012, 0.0..=0.01).await.expect("power");
 
@@ -79,5 +79,5 @@ fn main() {
     while !block_on(life(writes)) {
         writes += 1;
     }
-    println!("an armed vehicle: {:?}", Disarmed::proven_by(&SystemMode { armed: true, ..Default::default() }));
+    println!("an armed vehicle: {:?}", Disarmed::proven_by(&FlightStatus { armed: true, ..Default::default() }));
 }

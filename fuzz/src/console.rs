@@ -6,7 +6,7 @@ use stampfly_board::topics::{Id, TOPICS};
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
 use stampfly_flight::parameters::Parameters;
-use stampfly_types::messages::{FlightMode, FlightState, SystemMode};
+use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus};
 use stampfly_types::{Instant, Message};
 
 /// Longest line, as in the firmware.
@@ -61,12 +61,12 @@ fn known(state: u8, fill: u8) -> Newest {
     }
     if matches!(state, DISARMED | ARMED) {
         let armed = state == ARMED;
-        let state = if armed { FlightState::Flying } else { FlightState::IdleGround };
-        let mode = SystemMode { state, armed, mode: FlightMode::AltHold, ..SystemMode::default() };
-        newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
+        let phase = if armed { FlightPhase::Flying } else { FlightPhase::IdleGround };
+        let mode = FlightStatus { phase, armed, mode: FlightMode::AltHold, ..FlightStatus::default() };
+        newest.note(Id::flight_status as usize, Instant::ZERO, &mode.to_words());
     } else {
         // Words that are no state: what is not known to be disarmed counts as armed.
-        newest.note(Id::system_mode as usize, Instant::ZERO, &[!0; SystemMode::WORDS]);
+        newest.note(Id::flight_status as usize, Instant::ZERO, &[!0; FlightStatus::WORDS]);
     }
     newest
 }

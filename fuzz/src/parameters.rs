@@ -4,7 +4,7 @@ use crate::Input;
 use crate::flash::{Flash, FlashError, PAGE};
 use embassy_futures::block_on;
 use stampfly_param::{Disarmed, ParameterStore, SaveError};
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 const PAGES: usize = 5;
 const RANGE: core::ops::Range<u32> = 0..(PAGES * PAGE) as u32;
@@ -85,7 +85,7 @@ fn load(store: &mut ParameterStore<Flash>, name: &str) -> Option<f32> {
 }
 
 fn disarmed() -> Disarmed {
-    Disarmed::proven_by(&SystemMode::default()).expect("the default is disarmed")
+    Disarmed::proven_by(&FlightStatus::default()).expect("the default is disarmed")
 }
 
 /// The bytes of a store in use.

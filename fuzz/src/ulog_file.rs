@@ -3,12 +3,12 @@
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Format, Message, Reader, Topic};
 use stampfly_types::Message as _;
-use stampfly_types::messages::{ImuData, StateEstimate, SystemMode};
+use stampfly_types::messages::{ImuData, StateEstimate, FlightStatus};
 
 const TOPICS: [Topic; 3] = [
     Topic { name: "sensor_imu", fields: ImuData::FIELDS },
     Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
-    Topic { name: "system_mode", fields: SystemMode::FIELDS },
+    Topic { name: "flight_status", fields: FlightStatus::FIELDS },
 ];
 /// Columns of a message: its payload has at most 65,535 bytes.
 const COLUMNS: usize = 70_000;

@@ -11,7 +11,7 @@ use stampfly_flight::black_box::{LogRate, Retention};
 use stampfly_flight::newest::message;
 use stampfly_flight::{LogSchema, parameters::Parameters};
 use stampfly_log::ulog::{Definitions, Level, ParameterValue, Sink, WriteError, Writer};
-use stampfly_types::{Instant, messages::SystemMode};
+use stampfly_types::{Instant, messages::FlightStatus};
 
 /// Memory that the firmware has for it, words: 40 kB.
 pub const WORDS: usize = 10 * 1024;
@@ -24,10 +24,10 @@ pub type BlackBox<const WORDS: usize> = stampfly_flight::BlackBox<WORDS, COUNT>;
 /// ```
 /// use stampfly_board::black_box::{BlackBox, RETENTION};
 /// use stampfly_board::topics::Id;
-/// use stampfly_types::{Instant, Message, messages::SystemMode};
+/// use stampfly_types::{Instant, Message, messages::FlightStatus};
 /// let mut black_box = BlackBox::<256>::new(RETENTION);
-/// let armed = SystemMode { armed: true, ..Default::default() };
-/// black_box.note(Id::system_mode as usize, Instant::from_millis(1), 1, &armed.to_words());
+/// let armed = FlightStatus { armed: true, ..Default::default() };
+/// black_box.note(Id::flight_status as usize, Instant::from_millis(1), 1, &armed.to_words());
 /// assert_eq!(black_box.records().count(), 1);
 /// ```
 pub const RETENTION: Retention = Retention { topics: &TOPICS, rate, armed };
@@ -54,8 +54,8 @@ fn rate(topic: usize) -> LogRate {
         Id::estimate_status => LogRate::hertz(2),
         Id::estimator_command => LogRate::EverySample,
         Id::system_alert => LogRate::OnChange,
-        Id::system_mode => LogRate::OnChange,
-        Id::vehicle_status => LogRate::hertz(5),
+        Id::flight_status => LogRate::OnChange,
+        Id::land_detected => LogRate::hertz(5),
         Id::setpoint => LogRate::hertz(10),
         Id::control_output => LogRate::hertz(10),
         Id::actuator_motor => LogRate::hertz(20),
@@ -71,7 +71,7 @@ fn rate(topic: usize) -> LogRate {
 }
 
 fn armed(topic: usize, words: &[u32]) -> Option<bool> {
-    (topic == Id::system_mode as usize).then(|| message::<SystemMode>(words).is_some_and(|mode| mode.armed))
+    (topic == Id::flight_status as usize).then(|| message::<FlightStatus>(words).is_some_and(|mode| mode.armed))
 }
 
 /// Starts the log of a flight with these parameters: name of the vehicle, parameters, every topic, and a line of text

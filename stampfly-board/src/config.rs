@@ -6,14 +6,64 @@
 use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 
+/// Which estimator flies. The numbers are those of the parameter `estimator.type`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
+pub enum EstimatorKind {
+    /// Error-state Kalman filter.
+    #[default]
+    Eskf = 0,
+    /// Complementary filter.
+    Complementary = 1,
+}
+
+impl EstimatorKind {
+    /// The estimator with this number; `None` for any other.
+    #[must_use]
+    pub fn from_number(number: f32) -> Option<Self> {
+        [Self::Eskf, Self::Complementary].into_iter().find(|kind| kind.number() == number)
+    }
+
+    /// Its number.
+    #[must_use]
+    pub const fn number(self) -> f32 {
+        self as u8 as f32
+    }
+}
+
+/// Which controller flies. The numbers are those of the parameter `controller.type`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
+pub enum ControllerKind {
+    /// Cascade of loops.
+    #[default]
+    Cascade = 0,
+    /// Geometric controller.
+    Geometric = 1,
+}
+
+impl ControllerKind {
+    /// The controller with this number; `None` for any other.
+    #[must_use]
+    pub fn from_number(number: f32) -> Option<Self> {
+        [Self::Cascade, Self::Geometric].into_iter().find(|kind| kind.number() == number)
+    }
+
+    /// Its number.
+    #[must_use]
+    pub const fn number(self) -> f32 {
+        self as u8 as f32
+    }
+}
+
 /// Configuration of every component of one vehicle.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct VehicleConfig {
-    /// 0: error-state Kalman filter, 1: complementary filter.
-    pub estimator: f32,
-    /// 0: cascade, 1: geometric.
-    pub controller: f32,
+    /// Which estimator flies.
+    pub estimator: EstimatorKind,
+    /// Which controller flies.
+    pub controller: ControllerKind,
     /// Error-state Kalman filter.
     pub eskf: EskfConfig,
     /// Complementary filter.
@@ -24,14 +74,4 @@ pub struct VehicleConfig {
     pub geometric: GeometricConfig,
     /// Motors and battery.
     pub motor: MotorConfig,
-}
-
-impl VehicleConfig {
-    pub(crate) fn uses_complementary_estimator(&self) -> bool {
-        self.estimator >= 0.5
-    }
-
-    pub(crate) fn uses_geometric_controller(&self) -> bool {
-        self.controller >= 0.5
-    }
 }

@@ -17,7 +17,7 @@ use stampfly_flight::console::{CommandError, SensorLine, Vehicle};
 use stampfly_flight::newest::longest_message;
 use stampfly_flight::parameters::Parameters;
 use stampfly_flight::profile::Rows;
-use stampfly_types::messages::{PilotInput, PowerData, StateEstimate, SystemAlert, SystemMode};
+use stampfly_types::messages::{FlightStatus, PilotInput, PowerData, StateEstimate, SystemAlert};
 use stampfly_types::{Duration, Instant};
 
 /// How long a motor turns in a test.
@@ -111,7 +111,7 @@ impl Vehicle for Console<'_> {
     const TOPICS: &'static [TopicInfo] = &TOPICS;
 
     fn is_armed(&self) -> Option<bool> {
-        self.newest.get::<SystemMode>(Id::system_mode as usize).map(|(_, mode)| mode.armed)
+        self.newest.get::<FlightStatus>(Id::flight_status as usize).map(|(_, mode)| mode.armed)
     }
 
     fn version(&self) -> &str {
@@ -120,9 +120,9 @@ impl Vehicle for Console<'_> {
 
     fn status(&self, now: Instant, reply: &mut dyn fmt::Write) -> fmt::Result {
         let newest = self.newest;
-        let mode = newest.get::<SystemMode>(Id::system_mode as usize).map(|(_, mode)| mode).unwrap_or_default();
+        let mode = newest.get::<FlightStatus>(Id::flight_status as usize).map(|(_, mode)| mode).unwrap_or_default();
         let alert = newest.get::<SystemAlert>(Id::system_alert as usize).map(|(_, alert)| alert).unwrap_or_default();
-        write!(reply, "state    {}, {}\r\n", mode.state.name(), if mode.armed { "ARMED" } else { "disarmed" })?;
+        write!(reply, "state    {}, {}\r\n", mode.phase.name(), if mode.armed { "ARMED" } else { "disarmed" })?;
         write!(reply, "mode     {}\r\n", mode.mode.name())?;
         list(reply, "blocks", mode.blocks.names())?;
         list(reply, "alerts", alert.active.names())?;

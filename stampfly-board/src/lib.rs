@@ -22,4 +22,4 @@ pub mod schedule;
 pub mod simulation;
 pub mod topics;
 
-pub use config::VehicleConfig;
+pub use config::{ControllerKind, EstimatorKind, VehicleConfig};

@@ -2,10 +2,10 @@
 //!
 //! Everything but moving the bytes: firmware, which has the radio, gives [`Link`] what it has received and sends what
 //! [`Link::transmit`] returns. The mode machine decides whether the vehicle looks for a transmitter; the link follows
-//! `system_mode`, and publishes the transmitter it is paired with, to be stored.
+//! `flight_status`, and publishes the transmitter it is paired with, to be stored.
 
 use crate::messages::{LinkPeer, TelemetryFrame};
-use crate::topics::{CommandPilotTx, LinkPeerTx, SystemModeRx, TelemetryRx};
+use crate::topics::{CommandPilotTx, FlightStatusRx, LinkPeerTx, TelemetryRx};
 use stampfly_link::{Address, PairingPacket, Rejected, Session, TelemetryPacket};
 use stampfly_types::messages::{Alerts, ArmBlocks};
 use stampfly_types::{Duration, Instant};
@@ -22,7 +22,7 @@ pub struct Link<'b> {
     session: Session,
     pilot: CommandPilotTx<'b>,
     peer: LinkPeerTx<'b>,
-    mode: SystemModeRx<'b>,
+    mode: FlightStatusRx<'b>,
     telemetry: TelemetryRx<'b>,
     /// What the mode machine wanted last.
     pairing: bool,
@@ -45,7 +45,7 @@ impl<'b> Link<'b> {
         session: Session,
         pilot: CommandPilotTx<'b>,
         peer: LinkPeerTx<'b>,
-        mode: SystemModeRx<'b>,
+        mode: FlightStatusRx<'b>,
         telemetry: TelemetryRx<'b>,
     ) -> Self {
         Self { session, pilot, peer, mode, telemetry, pairing: false, counter: 0 }
@@ -100,7 +100,7 @@ fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
         height: -frame.position.z,
         velocity: frame.velocity,
         attitude: frame.attitude,
-        state: frame.state.into(),
+        state: frame.phase.into(),
         low_battery: frame.alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY),
         sensor_error: frame.alerts.intersects(SENSOR_ERROR),
         link_lost: frame.alerts.intersects(Alerts::COMM_LOST),

@@ -1,6 +1,6 @@
 //! Messages of this vehicle alone, declared beside its topic table.
 
-use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightState};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase};
 use stampfly_types::{Instant, Vec3, message};
 
 message! {
@@ -15,7 +15,7 @@ message! {
     /// What a ground station needs to know, at a rate a radio can carry.
     pub struct TelemetryFrame {
         /// Where the vehicle is in its life.
-        state: FlightState,
+        phase: FlightPhase,
         /// The flight mode.
         mode: FlightMode,
         /// May the motors turn?

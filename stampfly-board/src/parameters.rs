@@ -4,7 +4,7 @@
 //! value, so a replay flies with the parameters of the flight. [`stampfly_flight::parameters`] finds and changes them by
 //! name.
 
-use crate::config::VehicleConfig;
+use crate::config::{ControllerKind, EstimatorKind, VehicleConfig};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 
 /// The name in flash of the transmitter the vehicle is paired with: the six bytes of its address as one value, so that a
@@ -15,15 +15,49 @@ pub const PEER: &str = "link.peer";
 struct Line {
     info: ParameterInfo<'static>,
     get: fn(&VehicleConfig) -> f32,
-    set: fn(&mut VehicleConfig, f32),
+    /// Refuses a number that is no value of the field.
+    set: fn(&mut VehicleConfig, f32) -> Option<()>,
 }
+
+/// What a parameter can be: a number, or one of several kinds by its number.
+trait Value: Copy {
+    fn number(self) -> f32;
+    fn from_number(number: f32) -> Option<Self>;
+}
+
+impl Value for f32 {
+    fn number(self) -> f32 {
+        self
+    }
+    fn from_number(number: f32) -> Option<Self> {
+        Some(number)
+    }
+}
+
+macro_rules! kinds {
+    ($($Kind:ident)+) => { $(
+        impl Value for $Kind {
+            fn number(self) -> f32 {
+                Self::number(self)
+            }
+            fn from_number(number: f32) -> Option<Self> {
+                Self::from_number(number)
+            }
+        }
+    )+ };
+}
+
+kinds!(EstimatorKind ControllerKind);
 
 macro_rules! parameters {
     ($($name:literal [$min:literal, $max:literal] $unit:literal $($field:ident).+ => $meaning:literal;)+) => {
         const TABLE: &[Line] = &[$(Line {
             info: ParameterInfo { name: $name, min: $min, max: $max, unit: $unit, meaning: $meaning },
-            get: |config| config.$($field).+,
-            set: |config, value| config.$($field).+ = value,
+            get: |config| config.$($field).+.number(),
+            set: |config, number| {
+                config.$($field).+ = Value::from_number(number)?;
+                Some(())
+            },
         }),+];
     };
 }
@@ -96,7 +130,7 @@ impl Parameters for VehicleConfig {
         if !(*min..=*max).contains(&value) {
             return Err(ParameterError::OutOfRange { min: *min, max: *max });
         }
-        set(self, value);
+        set(self, value).ok_or(ParameterError::OutOfRange { min: *min, max: *max })?;
         Ok(())
     }
 }
@@ -114,6 +148,17 @@ mod tests {
             assert!((info.min..=info.max).contains(&value), "{} = {value}", info.name);
             assert!(all().take(index).all(|other| other.name != info.name), "{}", info.name);
         }
+    }
+
+    #[test]
+    fn a_kind_has_no_number_between_its_own() {
+        let mut config = VehicleConfig::default();
+        for refused in [0.5, 2.0, -1.0, f32::NAN] {
+            assert!(config.set(0, refused).is_err() && config.set(1, refused).is_err(), "{refused}");
+        }
+        assert_eq!((config.set(0, 1.0), config.set(1, 1.0)), (Ok(()), Ok(())));
+        assert_eq!((config.estimator, config.controller), (EstimatorKind::Complementary, ControllerKind::Geometric));
+        assert_eq!((config.set(0, 0.0), config.estimator), (Ok(()), EstimatorKind::Eskf));
     }
 
     #[test]

@@ -57,9 +57,9 @@ stampfly_bus::topics! {
     /// Conditions the failsafe has found.
     system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, notification, telemetry];
     /// State, mode, armed.
-    system_mode: SystemMode = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
+    flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
     /// Contact with the ground, and what take-off and landing ask for.
-    vehicle_status: VehicleStatus = latest @ 400 Hz from landing => [mode, navigation, control];
+    land_detected: LandDetected = latest @ 400 Hz from landing => [mode, navigation, control];
 
     // Control.
     /// The point on the path where the vehicle should be now.

@@ -5,7 +5,7 @@ use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_flight::console::{Request, answer};
 use stampfly_types::messages::{
-    Alerts, ArmBlocks, FlightMode, FlightState, PilotInput, PowerData, SystemAlert, SystemMode,
+    Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert,
 };
 use stampfly_types::{Instant, Message};
 
@@ -13,10 +13,10 @@ use stampfly_types::{Instant, Message};
 fn vehicle(armed: Option<bool>) -> Newest {
     let mut newest = Newest::new();
     if let Some(armed) = armed {
-        let state = if armed { FlightState::Flying } else { FlightState::IdleGround };
+        let phase = if armed { FlightPhase::Flying } else { FlightPhase::IdleGround };
         let blocks = ArmBlocks::LOW_BATTERY | ArmBlocks::THROTTLE;
-        let mode = SystemMode { state, armed, mode: FlightMode::AltHold, blocks, ..Default::default() };
-        newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
+        let mode = FlightStatus { phase, armed, mode: FlightMode::AltHold, blocks, ..Default::default() };
+        newest.note(Id::flight_status as usize, Instant::ZERO, &mode.to_words());
     }
     newest
 }

@@ -8,16 +8,16 @@ use stampfly_control::{
     CascadeController, ControlInput, Controller, GeometricController, Mixer, MotorStage, MultirotorMixer,
 };
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, Setpoint,
-    SetpointAxes, StateEstimate, SystemMode, Validity, VehicleStatus,
+    CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, GuidedCommand, GuidedKind,
+    LandDetected, Setpoint, SetpointAxes, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant, Quat, Vec3};
 
 struct Situation {
     estimate: StateEstimate,
     setpoint: Setpoint,
-    mode: SystemMode,
-    status: VehicleStatus,
+    mode: FlightStatus,
+    land_detected: LandDetected,
     command: CommandSetpoint,
 }
 
@@ -39,13 +39,13 @@ fn situation() -> Situation {
             axes: SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW,
             ..Setpoint::default()
         },
-        mode: SystemMode {
-            state: FlightState::Flying,
+        mode: FlightStatus {
+            phase: FlightPhase::Flying,
             mode: FlightMode::PosHold,
             armed: true,
-            ..SystemMode::default()
+            ..FlightStatus::default()
         },
-        status: VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..VehicleStatus::default() },
+        land_detected: LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..LandDetected::default() },
         command: CommandSetpoint { source: CommandSource::Guided, ..CommandSetpoint::default() },
     }
 }
@@ -64,8 +64,8 @@ fn control(c: &mut Criterion) {
         estimate: if (now.as_micros() / 2_500).is_multiple_of(2) { &s.estimate } else { &other_side },
         command: &s.command,
         setpoint: &s.setpoint,
-        mode: &s.mode,
-        status: &s.status,
+        flight_status: &s.mode,
+        land_detected: &s.land_detected,
         unmet,
     };
     let mut cascade = CascadeController::default();
@@ -107,7 +107,12 @@ fn guidance(c: &mut Criterion) {
     c.bench_function("navigator on a route", |b| {
         b.iter(|| {
             now += Duration::from_micros(2_500);
-            let input = NavigatorInput { mode: &s.mode, estimate: &estimate, status: &s.status, command: &s.command };
+            let input = NavigatorInput {
+                flight_status: &s.mode,
+                estimate: &estimate,
+                land_detected: &s.land_detected,
+                command: &s.command,
+            };
             let setpoint = navigator.step(now, &input);
             estimate.position = setpoint.position;
             if setpoint.remaining == 0 {

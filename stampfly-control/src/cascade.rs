@@ -9,7 +9,7 @@
 //! All loops run every step. The path's derivatives are fed forward at every level they reach (velocity, acceleration,
 //! and the rate at which the acceleration turns the vehicle), so that following a path needs no error to begin with.
 
-use stampfly_types::messages::{ControlOutput, FlightState};
+use stampfly_types::messages::{ControlOutput, FlightPhase};
 use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
 
 use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
@@ -67,15 +67,15 @@ const THROTTLE_OFF: f32 = 0.03;
 ///
 /// let mut controller = CascadeController::default();
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
-/// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
-/// let status = VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
+/// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
 /// let setpoint = Setpoint {
 ///     position: Vec3::new(1.0, 0.0, 0.0),
 ///     axes: SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW,
 ///     ..Default::default()
 /// };
 /// let input = ControlInput {
-///     estimate: &estimate, command: &CommandSetpoint::default(), setpoint: &setpoint, mode: &mode, status: &status,
+///     estimate: &estimate, command: &CommandSetpoint::default(), setpoint: &setpoint, flight_status: &mode, land_detected: &land_detected,
 ///     unmet: [0.0; 4],
 /// };
 /// let output = controller.step(Instant::from_micros(2_500), &input);
@@ -130,11 +130,11 @@ impl CascadeController {
 
     fn thrust(&mut self, intent: &Intent, input: &ControlInput<'_>, cos_tilt: f32, dt: f32) -> f32 {
         let limits = ThrustLimits {
-            ceiling: input.status.thrust_ceiling,
+            ceiling: input.land_detected.thrust_ceiling,
             unmet: input.unmet[3],
-            learn: !intent.grounded && input.status.thrust_ceiling > 1.0,
+            learn: !intent.grounded && input.land_detected.thrust_ceiling > 1.0,
             // While taking off the ground carries what thrust does not: the integral must be free to find the weight.
-            hold: intent.grounded && input.mode.state != FlightState::TakeOff,
+            hold: intent.grounded && input.flight_status.phase != FlightPhase::TakeOff,
         };
         let (path, estimate) = (input.setpoint, input.estimate);
         let climb = Climb {
@@ -193,8 +193,8 @@ impl Controller for CascadeController {
     #[inline]
     fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
-        if input.mode.control_resets != self.resets {
-            self.resets = input.mode.control_resets;
+        if input.flight_status.control_resets != self.resets {
+            self.resets = input.flight_status.control_resets;
             self.reset();
         }
         let Some(intent) = Intent::read(input) else {

@@ -1,12 +1,12 @@
 //! What a flight controller is: state and set-point in, thrust and torque out.
 //!
 //! Everything that differs between control laws lives behind [`Controller`]; everything they agree on (which loops
-//! the flight state, the flight mode and the valid outputs of the estimator call for) is decided once, in
+//! the flight phase, the flight mode and the valid outputs of the estimator call for) is decided once, in
 //! [`crate::intent`]. [`CascadeController`](crate::CascadeController) is the default,
 //! [`GeometricController`](crate::GeometricController) the proof that another law fits the same socket.
 
 use stampfly_types::Instant;
-use stampfly_types::messages::{CommandSetpoint, ControlOutput, Setpoint, StateEstimate, SystemMode, VehicleStatus};
+use stampfly_types::messages::{CommandSetpoint, ControlOutput, FlightStatus, LandDetected, Setpoint, StateEstimate};
 
 /// All a controller may look at in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,10 +17,10 @@ pub struct ControlInput<'a> {
     pub command: &'a CommandSetpoint,
     /// Where the vehicle should be.
     pub setpoint: &'a Setpoint,
-    /// Flight state and mode. A change of `control_resets` resets the controller.
-    pub mode: &'a SystemMode,
+    /// Flight phase and mode. A change of `control_resets` resets the controller.
+    pub flight_status: &'a FlightStatus,
     /// Contact with the ground and the thrust ceiling while landing.
-    pub status: &'a VehicleStatus,
+    pub land_detected: &'a LandDetected,
     /// What the mixer could not deliver in the previous step ([`Mixed::unmet`](crate::Mixed)).
     pub unmet: [f32; 4],
 }

@@ -80,12 +80,12 @@ impl Default for GeometricConfig {
 /// // Any controller, behind the same trait.
 /// let mut controller: Box<dyn Controller> = Box::new(GeometricController::default());
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
-/// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
-/// let status = VehicleStatus { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
+/// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
+/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
 /// let setpoint = Setpoint { axes: SetpointAxes::POSITION_Z | SetpointAxes::YAW, ..Default::default() };
 /// let output = controller.step(Instant::from_micros(2_500), &ControlInput {
 ///     estimate: &estimate, command: &CommandSetpoint { roll: 0.5, ..Default::default() }, setpoint: &setpoint,
-///     mode: &mode, status: &status, unmet: [0.0; 4],
+///     flight_status: &mode, land_detected: &land_detected, unmet: [0.0; 4],
 /// });
 /// assert!(output.torque.x > 0.0, "stick right, right wing down");
 /// ```
@@ -179,8 +179,8 @@ impl GeometricController {
 impl Controller for GeometricController {
     fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
-        if input.mode.control_resets != self.resets {
-            self.resets = input.mode.control_resets;
+        if input.flight_status.control_resets != self.resets {
+            self.resets = input.flight_status.control_resets;
             self.reset();
         }
         let Some(intent) = Intent::read(input) else {
@@ -201,7 +201,11 @@ impl Controller for GeometricController {
             Vertical::Throttle(throttle) => throttle * config.thrust_max,
             Vertical::Descend => 0.96 * hover,
         };
-        let ceiling = if input.status.thrust_ceiling <= 1.0 { input.status.thrust_ceiling * hover } else { f32::MAX };
+        let ceiling = if input.land_detected.thrust_ceiling <= 1.0 {
+            input.land_detected.thrust_ceiling * hover
+        } else {
+            f32::MAX
+        };
         let thrust =
             if thrust.is_finite() { within(thrust, 0.0, config.thrust_max.min(ceiling.max(0.0))) } else { 0.0 };
 

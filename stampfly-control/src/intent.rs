@@ -1,6 +1,6 @@
 //! What the vehicle is asked to do right now, and which of it can be done.
 //!
-//! Flight state, flight mode, commanded axes and validity of the estimate are discrete; the control laws are not.
+//! Flight phase, flight mode, commanded axes and validity of the estimate are discrete; the control laws are not.
 //! This file turns the first into a small [`Intent`] so that the laws need not look at them. It is also where
 //! the stack degrades:
 //!
@@ -14,7 +14,7 @@
 //! Write a control law against [`Intent`] and it behaves like the others in every mode and every failure.
 
 use stampfly_types::messages::{
-    FlightMode, FlightState, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity,
+    FlightMode, FlightPhase, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 use stampfly_types::{Quat, Vec3};
 
@@ -93,11 +93,11 @@ impl Intent {
     /// Reads the intent; `None` when the motors have nothing to do: on the ground, held, or not armed.
     #[must_use]
     pub fn read(input: &ControlInput<'_>) -> Option<Self> {
-        let in_motion = match input.mode.state {
-            FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => false,
-            FlightState::TakeOff | FlightState::Flying | FlightState::Landing => true,
+        let in_motion = match input.flight_status.phase {
+            FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => false,
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => true,
         };
-        if !(in_motion && input.mode.armed) {
+        if !(in_motion && input.flight_status.armed) {
             return None;
         }
         let known = Known::read(input.estimate);
@@ -116,7 +116,7 @@ impl Intent {
             if follow { Horizontal::Velocity } else { Horizontal::LEVEL }
         } else {
             let (forward, right) = (stick(input.command.pitch), stick(input.command.roll));
-            match input.mode.mode {
+            match input.flight_status.mode {
                 FlightMode::Acro if manual => Horizontal::Rates { forward, right },
                 FlightMode::Acro | FlightMode::Stabilize | FlightMode::AltHold => Horizontal::Lean { forward, right },
                 // The sticks of this mode mean velocities; without a commanded axis they mean nothing.
@@ -139,7 +139,7 @@ impl Intent {
         } else {
             Heading::Stick(stick(input.command.yaw))
         };
-        Some(Self { horizontal, vertical, heading, grounded: input.status.contact == GroundContact::Ground })
+        Some(Self { horizontal, vertical, heading, grounded: input.land_detected.contact == GroundContact::Ground })
     }
 }
 
@@ -154,8 +154,8 @@ const VERTICAL: SetpointAxes = SetpointAxes::POSITION_Z.with(SetpointAxes::VELOC
 /// Is the throttle stick a thrust? Never while landing and never in a mode that holds height: there a vertical
 /// set-point that is missing or broken must not turn into "stick at rest, motors off".
 fn throttle_commands_thrust(input: &ControlInput<'_>) -> bool {
-    let by_mode = match input.mode.mode {
-        FlightMode::Acro | FlightMode::Stabilize => input.mode.state != FlightState::Landing,
+    let by_mode = match input.flight_status.mode {
+        FlightMode::Acro | FlightMode::Stabilize => input.flight_status.phase != FlightPhase::Landing,
         FlightMode::AltHold | FlightMode::PosHold => false,
     };
     by_mode && !input.setpoint.axes.intersects(VERTICAL)
@@ -214,11 +214,6 @@ fn usable_axes(path: &Setpoint) -> SetpointAxes {
     axes
 }
 
-/// A stick within its range; a stick that is no number is at rest.
-fn stick(value: f32) -> f32 {
-    if value.is_finite() { value.clamp(-1.0, 1.0) } else { 0.0 }
-}
-
 fn is_finite(vector: &Vec3) -> bool {
     (vector.x + vector.y + vector.z).is_finite()
 }
@@ -231,14 +226,14 @@ fn is_rotation(attitude: &Quat) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{CommandSetpoint, SystemMode, VehicleStatus};
+    use stampfly_types::messages::{CommandSetpoint, FlightStatus, LandDetected};
 
     /// A vehicle in position hold with everything known and commanded, for tests to take something away.
     struct Case {
         estimate: StateEstimate,
         command: CommandSetpoint,
         setpoint: Setpoint,
-        mode: SystemMode,
+        mode: FlightStatus,
     }
 
     fn flying(mode: FlightMode, axes: SetpointAxes) -> Case {
@@ -246,7 +241,7 @@ mod tests {
             estimate: StateEstimate { valid: Validity::ALL, ..StateEstimate::default() },
             command: CommandSetpoint { roll: 0.5, pitch: -0.25, throttle: 0.6, yaw: 0.1, ..CommandSetpoint::default() },
             setpoint: Setpoint { axes, ..Setpoint::default() },
-            mode: SystemMode { state: FlightState::Flying, mode, armed: true, ..SystemMode::default() },
+            mode: FlightStatus { phase: FlightPhase::Flying, mode, armed: true, ..FlightStatus::default() },
         }
     }
 
@@ -255,13 +250,13 @@ mod tests {
     }
 
     fn read(case: &Case) -> Option<Intent> {
-        let status = VehicleStatus { contact: GroundContact::Air, ..VehicleStatus::default() };
+        let land_detected = LandDetected { contact: GroundContact::Air, ..LandDetected::default() };
         Intent::read(&ControlInput {
             estimate: &case.estimate,
             command: &case.command,
             setpoint: &case.setpoint,
-            mode: &case.mode,
-            status: &status,
+            flight_status: &case.mode,
+            land_detected: &land_detected,
             unmet: [0.0; 4],
         })
     }
@@ -273,12 +268,12 @@ mod tests {
 
     #[test]
     fn motors_have_work_only_when_armed_and_in_motion() {
-        for state in FlightState::ALL {
+        for phase in FlightPhase::ALL {
             for armed in [false, true] {
                 let mut case = everything();
-                (case.mode.state, case.mode.armed) = (*state, armed);
-                let in_motion = matches!(state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
-                assert_eq!(read(&case).is_some(), armed && in_motion, "{state:?} {armed}");
+                (case.mode.phase, case.mode.armed) = (*phase, armed);
+                let in_motion = matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
+                assert_eq!(read(&case).is_some(), armed && in_motion, "{phase:?} {armed}");
             }
         }
     }
@@ -322,7 +317,7 @@ mod tests {
         // Nor does a set-point that is not there.
         assert_eq!(axes(&flying(FlightMode::AltHold, SetpointAxes::NONE)).1, Vertical::Descend);
         let mut case = flying(FlightMode::Stabilize, SetpointAxes::NONE);
-        case.mode.state = FlightState::Landing;
+        case.mode.phase = FlightPhase::Landing;
         assert_eq!(axes(&case).1, Vertical::Descend);
     }
 
@@ -337,7 +332,7 @@ mod tests {
         assert_eq!(axes(&alt_hold), (lean, Vertical::Path));
         // A landing out of Acro is flown level, by the set-point.
         let mut landing = flying(FlightMode::Acro, SetpointAxes::POSITION_Z);
-        landing.mode.state = FlightState::Landing;
+        landing.mode.phase = FlightPhase::Landing;
         assert_eq!(axes(&landing), (lean, Vertical::Path));
         let mut down = flying(FlightMode::Stabilize, SetpointAxes::NONE);
         (down.command.throttle, down.command.roll) = (-1.0, f32::NAN);

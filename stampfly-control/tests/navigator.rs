@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use stampfly_control::guidance::{Navigator, NavigatorInput, Refusal, Route};
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
-    StateEstimate, SystemMode, Validity, VehicleStatus,
+    CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, LandDetected,
+    Setpoint, SetpointAxes, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant, Quat, Vec3};
 
@@ -13,9 +13,9 @@ const DT: f32 = 0.0025;
 struct Bench {
     navigator: Navigator,
     now: Instant,
-    mode: SystemMode,
+    mode: FlightStatus,
     estimate: StateEstimate,
-    status: VehicleStatus,
+    land_detected: LandDetected,
     command: CommandSetpoint,
     setpoint: Setpoint,
 }
@@ -26,9 +26,9 @@ impl Bench {
         let mut bench = Self {
             navigator: Navigator::default(),
             now: Instant::ZERO,
-            mode: SystemMode { state: FlightState::IdleGround, mode: FlightMode::PosHold, ..SystemMode::default() },
+            mode: FlightStatus { phase: FlightPhase::IdleGround, mode: FlightMode::PosHold, ..FlightStatus::default() },
             estimate: StateEstimate { valid: Validity::ALL, ..StateEstimate::default() },
-            status: VehicleStatus { descent_rate: 0.3, ..VehicleStatus::default() },
+            land_detected: LandDetected { descent_rate: 0.3, ..LandDetected::default() },
             command: CommandSetpoint { source: CommandSource::Guided, ..CommandSetpoint::default() },
             setpoint: Setpoint::default(),
         };
@@ -39,15 +39,15 @@ impl Bench {
     /// At the take-off height.
     fn aloft() -> Self {
         let mut bench = Self::new();
-        bench.enter(FlightState::TakeOff);
+        bench.enter(FlightPhase::TakeOff);
         bench.run(5.0);
         assert!((bench.estimate.position.z + 0.5).abs() < 1e-3, "default height: {:?}", bench.setpoint);
-        bench.enter(FlightState::Flying);
+        bench.enter(FlightPhase::Flying);
         bench
     }
 
-    fn enter(&mut self, state: FlightState) {
-        self.mode.state = state;
+    fn enter(&mut self, phase: FlightPhase) {
+        self.mode.phase = phase;
         self.mode.armed = true;
     }
 
@@ -56,9 +56,9 @@ impl Bench {
         self.setpoint = self.navigator.step(
             self.now,
             &NavigatorInput {
-                mode: &self.mode,
+                flight_status: &self.mode,
                 estimate: &self.estimate,
-                status: &self.status,
+                land_detected: &self.land_detected,
                 command: &self.command,
             },
         );
@@ -105,7 +105,7 @@ fn takes_off_to_the_height_asked_for_over_the_place_it_stands() {
         bench.estimate.position = Vec3::new(2.0, 1.0, -0.3);
         bench.step();
         bench.send(GuidedKind::TakeOff, [9.0, 9.0, asked]).expect("accepted");
-        bench.enter(FlightState::TakeOff);
+        bench.enter(FlightPhase::TakeOff);
         bench.run(12.0);
         assert!((bench.estimate.position - Vec3::new(2.0, 1.0, -0.3 - expected)).norm() < 1e-3, "{:?}", bench.setpoint);
     }
@@ -237,7 +237,7 @@ fn the_path_waits_for_a_vehicle_that_is_held_back() {
 fn landing_sinks_as_told_and_does_not_dig() {
     let mut bench = Bench::aloft();
     let place = bench.setpoint.position.xy();
-    bench.enter(FlightState::Landing);
+    bench.enter(FlightPhase::Landing);
     bench.run(1.0);
     assert!((bench.setpoint.velocity.z - 0.3).abs() < 1e-3);
     // The ground stops the vehicle, not the path.
@@ -247,7 +247,7 @@ fn landing_sinks_as_told_and_does_not_dig() {
         assert!(bench.setpoint.position.z <= 0.25 + 1e-5);
         assert_eq!(bench.setpoint.position.xy(), place);
     }
-    bench.status.descent_rate = f32::NAN;
+    bench.land_detected.descent_rate = f32::NAN;
     bench.step();
     assert!(bench.setpoint.position.z.is_finite() && bench.setpoint.velocity.z.is_finite());
 }
@@ -319,10 +319,10 @@ proptest! {
     ) {
         let mut bench = Bench::new();
         for ([x, y, z, u, v, w, q0, q1, q2, q3], [roll, pitch, yaw, throttle, rate], state, mode) in numbers {
-            bench.enter(FlightState::ALL[state]);
+            bench.enter(FlightPhase::ALL[state]);
             bench.mode.mode = FlightMode::ALL[mode];
             bench.command = CommandSetpoint { source: CommandSource::Pilot, roll, pitch, yaw, throttle };
-            bench.status.descent_rate = rate;
+            bench.land_detected.descent_rate = rate;
             bench.estimate.position = Vec3::new(x, y, z);
             bench.estimate.velocity = Vec3::new(u, v, w);
             bench.estimate.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(q0, q1, q2, q3));

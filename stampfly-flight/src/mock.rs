@@ -13,7 +13,7 @@ use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 /// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
 /// use rover::{Rover, topics}; // the rover of `tests/common`, configured by a gain
 /// use stampfly_flight::Mock;
-/// use stampfly_types::{Instant, messages::{MotorOutput, SystemMode, TofData}};
+/// use stampfly_types::{Instant, messages::{FlightStatus, MotorOutput, TofData}};
 ///
 /// # fn main() {
 /// let (mut bus, now) = (topics::Bus::new(), Instant::from_millis(20));
@@ -22,7 +22,7 @@ use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 /// mock.run("drive", now).expect("a runnable");
 /// let output = mock.newest::<MotorOutput>("actuator_motor").expect("published");
 /// assert_eq!((output.at, output.data.duty[0]), (now, 0.5));
-/// assert_eq!(mock.newest::<SystemMode>("system_mode"), None, "the monitor has not run");
+/// assert_eq!(mock.newest::<FlightStatus>("flight_status"), None, "the monitor has not run");
 /// # }
 /// ```
 pub struct Mock<'b, R: Schedule> {

@@ -144,19 +144,19 @@ impl fmt::Display for ShownSample<'_> {
 mod tests {
     use super::*;
     use crate::rover::topics::{COUNT, Id, TOPICS};
-    use stampfly_types::messages::{ArmBlocks, FlightState, MotorOutput, SystemMode, TofData};
+    use stampfly_types::messages::{ArmBlocks, FlightPhase, FlightStatus, MotorOutput, TofData};
     use std::string::ToString;
 
     #[test]
     fn every_kind_of_field_is_shown() {
         let mut newest = NewestSamples::<COUNT, { longest_message(&TOPICS) }>::new();
         let blocks = ArmBlocks::LOW_BATTERY | ArmBlocks::THROTTLE;
-        let mode = SystemMode { state: FlightState::Landing, blocks, ..Default::default() };
-        newest.note(Id::system_mode as usize, Instant::from_millis(4), &mode.to_words());
+        let mode = FlightStatus { phase: FlightPhase::Landing, blocks, ..Default::default() };
+        newest.note(Id::flight_status as usize, Instant::from_millis(4), &mode.to_words());
         let show = |newest: &NewestSamples<_, _>, topic: Id| {
             newest.show(topic as usize, topic.info(), Instant::from_millis(9)).map(|shown| shown.to_string())
         };
-        let text = show(&newest, Id::system_mode).expect("noted");
+        let text = show(&newest, Id::flight_status).expect("noted");
         for part in ["5 ms old", "state Landing", "armed false", "blocks LOW_BATTERY THROTTLE"] {
             assert!(text.contains(part), "{part} is missing:\n{text}");
         }

@@ -11,7 +11,7 @@ use stampfly_flight::console::{COMMANDS, Command, CommandError, Request, SensorL
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
 use stampfly_flight::{NewestSamples, Profile, longest_message};
-use stampfly_types::messages::{SystemMode, TofData};
+use stampfly_types::messages::{FlightStatus, TofData};
 use stampfly_types::{Instant, Message};
 
 static PROFILE: Profile<{ common::COUNT }> = Profile::new(&common::ACTIVATIONS);
@@ -55,7 +55,7 @@ impl Vehicle for Rover<'_> {
     const TOPICS: &'static [TopicInfo] = &topics::TOPICS;
 
     fn is_armed(&self) -> Option<bool> {
-        self.newest.get::<SystemMode>(Id::system_mode as usize).map(|(_, mode)| mode.armed)
+        self.newest.get::<FlightStatus>(Id::flight_status as usize).map(|(_, mode)| mode.armed)
     }
 
     fn version(&self) -> &str {
@@ -106,8 +106,8 @@ impl Rover<'_> {
     fn new(armed: Option<bool>) -> Self {
         let mut newest = NewestSamples::new();
         if let Some(armed) = armed {
-            let mode = SystemMode { armed, ..Default::default() };
-            newest.note(Id::system_mode as usize, Instant::ZERO, &mode.to_words());
+            let mode = FlightStatus { armed, ..Default::default() };
+            newest.note(Id::flight_status as usize, Instant::ZERO, &mode.to_words());
         }
         const SENSORS: &[SensorLine<'static>] = &[
             SensorLine { name: "range", samples: 70, errors: 2, last_error: Some(&"no echo") },

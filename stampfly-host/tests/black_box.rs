@@ -13,7 +13,7 @@ use stampfly_host::flown::fly;
 use stampfly_host::golden::Event;
 use stampfly_host::recorder::Recorder;
 use stampfly_lab::flight_log;
-use stampfly_types::messages::{ImuData, PilotInput, SystemMode};
+use stampfly_types::messages::{FlightStatus, ImuData, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 use std::sync::LazyLock;
 
@@ -48,8 +48,8 @@ static ACCIDENT: LazyLock<(Box<BlackBox<WORDS>>, Instant)> = LazyLock::new(|| {
                 }
                 taps.drain(&mut |topic, at, generation, words| {
                     black_box.note(topic, at, generation, words);
-                    if topic == Id::system_mode as usize {
-                        let mode = SystemMode::from_words(words.try_into().expect("its words")).expect("a mode");
+                    if topic == Id::flight_status as usize {
+                        let mode = FlightStatus::from_words(words.try_into().expect("its words")).expect("a mode");
                         match (mode.armed, armed_at) {
                             (true, None) => armed_at = Some(at),
                             (false, Some(_)) if stopped_at.is_none() => stopped_at = Some(at),
@@ -128,7 +128,7 @@ fn the_dump_is_a_log_that_shows_the_last_second() {
         ("sensor_tof", 9, 135),
         ("sensor_flow", 9, 115),
         ("sensor_power", 4, 300),
-        ("system_mode", 1, 1_005),
+        ("flight_status", 1, 1_005),
     ] {
         let series = &flight.topics[topic];
         let last_second: Vec<Instant> = series
@@ -141,7 +141,7 @@ fn the_dump_is_a_log_that_shows_the_last_second() {
         let longest = last_second.windows(2).map(|pair| pair[1].since(pair[0])).max().unwrap_or_default();
         assert!(longest <= Duration::from_millis(gap), "{topic}: nothing for {longest}");
     }
-    let modes = &flight.topics["system_mode"];
+    let modes = &flight.topics["flight_status"];
     let armed = modes.column("armed").expect("a column");
     let ended = armed.iter().position(|armed| *armed == 0.0).expect("how it ended");
     assert!(modes.at[ended].since(stopped) <= MIN_INTERVAL, "kept at {}, was at {stopped}", modes.at[ended]);
@@ -169,17 +169,17 @@ fn a_dump_that_is_cut_off_says_so() {
 #[test]
 fn a_flight_that_begins_while_the_last_is_told_ends_it() {
     let mut black_box = BlackBox::<256>::new(RETENTION);
-    let armed = SystemMode { armed: true, ..Default::default() }.to_words();
+    let armed = FlightStatus { armed: true, ..Default::default() }.to_words();
     let config = VehicleConfig::default();
     let nothing =
         block_on(dump(|| Ok(black_box.records().next()), |sink, at| open(sink, at, &config, ""), async |_| Ok(())));
     assert_eq!(nothing, Err(DumpError::Empty));
-    black_box.note(Id::system_mode as usize, Instant::from_micros(1), 1, &armed);
+    black_box.note(Id::flight_status as usize, Instant::from_micros(1), 1, &armed);
     let (mut cursor, mut asked) = (black_box.begin(), 0);
     let next = || {
         asked += 1;
         if asked == 2 {
-            black_box.note(Id::system_mode as usize, Instant::from_secs(9), 2, &armed);
+            black_box.note(Id::flight_status as usize, Instant::from_secs(9), 2, &armed);
         }
         black_box.next(&mut cursor)
     };

@@ -1,6 +1,6 @@
 //! The printed figures, computed again from the log, by their documentation and nothing else.
 //!
-//! Works on the columns a plot would show: `truth`, `setpoint`, `estimate_state` and `system_mode` of the parsed ULog.
+//! Works on the columns a plot would show: `truth`, `setpoint`, `estimate_state` and `flight_status` of the parsed ULog.
 
 use stampfly_board::simulation::metrics::FIGURES;
 use stampfly_board::simulation::mission::{HOVER, Mission, REFERENCE};
@@ -27,14 +27,14 @@ struct Row {
     goal: [f64; 3],
     at_rest: bool,
     estimate: [f64; 3],
-    state: f64,
+    phase: f64,
     mode: f64,
     armed: bool,
 }
 
 impl Row {
     fn holds_place(&self) -> bool {
-        self.state == FLYING && self.mode == POS_HOLD
+        self.phase == FLYING && self.mode == POS_HOLD
     }
 }
 
@@ -53,7 +53,7 @@ fn vector(series: &Series, field: &str, index: usize) -> [f64; 3] {
 /// One row per sample of the truth, which is taken whenever there is a new set-point.
 fn rows(flight: &Flight) -> Vec<Row> {
     let [truth, setpoint, estimate, mode] =
-        ["truth", "setpoint", "estimate_state", "system_mode"].map(|topic| &flight.topics[topic]);
+        ["truth", "setpoint", "estimate_state", "flight_status"].map(|topic| &flight.topics[topic]);
     let row = |(index, at): (usize, &Instant)| {
         let [s, e, m] = [setpoint, estimate, mode].map(|series| series.index_at(*at).expect("published before"));
         // The angle between body z and world z, from the third diagonal element of the rotation matrix.
@@ -69,7 +69,7 @@ fn rows(flight: &Flight) -> Vec<Row> {
             goal: vector(setpoint, "position", s),
             at_rest: distance(velocity, [0.0; 3]) < 1e-3 && column(setpoint, "yaw_rate")[s].abs() < 1e-3,
             estimate: vector(estimate, "position", e),
-            state: column(mode, "state")[m],
+            phase: column(mode, "phase")[m],
             mode: column(mode, "mode")[m],
             armed: column(mode, "armed")[m] != 0.0,
         }
@@ -101,17 +101,17 @@ fn recompute(rows: &[Row]) -> BTreeMap<&'static str, f64> {
     figures.insert("alt_rms_m", rms(holding().map(|row| row.truth[2] - row.goal[2])));
 
     // "highest truth above the take-off height, from take-off to three seconds into flight"
-    let flying = rows.iter().find(|row| row.state == FLYING).expect("it flew").at;
+    let flying = rows.iter().find(|row| row.phase == FLYING).expect("it flew").at;
     let climbing =
-        |row: &&Row| row.state == TAKE_OFF || row.state == FLYING && row.at.since(flying) < Duration::from_secs(3);
-    let goal = rows.iter().rfind(|row| row.state == TAKE_OFF).expect("it took off").goal[2];
+        |row: &&Row| row.phase == TAKE_OFF || row.phase == FLYING && row.at.since(flying) < Duration::from_secs(3);
+    let goal = rows.iter().rfind(|row| row.phase == TAKE_OFF).expect("it took off").goal[2];
     let goal =
-        rows.iter().filter(|row| row.state == FLYING).filter(climbing).map(|row| row.goal[2]).fold(goal, f64::min);
+        rows.iter().filter(|row| row.phase == FLYING).filter(climbing).map(|row| row.goal[2]).fold(goal, f64::min);
     let top = highest(rows.iter().filter(climbing).map(|row| -row.truth[2]));
     figures.insert("takeoff_overshoot_m", (top + goal).max(0.0));
 
     // "true sink rate at the last instant before the first contact of the landing"
-    let touch = rows.windows(2).find(|pair| pair[1].state == LANDING && pair[1].contact && !pair[0].contact);
+    let touch = rows.windows(2).find(|pair| pair[1].phase == LANDING && pair[1].contact && !pair[0].contact);
     figures.insert("touchdown_speed_mps", touch.expect("it landed")[0].sink);
 
     // Stretches in which the set-point rested while in POS_HOLD.
@@ -126,7 +126,7 @@ fn recompute(rows: &[Row]) -> BTreeMap<&'static str, f64> {
     figures.insert("hover_drift_m", highest(longest.iter().map(|row| apart(row.truth, longest[0].truth))));
 
     let end = &rows[rows.len() - 1];
-    assert!(end.state == IDLE_GROUND && end.contact && !end.armed);
+    assert!(end.phase == IDLE_GROUND && end.contact && !end.armed);
     figures.insert("land_error_m", apart(end.truth, [0.0; 3]));
     figures
 }

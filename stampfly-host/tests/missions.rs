@@ -14,7 +14,7 @@ use stampfly_host::recorder::Recorder;
 use stampfly_mode::transitions::{Event, next};
 use stampfly_sim::plant::Pose;
 use stampfly_types::Instant;
-use stampfly_types::messages::FlightState;
+use stampfly_types::messages::FlightPhase;
 
 /// Numbers from a seed.
 struct Draw(ChaCha8Rng);
@@ -122,9 +122,9 @@ fn complaints(mission: &Mission, flight: &Flight<StampFly, ()>) -> Vec<String> {
     for (what, value, bound) in bounds {
         check(value.is_some_and(|value| value <= bound), format!("{what}: {value:?}, may be {bound}"));
     }
-    let states: Vec<FlightState> = outcome.phases.iter().map(|phase| phase.state).collect();
-    check(states.first() == Some(&FlightState::Init), "does not begin in INIT".into());
-    for pair in states.windows(2).filter(|pair| pair[0] != pair[1]) {
+    let phases: Vec<FlightPhase> = outcome.phases.iter().map(|change| change.phase).collect();
+    check(phases.first() == Some(&FlightPhase::Init), "does not begin in INIT".into());
+    for pair in phases.windows(2).filter(|pair| pair[0] != pair[1]) {
         let possible =
             Event::ALL.iter().any(|event| [true, false].iter().any(|h| next(pair[0], *event, *h) == Some(pair[1])));
         check(possible, format!("{:?} to {:?} is not in the table", pair[0], pair[1]));

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
-use stampfly_board::{VehicleConfig, topics};
+use stampfly_board::{EstimatorKind, VehicleConfig, topics};
 use stampfly_flight::replay::{self, Difference, Replay, ReplayError, ReplayOptions};
 use stampfly_host::flown::fly;
 use stampfly_host::recorder::{Memory, Recorder};
@@ -183,7 +183,7 @@ fn a_replay_begins_at_any_key_frame() {
 fn parameters_come_from_the_log() {
     let mut setup = setup(1, None);
     setup.vehicle.cascade.altitude.height_gain *= 1.5;
-    setup.vehicle.estimator = 1.0;
+    setup.vehicle.estimator = EstimatorKind::Complementary;
     setup.limit = Duration::from_secs(8);
     let result = replay(&record(&setup)).expect("a log that can be replayed");
     assert_eq!(result.difference, None);

@@ -162,20 +162,20 @@ impl Flight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{StateEstimate, SystemMode};
+    use stampfly_types::messages::{FlightStatus, StateEstimate};
 
     #[test]
     fn columns_follow_the_schema() {
         let mut flight = Flight::default();
         let estimate = StateEstimate { height: 2.0, ..Default::default() };
         flight.push("estimate_state", Instant::from_micros(5), &estimate);
-        flight.push("system_mode", Instant::from_micros(7), &SystemMode::default());
+        flight.push("flight_status", Instant::from_micros(7), &FlightStatus::default());
         let series = &flight.topics["estimate_state"];
         assert_eq!(series.column("height"), Some(&[2.0][..]));
         assert_eq!(series.columns_of::<4>("attitude").map(|q| q.map(|c| c[0])), Some([1.0, 0.0, 0.0, 0.0]));
         assert_eq!(series.unit("velocity"), "m/s");
         assert_eq!(series.unit("attitude"), "");
-        assert_eq!(flight.topics["system_mode"].names("state")[3], ("Armed".to_owned(), 3));
+        assert_eq!(flight.topics["flight_status"].names("phase")[3], ("Armed".to_owned(), 3));
         assert_eq!(flight.span(), Some((Instant::from_micros(5), Instant::from_micros(7))));
         assert!(series.columns.iter().all(|column| column.values.len() == series.at.len()));
     }

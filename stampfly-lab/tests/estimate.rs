@@ -3,7 +3,7 @@
 //! The first part needs the recorded data; see `build.rs` for how they are found.
 
 use stampfly_lab::dataset::{self, Kind};
-use stampfly_lab::estimate::{self, Figures};
+use stampfly_lab::estimate::{self, Figures, Method};
 
 /// Set by the build script.
 const FOLDER: &str = env!("STAMPFLY_DATA_FOLDER");
@@ -119,9 +119,9 @@ fn runaway() -> String {
 #[test]
 fn an_attitude_filter_is_not_blamed_for_having_no_position() {
     let recording = dataset::parse("carried", runaway().as_bytes()).unwrap();
-    let mut config = estimate::suite(recording.kind);
-    config.estimator = estimate::ATTITUDE;
-    let figures = estimate::run(&recording, &config).figures;
+    let mut suite = estimate::suite(recording.kind);
+    suite.method = Method::Attitude;
+    let figures = estimate::run(&recording, &suite).figures;
     assert!(!figures.diverged && figures.end_xy_m.is_none(), "{figures:?}");
     assert_eq!((figures.unused["flow"], figures.unused["tof"]), (1.0, 1.0));
 }
@@ -130,11 +130,11 @@ fn an_attitude_filter_is_not_blamed_for_having_no_position() {
 fn an_estimator_that_runs_away_is_called_lost() {
     let recording = dataset::parse("runaway", runaway().as_bytes()).unwrap();
     assert_eq!(recording.kind, Kind::StampFlyLog);
-    let mut config = estimate::suite(recording.kind);
-    let kept = estimate::run(&recording, &config).figures;
+    let mut suite = estimate::suite(recording.kind);
+    let kept = estimate::run(&recording, &suite).figures;
     // The same filter that may not use its flow stays where it is, ten metres from what the flow says.
-    config.eskf.flow_min_quality = 101;
-    let blind = estimate::run(&recording, &config).figures;
+    suite.vehicle.eskf.flow_min_quality = 101;
+    let blind = estimate::run(&recording, &suite).figures;
     assert!(!kept.diverged && kept.max_xy_m.unwrap() > 5.0, "{kept:?}");
     assert!(blind.diverged && blind.unused["flow"] == 1.0, "{blind:?}");
 }

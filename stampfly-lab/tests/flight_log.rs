@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use stampfly_lab::flight_log::{self, LogErrorKind, Omission};
 use stampfly_log::ulog::{Definitions, Level, ReadErrorKind, Sample, Sink, Topic};
-use stampfly_types::messages::{StateEstimate, SystemMode};
+use stampfly_types::messages::{FlightStatus, StateEstimate};
 use stampfly_types::{Instant, Message};
 
 struct Bytes(Vec<u8>);
@@ -19,7 +19,7 @@ impl Sink for Bytes {
 fn log() -> Vec<u8> {
     let topics = [
         Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
-        Topic { name: "system_mode", fields: SystemMode::FIELDS },
+        Topic { name: "flight_status", fields: FlightStatus::FIELDS },
     ];
     let mut log = Definitions::start(Bytes(Vec::new()), Instant::from_micros(500)).unwrap();
     log.info("sys_name", "StampFly").unwrap();
@@ -30,7 +30,7 @@ fn log() -> Vec<u8> {
         let estimate = StateEstimate { height: n as f32, ..Default::default() };
         log.sample(0, &Sample { at, generation: n, words: &estimate.to_words() }).unwrap();
         if n % 10 == 0 {
-            let mode = SystemMode { transitions: n, ..Default::default() };
+            let mode = FlightStatus { transitions: n, ..Default::default() };
             log.sample(1, &Sample { at, generation: n, words: &mode.to_words() }).unwrap();
             log.sync().unwrap();
         }
@@ -51,8 +51,8 @@ fn our_log_becomes_series_with_units_and_names() {
     assert_eq!(estimate.column("height").unwrap(), (0..50).map(f64::from).collect::<Vec<_>>());
     assert_eq!(estimate.columns_of::<3>("velocity").unwrap()[2].len(), 50);
     assert_eq!(estimate.unit("velocity"), "m/s");
-    assert_eq!(flight.topics["system_mode"].column("transitions").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
-    assert_eq!(flight.topics["system_mode"].names("state")[5], ("Flying".to_owned(), 5));
+    assert_eq!(flight.topics["flight_status"].column("transitions").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
+    assert_eq!(flight.topics["flight_status"].names("phase")[5], ("Flying".to_owned(), 5));
     assert_eq!(flight.info["sys_name"], "StampFly");
     assert_eq!(flight.parameters["gain"], [(Instant::from_micros(500), 1.5), (Instant::from_micros(50_000), 2.5)]);
     assert_eq!((flight.events[0].at, flight.events[0].text.as_str()), (Instant::from_micros(20_000), "hello"));

@@ -18,7 +18,7 @@
 
 use crate::checksum;
 use stampfly_types::Vec3;
-use stampfly_types::messages::FlightState;
+use stampfly_types::messages::FlightPhase;
 
 const MARK: u8 = 0xAA;
 const KIND: u8 = 1;
@@ -46,14 +46,14 @@ impl LinkState {
     const ALL: [Self; 6] = [Self::Init, Self::Idle, Self::Armed, Self::Flying, Self::Landing, Self::Error];
 }
 
-impl From<FlightState> for LinkState {
-    fn from(state: FlightState) -> Self {
-        match state {
-            FlightState::Init => Self::Init,
-            FlightState::IdleGround | FlightState::IdleHeld => Self::Idle,
-            FlightState::Armed => Self::Armed,
-            FlightState::TakeOff | FlightState::Flying => Self::Flying,
-            FlightState::Landing => Self::Landing,
+impl From<FlightPhase> for LinkState {
+    fn from(phase: FlightPhase) -> Self {
+        match phase {
+            FlightPhase::Init => Self::Init,
+            FlightPhase::IdleGround | FlightPhase::IdleHeld => Self::Idle,
+            FlightPhase::Armed => Self::Armed,
+            FlightPhase::TakeOff | FlightPhase::Flying => Self::Flying,
+            FlightPhase::Landing => Self::Landing,
         }
     }
 }

@@ -8,7 +8,7 @@
 
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic};
 use stampfly_log::{ActivationTopic, FlightHash};
-use stampfly_types::messages::{FlightState, ImuData, PowerData, SystemMode};
+use stampfly_types::messages::{FlightPhase, FlightStatus, ImuData, PowerData};
 use stampfly_types::{ActivationRecord, GRAVITY, InputRecord, Instant, Message, Vec3, math};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -16,7 +16,7 @@ use std::io::{BufWriter, Write};
 const TOPICS: &[Topic] = &[
     Topic { name: "sensor_imu", fields: ImuData::FIELDS },
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
-    Topic { name: "system_mode", fields: SystemMode::FIELDS },
+    Topic { name: "flight_status", fields: FlightStatus::FIELDS },
 ];
 const IMU: usize = 0;
 const POWER: usize = 1;
@@ -63,8 +63,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         if step % 400 == 0 {
             log.sync()?;
-            let state = if step < 800 { FlightState::IdleGround } else { FlightState::Armed };
-            let mode = SystemMode { state, armed: step >= 800, ..Default::default() };
+            let phase = if step < 800 { FlightPhase::IdleGround } else { FlightPhase::Armed };
+            let mode = FlightStatus { phase, armed: step >= 800, ..Default::default() };
             publish(&mut log, MODE, Sample { at, generation: step / 400 + 1, words: &mode.to_words() })?;
         }
         if step == 800 {

@@ -6,7 +6,7 @@ use common::{ACTIVATIONS, Bytes, Odd, TOPICS, small_log, start};
 use proptest::prelude::*;
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Full, Message, Ram, Reader, Sample, Sink, Stamp, Topic, WriteError};
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 use stampfly_types::{ActivationRecord, InputRecord};
 use stampfly_types::{FieldKind, Instant, Message as _, leaves};
 
@@ -80,10 +80,10 @@ proptest! {
 
     #[test]
     fn numbers_beyond_their_type_are_refused(word in 0x100u32..) {
-        let mut words = SystemMode::default().to_words();
+        let mut words = FlightStatus::default().to_words();
         words[0] = word;
         let sample = Sample { at: Instant::ZERO, generation: 0, words: &words };
-        prop_assert_eq!(start().sample(5, &sample), Err(WriteError::OutOfRange("state")));
+        prop_assert_eq!(start().sample(5, &sample), Err(WriteError::OutOfRange("phase")));
     }
 }
 
@@ -121,7 +121,7 @@ fn formats_explain_the_data() {
     let units = "wide=us wides=us at=us both_ways=us maybe=m/s part_0_known=us part_1_known=us";
     assert!(infos.contains(&("units/odd", units)));
     assert!(infos.contains(&("units/sensor_imu", "accel=m/s^2 gyro=rad/s temperature=degC")));
-    assert!(infos.contains(&("names/system_mode/mode", "Acro=0 Stabilize=1 AltHold=2 PosHold=3")));
+    assert!(infos.contains(&("names/flight_status/mode", "Acro=0 Stabilize=1 AltHold=2 PosHold=3")));
     assert!(
         infos
             .iter()

@@ -2,7 +2,7 @@
 
 use crate::machine::ModeInput;
 use stampfly_types::frame;
-use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightState, SystemMode, Validity};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, Validity};
 
 /// Most tilt on the ground that still allows take-off, rad.
 const MAX_TILT: f32 = 0.35;
@@ -14,7 +14,7 @@ const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(A
 /// | block | stands for |
 /// |---|---|
 /// | `CALIBRATING` | still-calibration has not finished |
-/// | `NOT_ON_GROUND` | the state is not IDLE on the ground |
+/// | `NOT_ON_GROUND` | the phase is not IDLE on the ground |
 /// | `NO_BATTERY`, `LOW_BATTERY` | alerts of the failsafe |
 /// | `ATTITUDE`, `TILTED` | tilt unknown or in disagreement with gravity; more than 20° |
 /// | `SENSOR` | the inertial sensor or the battery monitor is silent |
@@ -28,7 +28,7 @@ const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(A
 ///
 /// State, pairing and the mode in force are read from `mode`.
 #[must_use]
-pub fn blocks(mode: &SystemMode, crashed: bool, stale_switch: bool, input: &ModeInput<'_>) -> ArmBlocks {
+pub fn blocks(mode: &FlightStatus, crashed: bool, stale_switch: bool, input: &ModeInput<'_>) -> ArmBlocks {
     let alerts = input.alerts;
     let manual = |mode| matches!(mode, FlightMode::Acro | FlightMode::Stabilize);
     // The mode in force may be a fallback, and may be left for the pilot's at any time.
@@ -38,7 +38,7 @@ pub fn blocks(mode: &SystemMode, crashed: bool, stale_switch: bool, input: &Mode
     let silent = alerts.contains(Alerts::COMM_LOST) && input.commands.is_empty();
     ArmBlocks::NONE
         .set(ArmBlocks::CALIBRATING, !input.calibration.complete)
-        .set(ArmBlocks::NOT_ON_GROUND, mode.state != FlightState::IdleGround)
+        .set(ArmBlocks::NOT_ON_GROUND, mode.phase != FlightPhase::IdleGround)
         .set(ArmBlocks::NO_BATTERY, alerts.contains(Alerts::USB_POWER))
         .set(ArmBlocks::LOW_BATTERY, alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY))
         .set(
@@ -59,7 +59,7 @@ pub fn blocks(mode: &SystemMode, crashed: bool, stale_switch: bool, input: &Mode
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{CalibrationResult, GuidedKind, PilotInput, StateEstimate, VehicleStatus};
+    use stampfly_types::messages::{CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
 
     /// What blocks a vehicle that stands ready.
     fn ready(mode: FlightMode, alerts: Alerts, pilot: Option<&PilotInput>, commands: &[GuidedKind]) -> ArmBlocks {
@@ -67,12 +67,12 @@ mod tests {
             alerts,
             estimate: &StateEstimate { valid: Validity::ALL, ..Default::default() },
             calibration: &CalibrationResult { complete: true, ..Default::default() },
-            status: &VehicleStatus::default(),
+            land_detected: &LandDetected::default(),
             pilot,
             commands,
             button: None,
         };
-        let mode = SystemMode { state: FlightState::IdleGround, mode, ..Default::default() };
+        let mode = FlightStatus { phase: FlightPhase::IdleGround, mode, ..Default::default() };
         blocks(&mode, false, false, &input)
     }
 

@@ -18,8 +18,8 @@
 //! vibration, peaks of 18; the six-sigma condition keeps a badly balanced propeller from looking like a crash.
 
 use stampfly_types::messages::{
-    Alerts, EstimatorStatus, FlightMode, FlightState, ImuData, PowerData, SelfTestVerdict, StateEstimate, SystemAlert,
-    SystemMode, Validity,
+    Alerts, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate,
+    SystemAlert, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3, frame, math};
 
@@ -98,7 +98,7 @@ pub struct FailsafeInput<'a> {
     /// How the self test at power-on ended.
     pub self_test: SelfTestVerdict,
     /// State and mode one step ago.
-    pub mode: &'a SystemMode,
+    pub flight_status: &'a FlightStatus,
 }
 
 /// The failsafe.
@@ -111,7 +111,7 @@ pub struct FailsafeInput<'a> {
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: Some((Instant::ZERO, &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, mode: &SystemMode::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -151,13 +151,13 @@ impl Failsafe {
 
     /// One step; runs on a deadline when there are no samples.
     pub fn step(&mut self, now: Instant, input: &FailsafeInput<'_>) -> SystemAlert {
-        let disarmed = !input.mode.armed;
+        let disarmed = !input.flight_status.armed;
         let mut active = if disarmed { self.active.without(LATCHED) } else { self.active };
         if let Some((at, imu)) = input.imu
             && self.last_imu != Some(at)
         {
             self.last_imu = Some(at);
-            active = self.inspect_motion(active, imu, input.mode.state);
+            active = self.inspect_motion(active, imu, input.flight_status.phase);
         }
         let silence = self.last_imu.map_or(now.since(Instant::ZERO), |at| now.since(at));
         let [degraded, lost] = self.config.imu_silence;
@@ -167,7 +167,7 @@ impl Failsafe {
         }
         active = self.inspect_attitude(active, now, input);
         active = self.inspect_power(active, now, input, disarmed);
-        let airborne = matches!(input.mode.state, FlightState::Flying | FlightState::Landing);
+        let airborne = matches!(input.flight_status.phase, FlightPhase::Flying | FlightPhase::Landing);
         let silent = |last: Option<Instant>, limit| last.is_none_or(|at| now.since(at) >= limit);
         active = active
             .set(Alerts::COMM_LOST, silent(input.command, self.config.link_silence))
@@ -182,7 +182,7 @@ impl Failsafe {
         SystemAlert { active, seen: self.seen }
     }
 
-    fn inspect_motion(&mut self, active: Alerts, imu: &ImuData, state: FlightState) -> Alerts {
+    fn inspect_motion(&mut self, active: Alerts, imu: &ImuData, phase: FlightPhase) -> Alerts {
         let rate = imu.gyro.norm();
         if !imu.accel.norm_squared().is_finite() || !rate.is_finite() {
             return active;
@@ -191,7 +191,7 @@ impl Failsafe {
         *blow += (imu.accel - *blow) * 0.3;
         let force = blow.norm();
         let [mean, variance] = self.force;
-        let landing = state == FlightState::Landing;
+        let landing = phase == FlightPhase::Landing;
         let impact = if landing { self.config.landing_impact } else { self.config.impact };
         let limit = impact.max(mean + self.config.impact_sigmas * math::sqrt(variance));
         self.impacts = if force >= limit { self.impacts.saturating_add(1) } else { 0 };
@@ -213,13 +213,16 @@ impl Failsafe {
 
     fn inspect_attitude(&mut self, active: Alerts, now: Instant, input: &FailsafeInput<'_>) -> Alerts {
         let known = input.estimate.valid.contains(Validity::TILT);
-        let flying = matches!(input.mode.state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
+        let flying =
+            matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
         let [tilt, time] = self.config.tumble;
-        let over =
-            flying && known && input.mode.mode != FlightMode::Acro && frame::tilt(&input.estimate.attitude) > tilt;
+        let over = flying
+            && known
+            && input.flight_status.mode != FlightMode::Acro
+            && frame::tilt(&input.estimate.attitude) > tilt;
         let tumbled = lasts(&mut self.tumbled, now, over, time);
         let [angle, time] = self.config.tilt_mismatch;
-        let standing = input.mode.state == FlightState::IdleGround && known;
+        let standing = input.flight_status.phase == FlightPhase::IdleGround && known;
         let apart = standing
             && self.gravity.is_some_and(|force| {
                 let up = input.estimate.attitude.inverse_transform_vector(&-Vec3::z());
@@ -276,14 +279,18 @@ mod tests {
 
     struct Rig {
         failsafe: Failsafe,
-        mode: SystemMode,
+        mode: FlightStatus,
         now: Instant,
     }
 
     impl Rig {
         fn flying() -> Self {
-            let mode =
-                SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+            let mode = FlightStatus {
+                phase: FlightPhase::Flying,
+                mode: FlightMode::PosHold,
+                armed: true,
+                ..Default::default()
+            };
             Self { failsafe: Failsafe::default(), mode, now: Instant::ZERO }
         }
 
@@ -300,7 +307,7 @@ mod tests {
                 tof: Some(now),
                 flow: Some(now),
                 self_test: SelfTestVerdict::NotRun,
-                mode: &self.mode,
+                flight_status: &self.mode,
             };
             self.failsafe.step(now, &input).active
         }
@@ -350,7 +357,7 @@ mod tests {
     #[test]
     fn a_firm_touchdown_is_no_crash() {
         let mut rig = Rig::flying();
-        rig.mode.state = FlightState::Landing;
+        rig.mode.phase = FlightPhase::Landing;
         for _ in 0..400 {
             rig.sample(REST, Vec3::zeros());
         }
@@ -362,7 +369,7 @@ mod tests {
     #[test]
     fn the_battery_warns_before_it_lands() {
         let mut failsafe = Failsafe::default();
-        let mode = SystemMode { armed: true, ..Default::default() };
+        let mode = FlightStatus { armed: true, ..Default::default() };
         let mut step = |k: u64, voltage: f32| {
             let at = Instant::from_micros(k * 100_000);
             let power = PowerData { voltage, ..Default::default() };
@@ -376,7 +383,7 @@ mod tests {
                 tof: None,
                 flow: None,
                 self_test: SelfTestVerdict::NotRun,
-                mode: &mode,
+                flight_status: &mode,
             };
             failsafe.step(at, &input).active
         };
@@ -403,7 +410,7 @@ mod tests {
             tof: None,
             flow: None,
             self_test: SelfTestVerdict::NotRun,
-            mode: &SystemMode::default(),
+            flight_status: &FlightStatus::default(),
         };
         failsafe.step(now, &input).active
     }
@@ -447,7 +454,8 @@ mod tests {
         let (estimate, status, mode) = Default::default();
         let mut failsafe = Failsafe::default();
         let mut step = |self_test| {
-            let (estimate, status, mode): (&StateEstimate, &EstimatorStatus, &SystemMode) = (&estimate, &status, &mode);
+            let (estimate, status, mode): (&StateEstimate, &EstimatorStatus, &FlightStatus) =
+                (&estimate, &status, &mode);
             let power = None;
             let input = FailsafeInput {
                 imu: None,
@@ -458,7 +466,7 @@ mod tests {
                 tof: None,
                 flow: None,
                 self_test,
-                mode,
+                flight_status: mode,
             };
             failsafe.step(Instant::ZERO, &input).active
         };

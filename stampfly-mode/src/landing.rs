@@ -10,7 +10,7 @@
 
 use stampfly_types::Instant;
 use stampfly_types::messages::{
-    ControlOutput, FlightState, GroundContact, Setpoint, StateEstimate, Validity, VehicleStatus,
+    ControlOutput, FlightPhase, GroundContact, LandDetected, Setpoint, StateEstimate, Validity,
 };
 
 /// Limits of take-off and landing.
@@ -64,8 +64,8 @@ impl Default for LandingConfig {
 pub struct LandingInput<'a> {
     /// The estimate.
     pub estimate: &'a StateEstimate,
-    /// The present flight state.
-    pub state: FlightState,
+    /// The present flight phase.
+    pub phase: FlightPhase,
     /// The set-point one step ago.
     pub setpoint: &'a Setpoint,
     /// The controller's demand one step ago.
@@ -82,11 +82,11 @@ pub struct LandingInput<'a> {
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let mut landed_at = None;
 /// for k in 0..1000u64 {
-///     let status = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
-///         estimate: &estimate, state: FlightState::Landing, setpoint: &Setpoint::default(),
+///     let land_detected = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
+///         estimate: &estimate, phase: FlightPhase::Landing, setpoint: &Setpoint::default(),
 ///         demand: &ControlOutput { thrust: 0.2, ..Default::default() },
 ///     });
-///     if status.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
+///     if land_detected.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
 /// }
 /// assert!(landed_at.is_some_and(|t| t > 0.3 && t < 1.5));
 /// ```
@@ -94,9 +94,9 @@ pub struct LandingInput<'a> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TakeoffLanding {
     config: LandingConfig,
-    state: FlightState,
+    phase: FlightPhase,
     contact: GroundContact,
-    /// Height of the estimate when the state was entered.
+    /// Height of the estimate when the phase was entered.
     entry_height: f32,
     entered: Instant,
     /// Since when take-off has been in its band, the descent has stalled, the ceiling has been falling, and the vehicle
@@ -128,7 +128,7 @@ impl TakeoffLanding {
     pub fn new(config: LandingConfig) -> Self {
         Self {
             config,
-            state: FlightState::Init,
+            phase: FlightPhase::Init,
             contact: GroundContact::Ground,
             entry_height: 0.0,
             entered: Instant::ZERO,
@@ -140,27 +140,27 @@ impl TakeoffLanding {
     }
 
     fn enter(&mut self, now: Instant, input: &LandingInput<'_>) {
-        self.state = input.state;
+        self.phase = input.phase;
         self.entered = now;
         self.entry_height = input.estimate.height;
         (self.in_band, self.stalled, self.ceiling, self.still) = (None, None, None, None);
     }
 
     /// One step, at the control rate.
-    pub fn step(&mut self, now: Instant, input: &LandingInput<'_>) -> VehicleStatus {
-        if input.state != self.state {
+    pub fn step(&mut self, now: Instant, input: &LandingInput<'_>) -> LandDetected {
+        if input.phase != self.phase {
             self.enter(now, input);
         }
         let config = self.config;
         let estimate = input.estimate;
         let height_known = estimate.valid.contains(Validity::HEIGHT);
-        let mut status =
-            VehicleStatus { thrust_ceiling: 2.0, descent_rate: config.descent, ..VehicleStatus::default() };
-        match self.state {
-            FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => {
+        let mut land_detected =
+            LandDetected { thrust_ceiling: 2.0, descent_rate: config.descent, ..LandDetected::default() };
+        match self.phase {
+            FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => {
                 self.contact = GroundContact::Ground;
             }
-            FlightState::TakeOff => {
+            FlightPhase::TakeOff => {
                 let rise = estimate.height - self.entry_height;
                 if rise > config.airborne_rise || estimate.velocity.z < -2.0 * config.still_speed {
                     self.contact = GroundContact::Air;
@@ -172,12 +172,12 @@ impl TakeoffLanding {
                     && estimate.velocity.z.abs() < 2.0 * config.still_speed;
                 let in_band = lasting(&mut self.in_band, now, arrived);
                 let [settle, limit] = config.takeoff_time;
-                status.takeoff_complete = in_band >= settle || now.since(self.entered).seconds() > limit;
+                land_detected.takeoff_complete = in_band >= settle || now.since(self.entered).seconds() > limit;
             }
-            FlightState::Flying => self.contact = GroundContact::Air,
-            FlightState::Landing => {
+            FlightPhase::Flying => self.contact = GroundContact::Air,
+            FlightPhase::Landing => {
                 let flare = (estimate.height / config.flare_height).clamp(0.0, 1.0);
-                status.descent_rate = if height_known {
+                land_detected.descent_rate = if height_known {
                     config.touchdown + (config.descent - config.touchdown) * flare
                 } else {
                     config.touchdown
@@ -188,19 +188,19 @@ impl TakeoffLanding {
                 let [share, ramp] = config.ceiling;
                 let falling = lasting(&mut self.ceiling, now, low || stalled);
                 if self.ceiling.is_some() {
-                    status.thrust_ceiling = 1.0 - (1.0 - share) * (falling / ramp).min(1.0);
+                    land_detected.thrust_ceiling = 1.0 - (1.0 - share) * (falling / ramp).min(1.0);
                 }
-                let unloaded = input.demand.thrust < 0.8 * config.hover_thrust && status.thrust_ceiling < 0.85;
+                let unloaded = input.demand.thrust < 0.8 * config.hover_thrust && land_detected.thrust_ceiling < 0.85;
                 // Rising counts: with so little thrust nothing can, but strong vibration makes the estimate believe so.
                 let still = lasting(&mut self.still, now, unloaded && !sinking);
-                status.landed = still >= config.touchdown_time;
-                if status.landed {
+                land_detected.landed = still >= config.touchdown_time;
+                if land_detected.landed {
                     self.contact = GroundContact::Ground;
                 }
             }
         }
-        status.contact = self.contact;
-        status
+        land_detected.contact = self.contact;
+        land_detected
     }
 }
 
@@ -211,7 +211,7 @@ mod tests {
 
     fn run(
         seconds: f32,
-        state: FlightState,
+        phase: FlightPhase,
         mut estimate: impl FnMut(f32) -> StateEstimate,
         thrust: f32,
     ) -> Option<f32> {
@@ -220,7 +220,7 @@ mod tests {
             let t = k as f32 * 0.0025;
             let input = LandingInput {
                 estimate: &estimate(t),
-                state,
+                phase,
                 setpoint: &Setpoint::default(),
                 demand: &ControlOutput { thrust, ..Default::default() },
             };
@@ -236,7 +236,7 @@ mod tests {
             valid: Validity::ALL,
             ..Default::default()
         };
-        assert_eq!(run(5.0, FlightState::Landing, sinking, 0.2), None);
+        assert_eq!(run(5.0, FlightPhase::Landing, sinking, 0.2), None);
     }
 
     #[test]
@@ -247,19 +247,19 @@ mod tests {
             valid: Validity::ALL,
             ..Default::default()
         };
-        let landed = run(5.0, FlightState::Landing, shaken, 0.2);
+        let landed = run(5.0, FlightPhase::Landing, shaken, 0.2);
         assert!(landed.is_some_and(|t| (0.5..1.0).contains(&t)), "{landed:?}");
     }
 
     #[test]
     fn hovering_low_in_flight_is_never_landed() {
         let low = |_: f32| StateEstimate { height: 0.04, valid: Validity::ALL, ..Default::default() };
-        assert_eq!(run(20.0, FlightState::Flying, low, 0.2), None);
+        assert_eq!(run(20.0, FlightPhase::Flying, low, 0.2), None);
     }
 
     #[test]
     fn touchdown_is_recognised_without_any_height() {
         let blind = |_: f32| StateEstimate { height: 7.0, valid: Validity::TILT, ..Default::default() };
-        assert!(run(5.0, FlightState::Landing, blind, 0.2).is_some());
+        assert!(run(5.0, FlightPhase::Landing, blind, 0.2).is_some());
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! | module | decides | steps |
 //! |---|---|---|
-//! | [`machine`] | state and flight mode: the only place where they change | 400 Hz |
-//! | [`transitions`] | which event leads to which state | inside the machine |
+//! | [`machine`] | flight phase and flight mode: the only place where they change | 400 Hz |
+//! | [`transitions`] | which event leads to which phase | inside the machine |
 //! | [`arming`] | whether the motors may be armed, and if not, why | inside the machine |
 //! | [`failsafe`] | what is wrong: detects, never acts | 400 Hz |
 //! | [`landing`] | contact with the ground, take-off and landing | 400 Hz |
@@ -25,7 +25,7 @@ pub mod failsafe;
 pub mod landing;
 pub mod machine;
 pub mod signal;
-mod touch;
+mod stop_button;
 pub mod transitions;
 
 pub use authority::{Authority, AuthorityConfig};

@@ -1,15 +1,15 @@
-//! The mode machine: the only place where the vehicle changes state.
+//! The mode machine: the only place where the vehicle changes phase.
 //!
 //! [`ModeMachine::step`] finds out which events have happened, most urgent first, takes at most one transition of the
-//! [table](crate::transitions) a step, and runs what leaving and entering a state means (resets of controller and
-//! estimator). The failsafe is an event, never a state.
+//! [table](crate::transitions) a step, and runs what leaving and entering a phase means (resets of controller and
+//! estimator). The failsafe is an event, never a phase.
 
 use crate::arming;
-use crate::touch::Touch;
+use crate::stop_button::StopButton;
 use crate::transitions::{Event, is_armed, next};
 use stampfly_types::messages::{
-    Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightState, GroundContact, GuidedKind,
-    PilotInput, StateEstimate, SystemMode, Validity, VehicleStatus,
+    Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightPhase, FlightStatus, GroundContact,
+    GuidedKind, LandDetected, PilotInput, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant};
 
@@ -26,7 +26,7 @@ pub struct ModeInput<'a> {
     /// The still-calibration.
     pub calibration: &'a CalibrationResult,
     /// Take-off and landing.
-    pub status: &'a VehicleStatus,
+    pub land_detected: &'a LandDetected,
     /// The pilot's newest frame, if it is fresh.
     pub pilot: Option<&'a PilotInput>,
     /// Commands since the last step, in order.
@@ -40,12 +40,12 @@ pub struct ModeInput<'a> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModeOutput {
     /// State, mode, armed.
-    pub mode: SystemMode,
+    pub flight_status: FlightStatus,
     /// What the estimator is to do.
     pub estimator: EstimatorCommand,
 }
 
-/// Alerts that stop the motors in any state.
+/// Alerts that stop the motors in any phase.
 const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
 /// Alerts that demand a landing at once.
 const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
@@ -68,12 +68,12 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 /// let mut machine = ModeMachine::default();
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let calibration = CalibrationResult { complete: true, ..Default::default() };
-/// let status = VehicleStatus::default();
+/// let land_detected = LandDetected::default();
 /// let mut input = ModeInput {
-///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, status: &status,
+///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, land_detected: &land_detected,
 ///     pilot: None, commands: &[], button: None,
 /// };
-/// assert_eq!(machine.step(Instant::ZERO, &input).mode.state, FlightState::IdleGround);
+/// assert_eq!(machine.step(Instant::ZERO, &input).flight_status.phase, FlightPhase::IdleGround);
 /// input.commands = &[GuidedKind::Arm];
 /// assert!(machine.step(Instant::from_micros(2_500), &input).mode.armed);
 /// input.commands = &[GuidedKind::Kill];
@@ -93,7 +93,7 @@ pub struct ModeMachine {
     crashed: bool,
     silent_since: Option<Instant>,
     was_diverged: bool,
-    touch: Touch,
+    stop_button: StopButton,
     /// While pairing: has the transmitter of before fallen silent?
     unheard: bool,
 }
@@ -102,11 +102,11 @@ impl ModeMachine {
     /// One step, at the control rate.
     pub fn step(&mut self, now: Instant, input: &ModeInput<'_>) -> ModeOutput {
         let switch = self.pilot_switch(input);
-        // Nobody can touch the button of an armed vehicle without holding it.
-        let grabbed = self.touch.grabs(now, input.button, is_armed(self.output.mode.state));
-        let input = &ModeInput { button: self.touch.meaning(input.button), ..*input };
+        // The button is on the vehicle: a gesture on an armed one means that it is held in a hand.
+        let stopped_by_button = self.stop_button.stops(now, input.button, is_armed(self.output.flight_status.phase));
+        let input = &ModeInput { button: self.stop_button.unused(input.button), ..*input };
         self.choose_mode(input);
-        let mode = &mut self.output.mode;
+        let mode = &mut self.output.flight_status;
         if input.button == Some(ButtonGesture::HoldPair) {
             mode.pairing = !mode.pairing;
             self.unheard = false;
@@ -119,17 +119,19 @@ impl ModeMachine {
         }
         self.unheard = mode.pairing && (self.unheard || input.pilot.is_none());
         mode.blocks = arming::blocks(mode, self.crashed, switch.is_stale, input);
-        let happened = self.happened(now, input, &switch, grabbed);
+        let happened = self.happened(now, input, &switch, stopped_by_button);
         if self.acknowledges(input, &switch) {
             self.crashed = false;
         }
-        let holds_height = matches!(self.output.mode.mode, FlightMode::AltHold | FlightMode::PosHold);
+        let holds_height = matches!(self.output.flight_status.mode, FlightMode::AltHold | FlightMode::PosHold);
         let transition = Event::ALL.into_iter().zip(happened).filter(|(_, happened)| *happened);
-        if let Some((event, state)) = transition
-            .filter_map(|(event, _)| next(self.output.mode.state, event, holds_height).map(|state| (event, state)))
+        if let Some((event, phase)) = transition
+            .filter_map(|(event, _)| {
+                next(self.output.flight_status.phase, event, holds_height).map(|phase| (event, phase))
+            })
             .next()
         {
-            self.leave_and_enter(now, event, state, input);
+            self.leave_and_enter(now, event, phase, input);
         }
         if input.alerts.contains(Alerts::ESTIMATE_DIVERGED) && !self.was_diverged {
             self.output.estimator.full_resets = self.output.estimator.full_resets.wrapping_add(1);
@@ -139,11 +141,17 @@ impl ModeMachine {
     }
 
     /// Which of [`Event::ALL`] have happened, in the same order.
-    fn happened(&mut self, now: Instant, input: &ModeInput<'_>, switch: &Switch, grabbed: bool) -> [bool; 10] {
-        let mode = &self.output.mode;
+    fn happened(
+        &mut self,
+        now: Instant,
+        input: &ModeInput<'_>,
+        switch: &Switch,
+        stopped_by_button: bool,
+    ) -> [bool; 10] {
+        let mode = &self.output.flight_status;
         let commanded = |kind: Command| input.commands.contains(&kind);
         let clicked = input.button == Some(ButtonGesture::Click);
-        let armed = is_armed(mode.state);
+        let armed = is_armed(mode.phase);
         let height_known = input.estimate.valid.contains(Validity::HEIGHT);
         let [held, standing] = HELD_HEIGHT;
 
@@ -157,16 +165,16 @@ impl ModeMachine {
         let manual = matches!(mode.mode, FlightMode::Acro | FlightMode::Stabilize);
         let throttle_up = input.pilot.is_some_and(|pilot| pilot.throttle > THROTTLE_TAKE_OFF);
         let lifts_off = if manual { throttle_up } else { self.takes_off && waited >= SPOOL };
-        let airborne_by_hand = manual && input.status.contact == GroundContact::Air;
+        let airborne_by_hand = manual && input.land_detected.contact == GroundContact::Air;
         [
             input.alerts.intersects(CUT)
                 || commanded(Command::Kill)
-                || grabbed
+                || stopped_by_button
                 || input.pilot.is_some_and(|pilot| pilot.kill),
-            commanded(Command::Disarm) || switch.falls || (mode.state == FlightState::Armed && waited >= ARMED_TIMEOUT),
-            input.status.landed,
+            commanded(Command::Disarm) || switch.falls || (mode.phase == FlightPhase::Armed && waited >= ARMED_TIMEOUT),
+            input.land_detected.landed,
             commanded(Command::Land) || abandoned || input.alerts.intersects(LAND),
-            input.status.takeoff_complete || airborne_by_hand,
+            input.land_detected.takeoff_complete || airborne_by_hand,
             commanded(Command::TakeOff) || lifts_off,
             (commanded(Command::Arm) || switch.rises || clicked) && mode.blocks.is_empty(),
             height_known && input.estimate.height < standing,
@@ -175,35 +183,35 @@ impl ModeMachine {
         ]
     }
 
-    /// Callbacks of leaving one state and entering another, in one place.
-    fn leave_and_enter(&mut self, now: Instant, event: Event, state: FlightState, input: &ModeInput<'_>) {
-        let ModeOutput { mode, estimator } = &mut self.output;
-        let left = mode.state;
-        mode.state = state;
-        mode.armed = is_armed(state);
+    /// Callbacks of leaving one phase and entering another, in one place.
+    fn leave_and_enter(&mut self, now: Instant, event: Event, phase: FlightPhase, input: &ModeInput<'_>) {
+        let ModeOutput { flight_status: mode, estimator } = &mut self.output;
+        let left = mode.phase;
+        mode.phase = phase;
+        mode.armed = is_armed(phase);
         mode.transitions = mode.transitions.wrapping_add(1);
         self.entered = now;
-        match state {
-            FlightState::IdleGround => {
+        match phase {
+            FlightPhase::IdleGround => {
                 mode.control_resets = mode.control_resets.wrapping_add(1);
-                if left == FlightState::IdleHeld {
+                if left == FlightPhase::IdleHeld {
                     estimator.full_resets = estimator.full_resets.wrapping_add(1);
                 }
                 self.crashed |= event == Event::Emergency && input.alerts.intersects(CUT);
             }
-            FlightState::Armed => {
+            FlightPhase::Armed => {
                 mode.control_resets = mode.control_resets.wrapping_add(1);
                 // Positions count from the take-off spot.
                 estimator.origin_resets = estimator.origin_resets.wrapping_add(1);
                 self.takes_off = !input.commands.contains(&Command::Arm);
             }
-            FlightState::Init
-            | FlightState::IdleHeld
-            | FlightState::TakeOff
-            | FlightState::Flying
-            | FlightState::Landing => {}
+            FlightPhase::Init
+            | FlightPhase::IdleHeld
+            | FlightPhase::TakeOff
+            | FlightPhase::Flying
+            | FlightPhase::Landing => {}
         }
-        estimator.on_ground = matches!(state, FlightState::IdleGround | FlightState::Armed);
+        estimator.on_ground = matches!(phase, FlightPhase::IdleGround | FlightPhase::Armed);
     }
 
     /// The mode in force: the one asked for, or the best one the estimate allows.
@@ -219,7 +227,7 @@ impl ModeMachine {
         let valid = input.estimate.valid;
         let height = valid.contains(Validity::VELOCITY_Z);
         let place = height && valid.contains(Validity::VELOCITY_XY);
-        self.output.mode.mode = match self.wanted {
+        self.output.flight_status.mode = match self.wanted {
             FlightMode::PosHold if place => FlightMode::PosHold,
             FlightMode::PosHold | FlightMode::AltHold if height => FlightMode::AltHold,
             FlightMode::PosHold | FlightMode::AltHold | FlightMode::Stabilize => FlightMode::Stabilize,
@@ -230,7 +238,7 @@ impl ModeMachine {
     fn pilot_switch(&mut self, input: &ModeInput<'_>) -> Switch {
         let Some(pilot) = input.pilot else {
             // Whatever the switch does meanwhile, nobody sees it: it has to be seen off again before it arms.
-            if !is_armed(self.output.mode.state) {
+            if !is_armed(self.output.flight_status.phase) {
                 self.switch = None;
             }
             return Switch::default();
@@ -248,10 +256,10 @@ impl ModeMachine {
 
     /// Somebody has come to look at a crashed vehicle.
     fn acknowledges(&self, input: &ModeInput<'_>, switch: &Switch) -> bool {
-        let idle = !is_armed(self.output.mode.state);
+        let idle = !is_armed(self.output.flight_status.phase);
         // A press alone is none: what it becomes may be a click, which must not find the crash acknowledged and arm.
-        let touched = input.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
-        idle && (switch.falls || touched || input.commands.contains(&Command::Disarm))
+        let gesture = input.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
+        idle && (switch.falls || gesture || input.commands.contains(&Command::Disarm))
     }
 }
 
@@ -276,7 +284,7 @@ mod tests {
     struct World {
         estimate: StateEstimate,
         calibration: CalibrationResult,
-        status: VehicleStatus,
+        land_detected: LandDetected,
         alerts: Alerts,
         pilot: Option<PilotInput>,
         /// Happens in the next step, and not again.
@@ -289,7 +297,7 @@ mod tests {
             Self {
                 estimate: StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() },
                 calibration: CalibrationResult { complete: true, ..Default::default() },
-                status: VehicleStatus::default(),
+                land_detected: LandDetected::default(),
                 alerts: Alerts::NONE,
                 pilot: None,
                 button: None,
@@ -303,7 +311,7 @@ mod tests {
                 alerts: self.alerts,
                 estimate: &self.estimate,
                 calibration: &self.calibration,
-                status: &self.status,
+                land_detected: &self.land_detected,
                 pilot: self.pilot.as_ref(),
                 commands,
                 button: self.button.take(),
@@ -314,72 +322,72 @@ mod tests {
 
     #[test]
     fn pairing_ends_with_the_first_frame_after_a_silence_and_its_arm_switch_must_be_seen_off() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         let hold = |world: &mut World, machine: &mut ModeMachine| {
             world.button = Some(ButtonGesture::HoldPair);
-            world.step(machine, &[]).mode.pairing
+            world.step(machine, &[]).flight_status.pairing
         };
         world.pilot = Some(PilotInput::default());
         world.step(&mut machine, &[]);
         assert!(hold(&mut world, &mut machine));
-        assert!(world.step(&mut machine, &[]).mode.pairing, "a frame from before is still fresh");
+        assert!(world.step(&mut machine, &[]).flight_status.pairing, "a frame from before is still fresh");
         assert!(!hold(&mut world, &mut machine), "the pilot has changed his mind");
         assert!(hold(&mut world, &mut machine));
         world.pilot = None;
-        assert!(world.step(&mut machine, &[]).mode.pairing);
+        assert!(world.step(&mut machine, &[]).flight_status.pairing);
         world.pilot = Some(PilotInput { arm: true, ..Default::default() });
-        let paired = world.step(&mut machine, &[]).mode;
+        let paired = world.step(&mut machine, &[]).flight_status;
         assert!(!paired.pairing && !paired.armed);
-        assert!(!world.step(&mut machine, &[]).mode.armed, "switched on before it was seen off");
+        assert!(!world.step(&mut machine, &[]).flight_status.armed, "switched on before it was seen off");
         world.pilot = Some(PilotInput::default());
         world.step(&mut machine, &[]);
         world.pilot = Some(PilotInput { arm: true, ..Default::default() });
-        assert!(world.step(&mut machine, &[]).mode.armed);
+        assert!(world.step(&mut machine, &[]).flight_status.armed);
     }
 
     /// What happens to the world before a command.
     type Change = fn(&mut World);
 
-    fn in_state(state: FlightState) -> (ModeMachine, World) {
+    fn in_phase(phase: FlightPhase) -> (ModeMachine, World) {
         let (mut machine, mut world) = (ModeMachine::default(), World::ready());
         let path: &[(Command, Change)] = &[
             (Command::None, |_| {}),
             (Command::Arm, |_| {}),
             (Command::TakeOff, |_| {}),
-            (Command::None, |world| world.status.takeoff_complete = true),
-            (Command::Land, |world| world.status.takeoff_complete = false),
+            (Command::None, |world| world.land_detected.takeoff_complete = true),
+            (Command::Land, |world| world.land_detected.takeoff_complete = false),
         ];
         for (command, change) in path {
-            if machine.output.mode.state == state {
+            if machine.output.flight_status.phase == phase {
                 break;
             }
             change(&mut world);
             world.step(&mut machine, &[*command]);
         }
-        if state == FlightState::IdleHeld {
-            (machine, world) = in_state(FlightState::IdleGround);
+        if phase == FlightPhase::IdleHeld {
+            (machine, world) = in_phase(FlightPhase::IdleGround);
             world.estimate.height = 0.5;
             world.step(&mut machine, &[]);
         }
-        world.status.takeoff_complete = false;
-        assert_eq!(machine.output.mode.state, state);
+        world.land_detected.takeoff_complete = false;
+        assert_eq!(machine.output.flight_status.phase, phase);
         (machine, world)
     }
 
     #[test]
     fn every_state_can_be_reached_and_every_armed_one_ends_on_the_ground() {
-        for &state in FlightState::ALL {
-            let (mut machine, mut world) = in_state(state);
-            world.status.landed = state == FlightState::Landing;
+        for &phase in FlightPhase::ALL {
+            let (mut machine, mut world) = in_phase(phase);
+            world.land_detected.landed = phase == FlightPhase::Landing;
             for command in [Command::Kill, Command::None] {
                 world.step(&mut machine, &[command]);
             }
-            assert!(!machine.output.mode.armed, "kill from {state:?}");
+            assert!(!machine.output.flight_status.armed, "kill from {phase:?}");
         }
     }
 
-    /// Every state × every single alert and pair of alerts × every command and gesture: motors never start unasked, a
-    /// cutting alert or a touch always stops them within the step, and only transitions of the table are taken.
+    /// Every phase × every single alert and pair of alerts × every command and gesture: motors never start unasked, a
+    /// cutting alert or a gesture always stops them within the step, and only transitions of the table are taken.
     #[test]
     fn exhaustive_single_step() {
         let bits: Vec<Alerts> = Alerts::NAMES.iter().map(|(_, bit)| bits_to_alerts(*bit)).collect();
@@ -388,29 +396,29 @@ mod tests {
             sets.extend(bits[i..].iter().map(|b| *a | *b));
         }
         let mut seen = BTreeSet::new();
-        for &state in FlightState::ALL {
-            let start = in_state(state);
+        for &phase in FlightPhase::ALL {
+            let start = in_phase(phase);
             for &alerts in &sets {
                 let commands = GuidedKind::ALL.iter().map(|command| (Some(*command), ButtonGesture::None));
                 for (command, gesture) in commands.chain(ButtonGesture::ALL.iter().map(|gesture| (None, *gesture))) {
                     let (mut machine, mut world) = start.clone();
                     (world.alerts, world.button) = (alerts, Some(gesture));
-                    let output = world.step(&mut machine, command.as_slice()).mode;
-                    assert_eq!(output.armed, is_armed(output.state));
+                    let output = world.step(&mut machine, command.as_slice()).flight_status;
+                    assert_eq!(output.armed, is_armed(output.phase));
                     if alerts.intersects(CUT) {
-                        assert!(!output.armed, "{state:?} {alerts:?} {command:?}");
+                        assert!(!output.armed, "{phase:?} {alerts:?} {command:?}");
                     }
-                    if gesture != ButtonGesture::None && is_armed(state) {
-                        assert_eq!(output.state, FlightState::IdleGround, "{state:?} {alerts:?} {gesture:?}");
+                    if gesture != ButtonGesture::None && is_armed(phase) {
+                        assert_eq!(output.phase, FlightPhase::IdleGround, "{phase:?} {alerts:?} {gesture:?}");
                     }
-                    if output.armed && !is_armed(state) {
+                    if output.armed && !is_armed(phase) {
                         let heard = command.is_some() || !alerts.contains(Alerts::COMM_LOST);
-                        assert!(heard && state == FlightState::IdleGround && output.blocks.is_empty());
+                        assert!(heard && phase == FlightPhase::IdleGround && output.blocks.is_empty());
                         assert!(command == Some(Command::Arm) || gesture == ButtonGesture::Click);
                     }
-                    let legal = Event::ALL.iter().any(|e| next(state, *e, true) == Some(output.state));
-                    assert!(output.state == state || legal, "{state:?} → {:?}", output.state);
-                    seen.insert((state, output.state));
+                    let legal = Event::ALL.iter().any(|e| next(phase, *e, true) == Some(output.phase));
+                    assert!(output.phase == phase || legal, "{phase:?} → {:?}", output.phase);
+                    seen.insert((phase, output.phase));
                 }
             }
         }
@@ -424,117 +432,117 @@ mod tests {
 
     #[test]
     fn a_switch_that_was_on_at_boot_does_not_arm() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
         for _ in 0..10 {
-            assert!(!world.step(&mut machine, &[]).mode.armed);
+            assert!(!world.step(&mut machine, &[]).flight_status.armed);
         }
         world.pilot = Some(PilotInput { arm: false, mode: FlightMode::PosHold, ..Default::default() });
         world.step(&mut machine, &[]);
         world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
-        assert!(world.step(&mut machine, &[]).mode.armed, "off, then on");
+        assert!(world.step(&mut machine, &[]).flight_status.armed, "off, then on");
     }
 
     #[test]
     fn a_switch_that_moved_while_nobody_was_heard_does_not_arm() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         let frame = |arm| Some(PilotInput { arm, ..Default::default() });
         for pilot in [frame(false), None, frame(true)] {
             world.pilot = pilot;
-            assert!(!world.step(&mut machine, &[]).mode.armed);
+            assert!(!world.step(&mut machine, &[]).flight_status.armed);
         }
-        assert!(world.step(&mut machine, &[]).mode.blocks.contains(ArmBlocks::ARM_SWITCH));
+        assert!(world.step(&mut machine, &[]).flight_status.blocks.contains(ArmBlocks::ARM_SWITCH));
         for pilot in [frame(false), frame(true)] {
             world.pilot = pilot;
             world.step(&mut machine, &[]);
         }
-        assert!(machine.output.mode.armed, "seen off, then on");
+        assert!(machine.output.flight_status.armed, "seen off, then on");
         for pilot in [None, frame(false)] {
             world.pilot = pilot;
             world.step(&mut machine, &[]);
         }
-        assert!(!machine.output.mode.armed, "but it disarms");
+        assert!(!machine.output.flight_status.armed, "but it disarms");
     }
 
     #[test]
     fn nobody_arms_a_vehicle_that_hears_nobody() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         world.alerts = Alerts::COMM_LOST;
         for gesture in [ButtonGesture::Press, ButtonGesture::Click] {
             world.button = Some(gesture);
-            let mode = world.step(&mut machine, &[]).mode;
+            let mode = world.step(&mut machine, &[]).flight_status;
             assert_eq!((mode.armed, mode.blocks), (false, ArmBlocks::NO_LINK), "{gesture:?}");
         }
         world.pilot = Some(PilotInput::default());
         world.step(&mut machine, &[]);
         world.pilot = Some(PilotInput { arm: true, ..Default::default() });
-        assert!(!world.step(&mut machine, &[]).mode.armed, "the failsafe decides who is heard");
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        assert!(!world.step(&mut machine, &[]).flight_status.armed, "the failsafe decides who is heard");
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         world.alerts = Alerts::COMM_LOST;
-        assert!(world.step(&mut machine, &[Command::Arm]).mode.armed, "a command is a sign of life itself");
+        assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed, "a command is a sign of life itself");
     }
 
     /// Lets time pass without a gesture, then one.
-    fn touch(world: &mut World, machine: &mut ModeMachine, after: Duration, gesture: ButtonGesture) -> SystemMode {
+    fn press(world: &mut World, machine: &mut ModeMachine, after: Duration, gesture: ButtonGesture) -> FlightStatus {
         world.now += after;
         world.button = Some(gesture);
-        world.step(machine, &[]).mode
+        world.step(machine, &[]).flight_status
     }
 
     #[test]
     fn a_press_stops_the_motors_in_every_state_and_means_nothing_else() {
         use ButtonGesture::{Click, DoubleClick, HoldPair, HoldReset, Press};
         let millis = Duration::from_millis;
-        for state in [FlightState::Armed, FlightState::TakeOff, FlightState::Flying, FlightState::Landing] {
+        for phase in [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing] {
             for rest in [Click, DoubleClick, HoldPair, HoldReset] {
-                let (mut machine, mut world) = in_state(state);
-                let stopped = touch(&mut world, &mut machine, Duration::ZERO, Press);
-                assert_eq!((stopped.state, stopped.armed), (FlightState::IdleGround, false), "{state:?}");
-                let later = touch(&mut world, &mut machine, millis(3_000), rest);
-                assert!(!later.armed && !later.pairing, "{state:?} {rest:?}");
+                let (mut machine, mut world) = in_phase(phase);
+                let stopped = press(&mut world, &mut machine, Duration::ZERO, Press);
+                assert_eq!((stopped.phase, stopped.armed), (FlightPhase::IdleGround, false), "{phase:?}");
+                let later = press(&mut world, &mut machine, millis(3_000), rest);
+                assert!(!later.armed && !later.pairing, "{phase:?} {rest:?}");
                 // A hand in a hurry presses again.
                 for (after, gesture) in [(300, Press), (500, Click), (1_500, Press), (500, Click), (900, Press)] {
-                    assert!(!touch(&mut world, &mut machine, millis(after), gesture).armed, "{state:?} {rest:?}");
+                    assert!(!press(&mut world, &mut machine, millis(after), gesture).armed, "{phase:?} {rest:?}");
                 }
-                assert!(!touch(&mut world, &mut machine, millis(3_000), HoldPair).pairing, "{state:?} {rest:?}");
+                assert!(!press(&mut world, &mut machine, millis(3_000), HoldPair).pairing, "{phase:?} {rest:?}");
                 // Left alone for a while, it is a button again.
-                assert!(!touch(&mut world, &mut machine, millis(2_000), Press).armed);
-                assert!(touch(&mut world, &mut machine, millis(500), Click).armed, "{state:?} {rest:?}");
+                assert!(!press(&mut world, &mut machine, millis(2_000), Press).armed);
+                assert!(press(&mut world, &mut machine, millis(500), Click).armed, "{phase:?} {rest:?}");
             }
         }
     }
 
     #[test]
-    fn who_touches_the_button_while_somebody_else_arms_stops_the_motors() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
-        assert!(!touch(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Press).armed);
-        assert!(world.step(&mut machine, &[Command::Arm]).mode.armed);
-        assert!(!touch(&mut world, &mut machine, Duration::from_millis(500), ButtonGesture::Click).armed);
+    fn a_press_while_a_command_arms_stops_the_motors() {
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+        assert!(!press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Press).armed);
+        assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
+        assert!(!press(&mut world, &mut machine, Duration::from_millis(500), ButtonGesture::Click).armed);
     }
 
     #[test]
-    fn a_touch_that_acknowledges_a_crash_does_not_arm() {
-        let (mut machine, mut world) = in_state(FlightState::Flying);
+    fn a_press_that_acknowledges_a_crash_does_not_arm() {
+        let (mut machine, mut world) = in_phase(FlightPhase::Flying);
         world.alerts = Alerts::IMPACT;
         world.step(&mut machine, &[]);
         world.alerts = Alerts::NONE;
         let millis = Duration::from_millis;
-        touch(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
-        assert_eq!(world.step(&mut machine, &[]).mode.blocks, ArmBlocks::CRASHED, "not yet");
-        assert!(!touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed);
-        assert_eq!(world.step(&mut machine, &[]).mode.blocks, ArmBlocks::NONE);
-        touch(&mut world, &mut machine, millis(500), ButtonGesture::Press);
-        assert!(touch(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed, "the next touch does");
+        press(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
+        assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::CRASHED, "not yet");
+        assert!(!press(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed);
+        assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::NONE);
+        press(&mut world, &mut machine, millis(500), ButtonGesture::Press);
+        assert!(press(&mut world, &mut machine, millis(500), ButtonGesture::Click).armed, "the next press does");
     }
 
     #[test]
     fn a_raised_stick_does_not_arm_a_vehicle_that_cannot_hold_height() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         let frame = |arm| Some(PilotInput { arm, throttle: 0.6, mode: FlightMode::AltHold, ..Default::default() });
         world.estimate.valid = Validity::TILT;
         for arm in [false, true] {
             world.pilot = frame(arm);
-            let mode = world.step(&mut machine, &[]).mode;
+            let mode = world.step(&mut machine, &[]).flight_status;
             assert_eq!((mode.armed, mode.mode, mode.blocks), (false, FlightMode::Stabilize, ArmBlocks::THROTTLE));
         }
         world.estimate.valid = Validity::ALL;
@@ -542,52 +550,53 @@ mod tests {
             world.pilot = frame(arm);
             world.step(&mut machine, &[]);
         }
-        assert!(machine.output.mode.armed, "where the stick is a climb rate, it does");
+        assert!(machine.output.flight_status.armed, "where the stick is a climb rate, it does");
     }
 
     #[test]
     fn a_click_takes_off_and_holds_the_place() {
-        let (mut machine, mut world) = in_state(FlightState::IdleGround);
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
         machine.wanted = FlightMode::Stabilize;
-        let clicked = touch(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
-        assert_eq!((clicked.state, clicked.mode), (FlightState::Armed, FlightMode::PosHold));
+        let clicked = press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
+        assert_eq!((clicked.phase, clicked.mode), (FlightPhase::Armed, FlightMode::PosHold));
         world.now += SPOOL;
-        let later = world.step(&mut machine, &[]).mode;
-        assert_eq!((later.state, later.mode), (FlightState::TakeOff, FlightMode::PosHold));
+        let later = world.step(&mut machine, &[]).flight_status;
+        assert_eq!((later.phase, later.mode), (FlightPhase::TakeOff, FlightMode::PosHold));
     }
 
     #[test]
     fn a_lost_link_hovers_then_lands() {
-        let (mut machine, mut world) = in_state(FlightState::Flying);
+        let (mut machine, mut world) = in_phase(FlightPhase::Flying);
         world.alerts = Alerts::COMM_LOST;
-        let landed_after = (0..2_000).find(|_| world.step(&mut machine, &[]).mode.state == FlightState::Landing);
+        let landed_after =
+            (0..2_000).find(|_| world.step(&mut machine, &[]).flight_status.phase == FlightPhase::Landing);
         assert_eq!(landed_after, Some(1_200), "3 s at 400 Hz");
         world.alerts = Alerts::NONE;
         assert_eq!(
-            world.step(&mut machine, &[]).mode.state,
-            FlightState::Landing,
+            world.step(&mut machine, &[]).flight_status.phase,
+            FlightPhase::Landing,
             "a link that returns is no reason to stop"
         );
     }
 
     #[test]
     fn modes_fall_back_to_what_is_known() {
-        let (mut machine, mut world) = in_state(FlightState::Flying);
-        assert_eq!(machine.output.mode.mode, FlightMode::PosHold);
+        let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+        assert_eq!(machine.output.flight_status.mode, FlightMode::PosHold);
         world.estimate.valid = Validity::ALL.without(Validity::VELOCITY_XY);
-        assert_eq!(world.step(&mut machine, &[]).mode.mode, FlightMode::AltHold);
+        assert_eq!(world.step(&mut machine, &[]).flight_status.mode, FlightMode::AltHold);
         world.estimate.valid = Validity::TILT;
-        assert_eq!(world.step(&mut machine, &[]).mode.mode, FlightMode::Stabilize);
+        assert_eq!(world.step(&mut machine, &[]).flight_status.mode, FlightMode::Stabilize);
     }
 
     #[test]
     fn a_crash_has_to_be_acknowledged() {
-        let (mut machine, mut world) = in_state(FlightState::Flying);
+        let (mut machine, mut world) = in_phase(FlightPhase::Flying);
         world.alerts = Alerts::IMPACT;
         world.step(&mut machine, &[]);
         world.alerts = Alerts::NONE;
-        assert!(!world.step(&mut machine, &[Command::Arm]).mode.armed);
+        assert!(!world.step(&mut machine, &[Command::Arm]).flight_status.armed);
         world.step(&mut machine, &[Command::Disarm]);
-        assert!(world.step(&mut machine, &[Command::Arm]).mode.armed);
+        assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
     }
 }

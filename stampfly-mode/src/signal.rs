@@ -1,9 +1,9 @@
 //! What people see and hear: one table for lights, one for tunes.
 //!
-//! The status light tells the state, the two body lights the flight mode, as on the StampFly. Rows of a table are
+//! The status light tells the phase, the two body lights the flight mode, as on the StampFly. Rows of a table are
 //! looked at from the top; the first one that applies wins.
 
-use stampfly_types::messages::{Alerts, FlightMode, FlightState, Signal, SystemMode, Tone};
+use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, FlightStatus, Signal, Tone};
 use stampfly_types::{Duration, Instant};
 
 /// How a light shows its colour.
@@ -34,14 +34,14 @@ const LIME: Colour = [16, 32, 0];
 /// use stampfly_mode::Signaller;
 /// use stampfly_types::{Instant, messages::*};
 /// let mut signaller = Signaller::default();
-/// let idle = SystemMode { state: FlightState::IdleGround, ..Default::default() };
+/// let idle = FlightStatus { phase: FlightPhase::IdleGround, ..Default::default() };
 /// let shown = signaller.step(Instant::ZERO, &idle, Alerts::NONE);
 /// assert!(shown.status[1] > 0 && shown.status[0] == 0, "green: ready");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Signaller {
-    last_state: Option<FlightState>,
+    last_phase: Option<FlightPhase>,
     last_warning: Option<Instant>,
     tone: Tone,
     tone_count: u32,
@@ -55,20 +55,20 @@ const REPEAT: Duration = Duration::from_secs(10);
 
 impl Signaller {
     /// What to show now; call at about 30 Hz.
-    pub fn step(&mut self, now: Instant, mode: &SystemMode, alerts: Alerts) -> Signal {
+    pub fn step(&mut self, now: Instant, mode: &FlightStatus, alerts: Alerts) -> Signal {
         let low = alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY);
         let fault = alerts.intersects(FAULT);
         let silent = alerts.contains(Alerts::COMM_LOST);
-        if self.last_state != Some(mode.state) {
-            let tone = match (self.last_state, mode.state) {
+        if self.last_phase != Some(mode.phase) {
+            let tone = match (self.last_phase, mode.phase) {
                 (None, _) => Tone::Start,
-                (Some(FlightState::Init), FlightState::IdleGround) => Tone::Ready,
-                (_, FlightState::Armed) => Tone::Arm,
-                (Some(FlightState::IdleHeld), FlightState::IdleGround) => Tone::None,
-                (_, FlightState::IdleGround) => Tone::Disarm,
+                (Some(FlightPhase::Init), FlightPhase::IdleGround) => Tone::Ready,
+                (_, FlightPhase::Armed) => Tone::Arm,
+                (Some(FlightPhase::IdleHeld), FlightPhase::IdleGround) => Tone::None,
+                (_, FlightPhase::IdleGround) => Tone::Disarm,
                 _ => Tone::None,
             };
-            self.last_state = Some(mode.state);
+            self.last_phase = Some(mode.phase);
             self.start(tone);
         } else if low && self.last_warning.is_none_or(|at| now.since(at) >= REPEAT) {
             self.last_warning = Some(now);
@@ -79,22 +79,22 @@ impl Signaller {
             (fault, RED, Blink::Fast),
             (low, CYAN, Blink::Slow),
             (mode.pairing, BLUE, Blink::Fast),
-            (mode.state == FlightState::Init, MAGENTA, Blink::Slow),
+            (mode.phase == FlightPhase::Init, MAGENTA, Blink::Slow),
             // Nobody is heard: a hint while it stands, an alarm while the motors may turn.
             (silent && mode.armed, ORANGE, Blink::Fast),
-            (silent && mode.state == FlightState::IdleGround, BLUE, Blink::Solid),
-            (mode.state == FlightState::IdleGround, GREEN, Blink::Solid),
-            (mode.state == FlightState::IdleHeld, CYAN, Blink::Fast),
-            (mode.state == FlightState::Armed, GREEN, Blink::Slow),
-            (mode.state == FlightState::TakeOff, WHITE, Blink::Fast),
-            (mode.state == FlightState::Flying, GREEN, Blink::Solid),
-            (mode.state == FlightState::Landing, ORANGE, Blink::Slow),
+            (silent && mode.phase == FlightPhase::IdleGround, BLUE, Blink::Solid),
+            (mode.phase == FlightPhase::IdleGround, GREEN, Blink::Solid),
+            (mode.phase == FlightPhase::IdleHeld, CYAN, Blink::Fast),
+            (mode.phase == FlightPhase::Armed, GREEN, Blink::Slow),
+            (mode.phase == FlightPhase::TakeOff, WHITE, Blink::Fast),
+            (mode.phase == FlightPhase::Flying, GREEN, Blink::Solid),
+            (mode.phase == FlightPhase::Landing, ORANGE, Blink::Slow),
         ];
-        let in_the_air = matches!(mode.state, FlightState::TakeOff | FlightState::Flying | FlightState::Landing);
+        let in_the_air = matches!(mode.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
         let rhythm = if in_the_air { Blink::Slow } else { Blink::Solid };
         let body = [
             (low, CYAN, Blink::Fast),
-            (mode.state == FlightState::Init, WHITE, Blink::Solid),
+            (mode.phase == FlightPhase::Init, WHITE, Blink::Solid),
             (mode.mode == FlightMode::Acro, BLUE, rhythm),
             (mode.mode == FlightMode::Stabilize, LIME, rhythm),
             (mode.mode == FlightMode::AltHold, ORANGE, rhythm),
@@ -127,10 +127,10 @@ mod tests {
 
     #[test]
     fn every_state_shows_something_and_warnings_win() {
-        for &state in FlightState::ALL {
-            let mode = SystemMode { state, ..Default::default() };
+        for &phase in FlightPhase::ALL {
+            let mode = FlightStatus { phase, ..Default::default() };
             let mut signaller = Signaller::default();
-            assert_ne!(signaller.step(Instant::ZERO, &mode, Alerts::NONE).status, OFF, "{state:?}");
+            assert_ne!(signaller.step(Instant::ZERO, &mode, Alerts::NONE).status, OFF, "{phase:?}");
             assert_eq!(signaller.step(Instant::ZERO, &mode, Alerts::LOW_BATTERY).status, CYAN);
             assert_eq!(signaller.step(Instant::ZERO, &mode, Alerts::LOW_BATTERY | Alerts::IMU_LOST).status, RED);
         }
@@ -139,23 +139,23 @@ mod tests {
     #[test]
     fn a_vehicle_nobody_flies_waits_in_blue_and_calls_in_the_air() {
         let mut signaller = Signaller::default();
-        let mut status = |state, armed, millis| {
-            let mode = SystemMode { state, armed, ..Default::default() };
+        let mut status = |phase, armed, millis| {
+            let mode = FlightStatus { phase, armed, ..Default::default() };
             signaller.step(Instant::from_millis(millis), &mode, Alerts::COMM_LOST).status
         };
         for millis in (0..2_000).step_by(30) {
-            assert_eq!(status(FlightState::IdleGround, false, millis), BLUE, "it does not blink at {millis}");
+            assert_eq!(status(FlightPhase::IdleGround, false, millis), BLUE, "it does not blink at {millis}");
         }
-        assert_eq!(status(FlightState::Init, false, 0), MAGENTA);
-        for state in [FlightState::Armed, FlightState::TakeOff, FlightState::Flying, FlightState::Landing] {
-            assert_eq!([0, 125].map(|millis| status(state, true, millis)), [ORANGE, OFF], "{state:?}");
+        assert_eq!(status(FlightPhase::Init, false, 0), MAGENTA);
+        for phase in [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing] {
+            assert_eq!([0, 125].map(|millis| status(phase, true, millis)), [ORANGE, OFF], "{phase:?}");
         }
     }
 
     #[test]
     fn faults_are_red() {
         for fault in [Alerts::IMU_LOST, Alerts::ESTIMATE_DIVERGED, Alerts::TILT_MISMATCH, Alerts::POWER_LOST] {
-            let mode = SystemMode { state: FlightState::IdleGround, ..Default::default() };
+            let mode = FlightStatus { phase: FlightPhase::IdleGround, ..Default::default() };
             assert_eq!(Signaller::default().step(Instant::ZERO, &mode, fault).status, RED, "{fault:?}");
         }
     }
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_warning_repeats_every_ten_seconds() {
         let mut signaller = Signaller::default();
-        let mode = SystemMode { state: FlightState::Flying, ..Default::default() };
+        let mode = FlightStatus { phase: FlightPhase::Flying, ..Default::default() };
         let mut count = 0;
         for second in 0..30 {
             count = signaller.step(Instant::from_secs(second), &mode, Alerts::LOW_BATTERY).tone_count;

@@ -1,17 +1,17 @@
-//! Which event leads from which state to which: the whole table, as one total function.
+//! Which event leads from which phase to which: the whole table, as one total function.
 //!
 //! ```text
 //! INIT ─ready─► IDLE_GROUND ◄─lifted/set down─► IDLE_HELD
 //!                 │ arm                 ▲ disarm, emergency
-//!                 ▼                     │ (from every state below)
+//!                 ▼                     │ (from every phase below)
 //!               ARMED ─take off─► TAKEOFF ─complete─► FLYING ─land─► LANDING ─touchdown─► IDLE_GROUND
 //! ```
 //!
 //! Who finds out that an event has happened is the [mode machine](crate::machine).
 
-use stampfly_types::messages::FlightState;
+use stampfly_types::messages::FlightPhase;
 
-/// Something that may change the state.
+/// Something that may change the phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// Sensors, calibration and estimate are ready.
@@ -55,10 +55,10 @@ impl Event {
 /// The transition table. `holds_height` says whether the flight mode holds height by itself: then a disarm in the air
 /// lands first.
 #[must_use]
-pub const fn next(state: FlightState, event: Event, holds_height: bool) -> Option<FlightState> {
+pub const fn next(phase: FlightPhase, event: Event, holds_height: bool) -> Option<FlightPhase> {
     use Event as E;
-    use FlightState as S;
-    match (state, event) {
+    use FlightPhase as S;
+    match (phase, event) {
         (S::Init, E::Ready) => Some(S::IdleGround),
         (S::IdleGround, E::Lifted) => Some(S::IdleHeld),
         (S::IdleHeld, E::SetDown) => Some(S::IdleGround),
@@ -82,8 +82,8 @@ pub const fn next(state: FlightState, event: Event, holds_height: bool) -> Optio
     }
 }
 
-/// May the motors turn in this state?
+/// May the motors turn in this phase?
 #[must_use]
-pub const fn is_armed(state: FlightState) -> bool {
-    matches!(state, FlightState::Armed | FlightState::TakeOff | FlightState::Flying | FlightState::Landing)
+pub const fn is_armed(phase: FlightPhase) -> bool {
+    matches!(phase, FlightPhase::Armed | FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing)
 }

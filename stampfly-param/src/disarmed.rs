@@ -1,6 +1,6 @@
 //! The proof that motors are off.
 
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 /// The vehicle was disarmed when this was made. It is worth one write and cannot be copied or kept in a log.
 ///
@@ -9,9 +9,9 @@ use stampfly_types::messages::SystemMode;
 ///
 /// ```
 /// use stampfly_param::Disarmed;
-/// use stampfly_types::messages::SystemMode;
-/// assert!(Disarmed::proven_by(&SystemMode { armed: true, ..Default::default() }).is_none());
-/// assert!(Disarmed::proven_by(&SystemMode::default()).is_some());
+/// use stampfly_types::messages::FlightStatus;
+/// assert!(Disarmed::proven_by(&FlightStatus { armed: true, ..Default::default() }).is_none());
+/// assert!(Disarmed::proven_by(&FlightStatus::default()).is_some());
 /// ```
 #[derive(Debug)]
 #[must_use = "a proof is for the write it allows"]
@@ -19,7 +19,7 @@ pub struct Disarmed(());
 
 impl Disarmed {
     /// The proof, if this is what the mode machine has decided.
-    pub fn proven_by(mode: &SystemMode) -> Option<Self> {
+    pub fn proven_by(mode: &FlightStatus) -> Option<Self> {
         (!mode.armed).then_some(Self(()))
     }
 }

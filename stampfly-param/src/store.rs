@@ -42,9 +42,9 @@ type NoCache = Cache<Uncached, Uncached, Uncached, u32>;
 /// # use flash::Flash;
 /// use embassy_futures::block_on;
 /// use stampfly_param::{Disarmed, ParameterStore};
-/// use stampfly_types::messages::SystemMode;
+/// use stampfly_types::messages::FlightStatus;
 ///
-/// let disarmed = || Disarmed::proven_by(&SystemMode::default()).unwrap();
+/// let disarmed = || Disarmed::proven_by(&FlightStatus::default()).unwrap();
 /// block_on(async {
 ///     let mut store = ParameterStore::open(Flash::new(), 0..1280).await.unwrap();
 ///     assert_eq!(store.load("hover.thrust", 0.1..=0.6).await, Ok(None));

@@ -6,7 +6,7 @@ use embassy_futures::block_on;
 use flash::Flash;
 use proptest::prelude::*;
 use stampfly_param::{Disarmed, LoadError, ParameterStore};
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 const RANGE: core::ops::Range<u32> = 0..1280;
 const PAGE: usize = 256;
@@ -24,7 +24,7 @@ fn name(index: usize) -> String {
 /// Is nothing there, and does everything that is saved stay?
 fn works(flash: Flash) {
     let mut store = open(flash).expect("five pages");
-    let disarmed = || Disarmed::proven_by(&SystemMode::default()).expect("disarmed");
+    let disarmed = || Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
     for index in 0..VALUES {
         assert_eq!(block_on(store.load(&name(index), -1e3..=1e3)), Ok(None));
     }
@@ -117,7 +117,7 @@ fn no_power_cut_while_erasing_leaves_anything_behind() {
 /// Forgetting everything is the same work, and a start finishes what a cut has left.
 #[test]
 fn no_power_cut_while_forgetting_leaves_half() {
-    let disarmed = || Disarmed::proven_by(&SystemMode::default()).expect("disarmed");
+    let disarmed = || Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
     let mut store = open(Flash::new()).expect("five pages");
     for index in 0..VALUES {
         assert_eq!(block_on(store.save(disarmed(), &name(index), index as f32, -1e3..=1e3)), Ok(()));
@@ -134,7 +134,7 @@ fn no_power_cut_while_forgetting_leaves_half() {
 /// A store of another size is not taken for this one.
 #[test]
 fn a_store_of_another_size_is_foreign() {
-    let disarmed = Disarmed::proven_by(&SystemMode::default()).expect("disarmed");
+    let disarmed = Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
     let mut small = block_on(ParameterStore::open(Flash::new(), 0..1024)).expect("four pages");
     assert_eq!(block_on(small.save(disarmed, &name(0), 1.0, 0.0..=1.0)), Ok(()));
     works(small.into_flash());
@@ -180,7 +180,7 @@ proptest! {
 /// Bytes where a number is asked for, or fewer of them, are nobody's value.
 #[test]
 fn too_few_bytes_are_no_value() {
-    let disarmed = Disarmed::proven_by(&SystemMode::default()).expect("disarmed");
+    let disarmed = Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
     let mut store = open(Flash::new()).expect("five pages");
     assert_eq!(block_on(store.save_bytes(disarmed, "x", [1, 2])), Ok(()));
     assert_eq!(block_on(store.load("x", 0.0..=1.0)), Err(LoadError::Corrupted));

@@ -6,13 +6,13 @@ use embassy_futures::block_on;
 use flash::{Flash, FlashError};
 use proptest::prelude::*;
 use stampfly_param::{Disarmed, LoadError, OpenError, ParameterStore, SaveError};
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 const RANGE: core::ops::Range<u32> = 0..1280;
 const NAMES: [&str; 5] = ["rate.roll.kp", "rate.roll.ti", "hover.thrust", "eskf.gate", "motor.duty.max"];
 
 fn disarmed() -> Disarmed {
-    Disarmed::proven_by(&SystemMode::default()).expect("disarmed")
+    Disarmed::proven_by(&FlightStatus::default()).expect("disarmed")
 }
 
 fn store(flash: Flash) -> ParameterStore<Flash> {

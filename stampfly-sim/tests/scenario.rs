@@ -2,10 +2,10 @@
 
 use proptest::prelude::*;
 use stampfly_sim::vehicle::Scenario;
-use stampfly_types::messages::{PowerData, SystemMode};
+use stampfly_types::messages::{FlightStatus, PowerData};
 
 /// A voltage is commanded, a mode is watched.
-fn parse(text: &str) -> Result<Scenario<PowerData, SystemMode>, String> {
+fn parse(text: &str) -> Result<Scenario<PowerData, FlightStatus>, String> {
     Scenario::parse(text, |power| (0.0..=5.0).contains(&power.voltage))
 }
 
@@ -19,10 +19,10 @@ fn values_stay_until_they_are_changed_and_act_after_their_time() {
 
 #[test]
 fn checks_are_made_on_the_first_line_at_or_after_their_time() {
-    let armed = |armed| SystemMode { armed, ..SystemMode::default() };
+    let armed = |armed| FlightStatus { armed, ..FlightStatus::default() };
     let log = [(0.0, armed(false)), (1.0, armed(true)), (2.0, armed(false))];
     for (text, failures) in [
-        ("0.5 check armed == 1\n1 check armed > 0.5\n1.1 check armed < 1\n2 check state == Init\n3 end", vec![]),
+        ("0.5 check armed == 1\n1 check armed > 0.5\n1.1 check armed < 1\n2 check phase == Init\n3 end", vec![]),
         ("1 check armed == 0\n2 check armed >= 1\n2.5 end", vec!["1 s: armed == 0", "2 s: armed >= 1"]),
         ("2.1 check armed <= 1\n3 end", vec!["2.1 s: armed <= 1"]),
     ] {
@@ -45,7 +45,7 @@ fn mistakes_are_named_with_their_line() {
         ("0 check armed 3", "line 1: 'check armed 3' is none: field, comparison, value"),
         ("0 check armour == 3", "line 1: 'check armour == 3' is none: field, comparison, value"),
         ("0 check armed = 3", "line 1: 'check armed = 3' is none: field, comparison, value"),
-        ("0 check state == Nowhere", "line 1: 'check state == Nowhere' is none: field, comparison, value"),
+        ("0 check phase == Nowhere", "line 1: 'check phase == Nowhere' is none: field, comparison, value"),
     ] {
         assert_eq!(parse(text).expect_err(text), error);
     }

@@ -149,14 +149,14 @@ macro_rules! message {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{ImuData, StateEstimate, SystemMode};
+    use crate::messages::{FlightStatus, ImuData, StateEstimate};
     use proptest::prelude::*;
 
     #[test]
     fn words_that_are_no_value_are_refused() {
-        let mut words = SystemMode::default().to_words();
+        let mut words = FlightStatus::default().to_words();
         words[0] = 77;
-        assert_eq!(SystemMode::from_words(&words), None, "unknown state");
+        assert_eq!(FlightStatus::from_words(&words), None, "unknown phase");
         let mut words = StateEstimate::default().to_words();
         words[0] = 3.0f32.to_bits();
         assert_eq!(StateEstimate::from_words(&words), None, "quaternion of norm 3");

@@ -417,7 +417,7 @@ impl Iterator for Leaves {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{FlightState, SystemMode};
+    use crate::messages::{FlightPhase, FlightStatus};
     use crate::{Message, Vec3, message};
     use proptest::prelude::*;
     use std::string::{String, ToString};
@@ -507,23 +507,23 @@ mod tests {
         }
         check::<Route>();
         check::<Leg>();
-        check::<SystemMode>();
+        check::<FlightStatus>();
     }
 
     #[test]
     fn values_speak() {
-        let mode = SystemMode { state: FlightState::Flying, armed: true, ..Default::default() };
+        let mode = FlightStatus { phase: FlightPhase::Flying, armed: true, ..Default::default() };
         let words = mode.to_words();
-        let said: Vec<_> = leaves(SystemMode::FIELDS).filter_map(|leaf| leaf.value(&words, 0)).collect();
+        let said: Vec<_> = leaves(FlightStatus::FIELDS).filter_map(|leaf| leaf.value(&words, 0)).collect();
         assert_eq!(said[0].to_string(), "Flying");
         assert_eq!((said[2], said[2].as_f64()), (Value::Bool(true), 1.0));
-        let blocks = leaves(SystemMode::FIELDS).nth(4).expect("blocks");
+        let blocks = leaves(FlightStatus::FIELDS).nth(4).expect("blocks");
         let show = |bits| blocks.kind.value(&[bits]).map(|value| value.to_string());
         assert_eq!(show(0).as_deref(), Some("none"));
         assert_eq!(show(0b101).as_deref(), Some("CALIBRATING NO_BATTERY"));
-        let state = leaves(SystemMode::FIELDS).next().expect("a state");
-        assert_eq!(state.kind.value(&[99]).map(|value| value.to_string()).as_deref(), Some("99?"));
-        assert_eq!(state.value(&words, 1), None, "it is no array");
+        let phase = leaves(FlightStatus::FIELDS).next().expect("a phase");
+        assert_eq!(phase.kind.value(&[99]).map(|value| value.to_string()).as_deref(), Some("99?"));
+        assert_eq!(phase.value(&words, 1), None, "it is no array");
         assert_eq!(FieldKind::F64.value(&[0]), None, "half a number");
     }
 

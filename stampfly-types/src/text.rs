@@ -119,7 +119,7 @@ fn read_field(field: &FieldInfo, text: &str, words: &mut [u32]) -> Option<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{ImuData, SystemMode};
+    use crate::messages::{FlightStatus, ImuData};
     use crate::{Instant, message};
     use proptest::prelude::*;
     use std::string::String;
@@ -171,12 +171,12 @@ mod tests {
 
     #[test]
     fn enumerations_have_names_and_numbers() {
-        let mode = SystemMode::default();
+        let mode = FlightStatus::default();
         let named = texts(&mode, Style::Names).unwrap();
         assert_eq!(named[0], "\"Init\"");
         assert_eq!(back(&named), Some(mode));
         assert_eq!(back(&texts(&mode, Style::Numbers).unwrap()), Some(mode));
-        let unknown: Option<SystemMode> = read(|_| Ok::<_, ()>("\"Elsewhere\"")).unwrap();
+        let unknown: Option<FlightStatus> = read(|_| Ok::<_, ()>("\"Elsewhere\"")).unwrap();
         assert_eq!(unknown, None);
     }
 

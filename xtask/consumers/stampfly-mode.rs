@@ -11,10 +11,10 @@ fn main() {
         alerts: Alerts::NONE,
         estimate: &estimate,
         calibration: &calibration,
-        status: &VehicleStatus::default(),
+        land_detected: &LandDetected::default(),
         pilot: None,
         commands: &[],
         button: None,
     };
-    assert_eq!(ModeMachine::default().step(Instant::from_micros(2_500), &input).mode.state, FlightState::IdleGround);
+    assert_eq!(ModeMachine::default().step(Instant::from_micros(2_500), &input).flight_status.phase, FlightPhase::IdleGround);
 }

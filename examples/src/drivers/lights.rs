@@ -9,7 +9,7 @@ use core::fmt::Write;
 use smart_leds_trait::{RGB8, SmartLedsWrite};
 use stampfly_drivers::{Indicator, Lights, Timebase};
 use stampfly_mode::Signaller;
-use stampfly_types::messages::{Alerts, FlightState, Signal, SystemMode};
+use stampfly_types::messages::{Alerts, FlightPhase, FlightStatus, Signal};
 
 /// How long a colour lasts at least: half a period of the fastest blinking.
 const EIGHTH_MS: u32 = 125;
@@ -42,13 +42,13 @@ where
     let mut signaller = Signaller::default();
     let mut shown = Shown::default();
     let mut before = Signal::default();
-    let states = FlightState::ALL.iter().map(|&state| (state.name(), state, Alerts::NONE));
+    let phases = FlightPhase::ALL.iter().map(|&phase| (phase.name(), phase, Alerts::NONE));
     let warnings = [("low battery", Alerts::LOW_BATTERY), ("sensor lost", Alerts::IMU_LOST)];
-    let warnings = warnings.map(|(name, alerts)| (name, FlightState::Flying, alerts));
+    let warnings = warnings.map(|(name, alerts)| (name, FlightPhase::Flying, alerts));
     writeln!(out, "Red Green Blue, White Cyan Magenta Orange Lime; a dot is dark.")?;
-    writeln!(out, "{:<12} {:<8}   body", "state", "status")?;
-    for (name, state, alerts) in states.chain(warnings) {
-        let mode = SystemMode { state, ..Default::default() };
+    writeln!(out, "{:<12} {:<8}   body", "phase", "status")?;
+    for (name, phase, alerts) in phases.chain(warnings) {
+        let mode = FlightStatus { phase, ..Default::default() };
         let mut seen = [['.'; 8]; 2];
         let [seen_status, seen_body] = &mut seen;
         for (status_letter, body_letter) in seen_status.iter_mut().zip(seen_body) {

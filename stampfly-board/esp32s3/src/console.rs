@@ -93,7 +93,7 @@ pub async fn run(parts: Parts) {
     }
 }
 
-fn newest_mode(memory: &RefCell<Memory>) -> Option<stampfly_types::messages::SystemMode> {
+fn newest_mode(memory: &RefCell<Memory>) -> Option<stampfly_types::messages::FlightStatus> {
     let mut memory = memory.borrow_mut();
     memory.catch_up();
     memory.mode()

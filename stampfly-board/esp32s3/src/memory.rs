@@ -8,7 +8,7 @@ use stampfly_board::black_box::{BlackBox, RETENTION, WORDS};
 use stampfly_board::console::Newest;
 use stampfly_board::topics::{self, Id};
 use stampfly_bus::Taps;
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 use static_cell::ConstStaticCell;
 
 /// Two periods of the fastest topic: every topic has room for at least that many samples.
@@ -41,8 +41,8 @@ impl Memory {
     }
 
     /// The mode machine's newest decision.
-    pub fn mode(&self) -> Option<SystemMode> {
-        self.newest.get(Id::system_mode as usize).map(|(_, mode)| mode)
+    pub fn mode(&self) -> Option<FlightStatus> {
+        self.newest.get(Id::flight_status as usize).map(|(_, mode)| mode)
     }
 }
 

@@ -39,8 +39,8 @@ pub async fn run(parts: Parts) {
     let mut vehicle = Address::default();
     vehicle.0.copy_from_slice(interface_mac_address(InterfaceMacAddress::Station).as_bytes());
     let session = Session::new(vehicle, CHANNEL, peer);
-    let topics::LinkEnds { command_pilot, system_mode, telemetry, link_peer, .. } = ends;
-    let link = RefCell::new(Link::new(session, command_pilot, link_peer, system_mode, telemetry));
+    let topics::LinkEnds { command_pilot, flight_status, telemetry, link_peer, .. } = ends;
+    let link = RefCell::new(Link::new(session, command_pilot, link_peer, flight_status, telemetry));
     join(receive(receiver, &link), send(sender, &manager, &link)).await;
 }
 

@@ -22,7 +22,7 @@ use stampfly_drivers::Timebase;
 use stampfly_flight::parameters::Parameters;
 use stampfly_link::Address;
 use stampfly_param::{Disarmed, EraseError, ParameterStore, SaveError};
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 /// Several periods of the motors' duties.
 const NOTICE: Duration = Duration::from_millis(20);
@@ -34,7 +34,7 @@ impl<'t> Writing<'t> {
     /// Returns when the motors are still. On an armed vehicle nothing begins.
     async fn begin(
         busy: &'t mut StorageBusyTx<'static>,
-        mode: &mut impl FnMut() -> Option<SystemMode>,
+        mode: &mut impl FnMut() -> Option<FlightStatus>,
     ) -> Result<Self, StorageError> {
         let _ = proven(mode)?;
         busy.publish(Clock.now(), &StorageBusy { busy: true });
@@ -111,7 +111,7 @@ impl Storage {
         &mut self,
         config: &VehicleConfig,
         busy: &mut StorageBusyTx<'static>,
-        mut mode: impl FnMut() -> Option<SystemMode>,
+        mut mode: impl FnMut() -> Option<FlightStatus>,
     ) -> Result<(), StorageError> {
         let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
@@ -128,7 +128,7 @@ impl Storage {
         &mut self,
         peer: Address,
         busy: &mut StorageBusyTx<'static>,
-        mut mode: impl FnMut() -> Option<SystemMode>,
+        mut mode: impl FnMut() -> Option<FlightStatus>,
     ) -> Result<(), StorageError> {
         let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
@@ -139,7 +139,7 @@ impl Storage {
     pub async fn reset(
         &mut self,
         busy: &mut StorageBusyTx<'static>,
-        mut mode: impl FnMut() -> Option<SystemMode>,
+        mut mode: impl FnMut() -> Option<FlightStatus>,
     ) -> Result<(), StorageError> {
         let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
@@ -148,7 +148,7 @@ impl Storage {
 }
 
 /// A vehicle nobody knows to be disarmed counts as armed.
-fn proven(mode: &mut impl FnMut() -> Option<SystemMode>) -> Result<Disarmed, StorageError> {
+fn proven(mode: &mut impl FnMut() -> Option<FlightStatus>) -> Result<Disarmed, StorageError> {
     mode().and_then(|mode| Disarmed::proven_by(&mode)).ok_or(StorageError::Armed)
 }
 

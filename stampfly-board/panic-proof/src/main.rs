@@ -51,10 +51,10 @@ fn vehicle() {
     let mut bus = topics::Bus::new();
     let vehicle = Assembled::<Runnables>::new(&mut bus, None, &config, black_box(Instant::ZERO));
     let Assembled { mut flight_loop, mut outside, mut taps } = vehicle;
-    let topics::LinkEnds { command_pilot, command_guided: mut guided, system_mode, telemetry, link_peer } =
+    let topics::LinkEnds { command_pilot, command_guided: mut guided, flight_status, telemetry, link_peer } =
         outside.link;
     let session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
-    let mut link = Link::new(session, command_pilot, link_peer, system_mode, telemetry);
+    let mut link = Link::new(session, command_pilot, link_peer, flight_status, telemetry);
     let mut memory = BlackBox::<1024>::new(RETENTION);
     while black_box(true) {
         let at: Instant = black_box(Instant::ZERO);

@@ -13,7 +13,7 @@ use stampfly_flight::Observer;
 use stampfly_flight::golden::PlayObserver;
 use stampfly_flight::newest::message;
 use stampfly_types::Instant;
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 
 /// Inputs of the estimation that are sensors of the vehicle: inertial, range, flow, field, pressure.
 const SENSORS: usize = 5;
@@ -168,8 +168,8 @@ impl PlayObserver for Profile<'_> {
     }
 
     fn published(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
-        if topic == topics::Id::system_mode as usize
-            && let Some(mode) = message::<SystemMode>(words)
+        if topic == topics::Id::flight_status as usize
+            && let Some(mode) = message::<FlightStatus>(words)
         {
             self.armed = mode.armed;
         }

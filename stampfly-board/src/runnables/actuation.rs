@@ -37,7 +37,7 @@ impl Runnable for Actuation {
     fn run(&mut self, activation: &mut Activation, ends: &mut ActuationEnds<'_>) {
         let now = activation.now();
         let demand = ends.control_output.fresh(now, STALE_DEMAND).copied();
-        let mode = ends.system_mode.fresh(now, STALE_DEMAND);
+        let mode = ends.flight_status.fresh(now, STALE_DEMAND);
         let armed = mode.is_some_and(|mode| mode.armed);
         if armed {
             self.armed_at = now;

@@ -1,6 +1,6 @@
 //! Control: state and set-point in, thrust and torque out.
 
-use crate::config::VehicleConfig;
+use crate::config::{ControllerKind, VehicleConfig};
 use crate::topics::ControlEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::{CascadeController, ControlInput, Controller, GeometricController};
@@ -25,10 +25,9 @@ impl Control {
     /// A controller at rest.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let controller = if config.uses_geometric_controller() {
-            Choice::Geometric(GeometricController::new(&config.geometric))
-        } else {
-            Choice::Cascade(CascadeController::new(&config.cascade))
+        let controller = match config.controller {
+            ControllerKind::Geometric => Choice::Geometric(GeometricController::new(&config.geometric)),
+            ControllerKind::Cascade => Choice::Cascade(CascadeController::new(&config.cascade)),
         };
         Self { controller }
     }
@@ -43,8 +42,8 @@ impl Runnable for Control {
             estimate: ends.estimate_state.get(),
             command: ends.command_setpoint.get(),
             setpoint: ends.setpoint.get(),
-            mode: ends.system_mode.get(),
-            status: ends.vehicle_status.get(),
+            flight_status: ends.flight_status.get(),
+            land_detected: ends.land_detected.get(),
             unmet: ends.actuator_motor.get().unmet,
         };
         let output = match &mut self.controller {

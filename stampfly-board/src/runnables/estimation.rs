@@ -1,6 +1,6 @@
 //! Estimation: every sensor in, the vehicle's state out.
 
-use crate::config::VehicleConfig;
+use crate::config::{EstimatorKind, VehicleConfig};
 use crate::topics::EstimationEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, feed};
@@ -27,10 +27,9 @@ impl Estimation {
     /// An estimation that waits for its calibration.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let estimator = if config.uses_complementary_estimator() {
-            Choice::Complementary(Complementary::new(config.complementary))
-        } else {
-            Choice::Eskf(Eskf::new(config.eskf))
+        let estimator = match config.estimator {
+            EstimatorKind::Complementary => Choice::Complementary(Complementary::new(config.complementary)),
+            EstimatorKind::Eskf => Choice::Eskf(Eskf::new(config.eskf)),
         };
         Self { estimator, started: false }
     }

@@ -46,7 +46,7 @@ impl Runnable for Failsafe {
             tof: self.last_tof,
             flow: self.last_flow,
             self_test: ends.self_test.get().verdict,
-            mode: ends.system_mode.get(),
+            flight_status: ends.flight_status.get(),
         };
         // Every sample counts for the impact detector, also those that came while something else ran.
         let mut alert = None;

@@ -26,11 +26,11 @@ impl Runnable for Landing {
     fn run(&mut self, activation: &mut Activation, ends: &mut LandingEnds<'_>) {
         let input = LandingInput {
             estimate: ends.estimate_state.get(),
-            state: ends.system_mode.get().state,
+            phase: ends.flight_status.get().phase,
             setpoint: ends.setpoint.get(),
             demand: ends.control_output.get(),
         };
-        let status = self.manager.step(activation.now(), &input);
-        ends.vehicle_status.publish(activation.now(), &status);
+        let land_detected = self.manager.step(activation.now(), &input);
+        ends.land_detected.publish(activation.now(), &land_detected);
     }
 }

@@ -6,7 +6,7 @@ use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::{ModeInput, ModeMachine};
-use stampfly_types::messages::{ButtonGesture, EstimatorCommand, GuidedKind, PilotInput, SystemMode};
+use stampfly_types::messages::{ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
 /// A pilot's frame as old as this counts as none.
@@ -20,7 +20,7 @@ pub struct Mode {
     pilot: Option<Stamped<PilotInput>>,
     published: Option<EstimatorCommand>,
     /// The decision of the step before.
-    last: SystemMode,
+    last: FlightStatus,
     /// When the vehicle was last armed.
     armed_at: Instant,
 }
@@ -60,15 +60,15 @@ impl Runnable for Mode {
             alerts: ends.system_alert.get().active,
             estimate: ends.estimate_state.get(),
             calibration: ends.calibration.get(),
-            status: ends.vehicle_status.get(),
+            land_detected: ends.land_detected.get(),
             pilot: self.pilot.as_ref().filter(|frame| frame.age(now) < STALE_PILOT).map(|frame| &frame.data),
             commands: &commands,
             button,
         };
         let output = self.machine.step(now, &input);
-        ends.system_mode.publish(now, &output.mode);
-        self.last = output.mode;
-        if output.mode.armed {
+        ends.flight_status.publish(now, &output.flight_status);
+        self.last = output.flight_status;
+        if output.flight_status.armed {
             self.armed_at = now;
         }
         // A press that stopped the motors and was held on does not count: a restart would lose the black box.

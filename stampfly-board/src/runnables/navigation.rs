@@ -29,9 +29,9 @@ impl Runnable for Navigation {
             let _ = self.navigator.accept(&command.data);
         }
         let input = NavigatorInput {
-            mode: ends.system_mode.get(),
+            flight_status: ends.flight_status.get(),
             estimate: ends.estimate_state.get(),
-            status: ends.vehicle_status.get(),
+            land_detected: ends.land_detected.get(),
             command: ends.command_setpoint.get(),
         };
         let setpoint = self.navigator.step(activation.now(), &input);

@@ -25,7 +25,7 @@ impl Runnable for Notification {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut NotificationEnds<'_>) {
         let alerts = ends.system_alert.get().active;
-        let signal = self.signaller.step(activation.now(), ends.system_mode.get(), alerts);
+        let signal = self.signaller.step(activation.now(), ends.flight_status.get(), alerts);
         ends.signal.publish(activation.now(), &signal);
     }
 }

@@ -26,8 +26,8 @@ impl Runnable for Telemetry {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut TelemetryEnds<'_>) {
         let frame = &mut self.frame;
-        let mode = ends.system_mode.get();
-        (frame.state, frame.mode, frame.armed, frame.blocks) = (mode.state, mode.mode, mode.armed, mode.blocks);
+        let mode = ends.flight_status.get();
+        (frame.phase, frame.mode, frame.armed, frame.blocks) = (mode.phase, mode.mode, mode.armed, mode.blocks);
         frame.alerts = ends.system_alert.get().active;
         // The default of an estimate is an attitude: level. Nothing has been estimated before the first sample.
         if let Some(estimate) = ends.estimate_state.sample() {

@@ -14,7 +14,7 @@ use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, Figure, Verdict};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
-use stampfly_types::messages::{FlightMode, FlightState, MotorOutput, Setpoint, StateEstimate, SystemMode};
+use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, MotorOutput, Setpoint, StateEstimate};
 use stampfly_types::{Duration, Instant, Message, Quat, Vec3, frame};
 use std::string::String;
 use std::vec::Vec;
@@ -58,11 +58,11 @@ impl Setup {
 
 /// A change of state or mode, for people.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Phase {
+pub struct PhaseChange {
     /// When it began.
     pub since: Instant,
     /// State.
-    pub state: FlightState,
+    pub phase: FlightPhase,
     /// Mode.
     pub mode: FlightMode,
 }
@@ -73,7 +73,7 @@ pub struct Outcome {
     /// The figures.
     pub metrics: Metrics,
     /// States and modes, in order.
-    pub phases: Vec<Phase>,
+    pub phases: Vec<PhaseChange>,
     /// Was the mission flown to its end?
     pub finished: bool,
     /// Largest true tilt, degrees.
@@ -100,9 +100,9 @@ impl Verdict for Outcome {
     }
 
     fn story(&self) -> Vec<String> {
-        let phases = self.phases.iter().map(|phase| {
-            let mode = if phase.state == FlightState::Flying { format!(" {:?}", phase.mode) } else { String::new() };
-            format!("{:>9.3} s  {}{mode}", phase.since.seconds_f64(), phase.state.name())
+        let phases = self.phases.iter().map(|change| {
+            let mode = if change.phase == FlightPhase::Flying { format!(" {:?}", change.mode) } else { String::new() };
+            format!("{:>9.3} s  {}{mode}", change.since.seconds_f64(), change.phase.name())
         });
         let [first, last] = self.battery;
         let extremes = [
@@ -194,8 +194,8 @@ struct Watch {
     collector: Collector,
     setpoint: Setpoint,
     estimate: StateEstimate,
-    mode: SystemMode,
-    phases: Vec<Phase>,
+    mode: FlightStatus,
+    phases: Vec<PhaseChange>,
     worst_tilt: f32,
     battery: Option<[f32; 2]>,
     motors_sane: bool,
@@ -213,7 +213,7 @@ impl Watch {
             collector: Collector::default(),
             setpoint: Setpoint::default(),
             estimate: StateEstimate::default(),
-            mode: SystemMode::default(),
+            mode: FlightStatus::default(),
             phases: Vec::new(),
             worst_tilt: 0.0,
             battery: None,
@@ -243,11 +243,11 @@ impl Watch {
                 self.due = Some(at);
             }
             Id::estimate_state => read(words, &mut self.estimate),
-            Id::system_mode => {
+            Id::flight_status => {
                 read(words, &mut self.mode);
-                let (state, mode) = (self.mode.state, self.mode.mode);
-                if self.phases.last().is_none_or(|last| (last.state, last.mode) != (state, mode)) {
-                    self.phases.push(Phase { since: at, state, mode });
+                let (phase, mode) = (self.mode.phase, self.mode.mode);
+                if self.phases.last().is_none_or(|last| (last.phase, last.mode) != (phase, mode)) {
+                    self.phases.push(PhaseChange { since: at, phase, mode });
                 }
             }
             Id::actuator_motor => {
@@ -275,7 +275,7 @@ impl Watch {
         let first = self.battery.map_or(truth.battery_voltage, |[first, _]| first);
         self.battery = Some([first, truth.battery_voltage]);
         let (setpoint, estimate, mode) = (self.setpoint, self.estimate, self.mode);
-        self.collector.add(&Snapshot { at, truth, setpoint: &setpoint, estimate: &estimate, mode: &mode });
+        self.collector.add(&Snapshot { at, truth, setpoint: &setpoint, estimate: &estimate, flight_status: &mode });
     }
 }
 
@@ -324,7 +324,7 @@ impl vehicle::Around for Around<'_> {
 
     fn progress(&self) -> (f32, &'static str) {
         let share = self.progress.done.get() as f32 / self.steps.max(1) as f32;
-        (share, self.watch.mode.state.name())
+        (share, self.watch.mode.phase.name())
     }
 
     fn is_over(&mut self, now: Instant) -> bool {

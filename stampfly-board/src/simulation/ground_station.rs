@@ -7,7 +7,7 @@ use super::mission::{Mission, Step};
 use crate::messages::TelemetryFrame;
 use crate::topics;
 use stampfly_sim::time::Clock;
-use stampfly_types::messages::{FlightState, GuidedCommand, GuidedKind};
+use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Vec3};
 use std::cell::Cell;
 
@@ -76,14 +76,14 @@ pub async fn fly(
     for step in &mission.steps {
         match *step {
             Step::Arm => {
-                link.wait_for(|frame| frame.state == FlightState::IdleGround && frame.blocks.is_empty()).await;
+                link.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
                 link.send(GuidedCommand { kind: GuidedKind::Arm, ..Default::default() }).await;
                 link.wait_for(|frame| frame.armed).await;
             }
             Step::TakeOff { height } => {
                 let position = Vec3::new(0.0, 0.0, -height);
                 link.send(GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() }).await;
-                link.wait_for(|frame| frame.state == FlightState::Flying).await;
+                link.wait_for(|frame| frame.phase == FlightPhase::Flying).await;
             }
             Step::GoTo { place: [north, east, up], yaw: heading, speed, dwell } => {
                 yaw = heading.unwrap_or(yaw);
@@ -99,7 +99,7 @@ pub async fn fly(
                 for _ in 0..ROUND_TRIP {
                     link.look().await;
                 }
-                link.wait_for(|frame| frame.remaining == 0 || frame.state != FlightState::Flying).await;
+                link.wait_for(|frame| frame.remaining == 0 || frame.phase != FlightPhase::Flying).await;
             }
             Step::Hover { seconds } => {
                 let until = link.clock.now() + Duration::from_seconds(seconds);

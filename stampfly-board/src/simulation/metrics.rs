@@ -15,7 +15,7 @@
 
 use serde::Serialize;
 use stampfly_sim::Truth;
-use stampfly_types::messages::{FlightMode, FlightState, Setpoint, StateEstimate, SystemMode};
+use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, Setpoint, StateEstimate};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
 /// One instant of a flight.
@@ -30,7 +30,7 @@ pub struct Snapshot<'a> {
     /// Where it believes to be.
     pub estimate: &'a StateEstimate,
     /// What it is doing.
-    pub mode: &'a SystemMode,
+    pub flight_status: &'a FlightStatus,
 }
 
 /// The figures. `None` where the flight had no such phase.
@@ -128,29 +128,29 @@ struct Last {
     at: Instant,
     place: Vec3,
     sink: f32,
-    state: FlightState,
+    phase: FlightPhase,
     armed: bool,
 }
 
 impl Collector {
     /// Takes one instant. Call at the control rate.
     pub fn add(&mut self, now: &Snapshot<'_>) {
-        let Snapshot { at, truth, setpoint, estimate, mode } = *now;
-        let holding = mode.state == FlightState::Flying && mode.mode == FlightMode::PosHold;
-        match mode.state {
-            FlightState::TakeOff => {
+        let Snapshot { at, truth, setpoint, estimate, flight_status } = *now;
+        let holding = flight_status.phase == FlightPhase::Flying && flight_status.mode == FlightMode::PosHold;
+        match flight_status.phase {
+            FlightPhase::TakeOff => {
                 self.flew = true;
                 self.takeoff_goal = Some(setpoint.position.z);
                 self.raise(truth);
             }
-            FlightState::Flying => {
+            FlightPhase::Flying => {
                 let since = *self.flying_since.get_or_insert(at);
                 if at.since(since) < TAKEOFF_TAIL {
                     self.takeoff_goal = self.takeoff_goal.map(|goal| goal.min(setpoint.position.z));
                     self.raise(truth);
                 }
             }
-            FlightState::Landing if truth.contact && !self.was_in_contact && self.touchdown.is_none() => {
+            FlightPhase::Landing if truth.contact && !self.was_in_contact && self.touchdown.is_none() => {
                 // The feet have begun to brake it by the time it is seen to touch.
                 self.touchdown = Some(self.last.map_or(0.0, |last| last.sink).max(0.0));
             }
@@ -176,7 +176,7 @@ impl Collector {
             self.end_rest(at);
         }
         let (place, sink) = (truth.position, truth.velocity.z);
-        self.last = Some(Last { at, place, sink, state: mode.state, armed: mode.armed });
+        self.last = Some(Last { at, place, sink, phase: flight_status.phase, armed: flight_status.armed });
     }
 
     fn raise(&mut self, truth: &Truth) {
@@ -199,7 +199,7 @@ impl Collector {
         if let Some(last) = self.last {
             self.end_rest(last.at);
         }
-        let landed = self.flew && self.was_in_contact && self.last.is_some_and(|l| l.state == FlightState::IdleGround);
+        let landed = self.flew && self.was_in_contact && self.last.is_some_and(|l| l.phase == FlightPhase::IdleGround);
         let overshoot = |highest: f32| Some(f64::from(highest + self.takeoff_goal?));
         Metrics {
             landed,

@@ -16,7 +16,7 @@ pub mod mission;
 mod page;
 pub mod sensing;
 
-pub use flight::{Outcome, Phase, Setup};
+pub use flight::{Outcome, PhaseChange, Setup};
 pub use page::PAGE;
 
 use crate::config::VehicleConfig;

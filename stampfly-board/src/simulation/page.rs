@@ -89,8 +89,8 @@ pub const PAGE: Page = Page {
         PanelSpec::new("Battery", "Current", "A", "sensor_power", &[("current", "current")]),
     ],
     bands: &[
-        ("system_mode", "state", "State"),
-        ("system_mode", "mode", "Mode"),
+        ("flight_status", "phase", "Phase"),
+        ("flight_status", "mode", "Mode"),
         ("command_setpoint", "source", "Command"),
     ],
     alerts: Some(("system_alert", "active")),

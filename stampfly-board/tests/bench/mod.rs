@@ -10,7 +10,7 @@ use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
 use stampfly_types::messages::{
-    ArmBlocks, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput, PowerData, SystemMode, TofData,
+    ArmBlocks, FlightStatus, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput, PowerData, TofData,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Message, Vec3};
 
@@ -50,8 +50,8 @@ impl<'b> Bench<'b> {
         let Assembled { flight_loop: flight, outside, taps } =
             Assembled::new(bus, None, &VehicleConfig::default(), Instant::ZERO);
         let topics::Outside { imu, tof, power, link, button_pin, console, storage, cutoff, supervisor, .. } = outside;
-        let topics::LinkEnds { command_pilot, command_guided: guided, system_mode, telemetry, link_peer } = link;
-        let link = Link::new(Session::new(VEHICLE, 1, peer), command_pilot, link_peer, system_mode, telemetry);
+        let topics::LinkEnds { command_pilot, command_guided: guided, flight_status, telemetry, link_peer } = link;
+        let link = Link::new(Session::new(VEHICLE, 1, peer), command_pilot, link_peer, flight_status, telemetry);
         let ends = Ends { imu, tof, power, button: button_pin, guided, console, storage, cutoff, supervisor };
         let newest = Newest::new();
         Self { flight, ends, link, taps, newest, monitor: true, program: false, now: Instant::ZERO }
@@ -63,11 +63,11 @@ impl<'b> Bench<'b> {
     }
 
     pub fn blocks(&self) -> ArmBlocks {
-        self.newest::<SystemMode>(Id::system_mode).blocks
+        self.newest::<FlightStatus>(Id::flight_status).blocks
     }
 
     pub fn armed(&self) -> bool {
-        self.newest::<SystemMode>(Id::system_mode).armed
+        self.newest::<FlightStatus>(Id::flight_status).armed
     }
 
     pub fn motors(&self) -> MotorOutput {

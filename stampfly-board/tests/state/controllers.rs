@@ -14,15 +14,15 @@ use stampfly_types::messages::*;
 const MODES: [FlightMode; 4] = [FlightMode::PosHold, FlightMode::AltHold, FlightMode::Stabilize, FlightMode::Acro];
 
 /// Stands, takes off, flies in one mode after the other, lands.
-fn mode_of(k: u64) -> SystemMode {
-    let state = match k {
-        0..50 => FlightState::Armed,
-        50..150 => FlightState::TakeOff,
-        150..1_050 => FlightState::Flying,
-        _ => FlightState::Landing,
+fn mode_of(k: u64) -> FlightStatus {
+    let phase = match k {
+        0..50 => FlightPhase::Armed,
+        50..150 => FlightPhase::TakeOff,
+        150..1_050 => FlightPhase::Flying,
+        _ => FlightPhase::Landing,
     };
-    SystemMode {
-        state,
+    FlightStatus {
+        phase,
         mode: MODES[(k / 130) as usize % MODES.len()],
         armed: true,
         control_resets: u32::from(k > 300) + u32::from(k > 850),
@@ -57,13 +57,13 @@ fn fly<C: Controller>(controller: &mut C, k: u64, n: &mut Numbers) -> ControlOut
         axes: SetpointAxes::ALL,
         ..Default::default()
     };
-    let status = VehicleStatus { thrust_ceiling: 2.0, ..Default::default() };
+    let land_detected = LandDetected { thrust_ceiling: 2.0, ..Default::default() };
     let input = ControlInput {
         estimate: &estimate(n),
         command: &sticks(n),
         setpoint: &setpoint,
-        mode: &mode_of(k),
-        status: &status,
+        flight_status: &mode_of(k),
+        land_detected: &land_detected,
         unmet: [0.0, 0.0, n.number(0.2), n.number(0.2)],
     };
     controller.step(at(k), &input)
@@ -83,12 +83,21 @@ fn navigator_goes_on() {
             let kind = if k.is_multiple_of(400) { GuidedKind::Hold } else { GuidedKind::WayPoint };
             let _ = navigator.accept(&GuidedCommand { kind, position, yaw, speed: 0.5, dwell: 0.1 });
         }
-        let mode = SystemMode { mode: if k < 1_000 { FlightMode::PosHold } else { FlightMode::AltHold }, ..mode_of(k) };
-        let status = VehicleStatus { descent_rate: 0.3, ..Default::default() };
+        let mode =
+            FlightStatus { mode: if k < 1_000 { FlightMode::PosHold } else { FlightMode::AltHold }, ..mode_of(k) };
+        let land_detected = LandDetected { descent_rate: 0.3, ..Default::default() };
         let estimate = StateEstimate { valid: Validity::ALL, ..estimate(n) };
         let command = CommandSetpoint { source: CommandSource::Guided, ..sticks(n) };
         let command = if (700..760).contains(&k) { sticks(n) } else { command };
-        navigator.step(at(k), &NavigatorInput { mode: &mode, estimate: &estimate, status: &status, command: &command })
+        navigator.step(
+            at(k),
+            &NavigatorInput {
+                flight_status: &mode,
+                estimate: &estimate,
+                land_detected: &land_detected,
+                command: &command,
+            },
+        )
     });
     assert!(navigator.refused() > 0, "the route was full once");
 }

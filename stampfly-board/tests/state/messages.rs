@@ -2,7 +2,7 @@
 
 use super::bytes;
 use proptest::prelude::*;
-use stampfly_types::messages::{Alerts, FlightMode, ImuData, MotorOutput, StateEstimate, SystemMode};
+use stampfly_types::messages::{Alerts, FlightMode, FlightStatus, ImuData, MotorOutput, StateEstimate};
 use stampfly_types::{ActivationRecord, Duration, Field, InputRecord, Instant, Message, Quat, Stamped};
 
 // Declared outside `stampfly-types`, with fields that serde knows nothing of.
@@ -60,9 +60,9 @@ proptest! {
     }
 
     #[test]
-    fn a_message_refuses_what_the_bus_refuses(mut words in Just(SystemMode::default().to_words()), place in 0..SystemMode::WORDS, word in 0u32..20) {
+    fn a_message_refuses_what_the_bus_refuses(mut words in Just(FlightStatus::default().to_words()), place in 0..FlightStatus::WORDS, word in 0u32..20) {
         words[place] = word;
-        prop_assert_eq!(read::<SystemMode>(&words), SystemMode::from_words(&words));
+        prop_assert_eq!(read::<FlightStatus>(&words), FlightStatus::from_words(&words));
     }
 }
 

@@ -7,10 +7,10 @@ use stampfly_mode::{
 use stampfly_types::Vec3;
 use stampfly_types::messages::*;
 
-const STATES: [FlightState; 4] = [FlightState::Armed, FlightState::TakeOff, FlightState::Flying, FlightState::Landing];
+const PHASES: [FlightPhase; 4] = [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing];
 
-fn state_of(k: u64) -> FlightState {
-    STATES[(k / 90) as usize % STATES.len()]
+fn phase_of(k: u64) -> FlightPhase {
+    PHASES[(k / 90) as usize % PHASES.len()]
 }
 
 fn pilot(k: u64, n: &mut Numbers) -> PilotInput {
@@ -33,7 +33,7 @@ fn mode_machine_goes_on() {
         let estimate = StateEstimate { height, valid: Validity::ALL, ..Default::default() };
         let calibration = CalibrationResult { complete: k > 20, ..Default::default() };
         let contact = if flies { GroundContact::Air } else { GroundContact::Ground };
-        let status = VehicleStatus {
+        let land_detected = LandDetected {
             contact,
             takeoff_complete: flies && k % 400 > 260,
             landed: k % 400 > 390,
@@ -46,13 +46,13 @@ fn mode_machine_goes_on() {
             alerts: if k % 400 > 330 { Alerts::COMM_LOST | Alerts::LOW_BATTERY } else { Alerts::NONE },
             estimate: &estimate,
             calibration: &calibration,
-            status: &status,
+            land_detected: &land_detected,
             pilot: Some(&pilot).filter(|_| k % 400 < 330),
             commands,
             button: n.once_in(150).then_some(ButtonGesture::Click),
         };
         let output = machine.step(at(k), &input);
-        (output.mode, output.estimator)
+        (output.flight_status, output.estimator)
     });
     assert!(format!("{machine:?}").contains("transitions"), "{machine:?}");
 }
@@ -67,7 +67,7 @@ fn failsafe_goes_on() {
         let status = EstimatorStatus { accel_innovation: n.number(0.5).abs(), ..Default::default() };
         let power = PowerData { voltage: 3.7 - 0.0004 * k as f32 + n.number(0.1), ..Default::default() };
         let armed = k % 330 > 60;
-        let state = if armed { FlightState::Flying } else { FlightState::IdleGround };
+        let phase = if armed { FlightPhase::Flying } else { FlightPhase::IdleGround };
         let input = FailsafeInput {
             imu: (k % 200 > 15).then_some((at(k), &imu)),
             estimate: &estimate,
@@ -77,7 +77,7 @@ fn failsafe_goes_on() {
             tof: Some(at(k - k % 350)),
             flow: None,
             self_test: SelfTestVerdict::NotRun,
-            mode: &SystemMode { state, armed, ..Default::default() },
+            flight_status: &FlightStatus { phase, armed, ..Default::default() },
         };
         failsafe.step(at(k), &input)
     });
@@ -90,7 +90,7 @@ fn landing_goes_on() {
         let estimate = StateEstimate { height, velocity: n.vector(0.05), valid: Validity::ALL, ..Default::default() };
         let setpoint = Setpoint { position: Vec3::new(0.0, 0.0, -0.5), ..Default::default() };
         let demand = ControlOutput { thrust: 0.25 + n.number(0.1), ..Default::default() };
-        let input = LandingInput { estimate: &estimate, state: state_of(k), setpoint: &setpoint, demand: &demand };
+        let input = LandingInput { estimate: &estimate, phase: phase_of(k), setpoint: &setpoint, demand: &demand };
         manager.step(at(k), &input)
     });
 }
@@ -111,7 +111,7 @@ fn authority_goes_on() {
 #[test]
 fn signals_go_on() {
     goes_on(Signaller::default(), 600, |signaller, k, n| {
-        let mode = SystemMode { state: state_of(k), armed: k % 90 > 45, ..Default::default() };
+        let mode = FlightStatus { phase: phase_of(k), armed: k % 90 > 45, ..Default::default() };
         let alerts = if n.once_in(20) { Alerts::NONE } else { Alerts::LOW_BATTERY };
         signaller.step(at(k), &mode, alerts)
     });

@@ -1,10 +1,10 @@
 //! The whole vehicle: a key frame in the middle of a flight, and the rest of the flight from there.
 
 use super::{Numbers, at, bytes};
-use stampfly_board::VehicleConfig;
 use stampfly_board::messages::ButtonContact;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics;
+use stampfly_board::{ControllerKind, EstimatorKind, VehicleConfig};
 use stampfly_bus::{Activation, Band};
 use stampfly_flight::{Assembled, Observer, key_frame};
 use stampfly_types::messages::*;
@@ -96,5 +96,9 @@ fn a_vehicle_goes_on_from_a_key_frame() {
 
 #[test]
 fn with_other_components_too() {
-    goes_on(&VehicleConfig { estimator: 1.0, controller: 1.0, ..VehicleConfig::default() });
+    goes_on(&VehicleConfig {
+        estimator: EstimatorKind::Complementary,
+        controller: ControllerKind::Geometric,
+        ..VehicleConfig::default()
+    });
 }

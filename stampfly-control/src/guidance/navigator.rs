@@ -2,7 +2,7 @@
 //!
 //! There is one path and it never jumps in flight; what changes is what moves it:
 //!
-//! | state | horizontally | vertically |
+//! | phase | horizontally | vertically |
 //! |---|---|---|
 //! | on the ground | follows the estimate | follows the estimate |
 //! | take-off | stays over the place of take-off | climbs to the take-off height |
@@ -15,8 +15,8 @@
 //! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it.
 
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightState, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
-    StateEstimate, SystemMode, Validity, VehicleStatus,
+    CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, LandDetected,
+    Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 use stampfly_types::{Duration, Instant, Vec3, frame, math};
 
@@ -76,12 +76,12 @@ impl Default for NavigatorConfig {
 /// All the navigator looks at in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NavigatorInput<'a> {
-    /// Flight state and mode.
-    pub mode: &'a SystemMode,
+    /// Flight phase and mode.
+    pub flight_status: &'a FlightStatus,
     /// Where the vehicle is.
     pub estimate: &'a StateEstimate,
     /// The rate of descent asked for while landing.
-    pub status: &'a VehicleStatus,
+    pub land_detected: &'a LandDetected,
     /// Who commands, and the sticks.
     pub command: &'a CommandSetpoint,
 }
@@ -98,11 +98,11 @@ pub struct NavigatorInput<'a> {
 /// navigator.accept(&GuidedCommand { kind: GuidedKind::WayPoint, position: there, ..Default::default() })?;
 ///
 /// let mut estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
-/// let mode = SystemMode { state: FlightState::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+/// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
 /// let command = CommandSetpoint { source: CommandSource::Guided, ..Default::default() };
 /// let mut now = Instant::ZERO;
 /// let setpoint = loop {
-///     let input = NavigatorInput { mode: &mode, estimate: &estimate, status: &Default::default(), command: &command };
+///     let input = NavigatorInput { flight_status: &mode, estimate: &estimate, land_detected: &Default::default(), command: &command };
 ///     let setpoint = navigator.step(now, &input);
 ///     if setpoint.arrived {
 ///         break setpoint;
@@ -129,7 +129,7 @@ pub struct Navigator {
     take_off: GuidedCommand,
     /// Height reference: where the vehicle last stood.
     ground: f32,
-    state: FlightState,
+    phase: FlightPhase,
     mode: FlightMode,
     /// The throttle stick has been centred since it got its present meaning.
     throttle_centred: bool,
@@ -157,7 +157,7 @@ impl Navigator {
             arrived: false,
             take_off: GuidedCommand::default(),
             ground: 0.0,
-            state: FlightState::Init,
+            phase: FlightPhase::Init,
             mode: FlightMode::default(),
             throttle_centred: false,
             position_known: false,
@@ -194,8 +194,8 @@ impl Navigator {
     /// One step: the set-point of this control period.
     pub fn step(&mut self, now: Instant, input: &NavigatorInput<'_>) -> Setpoint {
         let dt = self.timer.step(now);
-        let mode = input.mode;
-        let entered = mode.state != self.state;
+        let mode = input.flight_status;
+        let entered = mode.phase != self.phase;
         if entered || mode.mode != self.mode {
             self.throttle_centred = false;
         }
@@ -211,16 +211,16 @@ impl Navigator {
             self.leg = None;
         }
         self.position_known = position_known;
-        (self.state, self.mode) = (mode.state, mode.mode);
+        (self.phase, self.mode) = (mode.phase, mode.mode);
 
-        let axes = match mode.state {
-            FlightState::Init | FlightState::IdleGround | FlightState::IdleHeld | FlightState::Armed => {
+        let axes = match mode.phase {
+            FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => {
                 self.stand(entered, input);
                 SetpointAxes::NONE
             }
-            FlightState::TakeOff => self.take_off(entered, input, dt),
-            FlightState::Flying => self.fly(now, input, dt),
-            FlightState::Landing => self.land(entered, input, dt),
+            FlightPhase::TakeOff => self.take_off(entered, input, dt),
+            FlightPhase::Flying => self.fly(now, input, dt),
+            FlightPhase::Landing => self.land(entered, input, dt),
         };
         Setpoint { remaining: self.route.len() as u32, arrived: self.arrived, ..self.path.setpoint(axes) }
     }
@@ -260,7 +260,7 @@ impl Navigator {
         self.path.face(frame::yaw(&estimate.attitude));
         self.ground = self.path.position().z;
         // The route of a flight ends with it; one sent before take-off is kept.
-        if entered && !input.mode.armed {
+        if entered && !input.flight_status.armed {
             self.forget_route();
             self.take_off = GuidedCommand::default();
         }
@@ -271,7 +271,7 @@ impl Navigator {
             self.stand(false, input);
         }
         self.steer_heading(input, dt);
-        if manual(input.mode.mode) {
+        if manual(input.flight_status.mode) {
             self.follow_horizontally(input);
             self.follow_vertically(input);
             return SetpointAxes::YAW;
@@ -291,7 +291,7 @@ impl Navigator {
     /// Position hold steers with the sticks or stays; the other modes lean with them, and stay while there is no pilot.
     fn horizontal_axes(&mut self, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         let piloted = input.command.source == CommandSource::Pilot;
-        if input.mode.mode != FlightMode::PosHold && piloted {
+        if input.flight_status.mode != FlightMode::PosHold && piloted {
             self.follow_horizontally(input);
             return SetpointAxes::NONE;
         }
@@ -301,17 +301,17 @@ impl Navigator {
 
     fn fly(&mut self, now: Instant, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         let guided = input.command.source == CommandSource::Guided;
-        if !(guided && input.mode.mode == FlightMode::PosHold) {
+        if !(guided && input.flight_status.mode == FlightMode::PosHold) {
             // A leg is a plan from where the path was; once something else has moved it, the plan is void.
             self.leg = None;
             self.reached_at = None;
         }
-        match input.mode.mode {
+        match input.flight_status.mode {
             FlightMode::Acro | FlightMode::Stabilize => {
                 self.steer_heading(input, dt);
                 self.follow_horizontally(input);
                 self.follow_vertically(input);
-                if input.mode.mode == FlightMode::Acro {
+                if input.flight_status.mode == FlightMode::Acro {
                     self.path.face(frame::yaw(&input.estimate.attitude));
                     return SetpointAxes::NONE;
                 }
@@ -340,7 +340,7 @@ impl Navigator {
             self.forget_route();
         }
         self.steer_heading(input, dt);
-        let rate = input.status.descent_rate;
+        let rate = input.land_detected.descent_rate;
         self.path.sink(if rate.is_finite() { rate.max(0.0) } else { 0.0 }, dt);
         // Once the ground holds the vehicle, the path must not run away below it.
         let lowest = input.estimate.position.z + self.config.landing_lead;
@@ -462,9 +462,4 @@ fn known_horizontally(input: &NavigatorInput<'_>) -> SetpointAxes {
     } else {
         SetpointAxes::NONE
     }
-}
-
-/// A stick within its range; a stick that is no number is at rest.
-fn stick(value: f32) -> f32 {
-    if value.is_finite() { value.clamp(-1.0, 1.0) } else { 0.0 }
 }

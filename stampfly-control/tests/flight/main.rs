@@ -8,8 +8,8 @@ use plant::{Airframe, Flight, Spread, gust};
 use stampfly_control::guidance::{Navigator, NavigatorInput};
 use stampfly_control::{CascadeConfig, CascadeController, ControlInput, Controller, GeometricController};
 use stampfly_types::messages::{
-    CommandSource, FlightMode, FlightState, GroundContact, GuidedCommand, GuidedKind, SetpointAxes, StateEstimate,
-    SystemMode, Validity,
+    CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, GuidedCommand, GuidedKind, SetpointAxes,
+    StateEstimate, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Quat, Vec3, frame, math};
 
@@ -42,11 +42,15 @@ fn variations() -> Vec<(&'static str, Airframe)> {
 
 fn navigate<C: Controller>(flight: &mut Flight<C>, navigator: &mut Navigator) {
     let estimate = flight.estimate();
-    let input =
-        NavigatorInput { mode: &flight.mode, estimate: &estimate, status: &flight.status, command: &flight.command };
+    let input = NavigatorInput {
+        flight_status: &flight.flight_status,
+        estimate: &estimate,
+        land_detected: &flight.land_detected,
+        command: &flight.command,
+    };
     flight.setpoint = navigator.step(flight.now, &input);
     let in_air = flight.state.position.z < -0.04;
-    flight.status.contact = if in_air { GroundContact::Air } else { GroundContact::Ground };
+    flight.land_detected.contact = if in_air { GroundContact::Air } else { GroundContact::Ground };
 }
 
 fn command(kind: GuidedKind, position: Vec3) -> GuidedCommand {
@@ -70,17 +74,17 @@ fn mission<C: Controller>(controller: C, airframe: Airframe, wind: f32) -> Figur
     let mut figures = Figures::default();
     navigator.accept(&command(GuidedKind::TakeOff, Vec3::new(0.0, 0.0, -0.5))).expect("accepted");
     flight.command.source = CommandSource::Guided;
-    flight.mode.state = FlightState::Armed;
+    flight.flight_status.phase = FlightPhase::Armed;
     flight.fly(0.3, |f| navigate(f, &mut navigator));
     assert_eq!(flight.output.thrust, 0.0, "no thrust before take-off");
-    flight.mode.state = FlightState::TakeOff;
+    flight.flight_status.phase = FlightPhase::TakeOff;
     flight.fly(4.0, |f| {
         gust(f, wind);
         navigate(f, &mut navigator);
         figures.top = figures.top.max(-f.state.position.z);
         figures.take_off_tilt = figures.take_off_tilt.max(frame::tilt(&f.state.attitude));
     });
-    flight.mode.state = FlightState::Flying;
+    flight.flight_status.phase = FlightPhase::Flying;
     for (x, y) in [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)] {
         navigator.accept(&command(GuidedKind::WayPoint, Vec3::new(x, y, -0.5))).expect("accepted");
     }
@@ -108,12 +112,12 @@ fn aloft<C: Controller>(controller: C, airframe: Airframe) -> (Flight<C>, Naviga
     let mut flight = Flight::standing(controller, airframe);
     let mut navigator = Navigator::default();
     navigator.accept(&command(GuidedKind::TakeOff, Vec3::new(0.0, 0.0, -1.0))).expect("accepted");
-    flight.mode.state = FlightState::Armed;
+    flight.flight_status.phase = FlightPhase::Armed;
     flight.fly(0.01, |f| navigate(f, &mut navigator));
-    flight.mode.state = FlightState::TakeOff;
+    flight.flight_status.phase = FlightPhase::TakeOff;
     flight.fly(5.0, |f| navigate(f, &mut navigator));
     assert!((flight.state.position.z + 1.0).abs() < 0.02, "took off: {:?}", flight.state);
-    flight.mode.state = FlightState::Flying;
+    flight.flight_status.phase = FlightPhase::Flying;
     (flight, navigator)
 }
 
@@ -188,7 +192,7 @@ fn margins_of_the_rate_loop() {
 fn steps_of_lean_are_quick_and_damped() {
     for (name, airframe) in variations() {
         let mut flight = Flight::hovering(CascadeController::default(), Airframe { noise: [0.0; 3], ..airframe });
-        flight.mode.mode = FlightMode::AltHold;
+        flight.flight_status.mode = FlightMode::AltHold;
         flight.setpoint.axes = SetpointAxes::POSITION_Z | SetpointAxes::YAW;
         flight.command.source = CommandSource::Pilot;
         flight.fly(1.5, |_| ());
@@ -254,13 +258,13 @@ fn released_sticks_brake_and_hold() {
 #[test]
 fn mode_switched_at_speed_brakes_instead_of_pulling_back() {
     let (mut flight, mut navigator) = aloft(CascadeController::default(), Airframe::default());
-    flight.mode.mode = FlightMode::AltHold;
+    flight.flight_status.mode = FlightMode::AltHold;
     flight.command.source = CommandSource::Pilot;
     flight.command.pitch = 0.3;
     flight.fly(1.5, |f| navigate(f, &mut navigator));
     let (place, speed) = (flight.state.position.x, flight.state.velocity.x);
     assert!(speed > 0.5, "{speed}");
-    flight.mode.mode = FlightMode::PosHold;
+    flight.flight_status.mode = FlightMode::PosHold;
     flight.command.pitch = 0.0;
     flight.fly(4.0, |f| {
         navigate(f, &mut navigator);
@@ -274,15 +278,15 @@ fn mode_switched_at_speed_brakes_instead_of_pulling_back() {
 fn lands_softly_and_stays_down() {
     let (mut flight, mut navigator) = aloft(CascadeController::default(), noisy());
     flight.fly(1.0, |f| navigate(f, &mut navigator));
-    flight.mode.state = FlightState::Landing;
-    flight.status.descent_rate = 0.3;
+    flight.flight_status.phase = FlightPhase::Landing;
+    flight.land_detected.descent_rate = 0.3;
     let mut touchdown = None;
     flight.fly(6.0, |f| {
         navigate(f, &mut navigator);
         let height = -f.state.position.z;
         // Once it no longer sinks close to the ground, the landing manager lowers the ceiling over a second.
         if height < 0.15 && f.state.velocity.z < 0.1 {
-            f.status.thrust_ceiling = (f.status.thrust_ceiling.min(1.0) - 0.3 * 0.0025).max(0.7);
+            f.land_detected.thrust_ceiling = (f.land_detected.thrust_ceiling.min(1.0) - 0.3 * 0.0025).max(0.7);
         }
         if height > 0.0 {
             touchdown = Some(f.state.velocity.z);
@@ -342,15 +346,15 @@ fn poison_never_reaches_the_output() {
                         _ => (stick.roll, stick.throttle) = (value, value),
                     }
                     for mode in FlightMode::ALL {
-                        let mode = SystemMode { mode: *mode, ..f.mode };
+                        let mode = FlightStatus { mode: *mode, ..f.flight_status };
                         let out = f.controller.step(
                             f.now,
                             &ControlInput {
                                 estimate: &estimate,
                                 command: &stick,
                                 setpoint: &setpoint,
-                                mode: &mode,
-                                status: &f.status,
+                                flight_status: &mode,
+                                land_detected: &f.land_detected,
                                 unmet: [0.0; 4],
                             },
                         );
@@ -383,8 +387,8 @@ fn both_quaternions_of_an_attitude_give_the_same_torque() {
                 estimate,
                 command: &flight.command,
                 setpoint: &flight.setpoint,
-                mode: &flight.mode,
-                status: &flight.status,
+                flight_status: &flight.flight_status,
+                land_detected: &flight.land_detected,
                 unmet: [0.0; 4],
             },
         )
@@ -395,8 +399,8 @@ fn both_quaternions_of_an_attitude_give_the_same_torque() {
 #[test]
 fn ten_minutes_on_the_ground_wind_nothing_up() {
     let mut flight = Flight::standing(CascadeController::default(), Airframe::default());
-    flight.mode.mode = FlightMode::Stabilize;
-    flight.mode.state = FlightState::Flying;
+    flight.flight_status.mode = FlightMode::Stabilize;
+    flight.flight_status.phase = FlightPhase::Flying;
     flight.state.attitude = Quat::from_euler_angles(0.17, 0.0, 0.0);
     flight.setpoint.axes = SetpointAxes::YAW;
     flight.command.throttle = 0.1;

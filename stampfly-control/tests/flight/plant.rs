@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 
 use stampfly_control::{ControlInput, Controller, Mixed, Mixer, MultirotorMixer, Spin};
 use stampfly_types::messages::{
-    CommandSetpoint, ControlOutput, FlightMode, FlightState, GroundContact, Setpoint, StateEstimate, SystemMode,
-    Validity, VehicleStatus,
+    CommandSetpoint, ControlOutput, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, Setpoint,
+    StateEstimate, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
@@ -55,8 +55,8 @@ pub struct Flight<C> {
     pub controller: C,
     pub state: State,
     pub now: Instant,
-    pub mode: SystemMode,
-    pub status: VehicleStatus,
+    pub flight_status: FlightStatus,
+    pub land_detected: LandDetected,
     pub command: CommandSetpoint,
     pub setpoint: Setpoint,
     pub valid: Validity,
@@ -79,8 +79,8 @@ impl<C: Controller> Flight<C> {
         let mut flight = Self::standing(controller, airframe);
         flight.state.position.z = -1.0;
         flight.state.thrust = thrust;
-        flight.mode.state = FlightState::Flying;
-        flight.status.contact = GroundContact::Air;
+        flight.flight_status.phase = FlightPhase::Flying;
+        flight.land_detected.contact = GroundContact::Air;
         flight.setpoint.position.z = -1.0;
         flight
     }
@@ -99,13 +99,13 @@ impl<C: Controller> Flight<C> {
                 thrust: [0.0; 4],
             },
             now: Instant::from_secs(5),
-            mode: SystemMode {
-                state: FlightState::TakeOff,
+            flight_status: FlightStatus {
+                phase: FlightPhase::TakeOff,
                 mode: FlightMode::PosHold,
                 armed: true,
-                ..SystemMode::default()
+                ..FlightStatus::default()
             },
-            status: VehicleStatus { thrust_ceiling: 2.0, ..VehicleStatus::default() },
+            land_detected: LandDetected { thrust_ceiling: 2.0, ..LandDetected::default() },
             command: CommandSetpoint::default(),
             setpoint: Setpoint { axes: Axes::POSITION_XY | Axes::POSITION_Z | Axes::YAW, ..Setpoint::default() },
             valid: Validity::ALL,
@@ -136,8 +136,8 @@ impl<C: Controller> Flight<C> {
             estimate: &estimate,
             command: &self.command,
             setpoint: &self.setpoint,
-            mode: &self.mode,
-            status: &self.status,
+            flight_status: &self.flight_status,
+            land_detected: &self.land_detected,
             unmet: self.mixed.unmet,
         };
         self.output = self.controller.step(self.now, &input);

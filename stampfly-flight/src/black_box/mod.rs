@@ -57,24 +57,24 @@ pub struct Changed;
 /// use rover::topics::{self, Id}; // the rover of `tests/common`
 /// use stampfly_flight::black_box::{BlackBox, LogRate, Retention};
 /// use stampfly_flight::newest::message;
-/// use stampfly_types::messages::{SystemMode, TofData};
+/// use stampfly_types::messages::{FlightStatus, TofData};
 /// use stampfly_types::{Instant, Message};
 ///
 /// const RETENTION: Retention = Retention {
 ///     topics: &topics::TOPICS,
 ///     rate: |topic| if topic == Id::sensor_range as usize { LogRate::hertz(10) } else { LogRate::OnChange },
 ///     armed: |topic, words| {
-///         (topic == Id::system_mode as usize).then(|| message::<SystemMode>(words).is_some_and(|mode| mode.armed))
+///         (topic == Id::flight_status as usize).then(|| message::<FlightStatus>(words).is_some_and(|mode| mode.armed))
 ///     },
 /// };
 ///
 /// # fn main() {
 /// let mut black_box = BlackBox::<256, { topics::COUNT }>::new(RETENTION);
-/// let armed = SystemMode { armed: true, ..Default::default() };
+/// let armed = FlightStatus { armed: true, ..Default::default() };
 /// for millis in 0..400 {
 ///     let range = TofData { distance: 0.001 * millis as f32, valid: true, ..Default::default() };
 ///     let at = Instant::from_millis(millis);
-///     black_box.note(Id::system_mode as usize, at, millis as u32, &armed.to_words());
+///     black_box.note(Id::flight_status as usize, at, millis as u32, &armed.to_words());
 ///     black_box.note(Id::sensor_range as usize, at, millis as u32, &range.to_words());
 /// }
 /// let ranges = black_box.records().filter(|record| record.topic == Id::sensor_range as usize);

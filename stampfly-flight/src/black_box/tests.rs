@@ -4,25 +4,25 @@ use super::*;
 use crate::newest::message;
 use crate::rover::topics::{COUNT, Id, TOPICS};
 use proptest::prelude::*;
-use stampfly_types::messages::SystemMode;
+use stampfly_types::messages::FlightStatus;
 use stampfly_types::{Duration, Message};
 use std::vec::Vec;
 
 const RETENTION: Retention = Retention {
     topics: &TOPICS,
-    rate: |topic| if topic == Id::system_mode as usize { LogRate::OnChange } else { LogRate::EverySample },
+    rate: |topic| if topic == Id::flight_status as usize { LogRate::OnChange } else { LogRate::EverySample },
     armed: |topic, words| {
-        let mode = (topic == Id::system_mode as usize).then(|| message::<SystemMode>(words));
+        let mode = (topic == Id::flight_status as usize).then(|| message::<FlightStatus>(words));
         mode.map(|mode| mode.is_some_and(|mode| mode.armed))
     },
 };
 const RANGE: usize = Id::sensor_range as usize;
-const MODE: usize = Id::system_mode as usize;
+const MODE: usize = Id::flight_status as usize;
 
 type Small = BlackBox<257, COUNT>;
 
 fn mode(armed: bool) -> impl AsRef<[u32]> {
-    SystemMode { armed, ..Default::default() }.to_words()
+    FlightStatus { armed, ..Default::default() }.to_words()
 }
 
 fn arm<const WORDS: usize>(black_box: &mut BlackBox<WORDS, COUNT>, at: Instant) {
@@ -87,7 +87,7 @@ fn a_recording_begins_when_the_vehicle_is_armed_and_ends_a_tail_after() {
 fn states_are_kept_on_change_and_once_a_second() {
     let mut black_box = BlackBox::<1024, COUNT>::new(RETENTION);
     let mut note = |millis: u32, transitions| {
-        let mode = SystemMode { armed: true, transitions, ..Default::default() };
+        let mode = FlightStatus { armed: true, transitions, ..Default::default() };
         black_box.note(MODE, Instant::from_millis(millis.into()), millis, &mode.to_words());
         black_box.records().map(|record| record.generation).collect::<Vec<_>>()
     };

@@ -198,14 +198,19 @@ impl Deviation {
     /// Compares the numbers in two samples. An output that was never published is empty.
     fn add(&mut self, clock: Instant, info: &'static [FieldInfo], expected: &[u32], output: &[u32]) {
         for leaf in leaves(info) {
-            let number =
-                |words: &[u32], element| leaf.value(words, element).map_or(f32::NAN, |value| value.as_f64() as f32);
+            // Rounding changes nothing but real numbers.
+            let is_real = matches!(leaf.kind, FieldKind::F32 | FieldKind::F64);
+            let number = |words: &[u32]| leaf.kind.value(words).map_or(f32::NAN, |value| value.as_f64() as f32);
             for element in 0..leaf.count {
-                let deviation = (number(output, element) - number(expected, element)).abs();
-                // Rounding changes nothing but real numbers.
-                let is_real = matches!(leaf.kind, FieldKind::F32 | FieldKind::F64);
-                let deviation = if is_real || deviation == 0.0 { deviation } else { f32::INFINITY };
-                let deviation = if deviation.is_nan() { f32::INFINITY } else { deviation };
+                let deviation = match (leaf.words(output, element), leaf.words(expected, element)) {
+                    (Some(output), Some(expected)) if output == expected => 0.0,
+                    (Some(output), Some(expected)) if is_real => {
+                        let difference = (number(output) - number(expected)).abs();
+                        // Zeros of either sign are other bits, too.
+                        if difference.is_nan() { f32::INFINITY } else { difference.max(f32::MIN_POSITIVE) }
+                    }
+                    _ => f32::INFINITY,
+                };
                 self.worst = self.worst.max(deviation);
                 if deviation > self.tolerance {
                     self.since.get_or_insert(clock);

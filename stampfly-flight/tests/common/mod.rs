@@ -3,11 +3,11 @@
 
 use stampfly_bus::{Activation, Runnable};
 use stampfly_types::Duration;
-use stampfly_types::messages::{FlightState, MotorOutput, SystemMode};
+use stampfly_types::messages::{FlightPhase, FlightStatus, MotorOutput};
 
 /// Its topics.
 pub mod topics {
-    use stampfly_types::messages::{MotorOutput, SystemMode, TofData};
+    use stampfly_types::messages::{FlightStatus, MotorOutput, TofData};
 
     stampfly_bus::topics! {
         outside range_finder, motors;
@@ -17,7 +17,7 @@ pub mod topics {
         /// Duty of the two wheels.
         actuator_motor: MotorOutput = latest @ 50 Hz from drive => [motors, monitor];
         /// Moving or not.
-        system_mode: SystemMode = latest @ 10 Hz from monitor => [];
+        flight_status: FlightStatus = latest @ 10 Hz from monitor => [];
     }
 }
 
@@ -71,7 +71,7 @@ impl Runnable for Monitor {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut Self::Ends<'_>) {
         let moving = ends.actuator_motor.fresh(activation.now(), Duration::from_millis(100)).is_some_and(|m| m.armed);
-        let state = if moving { FlightState::Armed } else { FlightState::IdleGround };
-        ends.system_mode.publish(activation.now(), &SystemMode { state, armed: moving, ..Default::default() });
+        let phase = if moving { FlightPhase::Armed } else { FlightPhase::IdleGround };
+        ends.flight_status.publish(activation.now(), &FlightStatus { phase, armed: moving, ..Default::default() });
     }
 }

@@ -16,7 +16,7 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{
-    Alerts, FlightState, GuidedCommand, GuidedKind, MotorOutput, PilotInput, SystemAlert, SystemMode,
+    Alerts, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, MotorOutput, PilotInput, SystemAlert,
 };
 use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
@@ -66,11 +66,11 @@ impl Hands<'_> {
 
     /// Arms and takes off by command, and returns when the vehicle flies.
     pub async fn take_off(&mut self) {
-        self.wait_for(|frame| frame.state == FlightState::IdleGround && frame.blocks.is_empty()).await;
+        self.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
         self.command(GuidedKind::Arm);
         self.wait_for(|frame| frame.armed).await;
         self.command(GuidedKind::TakeOff);
-        self.wait_for(|frame| frame.state == FlightState::Flying).await;
+        self.wait_for(|frame| frame.phase == FlightPhase::Flying).await;
     }
 
     /// Presses the button for a fifth of a second.
@@ -84,7 +84,7 @@ impl Hands<'_> {
 /// What came of it: every sample of the topics that matter, and the truth beside every motor command.
 #[derive(Default)]
 pub struct Seen {
-    pub modes: Vec<(Instant, SystemMode)>,
+    pub modes: Vec<(Instant, FlightStatus)>,
     pub alerts: Vec<(Instant, Alerts)>,
     pub motors: Vec<(Instant, MotorOutput)>,
     pub truths: Vec<(Instant, Truth)>,
@@ -92,18 +92,18 @@ pub struct Seen {
 
 impl Seen {
     /// States in the order they were entered, with the instants.
-    pub fn states(&self) -> Vec<(Instant, FlightState)> {
-        let mut states: Vec<(Instant, FlightState)> = self.modes.iter().map(|(at, mode)| (*at, mode.state)).collect();
-        states.dedup_by_key(|(_, state)| *state);
-        states
+    pub fn phases(&self) -> Vec<(Instant, FlightPhase)> {
+        let mut phases: Vec<(Instant, FlightPhase)> = self.modes.iter().map(|(at, mode)| (*at, mode.phase)).collect();
+        phases.dedup_by_key(|(_, phase)| *phase);
+        phases
     }
 
     /// When a state was first entered at or after an instant.
-    pub fn entered(&self, state: FlightState, after: Instant) -> Option<Instant> {
-        self.states().into_iter().find(|(at, entered)| *entered == state && *at >= after).map(|(at, _)| at)
+    pub fn entered(&self, phase: FlightPhase, after: Instant) -> Option<Instant> {
+        self.phases().into_iter().find(|(at, entered)| *entered == phase && *at >= after).map(|(at, _)| at)
     }
 
-    pub fn end(&self) -> (&SystemMode, &Truth) {
+    pub fn end(&self) -> (&FlightStatus, &Truth) {
         (&self.modes.last().expect("it ran").1, &self.truths.last().expect("it ran").1)
     }
 
@@ -219,7 +219,7 @@ impl vehicle::Around for Watch<'_> {
     fn published(&mut self, topic: usize, at: Instant, words: &[u32]) {
         let what = "what was published";
         match Id::ALL[topic] {
-            Id::system_mode => self.seen.modes.push((at, message(words).expect(what))),
+            Id::flight_status => self.seen.modes.push((at, message(words).expect(what))),
             Id::system_alert => self.seen.alerts.push((at, message::<SystemAlert>(words).expect(what).active)),
             Id::actuator_motor => self.seen.motors.push((at, message(words).expect(what))),
             _ => {}

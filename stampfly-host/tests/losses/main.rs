@@ -3,7 +3,7 @@
 mod harness;
 
 use harness::{Seen, run};
-use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightState, GuidedKind, PilotInput};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 use std::cell::Cell;
 use std::rc::Rc;
@@ -21,7 +21,7 @@ fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
 
 /// It hovers for three seconds after half a second of silence, over its place, then lands there.
 fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Instant) {
-    let landing = seen.entered(FlightState::Landing, silent_since).expect("it lands");
+    let landing = seen.entered(FlightPhase::Landing, silent_since).expect("it lands");
     let waited = landing.since(silent_since).seconds();
     assert!((3.45..3.6).contains(&waited), "seed {seed}: landing after {waited} s of silence");
     let first = seen.alerts.iter().find(|(at, alerts)| *at >= silent_since && alerts.contains(Alerts::COMM_LOST));
@@ -29,7 +29,7 @@ fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Instant) {
     assert!((0.49..0.52).contains(&noticed), "seed {seed}: noticed after {noticed} s");
 
     let (mode, truth) = seen.end();
-    assert_eq!((mode.state, mode.armed, truth.contact), (FlightState::IdleGround, false, true), "seed {seed}");
+    assert_eq!((mode.phase, mode.armed, truth.contact), (FlightPhase::IdleGround, false, true), "seed {seed}");
     let drift = seen.drift(silent_since, landing);
     assert!(drift < 0.25, "seed {seed}: drifted {drift} m while waiting");
     let moved = seen.drift(silent_since, Instant::MAX);
@@ -65,11 +65,11 @@ fn a_silent_pilot() {
         let (since, note) = instant();
         let seen = run(seed, 35.0, |mut hands| {
             Box::pin(async move {
-                while hands.telemetry().state != FlightState::IdleGround || !hands.telemetry().blocks.is_empty() {
+                while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
                     hands.frame(&STICKS);
                     hands.sleep(0.02).await;
                 }
-                while hands.telemetry().state != FlightState::Flying {
+                while hands.telemetry().phase != FlightPhase::Flying {
                     hands.frame(&PilotInput { arm: true, ..STICKS });
                     hands.sleep(0.02).await;
                 }
@@ -96,8 +96,8 @@ fn a_link_that_comes_back_in_time() {
     });
     let lost: Vec<bool> = seen.alerts.iter().map(|(_, alerts)| alerts.contains(Alerts::COMM_LOST)).collect();
     assert!(lost.contains(&true) && lost.last() == Some(&false), "silence was noticed, and its end");
-    assert_eq!(seen.entered(FlightState::Landing, since.get()), None);
-    assert_eq!(seen.end().0.state, FlightState::Flying);
+    assert_eq!(seen.entered(FlightPhase::Landing, since.get()), None);
+    assert_eq!(seen.end().0.phase, FlightPhase::Flying);
 }
 
 #[test]
@@ -167,10 +167,10 @@ fn a_hiccup_of_the_inertial_sensor() {
     assert!(seen.alerts.iter().any(|(_, alerts)| alerts.contains(Alerts::IMU_DEGRADED)));
     assert!(seen.alerts.iter().all(|(_, alerts)| !alerts.contains(Alerts::IMU_LOST)));
     assert!(
-        seen.entered(FlightState::Landing, since.get())
+        seen.entered(FlightPhase::Landing, since.get())
             .is_some_and(|at| at.since(since.get()) > Duration::from_secs(2))
     );
-    assert_eq!((seen.end().0.state, seen.end().1.contact), (FlightState::IdleGround, true));
+    assert_eq!((seen.end().0.phase, seen.end().1.contact), (FlightPhase::IdleGround, true));
     assert!(seen.drift(since.get(), Instant::MAX) < 0.3);
 }
 
@@ -182,9 +182,9 @@ fn a_button_takes_off_and_stops_the_motors() {
         let (since, note) = instant();
         let seen = run(seed, 30.0, |mut hands| {
             Box::pin(async move {
-                hands.wait_for(|frame| frame.state == FlightState::IdleGround && frame.blocks.is_empty()).await;
+                hands.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
                 hands.click().await;
-                hands.wait_for(|frame| frame.state == FlightState::Flying).await;
+                hands.wait_for(|frame| frame.phase == FlightPhase::Flying).await;
                 // At any phase of the button's period.
                 hands.sleep(0.1 + 0.007 * seed as f32).await;
                 note.set(hands.clock.now());
@@ -192,13 +192,13 @@ fn a_button_takes_off_and_stops_the_motors() {
                 hands.wait_for(|_| false).await;
             })
         });
-        let states: Vec<FlightState> = seen.states().into_iter().map(|(_, state)| state).collect();
-        use FlightState as S;
+        let phases: Vec<FlightPhase> = seen.phases().into_iter().map(|(_, phase)| phase).collect();
+        use FlightPhase as S;
         // While it falls it looks as if somebody held it.
         let expected =
             [S::Init, S::IdleGround, S::Armed, S::TakeOff, S::Flying, S::IdleGround, S::IdleHeld, S::IdleGround];
-        assert_eq!(states, expected, "seed {seed}");
-        let flying = |mode: &&(Instant, stampfly_types::messages::SystemMode)| mode.1.state == S::Flying;
+        assert_eq!(phases, expected, "seed {seed}");
+        let flying = |mode: &&(Instant, stampfly_types::messages::FlightStatus)| mode.1.phase == S::Flying;
         assert!(seen.modes.iter().filter(flying).all(|(_, mode)| mode.mode == FlightMode::PosHold), "seed {seed}");
         let took = seen.motors_off_after(since.get());
         assert!((Duration::from_millis(50)..Duration::from_millis(110)).contains(&took), "seed {seed}: {took}");
@@ -216,8 +216,8 @@ fn a_button_alone_does_not_fly_the_vehicle() {
             }
         })
     });
-    let states: Vec<FlightState> = seen.states().into_iter().map(|(_, state)| state).collect();
-    assert_eq!(states, [FlightState::Init, FlightState::IdleGround]);
+    let phases: Vec<FlightPhase> = seen.phases().into_iter().map(|(_, phase)| phase).collect();
+    assert_eq!(phases, [FlightPhase::Init, FlightPhase::IdleGround]);
     let (_, last) = seen.modes.last().expect("it ran");
     assert_eq!(last.blocks, ArmBlocks::NO_LINK);
 }

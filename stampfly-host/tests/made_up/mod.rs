@@ -2,8 +2,8 @@
 
 use stampfly_lab::{Flight, flight::Event};
 use stampfly_types::messages::{
-    Alerts, ControlOutput, EstimatorStatus, FlightMode, FlightState, ImuData, MotorOutput, PowerData, Setpoint,
-    SetpointAxes, StateEstimate, SystemAlert, SystemMode, TofData,
+    Alerts, ControlOutput, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, ImuData, MotorOutput, PowerData,
+    Setpoint, SetpointAxes, StateEstimate, SystemAlert, TofData,
 };
 use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math, message};
 
@@ -22,7 +22,7 @@ message! {
 /// Rise, fly two figures of eight, land: kinematics with errors that look like errors, to develop the page with.
 pub fn flight() -> Flight {
     let mut flight = Flight::default();
-    let mut states = Vec::new();
+    let mut phases = Vec::new();
     for step in 0..24_000u64 {
         let at = Instant::from_micros(step * 2_500);
         let t = at.since(Instant::ZERO).seconds();
@@ -102,24 +102,24 @@ pub fn flight() -> Flight {
             let voltage = 4.15 - 0.008 * t - 0.08 * current;
             flight.push("sensor_power", at, &PowerData { voltage, current, power: voltage * current });
         }
-        let state = match t {
-            ..1.5 => FlightState::Init,
-            1.5..3.0 => FlightState::IdleGround,
-            3.0..4.0 => FlightState::Armed,
-            4.0..8.0 => FlightState::TakeOff,
-            8.0..52.0 => FlightState::Flying,
-            52.0..57.5 => FlightState::Landing,
-            _ => FlightState::IdleGround,
+        let phase = match t {
+            ..1.5 => FlightPhase::Init,
+            1.5..3.0 => FlightPhase::IdleGround,
+            3.0..4.0 => FlightPhase::Armed,
+            4.0..8.0 => FlightPhase::TakeOff,
+            8.0..52.0 => FlightPhase::Flying,
+            52.0..57.5 => FlightPhase::Landing,
+            _ => FlightPhase::IdleGround,
         };
         let flight_mode = if t < 8.0 { FlightMode::AltHold } else { FlightMode::PosHold };
-        if states.last() != Some(&state) {
-            states.push(state);
-            let text = format!("state {}", state.name());
+        if phases.last() != Some(&phase) {
+            phases.push(phase);
+            let text = format!("phase {}", phase.name());
             flight.events.push(Event { at, text });
         }
         if step % 40 == 0 {
             let armed = (3.0..57.5).contains(&t);
-            flight.push("system_mode", at, &SystemMode { state, mode: flight_mode, armed, ..Default::default() });
+            flight.push("flight_status", at, &FlightStatus { phase, mode: flight_mode, armed, ..Default::default() });
             let active = if t > 49.0 { Alerts::LOW_BATTERY } else { Alerts::NONE };
             let active = active.set(Alerts::FLOW_LOST, (31.0..31.4).contains(&t));
             flight.push("system_alert", at, &SystemAlert { active, seen: active });

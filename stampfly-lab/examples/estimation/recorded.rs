@@ -3,7 +3,7 @@
 use crate::{draw, range};
 use stampfly_lab::chart::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Panel, RED, Scale, Shape};
 use stampfly_lab::dataset::{self, Recording};
-use stampfly_lab::estimate::{self, Estimated};
+use stampfly_lab::estimate::{self, Estimated, Method};
 use stampfly_types::Instant;
 use std::error::Error;
 use std::path::PathBuf;
@@ -164,9 +164,9 @@ pub fn attitude() -> Result<(), Box<dyn Error>> {
         let recording = dataset::load(path)?;
         let suite = estimate::suite(recording.kind);
         let mut kalman = suite.clone();
-        kalman.estimator = 0.0;
-        let [ours, kalman] = [suite, kalman].map(|config| {
-            let figures = estimate::run(&recording, &config).figures;
+        kalman.method = Method::Vehicle;
+        let [ours, kalman] = [suite, kalman].map(|suite| {
+            let figures = estimate::run(&recording, &suite).figures;
             [figures.tilt_rmse_deg, figures.total_rmse_deg].map(Option::unwrap_or_default)
         });
         let known = |columns: [usize; 2]| columns.map(|column| cells[column].parse().unwrap_or(f64::NAN));

@@ -11,7 +11,7 @@ use stampfly_eskf::{EskfConfig, Estimator, Fusion};
 use stampfly_flight::Observer;
 use stampfly_sim::vehicle::Witness;
 use stampfly_sim::{Noise, Truth};
-use stampfly_types::messages::{FlightState, SystemMode, Validity};
+use stampfly_types::messages::{FlightPhase, FlightStatus, Validity};
 use stampfly_types::{Duration, Instant, Message, Quat, Vec3};
 
 /// Errors are looked at this often.
@@ -85,7 +85,7 @@ pub struct Observation {
     shadow: Shadow,
     config: EskfConfig,
     random: Noise,
-    mode: SystemMode,
+    mode: FlightStatus,
     snapshots: Vec<Snapshot>,
     due: Instant,
     sensors: [Followed; SENSORS.len()],
@@ -103,7 +103,7 @@ impl Observation {
             shadow: Shadow::new(config),
             config,
             random: Noise::new(seed, STREAM),
-            mode: SystemMode::default(),
+            mode: FlightStatus::default(),
             snapshots: Vec::new(),
             due: Instant::ZERO,
             sensors: Default::default(),
@@ -116,9 +116,9 @@ impl Observation {
     /// Takes a sample off the bus.
     fn sample(&mut self, id: Id, at: Instant, generation: u32, words: &[u32]) {
         self.shadow.sample(id, at, generation, words);
-        if id == Id::system_mode
+        if id == Id::flight_status
             && let Ok(words) = words.try_into()
-            && let Some(mode) = SystemMode::from_words(&words)
+            && let Some(mode) = FlightStatus::from_words(&words)
         {
             self.mode = mode;
         }
@@ -126,7 +126,7 @@ impl Observation {
 
     /// Takes an activation of the flight.
     fn activation(&mut self, activation: &Activation) {
-        let flying = self.mode.state == FlightState::Flying;
+        let flying = self.mode.phase == FlightPhase::Flying;
         let (sensors, result, config) = (&mut self.sensors, &mut self.result, &self.config);
         self.shadow.activation(activation.record(), &mut |sensor, now, fusion| {
             let followed = &mut sensors[sensor as usize];
@@ -157,7 +157,7 @@ impl Observation {
     fn truth(&mut self, at: Instant, truth: &Truth) {
         // An executor that is late has estimated an older instant by now.
         let Some((_, imu)) = self.shadow.imu().filter(|(stamp, _)| *stamp == at) else { return };
-        if self.mode.state != FlightState::Flying {
+        if self.mode.phase != FlightPhase::Flying {
             return;
         }
         self.offsets[0].add(imu.gyro - truth.angular_rate);

@@ -1,9 +1,9 @@
 //! Takes an estimator through a recording, sample by sample, in the order a vehicle would have seen them.
 
 use super::start::Start;
-use super::{ATTITUDE, attitude_suite};
+use super::{Method, Suite, attitude_suite};
 use crate::dataset::Recording;
-use stampfly_board::VehicleConfig;
+use stampfly_board::EstimatorKind;
 use stampfly_drivers::Sample;
 use stampfly_eskf::attitude::AttitudeFilter;
 use stampfly_eskf::{Complementary, Eskf, Estimator, Fusion};
@@ -91,16 +91,18 @@ fn velocities(recording: &Recording, start: &Start) -> Vec<Sample<Vec3>> {
     velocities
 }
 
-/// Runs the estimator that `config` names over a recording.
+/// Runs the estimator of the suite over a recording.
 #[must_use]
-pub fn drive(recording: &Recording, start: &Start, config: &VehicleConfig) -> Drive {
-    if config.estimator >= ATTITUDE {
-        let drive = through(recording, start, AttitudeFilter::new(attitude_suite(recording.kind)));
-        Drive { holds_position: false, ..drive }
-    } else if config.estimator >= 0.5 {
-        through(recording, start, Complementary::new(config.complementary))
-    } else {
-        through(recording, start, Eskf::new(config.eskf))
+pub fn drive(recording: &Recording, start: &Start, suite: &Suite) -> Drive {
+    match (suite.method, suite.vehicle.estimator) {
+        (Method::Attitude, _) => {
+            let drive = through(recording, start, AttitudeFilter::new(attitude_suite(recording.kind)));
+            Drive { holds_position: false, ..drive }
+        }
+        (Method::Vehicle, EstimatorKind::Complementary) => {
+            through(recording, start, Complementary::new(suite.vehicle.complementary))
+        }
+        (Method::Vehicle, EstimatorKind::Eskf) => through(recording, start, Eskf::new(suite.vehicle.eskf)),
     }
 }
 

@@ -31,8 +31,24 @@ use stampfly_board::VehicleConfig;
 use stampfly_eskf::attitude::AttitudeConfig;
 use stampfly_types::Vec3;
 
-/// The attitude filter as [`VehicleConfig::estimator`]. No vehicle can be told to use it: it holds no position.
-pub const ATTITUDE: f32 = 2.0;
+/// Which estimator runs over a recording.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// The one that flies, [`VehicleConfig::estimator`].
+    #[default]
+    Vehicle,
+    /// The attitude filter. No vehicle can be told to use it: it holds no position.
+    Attitude,
+}
+
+/// An estimator and its tuning.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Suite {
+    /// Which estimator.
+    pub method: Method,
+    /// Tuning of the estimators that fly. The attitude filter has [its own](attitude_suite).
+    pub vehicle: VehicleConfig,
+}
 
 /// An estimate over one recording, with its figures.
 #[derive(Clone, Debug)]
@@ -47,11 +63,12 @@ pub struct Estimated {
 
 /// The tuning for recordings of this kind: the vehicle's, but for what its sensors do differently.
 #[must_use]
-pub fn suite(kind: Kind) -> VehicleConfig {
-    let mut config = VehicleConfig::default();
+pub fn suite(kind: Kind) -> Suite {
+    let mut suite = Suite::default();
+    let config = &mut suite.vehicle;
     match kind {
         Kind::Broad => {
-            config.estimator = ATTITUDE;
+            suite.method = Method::Attitude;
             // For the Kalman filter, when it is asked for. Far from any motor, in a hand that throws it about: the field may be used, gravity only slowly, and what
             // looks like a bias of the accelerometer is motion.
             config.eskf.mag_enable = true;
@@ -86,7 +103,7 @@ pub fn suite(kind: Kind) -> VehicleConfig {
         }
         Kind::StampFlyFlight | Kind::Px4Replay => {}
     }
-    config
+    suite
 }
 
 /// The attitude filter's tuning for recordings of this kind: its own defaults, but for how late the sensors are.
@@ -115,9 +132,9 @@ pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
 /// # Ok::<(), dataset::DatasetErrorKind>(())
 /// ```
 #[must_use]
-pub fn run(recording: &Recording, config: &VehicleConfig) -> Estimated {
+pub fn run(recording: &Recording, suite: &Suite) -> Estimated {
     let start = Start::of(recording);
-    let drive = drive(recording, &start, config);
+    let drive = drive(recording, &start, suite);
     let figures = Figures::of(recording, &start, &drive);
     Estimated { start, drive, figures }
 }

@@ -20,7 +20,7 @@
 //!   `uint32_t`, arrays and vectors as `float[3]`. Fields are packed: there is no padding.
 //! * Units are one text info per topic, `units/estimate_state` = `position=m velocity=m/s …`; dimensionless fields
 //!   are left out.
-//! * Names of enumeration values and flags are one text info per field, `names/system_mode/state` =
+//! * Names of enumeration values and flags are one text info per field, `names/flight_status/state` =
 //!   `Init=0 IdleGround=1 …`; for flags the number is the bit mask.
 //! * Each activation of a runnable is a topic `activation_…`, see [`crate::trace`].
 //!

@@ -4,7 +4,7 @@
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic, Writer};
 use stampfly_types::messages::{
-    EstimatorStatus, ImuData, PowerData, Signal, StateEstimate, SystemAlert, SystemMode, TofData,
+    EstimatorStatus, FlightStatus, ImuData, PowerData, Signal, StateEstimate, SystemAlert, TofData,
 };
 use stampfly_types::{ActivationRecord, InputRecord};
 use stampfly_types::{Duration, Instant, Message, Vec3, message};
@@ -69,7 +69,7 @@ pub const TOPICS: &[Topic] = &[
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
     Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
     Topic { name: "estimate_status", fields: EstimatorStatus::FIELDS },
-    Topic { name: "system_mode", fields: SystemMode::FIELDS },
+    Topic { name: "flight_status", fields: FlightStatus::FIELDS },
     Topic { name: "system_alert", fields: SystemAlert::FIELDS },
     Topic { name: "signal", fields: Signal::FIELDS },
     Topic { name: "odd", fields: Odd::FIELDS },

@@ -6,7 +6,7 @@
 //! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] |
 //! | [`command`] | [`PilotInput`] [`GuidedCommand`] [`ButtonEvent`] [`CommandSetpoint`] [`Setpoint`] |
 //! | [`control`] | [`ControlOutput`] [`MotorOutput`] |
-//! | [`system`] | [`SystemMode`] [`SystemAlert`] [`VehicleStatus`] [`SelfTest`] [`Signal`] |
+//! | [`system`] | [`FlightStatus`] [`SystemAlert`] [`LandDetected`] [`SelfTest`] [`Signal`] |
 //!
 //! No message carries a time stamp: the bus stamps every sample with the instant its data is valid for.
 
@@ -18,12 +18,12 @@ pub mod system;
 
 pub use command::{
     ButtonEvent, ButtonGesture, CommandSetpoint, CommandSource, GuidedCommand, GuidedKind, PilotInput, Setpoint,
-    SetpointAxes,
+    SetpointAxes, stick,
 };
 pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
 pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};
 pub use sensor::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
 pub use system::{
-    Alerts, ArmBlocks, FlightMode, FlightState, GroundContact, SelfTest, SelfTestVerdict, Signal, SystemAlert,
-    SystemMode, Tone, VehicleStatus,
+    Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, SelfTest, SelfTestVerdict,
+    Signal, SystemAlert, Tone,
 };

@@ -3,8 +3,8 @@
 use crate::{message, message_enum, message_flags};
 
 message_enum! {
-    /// Where the vehicle is in its life. Failsafe is an event, never a state.
-    pub enum FlightState {
+    /// Where the vehicle is between power-on and landing. Failsafe is an event, never a phase.
+    pub enum FlightPhase {
         /// Sensors and calibration are starting.
         #[default]
         Init = 0,
@@ -74,9 +74,9 @@ message_flags! {
 
 message! {
     /// The mode machine's decision.
-    pub struct SystemMode {
-        /// Where the vehicle is in its life.
-        state: FlightState,
+    pub struct FlightStatus {
+        /// Where the vehicle is between power-on and landing.
+        phase: FlightPhase,
         /// The flight mode, in force while flying.
         mode: FlightMode,
         /// May the motors turn?
@@ -178,8 +178,8 @@ message_enum! {
 }
 
 message! {
-    /// What the take-off and landing manager sees, and what it asks of the vertical controller.
-    pub struct VehicleStatus {
+    /// What the land detector sees, and what take-off and landing ask of the vertical controller.
+    pub struct LandDetected {
         /// Contact with the ground.
         contact: GroundContact,
         /// Take-off has reached its height and settled.

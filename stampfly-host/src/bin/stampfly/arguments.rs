@@ -2,11 +2,11 @@
 
 use crate::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use stampfly_board::VehicleConfig;
 use stampfly_board::simulation::StampFly;
+use stampfly_board::{EstimatorKind, VehicleConfig};
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
-use stampfly_lab::estimate::{ATTITUDE, suite};
+use stampfly_lab::estimate::{Method, Suite, suite};
 use stampfly_sim::vehicle::{Live, Options, Vehicle};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -231,16 +231,17 @@ pub struct EstimateOptions {
 
 impl EstimateOptions {
     /// The tuning for one kind of recording, with what the options change.
-    pub fn config(&self, kind: Kind) -> Result<VehicleConfig, Failure> {
-        let mut config = suite(kind);
+    pub fn suite(&self, kind: Kind) -> Result<Suite, Failure> {
+        let mut suite = suite(kind);
+        let mut flown = |kind| (suite.method, suite.vehicle.estimator) = (Method::Vehicle, kind);
         match self.estimator {
-            Some(EstimatorChoice::Eskf) => config.estimator = 0.0,
-            Some(EstimatorChoice::Complementary) => config.estimator = 1.0,
-            Some(EstimatorChoice::Attitude) => config.estimator = ATTITUDE,
+            Some(EstimatorChoice::Eskf) => flown(EstimatorKind::Eskf),
+            Some(EstimatorChoice::Complementary) => flown(EstimatorKind::Complementary),
+            Some(EstimatorChoice::Attitude) => suite.method = Method::Attitude,
             None => {}
         }
-        set_parameters(&mut config, &self.param)?;
-        Ok(config)
+        set_parameters(&mut suite.vehicle, &self.param)?;
+        Ok(suite)
     }
 }
 

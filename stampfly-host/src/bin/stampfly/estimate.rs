@@ -22,7 +22,7 @@ struct Row {
 
 pub fn run(options: &EstimateOptions) -> Result<ExitCode, Failure> {
     // A wrong option is wrong for every file: say so once, before any work.
-    options.config(Kind::StampFlyLog)?;
+    options.suite(Kind::StampFlyLog)?;
     if let Some(folder) = &options.out {
         std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     }
@@ -50,7 +50,7 @@ pub fn run(options: &EstimateOptions) -> Result<ExitCode, Failure> {
 
 fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {
     let recording = dataset::load(file)?;
-    let estimated = estimate::run(&recording, &options.config(recording.kind)?);
+    let estimated = estimate::run(&recording, &options.suite(recording.kind)?);
     if let Some(folder) = &options.out {
         let page = folder.join(format!("estimate_{}.html", recording.name));
         let flight = estimated.to_flight(&recording);
