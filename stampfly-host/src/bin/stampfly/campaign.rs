@@ -1,8 +1,8 @@
 //! `stampfly campaign`: many flights. Exit code 1 when one of them did not land disarmed, or when the estimator's
 //! consistency was asked for and is outside its bars.
 
-use crate::Failure;
 use crate::arguments::CampaignOptions;
+use crate::failure::Failure;
 use crate::terminal;
 use serde_json::{Map, json};
 use stampfly_board::simulation::StampFly;
