@@ -29,6 +29,7 @@ extern crate self as stampfly_bus;
 
 mod activation;
 mod input;
+mod line;
 mod macros;
 mod response;
 mod ring;
@@ -40,9 +41,10 @@ mod topic;
 
 pub use activation::{Activation, ReadInputs, Runnable};
 pub use input::{NewestInput, SamplesInput};
+pub use line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 pub use macros::{schedule, topics};
 pub use response::{JITTER, Unbounded, response_time};
-pub use schedule::{ActivationInfo, Band, MAX_TRIGGERS, Schedule, Trigger};
+pub use schedule::Schedule;
 pub use scheduler::{ActivationState, Scheduler};
 pub use stampfly_types::activation::MAX_INPUTS;
 pub use stampfly_types::{Duration, Instant, Message, Stamped, message, message_enum, message_flags};

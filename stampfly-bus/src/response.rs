@@ -19,7 +19,7 @@
 //!
 //! Not counted: interrupts, and drivers that share the executor. What is left between response and deadline is theirs.
 
-use crate::schedule::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
+use crate::line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 use crate::table::TopicInfo;
 use stampfly_types::Duration;
 

@@ -1,6 +1,6 @@
 //! Which activation is due: the one decision that firmware, simulation and replay share.
 
-use crate::schedule::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
+use crate::line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 use crate::topic::AnyTopic;
 use stampfly_types::Instant;
 

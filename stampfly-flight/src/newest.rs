@@ -157,7 +157,7 @@ mod tests {
             newest.show(topic as usize, topic.info(), Instant::from_millis(9)).map(|shown| shown.to_string())
         };
         let text = show(&newest, Id::flight_status).expect("noted");
-        for part in ["5 ms old", "state Landing", "armed false", "blocks LOW_BATTERY THROTTLE"] {
+        for part in ["5 ms old", "phase Landing", "armed false", "blocks LOW_BATTERY THROTTLE"] {
             assert!(text.contains(part), "{part} is missing:\n{text}");
         }
         assert_eq!(show(&newest, Id::actuator_motor), None);

@@ -7,8 +7,9 @@
 //! when it plays the record.
 
 use crate::flown::fly;
+pub use crate::inputs::{Event, Inputs};
 use crate::recorder::Recorder;
-use stampfly_bus::{Band, Schedule, TopicTable};
+use stampfly_bus::Band;
 use stampfly_flight::Observer;
 use stampfly_flight::golden::{GoldenError, PlayObserver, Report, Writer, play, tables};
 use stampfly_sim::vehicle::{Golden, Vehicle, Verdict};
@@ -22,53 +23,6 @@ const TAIL: Duration = Duration::from_millis(100);
 const OUTPUT_PERIOD: Duration = Duration::from_millis(20);
 /// Time between the activations in which every sensor has something new.
 const GATHERING: Duration = Duration::from_millis(500);
-
-/// What a vehicle was given.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// Somebody outside published.
-    Sample {
-        /// The topic.
-        topic: usize,
-        /// The sample's instant.
-        at: Instant,
-        /// The message.
-        words: Vec<u32>,
-    },
-    /// The executor ran what was due.
-    Turn(Instant),
-}
-
-/// Collects what a vehicle is given, in order.
-#[derive(Clone, Debug, Default)]
-pub struct Inputs {
-    collected: Vec<Event>,
-    turn: Option<Instant>,
-}
-
-impl Inputs {
-    /// The executor is about to look what is due.
-    pub(crate) fn turn(&mut self, clock: Instant) {
-        self.turn = Some(clock);
-    }
-
-    /// Something was due.
-    pub(crate) fn activation(&mut self) {
-        self.collected.extend(self.turn.take().map(Event::Turn));
-    }
-
-    pub(crate) fn sample<R: Schedule>(&mut self, topic: usize, at: Instant, words: &[u32]) {
-        if <R::Topics as TopicTable>::TOPICS.get(topic).is_some_and(|info| info.is_outside) {
-            self.collected.push(Event::Sample { topic, at, words: words.to_vec() });
-        }
-    }
-
-    /// What was collected.
-    #[must_use]
-    pub fn into_collected(self) -> Vec<Event> {
-        self.collected
-    }
-}
 
 /// Why no golden flight was recorded.
 #[derive(Clone, Debug, PartialEq)]

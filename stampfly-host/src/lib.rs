@@ -15,6 +15,7 @@
 pub mod campaign;
 pub mod flown;
 pub mod golden;
+mod inputs;
 pub mod recorder;
 pub mod report;
 pub mod vehicles;

@@ -1,6 +1,6 @@
 //! Records a flight on a PC: the hash always, the log, wall times and inputs when asked for.
 
-use crate::golden::{Event, Inputs};
+use crate::inputs::{Event, Inputs};
 use stampfly_bus::{Activation, Schedule};
 use stampfly_flight::key_frame::{self, KeyFrameError};
 use stampfly_flight::{FlightLoop, LogSchema, Observer};

@@ -1,6 +1,6 @@
 //! May the motors be armed, and if not, why not: every reason at once, so that nobody has to guess.
 
-use crate::machine::ModeInput;
+use crate::input::ModeInput;
 use stampfly_types::frame;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, Validity};
 

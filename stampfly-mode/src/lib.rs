@@ -22,6 +22,7 @@ pub mod arming;
 pub mod authority;
 pub mod button;
 pub mod failsafe;
+mod input;
 pub mod landing;
 pub mod machine;
 pub mod signal;

@@ -5,35 +5,13 @@
 //! estimator). The failsafe is an event, never a phase.
 
 use crate::arming;
+pub use crate::input::{Command, ModeInput};
 use crate::stop_button::StopButton;
 use crate::transitions::{Event, is_armed, next};
 use stampfly_types::messages::{
-    Alerts, ButtonGesture, CalibrationResult, EstimatorCommand, FlightMode, FlightPhase, FlightStatus, GroundContact,
-    GuidedKind, LandDetected, PilotInput, StateEstimate, Validity,
+    Alerts, ButtonGesture, EstimatorCommand, FlightMode, FlightPhase, FlightStatus, GroundContact, Validity,
 };
 use stampfly_types::{Duration, Instant};
-
-/// A command from a program or the board, since the last step.
-pub type Command = GuidedKind;
-
-/// What the machine looks at.
-#[derive(Clone, Copy, Debug)]
-pub struct ModeInput<'a> {
-    /// The failsafe's findings.
-    pub alerts: Alerts,
-    /// The estimate.
-    pub estimate: &'a StateEstimate,
-    /// The still-calibration.
-    pub calibration: &'a CalibrationResult,
-    /// Take-off and landing.
-    pub land_detected: &'a LandDetected,
-    /// The pilot's newest frame, if it is fresh.
-    pub pilot: Option<&'a PilotInput>,
-    /// Commands since the last step, in order.
-    pub commands: &'a [Command],
-    /// A gesture on the button since the last step.
-    pub button: Option<ButtonGesture>,
-}
 
 /// What the machine decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,9 +53,9 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 /// };
 /// assert_eq!(machine.step(Instant::ZERO, &input).flight_status.phase, FlightPhase::IdleGround);
 /// input.commands = &[GuidedKind::Arm];
-/// assert!(machine.step(Instant::from_micros(2_500), &input).mode.armed);
+/// assert!(machine.step(Instant::from_micros(2_500), &input).flight_status.armed);
 /// input.commands = &[GuidedKind::Kill];
-/// assert!(!machine.step(Instant::from_micros(5_000), &input).mode.armed);
+/// assert!(!machine.step(Instant::from_micros(5_000), &input).flight_status.armed);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -29,7 +29,22 @@ use stampfly_board::golden;
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_flight::golden::{Verdict, stack_size};
 
-/// What each machine runs once it is awake. Says whether every bit was as recorded.
+#[cfg(not(target_arch = "xtensa"))]
+#[cfg_attr(any(target_arch = "arm", target_arch = "riscv32"), machine::entry)]
+fn main() -> ! {
+    machine::start();
+    machine::end(run())
+}
+
+#[cfg(target_arch = "xtensa")]
+#[unsafe(no_mangle)]
+#[expect(unsafe_code, reason = "xtensa/start.S calls it by its name")]
+extern "C" fn main() -> ! {
+    machine::start();
+    machine::end(run())
+}
+
+/// Plays the flight and says what came of it. Was every bit as recorded?
 fn run() -> bool {
     let mut memory = [0; memory::SIZE];
     let Some(record) = record::begin(&mut memory) else {
@@ -62,9 +77,4 @@ fn run() -> bool {
     profile.everything.print("chain, every sensor new");
     profile.recording.print("flight record");
     report.verdict == Verdict::Identical
-}
-
-#[cfg(not(target_os = "none"))]
-fn main() -> std::process::ExitCode {
-    machine::main()
 }

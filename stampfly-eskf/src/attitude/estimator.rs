@@ -3,6 +3,7 @@
 //! It has no position, no velocity and no height, says so in every estimate, and answers the sensors for them with
 //! [`Refusal::NotUsed`]. For a vehicle that must fly on something, when everything else is gone.
 
+use super::bookkeeping::Bookkeeping;
 use super::filter::AttitudeFilter;
 use crate::estimator::{Estimator, Fusion, Refusal};
 use stampfly_types::messages::{
@@ -21,19 +22,6 @@ const FUTURE: Duration = Duration::from_millis(100);
 const RECENT: Duration = Duration::from_secs(1);
 /// A heading that is known worse than this, rad, is not.
 const HEADING_SIGMA: f32 = 0.35;
-
-/// What the trait needs and the filter does not: time, and a record.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Bookkeeping {
-    now: Instant,
-    initialized: bool,
-    calibration: CalibrationResult,
-    command: EstimatorCommand,
-    mag_at: Option<Instant>,
-    mag_fused: Option<Instant>,
-    status: EstimatorStatus,
-}
 
 impl Estimator for AttitudeFilter {
     fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {

@@ -20,8 +20,8 @@
 mod field;
 
 use super::bias::GyroBias;
+use super::bookkeeping::Bookkeeping;
 use super::config::AttitudeConfig;
-use super::estimator::Bookkeeping;
 use super::hard_iron::HardIron;
 use super::heading::Heading;
 use super::low_pass::LowPass;

@@ -8,6 +8,7 @@
 //! Both are plain structs that know no clock: time enters as the length of a step.
 
 mod bias;
+mod bookkeeping;
 mod config;
 mod estimator;
 mod filter;

@@ -7,13 +7,12 @@
 //! matrix is inverted, but it makes its directions independent of each other first and then passes over the matrix
 //! once. The matrix stays exactly symmetric by construction: the update subtracts w·wᵀ, the propagation mirrors.
 
+pub use super::layout::N;
+use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY};
 use super::passage::Passage;
 use super::state::{Rotation, rotation_matrix};
-use super::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY};
 use stampfly_types::math;
 
-/// Number of error states.
-pub const N: usize = 15;
 /// Width of a stored row.
 const WIDTH: usize = 16;
 

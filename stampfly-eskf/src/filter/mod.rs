@@ -7,6 +7,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | [`layout`] | number and places of the error states |
 //! | [`state`] | nominal state, small rotations, injection of a correction |
 //! | [`covariance`] | storage, propagation, update |
 //! | [`roughness`] | how much the inertial signals change between samples: noise that follows vibration |
@@ -15,23 +16,14 @@
 
 pub mod covariance;
 pub mod history;
+pub mod layout;
 pub mod passage;
 pub mod roughness;
 pub mod state;
 
-pub use covariance::{Covariance, N};
+pub use covariance::Covariance;
 pub use history::History;
+pub use layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
 pub use passage::Passage;
 pub use roughness::Roughness;
 pub use state::Nominal;
-
-/// Index of the first position error state.
-pub const POSITION: usize = 0;
-/// Index of the first velocity error state.
-pub const VELOCITY: usize = 3;
-/// Index of the first attitude error state.
-pub const ATTITUDE: usize = 6;
-/// Index of the first gyro bias error state.
-pub const GYRO_BIAS: usize = 9;
-/// Index of the first accelerometer bias error state.
-pub const ACCEL_BIAS: usize = 12;

@@ -20,8 +20,8 @@
 //! What is neglected: that a bias acts along the changing, not the first, attitude, and the process noise of the
 //! passage itself. Within a tenth of a second both are far below any sensor's noise.
 
-use super::state::{Motion, Rotation, multiply, rotate_back, rotation_matrix};
-use super::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, Nominal, POSITION, VELOCITY};
+use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
+use super::state::{Motion, Nominal, Rotation, multiply, rotate_back, rotation_matrix};
 use stampfly_types::{GRAVITY, Vec3};
 
 /// What the inertial sensor saw between two instants. See the [module](self) documentation.

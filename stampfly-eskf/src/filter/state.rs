@@ -1,6 +1,6 @@
 //! The nominal state and how it moves.
 
-use super::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
+use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
 use stampfly_types::{GRAVITY, Quat, Vec3};
 
 /// The nominal state: what the filter believes, without its doubt.

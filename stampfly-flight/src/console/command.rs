@@ -1,11 +1,8 @@
 //! A line → a command. Pure text: nothing here depends on the vehicle's state.
 
 use super::Vehicle;
-use core::fmt;
+use super::error::{CommandError, MAX_WORDS};
 use heapless::Vec;
-
-/// Most words of a line.
-pub const MAX_WORDS: usize = 8;
 
 /// What a line asks for, with names as they were typed. `C` are the vehicle's own commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,30 +39,6 @@ pub enum Command<'l, C> {
     /// One of the vehicle's own.
     Vehicle(C),
 }
-
-/// Why a line is no command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum CommandError {
-    /// There is no such command.
-    Unknown,
-    /// The command exists and is written like this.
-    Usage(&'static str),
-    /// More than [`MAX_WORDS`] words.
-    TooManyWords,
-}
-
-impl fmt::Display for CommandError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown => f.write_str("there is no such command; try help"),
-            Self::Usage(usage) => write!(f, "usage: {usage}"),
-            Self::TooManyWords => write!(f, "at most {MAX_WORDS} words"),
-        }
-    }
-}
-
-impl core::error::Error for CommandError {}
 
 /// The commands of every vehicle: how they are written, and what they do.
 pub const COMMANDS: &[(&str, &str)] = &[

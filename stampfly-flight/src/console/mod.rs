@@ -12,10 +12,12 @@
 
 mod answer;
 mod command;
+mod error;
 mod line_editor;
 mod vehicle;
 
 pub use answer::{Request, answer};
-pub use command::{COMMANDS, Command, CommandError, MAX_WORDS};
+pub use command::{COMMANDS, Command};
+pub use error::{CommandError, MAX_WORDS};
 pub use line_editor::LineEditor;
 pub use vehicle::{SensorLine, Vehicle};

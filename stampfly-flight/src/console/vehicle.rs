@@ -1,6 +1,6 @@
 //! What the console asks of a vehicle.
 
-use super::CommandError;
+use super::error::CommandError;
 use crate::parameters::Parameters;
 use crate::profile::Rows;
 use core::fmt;

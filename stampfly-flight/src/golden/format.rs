@@ -18,7 +18,7 @@
 //! | hash | 8 | over everything published |
 //! | output | 8 | the output topic's place in the topic table |
 
-use super::GoldenError;
+use super::error::GoldenError;
 use crate::newest::{MAX_MESSAGE, longest_message};
 use heapless::Vec;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};

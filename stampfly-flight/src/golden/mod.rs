@@ -9,13 +9,14 @@
 //! room for a whole vehicle on the stack ([`stack_size`]). Not a test of how well a vehicle flies, nor of its sensors:
 //! the record does not react.
 
+mod error;
 mod format;
 
+pub use error::GoldenError;
 pub use format::{Writer, tables};
 
 use crate::newest::MAX_MESSAGE;
 use crate::{Assembled, Observer};
-use core::fmt;
 use format::Entry;
 use heapless::Vec;
 use stampfly_bus::{Band, PublishWords, Schedule, Taps, TopicTable};
@@ -53,30 +54,6 @@ pub struct Report {
     /// Length of the flight.
     pub duration: Duration,
 }
-
-/// Why a golden flight could not be played.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum GoldenError {
-    /// These bytes are something else.
-    NotGolden,
-    /// Recorded with other topics or runnables.
-    OtherTables,
-    /// Bytes are missing, left over, or no entries.
-    Damaged,
-}
-
-impl fmt::Display for GoldenError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotGolden => "not a golden flight",
-            Self::OtherTables => "the golden flight was recorded with other topics or runnables",
-            Self::Damaged => "the golden flight is damaged",
-        })
-    }
-}
-
-impl core::error::Error for GoldenError {}
 
 /// Is told more of a golden flight than its report: a log, a profiler, a watchdog to be fed.
 pub trait PlayObserver: Observer {

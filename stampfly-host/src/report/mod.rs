@@ -12,8 +12,6 @@ mod panels;
 
 use stampfly_lab::Flight;
 use stampfly_sim::vehicle::Page;
-use std::io;
-use std::path::Path;
 
 /// One line of the summary.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -75,20 +73,4 @@ pub struct Report<'a> {
     pub page: &'static Page,
     /// The flight.
     pub flight: &'a Flight,
-}
-
-impl Report<'_> {
-    /// The page.
-    #[must_use]
-    pub fn html(&self) -> String {
-        page::html(self)
-    }
-
-    /// Writes the page to a file.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn write(&self, path: impl AsRef<Path>) -> io::Result<()> {
-        std::fs::write(path, self.html())
-    }
 }

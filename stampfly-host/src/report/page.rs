@@ -5,6 +5,8 @@ use super::panels::{Actor, Band, Builder, Panel};
 use super::{Metric, Report};
 use serde::Serialize;
 use stampfly_sim::vehicle::Body;
+use std::io;
+use std::path::Path;
 
 /// The page's script, in the order its parts need each other.
 const SCRIPT: &str = concat!(
@@ -42,36 +44,47 @@ struct BodyShape {
     reach: f32,
 }
 
-/// Puts the page together.
-pub(super) fn html(report: &Report<'_>) -> String {
-    let span = report.flight.span().unwrap_or_default();
-    let grid = Grid::new(span);
-    let mut builder = Builder::new(report.flight, report.page, grid);
-    builder.all_panels();
-    let scene = builder.scene();
-    let Body { rings, radius, outline, down, nose, reach } = report.page.body;
-    let page = Page {
-        start: grid.start.seconds_f64(),
-        step: grid.step as f64 * 1e-6,
-        points: grid.points,
-        bands: builder.bands(),
-        events: report.flight.events.iter().map(|event| (event.at.seconds_f64(), event.text.clone())).collect(),
-        scene,
-        body: BodyShape { rings, radius, outline, down, nose, reach },
-        channels: builder.channels,
-        panels: builder.panels,
-    };
-    // Numbers, strings and lists always have a JSON form; `<` could end the script element they stand in.
-    let data = serde_json::to_string(&page).unwrap_or_default().replace('<', "\\u003c");
-    format!(
-        include_str!("page.html"),
-        style = include_str!("page.css"),
-        script = SCRIPT,
-        title = escape(&report.title),
-        subtitle = escape(&report.subtitle),
-        metrics = report.metrics.iter().map(metric).collect::<String>(),
-        data = data,
-    )
+impl Report<'_> {
+    /// The page.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let span = self.flight.span().unwrap_or_default();
+        let grid = Grid::new(span);
+        let mut builder = Builder::new(self.flight, self.page, grid);
+        builder.all_panels();
+        let scene = builder.scene();
+        let Body { rings, radius, outline, down, nose, reach } = self.page.body;
+        let page = Page {
+            start: grid.start.seconds_f64(),
+            step: grid.step as f64 * 1e-6,
+            points: grid.points,
+            bands: builder.bands(),
+            events: self.flight.events.iter().map(|event| (event.at.seconds_f64(), event.text.clone())).collect(),
+            scene,
+            body: BodyShape { rings, radius, outline, down, nose, reach },
+            channels: builder.channels,
+            panels: builder.panels,
+        };
+        // Numbers, strings and lists always have a JSON form; `<` could end the script element they stand in.
+        let data = serde_json::to_string(&page).unwrap_or_default().replace('<', "\\u003c");
+        format!(
+            include_str!("page.html"),
+            style = include_str!("page.css"),
+            script = SCRIPT,
+            title = escape(&self.title),
+            subtitle = escape(&self.subtitle),
+            metrics = self.metrics.iter().map(metric).collect::<String>(),
+            data = data,
+        )
+    }
+
+    /// Writes the page to a file.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        std::fs::write(path, self.html())
+    }
 }
 
 fn metric(metric: &Metric) -> String {

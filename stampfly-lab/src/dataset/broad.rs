@@ -4,9 +4,10 @@
 //! frame becomes FRD by half a turn about x; ENU becomes NED by swapping north and east and turning z over, which
 //! is half a turn about the line between them.
 
+use super::error::DatasetErrorKind;
 use super::npz::{Arrays, broken, numbers};
+use super::recording::{Kind, Recording, TruthPoint, attitude};
 use super::timing::Clock;
-use super::{DatasetErrorKind, Kind, Recording, TruthPoint, attitude};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{ImuData, MagData};
 use stampfly_types::{Instant, Vec3};

@@ -1,6 +1,6 @@
 //! Comma-separated numbers with a line of names on top.
 
-use super::DatasetErrorKind;
+use super::error::DatasetErrorKind;
 
 /// A table whose columns have names.
 pub(super) struct Table<'a> {

@@ -6,9 +6,10 @@
 //! The files were resampled to 100 Hz. Where the radio log ended before the motion capture did, its columns go on in
 //! straight lines, up to accelerations of 9 g in a vehicle that lies on the floor: that end is cut off.
 
+use super::error::DatasetErrorKind;
 use super::npz::{Array, Arrays, Elements, broken, numbers};
+use super::recording::{DevicePoint, Kind, Recording, TruthPoint, attitude};
 use super::timing::{Clock, straight_end};
-use super::{DatasetErrorKind, DevicePoint, Kind, Recording, TruthPoint, attitude};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{GRAVITY, Instant, Vec3};

@@ -1,7 +1,7 @@
 //! NumPy archives: a zip of arrays. Only what the data sets use: little-endian numbers and fixed-width text, one or
 //! two dimensions, either order.
 
-use super::DatasetErrorKind;
+use super::error::DatasetErrorKind;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 

@@ -1,8 +1,9 @@
 //! Input of PX4's EKF2 for its replay test: `time_us,sensor,values…`, body FRD, in the order it arrived.
 
 use super::csv::{Row, rows};
+use super::error::DatasetErrorKind;
+use super::recording::{Kind, Recording};
 use super::timing::Clock;
-use super::{DatasetErrorKind, Kind, Recording};
 use stampfly_drivers::Sample;
 use stampfly_types::Vec3;
 use stampfly_types::messages::{BaroData, ImuData, MagData};

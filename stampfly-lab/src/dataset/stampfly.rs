@@ -1,8 +1,9 @@
 //! What StampFlys recorded themselves. Body FRD, world NED and SI units already; angles in degrees.
 
 use super::csv::{Row, Table};
+use super::error::DatasetErrorKind;
+use super::recording::{DevicePoint, Kind, Recording};
 use super::timing::{Clock, Held};
-use super::{DatasetErrorKind, DevicePoint, Kind, Recording};
 use stampfly_drivers::Sample;
 use stampfly_types::messages::{BaroData, FlowData, ImuData, MagData, TofData};
 use stampfly_types::{Duration, Instant, Quat, Vec3, math};

@@ -34,6 +34,7 @@ pub mod safety;
 pub mod schedule;
 #[cfg(feature = "simulation")]
 pub mod simulation;
+mod tick;
 pub mod topics;
 
 pub use parameters::Parameters;

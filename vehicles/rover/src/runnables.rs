@@ -8,7 +8,7 @@ use crate::driver_input::{DriverSelector, DriverSources};
 use crate::messages::*;
 use crate::parameters::PROBATION;
 use crate::safety::{SafetyInput, SafetySupervisor};
-use crate::schedule::TICK;
+use crate::tick::TICK;
 use crate::topics::*;
 use crate::{Parameters, diag, models};
 use serde::{Deserialize, Serialize};

@@ -5,11 +5,9 @@
 
 use crate::Parameters;
 use crate::runnables::*;
+pub use crate::tick::TICK;
 use serde::{Deserialize, Serialize};
-use stampfly_types::Duration;
-
-/// The document's period, and the time step of the models.
-pub const TICK: Duration = Duration::from_millis(10);
+use stampfly_bus::Trigger;
 
 stampfly_bus::schedule! {
     /// The rover's runnables: the state of the vehicle.
@@ -37,3 +35,9 @@ stampfly_bus::schedule! {
     /// Are all components in other processes heard?
     com = ComSwc: every 20 ms, background, 10 us;
 }
+
+// The models advance by a tick whenever the chain runs.
+const _: () = match ACTIVATIONS[Id::driver_input as usize].trigger {
+    Trigger::Every(period) => assert!(period.as_micros() == TICK.as_micros()),
+    _ => panic!("the driver's input has no period"),
+};

@@ -5,7 +5,7 @@
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m_rt::entry;
+pub use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
 use panic_semihosting as _;
 
@@ -43,8 +43,8 @@ pub fn line(text: core::fmt::Arguments<'_>) {
     hprintln!("{}", text);
 }
 
-#[entry]
-fn main() -> ! {
+/// Starts the timer.
+pub fn start() {
     if let Some(peripherals) = Peripherals::take() {
         let mut timer = peripherals.SYST;
         timer.set_clock_source(SystClkSource::Core);
@@ -52,7 +52,11 @@ fn main() -> ! {
         timer.clear_current();
         timer.enable_counter();
     }
-    debug::exit(if crate::run() { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+}
+
+/// Ends the emulation, in success or not.
+pub fn end(success: bool) -> ! {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
     loop {
         cortex_m::asm::wfi();
     }

@@ -2,7 +2,7 @@
 //! own count of retired instructions is exact.
 
 use riscv::register::minstret;
-use riscv_rt::entry;
+pub use riscv_rt::entry;
 use semihosting::{print, process};
 
 /// A reading of the counter.
@@ -32,7 +32,10 @@ pub fn line(text: core::fmt::Arguments<'_>) {
     print!("{text}\n");
 }
 
-#[entry]
-fn main() -> ! {
-    process::exit(if crate::run() { 0 } else { 1 })
+/// Nothing has to be started.
+pub fn start() {}
+
+/// Ends the emulation, in success or not.
+pub fn end(success: bool) -> ! {
+    process::exit(if success { 0 } else { 1 })
 }

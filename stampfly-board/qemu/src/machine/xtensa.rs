@@ -62,6 +62,14 @@ pub fn line(text: fmt::Arguments<'_>) {
     let _ = writeln!(Output, "{text}");
 }
 
+/// Nothing has to be started.
+pub fn start() {}
+
+/// Ends the emulation, in success or not.
+pub fn end(success: bool) -> ! {
+    exit(usize::from(!success))
+}
+
 fn exit(code: usize) -> ! {
     loop {
         // SAFETY: ends the emulation.
@@ -79,9 +87,4 @@ extern "C" fn abort() -> ! {
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     line(format_args!("{info}"));
     exit(101)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn main() -> ! {
-    exit(usize::from(!crate::run()))
 }

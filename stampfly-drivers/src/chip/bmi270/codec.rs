@@ -1,7 +1,8 @@
 //! Registers, scales and frames of the BMI270, from Bosch BST-BMI270-DS000 revision 1.3. Registers are described in its
 //! §5.2 in the order of their addresses, which are given here; other sections are named by their titles.
 
-use super::Config;
+use super::config::Config;
+pub use super::config::{AccelRange, GyroRange, Rate};
 
 /// Register addresses, §5.2.
 pub mod register {
@@ -98,16 +99,6 @@ pub const BLOB_LIMIT: usize = 8192;
 /// A sensor time tick is 39.0625 µs, register 0x18: this many of them are 5 ms.
 pub const TICKS_IN_5_MILLIS: u64 = 128;
 
-/// Full scale of the accelerometer, register 0x41.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum AccelRange {
-    G2,
-    G4,
-    G8,
-    G16,
-}
-
 impl AccelRange {
     /// The register's value.
     #[must_use]
@@ -130,17 +121,6 @@ impl AccelRange {
             Self::G16 => 2_048.0,
         }
     }
-}
-
-/// Full scale of the gyroscope, °/s, register 0x43.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum GyroRange {
-    Dps125,
-    Dps250,
-    Dps500,
-    Dps1000,
-    Dps2000,
 }
 
 impl GyroRange {
@@ -167,15 +147,6 @@ impl GyroRange {
             Self::Dps125 => 262.4,
         }
     }
-}
-
-/// Samples per second as delivered. The chip samples four times as often.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Rate {
-    Hz400,
-    Hz200,
-    Hz100,
 }
 
 impl Rate {

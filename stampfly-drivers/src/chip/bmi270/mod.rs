@@ -9,13 +9,14 @@
 //! interface.
 
 pub mod codec;
+mod config;
 mod interrupt;
 
 use super::port::Port;
 use super::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters};
 use crate::{Decimator, Imu, Sample, Timebase};
-pub use codec::{AccelRange, GyroRange, Rate};
 use codec::{FRAME_BYTES, Status, register};
+pub use config::{AccelRange, Config, GyroRange, Rate};
 use embedded_hal_async::digital::Wait;
 use embedded_hal_async::i2c::I2c;
 use embedded_hal_async::spi::SpiDevice;
@@ -49,24 +50,6 @@ const EARLIEST: u64 = 2;
 const OVERRUN: u64 = 150;
 /// Samples may be missing for this many output periods.
 const PATIENCE: u64 = 4;
-
-/// What the chip is told to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    /// Full scale of the accelerometer.
-    pub accel_range: AccelRange,
-    /// Full scale of the gyroscope.
-    pub gyro_range: GyroRange,
-    /// Samples per second as delivered.
-    pub rate: Rate,
-}
-
-impl Default for Config {
-    /// ±8 g, ±2000 °/s, 400 Hz.
-    fn default() -> Self {
-        Self { accel_range: AccelRange::G8, gyro_range: GyroRange::Dps2000, rate: Rate::Hz400 }
-    }
-}
 
 /// The driver. Implements [`Imu`].
 ///

@@ -4,7 +4,8 @@
 //! The data sheet leaves the compensation to Bosch's sensor API; both forms here are its formulas (`bmm150.c`, BSD-3).
 //! They agree to within the integer form's rounding. Flight code uses the floating one.
 
-use super::Config;
+use super::config::Config;
+pub use super::config::{Preset, Rate};
 use stampfly_types::{Duration, Vec3};
 
 /// Register addresses.
@@ -34,16 +35,6 @@ pub const SOFT_RESET: u8 = 0x83;
 /// Sleep and start the self test, in [`register::MODE`]; its lowest bit falls when the test is over.
 pub const SELF_TEST: u8 = 0x07;
 
-/// How often the axes are measured for one sample (table "Recommended presets").
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Preset {
-    LowPower,
-    Regular,
-    Enhanced,
-    HighAccuracy,
-}
-
 impl Preset {
     /// Registers 0x51 and 0x52: 1 + 2 a repetitions of x and y, 1 + b of z.
     #[must_use]
@@ -62,20 +53,6 @@ impl Preset {
         let [xy, z] = self.codes();
         Duration::from_micros(145 * (1 + 2 * xy as u64) + 500 * (1 + z as u64) + 980)
     }
-}
-
-/// Samples per second.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Rate {
-    Hz2,
-    Hz6,
-    Hz8,
-    Hz10,
-    Hz15,
-    Hz20,
-    Hz25,
-    Hz30,
 }
 
 impl Rate {

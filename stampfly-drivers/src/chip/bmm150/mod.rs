@@ -4,12 +4,13 @@
 //! StampFly does not connect, and not with its SPI.
 
 pub mod codec;
+mod config;
 
 use super::port::Port;
 use super::{AxisMap, ChipError, I2cRegisters};
 use crate::{Magnetometer, Sample, Timebase};
-pub use codec::{Preset, Rate};
 use codec::{Reading, Trim, register};
+pub use config::{Config, Preset, Rate};
 use embedded_hal_async::i2c::I2c;
 use stampfly_types::messages::MagData;
 use stampfly_types::{Duration, Instant};
@@ -20,22 +21,6 @@ const START_UP: Duration = Duration::from_millis(3);
 const SELF_TEST_LIMIT: Duration = Duration::from_millis(20);
 /// How often the data is looked at once it may be new.
 const POLL: Duration = Duration::from_millis(2);
-
-/// What the chip is told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    /// Repetitions in a sample.
-    pub preset: Preset,
-    /// Samples per second. What the preset cannot do is [`ChipError::InvalidConfiguration`].
-    pub rate: Rate,
-}
-
-impl Default for Config {
-    /// Nine repetitions of x and y, fifteen of z, 25 Hz.
-    fn default() -> Self {
-        Self { preset: Preset::Regular, rate: Rate::Hz25 }
-    }
-}
 
 /// The driver. Implements [`Magnetometer`].
 ///

@@ -1,6 +1,7 @@
 //! Registers, timing and compensation of the BMP280, from Bosch BST-BMP280-DS001 revision 1.23.
 
-use super::Config;
+use super::config::Config;
+pub use super::config::{Filter, Oversampling};
 use stampfly_types::{Duration, math};
 
 /// Register addresses, §4.2.
@@ -32,17 +33,6 @@ pub const MEASURING: u8 = 0x08;
 /// Calibration is being copied, §4.3.3.
 pub const COPYING: u8 = 0x01;
 
-/// Conversions averaged into one, §3.3.1 and §3.3.2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Oversampling {
-    X1,
-    X2,
-    X4,
-    X8,
-    X16,
-}
-
 impl Oversampling {
     const fn code(self) -> u8 {
         self as u8 + 1
@@ -51,17 +41,6 @@ impl Oversampling {
     const fn conversions(self) -> u64 {
         1 << self as u8
     }
-}
-
-/// Coefficient of the chip's low-pass, §3.3.3: a step has arrived by three quarters after about as many samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Filter {
-    Off,
-    C2,
-    C4,
-    C8,
-    C16,
 }
 
 /// CTRL_MEAS without a mode.

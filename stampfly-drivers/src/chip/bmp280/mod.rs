@@ -5,12 +5,13 @@
 //! over seconds. Not with the SPI of this part.
 
 pub mod codec;
+mod config;
 
 use super::port::Port;
 use super::{ChipError, I2cRegisters};
 use crate::{Barometer, Sample, Timebase};
 use codec::{Calibration, Reading, register};
-pub use codec::{Filter, Oversampling};
+pub use config::{Config, Filter, Oversampling};
 use embedded_hal_async::i2c::I2c;
 use stampfly_types::messages::BaroData;
 use stampfly_types::{Duration, Instant};
@@ -26,31 +27,6 @@ const POLL: Duration = Duration::from_millis(1);
 const RANGE: core::ops::RangeInclusive<u32> = 30_000 << 8..=110_000 << 8;
 /// Where it works, hundredths of a degree Celsius, §1 table 2.
 const WORKS_AT: core::ops::RangeInclusive<i32> = -4_000..=8_500;
-
-/// What the driver and the chip are told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    /// Pressure conversions in a sample.
-    pub pressure: Oversampling,
-    /// Temperature conversions in a sample.
-    pub temperature: Oversampling,
-    /// Low-pass over samples.
-    pub filter: Filter,
-    /// Time between two samples; never less than a conversion takes.
-    pub interval: Duration,
-}
-
-impl Default for Config {
-    /// Four pressure conversions, two of temperature, a light filter, 25 Hz.
-    fn default() -> Self {
-        Self {
-            pressure: Oversampling::X4,
-            temperature: Oversampling::X2,
-            filter: Filter::C4,
-            interval: Duration::from_millis(40),
-        }
-    }
-}
 
 /// The driver. Implements [`Barometer`].
 ///

@@ -1,7 +1,8 @@
 //! Registers and scales of the INA3221, from Texas Instruments SBOS576B. Registers are words, high byte first,
 //! described in its §8.6 "Register Maps".
 
-use super::Config;
+use super::config::Config;
+pub use super::config::{Average, Channel, ConversionTime};
 use stampfly_types::Duration;
 
 /// Register addresses, §8.6.1.
@@ -34,15 +35,6 @@ const SHUNT_ENDS: [i16; 2] = [-4_096, 4_095];
 /// Shunt and bus, continuously.
 const CONTINUOUS: u16 = 0b111;
 
-/// Which pair of pins the shunt is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Channel {
-    One,
-    Two,
-    Three,
-}
-
 impl Channel {
     /// Address of its shunt voltage.
     #[must_use]
@@ -55,20 +47,6 @@ impl Channel {
     pub const fn bus_register(self) -> u8 {
         self.shunt_register() + 1
     }
-}
-
-/// Conversions averaged into one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum Average {
-    A1,
-    A4,
-    A16,
-    A64,
-    A128,
-    A256,
-    A512,
-    A1024,
 }
 
 impl Average {
@@ -84,20 +62,6 @@ impl Average {
             Self::A1024 => 1_024,
         }
     }
-}
-
-/// Time of one conversion, µs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names say it")]
-pub enum ConversionTime {
-    Us140,
-    Us204,
-    Us332,
-    Us588,
-    Us1100,
-    Us2116,
-    Us4156,
-    Us8244,
 }
 
 impl ConversionTime {

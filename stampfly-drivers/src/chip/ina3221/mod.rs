@@ -4,12 +4,13 @@
 //! for the voltage the motors see. Not as an over-current cut-off: a sample is tens of milliseconds old.
 
 pub mod codec;
+mod config;
 
 use super::port::Port;
 use super::{ChipError, I2cRegisters};
 use crate::{PowerMonitor, Sample, Timebase};
 use codec::register;
-pub use codec::{Average, Channel, ConversionTime};
+pub use config::{Average, Channel, Config, ConversionTime};
 use embedded_hal_async::i2c::I2c;
 use stampfly_types::messages::PowerData;
 use stampfly_types::{Duration, Instant};
@@ -20,26 +21,6 @@ const AFTER_RESET: Duration = Duration::from_millis(1);
 const POLL: Duration = Duration::from_millis(2);
 /// The single conversion of the self test takes 2.2 ms.
 const SELF_TEST_LIMIT: Duration = Duration::from_millis(10);
-
-/// What the chip and the driver are told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// Where the shunt is.
-    pub channel: Channel,
-    /// Resistance of the shunt, Ω.
-    pub shunt_ohms: f32,
-    /// Conversions in a sample.
-    pub average: Average,
-    /// Time of one conversion, of shunt and bus alike.
-    pub time: ConversionTime,
-}
-
-impl Default for Config {
-    /// The StampFly's: 0.01 Ω on channel 2 (R12 of its schematic); 64 times 588 µs, a sample every 75 ms.
-    fn default() -> Self {
-        Self { channel: Channel::Two, shunt_ohms: 0.01, average: Average::A64, time: ConversionTime::Us588 }
-    }
-}
 
 /// The driver. Implements [`PowerMonitor`].
 ///

@@ -5,7 +5,8 @@
 //! its VL53L1 and VL53LX drivers, and values that public drivers of the family write. The times of the two ranging
 //! parts are a formula of ours that meets the published values at 33 ms.
 
-use super::Config;
+use super::config::Config;
+pub use super::config::DistanceMode;
 use stampfly_types::Duration;
 
 /// Register addresses.
@@ -81,17 +82,6 @@ pub const FIXED: [(u16, &[u8]); 5] = [
     // Whole field of view; the steps of a measurement: bias, phase, detectors twice, range.
     (0x007C, &[0x00, 0x00, 0x02, 0xC7, 0xFF, 0x9B, 0x00, 0x00, 0x00, 0x01]),
 ];
-
-/// How far the chip looks: a longer light pulse period sees further, but not so well in sunlight.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DistanceMode {
-    /// Up to 1.3 m.
-    Short,
-    /// Up to 3 m.
-    Medium,
-    /// Up to 4 m.
-    Long,
-}
 
 impl DistanceMode {
     /// Codes of the light pulse periods of the two ranging parts. A target beyond what one of them tells apart appears

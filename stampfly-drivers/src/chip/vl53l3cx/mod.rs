@@ -10,13 +10,15 @@
 
 mod boot;
 pub mod codec;
+mod config;
 
 use super::port::Port;
 use super::{ChipError, I2cRegisters};
 use crate::{RangeFinder, Sample, Timebase};
 pub use boot::BootAddress;
-pub use codec::{DistanceMode, RangeStatus, Reading};
 use codec::{RESULT_BYTES, register};
+pub use codec::{RangeStatus, Reading};
+pub use config::{Config, DistanceMode};
 use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::{Error, ErrorKind};
 use embedded_hal_async::i2c::I2c;
@@ -41,31 +43,6 @@ const REPETITIONS: usize = 2;
 const POLL: Duration = Duration::from_millis(2);
 /// How often the number of the measurement has to advance in the self test.
 const ADVANCES: usize = 2;
-
-/// What the chip and the driver are told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// How far to look.
-    pub mode: DistanceMode,
-    /// How long to measure, 33 to 500 ms. Twice the time is a third less noise.
-    pub budget: Duration,
-    /// From one measurement to the next, no less than the budget.
-    pub period: Duration,
-    /// Added to what the chip says, m: the error of this chip behind this cover.
-    pub offset: f32,
-}
-
-impl Default for Config {
-    /// 4 m, 33 ms, 30 Hz, as it comes from the factory.
-    fn default() -> Self {
-        Self {
-            mode: DistanceMode::Long,
-            budget: Duration::from_micros(33_000),
-            period: Duration::from_micros(33_333),
-            offset: 0.0,
-        }
-    }
-}
 
 /// The driver. Implements [`RangeFinder`].
 ///

@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::Failure;
+use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};

@@ -1,7 +1,7 @@
 //! `stampfly estimate`: the estimator over recorded data. Exit code 1 when a file could not be used.
 
-use crate::Failure;
 use crate::arguments::EstimateOptions;
+use crate::failure::Failure;
 use crate::terminal;
 use serde::Serialize;
 use stampfly_host::Report;

@@ -1,8 +1,8 @@
 //! `stampfly fly`: one flight, its log and its report, and one screen about it. `stampfly serve`: the same, flown by other
 //! programs.
 
-use crate::Failure;
 use crate::arguments::{FlyOptions, ServeOptions};
+use crate::failure::Failure;
 use crate::terminal;
 use serde_json::{Map, json};
 use stampfly_bus::Schedule;

@@ -1,7 +1,7 @@
 //! `stampfly golden`: the golden flight, played or recorded. Exit code 0 when every bit is as recorded.
 
-use crate::Failure;
 use crate::arguments::GoldenOptions;
+use crate::failure::Failure;
 use serde_json::json;
 use stampfly_flight::golden::{Verdict, play};
 use stampfly_host::golden::record;

@@ -8,6 +8,7 @@ macro_rules! outln {
 mod arguments;
 mod campaign;
 mod estimate;
+mod failure;
 mod fly;
 mod golden;
 mod replay;
@@ -18,9 +19,6 @@ mod topics;
 use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
-
-/// What a command can end with besides success: something to tell, and an exit code of 1.
-type Failure = Box<dyn std::error::Error>;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -34,11 +32,5 @@ fn main() -> ExitCode {
         Command::Estimate(options) => estimate::run(&options),
         Command::Golden(options) => golden::run(&options),
     };
-    match result {
-        Ok(code) => code,
-        Err(failure) => {
-            eprintln!("stampfly: {failure}");
-            ExitCode::FAILURE
-        }
-    }
+    result.unwrap_or_else(|failure| failure::tell(&failure))
 }

@@ -1,7 +1,7 @@
 //! `stampfly replay`: the flight again. Exit code 0 when it is the same, 1 when it differs or cannot be replayed.
 
-use crate::Failure;
 use crate::arguments::ReplayOptions;
+use crate::failure::Failure;
 use serde_json::json;
 use stampfly_flight::{Replay, replay};
 use stampfly_host::vehicles::{self, ForVehicle};

@@ -1,7 +1,7 @@
 //! `stampfly schedule`: the activation table, with the response times that follow from it.
 
-use crate::Failure;
 use crate::arguments::TopicsOptions;
+use crate::failure::Failure;
 use serde_json::json;
 use stampfly_bus::{ActivationInfo, Band, Schedule, TopicInfo, TopicTable, Trigger, response_time};
 use stampfly_host::vehicles::{self, ForVehicle};

@@ -1,7 +1,7 @@
 //! `stampfly topics`: the topic table.
 
-use crate::Failure;
 use crate::arguments::TopicsOptions;
+use crate::failure::Failure;
 use serde_json::json;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
 use stampfly_host::vehicles::{self, ForVehicle};

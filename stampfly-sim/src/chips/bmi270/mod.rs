@@ -58,6 +58,7 @@
 mod bus;
 mod fifo;
 mod interrupt;
+mod interrupt_pin;
 mod registers;
 mod sampling;
 mod self_test;
@@ -69,7 +70,7 @@ use crate::time::Clock;
 use crate::world::World;
 use fifo::Fifo;
 use interrupt::Interrupt;
-pub use interrupt::InterruptPin;
+pub use interrupt_pin::InterruptPin;
 use self_test::SelfTest;
 use stampfly_types::{Duration, Instant};
 

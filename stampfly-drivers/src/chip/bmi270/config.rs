@@ -1,0 +1,49 @@
+//! What a BMI270 is told: full scales and rate. How the registers say it is in [`codec`](super::codec).
+
+/// What the chip is told to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// Full scale of the accelerometer.
+    pub accel_range: AccelRange,
+    /// Full scale of the gyroscope.
+    pub gyro_range: GyroRange,
+    /// Samples per second as delivered.
+    pub rate: Rate,
+}
+
+impl Default for Config {
+    /// ±8 g, ±2000 °/s, 400 Hz.
+    fn default() -> Self {
+        Self { accel_range: AccelRange::G8, gyro_range: GyroRange::Dps2000, rate: Rate::Hz400 }
+    }
+}
+
+/// Full scale of the accelerometer, register 0x41.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum AccelRange {
+    G2,
+    G4,
+    G8,
+    G16,
+}
+
+/// Full scale of the gyroscope, °/s, register 0x43.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum GyroRange {
+    Dps125,
+    Dps250,
+    Dps500,
+    Dps1000,
+    Dps2000,
+}
+
+/// Samples per second as delivered. The chip samples four times as often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Rate {
+    Hz400,
+    Hz200,
+    Hz100,
+}
