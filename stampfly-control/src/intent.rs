@@ -14,7 +14,7 @@
 //! Write a control law against [`Intent`] and it behaves like the others in every mode and every failure.
 
 use stampfly_types::messages::{
-    FlightMode, FlightPhase, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity,
+    FlightMode, FlightPhase, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 use stampfly_types::{Quat, Vec3};
 
@@ -212,11 +212,6 @@ fn usable_axes(path: &Setpoint) -> SetpointAxes {
         axes = axes.without(SetpointAxes::YAW | SetpointAxes::YAW_RATE);
     }
     axes
-}
-
-/// A stick within its range; a stick that is no number is at rest.
-fn stick(value: f32) -> f32 {
-    if value.is_finite() { value.clamp(-1.0, 1.0) } else { 0.0 }
 }
 
 fn is_finite(vector: &Vec3) -> bool {

@@ -5,7 +5,29 @@ mod made_up;
 use serde_json::Value;
 use stampfly_host::{Report, report::Metric};
 use stampfly_lab::Flight;
-use stampfly_types::{Instant, messages::PowerData};
+use stampfly_rover::simulation::Rover;
+use stampfly_sim::vehicle::Vehicle;
+use stampfly_types::{Instant, message, messages::PowerData};
+
+message! {
+    /// What every logged topic has beside its message.
+    struct Count {
+        /// Number of the sample.
+        generation: u32,
+    }
+}
+
+message! {
+    /// A vehicle on level ground.
+    struct OnGround {
+        /// Forward of the start.
+        x: f32 ["m"],
+        /// Left of the start.
+        y: f32 ["m"],
+        /// Counter-clockwise.
+        yaw: f32 ["rad"],
+    }
+}
 
 fn page(flight: &Flight) -> String {
     Report {
@@ -104,6 +126,35 @@ fn what_a_flight_does_not_have_is_left_out() {
         flight.push("sensor_power", Instant::from_millis(step * 100), &power);
     }
     assert_eq!(panels(&data(&page(&flight))), ["Battery/Voltage"], "a column without one number is no plot");
+}
+
+#[test]
+fn a_topic_without_a_place_gets_a_panel_per_unit() {
+    let mut flight = Flight::default();
+    for step in 0..10 {
+        let at = Instant::from_millis(step * 100);
+        flight.push("spare_power", at, &PowerData { voltage: 4.0, current: 1.0, power: 4.0 });
+        // What a replay needs is no plot.
+        flight.push("activation_spare", at, &Count { generation: step as u32 });
+        flight.push("spare_count", at, &Count { generation: step as u32 });
+    }
+    let panels = panels(&data(&page(&flight)));
+    assert_eq!(panels, ["Topics/spare power", "Topics/spare power", "Topics/spare power"]);
+}
+
+#[test]
+fn a_vehicle_in_a_plane_is_in_the_scene() {
+    let mut flight = Flight::default();
+    for step in 0..10u8 {
+        let state = OnGround { x: f32::from(step), y: 1.0, yaw: 0.5 };
+        flight.push("vehicle_state", Instant::from_millis(u64::from(step) * 100), &state);
+    }
+    let report =
+        |page| Report { title: String::new(), subtitle: String::new(), metrics: vec![], page, flight: &flight };
+    let data = data(&report(&Rover::PAGE).html());
+    let rover = &data["scene"][0];
+    assert_eq!(rover["role"], "truth");
+    assert!(rover["position"].is_array() && rover["attitude"].is_array(), "{rover}");
 }
 
 #[test]

@@ -16,7 +16,7 @@
 //! document of the ecosystem has sticks from 0 to 1000; no transmitter sends them.
 
 use crate::{Address, checksum};
-use stampfly_types::messages::{FlightMode, PilotInput};
+use stampfly_types::messages::{FlightMode, PilotInput, stick};
 
 const CENTRE: u16 = 2048;
 const MAX: u16 = 4095;
@@ -215,7 +215,7 @@ fn share(counts: u16) -> f32 {
 }
 
 fn counts(share: f32) -> u16 {
-    let share = if share.is_finite() { share.clamp(-1.0, 1.0) } else { 0.0 };
+    let share = stick(share);
     let steps = share * f32::from(if share > 0.0 { MAX - CENTRE } else { CENTRE });
     // Between 0 and 4095; the half rounds, because `as` cuts off.
     (f32::from(CENTRE) + steps + 0.5) as u16

@@ -3,7 +3,7 @@
 //! A pilot who moves a stick has the vehicle, at once, and keeps it: guidance does not take it back by itself but has
 //! to be given a new command. Without a fresh frame from anybody the set-point is the failsafe's: level, no climb.
 
-use stampfly_types::messages::{CommandSetpoint, CommandSource, PilotInput};
+use stampfly_types::messages::{CommandSetpoint, CommandSource, PilotInput, stick};
 use stampfly_types::{Duration, Instant};
 
 /// Limits of the arbitration.
@@ -54,12 +54,11 @@ impl Authority {
 
     /// A frame from the pilot. Sticks that are not finite count as centred; others are clamped to ±1.
     pub fn pilot(&mut self, at: Instant, input: &PilotInput) {
-        let clean = |stick: f32| if stick.is_finite() { stick.clamp(-1.0, 1.0) } else { 0.0 };
         let input = PilotInput {
-            roll: clean(input.roll),
-            pitch: clean(input.pitch),
-            yaw: clean(input.yaw),
-            throttle: clean(input.throttle),
+            roll: stick(input.roll),
+            pitch: stick(input.pitch),
+            yaw: stick(input.yaw),
+            throttle: stick(input.throttle),
             ..*input
         };
         let deflected =

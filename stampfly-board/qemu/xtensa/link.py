@@ -97,6 +97,16 @@ def compile_module(bitcode, stem):
     return object_file
 
 
+def place_functions(assembly, script):
+    """Writes the linker script's lines that put each function after its literals, within the reach of its loads."""
+    with open(assembly) as file:
+        functions = dict.fromkeys(re.findall(r"^\t\.section\t\.text\.([^\s,]+)", file.read(), re.MULTILINE))
+    with open(script, "w") as file:
+        for function in functions:
+            # Code has any length; literals are words.
+            file.write(f'. = ALIGN(4); *(".literal.{function}") *(".text.{function}")\n')
+
+
 def main(arguments):
     output, scripts, objects, libraries = None, [], [], []
     arguments = iter(arguments)
@@ -131,11 +141,12 @@ def main(arguments):
     run("opt-22", "-passes=internalize,globaldce,default<O3>", "--internalize-public-api-list=main,abort", linked,
         "-o", optimised)
     code = compile_module(optimised, f"{folder}/program")
+    place_functions(f"{folder}/program.s", f"{folder}/functions.ld")
     run("llvm-ar-22", "rcs", f"{folder}/libbuiltins.a",
         *[compile_module(path, f"{folder}/builtin{number}") for number, path in enumerate(builtins)])
     # rustc's own list of symbols is for a linker that keeps unused ones.
     native = [path for path in native if not path.endswith("symbols.o")]
-    run("xtensa-lx106-elf-ld", *scripts, "--gc-sections", "-o", output, *native, code, f"{folder}/libbuiltins.a")
+    run("xtensa-lx106-elf-ld", "-L", folder, *scripts, "--gc-sections", "-o", output, *native, code, f"{folder}/libbuiltins.a")
 
 
 main(sys.argv[1:])

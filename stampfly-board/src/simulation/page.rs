@@ -1,6 +1,6 @@
 //! What a page about a flight of the StampFly shows.
 
-use stampfly_sim::vehicle::{Body, Observer, Page, PanelSpec, Pick};
+use stampfly_sim::vehicle::{Body, Motion, Observer, Page, PanelSpec, Pick};
 
 const DEGREES: f64 = 180.0 / core::f64::consts::PI;
 const XYZ: [&str; 3] = ["x", "y", "z"];
@@ -8,9 +8,9 @@ const XYZ: [&str; 3] = ["x", "y", "z"];
 /// Plots, states and body of the StampFly.
 pub const PAGE: Page = Page {
     observers: &[
-        Observer { topic: "estimate_state", role: "estimate", name: "estimate" },
-        Observer { topic: "truth", role: "truth", name: "truth" },
-        Observer { topic: "device", role: "device", name: "on board" },
+        Observer { topic: "estimate_state", role: "estimate", name: "estimate", motion: Motion::Space },
+        Observer { topic: "truth", role: "truth", name: "truth", motion: Motion::Space },
+        Observer { topic: "device", role: "device", name: "on board", motion: Motion::Space },
     ],
     setpoint: Some("setpoint"),
     panels: &[

@@ -16,7 +16,7 @@
 
 use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, LandDetected,
-    Setpoint, SetpointAxes, StateEstimate, Validity,
+    Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 use stampfly_types::{Duration, Instant, Vec3, frame, math};
 
@@ -462,9 +462,4 @@ fn known_horizontally(input: &NavigatorInput<'_>) -> SetpointAxes {
     } else {
         SetpointAxes::NONE
     }
-}
-
-/// A stick within its range; a stick that is no number is at rest.
-fn stick(value: f32) -> f32 {
-    if value.is_finite() { value.clamp(-1.0, 1.0) } else { 0.0 }
 }

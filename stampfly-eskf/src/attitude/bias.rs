@@ -133,10 +133,11 @@ impl GyroBias {
     fn correct(&mut self, config: &AttitudeConfig, row: &Vec3, measured: f32, noise: f32) {
         let spread = self.covariance * row;
         let gain = spread / (row.dot(&spread) + noise);
-        let limit = config.bias_limit;
-        self.value += gain * (measured - row.dot(&self.value)).clamp(-limit, limit);
+        // Not `clamp`, which panics when a configured limit is negative or no number.
+        let limited = |part: f32| part.max(-config.bias_limit).min(config.bias_limit);
+        self.value += gain * limited(measured - row.dot(&self.value));
         self.covariance -= gain * spread.transpose();
-        let off = (self.value - self.calibrated).map(|part| part.clamp(-limit, limit));
+        let off = (self.value - self.calibrated).map(limited);
         self.value = self.calibrated + off;
     }
 }

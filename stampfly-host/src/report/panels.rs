@@ -5,9 +5,10 @@
 use super::grid::{Channel, Grid};
 use serde::Serialize;
 use stampfly_lab::flight::{Column, Flight, Series};
-use stampfly_sim::vehicle::{Observer, Page, PanelSpec, Pick};
+use stampfly_log::trace::TOPIC_PREFIX;
+use stampfly_sim::vehicle::{Motion, Observer, Page, PanelSpec, Pick};
 use stampfly_types::messages::SetpointAxes;
-use stampfly_types::{Quat, frame};
+use stampfly_types::{Quat, frame, math};
 
 /// One plot.
 #[derive(Serialize)]
@@ -58,6 +59,8 @@ pub(super) struct Builder<'a> {
 }
 
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+/// The column that numbers a topic's samples.
+const GENERATION: &str = "generation";
 
 impl<'a> Builder<'a> {
     pub(super) fn new(flight: &'a Flight, page: &'static Page, grid: Grid) -> Self {
@@ -122,7 +125,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A plot per topic and unit of everything that the vehicle's page does not mention.
+    /// A plot per topic and unit of everything that the vehicle's page does not mention. What only a replay needs is left
+    /// out: the records of activations, and the number of each sample.
     fn unmentioned(&mut self) {
         let page = self.page;
         let mentioned = |topic: &str| {
@@ -133,12 +137,14 @@ impl<'a> Builder<'a> {
                 || page.alerts.is_some_and(|(of, _)| of == topic)
         };
         let flight = self.flight;
-        for (topic, series) in flight.topics.iter().filter(|(topic, _)| !mentioned(topic)) {
-            let mut units: Vec<String> = series.columns.iter().map(|column| unit_of(series, column)).collect();
+        let unmentioned = |topic: &str| !mentioned(topic) && !topic.starts_with(TOPIC_PREFIX);
+        for (topic, series) in flight.topics.iter().filter(|(topic, _)| unmentioned(topic)) {
+            let columns = || series.columns.iter().filter(|column| column.name != GENERATION);
+            let mut units: Vec<String> = columns().map(|column| unit_of(series, column)).collect();
             units.sort();
             units.dedup();
             for unit in units {
-                let columns = series.columns.iter().filter(|column| unit_of(series, column) == unit).enumerate();
+                let columns = columns().filter(|column| unit_of(series, column) == unit).enumerate();
                 let columns: Vec<_> = columns.map(|(role, column)| (role, column.name.clone())).collect();
                 let lines = columns
                     .into_iter()
@@ -209,7 +215,7 @@ impl<'a> Builder<'a> {
         for (axis, title) in ["North", "East", "Up"].into_iter().enumerate() {
             let factor = if axis == 2 { -1.0 } else { 1.0 };
             let mut lines = Vec::new();
-            for Observer { topic, role, name } in self.page.observers {
+            for Observer { topic, role, name, .. } in self.page.observers {
                 lines.push(self.column((topic, &format!("{field}[{axis}]")), name, role, factor, Pick::Newest));
             }
             if let Some(commanded) = &commanded {
@@ -235,14 +241,16 @@ impl<'a> Builder<'a> {
     /// Who moves through space, the estimate first.
     pub(super) fn scene(&mut self) -> Vec<Actor> {
         let mut actors = Vec::new();
-        for Observer { topic, role, .. } in self.page.observers {
+        for Observer { topic, role, motion, .. } in self.page.observers {
             let Some(series) = self.series(topic) else { continue };
-            let position = series
-                .columns_of::<3>("position")
-                .map(|columns| columns.map(|c| self.grid.resample(series, c, Pick::Newest)));
-            let attitude = series
-                .columns_of::<4>("attitude")
-                .map(|columns| columns.map(|c| self.grid.resample(series, c, Pick::Newest)));
+            let (position, attitude) = match motion {
+                Motion::Space => {
+                    let resampled = |column| self.grid.resample(series, column, Pick::Newest);
+                    let position = series.columns_of::<3>("position").map(|columns| columns.map(resampled));
+                    (position, series.columns_of::<4>("attitude").map(|columns| columns.map(resampled)))
+                }
+                Motion::Plane => self.in_plane(series).unzip(),
+            };
             let position = position.and_then(|columns| self.all(columns));
             let attitude = attitude.and_then(|columns| self.all(columns));
             if position.is_some() || attitude.is_some() {
@@ -254,6 +262,23 @@ impl<'a> Builder<'a> {
             actors.push(Actor { role: "setpoint", position: Some(position), attitude: None });
         }
         actors
+    }
+
+    /// Position and attitude, as a vehicle in space would have them, of one that moves in a plane.
+    fn in_plane(&self, series: &Series) -> Option<([Vec<f64>; 3], [Vec<f64>; 4])> {
+        let column = |name| Some(self.grid.resample(series, series.column(name)?, Pick::Newest));
+        let (x, y, yaw) = (column("x")?, column("y")?, column("yaw")?);
+        // Left and counter-clockwise are positive there, right and clockwise here.
+        let right = y.iter().map(|y| -y).collect();
+        let level = vec![0.0; x.len()];
+        let (sin, cos) = yaw
+            .iter()
+            .map(|yaw| {
+                let (sin, cos) = math::sin_cos((-0.5 * yaw) as f32);
+                (f64::from(sin), f64::from(cos))
+            })
+            .unzip();
+        Some(([x, right, level.clone()], [cos, level.clone(), level, sin]))
     }
 
     /// All of these channels, or none.

@@ -23,7 +23,7 @@ mod witness;
 
 pub use executor::{Ended, FlightOptions, fly};
 pub use live::{Link, Live};
-pub use page::{Body, Observer, Page, PanelSpec, Pick};
+pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
 pub use scenario::Scenario;
 pub use scripted::{Following, Script, Scripted};
 pub use witness::Witness;

@@ -6,7 +6,7 @@
 /// What a page shows of a vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Page {
-    /// Topics that say where the vehicle is, the main one first: columns `position`, `velocity`, `attitude`.
+    /// Topics that say where the vehicle is, the main one first.
     pub observers: &'static [Observer],
     /// The topic that says where it should be; its column `axes` masks the others.
     pub setpoint: Option<&'static str>,
@@ -35,6 +35,17 @@ pub struct Observer {
     pub role: &'static str,
     /// For the legend.
     pub name: &'static str,
+    /// How its columns say it.
+    pub motion: Motion,
+}
+
+/// How a topic says where the vehicle is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Columns `position`, `velocity` (north, east, down) and `attitude` (body to earth).
+    Space,
+    /// A vehicle on level ground: columns `x` forward of the start, `y` left of it, `yaw` counter-clockwise.
+    Plane,
 }
 
 /// One plot.

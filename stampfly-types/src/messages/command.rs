@@ -26,6 +26,18 @@ message! {
     }
 }
 
+/// A stick as it may be used: within ±1, and centred when it is no number. Call it before using a stick: a radio, a program or a
+/// log may have sent anything.
+///
+/// ```
+/// use stampfly_types::messages::stick;
+/// assert_eq!([0.3, -1.5, f32::NAN].map(stick), [0.3, -1.0, 0.0]);
+/// ```
+#[must_use]
+pub fn stick(deflection: f32) -> f32 {
+    if deflection.is_finite() { deflection.clamp(-1.0, 1.0) } else { 0.0 }
+}
+
 message_enum! {
     /// What a guided command asks for.
     pub enum GuidedKind {

@@ -18,7 +18,7 @@ pub mod system;
 
 pub use command::{
     ButtonEvent, ButtonGesture, CommandSetpoint, CommandSource, GuidedCommand, GuidedKind, PilotInput, Setpoint,
-    SetpointAxes,
+    SetpointAxes, stick,
 };
 pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
 pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};

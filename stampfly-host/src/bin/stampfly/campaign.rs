@@ -10,6 +10,7 @@ use stampfly_host::campaign::{self, Flight, spreads, workers};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
 use stampfly_sim::vehicle::{Vehicle, Witness};
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -90,7 +91,11 @@ fn print<V: Vehicle, W>(
     if options.scene.json {
         let mut object = Map::new();
         object.insert("flights".into(), json!(all));
-        object.insert("landed".into(), json!(succeeded));
+        object.insert("succeeded".into(), json!(succeeded));
+        // Such as `landed`: in how many flights it held.
+        for (fact, held) in facts(flights) {
+            object.insert(fact.into(), json!(held));
+        }
         object.insert("failed_seeds".into(), json!(failed));
         for (name, _, spread) in spreads(flights) {
             object.insert(name.into(), json!(spread));
@@ -118,6 +123,15 @@ fn print<V: Vehicle, W>(
     if let Some(summary) = consistency {
         print_consistency(summary);
     }
+}
+
+/// How many flights each of the vehicle's yes-or-no results held in.
+fn facts<V: Vehicle, W>(flights: &[Flight<V, W>]) -> BTreeMap<&'static str, usize> {
+    let mut counts = BTreeMap::new();
+    for (fact, holds) in flights.iter().flat_map(|flight| flight.flown.outcome.facts()) {
+        *counts.entry(fact).or_default() += usize::from(holds);
+    }
+    counts
 }
 
 fn print_consistency(summary: &Summary) {

@@ -5,6 +5,7 @@
 
 mod drive;
 mod link;
+mod page;
 
 pub use drive::{Drive, Driver, Setup};
 
@@ -28,7 +29,7 @@ const STREAM: u64 = 1_100;
 
 impl Vehicle for Rover {
     const NAME: &'static str = "rover";
-    const PAGE: Page = Page { bands: &[("safety_status", "system_state", "State")], ..Page::EMPTY };
+    const PAGE: Page = page::PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
     type Surroundings = Scripted<Setup>;
