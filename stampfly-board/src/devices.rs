@@ -24,9 +24,16 @@ use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
-use stampfly_drivers::chip::{AxisMap, I2cRegisters, SpiRegisters};
+use stampfly_drivers::chip::{Axis, AxisMap, I2cRegisters, SpiRegisters};
 use stampfly_drivers::slot::Rhythm;
 use stampfly_types::Duration;
+
+/// How the inertial sensor is soldered, upside down: body = (y, x, −z) of the chip.
+pub const IMU_AXES: AxisMap = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
+/// How the flow sensor is soldered: body = (−y, x) of the chip.
+pub const FLOW_AXES: AxisMap = AxisMap::new(Axis::MinusY, Axis::PlusX, Axis::PlusZ).expect("a rotation");
+/// How the magnetometer is soldered: body = (−y, x, z) of the chip.
+pub const MAGNETOMETER_AXES: AxisMap = AxisMap::new(Axis::MinusY, Axis::PlusX, Axis::PlusZ).expect("a rotation");
 
 /// The rhythm of the inertial sensor on the bus it shares.
 pub const RHYTHM: Rhythm = Rhythm::HZ_400;
@@ -35,17 +42,17 @@ pub const LONGEST_FLOW: Duration = Duration::from_micros(200);
 
 /// The inertial sensor. `configuration_file` is Bosch's, 8 kB.
 pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, configuration_file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
-    Bmi270::spi(spi, clock, configuration_file, AxisMap::STAMPFLY_IMU, bmi270::Config::default())
+    Bmi270::spi(spi, clock, configuration_file, IMU_AXES, bmi270::Config::default())
 }
 
 /// The flow sensor.
 pub fn flow<S: SpiDevice, T: Timebase>(spi: S, clock: T) -> Pmw3901<S, T> {
-    Pmw3901::new(spi, clock, AxisMap::STAMPFLY_FLOW, pmw3901::Config::default())
+    Pmw3901::new(spi, clock, FLOW_AXES, pmw3901::Config::default())
 }
 
 /// The magnetometer.
 pub fn magnetometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmm150<I2cRegisters<I>, T> {
-    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, AxisMap::STAMPFLY_MAGNETOMETER, bmm150::Config::default())
+    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, MAGNETOMETER_AXES, bmm150::Config::default())
 }
 
 /// The barometer.
@@ -76,4 +83,16 @@ pub fn range_ahead<I: I2c, X: OutputPin, T: Timebase>(
     clock: T,
 ) -> Vl53l3cx<'_, I, X, T> {
     Vl53l3cx::new(i2c, shutdown, boot, 0x31, clock, vl53l3cx::Config::default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::Vec3;
+
+    #[test]
+    fn a_level_vehicle_at_rest_feels_its_weight_along_body_z() {
+        // The chip, upside down, sees +1 g: specific force points up, body z is down.
+        assert_eq!(IMU_AXES.to_body(Vec3::new(0.0, 0.0, 9.81)), Vec3::new(0.0, 0.0, -9.81));
+    }
 }

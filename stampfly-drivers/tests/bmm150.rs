@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{Access, AnyChip, Clock, Fault, I2cBus};
+use common::{AXES, Access, AnyChip, Clock, Fault, I2cBus};
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmm150::{Bmm150, Config, Preset, Rate};
-use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters};
+use stampfly_drivers::chip::{ChipError, I2cRegisters};
 use stampfly_drivers::{Magnetometer, Timebase};
 use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
@@ -98,7 +98,7 @@ fn bench(config: Config) -> (Clock, Shared, Bmm150<I2cRegisters<I2cBus<AnyChip>>
     let shared = chip.clone();
     let access: AnyChip = Box::new(move |access| shared.borrow_mut().access(access));
     let bus = I2cBus { address: 0x10, clock: clock.clone(), chip: access };
-    let driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock.clone(), AxisMap::STAMPFLY_MAGNETOMETER, config);
+    let driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock.clone(), AXES, config);
     (clock, chip, driver)
 }
 
@@ -108,8 +108,8 @@ fn every_sample_comes_once_in_microtesla_and_body_axes() {
         let (_, chip, mut compass) = bench(Config::default());
         chip.borrow_mut().period = 40_000 * percent / 100;
         let first = block_on(compass.next()).expect("a sample");
-        // Chip (36.33, 72.66, 168.16) µT; body = (−y, x, z).
-        let expected = stampfly_types::Vec3::new(-72.656, 36.328, 168.157);
+        // Chip (36.33, 72.66, 168.16) µT; body = (z, −x, −y).
+        let expected = stampfly_types::Vec3::new(168.157, -36.328, -72.656);
         assert!((first.data.field - expected).norm() < 0.02, "{}", first.data.field);
         assert_eq!((chip.borrow().registers[0x4C], chip.borrow().registers[0x51..0x53].to_vec()), (0x30, vec![4, 14]));
         let mut before = first.at;

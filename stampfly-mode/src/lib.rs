@@ -18,6 +18,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod arm_switch;
 pub mod arming;
 pub mod authority;
 pub mod button;

@@ -35,12 +35,16 @@ pub trait Field: Copy {
     fn read(words: &[u32]) -> Option<Self>;
 }
 
-macro_rules! one_word {
-    ($($type:ty, $kind:ident, |$value:ident| $write:expr, |$word:ident| $read:expr;)*) => { $(
-        impl Field for $type {
-            const KIND: FieldKind = FieldKind::$kind;
-            const COUNT: usize = 1;
-            const SIZE: usize = 1;
+/// Implements [`Field`] for a type that is always the same number of words: kind and number of its elements, the value as
+/// words, the words as a value. For this file and the macros that declare types with names.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __field {
+    ($Type:ty, $kind:expr, $count:literal, |$value:ident| $write:expr, |$words:pat_param| $read:expr) => {
+        impl $crate::Field for $Type {
+            const KIND: $crate::FieldKind = $kind;
+            const COUNT: usize = $count;
+            const SIZE: usize = $count * Self::KIND.size();
             #[inline]
             fn initial() -> Self {
                 Self::default()
@@ -48,64 +52,65 @@ macro_rules! one_word {
             #[inline]
             fn write(&self, words: &mut [u32]) {
                 let $value = *self;
-                if let Some(word) = words.first_mut() { *word = $write }
-            }
-            #[inline]
-            fn read(words: &[u32]) -> Option<Self> {
-                let $word = *words.first()?;
-                $read
-            }
-        }
-    )* };
-}
-
-one_word! {
-    f32, F32, |v| v.to_bits(), |w| Some(f32::from_bits(w));
-    u32, U32, |v| v, |w| Some(w);
-    i32, I32, |v| v.cast_unsigned(), |w| Some(w.cast_signed());
-    u16, U16, |v| u32::from(v), |w| u16::try_from(w).ok();
-    i16, I16, |v| i32::from(v).cast_unsigned(), |w| i16::try_from(w.cast_signed()).ok();
-    u8, U8, |v| u32::from(v), |w| u8::try_from(w).ok();
-    i8, I8, |v| i32::from(v).cast_unsigned(), |w| i8::try_from(w.cast_signed()).ok();
-    bool, Bool, |v| u32::from(v), |w| match w { 0 => Some(false), 1 => Some(true), _ => None };
-}
-
-macro_rules! two_words {
-    ($($type:ty, $kind:ident, |$value:ident| $write:expr, |$bits:ident| $read:expr;)*) => { $(
-        impl Field for $type {
-            const KIND: FieldKind = FieldKind::$kind;
-            const COUNT: usize = 1;
-            const SIZE: usize = 2;
-            #[inline]
-            fn initial() -> Self {
-                Self::default()
-            }
-            #[inline]
-            fn write(&self, words: &mut [u32]) {
-                let $value = *self;
-                let bits: u64 = $write;
-                if let [low, high, ..] = words {
-                    *low = bits as u32;
-                    *high = (bits >> 32) as u32;
+                if let Some(place) = words.first_chunk_mut() {
+                    *place = $write;
                 }
             }
             #[inline]
             fn read(words: &[u32]) -> Option<Self> {
-                let [low, high, ..] = words else { return None };
-                let $bits = u64::from(*low) | u64::from(*high) << 32;
-                Some($read)
+                let $words = *words.first_chunk()?;
+                $read
             }
         }
-    )* };
+    };
 }
 
-two_words! {
-    f64, F64, |v| v.to_bits(), |bits| f64::from_bits(bits);
-    u64, U64, |v| v, |bits| bits;
-    i64, I64, |v| v.cast_unsigned(), |bits| bits.cast_signed();
-    Instant, U64, |v| v.as_micros(), |bits| Instant::from_micros(bits);
-    Duration, U64, |v| v.as_micros(), |bits| Duration::from_micros(bits);
+/// Scalars: a list of what [`__field!`] takes, for one element.
+macro_rules! scalars {
+    ($($Type:ty, $kind:ident, |$value:ident| $write:expr, |$words:pat_param| $read:expr;)*) => {
+        $(crate::__field!($Type, FieldKind::$kind, 1, |$value| $write, |$words| $read);)*
+    };
 }
+
+scalars! {
+    f32, F32, |v| [v.to_bits()], |[w]| Some(f32::from_bits(w));
+    u32, U32, |v| [v], |[w]| Some(w);
+    i32, I32, |v| [v.cast_unsigned()], |[w]| Some(w.cast_signed());
+    u16, U16, |v| [u32::from(v)], |[w]| u16::try_from(w).ok();
+    i16, I16, |v| [i32::from(v).cast_unsigned()], |[w]| i16::try_from(w.cast_signed()).ok();
+    u8, U8, |v| [u32::from(v)], |[w]| u8::try_from(w).ok();
+    i8, I8, |v| [i32::from(v).cast_unsigned()], |[w]| i8::try_from(w.cast_signed()).ok();
+    bool, Bool, |v| [u32::from(v)], |[w]| match w { 0 => Some(false), 1 => Some(true), _ => None };
+    f64, F64, |v| split(v.to_bits()), |w| Some(f64::from_bits(join(w)));
+    u64, U64, |v| split(v), |w| Some(join(w));
+    i64, I64, |v| split(v.cast_unsigned()), |w| Some(join(w).cast_signed());
+    Instant, U64, |v| split(v.as_micros()), |w| Some(Instant::from_micros(join(w)));
+    Duration, U64, |v| split(v.as_micros()), |w| Some(Duration::from_micros(join(w)));
+}
+
+/// The low word, then the high one.
+#[inline]
+const fn split(bits: u64) -> [u32; 2] {
+    [bits as u32, (bits >> 32) as u32]
+}
+
+#[inline]
+const fn join([low, high]: [u32; 2]) -> u64 {
+    low as u64 | (high as u64) << 32
+}
+
+crate::__field!(Vec3, FieldKind::F32, 3, |v| [v.x, v.y, v.z].map(f32::to_bits), |words| {
+    let [x, y, z] = <[u32; 3]>::map(words, f32::from_bits);
+    Some(Vec3::new(x, y, z))
+});
+
+// Stored w, x, y, z. Refused when the norm is not within 1 % of one, so that a broken log cannot bring in a unit quaternion
+// that is none.
+crate::__field!(Quat, FieldKind::F32, 4, |v| [v.w, v.i, v.j, v.k].map(f32::to_bits), |words| {
+    let [w, x, y, z] = <[u32; 4]>::map(words, f32::from_bits);
+    let norm_squared = w * w + x * x + y * y + z * z;
+    (norm_squared - 1.0).abs().lt(&0.02).then(|| Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
+});
 
 impl<T: Field, const N: usize> Field for [T; N] {
     const KIND: FieldKind = T::KIND;
@@ -164,59 +169,6 @@ impl<T: Field> Field for Option<T> {
             true => T::read(value).map(Some),
             false => value.iter().all(|word| *word == 0).then_some(None),
         }
-    }
-}
-
-impl Field for Vec3 {
-    const KIND: FieldKind = FieldKind::F32;
-    const COUNT: usize = 3;
-    const SIZE: usize = 3;
-    #[inline]
-    fn initial() -> Self {
-        Self::default()
-    }
-    #[inline]
-    fn write(&self, words: &mut [u32]) {
-        if let [x, y, z, ..] = words {
-            *x = self.x.to_bits();
-            *y = self.y.to_bits();
-            *z = self.z.to_bits();
-        }
-    }
-    #[inline]
-    fn read(words: &[u32]) -> Option<Self> {
-        match words {
-            [x, y, z, ..] => Some(Vec3::new(f32::from_bits(*x), f32::from_bits(*y), f32::from_bits(*z))),
-            _ => None,
-        }
-    }
-}
-
-/// Stored w, x, y, z. Refused when the norm is not within 1 % of one, so that a broken log cannot bring in a unit
-/// quaternion that is none.
-impl Field for Quat {
-    const KIND: FieldKind = FieldKind::F32;
-    const COUNT: usize = 4;
-    const SIZE: usize = 4;
-    #[inline]
-    fn initial() -> Self {
-        Self::default()
-    }
-    #[inline]
-    fn write(&self, words: &mut [u32]) {
-        if let [w, x, y, z, ..] = words {
-            *w = self.w.to_bits();
-            *x = self.i.to_bits();
-            *y = self.j.to_bits();
-            *z = self.k.to_bits();
-        }
-    }
-    #[inline]
-    fn read(words: &[u32]) -> Option<Self> {
-        let [w, x, y, z, ..] = words else { return None };
-        let [w, x, y, z] = [*w, *x, *y, *z].map(f32::from_bits);
-        let norm_squared = w * w + x * x + y * y + z * z;
-        (norm_squared - 1.0).abs().lt(&0.02).then(|| Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
     }
 }
 

@@ -52,23 +52,13 @@ macro_rules! message_enum {
             }
         }
 
-        impl $crate::Field for $Name {
-            const KIND: $crate::FieldKind = $crate::FieldKind::Enum(Self::NAMES);
-            const COUNT: usize = 1;
-            const SIZE: usize = 1;
-            #[inline]
-            fn initial() -> Self {
-                Self::default()
-            }
-            #[inline]
-            fn write(&self, words: &mut [u32]) {
-                if let Some(word) = words.first_mut() { *word = *self as u32 }
-            }
-            #[inline]
-            fn read(words: &[u32]) -> Option<Self> {
-                Self::from_number(*words.first()?)
-            }
-        }
+        $crate::__field!(
+            $Name,
+            $crate::FieldKind::Enum($Name::NAMES),
+            1,
+            |variant| [variant as u32],
+            |[number]| Self::from_number(number)
+        );
 
         $crate::__serde_field!($Name);
     };
@@ -153,24 +143,13 @@ macro_rules! message_flags {
             fn bitor_assign(&mut self, other: Self) { *self = self.with(other) }
         }
 
-        impl $crate::Field for $Name {
-            const KIND: $crate::FieldKind = $crate::FieldKind::Flags(Self::NAMES);
-            const COUNT: usize = 1;
-            const SIZE: usize = 1;
-            #[inline]
-            fn initial() -> Self {
-                Self::default()
-            }
-            #[inline]
-            fn write(&self, words: &mut [u32]) {
-                if let Some(word) = words.first_mut() { *word = self.0 }
-            }
-            #[inline]
-            fn read(words: &[u32]) -> Option<Self> {
-                let bits = *words.first()?;
-                (bits & !Self::ALL.0 == 0).then_some(Self(bits))
-            }
-        }
+        $crate::__field!(
+            $Name,
+            $crate::FieldKind::Flags($Name::NAMES),
+            1,
+            |set| [set.0],
+            |[bits]| (bits & !Self::ALL.0 == 0).then_some(Self(bits))
+        );
 
         $crate::__serde_field!($Name);
     };

@@ -21,7 +21,7 @@ const MICROS_PER_SECOND: u64 = 1_000_000;
 
 /// A point in time: microseconds since power-on.
 ///
-/// The difference of two instants is only offered as [`Instant::since`], which saturates: a stamp that lies in the
+/// Counted as the [`Duration`] since power-on. The difference of two instants is only offered as [`Instant::since`], which saturates: a stamp that lies in the
 /// future is zero old instead of 584,000 years.
 ///
 /// ```
@@ -50,42 +50,42 @@ const MICROS_PER_SECOND: u64 = 1_000_000;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Instant(u64);
+pub struct Instant(Duration);
 
 impl Instant {
     /// Power-on.
-    pub const ZERO: Self = Self(0);
+    pub const ZERO: Self = Self(Duration::ZERO);
     /// The last instant that can be told, 584,000 years after power-on: "never" for a deadline.
-    pub const MAX: Self = Self(u64::MAX);
+    pub const MAX: Self = Self(Duration::MAX);
 
     /// The instant so many microseconds after power-on.
     #[must_use]
     pub const fn from_micros(micros: u64) -> Self {
-        Self(micros)
+        Self(Duration::from_micros(micros))
     }
 
     /// The instant so many milliseconds after power-on.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
-        Self(millis.saturating_mul(MICROS_PER_MILLI))
+        Self(Duration::from_millis(millis))
     }
 
     /// The instant so many seconds after power-on.
     #[must_use]
     pub const fn from_secs(secs: u64) -> Self {
-        Self(secs.saturating_mul(MICROS_PER_SECOND))
+        Self(Duration::from_secs(secs))
     }
 
     /// Microseconds since power-on.
     #[must_use]
     pub const fn as_micros(self) -> u64 {
-        self.0
+        self.0.as_micros()
     }
 
     /// The time from `earlier` to `self`; zero when `earlier` lies in the future.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
-        Duration(self.0.saturating_sub(earlier.0))
+        self.0.less(earlier.0)
     }
 
     /// The signed difference `self − other` in seconds.
@@ -97,7 +97,7 @@ impl Instant {
     /// Seconds since power-on with microsecond resolution, for display and logs.
     #[must_use]
     pub fn seconds_f64(self) -> f64 {
-        self.0 as f64 * 1e-6
+        self.0.seconds_f64()
     }
 }
 
@@ -183,12 +183,17 @@ impl Duration {
     pub fn seconds_f64(self) -> f64 {
         self.0 as f64 * 1e-6
     }
+
+    /// What is left of it after `other`. Operators cannot be constant.
+    const fn less(self, other: Self) -> Self {
+        Self(self.0.saturating_sub(other.0))
+    }
 }
 
 impl Add<Duration> for Instant {
     type Output = Self;
     fn add(self, duration: Duration) -> Self {
-        Self(self.0.saturating_add(duration.0))
+        Self(self.0 + duration)
     }
 }
 
@@ -202,7 +207,7 @@ impl AddAssign<Duration> for Instant {
 impl Sub<Duration> for Instant {
     type Output = Self;
     fn sub(self, duration: Duration) -> Self {
-        Self(self.0.saturating_sub(duration.0))
+        Self(self.0 - duration)
     }
 }
 
@@ -223,7 +228,7 @@ impl AddAssign for Duration {
 impl Sub for Duration {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        Self(self.0.saturating_sub(other.0))
+        self.less(other)
     }
 }
 
@@ -244,18 +249,14 @@ impl Div<u64> for Duration {
 
 impl fmt::Display for Instant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        seconds(self.0, f)
+        self.0.fmt(f)
     }
 }
 
 impl fmt::Display for Duration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        seconds(self.0, f)
+        write!(f, "{}.{:06} s", self.0 / MICROS_PER_SECOND, self.0 % MICROS_PER_SECOND)
     }
-}
-
-fn seconds(micros: u64, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    write!(f, "{}.{:06} s", micros / MICROS_PER_SECOND, micros % MICROS_PER_SECOND)
 }
 
 #[cfg(test)]

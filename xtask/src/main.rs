@@ -61,6 +61,9 @@ const STEPS: &[Step] = &[
         .accepting(&[Fix]),
     Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
     Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
+    Step::new("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)
+        .accepting(&[Fix])
+        .manual(),
 ];
 
 fn main() -> ExitCode {

@@ -5,12 +5,14 @@
 //! deviation of the acceleration's size within a line: at rest the chip's own noise, with motors or a knock on the table
 //! much more.
 
+/// How the chip is soldered on the StampFly, upside down: body = (y, x, −z) of the chip.
+const AXES: AxisMap = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
 use super::Failure;
 use super::show::{Bar, Spread, rate};
 use core::fmt::Write;
 use embedded_hal_async::spi::SpiDevice;
 use stampfly_drivers::chip::bmi270::{Bmi270, Config};
-use stampfly_drivers::chip::{AxisMap, ChipError};
+use stampfly_drivers::chip::{Axis, AxisMap, ChipError};
 use stampfly_drivers::{Imu, Timebase};
 use stampfly_eskf::attitude::Mahony;
 use stampfly_types::{Duration, frame};
@@ -47,7 +49,7 @@ pub async fn self_test<S: SpiDevice, T: Timebase>(
     configuration_file: &[u8],
     out: &mut impl Write,
 ) -> Result<bool, Failure<ChipError<S::Error>>> {
-    let mut imu = Bmi270::spi(spi, clock, configuration_file, AxisMap::STAMPFLY_IMU, Config::default());
+    let mut imu = Bmi270::spi(spi, clock, configuration_file, AXES, Config::default());
     imu.self_test().await?;
     writeln!(out, "self test of the accelerometer: passed")?;
     let passed = match imu.gyro_self_test().await {
@@ -69,7 +71,7 @@ pub async fn run<S: SpiDevice, T: Timebase>(
     configuration_file: &[u8],
     out: &mut impl Write,
 ) -> Result<Found, Failure<ChipError<S::Error>>> {
-    let mut imu = Bmi270::spi(spi, clock, configuration_file, AxisMap::STAMPFLY_IMU, Config::default());
+    let mut imu = Bmi270::spi(spi, clock, configuration_file, AXES, Config::default());
     imu.start().await?;
     writeln!(out, "BMI270 runs. Tilt it, turn it, knock on it.")?;
     writeln!(out, "   time    roll   pitch    turn  turn rate  shaking")?;

@@ -11,10 +11,12 @@ use core::f32::consts::TAU;
 use core::fmt::Write;
 use embedded_hal_async::i2c::I2c;
 use stampfly_drivers::chip::bmm150::{Bmm150, Config};
-use stampfly_drivers::chip::{AxisMap, ChipError};
+use stampfly_drivers::chip::{Axis, AxisMap, ChipError};
 use stampfly_drivers::{Magnetometer, Timebase};
 use stampfly_types::{Duration, math};
 
+/// How the chip is soldered on the StampFly: body = (−y, x, z) of the chip.
+const AXES: AxisMap = AxisMap::new(Axis::MinusY, Axis::PlusX, Axis::PlusZ).expect("a rotation");
 /// Time for a full turn.
 const TURN: Duration = Duration::from_secs(6);
 const SPAN: Duration = Duration::from_secs(10);
@@ -44,8 +46,7 @@ pub async fn self_test<I: I2c, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<(), Failure<ChipError<I::Error>>> {
-    let axes = AxisMap::STAMPFLY_MAGNETOMETER;
-    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, axes, Config::default()).self_test().await?;
+    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, AXES, Config::default()).self_test().await?;
     Ok(writeln!(out, "self test: passed")?)
 }
 
@@ -58,8 +59,7 @@ pub async fn run<I: I2c, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<Found, Failure<ChipError<I::Error>>> {
-    let axes = AxisMap::STAMPFLY_MAGNETOMETER;
-    let mut compass = Bmm150::new(i2c, Bmm150::ALL_LOW, clock, axes, Config::default());
+    let mut compass = Bmm150::new(i2c, Bmm150::ALL_LOW, clock, AXES, Config::default());
     compass.start().await?;
     writeln!(out, "BMM150 runs. Turn the level vehicle around once, within {:.0} s.", TURN.seconds())?;
     writeln!(out, "   time    forward      right       down")?;

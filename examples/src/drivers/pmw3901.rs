@@ -3,12 +3,14 @@
 //! The chip counts angles: the floor's speed is the turn rate it shows times the distance to the floor, and rotation
 //! of the vehicle is in it, too. It wants 8 cm of distance and light.
 
+/// How the chip is soldered on the StampFly: body = (−y, x) of the chip.
+const AXES: AxisMap = AxisMap::new(Axis::MinusY, Axis::PlusX, Axis::PlusZ).expect("a rotation");
 use super::Failure;
 use super::show::{Bar, Spread, rate};
 use core::fmt::Write;
 use embedded_hal_async::spi::SpiDevice;
 use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
-use stampfly_drivers::chip::{AxisMap, ChipError};
+use stampfly_drivers::chip::{Axis, AxisMap, ChipError};
 use stampfly_drivers::{OpticalFlow, Timebase};
 use stampfly_types::Duration;
 
@@ -35,7 +37,7 @@ pub async fn self_test<S: SpiDevice, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<(), Failure<ChipError<S::Error>>> {
-    Pmw3901::new(spi, clock, AxisMap::STAMPFLY_FLOW, Config::default()).self_test().await?;
+    Pmw3901::new(spi, clock, AXES, Config::default()).self_test().await?;
     Ok(writeln!(out, "self test: passed")?)
 }
 
@@ -49,7 +51,7 @@ pub async fn run<S: SpiDevice, T: Timebase>(
     out: &mut impl Write,
 ) -> Result<Found, Failure<ChipError<S::Error>>> {
     let config = Config::default();
-    let mut flow = Pmw3901::new(spi, clock, AxisMap::STAMPFLY_FLOW, config);
+    let mut flow = Pmw3901::new(spi, clock, AXES, config);
     flow.start().await?;
     writeln!(out, "PMW3901 runs. Move it over a floor with a pattern.")?;
     writeln!(out, "   time   counts forward   right   rad/s forward   right   quality")?;

@@ -6,8 +6,12 @@ use core::convert::Infallible;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::{i2c, spi};
 use stampfly_drivers::Timebase;
+use stampfly_drivers::chip::{Axis, AxisMap};
 use stampfly_types::Instant;
 use std::rc::Rc;
+
+/// How the chips are turned, no axis as in the body: body = (z, −x, −y) of the chip.
+pub const AXES: AxisMap = AxisMap::new(Axis::PlusZ, Axis::MinusX, Axis::MinusY).expect("a rotation");
 
 /// Virtual time in nanoseconds. Whoever waits moves it on, unless it is stopped: then a wait never ends.
 #[derive(Clone, Debug)]

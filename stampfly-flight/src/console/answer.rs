@@ -40,8 +40,8 @@ pub enum Request<R> {
 /// use stampfly_flight::profile::Rows;
 /// use stampfly_types::Instant;
 ///
-/// struct Rover { horn: u32 }
-/// struct NoParameters;
+/// struct Rover { horn: u32, loudness: Loudness }
+/// struct Loudness(f32);
 /// #[derive(Debug, PartialEq)]
 /// struct Honk;
 ///
@@ -57,8 +57,7 @@ pub enum Request<R> {
 ///     fn newest(&self, _: usize) -> Option<(Instant, &[u32])> { None }
 ///     fn sensors(&self) -> &[SensorLine<'_>] { &[] }
 ///     fn profile(&self) -> Rows<'_> { Rows::default() }
-///     # fn parameters(&mut self) -> &mut dyn Parameters { unimplemented!() }
-///     // fn parameters(&mut self) …: see `stampfly_flight::parameters`.
+///     fn parameters(&mut self) -> &mut dyn Parameters { &mut self.loudness }
 ///
 ///     fn parse(words: &[&str]) -> Result<Honk, CommandError> {
 ///         match words {
@@ -73,13 +72,27 @@ pub enum Request<R> {
 ///     }
 /// }
 ///
+/// impl Parameters for Loudness {
+///     fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
+///         let loudness = ParameterInfo { name: "horn.loudness", unit: "1", min: 0.0, max: 1.0, meaning: "duty" };
+///         (index == 0).then_some(loudness)
+///     }
+///     fn get(&self, index: usize) -> Option<f32> { (index == 0).then_some(self.0) }
+///     fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
+///         self.0 = if index == 0 { value } else { return Err(ParameterError::Unknown) };
+///         Ok(())
+///     }
+/// }
+///
 /// # fn main() {
-/// let (mut rover, mut reply) = (Rover { horn: 0 }, String::new());
+/// let (mut rover, mut reply) = (Rover { horn: 0, loudness: Loudness(0.5) }, String::new());
 /// assert_eq!(answer("honk", Instant::ZERO, &mut rover, &mut reply), Ok(Request::Vehicle(Honk)));
 /// assert_eq!(answer("reboot", Instant::ZERO, &mut rover, &mut reply), Ok(Request::Reboot));
 /// assert_eq!(reply, "");
 /// assert_eq!(answer("honk twice", Instant::ZERO, &mut rover, &mut reply), Ok(Request::Nothing));
 /// assert_eq!(reply, "usage: honk\r\n");
+/// assert_eq!(answer("param set horn.loudness 0.8", Instant::ZERO, &mut rover, &mut reply), Ok(Request::Nothing));
+/// assert_eq!(rover.loudness.0, 0.8);
 /// # }
 /// ```
 ///

@@ -4,12 +4,13 @@
 //! of their own. What has to agree is what is left when that is averaged away: the mean difference, within the
 //! resolution of the sensor.
 
+#[path = "../drivers/mounting.rs"]
+mod mounting;
 #[path = "../hover/pilot.rs"]
 mod pilot;
 
 use core::cell::RefCell;
 use embedded_hal::digital::OutputPin;
-use stampfly_drivers::chip::AxisMap;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
@@ -84,7 +85,7 @@ fn drivers_and_models_report_the_same_flight() {
 }
 
 fn compare(seed: u64) {
-    let config = SimulationConfig { seed, ..Default::default() };
+    let config = SimulationConfig { seed, ..SimulationConfig::example() };
     let image = stand_in_image();
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let board = Board::new(&world, &clock, &config, &image);
@@ -100,18 +101,18 @@ fn compare(seed: u64) {
     let [power_driver, power_model] = [const { RefCell::new(Series::<2>::new()) }; 2];
     let mut tasks = Tasks::new(clock.clone());
     let time = || clock.clone();
-    let driver = Bmi270::spi(board.imu, time(), &image, AxisMap::STAMPFLY_IMU, bmi270::Config::default());
+    let driver = Bmi270::spi(board.imu, time(), &image, mounting::IMU, bmi270::Config::default());
     let imu_channels = |data: stampfly_types::messages::ImuData| {
         let (a, g) = (data.accel, data.gyro);
         Some([a.x, a.y, a.z, g.x, g.y, g.z])
     };
     watch!(tasks, driver, imu_driver, imu_channels);
     watch!(tasks, imu, imu_model, imu_channels);
-    let driver = Pmw3901::new(board.flow, time(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default());
+    let driver = Pmw3901::new(board.flow, time(), mounting::FLOW, pmw3901::Config::default());
     let flow_channels = |data: stampfly_types::messages::FlowData| Some([data.delta_x, data.delta_y]);
     watch!(tasks, driver, flow_driver, flow_channels);
     watch!(tasks, flow, flow_model, flow_channels);
-    let axes = AxisMap::STAMPFLY_MAGNETOMETER;
+    let axes = mounting::MAGNETOMETER;
     let driver = Bmm150::new(board.i2c.clone(), Bmm150::ALL_LOW, time(), axes, bmm150::Config::default());
     let mag_channels = |data: stampfly_types::messages::MagData| Some([data.field.x, data.field.y, data.field.z]);
     watch!(tasks, driver, mag_driver, mag_channels);
@@ -169,9 +170,10 @@ fn compare(seed: u64) {
 fn drivers_and_models_say_the_same_of_a_range_that_is_none() {
     // Too near, near, too far for enough light, nothing there.
     for (height, status) in [(0.015, 4), (1.0, 0), (4.2, 2), (30.0, 2)] {
-        let plant = PlantParameters { gravity: 0.0, ground_height: 0.005, drag_quadratic: 0.0, ..Default::default() };
+        let plant =
+            PlantParameters { gravity: 0.0, ground_height: 0.005, drag_quadratic: 0.0, ..PlantParameters::EXAMPLE };
         let pose = Some(Pose { rotors: 0.0, ..Pose::hovering(height) });
-        let config = SimulationConfig { plant, wind: WindConfig::CALM, pose, ..Default::default() };
+        let config = SimulationConfig { plant, wind: WindConfig::CALM, pose, ..SimulationConfig::example() };
         let Simulation { clock, world, mut sensors } = Simulation::new(&config);
         let board = Board::new(&world, &clock, &config, &stand_in_image());
         let (boot, mut shutdown_front) = (BootAddress::new(), board.shutdown_front);

@@ -1,10 +1,10 @@
 //! BMI270.
 
-use crate::{Tap, hover, registers, standing};
+use crate::{Tap, hover, mounting, registers, standing};
 use core::cell::RefCell;
 use stampfly_drivers::Imu;
 use stampfly_drivers::chip::bmi270::{AccelRange, Bmi270, Config, GyroRange, Rate};
-use stampfly_drivers::chip::{AxisMap, ChipError, SpiRegisters};
+use stampfly_drivers::chip::{ChipError, SpiRegisters};
 use stampfly_sim::chips::{self, Attached, I2cBus, SpiBus, SpiPort, stand_in_image};
 use stampfly_sim::time::{Clock, Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
@@ -20,7 +20,7 @@ pub fn soldered(simulation: &Simulation, seed: u64) -> (SpiPort<chips::Bmi270>, 
 }
 
 fn driver<'b>(port: SpiPort<chips::Bmi270>, clock: &Clock, image: &'b [u8], config: Config) -> Driver<'b> {
-    Bmi270::spi(port, clock.clone(), image, AxisMap::STAMPFLY_IMU, config)
+    Bmi270::spi(port, clock.clone(), image, mounting::IMU, config)
 }
 
 /// What a call takes.
@@ -91,11 +91,11 @@ fn decimated(frames: &[[f64; 6]]) -> (Vec3, Vec3) {
 #[test]
 fn in_flight_every_sample_is_what_the_fifo_held() {
     let image = stand_in_image();
-    let simulation = Simulation::new(&SimulationConfig::default());
+    let simulation = Simulation::new(&SimulationConfig::example());
     let (port, _) = soldered(&simulation, 1);
     let (tap, transfers) = Tap::new(port);
     let Simulation { clock, world, sensors } = simulation;
-    let mut imu = Bmi270::spi(tap, clock.clone(), &image, AxisMap::STAMPFLY_IMU, Config::default());
+    let mut imu = Bmi270::spi(tap, clock.clone(), &image, mounting::IMU, Config::default());
     let samples = RefCell::new(Vec::new());
     let mut tasks = Tasks::new(clock.clone());
     hover(&mut tasks, clock.clone(), world, sensors.motors);
@@ -184,7 +184,7 @@ fn over_i2c_it_measures_the_same() {
         let clock = &simulation.clock;
         let bus = I2cBus::new(clock, 1);
         let attached = bus.attach(0x68, chips::Bmi270::new(&simulation.world, clock, seed, 1.0, &image));
-        let mut imu = Bmi270::i2c(bus, 0x68, clock.clone(), &image, AxisMap::STAMPFLY_IMU, Config::default());
+        let mut imu = Bmi270::i2c(bus, 0x68, clock.clone(), &image, mounting::IMU, Config::default());
         let samples: Vec<_> = (0..400).map(|_| block_on(clock, imu.next()).expect("a sample")).collect();
         assert_eq!(registers(&attached, 0x40), [0xAC, 0x02, 0xEC, 0x00]);
         assert!(samples.iter().all(|sample| (sample.data.accel.z + 9.81).abs() < 0.6), "gravity");

@@ -1,14 +1,13 @@
 //! BMI270 with its interrupt pin, which may be right, silent or stuck.
 
 use crate::bmi270::soldered;
-use crate::{Tap, registers, standing};
+use crate::{Tap, mounting, registers, standing};
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 use core::future::pending;
 use embedded_hal::digital::ErrorType;
 use embedded_hal_async::digital::Wait;
 use stampfly_drivers::Imu;
-use stampfly_drivers::chip::AxisMap;
 use stampfly_drivers::chip::bmi270::{Bmi270, Config};
 use stampfly_sim::Simulation;
 use stampfly_sim::chips::{InterruptPin, stand_in_image};
@@ -75,7 +74,7 @@ fn run(seed: u64, before: Wire, after: Wire) -> Run {
     let (tap, transfers) = Tap::new(port);
     let Simulation { clock, .. } = simulation;
     let (image, wire) = (stand_in_image(), Cell::new(before));
-    let imu = Bmi270::spi(tap, clock.clone(), &image, AxisMap::STAMPFLY_IMU, Config::default());
+    let imu = Bmi270::spi(tap, clock.clone(), &image, mounting::IMU, Config::default());
     let mut imu = imu.with_interrupt(Pin { pin, wire: &wire });
     let (samples, rises) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
     let mut tasks = Tasks::new(clock.clone());

@@ -1,9 +1,9 @@
 //! BMM150.
 
-use crate::{compensation, registers, standing};
+use crate::{compensation, mounting, registers, standing};
 use stampfly_drivers::Magnetometer;
 use stampfly_drivers::chip::bmm150::{Bmm150, Config, Preset, Rate};
-use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters};
+use stampfly_drivers::chip::{ChipError, I2cRegisters};
 use stampfly_sim::Simulation;
 use stampfly_sim::chips::{self, Attached, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
@@ -14,7 +14,7 @@ fn bench(config: Config) -> (Simulation, Attached, Bmm150<I2cRegisters<I2cBus>, 
     let clock = simulation.clock.clone();
     let bus = I2cBus::new(&clock, 1);
     let attached = bus.attach(Bmm150::ALL_LOW, chips::Bmm150::new(&simulation.world, &clock, 1));
-    let driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock, AxisMap::STAMPFLY_MAGNETOMETER, config);
+    let driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config);
     (simulation, attached, driver)
 }
 

@@ -9,6 +9,7 @@ mod bmp280;
 #[path = "../chips/compensation.rs"]
 mod compensation;
 mod ina3221;
+mod mounting;
 mod neighbours;
 #[path = "../hover/pilot.rs"]
 mod pilot;
@@ -32,7 +33,7 @@ use std::rc::Rc;
 
 /// A vehicle on the floor in still air.
 fn standing() -> Simulation {
-    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..Default::default() })
+    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..SimulationConfig::example() })
 }
 
 /// The registers from this one on.

@@ -1,10 +1,10 @@
 //! PMW3901.
 
-use crate::{Tap, hover, registers, standing};
+use crate::{Tap, hover, mounting, registers, standing};
 use core::cell::RefCell;
 use stampfly_drivers::OpticalFlow;
+use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
-use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_sim::chips::{self, Attached, Faults, SpiBus, SpiPort};
 use stampfly_sim::time::{Tasks, block_on};
 use stampfly_sim::{Simulation, SimulationConfig};
@@ -20,7 +20,7 @@ fn another_part_is_named() {
     let simulation = standing();
     let (port, attached) = soldered(&simulation);
     attached.set_id(0x42);
-    let mut driver = Pmw3901::new(port, simulation.clock.clone(), AxisMap::STAMPFLY_FLOW, Config::default());
+    let mut driver = Pmw3901::new(port, simulation.clock.clone(), mounting::FLOW, Config::default());
     let outcome = block_on(&simulation.clock, driver.start());
     assert_eq!(outcome, Err(ChipError::Identification { found: 0x42BD }));
 }
@@ -29,7 +29,7 @@ fn another_part_is_named() {
 fn the_start_keeps_every_pause_and_leaves_the_bank_of_the_data() {
     let simulation = standing();
     let (port, attached) = soldered(&simulation);
-    let mut driver = Pmw3901::new(port, simulation.clock.clone(), AxisMap::STAMPFLY_FLOW, Config::default());
+    let mut driver = Pmw3901::new(port, simulation.clock.clone(), mounting::FLOW, Config::default());
     let begun = simulation.clock.now();
     assert_eq!(block_on(&simulation.clock, driver.start()), Ok(()));
     let took = simulation.clock.now().since(begun);
@@ -43,11 +43,11 @@ fn the_start_keeps_every_pause_and_leaves_the_bank_of_the_data() {
 
 #[test]
 fn in_flight_every_sample_is_what_the_burst_held() {
-    let simulation = Simulation::new(&SimulationConfig::default());
+    let simulation = Simulation::new(&SimulationConfig::example());
     let (port, _) = soldered(&simulation);
     let (tap, transfers) = Tap::new(port);
     let Simulation { clock, world, sensors } = simulation;
-    let mut driver = Pmw3901::new(tap, clock.clone(), AxisMap::STAMPFLY_FLOW, Config::default());
+    let mut driver = Pmw3901::new(tap, clock.clone(), mounting::FLOW, Config::default());
     let samples = RefCell::new(Vec::new());
     let mut tasks = Tasks::new(clock.clone());
     hover(&mut tasks, clock.clone(), world, sensors.motors);
@@ -85,7 +85,7 @@ fn a_chip_that_lost_its_settings_is_found_out_within_a_second() {
     let simulation = standing();
     let (port, attached) = soldered(&simulation);
     let clock = &simulation.clock;
-    let mut driver = Pmw3901::new(port, clock.clone(), AxisMap::STAMPFLY_FLOW, Config::default());
+    let mut driver = Pmw3901::new(port, clock.clone(), mounting::FLOW, Config::default());
     block_on(clock, driver.next()).expect("a sample");
     attached.reset();
     let begun = clock.now();
@@ -100,7 +100,7 @@ fn after_a_start_that_succeeds_on_a_noisy_bus_it_sees() {
     let simulation = standing();
     let (port, attached) = soldered(&simulation);
     let clock = &simulation.clock;
-    let mut driver = Pmw3901::new(port, clock.clone(), AxisMap::STAMPFLY_FLOW, Config::default());
+    let mut driver = Pmw3901::new(port, clock.clone(), mounting::FLOW, Config::default());
     let (mut started, mut blind) = (0, 0);
     for _ in 0..600 {
         attached.set_faults(Faults { bit_errors: 1e-3, ..Faults::default() });

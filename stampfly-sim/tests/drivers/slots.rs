@@ -1,7 +1,7 @@
 //! Inertial and flow sensor on one bus in slots: the one on time, the other in between.
 
+use crate::mounting;
 use core::cell::{Cell, RefCell};
-use stampfly_drivers::chip::AxisMap;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::slot::{Rhythm, Slots};
@@ -28,15 +28,15 @@ async fn deliver(mut imu: impl Imu, note: impl Fn(Sample<ImuData>)) {
 /// The worst of one vehicle, whose inertial sensor's interrupt is wired or not: age of an inertial sample at its
 /// delivery, and time between two flow samples.
 fn worst(seed: u64, wired: bool) -> [Duration; 2] {
-    let config = SimulationConfig { seed, ..Default::default() };
+    let config = SimulationConfig { seed, ..SimulationConfig::example() };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
     let Board { imu, flow, .. } = Board::new(&world, &clock, &config, &image);
     let pin = imu.interrupt_pin();
     let mut slots = Slots::new(clock.clone(), Rhythm::HZ_400);
     let (lead, guest, bus) = slots.split(imu, flow, LONGEST);
-    let imu = Bmi270::spi(lead, clock.clone(), &image, AxisMap::STAMPFLY_IMU, bmi270::Config::default());
-    let mut flow = Pmw3901::new(guest, clock.clone(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default());
+    let imu = Bmi270::spi(lead, clock.clone(), &image, mounting::IMU, bmi270::Config::default());
+    let mut flow = Pmw3901::new(guest, clock.clone(), mounting::FLOW, pmw3901::Config::default());
     let [age, interval] = [const { Cell::new(Duration::ZERO) }; 2];
     let counts = RefCell::new([0; 2]);
     let mut tasks = Tasks::new(clock.clone());

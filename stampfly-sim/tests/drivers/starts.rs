@@ -2,7 +2,7 @@
 //!
 //! Every transfer of a start fails once, before or after the chip has seen it, and a start is dropped at any time of it.
 
-use crate::standing;
+use crate::{mounting, standing};
 use core::cell::Cell;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -91,7 +91,7 @@ macro_rules! recovers {
                 let (simulation, $trouble) = (standing(), Trouble::default());
                 $(let $boot = BootAddress::new();)?
                 let $clock = simulation.clock.clone();
-                let $board = Board::new(&simulation.world, &$clock, &SimulationConfig::default(), &image);
+                let $board = Board::new(&simulation.world, &$clock, &SimulationConfig::example(), &image);
                 let mut driver = $driver;
                 let drops = disturb(&$clock, &$trouble);
                 if let Some(instant) = drops {
@@ -131,7 +131,7 @@ recovers!(
     970,
     |board, clock, trouble, image| {
         let config = bmi270::Config::default();
-        Bmi270::spi(Unreliable(board.imu, trouble.clone()), clock.clone(), image, AxisMap::STAMPFLY_IMU, config)
+        Bmi270::spi(Unreliable(board.imu, trouble.clone()), clock.clone(), image, mounting::IMU, config)
     },
     |data| (data.accel.z + 9.81).abs() < 0.6
 );
@@ -140,7 +140,7 @@ recovers!(
     230,
     |board, clock, trouble| {
         let device = Unreliable(board.flow, trouble.clone());
-        Pmw3901::new(device, clock.clone(), AxisMap::STAMPFLY_FLOW, pmw3901::Config::default())
+        Pmw3901::new(device, clock.clone(), mounting::FLOW, pmw3901::Config::default())
     },
     |data| data.quality > 0
 );

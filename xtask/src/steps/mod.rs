@@ -27,3 +27,4 @@ pub mod peers;
 pub mod qemu;
 pub mod test;
 pub mod ulog;
+pub mod vectors;

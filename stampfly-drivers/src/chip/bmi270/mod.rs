@@ -75,7 +75,7 @@ const PATIENCE: u64 = 4;
 /// # #![allow(dead_code)]
 /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
 /// # fn main() {
-/// # let frames = [0x8C, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x10].repeat(4);
+/// # let frames = [0x8C, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xF0].repeat(4);
 /// # let (device, clock) = (Chip::new(&[
 /// #     (0x00, &[0x24]), (0x21, &[0x01]), (0x26, &frames), (0x18, &[3, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 52, 0]),
 /// # ]), Clock::default());
@@ -85,7 +85,7 @@ const PATIENCE: u64 = 4;
 /// use stampfly_drivers::chip::AxisMap;
 /// use stampfly_drivers::chip::bmi270::{Bmi270, Config};
 ///
-/// let mut imu = Bmi270::spi(device, clock, &configuration_file, AxisMap::STAMPFLY_IMU, Config::default());
+/// let mut imu = Bmi270::spi(device, clock, &configuration_file, AxisMap::IDENTITY, Config::default());
 /// let sample = block_on(imu.next()).expect("a sample");
 /// assert!((sample.data.accel.z + 9.81).abs() < 0.01, "level and still");
 /// # }

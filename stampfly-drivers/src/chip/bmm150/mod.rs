@@ -42,8 +42,7 @@ const POLL: Duration = Duration::from_millis(2);
 /// use stampfly_drivers::chip::AxisMap;
 /// use stampfly_drivers::chip::bmm150::{Bmm150, Config};
 ///
-/// let axes = AxisMap::STAMPFLY_MAGNETOMETER;
-/// let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, axes, Config::default());
+/// let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, AxisMap::IDENTITY, Config::default());
 /// let sample = block_on(compass.next()).expect("a measurement");
 /// assert!(sample.data.field.norm() > 20.0, "microtesla");
 /// # }

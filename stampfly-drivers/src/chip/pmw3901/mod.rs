@@ -77,14 +77,14 @@ impl Default for Config {
 /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/doc.rs"));
 /// # fn main() {
 /// # let (device, clock) = (Chip::new(&[
-/// #     (0x00, &[0x49]), (0x5F, &[0xB6]), (0x747, &[0x08]), (0x16, &[0x80, 0, 3, 0, 0, 0, 90, 1, 90, 9, 2, 7]),
+/// #     (0x00, &[0x49]), (0x5F, &[0xB6]), (0x747, &[0x08]), (0x16, &[0x80, 0, 0, 0, 3, 0, 90, 1, 90, 9, 2, 7]),
 /// # ]), Clock::default());
 /// use stampfly_drivers::OpticalFlow;
 /// use stampfly_drivers::blocking::block_on;
 /// use stampfly_drivers::chip::AxisMap;
 /// use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
 ///
-/// let mut flow = Pmw3901::new(device, clock, AxisMap::STAMPFLY_FLOW, Config::default());
+/// let mut flow = Pmw3901::new(device, clock, AxisMap::IDENTITY, Config::default());
 /// let sample = block_on(flow.next()).expect("a picture");
 /// assert!(sample.data.valid && sample.data.delta_y / sample.data.interval > 0.6, "to the right, rad/s");
 /// # }

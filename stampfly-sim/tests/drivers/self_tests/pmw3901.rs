@@ -2,10 +2,10 @@
 
 use super::{Bench, FAILED, Outcome, configuration, identification, put, restless};
 use crate::spoilt::{Spoil, Spoilt};
-use crate::standing;
+use crate::{mounting, standing};
 use stampfly_drivers::OpticalFlow;
+use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::pmw3901::{Config, Pmw3901};
-use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_sim::chips::{self, Faults, SpiBus, SpiPort};
 use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::Duration;
@@ -16,7 +16,7 @@ fn flow(spoil: Spoil) -> Bench<Pmw3901<Spoilt<SpiPort<chips::Pmw3901>>, Clock>> 
     let chip = chips::Pmw3901::new(&simulation.world, &clock, 1);
     let (bus, attached) = SpiBus::new(&clock, 1).attach(2_000_000, chip);
     let bus = Spoilt { bus, clock: clock.clone(), spoil };
-    (clock.clone(), attached, Pmw3901::new(bus, clock, AxisMap::STAMPFLY_FLOW, config))
+    (clock.clone(), attached, Pmw3901::new(bus, clock, mounting::FLOW, config))
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! A log replays bit for bit, and whatever is not bit for bit is found and named.
 
-use proptest::prelude::*;
+mod damage;
+mod places;
+
+use places::{find, key_frame_parts, messages, offset, places, without, without_key_frames};
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
@@ -14,7 +17,6 @@ use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::{ImuData, PowerData};
 use stampfly_types::{ActivationRecord, Duration, InputRecord, Instant, Message as _};
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::LazyLock;
 
 /// Everything in the mission that makes the stack do something.
@@ -46,97 +48,6 @@ static TOPICS: LazyLock<Vec<Topic>> = LazyLock::new(|| {
     let of_the_bus = topics::TOPICS.iter().map(|info| Topic { name: info.name, fields: info.fields });
     of_the_bus.chain(StampFly::BESIDE.iter().copied()).collect()
 });
-
-/// Every message of a log, in file order: its type and where its bytes are.
-fn messages(log: &[u8]) -> Vec<(u8, Range<usize>)> {
-    let mut messages = Vec::new();
-    // The file begins with 16 bytes of magic and time; a message with its size, less its head of three bytes, and type.
-    let mut at = 16;
-    while let Some(&[low, high, kind]) = log.get(at..at + 3) {
-        let end = at + 3 + usize::from(u16::from_le_bytes([low, high]));
-        messages.push((kind, at..end));
-        at = end;
-    }
-    assert_eq!(at, log.len(), "whole messages");
-    messages
-}
-
-/// Where the bytes of the parts of key frames are.
-fn key_frame_parts(log: &[u8]) -> Vec<Range<usize>> {
-    let parts = messages(log).into_iter().filter(|(kind, bytes)| {
-        *kind == b'M' && log[bytes.clone()].windows(9).take(32).any(|window| window == b"key_frame")
-    });
-    parts.map(|(_, bytes)| bytes).collect()
-}
-
-/// The log of a program that makes no key frames.
-fn without_key_frames(log: &[u8]) -> Vec<u8> {
-    let parts = key_frame_parts(log);
-    assert!(!parts.is_empty());
-    let mut end = 0;
-    let kept: Vec<&[u8]> = parts
-        .iter()
-        .map(|part| {
-            let kept = &log[end..part.start];
-            end = part.end;
-            kept
-        })
-        .collect();
-    [&kept.concat(), &log[end..]].concat()
-}
-
-/// One message of a log that carries a sample: which topic, when, and where its bytes are.
-struct Place {
-    topic: String,
-    at: Instant,
-    payload: Range<usize>,
-}
-
-impl Place {
-    /// The whole message, header and topic number included.
-    fn message(&self) -> Range<usize> {
-        self.payload.start - 5..self.payload.end
-    }
-}
-
-/// Every sample of a log, in file order.
-fn places(log: &[u8]) -> Vec<Place> {
-    let mut names = BTreeMap::new();
-    let mut places = Vec::new();
-    for message in Reader::new(log).expect("a ULog") {
-        match message.expect("an intact message") {
-            Message::Subscription { id, topic, .. } => {
-                names.insert(id, topic.to_owned());
-            }
-            Message::Data { id, payload } => {
-                let start = payload.as_ptr() as usize - log.as_ptr() as usize;
-                let at = Instant::from_micros(u64::from_le_bytes(*payload.first_chunk().expect("a stamp")));
-                places.push(Place { topic: names[&id].clone(), at, payload: start..start + payload.len() });
-            }
-            _ => {}
-        }
-    }
-    places
-}
-
-/// The first sample of a topic at or after this instant.
-fn find(log: &[u8], topic: &str, at: Instant) -> Place {
-    places(log).into_iter().find(|place| place.topic == topic && place.at >= at).expect("the flight lasts longer")
-}
-
-/// Where a field begins within the payload of a topic's samples.
-fn offset(log: &[u8], topic: &str, field: &str, index: Option<usize>) -> usize {
-    let format = Reader::new(log).expect("a ULog").find_map(|message| match message {
-        Ok(Message::Format(format)) if format.name == topic => Some(format),
-        _ => None,
-    });
-    let mut columns = format.expect("a format").columns().map(|column| column.expect("a basic type"));
-    columns.find(|column| column.field == field && column.index == index).expect("a column").offset
-}
-
-fn without(log: &[u8], range: Range<usize>) -> Vec<u8> {
-    [&log[..range.start], &log[range.end..]].concat()
-}
 
 fn difference(log: &[u8]) -> Difference {
     replay(log).expect("a log that can be replayed").difference.expect("a difference")
@@ -456,59 +367,5 @@ fn activations_with_other_inputs_are_refused() {
             log.activation(&record).expect("memory");
         });
         assert_eq!(replay(&log), Err(ReplayError::Schema(format!("activation_{name}"))), "{inputs} inputs");
-    }
-}
-
-/// The first second of a flight: small enough to be damaged many times.
-static SECOND: LazyLock<Vec<u8>> =
-    LazyLock::new(|| record(&Setup { limit: Duration::from_secs(1), ..setup(1, Some(1)) }));
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(100))]
-
-    /// Damage is an error, a difference or, where nothing depends on it, nothing. Never a panic.
-    #[test]
-    fn damage_never_panics(
-        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
-        keep in any::<prop::sample::Index>(),
-        cut in any::<bool>(),
-    ) {
-        let mut log = SECOND.clone();
-        for (index, byte) in damage {
-            let index = index.index(log.len());
-            log[index] = byte;
-        }
-        if cut {
-            log.truncate(keep.index(log.len()));
-        }
-        let _ = replay(&log);
-    }
-
-    /// Damage inside samples, where the framing stays whole and everything is read.
-    #[test]
-    fn damaged_samples_never_panic(damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 1..8)) {
-        static PLACES: LazyLock<Vec<Place>> = LazyLock::new(|| places(&SECOND));
-        let mut log = SECOND.clone();
-        for (index, value) in damage {
-            let payload = &mut log[PLACES[index.index(PLACES.len())].payload.clone()];
-            let start = value as usize % payload.len();
-            payload[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
-        }
-        let _ = replay(&log);
-    }
-
-    /// Damage inside key frames, from which the replay starts.
-    #[test]
-    fn damaged_key_frames_never_panic(damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 1..8)) {
-        static PARTS: LazyLock<Vec<Range<usize>>> = LazyLock::new(|| key_frame_parts(&SECOND));
-        let mut log = SECOND.clone();
-        for (index, value) in damage {
-            // Behind the head of the message and the key.
-            let part = PARTS[index.index(PARTS.len())].clone();
-            let bytes = &mut log[part.start + 40..part.end];
-            let start = value as usize % bytes.len();
-            bytes[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
-        }
-        let _ = replay_from(&log, Some(Instant::ZERO));
     }
 }

@@ -1,0 +1,63 @@
+//! A log that was damaged anywhere: an error, a difference or nothing, but never a panic.
+
+use super::places::{Place, key_frame_parts, places};
+use super::{record, replay, replay_from, setup};
+use proptest::prelude::*;
+use stampfly_board::simulation::Setup;
+use stampfly_types::{Duration, Instant};
+use std::ops::Range;
+use std::sync::LazyLock;
+
+/// The first second of a flight: small enough to be damaged many times.
+static SECOND: LazyLock<Vec<u8>> =
+    LazyLock::new(|| record(&Setup { limit: Duration::from_secs(1), ..setup(1, Some(1)) }));
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    /// Damage is an error, a difference or, where nothing depends on it, nothing. Never a panic.
+    #[test]
+    fn damage_never_panics(
+        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        keep in any::<prop::sample::Index>(),
+        cut in any::<bool>(),
+    ) {
+        let mut log = SECOND.clone();
+        for (index, byte) in damage {
+            let index = index.index(log.len());
+            log[index] = byte;
+        }
+        if cut {
+            log.truncate(keep.index(log.len()));
+        }
+        let _ = replay(&log);
+    }
+
+    /// Damage inside samples, where the framing stays whole and everything is read.
+    #[test]
+    fn damaged_samples_never_panic(damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 1..8)) {
+        static PLACES: LazyLock<Vec<Place>> = LazyLock::new(|| places(&SECOND));
+        let mut log = SECOND.clone();
+        for (index, value) in damage {
+            let payload = &mut log[PLACES[index.index(PLACES.len())].payload.clone()];
+            let start = value as usize % payload.len();
+            payload[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
+        }
+        let _ = replay(&log);
+    }
+
+    /// Damage inside key frames, from which the replay starts.
+    #[test]
+    fn damaged_key_frames_never_panic(damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 1..8)) {
+        static PARTS: LazyLock<Vec<Range<usize>>> = LazyLock::new(|| key_frame_parts(&SECOND));
+        let mut log = SECOND.clone();
+        for (index, value) in damage {
+            // Behind the head of the message and the key.
+            let part = PARTS[index.index(PARTS.len())].clone();
+            let bytes = &mut log[part.start + 40..part.end];
+            let start = value as usize % bytes.len();
+            bytes[start..].iter_mut().zip(value.to_le_bytes()).for_each(|(byte, new)| *byte = new);
+        }
+        let _ = replay_from(&log, Some(Instant::ZERO));
+    }
+}
