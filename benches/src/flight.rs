@@ -90,7 +90,7 @@ impl Recording {
     /// Flies and records. Panics when the vehicle does not fly, because there would be nothing to measure.
     #[must_use]
     pub fn new() -> Self {
-        let simulation = Simulation::new(&SimulationConfig::default());
+        let simulation = Simulation::new(&SimulationConfig::new(stampfly_board::simulation::PLANT));
         let mut bus = topics::Bus::new();
         let recorder = RefCell::new(Recorder {
             vehicle: Vehicle::new(&mut bus),

@@ -9,7 +9,7 @@ use stampfly_types::{Instant, frame};
 use std::cell::Cell;
 
 fn main() {
-    let simulation = Simulation::new(&SimulationConfig { seed: 7, ..Default::default() });
+    let simulation = Simulation::new(&SimulationConfig { seed: 7, ..SimulationConfig::example() });
     let Simulation { clock, world, sensors } = simulation;
     let (mut imu, mut tof, mut motors) = (sensors.imu, sensors.tof, sensors.motors);
     let (range, felt) = (Cell::new(0.0), Cell::new(0.0));

@@ -1,8 +1,9 @@
 //! Everything about the vehicle that can be tuned, as one value.
 //!
-//! Each crate owns its own configuration and its defaults; this struct only gathers them. The names people use are in
-//! [`parameters`](crate::parameters).
+//! Each crate owns its own configuration and the rules by which it follows from an airframe; this struct only gathers them, for
+//! the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
 
+use crate::airframe::{AIRFRAME, GROUND_HEIGHT};
 use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 
@@ -57,7 +58,7 @@ impl ControllerKind {
 }
 
 /// Configuration of every component of one vehicle.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct VehicleConfig {
     /// Which estimator flies.
@@ -74,4 +75,20 @@ pub struct VehicleConfig {
     pub geometric: GeometricConfig,
     /// Motors and battery.
     pub motor: MotorConfig,
+}
+
+impl Default for VehicleConfig {
+    /// The StampFly as it is built.
+    fn default() -> Self {
+        let ground_clearance = GROUND_HEIGHT as f32;
+        Self {
+            estimator: EstimatorKind::default(),
+            controller: ControllerKind::default(),
+            eskf: EskfConfig { ground_clearance, ..EskfConfig::default() },
+            complementary: ComplementaryConfig { ground_clearance, ..ComplementaryConfig::default() },
+            cascade: CascadeConfig::for_airframe(&AIRFRAME),
+            geometric: GeometricConfig::for_airframe(&AIRFRAME),
+            motor: MotorConfig::for_airframe(&AIRFRAME),
+        }
+    }
 }

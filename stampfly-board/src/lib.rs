@@ -1,13 +1,14 @@
 //! The StampFly assembled.
 //!
 //! Two tables say it all: [`topics`], who publishes what for whom, and [`schedule`], what runs when. The rest is
-//! [runnables], one a component. `stampfly-flight` runs them: on the hardware, in simulation, in a replay.
+//! [runnables], one a component. What the vehicle is, in numbers, is its [airframe]. `stampfly-flight` runs them: on the hardware, in simulation, in a replay.
 #![no_std]
 #![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 #[cfg(any(test, feature = "simulation"))]
 extern crate std;
 
+pub mod airframe;
 pub mod black_box;
 mod config;
 pub mod console;

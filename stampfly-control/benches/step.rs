@@ -5,7 +5,8 @@ use std::hint::black_box;
 
 use stampfly_control::guidance::{Axis, Bounds, Navigator, NavigatorInput};
 use stampfly_control::{
-    CascadeController, ControlInput, Controller, GeometricController, Mixer, MotorStage, MultirotorMixer,
+    Airframe, CascadeConfig, CascadeController, ControlInput, Controller, GeometricConfig, GeometricController, Mixer,
+    MotorConfig, MotorStage, MultirotorMixer,
 };
 use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, GuidedCommand, GuidedKind,
@@ -52,7 +53,8 @@ fn situation() -> Situation {
 
 fn control(c: &mut Criterion) {
     let s = situation();
-    let mixer = MultirotorMixer::stampfly();
+    let airframe = Airframe::EXAMPLE;
+    let mixer = MultirotorMixer::for_airframe(&airframe).expect("flies");
     // Errors of alternating sign: a flight that is under control, no integrator at its limit.
     let other_side = StateEstimate {
         position: 2.0 * s.setpoint.position - s.estimate.position,
@@ -68,7 +70,7 @@ fn control(c: &mut Criterion) {
         land_detected: &s.land_detected,
         unmet,
     };
-    let mut cascade = CascadeController::default();
+    let mut cascade = CascadeController::new(&CascadeConfig::for_airframe(&airframe));
     let mut now = Instant::ZERO;
     c.bench_function("cascade and mixer", |b| {
         let mut unmet = [0.0; 4];
@@ -79,7 +81,7 @@ fn control(c: &mut Criterion) {
             mixed
         });
     });
-    let mut geometric = GeometricController::default();
+    let mut geometric = GeometricController::new(&GeometricConfig::for_airframe(&airframe));
     c.bench_function("geometric and mixer", |b| {
         b.iter(|| {
             now += Duration::from_micros(2_500);
@@ -89,11 +91,11 @@ fn control(c: &mut Criterion) {
     let output = cascade.step(now, &input(now, [0.0; 4]));
     c.bench_function("mixer", |b| b.iter(|| mixer.mix(&black_box(output))));
     let mixed = mixer.mix(&output);
-    let mut motors = MotorStage::default();
+    let mut motors = MotorStage::new(&MotorConfig::for_airframe(&airframe));
     c.bench_function("motor stage", |b| {
         b.iter(|| {
             now += Duration::from_micros(2_500);
-            motors.step(now, &black_box(mixed), Some(3.8), true)
+            motors.step(now, &black_box(mixed), Some(7.6), true)
         });
     });
 }

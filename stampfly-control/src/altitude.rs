@@ -7,6 +7,7 @@
 
 use stampfly_types::GRAVITY;
 
+use crate::airframe::Airframe;
 use crate::bound::{symmetric, within};
 use crate::pid::{Pid, PidGains};
 use crate::rate::integration;
@@ -38,18 +39,19 @@ pub struct AltitudeConfig {
     pub descend_share: f32,
 }
 
-impl Default for AltitudeConfig {
-    /// The StampFly: 36.8 g, 0.672 N at full duty on a full battery.
-    fn default() -> Self {
+impl AltitudeConfig {
+    /// Thrusts from the airframe; the gains are squared frequencies and dampings that hold for any weight.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
         Self {
             height_gain: 2.5,
             correction_max: 0.8,
             velocity: PidGains { kp: 7.0, ti: 0.8, td: 0.0, eta: 0.125 },
             acceleration_max: 5.0,
-            hover_thrust: 0.0368 * GRAVITY,
+            hover_thrust: airframe.hover_thrust(),
             learning_time: 8.0,
             learning_range: 0.3,
-            thrust_max: 0.62,
+            thrust_max: airframe.thrust_limit(),
             thrust_min_share: 0.2,
             descend_share: 0.96,
         }
@@ -87,8 +89,9 @@ pub struct ThrustLimits {
 /// The vertical loops.
 ///
 /// ```
+/// use stampfly_control::Airframe;
 /// use stampfly_control::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
-/// let config = AltitudeConfig::default();
+/// let config = AltitudeConfig::for_airframe(&Airframe::EXAMPLE);
 /// let mut altitude = AltitudeController::new(&config);
 /// let still = Climb { cos_tilt: 1.0, ..Climb::default() };
 /// let limits = ThrustLimits { ceiling: 2.0, unmet: 0.0, learn: true, hold: false };
@@ -192,6 +195,10 @@ mod tests {
     const FREE: ThrustLimits = ThrustLimits { ceiling: 2.0, unmet: 0.0, learn: true, hold: false };
     const DT: f32 = 0.0025;
 
+    fn config() -> AltitudeConfig {
+        AltitudeConfig::for_airframe(&Airframe::EXAMPLE)
+    }
+
     /// A vehicle that is only a mass; gives the height error at the end and the controller.
     fn fly(weight: f32, seconds: f32, mut altitude: AltitudeController) -> (f32, AltitudeController) {
         let (mut z, mut v) = (0.0, 0.0);
@@ -206,7 +213,7 @@ mod tests {
 
     #[test]
     fn learns_the_weight_and_keeps_it_over_a_reset() {
-        let config = AltitudeConfig::default();
+        let config = config();
         for factor in [0.8, 1.0, 1.2] {
             let weight = config.hover_thrust * factor;
             let (z, mut altitude) = fly(weight, 60.0, AltitudeController::new(&config));
@@ -220,7 +227,7 @@ mod tests {
 
     #[test]
     fn learning_does_not_move_the_vehicle() {
-        let config = AltitudeConfig::default();
+        let config = config();
         let mut altitude = AltitudeController::new(&config);
         altitude.climb.set_integral(-1.5);
         let before = altitude.hover_thrust * (1.0 - altitude.climb.integral() / GRAVITY);
@@ -234,21 +241,21 @@ mod tests {
 
     #[test]
     fn the_ceiling_is_a_share_of_hover_thrust_and_off_above_one() {
-        let altitude = AltitudeController::new(&AltitudeConfig::default());
-        let limited = altitude.limit(1.0, &ThrustLimits { ceiling: 0.7, ..FREE });
+        let altitude = AltitudeController::new(&config());
+        let limited = altitude.limit(2.0 * config().thrust_max, &ThrustLimits { ceiling: 0.7, ..FREE });
         assert!((limited / altitude.hover_thrust() - 0.7).abs() < 1e-6);
-        assert_eq!(altitude.limit(1.0, &FREE), AltitudeConfig::default().thrust_max);
+        assert_eq!(altitude.limit(2.0 * config().thrust_max, &FREE), config().thrust_max);
     }
 
     proptest! {
         #[test]
         fn thrust_is_always_possible(values in prop::array::uniform5(any::<f32>()), ceiling: f32, unmet: f32) {
             let [error, target, acceleration, velocity, cos_tilt] = values;
-            let mut altitude = AltitudeController::new(&AltitudeConfig::default());
+            let mut altitude = AltitudeController::new(&config());
             for _ in 0..3 {
                 let climb = Climb { error, target, acceleration, velocity, cos_tilt };
                 let thrust = altitude.step(&climb, &ThrustLimits { ceiling, unmet, ..FREE }, DT);
-                prop_assert!((0.0..=AltitudeConfig::default().thrust_max).contains(&thrust));
+                prop_assert!((0.0..=config().thrust_max).contains(&thrust));
             }
         }
     }

@@ -10,7 +10,9 @@
 use nalgebra::Quaternion;
 use stampfly_types::{Quat, Vec3, math};
 
+use crate::airframe::Airframe;
 use crate::bound::symmetric;
+use crate::rate;
 
 /// Gains and limits of the attitude loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +28,17 @@ pub struct AttitudeConfig {
     pub heading_rate_max: f32,
 }
 
+impl AttitudeConfig {
+    /// The default gains, lowered with the rate loop's bandwidth when the airframe's motors are slow.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
+        let (quickness, quick) = (rate::quickness(airframe), Self::default());
+        Self { tilt_gain: quickness * quick.tilt_gain, heading_gain: quickness * quick.heading_gain, ..quick }
+    }
+}
+
 impl Default for AttitudeConfig {
-    /// About a third of the rate loop's bandwidth.
+    /// About a third of the rate loop's bandwidth, for motors quick enough for it.
     fn default() -> Self {
         Self { tilt_gain: 13.0, heading_gain: 5.0, tilt_rate_max: 5.0, heading_rate_max: 2.0 }
     }

@@ -12,6 +12,7 @@
 use stampfly_types::messages::{ControlOutput, FlightPhase};
 use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
 
+use crate::airframe::Airframe;
 use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
 use crate::attitude::{self, AttitudeConfig};
 use crate::bound::symmetric;
@@ -21,8 +22,8 @@ use crate::position::{PositionConfig, PositionController};
 use crate::rate::{RateConfig, RateController};
 use crate::timing::StepTimer;
 
-/// Gains and limits of all loops. The default is the StampFly.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Gains and limits of all loops.
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CascadeConfig {
     /// Body rate.
@@ -35,6 +36,20 @@ pub struct CascadeConfig {
     pub altitude: AltitudeConfig,
     /// What full stick means.
     pub sticks: StickConfig,
+}
+
+impl CascadeConfig {
+    /// Rate, attitude and altitude loops of the airframe; position and sticks as for any vehicle.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
+        Self {
+            rate: RateConfig::for_airframe(airframe),
+            attitude: AttitudeConfig::for_airframe(airframe),
+            position: PositionConfig::default(),
+            altitude: AltitudeConfig::for_airframe(airframe),
+            sticks: StickConfig::default(),
+        }
+    }
 }
 
 /// What full stick means in the modes that command angles or rates.
@@ -61,11 +76,11 @@ const THROTTLE_OFF: f32 = 0.03;
 /// The cascade.
 ///
 /// ```
-/// use stampfly_control::{CascadeController, ControlInput, Controller};
+/// use stampfly_control::{Airframe, CascadeConfig, CascadeController, ControlInput, Controller};
 /// use stampfly_types::messages::*;
 /// use stampfly_types::{Instant, Vec3};
 ///
-/// let mut controller = CascadeController::default();
+/// let mut controller = CascadeController::new(&CascadeConfig::for_airframe(&Airframe::EXAMPLE));
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
 /// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
 /// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
@@ -80,7 +95,7 @@ const THROTTLE_OFF: f32 = 0.03;
 /// };
 /// let output = controller.step(Instant::from_micros(2_500), &input);
 /// assert!(output.torque.y < 0.0, "nose down to fly forward");
-/// assert!(output.thrust > 0.3, "about its weight");
+/// assert!((output.thrust - Airframe::EXAMPLE.hover_thrust()).abs() < 0.1, "its weight");
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -96,12 +111,6 @@ pub struct CascadeController {
     resets: u32,
     /// The path's acceleration one step ago, while a path is followed: its difference is the path's jerk.
     path: Option<Vec3>,
-}
-
-impl Default for CascadeController {
-    fn default() -> Self {
-        Self::new(&CascadeConfig::default())
-    }
 }
 
 impl CascadeController {

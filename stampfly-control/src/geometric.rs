@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Rotation3};
 use stampfly_types::messages::ControlOutput;
 use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
+use crate::airframe::Airframe;
 use crate::attitude;
 use crate::bound::{symmetric, within};
 use crate::cascade::StickConfig;
@@ -50,12 +51,13 @@ pub struct GeometricConfig {
     pub sticks: StickConfig,
 }
 
-impl Default for GeometricConfig {
-    /// The StampFly.
-    fn default() -> Self {
+impl GeometricConfig {
+    /// Mass, inertia and limits from the airframe; the gains hold for any.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
         Self {
-            mass: 0.0368,
-            inertia: Vec3::new(9.16e-6, 13.3e-6, 20.4e-6),
+            mass: airframe.mass,
+            inertia: airframe.inertia,
             position: 14.0,
             velocity: 7.0,
             integral: 12.0,
@@ -63,8 +65,8 @@ impl Default for GeometricConfig {
             attitude: [450.0, 80.0],
             rate: [32.0, 16.0],
             tilt_max: 0.35,
-            thrust_max: 0.62,
-            torque_max: Vec3::new(3.0e-3, 3.0e-3, 1.0e-3),
+            thrust_max: airframe.thrust_limit(),
+            torque_max: airframe.torque_limit(),
             sticks: StickConfig::default(),
         }
     }
@@ -73,12 +75,13 @@ impl Default for GeometricConfig {
 /// Lee's controller.
 ///
 /// ```
-/// use stampfly_control::{ControlInput, Controller, GeometricController};
+/// use stampfly_control::{Airframe, ControlInput, Controller, GeometricConfig, GeometricController};
 /// use stampfly_types::messages::*;
 /// use stampfly_types::{Instant, Vec3};
 ///
 /// // Any controller, behind the same trait.
-/// let mut controller: Box<dyn Controller> = Box::new(GeometricController::default());
+/// let config = GeometricConfig::for_airframe(&Airframe::EXAMPLE);
+/// let mut controller: Box<dyn Controller> = Box::new(GeometricController::new(&config));
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
 /// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
 /// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
@@ -99,12 +102,6 @@ pub struct GeometricController {
     integral: Vec3,
     timer: StepTimer,
     resets: u32,
-}
-
-impl Default for GeometricController {
-    fn default() -> Self {
-        Self::new(&GeometricConfig::default())
-    }
 }
 
 impl GeometricController {

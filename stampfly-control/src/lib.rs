@@ -11,8 +11,9 @@
 //! * [`controller`]: the socket for control laws; [`cascade`] (the default, built from [`rate`], [`attitude`],
 //!   [`position`] and [`altitude`]) and [`geometric`] fit it; [`intent`] tells both what the flight mode and the
 //!   estimator's validity ask for;
+//! * [`airframe`]: the vehicle as a value, from which mixer, controllers and motor stage are configured;
 //! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry;
-//! * [`motor`]: thrust to duty;
+//! * [`motor`] and [`curve`]: thrust to duty;
 //! * [`filter`], [`pid`] and [`timing`]: building blocks.
 //!
 //! Units are SI, the body frame is FRD, the world NED (see [`stampfly_types::frame`]). Numbers that are not finite
@@ -26,10 +27,12 @@ struct Readme;
 #[cfg(test)]
 extern crate std;
 
+pub mod airframe;
 pub mod altitude;
 pub mod attitude;
 pub mod cascade;
 pub mod controller;
+pub mod curve;
 pub mod filter;
 pub mod geometric;
 pub mod guidance;
@@ -43,10 +46,12 @@ pub mod timing;
 
 mod bound;
 
+pub use airframe::{Airframe, Rotor, Spin};
 pub use cascade::{CascadeConfig, CascadeController, StickConfig};
 pub use controller::{ControlInput, Controller};
+pub use curve::MotorCurve;
 pub use geometric::{GeometricConfig, GeometricController};
 pub use intent::Intent;
-pub use mixer::{GeometryError, Mixed, Mixer, MultirotorMixer, Rotor, Spin};
-pub use motor::{MotorConfig, MotorCurve, MotorStage};
+pub use mixer::{GeometryError, Mixed, Mixer, MultirotorMixer};
+pub use motor::{MotorConfig, MotorStage};
 pub use pid::{Integration, Pid, PidGains};

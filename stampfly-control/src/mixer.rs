@@ -4,36 +4,17 @@
 //! drag torque per thrust; positive for a rotor that turns counter-clockwise seen from above). Stacked, that is a 4×N
 //! matrix; the mixer is its Moore–Penrose inverse, for four rotors the plain inverse.
 //!
+//! The inverse is computed when the mixer is made, in constants if need be: a vehicle's mixer can be a `const`, and an
+//! airframe that cannot be flown then does not compile.
+//!
 //! Motors can neither pull nor push without end. When a demand does not fit, it is given up in this order: yaw
 //! first, then thrust, roll and pitch last, because they decide about up and down. What was given up is reported, so
 //! that integrators can stop.
 
-use nalgebra::{Matrix4, Vector4};
 use stampfly_types::messages::{ControlOutput, MAX_MOTORS};
 
+use crate::airframe::{Airframe, Rotor};
 use crate::bound::{symmetric, within};
-
-/// Which way a rotor turns, seen from above.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Spin {
-    /// Clockwise: its drag turns the body counter-clockwise.
-    Clockwise,
-    /// Counter-clockwise: its drag turns the body clockwise, which is positive yaw.
-    CounterClockwise,
-}
-
-/// One rotor of the airframe.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rotor {
-    /// Forward of the centre of mass, m.
-    pub x: f32,
-    /// Right of the centre of mass, m.
-    pub y: f32,
-    /// Sense of rotation.
-    pub spin: Spin,
-    /// Drag torque per thrust, m.
-    pub kappa: f32,
-}
 
 /// Thrust per motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,13 +77,14 @@ struct Shares {
 /// The mixer of a multirotor with fixed, parallel rotors.
 ///
 /// ```
-/// use stampfly_control::{Mixer, MultirotorMixer};
+/// use stampfly_control::{Airframe, Mixer, MultirotorMixer};
 /// use stampfly_types::{Vec3, messages::ControlOutput};
-/// let mixer = MultirotorMixer::stampfly();
-/// let right = mixer.mix(&ControlOutput { thrust: 0.36, torque: Vec3::new(1e-3, 0.0, 0.0) });
+/// let mixer = MultirotorMixer::for_airframe(&Airframe::EXAMPLE)?;
+/// let right = mixer.mix(&ControlOutput { thrust: 4.9, torque: Vec3::new(0.05, 0.0, 0.0) });
 /// let [front_right, rear_right, rear_left, front_left, ..] = right.thrust;
 /// assert!(front_left > front_right && rear_left > rear_right, "more on the left rolls to the right");
 /// assert_eq!(right.unmet, [0.0; 4]);
+/// # Ok::<(), stampfly_control::GeometryError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -121,75 +103,54 @@ fn up_to_max_motors<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result
 }
 
 impl MultirotorMixer {
-    /// The StampFly's rotors: front right, rear right, rear left, front left. κ is the coast-down measurement.
-    pub const STAMPFLY_ROTORS: [Rotor; 4] = {
-        const D: f32 = 0.023;
-        const KAPPA: f32 = 4.10e-3;
-        [
-            Rotor { x: D, y: D, spin: Spin::CounterClockwise, kappa: KAPPA },
-            Rotor { x: -D, y: D, spin: Spin::Clockwise, kappa: KAPPA },
-            Rotor { x: -D, y: -D, spin: Spin::CounterClockwise, kappa: KAPPA },
-            Rotor { x: D, y: -D, spin: Spin::Clockwise, kappa: KAPPA },
-        ]
-    };
-    /// What one StampFly motor can do at 95 % duty on a full battery, N.
-    pub const STAMPFLY_THRUST_MAX: f32 = 0.168;
-
-    /// The StampFly's mixer.
-    #[must_use]
-    pub fn stampfly() -> Self {
-        // The inverse of a square X can be written down, so this cannot fail. A test holds it against `from_rotors`.
-        let mut shares = [Shares::default(); MAX_MOTORS];
-        for (share, rotor) in shares.iter_mut().zip(Self::STAMPFLY_ROTORS) {
-            *share = Shares {
-                thrust: 0.25,
-                collective: 4.0,
-                roll: -0.25 / rotor.y,
-                pitch: 0.25 / rotor.x,
-                yaw: 0.25 / signed_kappa(&rotor),
-            };
-        }
-        Self { shares, count: Self::STAMPFLY_ROTORS.len(), thrust_max: Self::STAMPFLY_THRUST_MAX }
-    }
-
-    /// The mixer of any airframe whose motors can push with 0 to `thrust_max` N each.
+    /// The mixer of an airframe.
     ///
     /// # Errors
     /// When there are too few or too many rotors or they cannot control the vehicle.
-    pub fn from_rotors(rotors: &[Rotor], thrust_max: f32) -> Result<Self, GeometryError> {
-        if !(4..=MAX_MOTORS).contains(&rotors.len()) {
+    pub const fn for_airframe(airframe: &Airframe) -> Result<Self, GeometryError> {
+        Self::from_rotors(airframe.rotors, airframe.motor_thrust_max)
+    }
+
+    /// The mixer of any rotors whose motors can push with 0 to `thrust_max` N each.
+    ///
+    /// # Errors
+    /// When there are too few or too many rotors or they cannot control the vehicle.
+    pub const fn from_rotors(rotors: &[Rotor], thrust_max: f32) -> Result<Self, GeometryError> {
+        if rotors.len() < 4 || rotors.len() > MAX_MOTORS {
             return Err(GeometryError::Count);
         }
         if !(thrust_max > 0.0 && thrust_max.is_finite()) {
             return Err(GeometryError::Uncontrollable);
         }
         // Torque in units of the airframe's own size, or the inverse of a small vehicle drowns in rounding.
-        let arm = rotors.iter().fold(0.0f32, |arm, r| arm.max(r.x.abs()).max(r.y.abs()));
-        let drag = rotors.iter().fold(0.0f32, |drag, r| drag.max(r.kappa.abs()));
+        let (mut arm, mut drag) = (0.0f32, 0.0f32);
+        let mut n = 0;
+        while n < rotors.len() {
+            arm = arm.max(rotors[n].x.abs()).max(rotors[n].y.abs());
+            drag = drag.max(rotors[n].kappa.abs());
+            n += 1;
+        }
         if !(arm > 0.0 && drag > 0.0 && arm.is_finite() && drag.is_finite()) {
             return Err(GeometryError::Uncontrollable);
         }
-        let column = |rotor: &Rotor| Vector4::new(1.0, -rotor.y / arm, rotor.x / arm, signed_kappa(rotor) / drag);
-        let gram = rotors.iter().map(column).fold(Matrix4::zeros(), |sum, c| sum + c * c.transpose());
-        // The determinant of a well-spread airframe is of the order of N⁴; a singular one leaves only rounding.
-        let determinant = gram.determinant();
-        if determinant.is_nan() || determinant < 1e-4 {
-            return Err(GeometryError::Uncontrollable);
-        }
-        let inverse = gram.try_inverse().ok_or(GeometryError::Uncontrollable)?;
-        let mut shares = [Shares::default(); MAX_MOTORS];
-        for (share, rotor) in shares.iter_mut().zip(rotors) {
-            let row = inverse * column(rotor);
-            if row.x < 1e-3 {
+        let Some(inverse) = inverse(gram(rotors, arm, drag)) else { return Err(GeometryError::Uncontrollable) };
+        let none = Shares { thrust: 0.0, collective: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0 };
+        let mut shares = [none; MAX_MOTORS];
+        let mut n = 0;
+        while n < rotors.len() {
+            let column = column(&rotors[n], arm, drag);
+            let thrust = product(&inverse[0], &column);
+            if thrust < 1e-3 {
                 return Err(GeometryError::Unbalanced);
             }
-            *share = Shares {
-                thrust: row.x,
-                collective: 1.0 / row.x,
-                roll: row.y / arm,
-                pitch: row.z / arm,
-                yaw: row.w / drag,
+            shares[n] = Shares {
+                thrust,
+                collective: 1.0 / thrust,
+                roll: product(&inverse[1], &column) / arm,
+                pitch: product(&inverse[2], &column) / arm,
+                yaw: product(&inverse[3], &column) / drag,
             };
+            n += 1;
         }
         Ok(Self { shares, count: rotors.len(), thrust_max })
     }
@@ -267,25 +228,91 @@ impl Mixer for MultirotorMixer {
     }
 }
 
-fn signed_kappa(rotor: &Rotor) -> f32 {
-    match rotor.spin {
-        Spin::CounterClockwise => rotor.kappa,
-        Spin::Clockwise => -rotor.kappa,
+type Matrix = [[f32; 4]; 4];
+
+/// What one rotor adds to thrust, roll, pitch and yaw, torque in units of `arm` and `drag`.
+const fn column(rotor: &Rotor, arm: f32, drag: f32) -> [f32; 4] {
+    [1.0, -rotor.y / arm, rotor.x / arm, rotor.yaw_arm() / drag]
+}
+
+const fn product(a: &[f32; 4], b: &[f32; 4]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+}
+
+/// The sum of each rotor's column times itself.
+const fn gram(rotors: &[Rotor], arm: f32, drag: f32) -> Matrix {
+    let mut gram = [[0.0; 4]; 4];
+    let mut n = 0;
+    while n < rotors.len() {
+        let column = column(&rotors[n], arm, drag);
+        let mut row = 0;
+        while row < 4 {
+            let mut place = 0;
+            while place < 4 {
+                gram[row][place] += column[row] * column[place];
+                place += 1;
+            }
+            row += 1;
+        }
+        n += 1;
     }
+    gram
+}
+
+/// The inverse by Gauss and Jordan, without exchanging rows: the matrix is symmetric and not negative, so its diagonal
+/// holds the pivots. `None` when it is nearly singular or holds no numbers.
+const fn inverse(mut matrix: Matrix) -> Option<Matrix> {
+    let mut inverse = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    let mut determinant = 1.0f32;
+    let mut pivot = 0;
+    while pivot < 4 {
+        let diagonal = matrix[pivot][pivot];
+        if diagonal.is_nan() || diagonal <= 0.0 {
+            return None;
+        }
+        determinant *= diagonal;
+        let mut place = 0;
+        while place < 4 {
+            matrix[pivot][place] /= diagonal;
+            inverse[pivot][place] /= diagonal;
+            place += 1;
+        }
+        let mut row = 0;
+        while row < 4 {
+            let factor = matrix[row][pivot];
+            let mut place = 0;
+            while row != pivot && place < 4 {
+                matrix[row][place] -= factor * matrix[pivot][place];
+                inverse[row][place] -= factor * inverse[pivot][place];
+                place += 1;
+            }
+            row += 1;
+        }
+        pivot += 1;
+    }
+    // The determinant of a well-spread airframe is of the order of N⁴; a singular one leaves only rounding.
+    if determinant < 1e-4 { None } else { Some(inverse) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::airframe::Spin;
     use proptest::prelude::*;
     use stampfly_types::Vec3;
     use std::vec::Vec;
+
+    const QUADROTOR: Airframe = Airframe::EXAMPLE;
+    const MIXER: MultirotorMixer = match MultirotorMixer::for_airframe(&QUADROTOR) {
+        Ok(mixer) => mixer,
+        Err(_) => panic!("it flies"),
+    };
 
     /// Thrust and torque that the rotors produce: the definition, not the inverse.
     fn produced(rotors: &[Rotor], mixed: &Mixed) -> ControlOutput {
         rotors.iter().zip(mixed.thrust).fold(ControlOutput::default(), |sum, (rotor, thrust)| ControlOutput {
             thrust: sum.thrust + thrust,
-            torque: sum.torque + Vec3::new(-rotor.y, rotor.x, signed_kappa(rotor)) * thrust,
+            torque: sum.torque + Vec3::new(-rotor.y, rotor.x, rotor.yaw_arm()) * thrust,
         })
     }
 
@@ -304,19 +331,18 @@ mod tests {
     }
 
     #[test]
-    fn the_closed_form_is_the_inverse() {
-        let general = MultirotorMixer::from_rotors(&MultirotorMixer::STAMPFLY_ROTORS, 0.168).expect("flies");
-        let closed = MultirotorMixer::stampfly();
-        for (a, b) in general.shares.iter().zip(&closed.shares) {
-            for (a, b) in [(a.thrust, b.thrust), (a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)] {
-                assert!((a - b).abs() <= 1e-4 * b.abs(), "{a} against {b}");
+    fn a_square_has_the_inverse_that_can_be_written_down() {
+        for (share, rotor) in MIXER.shares.iter().zip(QUADROTOR.rotors) {
+            let closed = [0.25, -0.25 / rotor.y, 0.25 / rotor.x, 0.25 / rotor.yaw_arm()];
+            for (a, b) in [share.thrust, share.roll, share.pitch, share.yaw].into_iter().zip(closed) {
+                assert!((a - b).abs() <= 1e-6 * b.abs(), "{a} against {b}");
             }
         }
     }
 
     #[test]
     fn airframes_that_cannot_fly_are_refused() {
-        let rotors = MultirotorMixer::STAMPFLY_ROTORS;
+        let rotors = Rotor::quadrotor_x(0.05, 0.01);
         assert_eq!(MultirotorMixer::from_rotors(&rotors[..3], 0.2), Err(GeometryError::Count));
         let one_way = rotors.map(|rotor| Rotor { spin: Spin::Clockwise, ..rotor });
         assert_eq!(MultirotorMixer::from_rotors(&one_way, 0.2), Err(GeometryError::Uncontrollable));
@@ -324,27 +350,37 @@ mod tests {
         assert_eq!(MultirotorMixer::from_rotors(&in_line, 0.2), Err(GeometryError::Uncontrollable));
         let broken = rotors.map(|rotor| Rotor { x: f32::NAN, ..rotor });
         assert_eq!(MultirotorMixer::from_rotors(&broken, 0.2), Err(GeometryError::Uncontrollable));
-        let beside = rotors.map(|rotor| Rotor { x: rotor.x + 0.1, ..rotor });
+        let beside = rotors.map(|rotor| Rotor { x: rotor.x + 0.2, ..rotor });
         assert_eq!(MultirotorMixer::from_rotors(&beside, 0.2), Err(GeometryError::Unbalanced));
     }
 
     #[test]
     fn broken_demands_are_zero() {
-        let mixer = MultirotorMixer::stampfly();
-        let mixed = mixer.mix(&ControlOutput { thrust: f32::NAN, torque: Vec3::repeat(f32::INFINITY) });
+        let mixed = MIXER.mix(&ControlOutput { thrust: f32::NAN, torque: Vec3::repeat(f32::INFINITY) });
         assert_eq!(mixed.thrust, [0.0; MAX_MOTORS]);
     }
 
     prop_compose! {
-        fn demands()(thrust in -0.2f32..1.2, x in -0.02f32..0.02, y in -0.02f32..0.02, z in -0.004f32..0.004)
+        /// In shares of what the rotors can do, and beyond.
+        fn demands()(thrust in -0.3f32..1.8, x in -2.6f32..2.6, y in -2.6f32..2.6, z in -3.0f32..3.0)
             -> ControlOutput
         {
             ControlOutput { thrust, torque: Vec3::new(x, y, z) }
         }
     }
 
-    /// Checks all promises for one airframe; `scale` brings the demand to its size.
-    fn keeps_its_promises(rotors: &[Rotor], thrust_max: f32, demand: &ControlOutput) -> Result<(), TestCaseError> {
+    /// A demand in N and N·m from its shares.
+    fn demand_on(rotors: &[Rotor], thrust_max: f32, shares: &ControlOutput) -> ControlOutput {
+        let reach = rotors.iter().fold(Vec3::zeros(), |sum, r| sum + Vec3::new(r.y.abs(), r.x.abs(), r.kappa));
+        ControlOutput {
+            thrust: shares.thrust * thrust_max * rotors.len() as f32,
+            torque: shares.torque.component_mul(&reach) * (0.5 * thrust_max),
+        }
+    }
+
+    /// Checks all promises for one airframe.
+    fn keeps_its_promises(rotors: &[Rotor], thrust_max: f32, shares: &ControlOutput) -> Result<(), TestCaseError> {
+        let demand = &demand_on(rotors, thrust_max, shares);
         let mixer = MultirotorMixer::from_rotors(rotors, thrust_max).expect("flies");
         let mixed = mixer.mix(demand);
         let got = produced(rotors, &mixed);
@@ -384,33 +420,33 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
         #[test]
-        fn the_stampfly_keeps_its_promises(demand in demands()) {
-            keeps_its_promises(&MultirotorMixer::STAMPFLY_ROTORS, 0.168, &demand)?;
+        fn a_quadrotor_keeps_its_promises(demand in demands()) {
+            keeps_its_promises(QUADROTOR.rotors, QUADROTOR.motor_thrust_max, &demand)?;
         }
 
         #[test]
         fn a_hexacopter_keeps_them_too(demand in demands()) {
-            let bigger = ControlOutput { thrust: demand.thrust * 20.0, torque: demand.torque * 100.0 };
-            keeps_its_promises(&hexacopter(), 4.0, &bigger)?;
+            keeps_its_promises(&hexacopter(), 4.0, &demand)?;
         }
 
         #[test]
         fn a_demand_that_fits_is_met_exactly(
-            thrust in 0.25f32..0.45, x in -1e-3f32..1e-3, y in -1e-3f32..1e-3, z in -2e-4f32..2e-4,
+            thrust in 0.38f32..0.65, x in -0.12f32..0.12, y in -0.12f32..0.12, z in -0.12f32..0.12,
         ) {
-            let demand = ControlOutput { thrust, torque: Vec3::new(x, y, z) };
-            let mixed = MultirotorMixer::stampfly().mix(&demand);
-            let got = produced(&MultirotorMixer::STAMPFLY_ROTORS, &mixed);
+            let shares = ControlOutput { thrust, torque: Vec3::new(x, y, z) };
+            let demand = demand_on(QUADROTOR.rotors, QUADROTOR.motor_thrust_max, &shares);
+            let mixed = MIXER.mix(&demand);
+            let got = produced(QUADROTOR.rotors, &mixed);
             prop_assert_eq!(mixed.unmet, [0.0; 4]);
-            prop_assert!((got.thrust - thrust).abs() < 1e-6);
-            prop_assert!((got.torque - demand.torque).norm() < 1e-8);
+            prop_assert!((got.thrust - demand.thrust).abs() < 2e-6 * QUADROTOR.full_thrust());
+            prop_assert!((got.torque - demand.torque).norm() < 2e-6 * QUADROTOR.torque_limit().x);
         }
 
         #[test]
         fn any_bits_give_possible_thrusts(thrust: f32, x: f32, y: f32, z: f32) {
-            let mixed = MultirotorMixer::stampfly().mix(&ControlOutput { thrust, torque: Vec3::new(x, y, z) });
+            let mixed = MIXER.mix(&ControlOutput { thrust, torque: Vec3::new(x, y, z) });
             for thrust in mixed.thrust {
-                prop_assert!((0.0..=MultirotorMixer::STAMPFLY_THRUST_MAX).contains(&thrust));
+                prop_assert!((0.0..=QUADROTOR.motor_thrust_max).contains(&thrust));
             }
             prop_assert!(mixed.unmet.iter().all(|share| share.is_finite()));
         }

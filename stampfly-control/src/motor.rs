@@ -1,65 +1,16 @@
-//! Thrust to duty cycle: the propeller's square law, the motor's voltage curve, the battery.
-//!
-//! Thrust T = Ct ω² gives the speed, V(ω) = Am ω² + Bm ω + Cm the voltage at which a brushed motor turns its propeller
-//! at that speed, and duty is that voltage over the battery's. The constants belong together: a curve measured on the
-//! bench without airflow promises 11 to 13 % more thrust than the vehicle has in flight.
+//! Thrust to duty cycle: the motor's [curve](crate::curve) gives a voltage, and duty is that voltage over the battery's.
 //!
 //! Battery voltage arrives slowly and with noise, and duty that follows every flicker of it puts the flicker into the
 //! thrust, so it is low-passed. A reading that no cell can have is replaced by the nominal voltage.
 
+use stampfly_types::Instant;
 use stampfly_types::messages::{MAX_MOTORS, MotorOutput};
-use stampfly_types::{Instant, math};
 
+use crate::airframe::Airframe;
 use crate::bound::{symmetric, within};
+use crate::curve::MotorCurve;
 use crate::mixer::Mixed;
 use crate::timing::StepTimer;
-
-/// How a motor with its propeller turns voltage into thrust.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct MotorCurve {
-    /// Thrust per squared speed, N/(rad/s)².
-    pub ct: f32,
-    /// Voltage per squared speed, V/(rad/s)².
-    pub am: f32,
-    /// Voltage per speed, V/(rad/s).
-    pub bm: f32,
-    /// Voltage to overcome friction, V.
-    pub cm: f32,
-}
-
-impl Default for MotorCurve {
-    /// The StampFly, anchored to its hover in flight.
-    fn default() -> Self {
-        Self { ct: 1.0e-8, am: 6.0368e-8, bm: 6.699_042e-4, cm: 1.53e-2 }
-    }
-}
-
-impl MotorCurve {
-    /// Voltage at which the motor pushes with `thrust` N. Zero for no thrust: a motor that need not turn gets nothing.
-    #[must_use]
-    #[inline]
-    pub fn voltage(&self, thrust: f32) -> f32 {
-        // False for NaN as well.
-        if thrust > 0.0 {
-            let squared = thrust / self.ct;
-            self.am * squared + self.bm * math::sqrt(squared) + self.cm
-        } else {
-            0.0
-        }
-    }
-
-    /// Thrust, N, at a voltage: the inverse of [`Self::voltage`].
-    #[must_use]
-    pub fn thrust(&self, voltage: f32) -> f32 {
-        let above = voltage - self.cm;
-        if above <= 0.0 {
-            return 0.0;
-        }
-        let speed = (math::sqrt(self.bm * self.bm + 4.0 * self.am * above) - self.bm) / (2.0 * self.am);
-        self.ct * speed * speed
-    }
-}
 
 /// Curve, battery and limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,15 +32,24 @@ pub struct MotorConfig {
     pub slew_max: f32,
 }
 
-impl Default for MotorConfig {
-    /// The StampFly: one LiHV cell. The slew limit crosses the whole range in 25 ms, about one motor time constant:
-    /// it takes the edge off current peaks and off nothing the motor could follow.
-    fn default() -> Self {
+impl MotorConfig {
+    /// Voltage of a lithium cell to assume when none is known, V.
+    const CELL_NOMINAL: f32 = 3.7;
+    /// A cell below this is none, V: it would be destroyed.
+    const CELL_LOWEST: f32 = 2.5;
+    /// A cell above this is none either, V: the kinds charged highest have 4.35 V.
+    const CELL_HIGHEST: f32 = 5.0;
+
+    /// The airframe's curve and cells. The slew limit crosses the whole range in 25 ms, about one time constant of a small
+    /// motor: it takes the edge off current peaks and off nothing the motor could follow.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
+        let cells = f32::from(airframe.cells);
         Self {
-            curve: MotorCurve::default(),
-            nominal_voltage: 3.7,
-            lowest_voltage: 2.5,
-            highest_voltage: 5.0,
+            curve: airframe.motor,
+            nominal_voltage: Self::CELL_NOMINAL * cells,
+            lowest_voltage: Self::CELL_LOWEST * cells,
+            highest_voltage: Self::CELL_HIGHEST * cells,
             voltage_time: 0.5,
             duty_max: 0.95,
             slew_max: 40.0,
@@ -100,16 +60,16 @@ impl Default for MotorConfig {
 /// The motors' output stage.
 ///
 /// ```
-/// use stampfly_control::{Mixed, MotorStage};
+/// use stampfly_control::{Airframe, Mixed, MotorConfig, MotorStage};
 /// use stampfly_types::Instant;
-/// let mut motors = MotorStage::default();
-/// let hover = Mixed { thrust: [0.09, 0.09, 0.09, 0.09, 0.0, 0.0, 0.0, 0.0], count: 4, unmet: [0.0; 4] };
+/// let mut motors = MotorStage::new(&MotorConfig::for_airframe(&Airframe::EXAMPLE));
+/// let hover = Mixed { thrust: [1.226, 1.226, 1.226, 1.226, 0.0, 0.0, 0.0, 0.0], count: 4, unmet: [0.0; 4] };
 /// let mut output = Default::default();
 /// for n in 0..20 {
-///     output = motors.step(Instant::from_micros(2_500 * n), &hover, Some(3.7), true);
+///     output = motors.step(Instant::from_micros(2_500 * n), &hover, Some(7.4), true);
 /// }
-/// assert!((output.duty[0] - 0.69).abs() < 0.01);
-/// assert_eq!(motors.step(Instant::from_micros(60_000), &hover, Some(3.7), false).duty, [0.0; 8], "not armed, not turning");
+/// assert!((output.duty[0] - 0.66).abs() < 0.01);
+/// assert_eq!(motors.step(Instant::from_micros(60_000), &hover, Some(7.4), false).duty, [0.0; 8], "not armed, not turning");
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -118,12 +78,6 @@ pub struct MotorStage {
     voltage: Option<f32>,
     duty: [f32; MAX_MOTORS],
     timer: StepTimer,
-}
-
-impl Default for MotorStage {
-    fn default() -> Self {
-        Self::new(&MotorConfig::default())
-    }
 }
 
 impl MotorStage {
@@ -175,6 +129,10 @@ mod tests {
     use proptest::prelude::*;
     use stampfly_types::Duration;
 
+    fn stage() -> MotorStage {
+        MotorStage::new(&MotorConfig::for_airframe(&Airframe::EXAMPLE))
+    }
+
     fn mixed(thrust: f32) -> Mixed {
         let mut mixed = Mixed { count: 4, ..Mixed::default() };
         mixed.thrust[..4].fill(thrust);
@@ -182,53 +140,39 @@ mod tests {
     }
 
     #[test]
-    fn hover_needs_the_duty_flown() {
-        let curve = MotorCurve::default();
-        let hover = curve.voltage(0.0902);
-        assert!((hover - 2.57).abs() < 0.01, "{hover} V");
-        assert!((curve.voltage(0.168) - 3.77).abs() < 0.01);
-    }
-
-    #[test]
     fn implausible_batteries_count_as_nominal() {
-        for reading in [None, Some(0.0), Some(2.4), Some(f32::NAN), Some(f32::INFINITY), Some(-4.0), Some(12.0)] {
-            let mut motors = MotorStage::default();
-            motors.step(Instant::ZERO, &mixed(0.09), reading, true);
-            assert_eq!(motors.battery_voltage(), 3.7, "{reading:?}");
+        for reading in [None, Some(0.0), Some(4.8), Some(f32::NAN), Some(f32::INFINITY), Some(-4.0), Some(12.0)] {
+            let mut motors = stage();
+            motors.step(Instant::ZERO, &mixed(1.2), reading, true);
+            assert_eq!(motors.battery_voltage(), 7.4, "{reading:?}");
         }
     }
 
     #[test]
     fn a_flicker_of_the_battery_hardly_reaches_the_duty() {
-        let mut motors = MotorStage::default();
+        let mut motors = stage();
         let mut duty = [0.0f32; 2];
         for n in 0..4000u64 {
-            let voltage = if n % 2 == 0 { 3.6 } else { 3.8 };
+            let voltage = if n % 2 == 0 { 7.2 } else { 7.6 };
             duty[n as usize % 2] =
-                motors.step(Instant::from_micros(n * 2_500), &mixed(0.09), Some(voltage), true).duty[0];
+                motors.step(Instant::from_micros(n * 2_500), &mixed(1.2), Some(voltage), true).duty[0];
         }
         assert!((duty[0] - duty[1]).abs() < 1e-3);
     }
 
     proptest! {
         #[test]
-        fn the_curve_and_its_inverse_agree(thrust in 1e-4f32..0.2) {
-            let curve = MotorCurve::default();
-            prop_assert!((curve.thrust(curve.voltage(thrust)) / thrust - 1.0).abs() < 1e-2);
-        }
-
-        #[test]
         fn duties_are_possible_slow_and_dead_when_disarmed(
             steps in prop::collection::vec((any::<f32>(), prop::option::of(any::<f32>()), any::<bool>(), 0u64..30_000), 1..50),
         ) {
-            let mut motors = MotorStage::default();
+            let mut motors = stage();
             let (mut now, mut before) = (Instant::ZERO, [0.0f32; 8]);
             for (thrust, voltage, armed, span) in steps {
                 now += Duration::from_micros(span);
                 let out = motors.step(now, &mixed(thrust), voltage, armed);
                 for (duty, before) in out.duty.iter().zip(before) {
                     prop_assert!((0.0..=0.95).contains(duty));
-                    let slew = MotorConfig::default().slew_max * StepTimer::LONGEST.seconds();
+                    let slew = motors.config.slew_max * StepTimer::LONGEST.seconds();
                     prop_assert!(!armed || (duty - before).abs() <= slew + 1e-6);
                     prop_assert!(armed || *duty == 0.0);
                 }

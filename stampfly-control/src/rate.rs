@@ -1,12 +1,29 @@
 //! Body rate to torque: the innermost loop, one [`Pid`] per axis.
 //!
-//! With the derivative time near the motor's time constant (about 18 ms) the zero of the loop cancels the motor's
-//! pole and what remains is close to an integrator with 7 ms of delay (filter, sampling, computing). That sets the
-//! gain: Kp = I·ω for a crossover ω of 40–45 rad/s keeps 55° of phase when the motor is half as slow again.
+//! With the derivative time near the motor's time constant the zero of the loop cancels the motor's pole and what remains
+//! is close to an integrator with 7 ms of delay (filter, sampling, computing). That sets the gain: Kp = I·ω, the moment of
+//! inertia about the axis times the crossover ω. [`TILT_BANDWIDTH`] and [`YAW_BANDWIDTH`] are that ω, lowered for motors
+//! slower than [`QUICK_MOTOR`]; [`RateConfig::for_airframe`] applies the rule.
 
 use stampfly_types::Vec3;
 
+use crate::airframe::Airframe;
 use crate::pid::{Integration, Pid, PidGains};
+
+/// Crossover of the roll and pitch rate loops, rad/s: with 7 ms of delay in the loop it keeps 55° of phase when the motor
+/// is half as slow again.
+pub const TILT_BANDWIDTH: f32 = 43.6;
+/// Crossover of the yaw rate loop, rad/s. Half of roll and pitch: the rotors' drag is weak, and more gain only drives the
+/// motors into their limits.
+pub const YAW_BANDWIDTH: f32 = 22.0;
+/// Time constant of the motors up to which these bandwidths hold, s. Slower motors lower them in proportion: what their pole
+/// leaves after the lead grows with it, and a step of the lean would overshoot by more than 15 %.
+pub const QUICK_MOTOR: f32 = 0.02;
+/// Derivative time of roll and pitch over the motors' time constant: a little less than all of it, since a motor is
+/// quicker above hover.
+pub const TILT_LEAD: f32 = 8.0 / 9.0;
+/// The same for yaw, where a rotor's own inertia already acts as a lead.
+pub const YAW_LEAD: f32 = 5.0 / 9.0;
 
 /// Gains and limits of the body-rate loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,24 +39,35 @@ pub struct RateConfig {
     pub torque_max: Vec3,
 }
 
-impl Default for RateConfig {
-    /// The StampFly: inertia 9.16, 13.3 and 20.4 × 10⁻⁶ kg·m², motor lag 18 ms.
-    fn default() -> Self {
+impl RateConfig {
+    /// The gains of an airframe: Kp is bandwidth times moment of inertia, the derivative time a share of the motors' time
+    /// constant, the torque limits are [`Airframe::torque_limit`].
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
+        let (inertia, lag) = (airframe.inertia, airframe.motor_lag);
+        let (tilt, yaw) = (quickness(airframe) * TILT_BANDWIDTH, quickness(airframe) * YAW_BANDWIDTH);
+        let tilt = |inertia| PidGains { kp: tilt * inertia, ti: 0.5, td: TILT_LEAD * lag, eta: 0.2 };
         Self {
-            roll: PidGains { kp: 4.0e-4, ti: 0.5, td: 0.016, eta: 0.2 },
-            pitch: PidGains { kp: 5.8e-4, ti: 0.5, td: 0.016, eta: 0.2 },
-            yaw: PidGains { kp: 4.5e-4, ti: 0.8, td: 0.010, eta: 0.2 },
-            torque_max: Vec3::new(3.0e-3, 3.0e-3, 1.0e-3),
+            roll: tilt(inertia.x),
+            pitch: tilt(inertia.y),
+            yaw: PidGains { kp: yaw * inertia.z, ti: 0.8, td: YAW_LEAD * lag, eta: 0.2 },
+            torque_max: airframe.torque_limit(),
         }
     }
+}
+
+/// Share of the bandwidths that the airframe's motors allow: 1 up to [`QUICK_MOTOR`], less for slower ones.
+pub(crate) fn quickness(airframe: &Airframe) -> f32 {
+    (QUICK_MOTOR / airframe.motor_lag).min(1.0)
 }
 
 /// The body-rate loops.
 ///
 /// ```
+/// use stampfly_control::Airframe;
 /// use stampfly_control::rate::{RateConfig, RateController};
 /// use stampfly_types::Vec3;
-/// let mut rate = RateController::new(&RateConfig::default());
+/// let mut rate = RateController::new(&RateConfig::for_airframe(&Airframe::EXAMPLE));
 /// let torque = rate.step(&Vec3::new(1.0, 0.0, 0.0), &Vec3::zeros(), 0.0025, [0.0; 4], false);
 /// assert!(torque.x > 0.0 && torque.y == 0.0 && torque.z == 0.0);
 /// ```
@@ -117,7 +145,7 @@ mod tests {
 
     #[test]
     fn torque_stays_within_its_limits() {
-        let config = RateConfig::default();
+        let config = RateConfig::for_airframe(&Airframe::EXAMPLE);
         let mut rate = RateController::new(&config);
         let torque = rate.step(&Vec3::new(1e6, -1e6, 1e6), &Vec3::zeros(), 0.0025, [0.0; 4], false);
         assert_eq!(torque, Vec3::new(config.torque_max.x, -config.torque_max.y, config.torque_max.z));

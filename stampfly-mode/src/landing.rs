@@ -41,10 +41,12 @@ pub struct LandingConfig {
     pub takeoff_time: [f32; 2],
 }
 
-impl Default for LandingConfig {
-    fn default() -> Self {
+impl LandingConfig {
+    /// The limits for a vehicle that hovers with this thrust, N. Speeds, heights and times are for flights indoors.
+    #[must_use]
+    pub const fn for_hover_thrust(hover_thrust: f32) -> Self {
         Self {
-            hover_thrust: 0.361,
+            hover_thrust,
             airborne_rise: 0.05,
             descent: 0.3,
             touchdown: 0.15,
@@ -75,16 +77,17 @@ pub struct LandingInput<'a> {
 /// The take-off and landing manager.
 ///
 /// ```
-/// use stampfly_mode::{LandingInput, TakeoffLanding};
+/// use stampfly_mode::{LandingConfig, LandingInput, TakeoffLanding};
 /// use stampfly_types::{Instant, messages::*};
-/// let mut manager = TakeoffLanding::default();
+/// // A vehicle of half a kilogram.
+/// let mut manager = TakeoffLanding::new(LandingConfig::for_hover_thrust(4.9));
 /// // Standing on the floor in LANDING, asked to sink and not sinking: after a while it has landed.
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let mut landed_at = None;
 /// for k in 0..1000u64 {
 ///     let land_detected = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
 ///         estimate: &estimate, phase: FlightPhase::Landing, setpoint: &Setpoint::default(),
-///         demand: &ControlOutput { thrust: 0.2, ..Default::default() },
+///         demand: &ControlOutput { thrust: 2.7, ..Default::default() },
 ///     });
 ///     if land_detected.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
 /// }
@@ -105,12 +108,6 @@ pub struct TakeoffLanding {
     stalled: Option<Instant>,
     ceiling: Option<Instant>,
     still: Option<Instant>,
-}
-
-impl Default for TakeoffLanding {
-    fn default() -> Self {
-        Self::new(LandingConfig::default())
-    }
 }
 
 /// How long a condition has held without a break, s.
@@ -209,13 +206,17 @@ mod tests {
     use super::*;
     use stampfly_types::Vec3;
 
+    const HOVER_THRUST: f32 = 4.9;
+    /// Less than what carries the vehicle: it stands, or it falls.
+    const LOW_THRUST: f32 = 0.55 * HOVER_THRUST;
+
     fn run(
         seconds: f32,
         phase: FlightPhase,
         mut estimate: impl FnMut(f32) -> StateEstimate,
         thrust: f32,
     ) -> Option<f32> {
-        let mut manager = TakeoffLanding::default();
+        let mut manager = TakeoffLanding::new(LandingConfig::for_hover_thrust(HOVER_THRUST));
         (0..(seconds * 400.0) as u64).find_map(|k| {
             let t = k as f32 * 0.0025;
             let input = LandingInput {
@@ -236,7 +237,7 @@ mod tests {
             valid: Validity::ALL,
             ..Default::default()
         };
-        assert_eq!(run(5.0, FlightPhase::Landing, sinking, 0.2), None);
+        assert_eq!(run(5.0, FlightPhase::Landing, sinking, LOW_THRUST), None);
     }
 
     #[test]
@@ -247,19 +248,19 @@ mod tests {
             valid: Validity::ALL,
             ..Default::default()
         };
-        let landed = run(5.0, FlightPhase::Landing, shaken, 0.2);
+        let landed = run(5.0, FlightPhase::Landing, shaken, LOW_THRUST);
         assert!(landed.is_some_and(|t| (0.5..1.0).contains(&t)), "{landed:?}");
     }
 
     #[test]
     fn hovering_low_in_flight_is_never_landed() {
         let low = |_: f32| StateEstimate { height: 0.04, valid: Validity::ALL, ..Default::default() };
-        assert_eq!(run(20.0, FlightPhase::Flying, low, 0.2), None);
+        assert_eq!(run(20.0, FlightPhase::Flying, low, LOW_THRUST), None);
     }
 
     #[test]
     fn touchdown_is_recognised_without_any_height() {
         let blind = |_: f32| StateEstimate { height: 7.0, valid: Validity::TILT, ..Default::default() };
-        assert!(run(5.0, FlightPhase::Landing, blind, 0.2).is_some());
+        assert!(run(5.0, FlightPhase::Landing, blind, LOW_THRUST).is_some());
     }
 }

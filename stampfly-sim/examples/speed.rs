@@ -16,7 +16,7 @@ const SECONDS: u64 = 60;
 
 fn main() {
     for (name, vibration) in [("with vibration", 1.0), ("without vibration", 0.0)] {
-        let config = SimulationConfig { vibration, pose: Some(Pose::hovering(1.0)), ..Default::default() };
+        let config = SimulationConfig { vibration, pose: Some(Pose::hovering(1.0)), ..SimulationConfig::example() };
         let Simulation { clock, world, sensors } = Simulation::new(&config);
         let (mut imu, mut tof, mut flow) = (sensors.imu, sensors.tof, sensors.flow);
         let (mut mag, mut baro, mut power, mut motors) = (sensors.mag, sensors.baro, sensors.power, sensors.motors);

@@ -1,4 +1,4 @@
-//! A simulated StampFly behind the same traits as the real one.
+//! A simulated quadrotor behind the same traits as a real one.
 //!
 //! * [`time`]: virtual time and a deterministic executor;
 //! * [`plant`]: the vehicle as a body with motors, a battery, a floor and the air;
@@ -10,8 +10,8 @@
 //! Everything is a value: no global, no thread, and no wall clock but in [`vehicle::Live`]. A process can hold as many vehicles as memory allows,
 //! and the same seed gives the same bits, in debug and release builds and on every machine.
 //!
-//! Not for other vehicles yet: the plant is a quadcopter with the StampFly's layout, though every number of it can be
-//! set by name.
+//! The vehicle is a value, [`PlantParameters`](plant::PlantParameters), that its own crate gives. Not for every vehicle: the plant is a
+//! quadrotor in X of up to a few hundred grams with brushed motors; the chips, and the vibration they feel, are the StampFly's.
 
 pub mod chips;
 mod noise;

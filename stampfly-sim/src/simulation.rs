@@ -23,16 +23,17 @@ pub struct SimulationConfig {
     pub pose: Option<Pose>,
 }
 
-impl Default for SimulationConfig {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            start: Instant::ZERO,
-            plant: PlantParameters::default(),
-            wind: WindConfig::default(),
-            vibration: 1.0,
-            pose: None,
-        }
+impl SimulationConfig {
+    /// This vehicle with seed 1, standing on the floor of a room with people in it.
+    #[must_use]
+    pub fn new(plant: PlantParameters) -> Self {
+        Self { seed: 1, start: Instant::ZERO, plant, wind: WindConfig::default(), vibration: 1.0, pose: None }
+    }
+
+    /// [`PlantParameters::EXAMPLE`], a vehicle that nobody built: for examples and tests.
+    #[must_use]
+    pub fn example() -> Self {
+        Self::new(PlantParameters::EXAMPLE)
     }
 }
 
@@ -46,7 +47,7 @@ impl Default for SimulationConfig {
 /// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
 /// use stampfly_types::messages::MotorOutput;
 ///
-/// let mut simulation = Simulation::new(&SimulationConfig::default());
+/// let mut simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// block_on(&clock, async {
 ///     for _ in 0..400 {

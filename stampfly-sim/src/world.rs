@@ -76,7 +76,7 @@ impl State {
 /// use stampfly_types::Instant;
 ///
 /// let pose = Pose { rotors: 0.0, ..Pose::hovering(2.0) };
-/// let plant = Plant::new(&PlantParameters::default(), &WindConfig::CALM, Some(&pose), 1);
+/// let plant = Plant::new(&PlantParameters::EXAMPLE, &WindConfig::CALM, Some(&pose), 1);
 /// let world = World::new(plant, Instant::ZERO);
 /// let later = world.truth_at(Instant::from_millis(100)).velocity.z;
 /// let earlier = world.truth_at(Instant::from_millis(50)).velocity.z;

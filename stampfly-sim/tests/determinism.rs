@@ -9,7 +9,8 @@ use std::cell::RefCell;
 
 /// All the words two sensors and the truth give in two seconds with the motors running.
 fn fly(seed: u64, with_flow: bool) -> Vec<u32> {
-    let Simulation { clock, world, sensors } = Simulation::new(&SimulationConfig { seed, ..Default::default() });
+    let Simulation { clock, world, sensors } =
+        Simulation::new(&SimulationConfig { seed, ..SimulationConfig::example() });
     let (mut imu, mut tof, mut flow, mut motors) = (sensors.imu, sensors.tof, sensors.flow, sensors.motors);
     let words = RefCell::new(Vec::new());
     let mut tasks = Tasks::new(clock.clone());

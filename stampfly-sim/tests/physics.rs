@@ -7,7 +7,7 @@ use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
 const STEPS_PER_SECOND: u32 = 1600;
 
 fn perfect() -> PlantParameters {
-    PlantParameters { manufacturing_spread: 0.0, ..Default::default() }
+    PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE }
 }
 
 fn calm(parameters: &PlantParameters, pose: Option<&Pose>) -> Plant {
@@ -57,7 +57,7 @@ fn a_body_spinning_free_keeps_angular_momentum_and_energy() {
 
 #[test]
 fn a_vehicle_that_stands_stands_perfectly_still() {
-    let mut plant = calm(&PlantParameters::default(), None);
+    let mut plant = calm(&PlantParameters::EXAMPLE, None);
     for _ in 0..STEPS_PER_SECOND {
         plant.step();
         let motion = plant.motion();
@@ -65,7 +65,7 @@ fn a_vehicle_that_stands_stands_perfectly_still() {
         assert!((motion.specific_force - Vector3::new(0.0, 0.0, -9.80665)).norm() < 1e-9, "{}", motion.specific_force);
         assert!(motion.rate.norm() < 1e-12 && motion.velocity.norm() < 1e-12);
     }
-    assert!((plant.motion().position.z + 0.03).abs() < 1e-9);
+    assert!((plant.motion().position.z + PlantParameters::EXAMPLE.ground_height).abs() < 1e-9);
 }
 
 #[test]
@@ -76,22 +76,22 @@ fn a_dropped_vehicle_comes_to_rest_on_its_feet() {
         rotors: 0.0,
         ..Pose::hovering(0.15)
     };
-    let mut plant = calm(&PlantParameters::default(), Some(&pose));
+    let mut plant = calm(&PlantParameters::EXAMPLE, Some(&pose));
     run(&mut plant, 3.0);
     let motion = plant.motion();
     assert!(motion.velocity.norm() < 1e-6 && motion.rate.norm() < 1e-6, "{motion:?}");
     assert!((motion.attitude * Vector3::z()).z > 0.9999, "upright but for what friction holds: {motion:?}");
-    assert!((motion.position.z + 0.03).abs() < 1e-4);
+    assert!((motion.position.z + PlantParameters::EXAMPLE.ground_height).abs() < 1e-4);
 }
 
 #[test]
 fn a_crashed_vehicle_lies_on_its_back_above_the_floor() {
     let pose = Pose { attitude: UnitQuaternion::from_euler_angles(2.9, 0.1, 0.0), rotors: 0.0, ..Pose::hovering(0.5) };
-    let mut plant = calm(&PlantParameters::default(), Some(&pose));
+    let mut plant = calm(&PlantParameters::EXAMPLE, Some(&pose));
     run(&mut plant, 5.0);
     let motion = plant.motion();
     assert!((motion.attitude * Vector3::z()).z < -0.99 && motion.velocity.norm() < 1e-3, "{motion:?}");
-    assert!((motion.position.z + 0.0103).abs() < 1e-3 && plant.ground().contact());
+    assert!((motion.position.z + PlantParameters::EXAMPLE.corner_height).abs() < 1e-3 && plant.ground().contact());
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn friction_holds_on_the_floor_up_to_its_limit() {
         run(&mut plant, 2.0);
         plant.motion().position.x
     };
-    // At the height of the body a eleventh of the wind is left: 10 m/s push with 0.08 N, 25 m/s with 0.5 N; 0.22 N hold.
+    // At the height of the body a eleventh of the wind is left: 10 m/s push with 0.08 N, 25 m/s with 0.5 N; 0.29 N hold.
     assert!(slip(10.0).abs() < 1e-3, "{}", slip(10.0));
     assert!(slip(25.0) > 0.05, "{}", slip(25.0));
 }
@@ -122,13 +122,14 @@ fn the_floor_adds_lift_and_the_extra_fades_with_height() {
 
 #[test]
 fn speeding_up_a_rotor_pushes_the_body_the_other_way_before_drag_does() {
-    let mut plant = calm(&perfect(), Some(&Pose { rotors: 0.5, ..Pose::hovering(5.0) }));
+    let parameters = perfect();
+    let mut plant = calm(&parameters, Some(&Pose { rotors: 0.5, ..Pose::hovering(5.0) }));
     // The counter-clockwise pair gets power: their drag and their acceleration both turn the body clockwise.
     plant.set_duty([0.8, 0.0, 0.8, 0.0]);
     plant.step();
     let acceleration = plant.motion().angular_acceleration.z;
     let w = 0.5 * plant.rotors().hover_speed();
-    let drag_alone = 2.0 * 4.1e-11 * w * w / 20.4e-6;
+    let drag_alone = 2.0 * parameters.torque_coefficient * w * w / parameters.inertia_z;
     assert!(acceleration > 3.0 * drag_alone, "{acceleration} rad/s² against {drag_alone} from drag");
 }
 
@@ -140,7 +141,7 @@ fn rotors_turning_one_way_deflect_a_pitch_into_a_roll() {
     plant.set_duty([0.0, 0.6, 0.0, 0.6]);
     run(&mut plant, 0.3);
     let still = plant.motion().angular_acceleration.x;
-    let momentum = 1.375e-8 * (plant.rotors().speed()[1] + plant.rotors().speed()[3]);
+    let momentum = parameters.rotor_inertia * (plant.rotors().speed()[1] + plant.rotors().speed()[3]);
     let pose = Pose { rate: Vector3::new(0.0, 2.0, 0.0), rotors: 0.0, ..Pose::hovering(50.0) };
     let mut plant = calm(&parameters, Some(&pose));
     plant.set_duty([0.0, 0.6, 0.0, 0.6]);
@@ -151,22 +152,26 @@ fn rotors_turning_one_way_deflect_a_pitch_into_a_roll() {
     }
     assert!(still.abs() < 1e-9);
     // Pitch rate stays near 2 rad/s while the momentum builds up; the sign is the point, the size a bound.
-    let limit = -2.0 * momentum / 9.16e-6 * 0.3;
+    let limit = -2.0 * momentum / parameters.inertia_x * 0.3;
     assert!(rolled < 0.0 && rolled > 2.0 * limit, "{rolled} against {limit}");
 }
 
 #[test]
-fn a_hover_drains_the_battery_in_about_four_minutes() {
-    let mut plant = calm(&perfect(), Some(&Pose::hovering(1000.0)));
-    let mut seconds = 0;
-    while plant.battery().charge() > 0.1 && seconds < 1000 {
+fn a_hover_drains_the_battery_as_fast_as_its_current_says() {
+    let p = perfect();
+    let mut plant = calm(&p, Some(&Pose::hovering(1000.0)));
+    let (mut seconds, mut drawn) = (0.0, 0.0);
+    while plant.battery().charge() > 0.1 && seconds < 1000.0 {
         let w = plant.rotors().hover_speed();
-        let duty = (6.0368e-8 * w * w + 6.699042e-4 * w + 1.53e-2) / plant.battery().voltage();
-        plant.set_duty([duty.min(1.0); 4]);
+        let voltage = (p.motor_voltage_a * w + p.motor_voltage_b) * w + p.motor_voltage_c;
+        plant.set_duty([(voltage / plant.battery().voltage()).min(1.0); 4]);
         run(&mut plant, 1.0);
-        seconds += 1;
+        seconds += 1.0;
+        drawn += plant.motion().current;
     }
-    assert!((200..=300).contains(&seconds), "{seconds} s");
+    // Ninety percent, in ampere seconds.
+    assert!((drawn / (0.9 * 3600.0 * p.battery_capacity) - 1.0).abs() < 0.01, "{drawn} C");
+    assert!((3.0..5.0).contains(&(drawn / seconds)), "{} A", drawn / seconds);
 }
 
 proptest! {
@@ -185,7 +190,7 @@ proptest! {
             rate: Vector3::from(rate),
             ..Pose::hovering(height)
         };
-        let mut plant = Plant::new(&PlantParameters::default(), &WindConfig::default(), Some(&pose), seed);
+        let mut plant = Plant::new(&PlantParameters::EXAMPLE, &WindConfig::default(), Some(&pose), seed);
         plant.set_duty(duty.map(|d| if d.is_finite() { d.abs().fract() } else { 0.5 }));
         run(&mut plant, 1.0);
         let motion = plant.motion();

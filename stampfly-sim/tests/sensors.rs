@@ -18,14 +18,14 @@ fn drifting(seed: u64, pose: Pose) -> Simulation {
         inertia_x: 1e-5,
         inertia_y: 1e-5,
         inertia_z: 1e-5,
-        ..Default::default()
+        ..PlantParameters::EXAMPLE
     };
     let pose = Some(Pose { rotors: 0.0, ..pose });
-    Simulation::new(&SimulationConfig { seed, plant, wind: WindConfig::CALM, pose, ..Default::default() })
+    Simulation::new(&SimulationConfig { seed, plant, wind: WindConfig::CALM, pose, ..SimulationConfig::example() })
 }
 
 fn standing(seed: u64) -> Simulation {
-    Simulation::new(&SimulationConfig { seed, wind: WindConfig::CALM, ..Default::default() })
+    Simulation::new(&SimulationConfig { seed, wind: WindConfig::CALM, ..SimulationConfig::example() })
 }
 
 fn mean_and_deviation(values: &[f32]) -> (f32, f32) {
@@ -209,8 +209,8 @@ fn a_late_flow_reader_loses_no_motion() {
 fn the_field_turns_with_the_vehicle_around_its_hard_iron() {
     let mut headings = Vec::new();
     for yaw in [0.0, 1.0, 2.5] {
-        let pose = Pose::standing(&PlantParameters::default(), yaw);
-        let mut simulation = Simulation::new(&SimulationConfig { pose: Some(pose), ..Default::default() });
+        let pose = Pose::standing(&PlantParameters::EXAMPLE, yaw);
+        let mut simulation = Simulation::new(&SimulationConfig { pose: Some(pose), ..SimulationConfig::example() });
         let clock = simulation.clock.clone();
         let hard_iron = simulation.sensors.mag.hard_iron();
         let sum = (0..50).fold(Vec3::zeros(), |sum, _| {
@@ -255,7 +255,11 @@ fn the_battery_monitor_reads_what_the_board_draws() {
     let clock = simulation.clock.clone();
     for _ in 0..20 {
         let Ok(sample) = block_on(&clock, simulation.sensors.power.next());
-        assert!((sample.data.current - 0.15).abs() < 0.02, "{:?}", sample.data);
+        assert!(
+            (sample.data.current - PlantParameters::EXAMPLE.board_current as f32).abs() < 0.02,
+            "{:?}",
+            sample.data
+        );
         assert!((sample.data.voltage - 4.34).abs() < 0.03, "{:?}", sample.data);
         assert!((sample.data.power - sample.data.voltage * sample.data.current).abs() < 1e-6);
     }

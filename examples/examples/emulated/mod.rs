@@ -29,8 +29,8 @@ pub struct Hand {
 /// its configuration file.
 pub fn vehicle(pose: Option<Pose>) -> (Simulation, Board, Vec<u8>) {
     // Four equal motors, so that a simple hand keeps it level.
-    let plant = PlantParameters { manufacturing_spread: 0.0, ..Default::default() };
-    let config = SimulationConfig { wind: WindConfig::CALM, plant, pose, ..Default::default() };
+    let plant = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
+    let config = SimulationConfig { wind: WindConfig::CALM, plant, pose, ..SimulationConfig::example() };
     let simulation = Simulation::new(&config);
     let image = stand_in_image();
     let board = Board::new(&simulation.world, &simulation.clock, &config, &image);

@@ -1,5 +1,6 @@
 //! Actuation: thrust and torque in, motor duty out. The last place where a motor can be kept still.
 
+use crate::airframe::MIXER;
 use crate::config::VehicleConfig;
 use crate::console::TEST_DUTY;
 use crate::topics::ActuationEnds;
@@ -27,7 +28,7 @@ impl Actuation {
     /// Motors at rest.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        Self { mixer: MultirotorMixer::stampfly(), motors: MotorStage::new(&config.motor), armed_at: Instant::ZERO }
+        Self { mixer: MIXER, motors: MotorStage::new(&config.motor), armed_at: Instant::ZERO }
     }
 }
 

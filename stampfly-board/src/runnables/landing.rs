@@ -3,7 +3,7 @@
 use crate::config::VehicleConfig;
 use crate::topics::LandingEnds;
 use stampfly_bus::{Activation, Runnable};
-use stampfly_mode::{LandingInput, TakeoffLanding};
+use stampfly_mode::{LandingConfig, LandingInput, TakeoffLanding};
 
 /// Take-off and landing manager: the estimate in, contact with the ground out.
 #[derive(Clone, Debug)]
@@ -15,8 +15,9 @@ pub struct Landing {
 impl Landing {
     /// Standing.
     #[must_use]
-    pub fn new(_: &VehicleConfig) -> Self {
-        Self { manager: TakeoffLanding::default() }
+    pub fn new(config: &VehicleConfig) -> Self {
+        let hover_thrust = config.cascade.altitude.hover_thrust;
+        Self { manager: TakeoffLanding::new(LandingConfig::for_hover_thrust(hover_thrust)) }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::ground_station::{self, Progress};
 use super::metrics::{Collector, FIGURES, Metrics, Snapshot};
 use super::mission::{self, Mission};
+use super::plant::PLANT;
 use super::sensing::{self, Healths, Others, Sensing, Shared};
 use crate::config::VehicleConfig;
 use crate::messages::ButtonContact;
@@ -43,7 +44,7 @@ impl Setup {
     /// The reference mission with this seed.
     #[must_use]
     pub fn reference(seed: u64) -> Self {
-        let simulation = SimulationConfig { seed, ..SimulationConfig::default() };
+        let simulation = SimulationConfig { seed, ..SimulationConfig::new(PLANT) };
         Self {
             vehicle: VehicleConfig::default(),
             mission: Mission::parse(mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),

@@ -2,6 +2,7 @@
 //!
 //! | module | what it is |
 //! |---|---|
+//! | [`plant`] | the vehicle as a body |
 //! | [`sensing`] | what feeds the bus: models of the sensors, or the drivers over emulated chips |
 //! | [`mission`], [`ground_station`] | what to fly, and the program that asks the vehicle for it |
 //! | [`metrics`] | how good a flight was |
@@ -14,10 +15,12 @@ pub mod ground_station;
 pub mod metrics;
 pub mod mission;
 mod page;
+pub mod plant;
 pub mod sensing;
 
 pub use flight::{Outcome, PhaseChange, Setup};
 pub use page::PAGE;
+pub use plant::PLANT;
 
 use crate::config::VehicleConfig;
 use crate::golden;

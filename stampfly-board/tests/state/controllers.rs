@@ -2,6 +2,7 @@
 
 use super::{Numbers, at, bytes, goes_on};
 use serde::{Serialize, de::DeserializeOwned};
+use stampfly_board::airframe::{AIRFRAME, MIXER};
 use stampfly_control::filter::{Biquad, BiquadChain, BiquadCoefficients, DynamicNotch, LowPass};
 use stampfly_control::guidance::{Navigator, NavigatorInput};
 use stampfly_control::{
@@ -71,8 +72,8 @@ fn fly<C: Controller>(controller: &mut C, k: u64, n: &mut Numbers) -> ControlOut
 
 #[test]
 fn controllers_go_on() {
-    goes_on(CascadeController::new(&CascadeConfig::default()), 600, fly);
-    goes_on(GeometricController::new(&GeometricConfig::default()), 600, fly);
+    goes_on(CascadeController::new(&CascadeConfig::for_airframe(&AIRFRAME)), 600, fly);
+    goes_on(GeometricController::new(&GeometricConfig::for_airframe(&AIRFRAME)), 600, fly);
 }
 
 #[test]
@@ -104,17 +105,16 @@ fn navigator_goes_on() {
 
 #[test]
 fn motors_go_on() {
-    let mixer = MultirotorMixer::stampfly();
-    goes_on(MotorStage::new(&MotorConfig::default()), 500, |motors, k, n| {
+    goes_on(MotorStage::new(&MotorConfig::for_airframe(&AIRFRAME)), 500, |motors, k, n| {
         let demand = ControlOutput { thrust: 0.36 + n.number(0.3), torque: n.vector(1e-3) };
         let voltage = (!n.once_in(10)).then(|| 3.7 + n.number(0.6));
-        motors.step(at(k), &mixer.mix(&demand), voltage, !(300..320).contains(&k))
+        motors.step(at(k), &MIXER.mix(&demand), voltage, !(300..320).contains(&k))
     });
 }
 
 #[test]
 fn the_mixer_comes_back() {
-    let mixer = MultirotorMixer::stampfly();
+    let mixer = MIXER;
     let mut written = bytes(&mixer);
     assert_eq!(postcard::from_bytes(&written), Ok(mixer));
     // The number of rotors, before the largest thrust.

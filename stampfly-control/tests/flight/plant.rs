@@ -1,20 +1,27 @@
 //! A quadcopter of its own: rigid body, first-order motors, drag, wind, ground. Written from the equations of motion
 //! and sharing nothing with the controllers, so that an error here and an error there do not cancel.
 //!
-//! Drag follows the common model of 0.1·v², which overstates it for so small a vehicle: gusts hit harder than in air.
+//! Drag overstates what air does to a vehicle of this mass several times, so that gusts hit hard.
 
 use std::collections::VecDeque;
 
-use stampfly_control::{ControlInput, Controller, Mixed, Mixer, MultirotorMixer, Spin};
+use stampfly_control::{Airframe, ControlInput, Controller, Mixed, Mixer, MultirotorMixer};
 use stampfly_types::messages::{
     CommandSetpoint, ControlOutput, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, Setpoint,
     StateEstimate, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
+/// The airframe the gains are derived from.
+pub const AIRFRAME: Airframe = Airframe::EXAMPLE;
+/// Drag over air speed squared, N/(m/s)².
+const DRAG: f32 = 2.7 * AIRFRAME.mass;
+/// Drag torque over angular rate squared, N·m/(rad/s)², about the axis of least inertia.
+const TURNING_DRAG: f32 = 6e-4;
+
 /// What can differ from the vehicle the gains were chosen for.
 #[derive(Clone, Copy, Debug)]
-pub struct Airframe {
+pub struct Vehicle {
     pub mass: f32,
     pub inertia: Vec3,
     pub motor_lag: f32,
@@ -26,12 +33,12 @@ pub struct Airframe {
     pub motor_gain: [f32; 4],
 }
 
-impl Default for Airframe {
+impl Default for Vehicle {
     fn default() -> Self {
         Self {
-            mass: 0.0368,
-            inertia: Vec3::new(9.16e-6, 13.3e-6, 20.4e-6),
-            motor_lag: 0.018,
+            mass: AIRFRAME.mass,
+            inertia: AIRFRAME.inertia,
+            motor_lag: AIRFRAME.motor_lag,
             // 3 ms of filter and one period of computing, rounded up.
             delay: 2,
             noise: [0.0; 3],
@@ -51,7 +58,7 @@ pub struct State {
 
 /// One vehicle under one controller.
 pub struct Flight<C> {
-    pub airframe: Airframe,
+    pub vehicle: Vehicle,
     pub controller: C,
     pub state: State,
     pub now: Instant,
@@ -74,9 +81,9 @@ const SUBSTEPS: u32 = 5;
 
 impl<C: Controller> Flight<C> {
     /// Hovering at 1 m over the origin.
-    pub fn hovering(controller: C, airframe: Airframe) -> Self {
-        let thrust = [airframe.mass * GRAVITY / 4.0; 4];
-        let mut flight = Self::standing(controller, airframe);
+    pub fn hovering(controller: C, vehicle: Vehicle) -> Self {
+        let thrust = [vehicle.mass * GRAVITY / 4.0; 4];
+        let mut flight = Self::standing(controller, vehicle);
         flight.state.position.z = -1.0;
         flight.state.thrust = thrust;
         flight.flight_status.phase = FlightPhase::Flying;
@@ -86,10 +93,10 @@ impl<C: Controller> Flight<C> {
     }
 
     /// Standing on the ground at the origin, armed and about to take off.
-    pub fn standing(controller: C, airframe: Airframe) -> Self {
+    pub fn standing(controller: C, vehicle: Vehicle) -> Self {
         use stampfly_types::messages::SetpointAxes as Axes;
         Self {
-            airframe,
+            vehicle,
             controller,
             state: State {
                 position: Vec3::zeros(),
@@ -112,7 +119,7 @@ impl<C: Controller> Flight<C> {
             wind: Vec3::zeros(),
             output: ControlOutput::default(),
             mixed: Mixed::default(),
-            mixer: MultirotorMixer::stampfly(),
+            mixer: MultirotorMixer::for_airframe(&AIRFRAME).expect("flies"),
             history: VecDeque::new(),
             specific_force: Vec3::new(0.0, 0.0, -GRAVITY),
             random: 12345,
@@ -128,7 +135,7 @@ impl<C: Controller> Flight<C> {
     pub fn step(&mut self) {
         let measured = self.noisy();
         self.history.push_back(measured);
-        if self.history.len() > 1 + self.airframe.delay {
+        if self.history.len() > 1 + self.vehicle.delay {
             self.history.pop_front();
         }
         let estimate = self.estimate();
@@ -176,7 +183,7 @@ impl<C: Controller> Flight<C> {
 
     fn noisy(&mut self) -> StateEstimate {
         let mut estimate = self.measure();
-        let [rate, velocity, position] = self.airframe.noise;
+        let [rate, velocity, position] = self.vehicle.noise;
         estimate.angular_rate += self.random_vector() * rate;
         estimate.velocity += self.random_vector() * velocity;
         estimate.position += self.random_vector() * position;
@@ -196,22 +203,18 @@ impl<C: Controller> Flight<C> {
         let body = &mut self.state;
         let mut force = 0.0;
         let mut torque = Vec3::zeros();
-        for (n, rotor) in MultirotorMixer::STAMPFLY_ROTORS.iter().enumerate() {
-            let wanted = self.mixed.thrust[n] * self.airframe.motor_gain[n];
-            body.thrust[n] += (wanted - body.thrust[n]) * (dt / self.airframe.motor_lag);
+        for (n, rotor) in AIRFRAME.rotors.iter().enumerate() {
+            let wanted = self.mixed.thrust[n] * self.vehicle.motor_gain[n];
+            body.thrust[n] += (wanted - body.thrust[n]) * (dt / self.vehicle.motor_lag);
             let thrust = body.thrust[n];
-            let drag = match rotor.spin {
-                Spin::CounterClockwise => rotor.kappa,
-                Spin::Clockwise => -rotor.kappa,
-            };
             force += thrust;
-            torque += Vec3::new(-rotor.y * thrust, rotor.x * thrust, drag * thrust);
+            torque += Vec3::new(-rotor.y * thrust, rotor.x * thrust, rotor.yaw_arm() * thrust);
         }
         let airspeed = body.velocity - self.wind;
-        let drag = -airspeed * 0.1 * airspeed.norm();
+        let drag = -airspeed * DRAG * airspeed.norm();
         let push = body.attitude * Vec3::new(0.0, 0.0, -force) + drag;
-        let acceleration = push / self.airframe.mass + Vec3::new(0.0, 0.0, GRAVITY);
-        self.specific_force = body.attitude.inverse() * (push / self.airframe.mass);
+        let acceleration = push / self.vehicle.mass + Vec3::new(0.0, 0.0, GRAVITY);
+        self.specific_force = body.attitude.inverse() * (push / self.vehicle.mass);
         let on_ground = body.position.z >= 0.0;
         if on_ground && acceleration.z > 0.0 {
             // The ground carries the rest and holds the feet.
@@ -222,9 +225,9 @@ impl<C: Controller> Flight<C> {
         }
         body.velocity += acceleration * dt;
         body.position += body.velocity * dt;
-        let momentum = self.airframe.inertia.component_mul(&body.rate);
-        let turning = (torque - body.rate.cross(&momentum) - body.rate * (1e-5 * body.rate.norm()))
-            .component_div(&self.airframe.inertia);
+        let momentum = self.vehicle.inertia.component_mul(&body.rate);
+        let turning = (torque - body.rate.cross(&momentum) - body.rate * (TURNING_DRAG * body.rate.norm()))
+            .component_div(&self.vehicle.inertia);
         body.rate += turning * dt;
         body.attitude *= Quat::new(body.rate * dt);
         body.attitude.renormalize();

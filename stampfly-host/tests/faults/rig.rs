@@ -40,12 +40,13 @@ impl Access {
 
 /// Runs until `end`; at each instant of `events` something is done.
 pub fn run(end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7] {
-    run_with(SimulationConfig::default().seed, end, events)
+    run_with(SimulationConfig::new(stampfly_board::simulation::PLANT).seed, end, events)
 }
 
 /// The same with chips and noise of this seed.
 pub fn run_with(seed: u64, end: Instant, events: &[Event<'_>]) -> [Vec<Said>; 7] {
-    let config = SimulationConfig { wind: WindConfig::CALM, seed, ..Default::default() };
+    let config =
+        SimulationConfig { wind: WindConfig::CALM, seed, ..SimulationConfig::new(stampfly_board::simulation::PLANT) };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
     let Board { i2c, imu, flow, shutdown_bottom, shutdown_front, attached } =

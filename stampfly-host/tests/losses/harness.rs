@@ -241,7 +241,7 @@ impl vehicle::Around for Watch<'_> {
 
 /// Runs a vehicle for this long with this script.
 pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Script<'b>) -> Seen {
-    let config = SimulationConfig { seed, ..Default::default() };
+    let config = SimulationConfig { seed, ..SimulationConfig::new(stampfly_board::simulation::PLANT) };
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let limit = Duration::from_seconds(seconds);
     let end = config.start + limit;

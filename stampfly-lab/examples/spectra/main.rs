@@ -147,7 +147,7 @@ fn simulate(height: Option<f64>, samples: usize) -> [Vec<f64>; 6] {
     let config = SimulationConfig {
         pose: height.map(Pose::hovering),
         wind: WindConfig { gust: 0.7, ..Default::default() },
-        ..Default::default()
+        ..SimulationConfig::new(stampfly_board::simulation::PLANT)
     };
     let mut simulation = Simulation::new(&config);
     let clock = simulation.clock.clone();

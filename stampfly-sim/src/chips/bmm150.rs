@@ -110,7 +110,7 @@ fn counts(field: [f64; 3], hall: f64) -> [i16; 3] {
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// bus.attach(0x10, Bmm150::new(&simulation.world, &clock, 1));

@@ -20,7 +20,7 @@ const FLOW_CLOCK: u32 = 2_000_000;
 /// use stampfly_sim::chips::{Board, stand_in_image};
 /// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
 ///
-/// let config = SimulationConfig::default();
+/// let config = SimulationConfig::example();
 /// let simulation = Simulation::new(&config);
 /// let board = Board::new(&simulation.world, &simulation.clock, &config, &stand_in_image());
 /// let mut monitor = Ina3221::new(board.i2c, Ina3221::A0_GROUND, simulation.clock.clone(), Config::default());

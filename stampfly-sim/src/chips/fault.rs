@@ -27,7 +27,7 @@ pub struct Faults {
 /// use stampfly_sim::chips::{Bmp280, Faults, I2cBus};
 /// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// let barometer = bus.attach(0x76, Bmp280::new(&simulation.world, &clock, 1));

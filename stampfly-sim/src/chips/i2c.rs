@@ -51,7 +51,7 @@ struct State {
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// bus.attach(0x76, Bmp280::new(&simulation.world, &clock, 1));

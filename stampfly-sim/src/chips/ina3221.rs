@@ -53,7 +53,7 @@ const SHUNT_RESISTANCE: f64 = 0.01;
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// bus.attach(0x40, Ina3221::new(&simulation.world, &clock, 1));

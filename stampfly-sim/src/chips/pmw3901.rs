@@ -74,7 +74,7 @@ const FACTORY: [u8; 2] = [0x1A, 0x60];
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let chip = Pmw3901::new(&simulation.world, &clock, 1);
 /// let (mut port, _) = SpiBus::new(&clock, 1).attach(2_000_000, chip);

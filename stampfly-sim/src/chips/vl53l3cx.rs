@@ -92,7 +92,7 @@ fn macro_periods(code: u16) -> f64 {
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let mut bus = I2cBus::new(&clock, 1);
 /// let (chip, _shutdown) = Vl53l3cx::new(&simulation.world, &clock, 1, Mount::Bottom);

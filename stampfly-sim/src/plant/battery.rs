@@ -1,4 +1,4 @@
-//! One lithium cell of the high-voltage kind.
+//! Lithium cells of the high-voltage kind, in series.
 //!
 //! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that acts slowly.
 //! Temperature and ageing are left out; set the resistances and the capacity instead.
@@ -16,6 +16,7 @@ pub struct Battery {
     current: f64,
     polarisation: f64,
     voltage: f64,
+    cells: f64,
     initial: f64,
     capacity: f64,
     resistance: f64,
@@ -30,6 +31,7 @@ impl Battery {
             current: 0.0,
             polarisation: 0.0,
             voltage: 0.0,
+            cells: parameters.battery_cells,
             initial: parameters.battery_charge,
             capacity: parameters.battery_capacity * 3600.0,
             resistance: parameters.battery_resistance,
@@ -78,7 +80,7 @@ impl Battery {
         let position = self.charge().min(1.0) * 10.0;
         let below = (position as usize).min(9);
         let (low, high) = (OPEN_CIRCUIT[below], OPEN_CIRCUIT[below + 1]);
-        low + (high - low) * (position - below as f64)
+        self.cells * (low + (high - low) * (position - below as f64))
     }
 }
 
@@ -88,15 +90,17 @@ mod tests {
 
     #[test]
     fn voltage_sags_at_once_then_slowly_and_comes_back() {
-        let mut battery = Battery::new(&PlantParameters { board_current: 0.0, ..Default::default() });
+        let parameters = PlantParameters { board_current: 0.0, ..PlantParameters::EXAMPLE };
+        let (at_once, slowly) = (4.0 * parameters.battery_resistance, 4.0 * parameters.battery_polarisation);
+        let mut battery = Battery::new(&parameters);
         assert_eq!(battery.voltage(), 4.35);
         battery.step(0.001, 4.0);
-        assert!((battery.voltage() - (4.35 - 0.24)).abs() < 1e-3, "{}", battery.voltage());
+        assert!((battery.voltage() - (4.35 - at_once)).abs() < 1e-3, "{}", battery.voltage());
         for _ in 0..30_000 {
             battery.step(0.001, 4.0);
         }
         let sag = battery.open_circuit() - battery.voltage();
-        assert!((sag - 4.0 * 0.06 - 4.0 * 0.03 * (1.0 - (-3f64).exp())).abs() < 1e-3, "{sag}");
+        assert!((sag - at_once - slowly * (1.0 - (-3f64).exp())).abs() < 1e-3, "{sag}");
         for _ in 0..100_000 {
             battery.step(0.001, 0.0);
         }
@@ -106,11 +110,18 @@ mod tests {
 
     #[test]
     fn an_empty_battery_stays_empty() {
-        let mut battery = Battery::new(&PlantParameters { battery_charge: 0.01, ..Default::default() });
+        let mut battery = Battery::new(&PlantParameters { battery_charge: 0.01, ..PlantParameters::EXAMPLE });
         for _ in 0..1_000 {
             battery.step(1.0, 4.0);
         }
         assert_eq!(battery.charge(), 0.0);
         assert_eq!(battery.open_circuit(), OPEN_CIRCUIT[0]);
+    }
+
+    #[test]
+    fn cells_add_up() {
+        let battery =
+            Battery::new(&PlantParameters { battery_cells: 3.0, board_current: 0.0, ..PlantParameters::EXAMPLE });
+        assert!((battery.voltage() - 3.0 * 4.35).abs() < 1e-9);
     }
 }

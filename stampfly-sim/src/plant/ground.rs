@@ -9,10 +9,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// Feet and corners, in units of their offset (x, y).
 const SIDES: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
 
-/// The upper corners of the frame: distance from body x and y, height above the origin, m (half extents of the
-/// product).
-const CORNER: (f64, f64) = (0.0408, 0.0103);
-
 /// Points that can touch: feet first, then corners.
 const POINTS: usize = 8;
 
@@ -37,7 +33,8 @@ impl Ground {
         let sink = p.mass * p.gravity / (4.0 * p.foot_stiffness);
         let points: [Vector3<f64>; POINTS] = core::array::from_fn(|i| {
             let (x, y) = SIDES[i % 4];
-            let (offset, down) = if i < 4 { (p.foot_offset, p.ground_height + sink) } else { (CORNER.0, -CORNER.1) };
+            let (offset, down) =
+                if i < 4 { (p.foot_offset, p.ground_height + sink) } else { (p.corner_offset, -p.corner_height) };
             Vector3::new(x * offset, y * offset, down)
         });
         Self {

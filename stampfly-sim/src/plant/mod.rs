@@ -97,7 +97,7 @@ pub struct Pose {
 ///
 /// // One second at full power from a hover.
 /// let pose = Pose::hovering(1.0);
-/// let parameters = PlantParameters { manufacturing_spread: 0.0, ..Default::default() };
+/// let parameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
 /// let mut plant = Plant::new(&parameters, &WindConfig::CALM, Some(&pose), 1);
 /// plant.set_duty([1.0; 4]);
 /// for _ in 0..1600 {

@@ -137,8 +137,15 @@ mod tests {
     use super::*;
     use crate::noise::Noise;
 
+    const IDEAL: PlantParameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
+
     fn ideal() -> Rotors {
-        Rotors::new(&PlantParameters { manufacturing_spread: 0.0, ..Default::default() }, &mut Noise::new(0, 0))
+        Rotors::new(&IDEAL, &mut Noise::new(0, 0))
+    }
+
+    /// The steady voltage at a speed.
+    fn curve(w: f64) -> f64 {
+        IDEAL.motor_voltage_a * w * w + IDEAL.motor_voltage_b * w + IDEAL.motor_voltage_c
     }
 
     fn settle(rotors: &mut Rotors, voltage: f64) -> RotorLoads {
@@ -156,24 +163,25 @@ mod tests {
             rotors.set_duty([1.0; 4]);
             settle(&mut rotors, voltage);
             let w = rotors.speed()[0];
-            let curve = 6.0368e-8 * w * w + 6.699042e-4 * w + 1.53e-2;
+            let curve = curve(w);
             assert!((curve - voltage).abs() < 1e-3, "{voltage} V gives {w} rad/s, which needs {curve} V");
         }
     }
 
     #[test]
-    fn hover_needs_the_weight_and_about_two_thirds_of_the_duty() {
+    fn hover_needs_the_weight_and_the_duty_of_the_curve() {
         let mut rotors = ideal();
         let w = rotors.hover_speed();
-        let voltage = 6.0368e-8 * w * w + 6.699042e-4 * w + 1.53e-2;
-        for (battery, expected) in [(3.7, 0.69), (4.2, 0.61)] {
-            let duty = voltage / battery;
-            assert!((duty - expected).abs() < 0.01, "{duty} at {battery} V");
+        for battery in [3.7, 4.2] {
+            let duty = curve(w) / battery;
             rotors.set_duty([duty; 4]);
             let loads = settle(&mut rotors, battery);
-            assert!((loads.thrust / (0.0368 * 9.80665) - 1.0).abs() < 2e-3, "{}", loads.thrust);
+            assert!((loads.thrust / (IDEAL.mass * IDEAL.gravity) - 1.0).abs() < 2e-3, "{}", loads.thrust);
             assert!(loads.torque.norm() < 1e-9 && loads.momentum_z.abs() < 1e-9, "balanced");
-            assert!((3.0..5.0).contains(&loads.current), "four minutes on 300 mAh: {} A", loads.current);
+            // Torque over the motor's constant, which the curve fixes, times the share of the time that the switch is closed.
+            let per_volt = IDEAL.torque_coefficient / IDEAL.motor_voltage_a;
+            let each = (curve(w) - per_volt * IDEAL.motor_resistance * w) / IDEAL.motor_resistance;
+            assert!((loads.current / (4.0 * duty * each) - 1.0).abs() < 2e-3, "{} A", loads.current);
         }
     }
 

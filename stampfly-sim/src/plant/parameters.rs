@@ -1,7 +1,7 @@
 //! What the vehicle and its surroundings are made of: one table, settable by name.
 //!
-//! The defaults are the StampFly as measured by the people who build it (their "flight anchored" set of August
-//! 2026), completed where they give nothing; the descriptions say which is which.
+//! A vehicle's crate writes down its own [`PlantParameters`], with the sources of its numbers. There is no default, since a
+//! simulation of some other vehicle would look right and be wrong.
 
 use core::fmt;
 
@@ -14,7 +14,7 @@ pub struct ParameterInfo {
     pub value: f64,
     /// SI unit, `"1"` where there is none.
     pub unit: &'static str,
-    /// What it is and where the default comes from.
+    /// What it is.
     pub description: &'static str,
     /// The smallest and largest value that make sense.
     pub range: (f64, f64),
@@ -47,20 +47,17 @@ impl fmt::Display for ParameterError {
 impl std::error::Error for ParameterError {}
 
 macro_rules! parameters {
-    ($(#[$meta:meta])* $Name:ident { $($field:ident = $default:literal [$unit:literal] in $low:literal ..= $high:literal, $description:literal;)* }) => {
+    ($(#[$meta:meta])* $Name:ident { $($field:ident = $example:literal [$unit:literal] in $low:literal ..= $high:literal, $description:literal;)* }) => {
         $(#[$meta])*
         #[derive(Clone, Debug, PartialEq)]
         pub struct $Name {
             $(#[doc = concat!($description, " Unit: ", $unit, ".")] pub $field: f64,)*
         }
 
-        impl Default for $Name {
-            fn default() -> Self {
-                Self { $($field: $default),* }
-            }
-        }
-
         impl $Name {
+            /// A quadrotor of 50 g that nobody built, in round numbers: for examples and tests.
+            pub const EXAMPLE: Self = Self { $($field: $example),* };
+
             /// Sets a parameter by name.
             ///
             /// # Errors
@@ -93,12 +90,12 @@ macro_rules! parameters {
 }
 
 parameters! {
-    /// Airframe, motors, propellers, battery, ground and air.
+    /// Airframe, motors, propellers, battery, ground and air of a quadrotor in X.
     ///
     /// ```
     /// use stampfly_sim::plant::PlantParameters;
     ///
-    /// let mut plant = PlantParameters::default();
+    /// let mut plant = PlantParameters::EXAMPLE;
     /// plant.set("mass", 0.040)?;
     /// assert_eq!(plant.mass, 0.040);
     /// assert!(plant.set("mass", -1.0).is_err() && plant.set("colour", 1.0).is_err());
@@ -106,35 +103,38 @@ parameters! {
     /// # Ok::<(), stampfly_sim::plant::ParameterError>(())
     /// ```
     PlantParameters {
-        mass = 0.0368 ["kg"] in 0.01 ..= 0.2, "Take-off mass, battery included (measured).";
-        inertia_x = 9.16e-6 ["kg*m^2"] in 1e-6 ..= 1e-3, "Moment of inertia about body x (measured).";
-        inertia_y = 13.3e-6 ["kg*m^2"] in 1e-6 ..= 1e-3, "Moment of inertia about body y (measured).";
-        inertia_z = 20.4e-6 ["kg*m^2"] in 1e-6 ..= 1e-3, "Moment of inertia about body z (measured).";
+        mass = 0.05 ["kg"] in 0.01 ..= 2.0, "Take-off mass, battery included.";
+        inertia_x = 2.0e-5 ["kg*m^2"] in 1e-6 ..= 0.1, "Moment of inertia about body x.";
+        inertia_y = 2.5e-5 ["kg*m^2"] in 1e-6 ..= 0.1, "Moment of inertia about body y.";
+        inertia_z = 4.0e-5 ["kg*m^2"] in 1e-6 ..= 0.1, "Moment of inertia about body z.";
         gravity = 9.80665 ["m/s^2"] in 0.0 ..= 20.0, "Gravity (ISO 80000-3).";
-        rotor_offset = 0.023 ["m"] in 0.005 ..= 0.2, "Distance of each rotor from the body's x and y axis (measured).";
-        thrust_coefficient = 1.0e-8 ["N*s^2/rad^2"] in 1e-9 ..= 1e-6, "Thrust over rotor speed squared (flight anchored).";
-        torque_coefficient = 4.1e-11 ["N*m*s^2/rad^2"] in 1e-13 ..= 1e-8, "Rotor drag torque over rotor speed squared (coast-down).";
-        motor_voltage_a = 6.0368e-8 ["V*s^2/rad^2"] in 1e-9 ..= 1e-6, "Steady motor voltage: coefficient of speed squared (flight anchored).";
-        motor_voltage_b = 6.699042e-4 ["V*s/rad"] in 1e-5 ..= 1e-2, "Steady motor voltage: coefficient of speed (flight anchored).";
-        motor_voltage_c = 1.53e-2 ["V"] in 0.0 ..= 1.0, "Steady motor voltage: constant part, friction (flight anchored).";
-        motor_resistance = 0.76 ["ohm"] in 0.05 ..= 5.0, "Winding, switch and leads; chosen so that the battery lasts the four minutes it does, since the voltage curve leaves it free.";
-        rotor_inertia = 1.375e-8 ["kg*m^2"] in 1e-10 ..= 1e-6, "Moment of inertia of motor and propeller (coast-down); gives a lag of 20 ms at hover.";
+        rotor_offset = 0.03 ["m"] in 0.005 ..= 0.5, "Distance of each rotor from the body's x and y axis.";
+        thrust_coefficient = 1.5e-8 ["N*s^2/rad^2"] in 1e-9 ..= 1e-4, "Thrust over rotor speed squared.";
+        torque_coefficient = 7.5e-11 ["N*m*s^2/rad^2"] in 1e-13 ..= 1e-6, "Rotor drag torque over rotor speed squared.";
+        motor_voltage_a = 7.0e-8 ["V*s^2/rad^2"] in 1e-9 ..= 1e-4, "Steady motor voltage: coefficient of speed squared.";
+        motor_voltage_b = 6.0e-4 ["V*s/rad"] in 1e-5 ..= 1.0, "Steady motor voltage: coefficient of speed.";
+        motor_voltage_c = 0.02 ["V"] in 0.0 ..= 1.0, "Steady motor voltage: constant part, friction.";
+        motor_resistance = 0.5 ["ohm"] in 0.01 ..= 5.0, "Winding, switch and leads of one motor.";
+        rotor_inertia = 2.0e-8 ["kg*m^2"] in 1e-10 ..= 1e-4, "Moment of inertia of motor and propeller.";
         manufacturing_spread = 1.0 ["1"] in 0.0 ..= 5.0, "Scales the per-seed differences between rotors and the offset of the centre of mass; 0 is the perfect vehicle.";
-        drag_horizontal = 0.015 ["N*s/m"] in 0.0 ..= 1.0, "Rotor drag along body x and y at hover speed of the rotors (typical for the size).";
-        drag_vertical = 0.0515 ["N*s/m"] in 0.0 ..= 1.0, "Loss of thrust with climb speed at hover (1.4 1/s of damping, from theory).";
-        drag_quadratic = 0.004 ["N*s^2/m^2"] in 0.0 ..= 1.0, "Drag of the body over air speed squared (flat plate of its size).";
+        drag_horizontal = 0.02 ["N*s/m"] in 0.0 ..= 1.0, "Rotor drag along body x and y at hover speed of the rotors.";
+        drag_vertical = 0.07 ["N*s/m"] in 0.0 ..= 1.0, "Loss of thrust with climb speed at hover.";
+        drag_quadratic = 0.005 ["N*s^2/m^2"] in 0.0 ..= 1.0, "Drag of the body over air speed squared.";
         drag_rotation = 1.0e-6 ["N*m*s^2/rad^2"] in 0.0 ..= 1e-3, "Drag torque over angular rate squared.";
-        battery_capacity = 0.300 ["A*h"] in 0.01 ..= 10.0, "Capacity of the battery (label).";
+        battery_cells = 1.0 ["1"] in 1.0 ..= 12.0, "Lithium cells in series.";
+        battery_capacity = 0.35 ["A*h"] in 0.01 ..= 10.0, "Capacity of the battery.";
         battery_charge = 1.0 ["1"] in 0.0 ..= 1.0, "State of charge at the start.";
-        battery_resistance = 0.06 ["ohm"] in 0.0 ..= 1.0, "Internal resistance that acts at once, leads included.";
-        battery_polarisation = 0.03 ["ohm"] in 0.0 ..= 1.0, "Internal resistance that acts with the time constant.";
+        battery_resistance = 0.05 ["ohm"] in 0.0 ..= 1.0, "Internal resistance that acts at once, leads included.";
+        battery_polarisation = 0.02 ["ohm"] in 0.0 ..= 1.0, "Internal resistance that acts with the time constant.";
         battery_time_constant = 10.0 ["s"] in 0.1 ..= 1000.0, "Time constant of the polarisation.";
-        board_current = 0.15 ["A"] in 0.0 ..= 2.0, "What everything but the motors draws.";
-        ground_height = 0.03 ["m"] in 0.005 ..= 0.2, "Height of the body's origin, and of the bottom range finder, when standing (range finder logs).";
-        foot_offset = 0.030 ["m"] in 0.005 ..= 0.2, "Distance of each foot from the body's x and y axis.";
-        foot_stiffness = 700.0 ["N/m"] in 10.0 ..= 1000.0, "Spring of one foot or corner on the floor.";
+        board_current = 0.2 ["A"] in 0.0 ..= 2.0, "What everything but the motors draws.";
+        ground_height = 0.03 ["m"] in 0.005 ..= 0.5, "Height of the body's origin, and of the bottom range finder, when standing.";
+        foot_offset = 0.035 ["m"] in 0.005 ..= 0.5, "Distance of each foot from the body's x and y axis.";
+        foot_stiffness = 800.0 ["N/m"] in 10.0 ..= 1000.0, "Spring of one foot or corner on the floor.";
         foot_damping = 2.0 ["N*s/m"] in 0.0 ..= 3.0, "Damper of one foot or corner on the floor.";
         foot_friction = 0.6 ["1"] in 0.0 ..= 2.0, "Friction coefficient of feet and corners.";
+        corner_offset = 0.05 ["m"] in 0.005 ..= 0.5, "Distance of each upper corner of the frame from the body's x and y axis.";
+        corner_height = 0.01 ["m"] in 0.0 ..= 0.5, "Height of the upper corners above the body's origin.";
         ground_effect_gain = 0.10 ["1"] in 0.0 ..= 1.0, "Extra thrust with the rotors at the floor.";
         ground_effect_height = 0.05 ["m"] in 0.001 ..= 1.0, "Height over which the ground effect fades by e.";
     }
@@ -145,9 +145,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_default_lies_in_its_own_range_and_every_name_can_be_set() {
-        let mut parameters = PlantParameters::default();
-        for info in PlantParameters::default().iter() {
+    fn the_example_lies_in_every_range_and_every_name_can_be_set() {
+        let mut parameters = PlantParameters::EXAMPLE;
+        for info in PlantParameters::EXAMPLE.iter() {
             assert!((info.range.0..=info.range.1).contains(&info.value), "{}", info.name);
             parameters.set(info.name, info.range.1).expect("the upper end is allowed");
             assert!(parameters.iter().any(|p| p.name == info.name && p.value == info.range.1));

@@ -98,7 +98,7 @@ impl RangePhysics {
 /// use stampfly_sim::sensors::{Mount, RangeModel};
 /// use stampfly_sim::{Simulation, SimulationConfig, time::block_on};
 ///
-/// let mut simulation = Simulation::new(&SimulationConfig::default());
+/// let mut simulation = Simulation::new(&SimulationConfig::example());
 /// let Ok(sample) = block_on(&simulation.clock, simulation.sensors.tof.next());
 /// assert!(sample.data.valid && (sample.data.distance - 0.03).abs() < 0.01, "standing");
 ///

@@ -85,7 +85,7 @@ fn drivers_and_models_report_the_same_flight() {
 }
 
 fn compare(seed: u64) {
-    let config = SimulationConfig { seed, ..Default::default() };
+    let config = SimulationConfig { seed, ..SimulationConfig::example() };
     let image = stand_in_image();
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let board = Board::new(&world, &clock, &config, &image);
@@ -170,9 +170,10 @@ fn compare(seed: u64) {
 fn drivers_and_models_say_the_same_of_a_range_that_is_none() {
     // Too near, near, too far for enough light, nothing there.
     for (height, status) in [(0.015, 4), (1.0, 0), (4.2, 2), (30.0, 2)] {
-        let plant = PlantParameters { gravity: 0.0, ground_height: 0.005, drag_quadratic: 0.0, ..Default::default() };
+        let plant =
+            PlantParameters { gravity: 0.0, ground_height: 0.005, drag_quadratic: 0.0, ..PlantParameters::EXAMPLE };
         let pose = Some(Pose { rotors: 0.0, ..Pose::hovering(height) });
-        let config = SimulationConfig { plant, wind: WindConfig::CALM, pose, ..Default::default() };
+        let config = SimulationConfig { plant, wind: WindConfig::CALM, pose, ..SimulationConfig::example() };
         let Simulation { clock, world, mut sensors } = Simulation::new(&config);
         let board = Board::new(&world, &clock, &config, &stand_in_image());
         let (boot, mut shutdown_front) = (BootAddress::new(), board.shutdown_front);

@@ -18,7 +18,7 @@ use stampfly_types::Duration;
 
 /// A vehicle on the floor in still air.
 fn standing() -> Simulation {
-    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..Default::default() })
+    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..SimulationConfig::example() })
 }
 
 /// Lets time pass.

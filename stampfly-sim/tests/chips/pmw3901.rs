@@ -28,14 +28,14 @@ struct Chip {
 impl Chip {
     /// Just powered, without weight, moving at this velocity over the floor.
     fn cold(height: f64, velocity: [f64; 3]) -> Self {
-        let plant = PlantParameters { gravity: 0.0, drag_quadratic: 0.0, ..Default::default() };
+        let plant = PlantParameters { gravity: 0.0, drag_quadratic: 0.0, ..PlantParameters::EXAMPLE };
         let mut pose = Pose { rotors: 0.0, ..Pose::hovering(height) };
         pose.velocity = Vector3::from(velocity);
         let simulation = Simulation::new(&SimulationConfig {
             plant,
             wind: WindConfig::CALM,
             pose: Some(pose),
-            ..Default::default()
+            ..SimulationConfig::example()
         });
         let chip = Pmw3901::new(&simulation.world, &simulation.clock, 1);
         let (port, attached) = SpiBus::new(&simulation.clock, 1).attach(2_000_000, chip);

@@ -91,7 +91,7 @@ fn decimated(frames: &[[f64; 6]]) -> (Vec3, Vec3) {
 #[test]
 fn in_flight_every_sample_is_what_the_fifo_held() {
     let image = stand_in_image();
-    let simulation = Simulation::new(&SimulationConfig::default());
+    let simulation = Simulation::new(&SimulationConfig::example());
     let (port, _) = soldered(&simulation, 1);
     let (tap, transfers) = Tap::new(port);
     let Simulation { clock, world, sensors } = simulation;

@@ -33,7 +33,7 @@ use std::rc::Rc;
 
 /// A vehicle on the floor in still air.
 fn standing() -> Simulation {
-    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..Default::default() })
+    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..SimulationConfig::example() })
 }
 
 /// The registers from this one on.

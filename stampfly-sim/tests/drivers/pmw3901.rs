@@ -43,7 +43,7 @@ fn the_start_keeps_every_pause_and_leaves_the_bank_of_the_data() {
 
 #[test]
 fn in_flight_every_sample_is_what_the_burst_held() {
-    let simulation = Simulation::new(&SimulationConfig::default());
+    let simulation = Simulation::new(&SimulationConfig::example());
     let (port, _) = soldered(&simulation);
     let (tap, transfers) = Tap::new(port);
     let Simulation { clock, world, sensors } = simulation;

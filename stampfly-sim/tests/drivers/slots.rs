@@ -28,7 +28,7 @@ async fn deliver(mut imu: impl Imu, note: impl Fn(Sample<ImuData>)) {
 /// The worst of one vehicle, whose inertial sensor's interrupt is wired or not: age of an inertial sample at its
 /// delivery, and time between two flow samples.
 fn worst(seed: u64, wired: bool) -> [Duration; 2] {
-    let config = SimulationConfig { seed, ..Default::default() };
+    let config = SimulationConfig { seed, ..SimulationConfig::example() };
     let Simulation { clock, world, .. } = Simulation::new(&config);
     let image = stand_in_image();
     let Board { imu, flow, .. } = Board::new(&world, &clock, &config, &image);

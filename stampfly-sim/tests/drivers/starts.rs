@@ -91,7 +91,7 @@ macro_rules! recovers {
                 let (simulation, $trouble) = (standing(), Trouble::default());
                 $(let $boot = BootAddress::new();)?
                 let $clock = simulation.clock.clone();
-                let $board = Board::new(&simulation.world, &$clock, &SimulationConfig::default(), &image);
+                let $board = Board::new(&simulation.world, &$clock, &SimulationConfig::example(), &image);
                 let mut driver = $driver;
                 let drops = disturb(&$clock, &$trouble);
                 if let Some(instant) = drops {

@@ -78,7 +78,7 @@ fn both_move_and_are_told_what_the_configuration_says() {
 
 #[test]
 fn in_flight_the_distance_is_that_of_the_registers_and_the_truth() {
-    let simulation = Simulation::new(&SimulationConfig::default());
+    let simulation = Simulation::new(&SimulationConfig::example());
     let boot = BootAddress::new();
     let (mut below, _ahead, [chip, _]) = drivers(&simulation, &boot, Config::default());
     let Simulation { clock, world, sensors } = simulation;

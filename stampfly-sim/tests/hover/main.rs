@@ -31,7 +31,7 @@ fn fly(config: &SimulationConfig, seconds: u32, target: impl Fn(f32) -> Option<f
 #[test]
 fn takes_off_hovers_in_gusts_and_lands() {
     for seed in 1..=5 {
-        let config = SimulationConfig { seed, ..Default::default() };
+        let config = SimulationConfig { seed, ..SimulationConfig::example() };
         let record = fly(&config, 16, |t| match t {
             t if t < 1.0 => None,
             t if t < 10.0 => Some(-0.8),
@@ -55,7 +55,7 @@ fn takes_off_hovers_in_gusts_and_lands() {
 
 #[test]
 fn still_air_and_a_perfect_vehicle_give_a_perfect_hover() {
-    let mut config = SimulationConfig { wind: WindConfig::CALM, ..Default::default() };
+    let mut config = SimulationConfig { wind: WindConfig::CALM, ..SimulationConfig::example() };
     config.plant.manufacturing_spread = 0.0;
     config.pose = Some(stampfly_sim::plant::Pose::hovering(1.0));
     let record = fly(&config, 5, |_| Some(-1.0));

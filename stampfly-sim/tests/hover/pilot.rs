@@ -3,14 +3,17 @@
 //! Proportional and derivative action only, on quantities no real vehicle knows. It exists to try the simulator.
 
 use stampfly_sim::Truth;
+use stampfly_sim::plant::PlantParameters;
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{GRAVITY, Vec3};
 
-const MASS: f32 = 0.0368;
-const OFFSET: f32 = 0.023;
-const YAW_ARM: f32 = 4.1e-3;
+const VEHICLE: PlantParameters = PlantParameters::EXAMPLE;
+const MASS: f32 = VEHICLE.mass as f32;
+const INERTIA: Vec3 = Vec3::new(VEHICLE.inertia_x as f32, VEHICLE.inertia_y as f32, VEHICLE.inertia_z as f32);
+const OFFSET: f32 = VEHICLE.rotor_offset as f32;
+const YAW_ARM: f32 = (VEHICLE.torque_coefficient / VEHICLE.thrust_coefficient) as f32;
 
-/// Motor duties that bring the vehicle to the origin's vertical at `down` metres (negative is up).
+/// Motor duties that bring the example's vehicle to the origin's vertical at `down` metres (negative is up).
 pub fn fly(truth: &Truth, down: f32) -> MotorOutput {
     let error = Vec3::new(-truth.position.x, -truth.position.y, (down - truth.position.z).clamp(-0.3, 0.3));
     let wanted =
@@ -22,16 +25,17 @@ pub fn fly(truth: &Truth, down: f32) -> MotorOutput {
     let (roll, pitch) = (force.y / GRAVITY, -force.x / GRAVITY);
     let rate = truth.angular_rate;
     let torque = Vec3::new(
-        9.16e-6 * (300.0 * roll - 25.0 * rate.x),
-        13.3e-6 * (300.0 * pitch - 25.0 * rate.y),
-        20.4e-6 * (20.0 * north.y - 10.0 * rate.z),
+        INERTIA.x * (300.0 * roll - 25.0 * rate.x),
+        INERTIA.y * (300.0 * pitch - 25.0 * rate.y),
+        INERTIA.z * (20.0 * north.y - 10.0 * rate.z),
     );
     let mut output = MotorOutput { count: 4, armed: true, ..Default::default() };
     let signs = [(-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0)];
     for (duty, (x, y, z)) in output.duty.iter_mut().zip(signs) {
         let share = 0.25 * (thrust + (x * torque.x + y * torque.y) / OFFSET + z * torque.z / YAW_ARM);
-        let speed = f64::from(share.max(0.0) / 1e-8).sqrt() as f32;
-        *duty = (6.0368e-8 * speed * speed + 6.699042e-4 * speed + 1.53e-2) / truth.battery_voltage.max(2.5);
+        let speed = (f64::from(share.max(0.0)) / VEHICLE.thrust_coefficient).sqrt();
+        let voltage = (VEHICLE.motor_voltage_a * speed + VEHICLE.motor_voltage_b) * speed + VEHICLE.motor_voltage_c;
+        *duty = voltage as f32 / truth.battery_voltage.max(2.5);
     }
     output
 }

@@ -9,7 +9,7 @@ use stampfly_board::simulation::StampFly;
 use stampfly_host::campaign::{self, Flight, spreads, workers};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
-use stampfly_sim::vehicle::{Vehicle, Witness};
+use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;

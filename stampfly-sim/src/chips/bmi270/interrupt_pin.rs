@@ -27,7 +27,7 @@ use std::rc::Rc;
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let chip = Bmi270::new(&simulation.world, &clock, 1, 1.0, &[0x5A; 8192]);
 /// let (mut port, _) = SpiBus::new(&clock, 1).attach(8_000_000, chip);

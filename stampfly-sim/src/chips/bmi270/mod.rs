@@ -152,7 +152,7 @@ const UPLOAD_SIZE: usize = 8_192;
 /// use stampfly_sim::{Simulation, SimulationConfig};
 /// use stampfly_types::Instant;
 ///
-/// let simulation = Simulation::new(&SimulationConfig::default());
+/// let simulation = Simulation::new(&SimulationConfig::example());
 /// let clock = simulation.clock.clone();
 /// let image = [0x5A; 8192];
 /// let chip = Bmi270::new(&simulation.world, &clock, 1, 1.0, &image);
