@@ -21,8 +21,8 @@ const MICROS_PER_SECOND: u64 = 1_000_000;
 
 /// A point in time: microseconds since power-on.
 ///
-/// Counted as the [`Duration`] since power-on. The difference of two instants is only offered as [`Instant::since`], which saturates: a stamp that lies in the
-/// future is zero old instead of 584,000 years.
+/// Counted as the [`Duration`] since power-on. The difference of two instants is only offered as [`Instant::since`], which
+/// saturates: a stamp that lies in the future is zero old instead of 584,000 years.
 ///
 /// ```
 /// use stampfly_types::{Duration, Instant};
@@ -48,9 +48,16 @@ const MICROS_PER_SECOND: u64 = 1_000_000;
 /// use stampfly_types::{Duration, Instant};
 /// let timeout: Duration = Instant::from_secs(2);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Instant(Duration);
+
+impl fmt::Debug for Instant {
+    /// As the duration's, under its own name: `Instant(2500)`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Instant").field(&self.as_micros()).finish()
+    }
+}
 
 impl Instant {
     /// Power-on.
