@@ -2,8 +2,8 @@
 //!
 //! The numbers are those of the people who build it, their "flight anchored" set of August 2026: mass, inertia and places
 //! of the rotors were weighed and measured, drag torques come from coast-downs, and the motors' curve is anchored to the
-//! hover in flight. [`VehicleConfig`](crate::VehicleConfig) derives the flight stack's configuration from [`AIRFRAME`], the simulation its plant
-//! from the same constants.
+//! hover in flight. [`VehicleConfig`](crate::VehicleConfig) derives the flight stack's configuration from [`AIRFRAME`],
+//! the simulation its plant from the same constants.
 //!
 //! Constants are `f64`, for the simulation; the flight stack computes with their nearest `f32`.
 

@@ -1,7 +1,7 @@
 //! Everything about the vehicle that can be tuned, as one value.
 //!
-//! Each crate owns its own configuration and the rules by which it follows from an airframe; this struct only gathers them, for
-//! the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
+//! Each crate owns its own configuration and the rules by which it follows from an airframe; this struct only gathers
+//! them, for the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
 
 use crate::airframe::{AIRFRAME, GROUND_HEIGHT};
 use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};

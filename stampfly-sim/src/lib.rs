@@ -10,8 +10,9 @@
 //! Everything is a value: no global, no thread, and no wall clock but in [`vehicle::Live`]. A process can hold as many vehicles as memory allows,
 //! and the same seed gives the same bits, in debug and release builds and on every machine.
 //!
-//! The vehicle is a value, [`PlantParameters`](plant::PlantParameters), that its own crate gives. Not for every vehicle: the plant is a
-//! quadrotor in X of up to a few hundred grams with brushed motors; the chips, and the vibration they feel, are the StampFly's.
+//! The vehicle is a value, [`PlantParameters`](plant::PlantParameters), that its own crate gives. Not for every vehicle:
+//! the plant is a quadrotor in X of up to a few hundred grams with brushed motors; the chips, and the vibration they
+//! feel, are the StampFly's.
 
 pub mod chips;
 mod noise;
