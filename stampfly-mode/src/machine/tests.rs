@@ -2,6 +2,7 @@
 
 use super::*;
 use stampfly_types::messages::{ArmBlocks, CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
+use stampfly_types::Duration;
 use std::collections::BTreeSet;
 use std::vec;
 use std::vec::Vec;
@@ -286,7 +287,7 @@ fn a_click_takes_off_and_holds_the_place() {
     machine.wanted = FlightMode::Stabilize;
     let clicked = press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
     assert_eq!((clicked.phase, clicked.mode), (FlightPhase::Armed, FlightMode::PosHold));
-    world.now += SPOOL;
+    world.now += ModeConfig::default().spool;
     let later = world.step(&mut machine, &[]).flight_status;
     assert_eq!((later.phase, later.mode), (FlightPhase::TakeOff, FlightMode::PosHold));
 }
