@@ -64,7 +64,9 @@ pub fn blocks(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{CalibrationResult, FlightMode, GuidedKind, LandDetected, PilotInput, StateEstimate};
+    use stampfly_types::messages::{
+        CalibrationResult, FlightMode, GuidedKind, LandDetected, PilotInput, StateEstimate,
+    };
 
     /// What blocks a vehicle that stands ready.
     fn ready(mode: FlightMode, alerts: Alerts, pilot: Option<&PilotInput>, commands: &[GuidedKind]) -> ArmBlocks {

@@ -10,10 +10,10 @@ use crate::config::ModeConfig;
 pub use crate::input::{Command, ModeInput};
 use crate::stop_button::StopButton;
 use crate::transitions::{Event, is_armed, next};
+use stampfly_types::Instant;
 use stampfly_types::messages::{
     Alerts, ButtonGesture, EstimatorCommand, FlightMode, FlightPhase, FlightStatus, GroundContact, Validity,
 };
-use stampfly_types::Instant;
 
 /// What the machine decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -147,7 +147,9 @@ impl ModeMachine {
                 || commanded(Command::Kill)
                 || stopped_by_button
                 || input.pilot.is_some_and(|pilot| pilot.kill),
-            commanded(Command::Disarm) || switch.falls || (mode.phase == FlightPhase::Armed && waited >= config.armed_timeout),
+            commanded(Command::Disarm)
+                || switch.falls
+                || (mode.phase == FlightPhase::Armed && waited >= config.armed_timeout),
             input.land_detected.landed,
             commanded(Command::Land) || abandoned || input.alerts.intersects(LAND),
             input.land_detected.takeoff_complete || airborne_by_hand,

@@ -1,8 +1,8 @@
 //! The machine from outside, step by step: phases, events, the arm switch, the button, crashes.
 
 use super::*;
-use stampfly_types::messages::{ArmBlocks, CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
 use stampfly_types::Duration;
+use stampfly_types::messages::{ArmBlocks, CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
 use std::collections::BTreeSet;
 use std::vec;
 use std::vec::Vec;
