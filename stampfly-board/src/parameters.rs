@@ -176,13 +176,13 @@ parameters! {
     "navigator.leash.length" [0.2, 5.0] "m" navigator.leash => "the path waits for a vehicle farther away";
     "navigator.landing.lead" [0.05, 1.0] "m" navigator.landing_lead => "while landing the path is this far below at most";
     "navigator.horizontal.speed" [0.1, 5.0] "m/s" navigator.limits.horizontal.speed => "bound of the path";
-    "navigator.horizontal.acceleration" [0.1, 5.0] "m/s^2" navigator.limits.horizontal.acceleration => "bound of the path";
+    "navigator.horizontal.accel" [0.1, 5.0] "m/s^2" navigator.limits.horizontal.acceleration => "bound of the path";
     "navigator.horizontal.jerk" [1.0, 50.0] "m/s^3" navigator.limits.horizontal.jerk => "bound of the path";
     "navigator.vertical.speed" [0.1, 2.0] "m/s" navigator.limits.vertical.speed => "bound of the path";
-    "navigator.vertical.acceleration" [0.1, 5.0] "m/s^2" navigator.limits.vertical.acceleration => "bound of the path";
+    "navigator.vertical.accel" [0.1, 5.0] "m/s^2" navigator.limits.vertical.acceleration => "bound of the path";
     "navigator.vertical.jerk" [1.0, 50.0] "m/s^3" navigator.limits.vertical.jerk => "bound of the path";
     "navigator.heading.rate" [0.1, 6.0] "rad/s" navigator.limits.heading.speed => "bound of the path";
-    "navigator.heading.acceleration" [0.5, 20.0] "rad/s^2" navigator.limits.heading.acceleration => "bound of the path";
+    "navigator.heading.accel" [0.5, 20.0] "rad/s^2" navigator.limits.heading.acceleration => "bound of the path";
     "navigator.heading.jerk" [5.0, 200.0] "rad/s^3" navigator.limits.heading.jerk => "bound of the path";
 
     "authority.stick.dead_band" [0.0, 0.2] "1" authority.dead_band => "sticks this close to their centre are centred";
@@ -260,6 +260,20 @@ mod tests {
             let set = Duration::from_seconds(16.0 + f32::from(step) * 0.010_01);
             assert!(comes_back(set), "{set}");
         }
+    }
+
+    /// The log of a flight has every parameter as a number, and a replay sets them one by one.
+    #[test]
+    fn the_numbers_of_a_flight_give_its_configuration() {
+        let mut flown = VehicleConfig::default();
+        flown.failsafe.tumble_time = Duration::from_micros(123_457);
+        flown.mode.armed_timeout = Duration::from_micros(9_999_999);
+        flown.navigator.height_max = 2.1;
+        let mut replayed = VehicleConfig::default();
+        for (index, _) in all().enumerate() {
+            replayed.set(index, flown.get(index).expect("in the table")).expect("in range");
+        }
+        assert_eq!(replayed, flown);
     }
 
     #[test]
