@@ -4,8 +4,10 @@
 //! them, for the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
 
 use crate::airframe::{AIRFRAME, GROUND_HEIGHT};
+use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
+use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
 
 /// Which estimator flies. The numbers are those of the parameter `estimator.type`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,6 +77,18 @@ pub struct VehicleConfig {
     pub geometric: GeometricConfig,
     /// Motors and battery.
     pub motor: MotorConfig,
+    /// Take-off, route and sticks.
+    pub navigator: NavigatorConfig,
+    /// Mode machine and arming.
+    pub mode: ModeConfig,
+    /// Detectors of what can go wrong.
+    pub failsafe: FailsafeConfig,
+    /// Take-off and landing manager. Its hover thrust is that of the cascade.
+    pub landing: LandingConfig,
+    /// Whose sticks count.
+    pub authority: AuthorityConfig,
+    /// Gestures on the button.
+    pub button: ButtonConfig,
 }
 
 impl Default for VehicleConfig {
@@ -89,6 +103,12 @@ impl Default for VehicleConfig {
             cascade: CascadeConfig::for_airframe(&AIRFRAME),
             geometric: GeometricConfig::for_airframe(&AIRFRAME),
             motor: MotorConfig::for_airframe(&AIRFRAME),
+            navigator: NavigatorConfig::default(),
+            mode: ModeConfig::default(),
+            failsafe: FailsafeConfig::default(),
+            landing: LandingConfig::default(),
+            authority: AuthorityConfig::default(),
+            button: ButtonConfig::default(),
         }
     }
 }

@@ -1,11 +1,13 @@
 //! The StampFly's parameters, by name.
 //!
-//! One line per parameter: name, range, unit, field, meaning. Defaults are the fields' own. The log stores every
+//! One line per parameter: name, range, unit, field, meaning. Ranges exclude what no vehicle could fly with, and where one
+//! value has to stay below another their ranges do not overlap. Defaults are the fields' own. The log stores every
 //! value, so a replay flies with the parameters of the flight. [`stampfly_flight::parameters`] finds and changes them by
 //! name.
 
 use crate::config::{ControllerKind, EstimatorKind, VehicleConfig};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
+use stampfly_types::Duration;
 
 /// The name in flash of the transmitter the vehicle is paired with: the six bytes of its address as one value, so that a
 /// power cut cannot leave half of an address.
@@ -19,7 +21,7 @@ struct Line {
     set: fn(&mut VehicleConfig, f32) -> Option<()>,
 }
 
-/// What a parameter can be: a number, or one of several kinds by its number.
+/// What a parameter can be: a number, a time in seconds, or one of several kinds by its number.
 trait Value: Copy {
     fn number(self) -> f32;
     fn from_number(number: f32) -> Option<Self>;
@@ -31,6 +33,18 @@ impl Value for f32 {
     }
     fn from_number(number: f32) -> Option<Self> {
         Some(number)
+    }
+}
+
+/// Whole microseconds. A time comes back exactly: up to 16 seconds every microsecond has a number of its own, and above that
+/// a number is always the same time.
+impl Value for Duration {
+    fn number(self) -> f32 {
+        // Not `seconds`, which is off by one in the last place for some.
+        self.seconds_f64() as f32
+    }
+    fn from_number(number: f32) -> Option<Self> {
+        Some(Self::from_seconds(number))
     }
 }
 
@@ -100,6 +114,80 @@ parameters! {
 
     "motor.duty.max" [0.1, 1.0] "1" motor.duty_max => "largest duty";
     "motor.slew.max" [1.0, 1000.0] "1/s" motor.slew_max => "largest change of duty";
+
+    "mode.arming.tilt" [0.05, 0.7] "rad" mode.arming_tilt => "largest tilt that allows arming";
+    "mode.arming.throttle" [0.01, 0.09] "1" mode.throttle_rest => "largest throttle that allows arming in a manual mode";
+    "mode.takeoff.throttle" [0.1, 0.5] "1" mode.throttle_take_off => "throttle that takes off in a manual mode";
+    "mode.takeoff.delay" [0.1, 2.0] "s" mode.spool => "time between arming and a take-off by itself";
+    "mode.armed.timeout" [3.0, 60.0] "s" mode.armed_timeout => "armed without a take-off, it disarms after this long";
+    "mode.link.timeout" [0.0, 60.0] "s" mode.hover_without_link => "without a link it hovers this long, then lands";
+    "mode.held.height" [0.11, 0.5] "m" mode.held_height => "above this height somebody holds it";
+    "mode.standing.height" [0.05, 0.1] "m" mode.standing_height => "below this height it stands again";
+    "mode.button.release" [0.5, 10.0] "s" mode.button_release => "presses count again after a stop and this long released";
+    "button.click.double" [0.2, 1.0] "s" button.double_click => "longest time between the clicks of a double click";
+    "button.hold.pair" [1.0, 4.0] "s" button.hold_pair => "a press this long pairs";
+    "button.hold.reset" [4.5, 20.0] "s" button.hold_reset => "a press this long restarts";
+
+    "failsafe.impact.flying" [20.0, 150.0] "m/s^2" failsafe.impact => "specific force of an impact";
+    "failsafe.impact.landing" [20.0, 150.0] "m/s^2" failsafe.landing_impact => "specific force of an impact while landing";
+    "failsafe.impact.sigmas" [3.0, 20.0] "1" failsafe.impact_sigmas => "impact, standard deviations of the vibration";
+    "failsafe.rate.max" [5.0, 34.0] "rad/s" failsafe.rate => "rate at which the motors stop";
+    "failsafe.tumble.tilt" [0.8, 3.0] "rad" failsafe.tumble_tilt => "tilt of a vehicle that tumbles";
+    "failsafe.tumble.time" [0.05, 2.0] "s" failsafe.tumble_time => "tilted for this long it tumbles";
+    "failsafe.imu.degraded" [0.005, 0.02] "s" failsafe.imu_degraded => "silence of a degraded inertial sensor";
+    "failsafe.imu.lost" [0.02, 0.1] "s" failsafe.imu_lost => "silence of a lost inertial sensor, stops the motors";
+    "failsafe.link.timeout" [0.1, 5.0] "s" failsafe.link_silence => "silence of a lost link";
+    "failsafe.battery.low" [3.2, 4.0] "V" failsafe.battery_low => "low battery: warns, no arming";
+    "failsafe.battery.critical" [2.5, 3.2] "V" failsafe.battery_critical => "critical battery: lands";
+    "failsafe.battery.usb" [2.5, 3.6] "V" failsafe.usb => "disarmed below this it has no battery, no arming";
+    "failsafe.battery.hysteresis" [0.0, 0.3] "V" failsafe.battery_hysteresis => "an alert of the battery clears this much higher";
+    "failsafe.battery.time" [0.1, 20.0] "s" failsafe.battery_time => "time constant of the voltage's low-pass";
+    "failsafe.power.timeout" [0.2, 10.0] "s" failsafe.power_silence => "silence of a lost battery monitor";
+    "failsafe.aiding.timeout" [0.2, 10.0] "s" failsafe.aiding_silence => "silence of lost range or flow in the air";
+    "failsafe.mismatch.tilt" [0.05, 0.7] "rad" failsafe.tilt_mismatch => "gravity and tilt so far apart on the ground";
+    "failsafe.mismatch.time" [0.1, 5.0] "s" failsafe.tilt_mismatch_time => "for this long apart is an alert";
+
+    "landing.descent.speed" [0.2, 1.0] "m/s" landing.descent => "descent";
+    "landing.touchdown.speed" [0.12, 0.5] "m/s" landing.touchdown => "descent at the ground";
+    "landing.flare.height" [0.05, 2.0] "m" landing.flare_height => "below this height the descent slows down";
+    "landing.ceiling.height" [0.04, 0.2] "m" landing.ceiling_height => "below this height the thrust ceiling falls";
+    "landing.ceiling.share" [0.3, 0.75] "1" landing.ceiling_share => "where the thrust ceiling ends, share of hover thrust";
+    "landing.ceiling.time" [0.1, 5.0] "s" landing.ceiling_time => "how long the thrust ceiling falls";
+    "landing.still.speed" [0.02, 0.1] "m/s" landing.still_speed => "slower than this is not sinking";
+    "landing.still.time" [0.3, 10.0] "s" landing.stall_time => "not sinking this long, the thrust ceiling falls at any height";
+    "landing.touchdown.time" [0.1, 2.0] "s" landing.touchdown_time => "not sinking this long under the ceiling is touchdown";
+    "takeoff.airborne.rise" [0.02, 0.3] "m" landing.airborne_rise => "a rise that is airborne";
+    "takeoff.airborne.speed" [0.1, 0.5] "m/s" landing.airborne_speed => "a climb rate that is airborne";
+    "takeoff.arrived.band" [0.02, 0.3] "m" landing.takeoff_band => "take-off has arrived this close to its goal";
+    "takeoff.arrived.speed" [0.05, 0.5] "m/s" landing.takeoff_speed => "take-off has arrived slower than this";
+    "takeoff.arrived.time" [0.1, 5.0] "s" landing.takeoff_settle => "arrived for this long, take-off is complete";
+    "takeoff.limit.time" [2.0, 60.0] "s" landing.takeoff_limit => "take-off is complete after this long in any case";
+
+    "navigator.takeoff.height" [0.2, 3.0] "m" navigator.take_off_height => "take-off height when a command names none";
+    "navigator.takeoff.speed" [0.1, 2.0] "m/s" navigator.take_off_speed => "take-off speed when a command names none";
+    "navigator.route.speed" [0.05, 5.0] "m/s" navigator.route_speed => "way-point speed when a command names none";
+    "navigator.stick.speed" [0.05, 5.0] "m/s" navigator.stick_speed => "horizontal speed at full stick";
+    "navigator.stick.climb" [0.05, 2.0] "m/s" navigator.climb_rate => "climb rate at full throttle stick";
+    "navigator.stick.sink" [0.05, 2.0] "m/s" navigator.sink_rate => "rate of descent at full throttle stick down";
+    "navigator.stick.turn" [0.1, 6.0] "rad/s" navigator.turn_rate => "rate of turn at full yaw stick";
+    "navigator.height.min" [0.1, 0.5] "m" navigator.height_min => "least height over the place of take-off";
+    "navigator.height.max" [0.5, 100.0] "m" navigator.height_max => "largest height over the place of take-off";
+    "navigator.waypoint.radius" [0.03, 1.0] "m" navigator.reached => "a way-point is reached this close";
+    "navigator.leash.length" [0.2, 5.0] "m" navigator.leash => "the path waits for a vehicle farther away";
+    "navigator.landing.lead" [0.05, 1.0] "m" navigator.landing_lead => "while landing the path is this far below at most";
+    "navigator.horizontal.speed" [0.1, 5.0] "m/s" navigator.limits.horizontal.speed => "bound of the path";
+    "navigator.horizontal.accel" [0.1, 5.0] "m/s^2" navigator.limits.horizontal.acceleration => "bound of the path";
+    "navigator.horizontal.jerk" [1.0, 50.0] "m/s^3" navigator.limits.horizontal.jerk => "bound of the path";
+    "navigator.vertical.speed" [0.1, 2.0] "m/s" navigator.limits.vertical.speed => "bound of the path";
+    "navigator.vertical.accel" [0.1, 5.0] "m/s^2" navigator.limits.vertical.acceleration => "bound of the path";
+    "navigator.vertical.jerk" [1.0, 50.0] "m/s^3" navigator.limits.vertical.jerk => "bound of the path";
+    "navigator.heading.rate" [0.1, 6.0] "rad/s" navigator.limits.heading.speed => "bound of the path";
+    "navigator.heading.accel" [0.5, 20.0] "rad/s^2" navigator.limits.heading.acceleration => "bound of the path";
+    "navigator.heading.jerk" [5.0, 200.0] "rad/s^3" navigator.limits.heading.jerk => "bound of the path";
+
+    "authority.stick.dead_band" [0.0, 0.2] "1" authority.dead_band => "sticks this close to their centre are centred";
+    "authority.stick.take_over" [0.05, 0.9] "1" authority.take_over => "deflection that takes over from guidance";
+    "authority.pilot.timeout" [0.1, 5.0] "s" authority.stale => "a pilot's frame as old as this counts as none";
 }
 
 /// Every parameter, in the order of their numbers.
@@ -159,6 +247,33 @@ mod tests {
         assert_eq!((config.set(0, 1.0), config.set(1, 1.0)), (Ok(()), Ok(())));
         assert_eq!((config.estimator, config.controller), (EstimatorKind::Complementary, ControllerKind::Geometric));
         assert_eq!((config.set(0, 0.0), config.estimator), (Ok(()), EstimatorKind::Eskf));
+    }
+
+    #[test]
+    fn a_time_comes_back_exactly() {
+        let comes_back = |time: Duration| Value::from_number(time.number()) == Some(time);
+        for micros in (0..16_000_000).step_by(997).chain(15_999_900..=16_000_000) {
+            assert!(comes_back(Duration::from_micros(micros)), "{micros} us");
+        }
+        // Above, a number is coarser than a microsecond; what was set by one still comes back.
+        for step in 0..4_400u16 {
+            let set = Duration::from_seconds(16.0 + f32::from(step) * 0.010_01);
+            assert!(comes_back(set), "{set}");
+        }
+    }
+
+    /// The log of a flight has every parameter as a number, and a replay sets them one by one.
+    #[test]
+    fn the_numbers_of_a_flight_give_its_configuration() {
+        let mut flown = VehicleConfig::default();
+        flown.failsafe.tumble_time = Duration::from_micros(123_457);
+        flown.mode.armed_timeout = Duration::from_micros(9_999_999);
+        flown.navigator.height_max = 2.1;
+        let mut replayed = VehicleConfig::default();
+        for (index, _) in all().enumerate() {
+            replayed.set(index, flown.get(index).expect("in the table")).expect("in range");
+        }
+        assert_eq!(replayed, flown);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A conversation with the StampFly: what its console has beside that of every vehicle.
 
-use stampfly_board::console::{Command, Console, Newest, Profile};
+use stampfly_board::console::{Command, Console, Newest, Profile, REPLY};
 use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_flight::console::{Request, answer};
@@ -72,6 +72,15 @@ fn only_motors_that_exist_turn_and_only_slowly() {
     for line in ["motor test 1", "motor test 256 1", "motor", "motor test one 1"] {
         assert!(ask(&vehicle(Some(false)), line).0.contains("usage: motor test N PERCENT"), "{line}");
     }
+}
+
+#[test]
+fn the_list_of_parameters_has_room_in_a_reply() {
+    let (list, _) = ask(&vehicle(Some(false)), "param list");
+    // With room for values that are longer than the defaults.
+    assert!(list.len() <= REPLY * 3 / 4, "{} bytes", list.len());
+    let first_column = |line: &str| line.split(' ').next().map_or(0, str::len);
+    assert!(list.lines().all(|line| first_column(line) <= 28), "the columns are straight");
 }
 
 #[test]

@@ -154,11 +154,8 @@ const VERTICAL: SetpointAxes = SetpointAxes::POSITION_Z.with(SetpointAxes::VELOC
 /// Is the throttle stick a thrust? Never while landing and never in a mode that holds height: there a vertical
 /// set-point that is missing or broken must not turn into "stick at rest, motors off".
 fn throttle_commands_thrust(input: &ControlInput<'_>) -> bool {
-    let by_mode = match input.flight_status.mode {
-        FlightMode::Acro | FlightMode::Stabilize => input.flight_status.phase != FlightPhase::Landing,
-        FlightMode::AltHold | FlightMode::PosHold => false,
-    };
-    by_mode && !input.setpoint.axes.intersects(VERTICAL)
+    let status = input.flight_status;
+    status.mode.is_manual() && status.phase != FlightPhase::Landing && !input.setpoint.axes.intersects(VERTICAL)
 }
 
 /// Which parts of the estimate may be used: declared valid, and numbers.

@@ -1,11 +1,10 @@
 //! May the motors be armed, and if not, why not: every reason at once, so that nobody has to guess.
 
+use crate::config::ModeConfig;
 use crate::input::ModeInput;
 use stampfly_types::frame;
-use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, Validity};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightPhase, FlightStatus, Validity};
 
-/// Most tilt on the ground that still allows take-off, rad.
-const MAX_TILT: f32 = 0.35;
 /// Sensors without which nobody takes off.
 const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::POWER_LOST);
 
@@ -16,11 +15,11 @@ const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(A
 /// | `CALIBRATING` | still-calibration has not finished |
 /// | `NOT_ON_GROUND` | the phase is not IDLE on the ground |
 /// | `NO_BATTERY`, `LOW_BATTERY` | alerts of the failsafe |
-/// | `ATTITUDE`, `TILTED` | tilt unknown or in disagreement with gravity; more than 20° |
+/// | `ATTITUDE`, `TILTED` | tilt unknown or in disagreement with gravity; more than [`ModeConfig::arming_tilt`] |
 /// | `SENSOR` | the inertial sensor or the battery monitor is silent |
 /// | `ESTIMATE` | the estimate is lost |
 /// | `PAIRING` | pairing with a transmitter |
-/// | `THROTTLE` | the throttle is not at rest, and the mode in force or the pilot's makes thrust of it |
+/// | `THROTTLE` | the throttle is above [`ModeConfig::throttle_rest`], and the mode in force or the pilot's makes thrust of it |
 /// | `ARM_SWITCH` | the arm switch has been on since before the vehicle saw it off |
 /// | `SELF_TEST` | the self test at power-on failed |
 /// | `CRASHED` | a crash nobody has acknowledged by a disarm command or the button |
@@ -28,12 +27,18 @@ const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(A
 ///
 /// State, pairing and the mode in force are read from `mode`.
 #[must_use]
-pub fn blocks(mode: &FlightStatus, crashed: bool, stale_switch: bool, input: &ModeInput<'_>) -> ArmBlocks {
+pub fn blocks(
+    config: &ModeConfig,
+    mode: &FlightStatus,
+    crashed: bool,
+    stale_switch: bool,
+    input: &ModeInput<'_>,
+) -> ArmBlocks {
     let alerts = input.alerts;
-    let manual = |mode| matches!(mode, FlightMode::Acro | FlightMode::Stabilize);
     // The mode in force may be a fallback, and may be left for the pilot's at any time.
-    let throttle_up =
-        input.pilot.is_some_and(|pilot| (manual(mode.mode) || manual(pilot.mode)) && pilot.throttle > 0.05);
+    let throttle_up = input.pilot.is_some_and(|pilot| {
+        (mode.mode.is_manual() || pilot.mode.is_manual()) && pilot.throttle > config.throttle_rest
+    });
     // A command in hand is a sign of life, also when it came after the failsafe looked.
     let silent = alerts.contains(Alerts::COMM_LOST) && input.commands.is_empty();
     ArmBlocks::NONE
@@ -45,7 +50,7 @@ pub fn blocks(mode: &FlightStatus, crashed: bool, stale_switch: bool, input: &Mo
             ArmBlocks::ATTITUDE,
             !input.estimate.valid.contains(Validity::TILT) || alerts.contains(Alerts::TILT_MISMATCH),
         )
-        .set(ArmBlocks::TILTED, frame::tilt(&input.estimate.attitude) > MAX_TILT)
+        .set(ArmBlocks::TILTED, frame::tilt(&input.estimate.attitude) > config.arming_tilt)
         .set(ArmBlocks::SENSOR, alerts.intersects(SILENT_SENSOR))
         .set(ArmBlocks::ESTIMATE, alerts.contains(Alerts::ESTIMATE_DIVERGED))
         .set(ArmBlocks::SELF_TEST, alerts.contains(Alerts::SELF_TEST_FAILED))
@@ -59,7 +64,9 @@ pub fn blocks(mode: &FlightStatus, crashed: bool, stale_switch: bool, input: &Mo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
+    use stampfly_types::messages::{
+        CalibrationResult, FlightMode, GuidedKind, LandDetected, PilotInput, StateEstimate,
+    };
 
     /// What blocks a vehicle that stands ready.
     fn ready(mode: FlightMode, alerts: Alerts, pilot: Option<&PilotInput>, commands: &[GuidedKind]) -> ArmBlocks {
@@ -73,17 +80,16 @@ mod tests {
             button: None,
         };
         let mode = FlightStatus { phase: FlightPhase::IdleGround, mode, ..Default::default() };
-        blocks(&mode, false, false, &input)
+        blocks(&ModeConfig::default(), &mode, false, false, &input)
     }
 
     #[test]
     fn a_raised_throttle_blocks_where_it_is_thrust_whichever_mode_the_pilot_wants() {
-        let manual = |mode: FlightMode| matches!(mode, FlightMode::Acro | FlightMode::Stabilize);
         for &in_force in FlightMode::ALL {
             for &wanted in FlightMode::ALL {
                 let pilot = |throttle| PilotInput { throttle, mode: wanted, ..Default::default() };
                 let raised = ready(in_force, Alerts::NONE, Some(&pilot(0.6)), &[]);
-                let expected = ArmBlocks::NONE.set(ArmBlocks::THROTTLE, manual(in_force) || manual(wanted));
+                let expected = ArmBlocks::NONE.set(ArmBlocks::THROTTLE, in_force.is_manual() || wanted.is_manual());
                 assert_eq!(raised, expected, "{in_force:?}, wanted {wanted:?}");
                 assert_eq!(ready(in_force, Alerts::NONE, Some(&pilot(0.0)), &[]), ArmBlocks::NONE);
             }

@@ -1,16 +1,38 @@
 //! What a press of the button meant.
 //!
-//! Debounced over 50 ms. Every press is reported as soon as it is sure, for whoever has to stop something; what it
-//! becomes follows. Shorter than three seconds it is a click, a second one within 400 ms makes it a double click;
-//! holding reports once at three seconds (pair) and once at five (restart), while the button is still down.
+//! Every press is reported as soon as it is sure, for whoever has to stop something; what it becomes follows. A short one
+//! is a click, and a second one soon after makes it a double click. Holding reports twice, while the button is still down:
+//! first to pair, later to restart. The times are in [`ButtonConfig`].
 
 use stampfly_types::messages::{ButtonEvent, ButtonGesture};
 use stampfly_types::{Duration, Instant};
 
-const DEBOUNCE: Duration = Duration::from_millis(50);
-const DOUBLE_CLICK: Duration = Duration::from_millis(400);
-const HOLD_PAIR: Duration = Duration::from_secs(3);
-const HOLD_RESET: Duration = Duration::from_secs(5);
+/// Times that tell gestures apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ButtonConfig {
+    /// A contact counts when it has not changed for this long.
+    pub debounce: Duration,
+    /// Longest time between two clicks that make a double click.
+    pub double_click: Duration,
+    /// A press held for this long asks for pairing.
+    pub hold_pair: Duration,
+    /// A press held for this long asks for a restart; longer than the one for pairing.
+    pub hold_reset: Duration,
+}
+
+impl Default for ButtonConfig {
+    /// They suit any small button that a finger presses.
+    fn default() -> Self {
+        Self {
+            // Contacts bounce for up to 20 ms. Two or three readings at 50 Hz.
+            debounce: Duration::from_millis(50),
+            double_click: Duration::from_millis(400),
+            hold_pair: Duration::from_secs(3),
+            hold_reset: Duration::from_secs(5),
+        }
+    }
+}
 
 /// Turns a contact into gestures.
 ///
@@ -27,6 +49,7 @@ const HOLD_RESET: Duration = Duration::from_secs(5);
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ButtonDecoder {
+    config: ButtonConfig,
     /// The contact's raw level and since when it has had it.
     raw: bool,
     raw_since: Instant,
@@ -40,12 +63,18 @@ pub struct ButtonDecoder {
 }
 
 impl ButtonDecoder {
+    /// The decoder of a button that is not pressed.
+    #[must_use]
+    pub fn new(config: ButtonConfig) -> Self {
+        Self { config, ..Self::default() }
+    }
+
     /// Takes the contact's level; call at 50 Hz or faster.
     pub fn step(&mut self, now: Instant, contact: bool) -> Option<ButtonEvent> {
         if contact != self.raw {
             (self.raw, self.raw_since) = (contact, now);
         }
-        if self.raw != self.pressed && now.since(self.raw_since) >= DEBOUNCE {
+        if self.raw != self.pressed && now.since(self.raw_since) >= self.config.debounce {
             self.pressed = self.raw;
             let held = self.raw_since.since(self.pressed_since).seconds();
             self.pressed_since = self.raw_since;
@@ -64,8 +93,8 @@ impl ButtonDecoder {
         if self.pressed {
             let (held, event) = (now.since(self.pressed_since), self.reported);
             let reached = match held {
-                held if held >= HOLD_RESET => ButtonGesture::HoldReset,
-                held if held >= HOLD_PAIR => ButtonGesture::HoldPair,
+                held if held >= self.config.hold_reset => ButtonGesture::HoldReset,
+                held if held >= self.config.hold_pair => ButtonGesture::HoldPair,
                 _ => ButtonGesture::None,
             };
             if reached > event {
@@ -77,7 +106,7 @@ impl ButtonDecoder {
             return None;
         }
         let (at, held) = self.click?;
-        if now.since(at) < DOUBLE_CLICK {
+        if now.since(at) < self.config.double_click {
             return None;
         }
         self.click = None;

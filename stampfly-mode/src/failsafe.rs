@@ -1,5 +1,7 @@
 //! Anomaly detection: conditions in, a set of alerts out. It detects and never acts; the mode machine decides.
 //!
+//! The numbers of this table are the defaults of [`FailsafeConfig`].
+//!
 //! | alert | condition | clears |
 //! |---|---|---|
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing), and above six sigma of the present vibration, in two samples running | when disarmed |
@@ -35,16 +37,24 @@ pub struct FailsafeConfig {
     pub impact_sigmas: f32,
     /// Angular rate, rad/s.
     pub rate: f32,
-    /// Tilt, rad, and for how long, s.
-    pub tumble: [f32; 2],
-    /// Silence of the inertial sensor: degraded, lost.
-    pub imu_silence: [Duration; 2],
+    /// Tilt of a vehicle that tumbles, rad.
+    pub tumble_tilt: f32,
+    /// For how long it is tilted so far.
+    pub tumble_time: Duration,
+    /// Silence of the inertial sensor after which it is degraded.
+    pub imu_degraded: Duration,
+    /// Silence of the inertial sensor after which it is lost.
+    pub imu_lost: Duration,
     /// Silence of the command link.
     pub link_silence: Duration,
-    /// Battery: warn, land, V.
-    pub battery: [f32; 2],
+    /// Voltage of a low battery, V.
+    pub battery_low: f32,
+    /// Voltage of a battery with which the vehicle lands, V.
+    pub battery_critical: f32,
     /// Below this a disarmed vehicle has no battery, V.
     pub usb: f32,
+    /// Below this no meter is fitted, V.
+    pub no_meter: f32,
     /// Hysteresis of the battery thresholds, V.
     pub battery_hysteresis: f32,
     /// Time constant of the battery low-pass, s.
@@ -53,27 +63,50 @@ pub struct FailsafeConfig {
     pub power_silence: Duration,
     /// Silence of range and flow in the air.
     pub aiding_silence: Duration,
-    /// Disagreement of gravity and tilt on the ground, rad, and for how long, s.
-    pub tilt_mismatch: [f32; 2],
+    /// Disagreement of gravity and tilt on the ground, rad.
+    pub tilt_mismatch: f32,
+    /// For how long they disagree.
+    pub tilt_mismatch_time: Duration,
+    /// Weight of an inertial sample in the specific force that is compared with the impact thresholds. A blow lasts some
+    /// 10 ms, a propeller's shaking averages out.
+    pub blow_weight: f32,
+    /// Weight of an inertial sample in mean and variance of the vibration.
+    pub vibration_weight: f32,
+    /// Weight of an inertial sample in the gravity that is compared with the tilt on the ground.
+    pub gravity_weight: f32,
+    /// Samples running above a threshold of force or rate that are an alert: one alone is a glitch.
+    pub motion_samples: u32,
 }
 
 impl Default for FailsafeConfig {
+    /// For one lithium cell and an inertial sensor at 400 Hz: voltages grow with the number of cells, and weights of samples
+    /// shrink with their rate.
     fn default() -> Self {
         Self {
             impact: 3.0 * GRAVITY,
             landing_impact: 6.0 * GRAVITY,
             impact_sigmas: 6.0,
             rate: 13.96,
-            tumble: [1.05, 0.3],
-            imu_silence: [Duration::from_millis(10), Duration::from_millis(25)],
+            tumble_tilt: 1.05,
+            tumble_time: Duration::from_millis(300),
+            imu_degraded: Duration::from_millis(10),
+            imu_lost: Duration::from_millis(25),
             link_silence: Duration::from_millis(500),
-            battery: [3.4, 3.0],
+            battery_low: 3.4,
+            battery_critical: 3.0,
             usb: 3.3,
+            no_meter: 0.1,
             battery_hysteresis: 0.1,
             battery_time: 2.0,
             power_silence: Duration::from_secs(1),
             aiding_silence: Duration::from_secs(1),
-            tilt_mismatch: [0.1745, 0.5],
+            tilt_mismatch: 0.1745,
+            tilt_mismatch_time: Duration::from_millis(500),
+            // Time constants of about 10 ms, 100 ms and a second at 400 Hz.
+            blow_weight: 0.3,
+            vibration_weight: 0.02,
+            gravity_weight: 0.0025,
+            motion_samples: 2,
         }
     }
 }
@@ -127,11 +160,11 @@ pub struct Failsafe {
     last_step: Option<Instant>,
     impacts: u32,
     overspeeds: u32,
-    /// Specific force over about 10 ms: a blow lasts that long, a propeller's shaking averages out.
+    /// Specific force over the length of a blow.
     blow: Option<Vec3>,
-    /// Running mean and variance of its norm over about 100 ms.
+    /// Running mean and variance of its norm.
     force: [f32; 2],
-    /// Specific force with a time constant of a second, for the tilt on the ground.
+    /// Specific force for the tilt on the ground.
     gravity: Option<Vec3>,
     tumbled: Option<Instant>,
     mismatch: Option<Instant>,
@@ -160,9 +193,8 @@ impl Failsafe {
             active = self.inspect_motion(active, imu, input.flight_status.phase);
         }
         let silence = self.last_imu.map_or(now.since(Instant::ZERO), |at| now.since(at));
-        let [degraded, lost] = self.config.imu_silence;
-        active = active.set(Alerts::IMU_DEGRADED, silence >= degraded);
-        if silence >= lost {
+        active = active.set(Alerts::IMU_DEGRADED, silence >= self.config.imu_degraded);
+        if silence >= self.config.imu_lost {
             active |= Alerts::IMU_LOST;
         }
         active = self.inspect_attitude(active, now, input);
@@ -183,29 +215,31 @@ impl Failsafe {
     }
 
     fn inspect_motion(&mut self, active: Alerts, imu: &ImuData, phase: FlightPhase) -> Alerts {
+        let config = self.config;
         let rate = imu.gyro.norm();
         if !imu.accel.norm_squared().is_finite() || !rate.is_finite() {
             return active;
         }
         let blow = self.blow.get_or_insert(imu.accel);
-        *blow += (imu.accel - *blow) * 0.3;
+        *blow += (imu.accel - *blow) * config.blow_weight;
         let force = blow.norm();
         let [mean, variance] = self.force;
         let landing = phase == FlightPhase::Landing;
-        let impact = if landing { self.config.landing_impact } else { self.config.impact };
-        let limit = impact.max(mean + self.config.impact_sigmas * math::sqrt(variance));
+        let impact = if landing { config.landing_impact } else { config.impact };
+        let limit = impact.max(mean + config.impact_sigmas * math::sqrt(variance));
         self.impacts = if force >= limit { self.impacts.saturating_add(1) } else { 0 };
-        self.overspeeds = if rate >= self.config.rate { self.overspeeds.saturating_add(1) } else { 0 };
+        self.overspeeds = if rate >= config.rate { self.overspeeds.saturating_add(1) } else { 0 };
         // An impact must not raise its own threshold: outliers enter clipped.
         let off = force.min(limit) - mean;
-        self.force = [mean + 0.02 * off, variance + 0.02 * (off * off - variance)];
+        let weight = config.vibration_weight;
+        self.force = [mean + weight * off, variance + weight * (off * off - variance)];
         let gravity = self.gravity.get_or_insert(imu.accel);
-        *gravity += (imu.accel - *gravity) * 0.0025;
+        *gravity += (imu.accel - *gravity) * config.gravity_weight;
         let mut active = active;
-        if self.impacts >= 2 {
+        if self.impacts >= config.motion_samples {
             active |= Alerts::IMPACT;
         }
-        if self.overspeeds >= 2 {
+        if self.overspeeds >= config.motion_samples {
             active |= Alerts::GYRO_ANOMALY;
         }
         active
@@ -215,20 +249,19 @@ impl Failsafe {
         let known = input.estimate.valid.contains(Validity::TILT);
         let flying =
             matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
-        let [tilt, time] = self.config.tumble;
+        let config = self.config;
         let over = flying
             && known
             && input.flight_status.mode != FlightMode::Acro
-            && frame::tilt(&input.estimate.attitude) > tilt;
-        let tumbled = lasts(&mut self.tumbled, now, over, time);
-        let [angle, time] = self.config.tilt_mismatch;
+            && frame::tilt(&input.estimate.attitude) > config.tumble_tilt;
+        let tumbled = lasts(&mut self.tumbled, now, over, config.tumble_time);
         let standing = input.flight_status.phase == FlightPhase::IdleGround && known;
         let apart = standing
             && self.gravity.is_some_and(|force| {
                 let up = input.estimate.attitude.inverse_transform_vector(&-Vec3::z());
-                math::acos(force.dot(&up) / force.norm().max(1e-3)) > angle
+                math::acos(force.dot(&up) / force.norm().max(1e-3)) > config.tilt_mismatch
             });
-        let mismatch = lasts(&mut self.mismatch, now, apart, time);
+        let mismatch = lasts(&mut self.mismatch, now, apart, config.tilt_mismatch_time);
         let active = active.set(Alerts::TILT_MISMATCH, mismatch);
         if tumbled { active | Alerts::TUMBLED } else { active }
     }
@@ -243,8 +276,8 @@ impl Failsafe {
         };
         self.last_power = Some(at);
         let active = active.set(Alerts::POWER_LOST, now.since(at) >= self.config.power_silence);
-        if power.voltage < 0.1 {
-            return active; // No meter.
+        if power.voltage < self.config.no_meter {
+            return active;
         }
         let dt = last.map_or(0.0, |last| at.since(last).seconds());
         let before = self.voltage.unwrap_or(power.voltage);
@@ -254,21 +287,20 @@ impl Failsafe {
             let hysteresis = if active.contains(alert) { self.config.battery_hysteresis } else { 0.0 };
             voltage <= limit + hysteresis
         };
-        let [warn, land] = self.config.battery;
         active
             .set(Alerts::USB_POWER, below(Alerts::USB_POWER, self.config.usb) && disarmed)
-            .set(Alerts::LOW_BATTERY, below(Alerts::LOW_BATTERY, warn))
-            .set(Alerts::CRITICAL_BATTERY, below(Alerts::CRITICAL_BATTERY, land))
+            .set(Alerts::LOW_BATTERY, below(Alerts::LOW_BATTERY, self.config.battery_low))
+            .set(Alerts::CRITICAL_BATTERY, below(Alerts::CRITICAL_BATTERY, self.config.battery_critical))
     }
 }
 
-/// Has the condition held for `seconds` without a break?
-fn lasts(since: &mut Option<Instant>, now: Instant, holds: bool, seconds: f32) -> bool {
+/// Has the condition held for this time without a break?
+fn lasts(since: &mut Option<Instant>, now: Instant, holds: bool, time: Duration) -> bool {
     if !holds {
         *since = None;
         return false;
     }
-    now.since(*since.get_or_insert(now)).seconds() >= seconds
+    now.since(*since.get_or_insert(now)) >= time
 }
 
 #[cfg(test)]

@@ -8,19 +8,19 @@
 //! effect; the ramp also makes the test for touchdown safe: with two thirds of its weight carried, a vehicle that does
 //! not sink stands.
 
-use stampfly_types::Instant;
 use stampfly_types::messages::{
     ControlOutput, FlightPhase, GroundContact, LandDetected, Setpoint, StateEstimate, Validity,
 };
+use stampfly_types::{Duration, Instant};
 
 /// Limits of take-off and landing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LandingConfig {
-    /// Thrust that carries the vehicle, N.
-    pub hover_thrust: f32,
     /// Rise above the take-off spot that counts as airborne, m.
     pub airborne_rise: f32,
+    /// Climb rate that counts as airborne, m/s.
+    pub airborne_speed: f32,
     /// Descent speed, m/s.
     pub descent: f32,
     /// Descent speed at the ground, m/s.
@@ -29,34 +29,58 @@ pub struct LandingConfig {
     pub flare_height: f32,
     /// Below this height the thrust ceiling begins to fall, m.
     pub ceiling_height: f32,
-    /// Where the ceiling ends, as a share of hover thrust, and how long it takes to get there, s.
-    pub ceiling: [f32; 2],
+    /// Where the ceiling ends, share of hover thrust.
+    pub ceiling_share: f32,
+    /// How long the ceiling takes to get there.
+    pub ceiling_time: Duration,
     /// Slower than this, or upwards, is not sinking, m/s.
     pub still_speed: f32,
-    /// Not sinking for this long with the ceiling down is touchdown, s.
-    pub touchdown_time: f32,
+    /// Not sinking for this long although it is asked to, the vehicle may stand: the thrust ceiling begins to fall at any
+    /// height.
+    pub stall_time: Duration,
+    /// A vehicle that demands less thrust than this does not carry itself, share of hover thrust.
+    pub unloaded_thrust: f32,
+    /// Touchdown needs a thrust ceiling below this, share of hover thrust; above [`Self::ceiling_share`], which it has to
+    /// pass.
+    pub unloaded_ceiling: f32,
+    /// Not sinking for this long with the ceiling down is touchdown.
+    pub touchdown_time: Duration,
     /// Within this band of its goal take-off has arrived, m.
     pub takeoff_band: f32,
-    /// Time in the band that completes take-off, and time after which it is complete in any case, s.
-    pub takeoff_time: [f32; 2],
+    /// Vertical speed with which take-off has arrived, m/s.
+    pub takeoff_speed: f32,
+    /// Vertical speed of the path that has arrived, m/s.
+    pub takeoff_path_speed: f32,
+    /// Time in the band that completes take-off.
+    pub takeoff_settle: Duration,
+    /// Time after which take-off is complete in any case.
+    pub takeoff_limit: Duration,
 }
 
-impl LandingConfig {
-    /// The limits for a vehicle that hovers with this thrust, N. Speeds, heights and times are for flights indoors.
-    #[must_use]
-    pub const fn for_hover_thrust(hover_thrust: f32) -> Self {
+impl Default for LandingConfig {
+    /// Speeds, heights and times for flights indoors.
+    fn default() -> Self {
         Self {
-            hover_thrust,
             airborne_rise: 0.05,
+            // Twice `still_speed`, as for `takeoff_speed`: what the estimate of a vehicle that stands does not reach.
+            airborne_speed: 0.16,
             descent: 0.3,
             touchdown: 0.15,
             flare_height: 0.3,
             ceiling_height: 0.06,
-            ceiling: [0.6, 0.8],
+            // With less than two thirds of its weight carried, a vehicle that does not sink stands.
+            ceiling_share: 0.6,
+            ceiling_time: Duration::from_millis(800),
             still_speed: 0.08,
-            touchdown_time: 0.3,
+            stall_time: Duration::from_secs(1),
+            unloaded_thrust: 0.8,
+            unloaded_ceiling: 0.85,
+            touchdown_time: Duration::from_millis(300),
             takeoff_band: 0.06,
-            takeoff_time: [0.4, 8.0],
+            takeoff_speed: 0.16,
+            takeoff_path_speed: 0.02,
+            takeoff_settle: Duration::from_millis(400),
+            takeoff_limit: Duration::from_secs(8),
         }
     }
 }
@@ -80,7 +104,7 @@ pub struct LandingInput<'a> {
 /// use stampfly_mode::{LandingConfig, LandingInput, TakeoffLanding};
 /// use stampfly_types::{Instant, messages::*};
 /// // A vehicle of half a kilogram.
-/// let mut manager = TakeoffLanding::new(LandingConfig::for_hover_thrust(4.9));
+/// let mut manager = TakeoffLanding::new(4.9, LandingConfig::default());
 /// // Standing on the floor in LANDING, asked to sink and not sinking: after a while it has landed.
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
 /// let mut landed_at = None;
@@ -96,6 +120,8 @@ pub struct LandingInput<'a> {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TakeoffLanding {
+    /// Thrust that carries the vehicle, N.
+    hover_thrust: f32,
     config: LandingConfig,
     phase: FlightPhase,
     contact: GroundContact,
@@ -110,20 +136,24 @@ pub struct TakeoffLanding {
     still: Option<Instant>,
 }
 
-/// How long a condition has held without a break, s.
-fn lasting(since: &mut Option<Instant>, now: Instant, holds: bool) -> f32 {
+/// Thrust ceiling that is none, share of hover thrust.
+const UNLIMITED: f32 = 2.0;
+
+/// How long a condition has held without a break.
+fn lasting(since: &mut Option<Instant>, now: Instant, holds: bool) -> Duration {
     if !holds {
         *since = None;
-        return 0.0;
+        return Duration::ZERO;
     }
-    now.since(*since.get_or_insert(now)).seconds()
+    now.since(*since.get_or_insert(now))
 }
 
 impl TakeoffLanding {
-    /// A manager of a vehicle that stands.
+    /// A manager of a vehicle that stands and hovers with this thrust, N.
     #[must_use]
-    pub fn new(config: LandingConfig) -> Self {
+    pub fn new(hover_thrust: f32, config: LandingConfig) -> Self {
         Self {
+            hover_thrust,
             config,
             phase: FlightPhase::Init,
             contact: GroundContact::Ground,
@@ -152,24 +182,24 @@ impl TakeoffLanding {
         let estimate = input.estimate;
         let height_known = estimate.valid.contains(Validity::HEIGHT);
         let mut land_detected =
-            LandDetected { thrust_ceiling: 2.0, descent_rate: config.descent, ..LandDetected::default() };
+            LandDetected { thrust_ceiling: UNLIMITED, descent_rate: config.descent, ..LandDetected::default() };
         match self.phase {
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => {
                 self.contact = GroundContact::Ground;
             }
             FlightPhase::TakeOff => {
                 let rise = estimate.height - self.entry_height;
-                if rise > config.airborne_rise || estimate.velocity.z < -2.0 * config.still_speed {
+                if rise > config.airborne_rise || estimate.velocity.z < -config.airborne_speed {
                     self.contact = GroundContact::Air;
                 }
                 let path = input.setpoint;
                 let arrived = self.contact == GroundContact::Air
-                    && path.velocity.z.abs() < 0.02
+                    && path.velocity.z.abs() < config.takeoff_path_speed
                     && (path.position.z - estimate.position.z).abs() < config.takeoff_band
-                    && estimate.velocity.z.abs() < 2.0 * config.still_speed;
+                    && estimate.velocity.z.abs() < config.takeoff_speed;
                 let in_band = lasting(&mut self.in_band, now, arrived);
-                let [settle, limit] = config.takeoff_time;
-                land_detected.takeoff_complete = in_band >= settle || now.since(self.entered).seconds() > limit;
+                let overdue = now.since(self.entered) > config.takeoff_limit;
+                land_detected.takeoff_complete = in_band >= config.takeoff_settle || overdue;
             }
             FlightPhase::Flying => self.contact = GroundContact::Air,
             FlightPhase::Landing => {
@@ -180,14 +210,15 @@ impl TakeoffLanding {
                     config.touchdown
                 };
                 let sinking = estimate.velocity.z > config.still_speed;
-                let stalled = lasting(&mut self.stalled, now, !sinking) > 1.0;
+                let stalled = lasting(&mut self.stalled, now, !sinking) > config.stall_time;
                 let low = height_known && estimate.height < config.ceiling_height;
-                let [share, ramp] = config.ceiling;
                 let falling = lasting(&mut self.ceiling, now, low || stalled);
                 if self.ceiling.is_some() {
-                    land_detected.thrust_ceiling = 1.0 - (1.0 - share) * (falling / ramp).min(1.0);
+                    let fallen = (falling.seconds() / config.ceiling_time.seconds()).min(1.0);
+                    land_detected.thrust_ceiling = 1.0 - (1.0 - config.ceiling_share) * fallen;
                 }
-                let unloaded = input.demand.thrust < 0.8 * config.hover_thrust && land_detected.thrust_ceiling < 0.85;
+                let unloaded = input.demand.thrust < config.unloaded_thrust * self.hover_thrust
+                    && land_detected.thrust_ceiling < config.unloaded_ceiling;
                 // Rising counts: with so little thrust nothing can, but strong vibration makes the estimate believe so.
                 let still = lasting(&mut self.still, now, unloaded && !sinking);
                 land_detected.landed = still >= config.touchdown_time;
@@ -216,7 +247,7 @@ mod tests {
         mut estimate: impl FnMut(f32) -> StateEstimate,
         thrust: f32,
     ) -> Option<f32> {
-        let mut manager = TakeoffLanding::new(LandingConfig::for_hover_thrust(HOVER_THRUST));
+        let mut manager = TakeoffLanding::new(HOVER_THRUST, LandingConfig::default());
         (0..(seconds * 400.0) as u64).find_map(|k| {
             let t = k as f32 * 0.0025;
             let input = LandingInput {

@@ -22,6 +22,7 @@ mod arm_switch;
 pub mod arming;
 pub mod authority;
 pub mod button;
+mod config;
 pub mod failsafe;
 mod input;
 pub mod landing;
@@ -31,7 +32,8 @@ mod stop_button;
 pub mod transitions;
 
 pub use authority::{Authority, AuthorityConfig};
-pub use button::ButtonDecoder;
+pub use button::{ButtonConfig, ButtonDecoder};
+pub use config::ModeConfig;
 pub use failsafe::{Failsafe, FailsafeConfig, FailsafeInput};
 pub use landing::{LandingConfig, LandingInput, TakeoffLanding};
 pub use machine::{Command, ModeInput, ModeMachine, ModeOutput};

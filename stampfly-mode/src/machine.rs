@@ -6,13 +6,14 @@
 
 use crate::arm_switch::{ArmSwitch, Switched};
 use crate::arming;
+use crate::config::ModeConfig;
 pub use crate::input::{Command, ModeInput};
 use crate::stop_button::StopButton;
 use crate::transitions::{Event, is_armed, next};
+use stampfly_types::Instant;
 use stampfly_types::messages::{
     Alerts, ButtonGesture, EstimatorCommand, FlightMode, FlightPhase, FlightStatus, GroundContact, Validity,
 };
-use stampfly_types::{Duration, Instant};
 
 /// What the machine decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,16 +29,6 @@ pub struct ModeOutput {
 const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
 /// Alerts that demand a landing at once.
 const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
-/// How long the vehicle hovers without a link before it lands.
-const HOVER_WITHOUT_LINK: Duration = Duration::from_secs(3);
-/// Time between arming and take-off when the pilot's mode takes off by itself.
-const SPOOL: Duration = Duration::from_millis(300);
-/// An armed vehicle that is not told to take off is disarmed after this long.
-const ARMED_TIMEOUT: Duration = Duration::from_secs(10);
-/// Height above the ground that means somebody has lifted the vehicle, m, and below which it stands again.
-const HELD_HEIGHT: [f32; 2] = [0.15, 0.08];
-/// Manual throttle that takes off.
-const THROTTLE_TAKE_OFF: f32 = 0.1;
 
 /// The mode machine.
 ///
@@ -61,6 +52,7 @@ const THROTTLE_TAKE_OFF: f32 = 0.1;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModeMachine {
+    config: ModeConfig,
     output: ModeOutput,
     entered: Instant,
     /// The mode asked for; the one in force may be a fallback.
@@ -77,11 +69,18 @@ pub struct ModeMachine {
 }
 
 impl ModeMachine {
+    /// The machine of a vehicle that has just been switched on.
+    #[must_use]
+    pub fn new(config: ModeConfig) -> Self {
+        Self { config, ..Self::default() }
+    }
+
     /// One step, at the control rate.
     pub fn step(&mut self, now: Instant, input: &ModeInput<'_>) -> ModeOutput {
         let switch = self.arm_switch.step(input.pilot, is_armed(self.output.flight_status.phase));
         // The button is on the vehicle: a gesture on an armed one means that it is held in a hand.
-        let stopped_by_button = self.stop_button.stops(now, input.button, is_armed(self.output.flight_status.phase));
+        let armed = is_armed(self.output.flight_status.phase);
+        let stopped_by_button = self.stop_button.stops(now, self.config.button_release, input.button, armed);
         let input = &ModeInput { button: self.stop_button.unused(input.button), ..*input };
         self.choose_mode(input);
         let mode = &mut self.output.flight_status;
@@ -96,12 +95,12 @@ impl ModeMachine {
             mode.pairing = false;
         }
         self.unheard = mode.pairing && (self.unheard || input.pilot.is_none());
-        mode.blocks = arming::blocks(mode, self.crashed, switch.is_stale, input);
+        mode.blocks = arming::blocks(&self.config, mode, self.crashed, switch.is_stale, input);
         let happened = self.happened(now, input, &switch, stopped_by_button);
         if self.acknowledges(input, &switch) {
             self.crashed = false;
         }
-        let holds_height = matches!(self.output.flight_status.mode, FlightMode::AltHold | FlightMode::PosHold);
+        let holds_height = !self.output.flight_status.mode.is_manual();
         let transition = Event::ALL.into_iter().zip(happened).filter(|(_, happened)| *happened);
         if let Some((event, phase)) = transition
             .filter_map(|(event, _)| {
@@ -126,37 +125,38 @@ impl ModeMachine {
         switch: &Switched,
         stopped_by_button: bool,
     ) -> [bool; 10] {
-        let mode = &self.output.flight_status;
+        let (config, mode) = (&self.config, &self.output.flight_status);
         let commanded = |kind: Command| input.commands.contains(&kind);
         let clicked = input.button == Some(ButtonGesture::Click);
         let armed = is_armed(mode.phase);
         let height_known = input.estimate.valid.contains(Validity::HEIGHT);
-        let [held, standing] = HELD_HEIGHT;
 
         if input.alerts.contains(Alerts::COMM_LOST) && armed {
             self.silent_since.get_or_insert(now);
         } else {
             self.silent_since = None;
         }
-        let abandoned = self.silent_since.is_some_and(|since| now.since(since) >= HOVER_WITHOUT_LINK);
+        let abandoned = self.silent_since.is_some_and(|since| now.since(since) >= config.hover_without_link);
         let waited = now.since(self.entered);
-        let manual = matches!(mode.mode, FlightMode::Acro | FlightMode::Stabilize);
-        let throttle_up = input.pilot.is_some_and(|pilot| pilot.throttle > THROTTLE_TAKE_OFF);
-        let lifts_off = if manual { throttle_up } else { self.takes_off && waited >= SPOOL };
+        let manual = mode.mode.is_manual();
+        let throttle_up = input.pilot.is_some_and(|pilot| pilot.throttle > config.throttle_take_off);
+        let lifts_off = if manual { throttle_up } else { self.takes_off && waited >= config.spool };
         let airborne_by_hand = manual && input.land_detected.contact == GroundContact::Air;
         [
             input.alerts.intersects(CUT)
                 || commanded(Command::Kill)
                 || stopped_by_button
                 || input.pilot.is_some_and(|pilot| pilot.kill),
-            commanded(Command::Disarm) || switch.falls || (mode.phase == FlightPhase::Armed && waited >= ARMED_TIMEOUT),
+            commanded(Command::Disarm)
+                || switch.falls
+                || (mode.phase == FlightPhase::Armed && waited >= config.armed_timeout),
             input.land_detected.landed,
             commanded(Command::Land) || abandoned || input.alerts.intersects(LAND),
             input.land_detected.takeoff_complete || airborne_by_hand,
             commanded(Command::TakeOff) || lifts_off,
             (commanded(Command::Arm) || switch.rises || clicked) && mode.blocks.is_empty(),
-            height_known && input.estimate.height < standing,
-            height_known && input.estimate.height > held,
+            height_known && input.estimate.height < config.standing_height,
+            height_known && input.estimate.height > config.held_height,
             input.calibration.complete && input.estimate.valid.contains(Validity::TILT),
         ]
     }

@@ -6,10 +6,6 @@
 use stampfly_types::messages::ButtonGesture;
 use stampfly_types::{Duration, Instant};
 
-/// After an emergency stop gestures are ignored until the button has been released for this long: a person in a hurry
-/// presses more than once.
-const RELEASED: Duration = Duration::from_secs(2);
-
 /// Tells gestures that stop the motors from gestures that mean something else. The one that stopped them means nothing
 /// more, and neither do those right after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,10 +18,11 @@ pub(crate) struct StopButton {
 }
 
 impl StopButton {
-    /// Does this gesture stop the motors?
-    pub fn stops(&mut self, now: Instant, gesture: Option<ButtonGesture>, armed: bool) -> bool {
+    /// Does this gesture stop the motors? After one that has, gestures count again once the button has been released for
+    /// the time `release`.
+    pub fn stops(&mut self, now: Instant, release: Duration, gesture: Option<ButtonGesture>, armed: bool) -> bool {
         let Some(gesture) = gesture.filter(|gesture| *gesture != ButtonGesture::None) else { return false };
-        let released = now.since(self.last) >= RELEASED;
+        let released = now.since(self.last) >= release;
         self.used = armed || (self.used && !(gesture == ButtonGesture::Press && released));
         self.last = now;
         armed

@@ -14,7 +14,7 @@ use esp_hal::Async;
 use esp_hal::peripherals::USB_DEVICE;
 use esp_hal::usb::usb_serial_jtag::{UsbSerialJtag, UsbSerialJtagTx};
 use heapless::String;
-use stampfly_board::console::{self, Command, Profile};
+use stampfly_board::console::{self, Command, Profile, REPLY};
 use stampfly_board::golden::Outcome;
 use stampfly_board::{VehicleConfig, black_box, topics};
 use stampfly_drivers::Timebase;
@@ -23,8 +23,6 @@ use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
 use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
-/// The longest reply is the list of parameters.
-const REPLY: usize = 4 * 1024;
 /// A terminal that takes nothing for this long is none.
 const PATIENCE: Duration = Duration::from_millis(200);
 /// A terminal in the middle of a log is one, and may be busy.

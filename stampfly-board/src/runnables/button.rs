@@ -6,7 +6,7 @@ use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::ButtonDecoder;
 
 /// Button: a contact in, gestures out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Button {
     decoder: ButtonDecoder,
@@ -15,8 +15,8 @@ pub struct Button {
 impl Button {
     /// A button that is not pressed.
     #[must_use]
-    pub fn new(_: &VehicleConfig) -> Self {
-        Self::default()
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self { decoder: ButtonDecoder::new(config.button) }
     }
 }
 

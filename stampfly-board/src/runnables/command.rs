@@ -7,7 +7,7 @@ use stampfly_mode::Authority;
 use stampfly_types::messages::GuidedKind;
 
 /// Command: every source of commands in, one arbitrated set of sticks out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Command {
     authority: Authority,
@@ -16,8 +16,8 @@ pub struct Command {
 impl Command {
     /// No source has authority.
     #[must_use]
-    pub fn new(_: &VehicleConfig) -> Self {
-        Self::default()
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self { authority: Authority::new(config.authority) }
     }
 }
 

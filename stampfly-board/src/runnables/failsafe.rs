@@ -7,7 +7,7 @@ use stampfly_mode::FailsafeInput;
 use stampfly_types::Instant;
 
 /// Failsafe: everything that can go wrong in, alerts out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Failsafe {
     failsafe: stampfly_mode::Failsafe,
@@ -19,8 +19,13 @@ pub struct Failsafe {
 impl Failsafe {
     /// Nothing wrong yet.
     #[must_use]
-    pub fn new(_: &VehicleConfig) -> Self {
-        Self::default()
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self {
+            failsafe: stampfly_mode::Failsafe::new(config.failsafe),
+            last_command: None,
+            last_tof: None,
+            last_flow: None,
+        }
     }
 }
 

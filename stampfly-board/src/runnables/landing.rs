@@ -3,7 +3,7 @@
 use crate::config::VehicleConfig;
 use crate::topics::LandingEnds;
 use stampfly_bus::{Activation, Runnable};
-use stampfly_mode::{LandingConfig, LandingInput, TakeoffLanding};
+use stampfly_mode::{LandingInput, TakeoffLanding};
 
 /// Take-off and landing manager: the estimate in, contact with the ground out.
 #[derive(Clone, Debug)]
@@ -16,8 +16,7 @@ impl Landing {
     /// Standing.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let hover_thrust = config.cascade.altitude.hover_thrust;
-        Self { manager: TakeoffLanding::new(LandingConfig::for_hover_thrust(hover_thrust)) }
+        Self { manager: TakeoffLanding::new(config.cascade.altitude.hover_thrust, config.landing) }
     }
 }
 

@@ -9,14 +9,13 @@ use stampfly_mode::{ModeInput, ModeMachine};
 use stampfly_types::messages::{ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
-/// A pilot's frame as old as this counts as none.
-const STALE_PILOT: Duration = Duration::from_millis(500);
-
 /// State management: alerts, commands and facts in, the vehicle's state out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mode {
     machine: ModeMachine,
+    /// A pilot's frame as old as this counts as none.
+    stale_pilot: Duration,
     pilot: Option<Stamped<PilotInput>>,
     published: Option<EstimatorCommand>,
     /// The decision of the step before.
@@ -28,8 +27,16 @@ pub struct Mode {
 impl Mode {
     /// A vehicle that has just been switched on.
     #[must_use]
-    pub fn new(_: &VehicleConfig) -> Self {
-        Self::default()
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self {
+            machine: ModeMachine::new(config.mode),
+            // The frames that count for the sticks count here, too.
+            stale_pilot: config.authority.stale,
+            pilot: None,
+            published: None,
+            last: FlightStatus::default(),
+            armed_at: Instant::ZERO,
+        }
     }
 }
 
@@ -61,7 +68,7 @@ impl Runnable for Mode {
             estimate: ends.estimate_state.get(),
             calibration: ends.calibration.get(),
             land_detected: ends.land_detected.get(),
-            pilot: self.pilot.as_ref().filter(|frame| frame.age(now) < STALE_PILOT).map(|frame| &frame.data),
+            pilot: self.pilot.as_ref().filter(|frame| frame.age(now) < self.stale_pilot).map(|frame| &frame.data),
             commands: &commands,
             button,
         };

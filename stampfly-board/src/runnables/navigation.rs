@@ -6,7 +6,7 @@ use stampfly_bus::{Activation, Runnable};
 use stampfly_control::guidance::{Navigator, NavigatorInput};
 
 /// Navigator: commands and state in, the vehicle's path out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Navigation {
     navigator: Navigator,
@@ -15,8 +15,8 @@ pub struct Navigation {
 impl Navigation {
     /// Without a route.
     #[must_use]
-    pub fn new(_: &VehicleConfig) -> Self {
-        Self::default()
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self { navigator: Navigator::new(&config.navigator) }
     }
 }
 

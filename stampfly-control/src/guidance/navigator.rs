@@ -44,8 +44,10 @@ pub struct NavigatorConfig {
     pub sink_rate: f32,
     /// Rate of turn at full yaw stick, rad/s.
     pub turn_rate: f32,
-    /// Sticks and commands keep the height over the place of take-off between these, m.
-    pub height: (f32, f32),
+    /// Sticks and commands keep at least this height over the place of take-off, m.
+    pub height_min: f32,
+    /// Sticks and commands keep at most this height over the place of take-off, m.
+    pub height_max: f32,
     /// A way-point is reached when the path ends there, heading included, and the vehicle is this close, m.
     pub reached: f32,
     /// The path waits when the vehicle is farther away than this, m.
@@ -65,7 +67,8 @@ impl Default for NavigatorConfig {
             climb_rate: 0.5,
             sink_rate: 0.4,
             turn_rate: 1.5,
-            height: (0.2, 3.0),
+            height_min: 0.2,
+            height_max: 3.0,
             reached: 0.15,
             leash: 0.6,
             landing_lead: 0.25,
@@ -271,7 +274,7 @@ impl Navigator {
             self.stand(false, input);
         }
         self.steer_heading(input, dt);
-        if manual(input.flight_status.mode) {
+        if input.flight_status.mode.is_manual() {
             self.follow_horizontally(input);
             self.follow_vertically(input);
             return SetpointAxes::YAW;
@@ -285,7 +288,7 @@ impl Navigator {
     fn take_off_height(&self) -> f32 {
         let asked = -self.take_off.position.z;
         let height = if asked > 0.0 { asked } else { self.config.take_off_height };
-        within(height, self.config.height.0, self.config.height.1)
+        within(height, self.config.height_min, self.config.height_max)
     }
 
     /// Position hold steers with the sticks or stays; the other modes lean with them, and stay while there is no pilot.
@@ -365,7 +368,7 @@ impl Navigator {
             return;
         }
         let mut goal = way_point.position;
-        goal.z = within(goal.z, self.ground - self.config.height.1, self.ground - self.config.height.0);
+        goal.z = within(goal.z, self.ground - self.config.height_max, self.ground - self.config.height_min);
         let leg = *self.leg.get_or_insert_with(|| self.path.leg_to(goal, way_point.speed));
         self.path.follow(&leg, dt);
         let close = (input.estimate.position - goal).norm() <= self.config.reached;
@@ -406,13 +409,12 @@ impl Navigator {
         };
         // A stick that was pushed before it meant climb must first come back.
         self.throttle_centred |= throttle == 0.0;
-        let (lowest, highest) = self.config.height;
         if throttle == 0.0 || !self.throttle_centred {
             self.path.sink(0.0, dt);
         } else if throttle > 0.0 {
-            self.path.sink_to(self.ground - highest, throttle * self.config.climb_rate, dt);
+            self.path.sink_to(self.ground - self.config.height_max, throttle * self.config.climb_rate, dt);
         } else {
-            self.path.sink_to(self.ground - lowest, -throttle * self.config.sink_rate, dt);
+            self.path.sink_to(self.ground - self.config.height_min, -throttle * self.config.sink_rate, dt);
         }
     }
 
@@ -442,13 +444,6 @@ impl Navigator {
         let error = self.path.position() - input.estimate.position;
         let leash = self.config.leash;
         self.position_known && error.x * error.x + error.y * error.y > leash * leash
-    }
-}
-
-fn manual(mode: FlightMode) -> bool {
-    match mode {
-        FlightMode::Acro | FlightMode::Stabilize => true,
-        FlightMode::AltHold | FlightMode::PosHold => false,
     }
 }
 

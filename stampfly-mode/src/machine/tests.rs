@@ -1,6 +1,7 @@
 //! The machine from outside, step by step: phases, events, the arm switch, the button, crashes.
 
 use super::*;
+use stampfly_types::Duration;
 use stampfly_types::messages::{ArmBlocks, CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
 use std::collections::BTreeSet;
 use std::vec;
@@ -286,7 +287,7 @@ fn a_click_takes_off_and_holds_the_place() {
     machine.wanted = FlightMode::Stabilize;
     let clicked = press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
     assert_eq!((clicked.phase, clicked.mode), (FlightPhase::Armed, FlightMode::PosHold));
-    world.now += SPOOL;
+    world.now += ModeConfig::default().spool;
     let later = world.step(&mut machine, &[]).flight_status;
     assert_eq!((later.phase, later.mode), (FlightPhase::TakeOff, FlightMode::PosHold));
 }
@@ -303,6 +304,35 @@ fn a_lost_link_hovers_then_lands() {
         FlightPhase::Landing,
         "a link that returns is no reason to stop"
     );
+}
+
+#[test]
+fn another_vehicle_waits_as_long_as_its_configuration_says() {
+    let second = Duration::from_secs(1);
+    let config = ModeConfig { hover_without_link: second, armed_timeout: second * 2, ..ModeConfig::default() };
+    let (mut machine, mut world) = (ModeMachine::new(config), World::ready());
+    world.step(&mut machine, &[]);
+    assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
+    let disarmed_after = (1..2_000).find(|_| !world.step(&mut machine, &[]).flight_status.armed);
+    assert_eq!(disarmed_after, Some(800), "2 s at 400 Hz");
+
+    (machine, world) = in_phase(FlightPhase::Flying);
+    machine.config = config;
+    world.alerts = Alerts::COMM_LOST;
+    let landed_after = (0..2_000).find(|_| world.step(&mut machine, &[]).flight_status.phase == FlightPhase::Landing);
+    assert_eq!(landed_after, Some(400), "1 s at 400 Hz");
+}
+
+#[test]
+fn the_machine_blocks_arming_at_the_tilt_of_its_configuration() {
+    let tilted = stampfly_types::Quat::from_euler_angles(0.2, 0.0, 0.0);
+    for (arming_tilt, blocks) in [(0.15, ArmBlocks::TILTED), (0.25, ArmBlocks::NONE)] {
+        let mut machine = ModeMachine::new(ModeConfig { arming_tilt, ..ModeConfig::default() });
+        let mut world = World::ready();
+        world.estimate.attitude = tilted;
+        world.step(&mut machine, &[]);
+        assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, blocks);
+    }
 }
 
 #[test]

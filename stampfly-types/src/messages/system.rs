@@ -38,6 +38,24 @@ message_enum! {
     }
 }
 
+impl FlightMode {
+    /// Is the pilot's throttle a thrust? In the other modes it is a climb rate, and the vehicle holds its height while the
+    /// stick is centred.
+    ///
+    /// ```
+    /// use stampfly_types::messages::FlightMode;
+    /// assert!(FlightMode::Acro.is_manual() && FlightMode::Stabilize.is_manual());
+    /// assert!(!FlightMode::AltHold.is_manual() && !FlightMode::PosHold.is_manual());
+    /// ```
+    #[must_use]
+    pub const fn is_manual(self) -> bool {
+        match self {
+            Self::Acro | Self::Stabilize => true,
+            Self::AltHold | Self::PosHold => false,
+        }
+    }
+}
+
 message_flags! {
     /// Why the vehicle will not arm. Empty means it will.
     pub struct ArmBlocks {
