@@ -1,8 +1,15 @@
-//! A position that is measured from outside, or simply known, in the world's axes.
+//! A position in the world's axes: measured from outside, or a pseudo-measurement.
 //!
 //! It is the state itself: z = p, so the Jacobian is the identity in the three position errors.
 //!
 //! A camera system's position, or the place where a vehicle stands.
+//!
+//! | external position in [`Eskf`](crate::Eskf) | condition |
+//! |---|---|
+//! | start | initialised, finite, new, at most 0.1 s old |
+//! | continue | the same, and a joint test ratio of the three axes of at most one |
+//! | stop | no condition of its own: inactive one second after the last accepted sample |
+//! | reset | rejected for longer than `lockout`: position to the sample, the surface with it; variance of position and velocity reset, attitude inflated |
 
 use super::Row;
 use crate::filter::{Nominal, POSITION};
