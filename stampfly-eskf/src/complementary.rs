@@ -9,7 +9,7 @@
 //! fixed-gain observers.
 
 use crate::estimator::{Estimator, Fusion, Refusal};
-use crate::filter::Nominal;
+use crate::filter::NominalState;
 use crate::filter::state::{rotate, rotate_back};
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::{
@@ -68,7 +68,7 @@ impl Default for ComplementaryConfig {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Complementary {
     config: ComplementaryConfig,
-    state: Nominal,
+    state: NominalState,
     now: Instant,
     initialized: bool,
     calibration: CalibrationResult,
@@ -88,7 +88,7 @@ impl Complementary {
     pub fn new(config: ComplementaryConfig) -> Self {
         Self {
             config,
-            state: Nominal::default(),
+            state: NominalState::default(),
             now: Instant::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
@@ -230,7 +230,7 @@ impl Estimator for Complementary {
         self.status.flow_innovation = [error.x, error.y];
         if self.anchor.is_none() {
             self.state.velocity += rotate(&rotation, &error) * self.config.flow_gain;
-            // Faster forward than expected means the nose is lower than believed.
+            // Faster forward than expected means the nose is lower than estimated.
             self.turn(Vec3::new(error.y, -error.x, 0.0) * self.config.flow_tilt_gain);
         }
         self.flow_fused = Some(self.now);

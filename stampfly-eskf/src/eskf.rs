@@ -29,7 +29,7 @@ use crate::filter::covariance::{Covariance, Innovation, ProcessNoise};
 use crate::filter::history::MAX_AGE;
 use crate::filter::state::{Rotation, multiply, rotate, rotate_back};
 use crate::filter::{
-    ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, PropagationStep, VELOCITY, Vibration,
+    ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, NominalState, POSITION, PropagationStep, VELOCITY, Vibration,
 };
 use crate::level::attitude_from_specific_force;
 use gate::{Gates, Sensor};
@@ -102,7 +102,7 @@ impl Mean {
 pub struct Eskf {
     config: EskfConfig,
     noise: ProcessNoise,
-    state: Nominal,
+    state: NominalState,
     covariance: Covariance,
     /// Inertial samples over which the covariance has yet to be propagated, and the attitude in which they began.
     pending_step: PropagationStep,
@@ -136,7 +136,7 @@ pub struct Eskf {
 
 /// The state at the time of a measurement: EKF2's delayed time horizon, computed back for each measurement.
 struct DelayedState {
-    state: Nominal,
+    state: NominalState,
     rotation: Rotation,
     /// Propagation since then.
     step: PropagationStep,
@@ -162,9 +162,9 @@ impl Eskf {
             noise: process_noise(&config),
             covariance: initial_covariance(&config),
             config,
-            state: Nominal::default(),
+            state: NominalState::default(),
             pending_step: PropagationStep::default(),
-            pending_rotation: Nominal::default().rotation(),
+            pending_rotation: NominalState::default().rotation(),
             history: History::default(),
             vibration: [Vibration::default(); 2],
             now: Instant::ZERO,
@@ -196,7 +196,7 @@ impl Eskf {
 
     /// The nominal state.
     #[must_use]
-    pub fn nominal(&self) -> &Nominal {
+    pub fn nominal(&self) -> &NominalState {
         &self.state
     }
 

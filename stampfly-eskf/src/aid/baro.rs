@@ -14,12 +14,12 @@
 //! | origin reset by command | the offset shifts with the origin |
 
 use super::Row;
-use crate::filter::{Nominal, POSITION};
+use crate::filter::{NominalState, POSITION};
 
 /// Predicted altitude for an altitude `offset` of the origin, m.
 #[inline]
 #[must_use]
-pub fn altitude(state: &Nominal, offset: f32) -> Row {
+pub fn altitude(state: &NominalState, offset: f32) -> Row {
     Row::new(offset - state.position.z, [(POSITION + 2, -1.0)])
 }
 

@@ -19,12 +19,12 @@
 
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
-use crate::filter::{ATTITUDE, GYRO_BIAS, Nominal, VELOCITY};
+use crate::filter::{ATTITUDE, GYRO_BIAS, NominalState, VELOCITY};
 
 /// Predicted velocity along body x and along body y, from `distance` metres to the surface along the beam.
 #[inline]
 #[must_use]
-pub fn body_velocity(state: &Nominal, rotation: &Rotation, distance: f32) -> [Row; 2] {
+pub fn body_velocity(state: &NominalState, rotation: &Rotation, distance: f32) -> [Row; 2] {
     let v = rotate_back(rotation, &state.velocity);
     let [north, east, down] = rotation;
     let columns = |c: usize| [(VELOCITY, north[c]), (VELOCITY + 1, east[c]), (VELOCITY + 2, down[c])];
@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn a_gyro_bias_is_predicted_by_the_model() {
         // Standing still, the gyro reads its bias: the reading is −d·b_y in x, as predicted.
-        let state = Nominal { gyro_bias: [0.02, 0.05, 0.0].into(), ..Nominal::default() };
+        let state = NominalState { gyro_bias: [0.02, 0.05, 0.0].into(), ..NominalState::default() };
         let rows = body_velocity(&state, &state.rotation(), 0.5);
         let measured = measured_velocity([0.0, 0.0], [0.02, 0.05], 0.5);
         assert!((rows[0].predicted - measured[0]).abs() < 1e-7);

@@ -16,13 +16,13 @@
 
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, Nominal};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, NominalState};
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Predicted specific force along body x, y and z of a body that accelerates by `acceleration` (world, m/s²).
 #[inline]
 #[must_use]
-pub fn specific_force(state: &Nominal, rotation: &Rotation, acceleration: &Vec3) -> [Row; 3] {
+pub fn specific_force(state: &NominalState, rotation: &Rotation, acceleration: &Vec3) -> [Row; 3] {
     let force = Vec3::new(acceleration.x, acceleration.y, acceleration.z - GRAVITY);
     let f = rotate_back(rotation, &force);
     let bias = state.accel_bias;

@@ -39,14 +39,14 @@ pub fn error(rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row> {
 mod tests {
     use super::*;
     use crate::filter::state::rotate_back;
-    use crate::filter::{N, Nominal};
+    use crate::filter::{N, NominalState};
 
     /// The row is exact for rotations about the vertical, which is all it claims.
     #[test]
     fn jacobian_matches_a_turn_about_the_vertical() {
         let state = crate::aid::numeric::awkward_state();
         let field = rotate_back(&state.rotation(), &Vec3::new(22.0, -9.0, 38.0));
-        let at = |state: &Nominal| error(&state.rotation(), &field, 0.1).expect("a field").predicted;
+        let at = |state: &NominalState| error(&state.rotation(), &field, 0.1).expect("a field").predicted;
         let row = error(&state.rotation(), &field, 0.1).expect("a field");
         let axis = rotate_back(&state.rotation(), &Vec3::z());
         let step = 0.01;

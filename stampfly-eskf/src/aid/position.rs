@@ -12,12 +12,12 @@
 //! | reset | rejected for longer than `lockout`: position to the sample, the surface with it; variance of position and velocity reset, attitude inflated |
 
 use super::Row;
-use crate::filter::{Nominal, POSITION};
+use crate::filter::{NominalState, POSITION};
 
 /// Predicted position, world, m: the state's own.
 #[inline]
 #[must_use]
-pub fn world(state: &Nominal) -> [Row; 3] {
+pub fn world(state: &NominalState) -> [Row; 3] {
     let axis = |i: usize| Row::new(state.position[i], [(POSITION + i, 1.0)]);
     [axis(0), axis(1), axis(2)]
 }

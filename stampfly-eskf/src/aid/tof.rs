@@ -15,13 +15,13 @@
 
 use super::Row;
 use crate::filter::state::Rotation;
-use crate::filter::{ATTITUDE, Nominal, POSITION};
+use crate::filter::{ATTITUDE, NominalState, POSITION};
 
 /// The range a level `surface` (world down coordinate, m) should give. `rotation[2][2]` must be positive: the caller has
 /// checked the tilt.
 #[inline]
 #[must_use]
-pub fn range(state: &Nominal, rotation: &Rotation, surface: f32) -> Row {
+pub fn range(state: &NominalState, rotation: &Rotation, surface: f32) -> Row {
     let [r31, r32, r33] = rotation[2];
     let inverse = 1.0 / r33;
     let predicted = (surface - state.position.z) * inverse;

@@ -13,12 +13,12 @@
 //! | reset | rejected for longer than `lockout`: velocity to the sample; its variance reset, attitude inflated |
 
 use super::Row;
-use crate::filter::{Nominal, VELOCITY};
+use crate::filter::{NominalState, VELOCITY};
 
 /// Predicted velocity, world, m/s: the state's own.
 #[inline]
 #[must_use]
-pub fn world(state: &Nominal) -> [Row; 3] {
+pub fn world(state: &NominalState) -> [Row; 3] {
     let axis = |i: usize| Row::new(state.velocity[i], [(VELOCITY + i, 1.0)]);
     [axis(0), axis(1), axis(2)]
 }

@@ -19,8 +19,8 @@ use stampfly_types::Vec3;
 
 /// Squared distance, in variances, beyond which a component of a sample is an outlier.
 const GATE: f32 = 16.0;
-/// Outliers for so long, s, and the doubt grows until they are none.
-const PATIENCE: f32 = 3.0;
+/// Outliers for so long, s, and the variance is inflated until they are none.
+const LOCKOUT: f32 = 3.0;
 /// Over how long the strength of the field is watched, s.
 const WATCH: f32 = 15.0;
 /// An offset is used when it takes out so much of the strength's variance, and no longer when it leaves so much.
@@ -80,9 +80,9 @@ impl HardIron {
             return Vec3::zeros();
         }
         let offset = self.state.fixed_rows::<3>(3).into_owned();
-        let doubt = self.covariance.diagonal().fixed_rows::<3>(3).sum();
-        let chance = config.hard_iron_least * config.hard_iron_least + doubt;
-        // James and Stein's estimator, positive part: zero while the offset is no longer than its own doubt.
+        let variance = self.covariance.diagonal().fixed_rows::<3>(3).sum();
+        let chance = config.hard_iron_least * config.hard_iron_least + variance;
+        // James and Stein's estimator, positive part: zero while the offset is no longer than its own deviation.
         offset * (1.0 - chance / offset.norm_squared().max(1e-6)).max(0.0)
     }
 
@@ -115,7 +115,7 @@ impl HardIron {
             self.state.fixed_rows_mut::<3>(0).copy_from(&turned);
         }
         let walk = |sigma: f32| sigma * sigma * dt;
-        let patience = if self.outliers_for > PATIENCE { 400.0 } else { 1.0 };
+        let patience = if self.outliers_for > LOCKOUT { 400.0 } else { 1.0 };
         let walks = [walk(config.field_walk), walk(config.hard_iron_walk)].map(|walk| walk * patience);
         for state in 0..6 {
             if let Some(variance) = self.covariance.get_mut((state, state)) {

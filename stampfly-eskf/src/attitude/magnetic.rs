@@ -46,7 +46,7 @@ impl Field {
 
 /// What a field is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum FieldStatus {
     /// It is the reference, as far as can be told.
     Clean {
         /// Distance from the reference, one at the limit.
@@ -57,8 +57,8 @@ pub(super) enum Verdict {
         /// Distance from the reference, above one unless it has only just begun to agree again.
         ratio: f32,
     },
-    /// There is no reference yet to judge it by.
-    Unjudged,
+    /// There is no reference yet to compare it with.
+    NoReference,
     /// It has become the first reference with this sample.
     Found,
     /// Another field than before has become the reference with this sample.
@@ -99,8 +99,8 @@ impl Magnetic {
     }
 
     /// Takes a field in the level frame, `dt` seconds after the one before; `rate` is how fast the body turns, rad/s.
-    pub fn step(&mut self, config: &AttitudeConfig, field: &Vec3, rate: f32, dt: f32) -> Verdict {
-        let Some(seen) = Field::of(field) else { return Verdict::Vertical };
+    pub fn step(&mut self, config: &AttitudeConfig, field: &Vec3, rate: f32, dt: f32) -> FieldStatus {
+        let Some(seen) = Field::of(field) else { return FieldStatus::Vertical };
         self.current.step(&Vector2::new(seen.strength, seen.dip), dt);
         let &[strength, dip] = self.current.value().as_ref();
         let now = Field { strength, dip };
@@ -122,7 +122,7 @@ impl Magnetic {
             if self.home_agrees_for >= config.mag_agree_time {
                 (self.reference, self.home) = (Some(home), None);
                 self.agrees_for = self.home_agrees_for;
-                return Verdict::Back;
+                return FieldStatus::Back;
             }
         }
         match &mut self.candidate {
@@ -142,12 +142,12 @@ impl Magnetic {
             let before = core::mem::replace(&mut self.reference, self.candidate);
             self.home = self.home.or(before);
             (self.agrees_for, self.home_agrees_for) = (config.mag_agree_time, 0.0);
-            return if before.is_some() { Verdict::Renewed } else { Verdict::Found };
+            return if before.is_some() { FieldStatus::Renewed } else { FieldStatus::Found };
         }
         match (clean, self.reference) {
-            (true, _) => Verdict::Clean { ratio },
-            (false, Some(_)) => Verdict::Disturbed { ratio },
-            (false, None) => Verdict::Unjudged,
+            (true, _) => FieldStatus::Clean { ratio },
+            (false, Some(_)) => FieldStatus::Disturbed { ratio },
+            (false, None) => FieldStatus::NoReference,
         }
     }
 }
@@ -165,11 +165,11 @@ mod tests {
         let (mut clean, mut others) = (0, [0; 4]);
         for _ in 0..(time / DT) as u32 {
             match watch.step(&config, &field, rate, DT) {
-                Verdict::Clean { .. } => clean += 1,
-                Verdict::Disturbed { .. } => others[0] += 1,
-                Verdict::Renewed | Verdict::Found => others[1] += 1,
-                Verdict::Back => others[2] += 1,
-                Verdict::Unjudged | Verdict::Vertical => others[3] += 1,
+                FieldStatus::Clean { .. } => clean += 1,
+                FieldStatus::Disturbed { .. } => others[0] += 1,
+                FieldStatus::Renewed | FieldStatus::Found => others[1] += 1,
+                FieldStatus::Back => others[2] += 1,
+                FieldStatus::NoReference | FieldStatus::Vertical => others[3] += 1,
             }
         }
         (clean, others)
@@ -212,6 +212,6 @@ mod tests {
     fn a_field_without_a_level_part_has_no_heading() {
         let mut watch = Magnetic::new(Some(&EARTH));
         let verdict = watch.step(&AttitudeConfig::default(), &Vec3::new(0.0, 0.5, 50.0), 0.0, DT);
-        assert_eq!(verdict, Verdict::Vertical);
+        assert_eq!(verdict, FieldStatus::Vertical);
     }
 }

@@ -271,7 +271,7 @@ impl Covariance {
 
     /// Updates the covariance with a measurement: P ← P − P·Hᵀ·S⁻¹·H·P, in the square-root form P − D·Dᵀ with
     /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
-    /// [`Nominal::correct`](super::Nominal::correct).
+    /// [`NominalState::correct`](super::NominalState::correct).
     ///
     /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
     #[inline]
@@ -334,7 +334,7 @@ impl Covariance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::state::Nominal;
+    use crate::filter::state::NominalState;
     use nalgebra::SMatrix;
     use proptest::prelude::*;
     use stampfly_types::Vec3;
@@ -398,7 +398,7 @@ mod tests {
             // The other way through the rows, which this machine does not take by itself.
             let mut other = p;
             let mut exact = dense(&p);
-            let mut state = Nominal::default();
+            let mut state = NominalState::default();
             for n in 0..1000usize {
                 let (x, y, z, a) = rates[n / 50];
                 let (rotation, mut step) = (state.rotation(), PropagationStep::default());

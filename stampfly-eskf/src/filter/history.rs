@@ -41,9 +41,9 @@ const EMPTY: Interval = Interval {
 /// The last tenth of a second. See the [module](self) documentation.
 ///
 /// ```
-/// use stampfly_eskf::filter::{History, Nominal};
+/// use stampfly_eskf::filter::{History, NominalState};
 /// use stampfly_types::Vec3;
-/// let (mut state, mut history) = (Nominal::default(), History::default());
+/// let (mut state, mut history) = (NominalState::default(), History::default());
 /// for _ in 0..10 {
 ///     history.add(&state.propagate(&Vec3::new(0.0, 0.0, -9.80665), &Vec3::x(), 0.0025));
 /// }
@@ -201,12 +201,12 @@ mod stored {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::Nominal;
+    use crate::filter::NominalState;
     use proptest::prelude::*;
 
     /// A rate that grows evenly, 1 rad/s², sampled at this rate: the state, its history and the time after about 0.3 s.
-    fn spun_up(rate: f32) -> (Nominal, History, f32) {
-        let (mut state, mut history) = (Nominal::default(), History::default());
+    fn spun_up(rate: f32) -> (NominalState, History, f32) {
+        let (mut state, mut history) = (NominalState::default(), History::default());
         let dt = 1.0 / rate;
         let steps = (0.3 * rate) as u32;
         for step in 0..steps {

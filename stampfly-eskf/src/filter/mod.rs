@@ -25,5 +25,5 @@ pub use covariance::Covariance;
 pub use history::History;
 pub use layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
 pub use propagation::PropagationStep;
-pub use state::Nominal;
+pub use state::NominalState;
 pub use vibration::Vibration;

@@ -22,7 +22,7 @@
 //! step itself. Within a tenth of a second both are far below any sensor's noise.
 
 use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
-use super::state::{Motion, Nominal, Rotation, multiply, rotate_back, rotation_matrix};
+use super::state::{Motion, NominalState, Rotation, multiply, rotate_back, rotation_matrix};
 use stampfly_types::{GRAVITY, Vec3};
 
 /// The inertial samples between two instants, pre-integrated. See the [module](self) documentation.
@@ -73,12 +73,12 @@ impl PropagationStep {
     /// The state at the beginning of a step that ends in the state `now`.
     #[inline]
     #[must_use]
-    pub fn state_at_start(&self, now: &Nominal) -> Nominal {
+    pub fn state_at_start(&self, now: &NominalState) -> NominalState {
         let [w, x, y, z] = self.delta_rotation;
         let tau = self.duration;
         let gravity = Vec3::new(0.0, 0.0, GRAVITY * tau);
         let velocity = now.velocity - self.delta_velocity - gravity;
-        Nominal {
+        NominalState {
             attitude: multiply(now.attitude, [w, -x, -y, -z]),
             velocity,
             position: now.position - velocity * tau - self.delta_position - gravity * (0.5 * tau),
@@ -112,7 +112,7 @@ mod tests {
     use crate::aid::{self, numeric};
     use proptest::prelude::*;
 
-    fn propagated(samples: &[(f32, f32, f32, f32)]) -> (Nominal, Nominal, PropagationStep) {
+    fn propagated(samples: &[(f32, f32, f32, f32)]) -> (NominalState, NominalState, PropagationStep) {
         let first = numeric::awkward_state();
         let mut state = first;
         let mut step = PropagationStep::default();
@@ -143,7 +143,7 @@ mod tests {
             samples in prop::collection::vec((-2f32..2.0, -2f32..2.0, -2f32..2.0, -3f32..3.0), 1..40),
         ) {
             let (_, last, step) = propagated(&samples);
-            let measure = |state: &Nominal| aid::tof::range(state, &state.rotation(), 0.05);
+            let measure = |state: &NominalState| aid::tof::range(state, &state.rotation(), 0.05);
             let start = step.state_at_start(&last);
             let propagated = step.propagate_jacobian(&start.rotation(), &measure(&start).jacobian);
             for (i, stated) in propagated.iter().enumerate().take(GYRO_BIAS) {

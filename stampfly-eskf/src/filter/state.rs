@@ -6,7 +6,7 @@ use stampfly_types::{GRAVITY, Quat, Vec3};
 /// The nominal state: the estimate, without its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Nominal {
+pub struct NominalState {
     /// World NED, m.
     pub position: Vec3,
     /// World NED, m/s.
@@ -19,7 +19,7 @@ pub struct Nominal {
     pub accel_bias: Vec3,
 }
 
-impl Default for Nominal {
+impl Default for NominalState {
     fn default() -> Self {
         Self {
             position: Vec3::zeros(),
@@ -49,7 +49,7 @@ pub struct Motion {
     pub dt: f32,
 }
 
-impl Nominal {
+impl NominalState {
     /// Propagates the state by one inertial sample: attitude by half a step, velocity and position with that attitude,
     /// attitude by the other half. Second order in `dt`.
     #[inline]
@@ -191,7 +191,7 @@ mod tests {
 
         #[test]
         fn quaternion_stays_unit(rates in prop::collection::vec((-35f32..35.0, -35f32..35.0, -35f32..35.0), 1..200)) {
-            let mut state = Nominal::default();
+            let mut state = NominalState::default();
             for (x, y, z) in rates {
                 state.propagate(&Vec3::new(0.0, 0.0, -9.8), &Vec3::new(x, y, z), 0.0025);
             }
@@ -215,13 +215,13 @@ mod tests {
 
     #[test]
     fn free_fall_accelerates_and_a_stationary_body_does_not_move() {
-        let mut state = Nominal::default();
+        let mut state = NominalState::default();
         for _ in 0..400 {
             state.propagate(&Vec3::zeros(), &Vec3::zeros(), 0.0025);
         }
         assert!((state.velocity.z - GRAVITY).abs() < 1e-3);
         assert!((state.position.z - 0.5 * GRAVITY).abs() < 1e-3);
-        let mut state = Nominal::default();
+        let mut state = NominalState::default();
         for _ in 0..400 {
             state.propagate(&Vec3::new(0.0, 0.0, -GRAVITY), &Vec3::zeros(), 0.0025);
         }
