@@ -114,7 +114,7 @@ pub struct Eskf {
     initialized: bool,
     calibration: CalibrationResult,
     command: EstimatorCommand,
-    /// Where the vehicle stands, while it does.
+    /// Position of a stationary vehicle, while it is on the ground.
     anchor: Option<Vec3>,
     /// World down coordinate of the surface below.
     surface: Option<f32>,
@@ -227,7 +227,7 @@ impl Eskf {
         if age.abs() < SIMULTANEOUS {
             return Ok(self.current_state());
         }
-        // Right after the start there is no past to compare with.
+        // Right after the start the history is empty.
         let step = self.history.since(age).ok_or(Refusal::Stale)?;
         let state = step.state_at_start(&self.state);
         Ok(DelayedState { state, rotation: state.rotation(), step, age })
@@ -342,7 +342,7 @@ impl Eskf {
         }
     }
 
-    /// Does a sensor, or standing, hold the velocity?
+    /// Is the velocity measured, or held by the zero-velocity update?
     fn is_velocity_aided(&self) -> bool {
         let by = [Sensor::Flow, Sensor::Velocity, Sensor::Position];
         self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))

@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_gyro_bias_is_predicted_by_the_model() {
-        // Standing still, the gyro reads its bias: the reading is −d·b_y in x, as predicted.
+        // A stationary gyro reads its bias: the reading is −d·b_y in x, as predicted.
         let state = NominalState { gyro_bias: [0.02, 0.05, 0.0].into(), ..NominalState::default() };
         let rows = body_velocity(&state, &state.rotation(), 0.5);
         let measured = measured_velocity([0.0, 0.0], [0.02, 0.05], 0.5);

@@ -1,9 +1,9 @@
-//! The accelerometer as an inclinometer.
+//! Gravity: the accelerometer as an inclinometer.
 //!
 //! The specific force is the body's own acceleration less gravity, updated from the body: f = Rᵀ·(a − g) + b. With
 //! f₀ = Rᵀ·(a − g), a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds itself.
 //!
-//! The acceleration a must come from elsewhere: zero for a body that stands or is carried gently, the change of a measured
+//! The acceleration a must come from elsewhere: zero for a body that is stationary or carried gently, the change of a measured
 //! velocity for one that flies (see [`Acceleration`]). Left at zero in flight the model pulls the attitude towards level,
 //! because a multicopter's accelerometer points along its thrust, whatever the tilt.
 //!

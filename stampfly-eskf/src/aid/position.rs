@@ -2,7 +2,7 @@
 //!
 //! It is the state itself: z = p, so the Jacobian is the identity in the three position errors.
 //!
-//! A camera system's position, or the place where a vehicle stands.
+//! A camera system's position, or the place of a stationary vehicle.
 //!
 //! | external position in [`Eskf`](crate::Eskf) | condition |
 //! |---|---|

@@ -128,7 +128,10 @@ impl Estimator for AttitudeFilter {
 
     fn status(&self) -> EstimatorStatus {
         let down = self.attitude_without_field().inverse() * Vec3::z();
-        let seen = -self.specific_force();
-        EstimatorStatus { accel_innovation: math::atan2(seen.cross(&down).norm(), seen.dot(&down)), ..self.book.status }
+        let measured = -self.specific_force();
+        EstimatorStatus {
+            accel_innovation: math::atan2(measured.cross(&down).norm(), measured.dot(&down)),
+            ..self.book.status
+        }
     }
 }

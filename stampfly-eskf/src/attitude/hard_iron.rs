@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn turning_tells_it_and_rest_does_not() {
+    fn hard_iron_is_found_by_turning_and_not_while_stationary() {
         let config = AttitudeConfig::default();
         let offset = Vec3::new(10.0, -20.0, 5.0);
         let mut hard_iron = HardIron::new(&config);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_doubt_stays_positive_over_an_hour() {
+    fn the_covariance_stays_positive_over_an_hour() {
         let config = AttitudeConfig::default();
         let mut hard_iron = HardIron::new(&config);
         for round in 0..36u8 {

@@ -51,7 +51,7 @@ mod tests {
     use super::*;
     use stampfly_types::GRAVITY;
 
-    /// Time until rest is seen, s, if it is within five seconds.
+    /// Time until a stationary body is detected, s, if it is within five seconds.
     fn detected_after(rate: impl Fn(u16) -> f32, force: impl Fn(u16) -> f32) -> Option<f32> {
         let config = AttitudeConfig::default();
         let mut detector = StationaryDetector::new(&config);

@@ -9,7 +9,7 @@ impl Estimator for Eskf {
         if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
             return;
         }
-        // Field by field would forget one; a whole one beside this one would be a second estimator on the stack.
+        // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the stack.
         let command = self.command;
         *self = Self::new(self.config);
         self.now = at;
@@ -140,11 +140,11 @@ impl Estimator for Eskf {
 
     fn estimate(&self) -> StateEstimate {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
-        let standing = self.anchor.is_some();
+        let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let outside = recent(Sensor::Velocity) || recent(Sensor::Position);
+        let external = recent(Sensor::Velocity) || recent(Sensor::Position);
         let horizontal = sound && self.is_velocity_aided();
-        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || outside || standing);
+        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || external || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
             .set(Validity::HEADING, self.initialized)
@@ -158,8 +158,8 @@ impl Estimator for Eskf {
             .set(SensorMask::BARO, recent(Sensor::Baro))
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
-            .set(SensorMask::STATIONARY, standing)
-            .set(SensorMask::EXTERNAL, outside || recent(Sensor::Attitude));
+            .set(SensorMask::STATIONARY, stationary)
+            .set(SensorMask::EXTERNAL, external || recent(Sensor::Attitude));
         let p = &self.covariance;
         StateEstimate {
             attitude: self.state.quat(),

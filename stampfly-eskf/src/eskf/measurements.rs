@@ -268,7 +268,7 @@ impl Eskf {
     }
 }
 
-/// A flow row that says nothing about the heading: without the part of its attitude columns along the vertical, as the
+/// A flow row that does not observe the heading: without the part of its attitude columns along the vertical, as the
 /// body sees it. In theory flow shows the heading while the vehicle accelerates; in practice a degree of mounting error
 /// and the beat of pictures and reads turn the estimated heading by degrees a minute, where a calibrated gyro alone
 /// keeps it within one.

@@ -2,7 +2,7 @@
 //!
 //! | pseudo-measurement | active while | stops | gated |
 //! |---|---|---|---|
-//! | [`constrain_stationary`](Eskf::constrain_stationary): velocity zero, position where it stood | commanded `on_ground`, every fourth sample | take-off, origin reset | no |
+//! | [`constrain_stationary`](Eskf::constrain_stationary): velocity zero, position where it stood | commanded `on_ground`, every fourth sample | take-off; an origin reset moves the position to zero | no |
 //! | [`update_gravity`](Eskf::update_gravity): gravity as the vertical | stationary; with [`GravityUse::WhenUnaided`] while nothing holds the velocity; with [`GravityUse::Always`] at every sample in flight | the other cases | yes, reset in `aid/gravity.rs` |
 //! | [`constrain_heading`](Eskf::constrain_heading): heading zero | once, at initialisation | | no |
 //! | [`reset_unobserved_motion`](Eskf::reset_unobserved_motion): velocity to zero at the largest deviation | nothing holds the velocity | flow, velocity or position within the last second, or on the ground | no |
@@ -45,7 +45,7 @@ impl Eskf {
                 self.gates.restart_lockout(Sensor::Gravity, self.now);
                 for axis in 0..3 {
                     self.covariance.inflate(ATTITUDE + axis, 0.1);
-                    // Gravity turned into motion by a wrong tilt, and what was learned from that.
+                    // A wrong tilt turned gravity into velocity, and into accelerometer bias.
                     self.state.velocity[axis] = 0.0;
                     self.covariance.reset(VELOCITY + axis, MAX_VELOCITY_SIGMA * MAX_VELOCITY_SIGMA);
                     self.reset_accel_bias(axis);
@@ -88,7 +88,8 @@ impl Eskf {
     }
 
     /// Constrains the velocity near zero, for `dt` seconds, while the tilt hides the ground from range and flow: the
-    /// integral of a tilt error grows by the second. Vehicles that use their velocity do not fly like this; hands carry them so, slowly.
+    /// integral of a tilt error grows by the second. Vehicles that use their velocity do not fly like this; they are carried
+    /// so by hand, slowly.
     pub(super) fn constrain_unobserved_velocity(&mut self, dt: f32) {
         let sigma = self.config.unobserved_velocity / math::sqrt(dt.max(1e-3));
         self.constrain(aid::velocity::world(&self.state), [0.0; 3], sigma);

@@ -164,7 +164,7 @@ mod tests {
                 let numeric = (shifted(1.0) - shifted(-1.0)) / (2.0 * delta);
                 prop_assert!((numeric - stated).abs() < 3e-3, "state {i}: numeric {numeric}, stated {stated}");
             }
-            // A bias, seen from the end: the samples meant something else all along.
+            // A bias changes every sample, so it is applied from the beginning.
             for i in GYRO_BIAS..N {
                 let delta = 2e-2;
                 let shifted = |sign: f32| {

@@ -1,6 +1,6 @@
 //! Vibration of the inertial signals, measured as their change from sample to sample.
 //!
-//! A sample stands for the stretch of time until the next. Where the signal changes by Δ from one to the next, that is
+//! A sample stands for the interval until the next. Where the signal changes by Δ from one to the next, that is
 //! wrong by some share of Δ: vibration, aliasing, a jerk, the samples that a logger left out. So the noise that drives
 //! the filter is the sensor's own plus a share of what the signal is doing, and one tuning serves a vehicle that
 //! stands, one that is carried and one whose propellers are out of balance.

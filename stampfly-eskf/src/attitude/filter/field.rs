@@ -69,17 +69,17 @@ impl AttitudeFilter {
                 self.heading.update(config, &level, NO_REFERENCE_SIGMA, stationary, dt);
                 Fusion::Fused { ratio: 1.0 }
             }
-            FieldStatus::Found => {
+            FieldStatus::FirstReference => {
                 self.heading.inflate(MOVING_START_SIGMA);
                 self.bias.interrupt(1.0);
                 Fusion::Reset
             }
-            FieldStatus::Renewed => {
+            FieldStatus::NewReference => {
                 self.heading.change_reference(config, &level);
                 self.bias.interrupt(1.0);
                 Fusion::Reset
             }
-            FieldStatus::Back => {
+            FieldStatus::ReferenceReturned => {
                 self.heading.clear_declination();
                 self.bias.interrupt(1.0);
                 Fusion::Reset
