@@ -1,4 +1,4 @@
-//! A complementary filter: gyro for the short run, gravity, range and flow for the long.
+//! A complementary filter: gyro at high frequencies, gravity, range and flow at low ones.
 //!
 //! Proves that the estimator can be swapped, and serves where a few hundred bytes and some fifty nanoseconds must do.
 //! It has fixed gains, no covariance, no gates beyond plain limits, and no accelerometer bias: in aggressive flight
@@ -9,7 +9,7 @@
 //! fixed-gain observers.
 
 use crate::estimator::{Estimator, Fusion, Refusal};
-use crate::filter::Nominal;
+use crate::filter::NominalState;
 use crate::filter::state::{rotate, rotate_back};
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::{
@@ -68,7 +68,7 @@ impl Default for ComplementaryConfig {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Complementary {
     config: ComplementaryConfig,
-    state: Nominal,
+    state: NominalState,
     now: Instant,
     initialized: bool,
     calibration: CalibrationResult,
@@ -88,7 +88,7 @@ impl Complementary {
     pub fn new(config: ComplementaryConfig) -> Self {
         Self {
             config,
-            state: Nominal::default(),
+            state: NominalState::default(),
             now: Instant::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
@@ -163,13 +163,13 @@ impl Estimator for Complementary {
         let dt = dt.min(0.5);
         let motion = self.state.propagate(&imu.accel, &imu.gyro, dt);
         (self.rate, self.force) = (motion.rate, motion.force);
-        let standing = self.anchor.is_some();
+        let stationary = self.anchor.is_some();
         if let Some(anchor) = self.anchor {
             self.state.position = anchor;
             self.state.velocity = Vec3::zeros();
         }
         // In flight over a visible surface flow holds the tilt; otherwise gravity does.
-        if standing || !self.recent(self.flow_fused) {
+        if stationary || !self.recent(self.flow_fused) {
             let norm = imu.accel.norm();
             if (0.8 * GRAVITY..1.2 * GRAVITY).contains(&norm) {
                 let up = rotate_back(&self.state.rotation(), &-Vec3::z());
@@ -230,7 +230,7 @@ impl Estimator for Complementary {
         self.status.flow_innovation = [error.x, error.y];
         if self.anchor.is_none() {
             self.state.velocity += rotate(&rotation, &error) * self.config.flow_gain;
-            // Faster forward than expected means the nose is lower than believed.
+            // Faster forward than expected means the nose is lower than estimated.
             self.turn(Vec3::new(error.y, -error.x, 0.0) * self.config.flow_tilt_gain);
         }
         self.flow_fused = Some(self.now);
@@ -255,10 +255,10 @@ impl Estimator for Complementary {
     }
 
     fn estimate(&self) -> StateEstimate {
-        let standing = self.anchor.is_some();
+        let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let horizontal = sound && (standing || self.recent(self.flow_fused));
-        let vertical = sound && (standing || self.recent(self.tof_fused));
+        let horizontal = sound && (stationary || self.recent(self.flow_fused));
+        let vertical = sound && (stationary || self.recent(self.tof_fused));
         StateEstimate {
             attitude: self.state.quat(),
             position: self.state.position,
@@ -278,7 +278,7 @@ impl Estimator for Complementary {
                 .set(SensorMask::IMU, self.initialized)
                 .set(SensorMask::TOF, self.recent(self.tof_fused))
                 .set(SensorMask::FLOW, self.recent(self.flow_fused))
-                .set(SensorMask::STATIONARY, standing),
+                .set(SensorMask::STATIONARY, stationary),
         }
     }
 

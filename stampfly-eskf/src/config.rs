@@ -6,15 +6,15 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EskfConfig {
     /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and axes;
-    /// vibration is `accel_roughness`.
+    /// vibration is `accel_vibration`.
     pub accel_noise: f32,
     /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
     pub gyro_noise: f32,
-    /// What a change of the accelerometer from sample to sample adds to its noise: share of its square, 1. A third for
-    /// white noise of 800 Hz bandwidth sampled at 400 Hz. See [`Roughness`](crate::filter::Roughness).
-    pub accel_roughness: f32,
+    /// Share of the squared change of the accelerometer from sample to sample that adds to its noise, 1. A third for
+    /// white noise of 800 Hz bandwidth sampled at 400 Hz. See [`Vibration`](crate::filter::Vibration).
+    pub accel_vibration: f32,
     /// The same for the gyro.
-    pub gyro_roughness: f32,
+    pub gyro_vibration: f32,
     /// Gyro bias random walk, rad/s/√s.
     pub gyro_bias_walk: f32,
     /// Accelerometer bias random walk, m/s²/√s.
@@ -76,20 +76,20 @@ pub struct EskfConfig {
     pub gravity_use: GravityUse,
     /// Its standard deviation as one, m/s².
     pub gravity_sigma: f32,
-    /// The same while standing still, m/s².
-    pub still_gravity_sigma: f32,
-    /// Standard deviation of "does not move" while standing, m/s.
-    pub still_velocity_sigma: f32,
-    /// Standard deviation of "is where it started" while standing, m.
-    pub still_position_sigma: f32,
+    /// The same while stationary, m/s².
+    pub stationary_gravity_sigma: f32,
+    /// Standard deviation of "does not move" while stationary, m/s.
+    pub stationary_velocity_sigma: f32,
+    /// Standard deviation of "is where it stood" while stationary, m.
+    pub stationary_position_sigma: f32,
 
-    /// Doubt in "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the accelerometer noise it is
+    /// Standard deviation of "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the accelerometer noise it is
     /// the time in which the velocity fades.
-    pub blind_velocity: f32,
+    pub unobserved_velocity: f32,
 
     /// Gates, in standard deviations.
     pub gate: f32,
-    /// After this long without an accepted sample of a sensor that keeps reporting, the state moves to it, s.
+    /// Lock-out time: after this long with every measurement of a sensor rejected, the state is reset to it, s.
     pub lockout: f32,
 }
 
@@ -140,8 +140,8 @@ impl Default for EskfConfig {
         Self {
             accel_noise: 0.1,
             gyro_noise: 5e-4,
-            accel_roughness: 0.35,
-            gyro_roughness: 0.25,
+            accel_vibration: 0.35,
+            gyro_vibration: 0.25,
             gyro_bias_walk: 3e-5,
             accel_bias_walk: 1e-3,
             initial_position: 0.01,
@@ -168,10 +168,10 @@ impl Default for EskfConfig {
             mag_enable: false,
             gravity_use: GravityUse::WhenUnaided,
             gravity_sigma: 1.0,
-            still_gravity_sigma: 0.1,
-            still_velocity_sigma: 0.01,
-            still_position_sigma: 0.005,
-            blind_velocity: 0.07,
+            stationary_gravity_sigma: 0.1,
+            stationary_velocity_sigma: 0.01,
+            stationary_position_sigma: 0.005,
+            unobserved_velocity: 0.07,
             gate: 4.0,
             lockout: 0.2,
         }

@@ -1,36 +1,39 @@
-//! The error-state Kalman filter as an estimator: which measurement is used when, and what happens when it disagrees.
+//! The error-state Kalman filter as an estimator: predict, update, gate, inflate, reset.
 //!
-//! The arithmetic lives in [`filter`](crate::filter), the models in [`aid`](crate::aid). Use this for anything that
+//! The arithmetic is in [`filter`](crate::filter), the measurement models are in [`aid`](crate::aid), each with the
+//! conditions for its start, continuation, stop and reset. Use this for anything that
 //! flies indoors on an inertial sensor, optical flow and a range; use the
 //! [`Complementary`](crate::Complementary) filter where a few hundred bytes must do.
 //!
 //! | file | what |
 //! |---|---|
-//! | `eskf.rs` | the filter itself and its time |
-//! | `eskf/interface.rs` | the [`Estimator`] it is |
-//! | `eskf/measurements.rs` | one function a sensor |
-//! | `eskf/assumptions.rs` | what is assumed where nothing measures |
-//! | `eskf/gate.rs` | gates, lock-outs, resets |
-//! | `eskf/persistence.rs` | innovations that keep to one side |
+//! | `eskf.rs` | the filter's state, time alignment, update, inflation and resets |
+//! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
+//! | `eskf/measurements.rs` | one update a sensor |
+//! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, initial heading, unobserved velocity |
+//! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
+//! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
-mod assumptions;
 mod gate;
+mod innovation_bias;
 mod interface;
 mod measurements;
-mod persistence;
+mod pseudo_measurements;
 
 use crate::aid::baro::Offset;
 use crate::aid::gravity::Acceleration;
 use crate::aid::{self, Row};
 use crate::config::{EskfConfig, GravityUse};
 use crate::estimator::{Estimator, Fusion, Refusal};
-use crate::filter::covariance::{Covariance, ProcessNoise, Projection};
-use crate::filter::history::REACH;
+use crate::filter::covariance::{Covariance, Innovation, ProcessNoise};
+use crate::filter::history::MAX_AGE;
 use crate::filter::state::{Rotation, multiply, rotate, rotate_back};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, Nominal, POSITION, Passage, Roughness, VELOCITY};
+use crate::filter::{
+    ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, NominalState, POSITION, PropagationStep, VELOCITY, Vibration,
+};
 use crate::level::attitude_from_specific_force;
 use gate::{Gates, Sensor};
-use persistence::Persistence;
+use innovation_bias::InnovationBiasMonitor;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
@@ -38,21 +41,22 @@ use stampfly_types::messages::{
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
 /// Measurements from farther ahead than this are refused, s.
-const AHEAD: f32 = 0.02;
-/// Measurements this close to the last inertial sample are compared with the present state, s.
-const PRESENT: f32 = 0.5e-3;
+const MAX_AHEAD: f32 = 0.02;
+/// Measurements this close in time to the last inertial sample are compared with the present state, s.
+const SIMULTANEOUS: f32 = 0.5e-3;
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
-/// The state moves with every inertial sample, its doubt with the first sample after this much time, s: at 400 Hz with
-/// every second one. A hundredth of the time in which doubt changes, and half the work. (PX4's EKF2 takes 10 ms.)
-const DOUBT_STEP: f32 = 4e-3;
-/// What is added to the doubt of a filter whose innovations keep to one side, rad and rad/s.
-const DOUBTED_TILT: f32 = 0.1;
-const DOUBTED_GYRO_BIAS: f32 = 0.03;
-/// What is assumed where nothing measures is looked at on every n-th inertial sample.
-const STILL_DIVIDER: u32 = 4;
+/// The state is propagated with every inertial sample, the covariance with the first sample after this much time, s: at
+/// 400 Hz with every second one. A hundredth of the time in which the covariance changes, and half the work. (PX4's EKF2 takes 10 ms.)
+const COVARIANCE_STEP: f32 = 4e-3;
+/// Standard deviations added to tilt and gyro bias when flow's innovations are biased, and after a reset to flow: rad
+/// and rad/s.
+const TILT_INFLATION: f32 = 0.1;
+const GYRO_BIAS_INFLATION: f32 = 0.03;
+/// Pseudo-measurements are made on every n-th inertial sample.
+const PSEUDO_MEASUREMENT_DIVIDER: u32 = 4;
 
-/// Running mean of inertial samples between two looks at gravity.
+/// Mean of the inertial samples between two updates with gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Mean {
@@ -98,24 +102,24 @@ impl Mean {
 pub struct Eskf {
     config: EskfConfig,
     noise: ProcessNoise,
-    state: Nominal,
+    state: NominalState,
     covariance: Covariance,
-    /// What the covariance has yet to follow, and the attitude in which that began.
-    pending: Passage,
-    start: Rotation,
+    /// Inertial samples over which the covariance has yet to be propagated, and the attitude in which they began.
+    pending_step: PropagationStep,
+    pending_rotation: Rotation,
     history: History,
     /// Of the specific force and of the rate.
-    roughness: [Roughness; 2],
+    vibration: [Vibration; 2],
     now: Instant,
     initialized: bool,
     calibration: CalibrationResult,
     command: EstimatorCommand,
-    /// Where the vehicle stands, while it does.
+    /// Position of a stationary vehicle, while it is on the ground.
     anchor: Option<Vec3>,
     /// World down coordinate of the surface below.
     surface: Option<f32>,
     baro_offset: Option<Offset>,
-    baro_seen: Instant,
+    baro_updated: Instant,
     /// Direction of the magnetic field, world.
     field: Option<Vec3>,
     acceleration: Acceleration,
@@ -124,19 +128,19 @@ pub struct Eskf {
     force: Vec3,
     accels: Mean,
     gates: Gates,
-    persistence: Persistence,
+    flow_innovation_bias: InnovationBiasMonitor,
     /// Last specific force used as the vertical, and what it should have been.
     gravity: [Vec3; 2],
     status: EstimatorStatus,
 }
 
-/// The state at the time of a measurement.
-struct Then {
-    state: Nominal,
+/// The state at the time of a measurement: EKF2's delayed time horizon, computed back for each measurement.
+struct DelayedState {
+    state: NominalState,
     rotation: Rotation,
-    /// What happened since.
-    passage: Passage,
-    /// How long ago that is, s; zero for the present.
+    /// Propagation since then.
+    step: PropagationStep,
+    /// Age of the measurement, s; zero for the present.
     age: f32,
 }
 
@@ -158,11 +162,11 @@ impl Eskf {
             noise: process_noise(&config),
             covariance: initial_covariance(&config),
             config,
-            state: Nominal::default(),
-            pending: Passage::default(),
-            start: Nominal::default().rotation(),
+            state: NominalState::default(),
+            pending_step: PropagationStep::default(),
+            pending_rotation: NominalState::default().rotation(),
             history: History::default(),
-            roughness: [Roughness::default(); 2],
+            vibration: [Vibration::default(); 2],
             now: Instant::ZERO,
             initialized: false,
             calibration: CalibrationResult::default(),
@@ -170,7 +174,7 @@ impl Eskf {
             anchor: None,
             surface: None,
             baro_offset: None,
-            baro_seen: Instant::ZERO,
+            baro_updated: Instant::ZERO,
             field: None,
             acceleration: Acceleration::default(),
             steps: 0,
@@ -178,7 +182,7 @@ impl Eskf {
             force: Vec3::zeros(),
             accels: Mean::default(),
             gates: Gates::default(),
-            persistence: Persistence::default(),
+            flow_innovation_bias: InnovationBiasMonitor::default(),
             gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
@@ -192,18 +196,18 @@ impl Eskf {
 
     /// The nominal state.
     #[must_use]
-    pub fn nominal(&self) -> &Nominal {
+    pub fn nominal(&self) -> &NominalState {
         &self.state
     }
 
-    /// The state now, as something to compare a measurement with.
-    fn present(&self) -> Then {
-        Then { state: self.state, rotation: self.state.rotation(), passage: Passage::default(), age: 0.0 }
+    /// The present state, for a measurement without delay.
+    fn current_state(&self) -> DelayedState {
+        DelayedState { state: self.state, rotation: self.state.rotation(), step: PropagationStep::default(), age: 0.0 }
     }
 
-    /// Checks every measurement passes: initialised, finite, new, neither too old nor from the future. Gives the state
-    /// it is to be compared with.
-    fn admit(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<Then, Refusal> {
+    /// The state at the time of a measurement. Refuses measurements before initialisation, and those that are not finite,
+    /// not new, too old or from the future.
+    fn time_align(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<DelayedState, Refusal> {
         if !self.initialized {
             return Err(Refusal::NotInitialized);
         }
@@ -211,97 +215,102 @@ impl Eskf {
             return Err(Refusal::NotFinite);
         }
         let age = self.now.signed_seconds_since(at);
-        if age > REACH {
+        if age > MAX_AGE {
             return Err(Refusal::Stale);
         }
-        if age < -AHEAD {
+        if age < -MAX_AHEAD {
             return Err(Refusal::Future);
         }
         if !self.gates.is_new(sensor, at) {
             return Err(Refusal::Repeated);
         }
-        if age.abs() < PRESENT {
-            return Ok(self.present());
+        if age.abs() < SIMULTANEOUS {
+            return Ok(self.current_state());
         }
-        // Right after the start there is no past to compare with.
-        let passage = self.history.since(age).ok_or(Refusal::Stale)?;
-        let state = passage.before(&self.state);
-        Ok(Then { state, rotation: state.rotation(), passage, age })
+        // Right after the start the history is empty.
+        let step = self.history.since(age).ok_or(Refusal::Stale)?;
+        let state = step.state_at_start(&self.state);
+        Ok(DelayedState { state, rotation: state.rotation(), step, age })
     }
 
-    /// Compares a measurement with the state of its time: what it would do.
+    /// Innovation of a measurement against the state of its time.
     #[inline]
-    fn compare<const M: usize>(
+    fn innovation<const M: usize>(
         &self,
-        then: &Then,
+        delayed: &DelayedState,
         rows: [Row; M],
         measured: [f32; M],
         variances: [f32; M],
-    ) -> Projection<M> {
-        let carried = |row: &Row| {
-            if then.age == 0.0 { row.jacobian } else { then.passage.carry(&then.rotation, &row.jacobian) }
+    ) -> Innovation<M> {
+        let propagated = |row: &Row| {
+            if delayed.age == 0.0 {
+                row.jacobian
+            } else {
+                delayed.step.propagate_jacobian(&delayed.rotation, &row.jacobian)
+            }
         };
-        let jacobians = rows.each_ref().map(carried);
+        let jacobians = rows.each_ref().map(propagated);
         let mut innovations = measured;
         for (innovation, row) in innovations.iter_mut().zip(&rows) {
             *innovation -= row.predicted;
         }
-        self.covariance.project(&jacobians, innovations, variances)
+        self.covariance.innovation(&jacobians, innovations, variances)
     }
 
-    /// The test ratio of a measurement: beyond one it is outside the gate.
+    /// Test ratio: normalised innovation squared over the gate's. Above one the measurement is outside the gate.
     #[inline]
-    fn ratio<const M: usize>(&self, projection: &Projection<M>) -> f32 {
-        projection.distance() / self.config.gate_distance(M)
+    fn test_ratio<const M: usize>(&self, innovation: &Innovation<M>) -> f32 {
+        innovation.nis() / self.config.gate_distance(M)
     }
 
-    /// Lets a measurement into the estimate.
+    /// Updates state and covariance with a measurement.
     #[inline]
-    fn absorb<const M: usize>(&mut self, projection: &Projection<M>, ratio: f32) -> Fusion {
-        let correction = self.covariance.absorb(projection);
+    fn update<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32) -> Fusion {
+        let correction = self.covariance.update(innovation);
         self.state.correct(&correction);
         Fusion::Fused { ratio }
     }
 
-    /// Absorbs what is known, not measured: no gate.
-    fn know<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
-        let projection = self.compare(&self.present(), rows, values, [sigma * sigma; M]);
-        let ratio = self.ratio(&projection);
-        self.absorb(&projection, ratio);
+    /// Updates state and covariance with a pseudo-measurement, without a gate.
+    fn constrain<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
+        let innovation = self.innovation(&self.current_state(), rows, values, [sigma * sigma; M]);
+        let ratio = self.test_ratio(&innovation);
+        self.update(&innovation, ratio);
     }
 
-    /// Starts the memory anew: after a turn of the state the kept impulses point elsewhere, after a gap their time is
-    /// wrong. Late measurements wait until there is a past again.
-    fn forget_past(&mut self) {
+    /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time is
+    /// wrong. Late measurements are refused until it has filled again.
+    fn reset_history(&mut self) {
         self.history = History::default();
-        self.pending = Passage::default();
-        self.start = self.state.rotation();
+        self.pending_step = PropagationStep::default();
+        self.pending_rotation = self.state.rotation();
     }
 
-    /// Notes that the state was moved to a sensor that had been locked out.
-    fn moved_to(&mut self, sensor: Sensor) -> Fusion {
+    /// Counts a reset of the state to a sensor that had been locked out.
+    fn finish_reset(&mut self, sensor: Sensor) -> Fusion {
         self.status.resets = self.status.resets.wrapping_add(1);
-        self.status.diverged |= self.gates.reset(sensor, self.now);
+        self.status.diverged |= self.gates.record_reset(sensor, self.now);
         Fusion::Reset
     }
 
-    /// Doubts what flow shows only by and by, because its innovations keep to one side. Doubting it again and again means
-    /// that the estimate is lost.
-    fn doubt(&mut self) {
-        self.doubt_tilt();
-        self.status.diverged |= self.gates.doubt(self.now);
+    /// Inflates tilt and gyro bias because flow's innovations are biased. Counts as a reset: many in a row mean that the
+    /// estimate has diverged.
+    fn inflate_on_innovation_bias(&mut self) {
+        self.inflate_tilt();
+        self.status.diverged |= self.gates.count_reset(self.now);
     }
 
-    /// Doubts the tilt and what may have tilted it.
-    fn doubt_tilt(&mut self) {
+    /// Inflates the tilt and the gyro bias that may have tilted it.
+    fn inflate_tilt(&mut self) {
         for axis in 0..2 {
-            self.covariance.inflate(ATTITUDE + axis, DOUBTED_TILT * DOUBTED_TILT);
-            self.covariance.inflate(GYRO_BIAS + axis, DOUBTED_GYRO_BIAS * DOUBTED_GYRO_BIAS);
-            // Tilt and accelerometer bias look alike to flow: what went into the bias is asked for again.
-            self.forget_accel_bias(axis);
+            self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
+            self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
+            // Tilt and accelerometer bias look alike to flow: the bias is estimated anew.
+            self.reset_accel_bias(axis);
         }
     }
 
+    /// Counts a measurement in the status.
     fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {
         if let Some(offered) = self.status.offered.get_mut(counter as usize) {
             *offered = offered.wrapping_add(1);
@@ -314,41 +323,45 @@ impl Eskf {
         fusion
     }
 
-    /// Gives up what is not finite and starts again from the last calibration.
-    fn recover(&mut self) {
+    /// Starts again from the last calibration.
+    fn restart(&mut self) {
         let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
         self.initialize(at, &calibration);
         self.status.resets = resets.wrapping_add(1);
         self.status.diverged = true;
     }
 
-    fn watch(&mut self) {
+    /// Restarts a filter that is not finite or whose covariance is not sound; a position or velocity beyond any flight
+    /// means divergence.
+    fn check_health(&mut self) {
         if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
-            self.recover();
-        } else if self.holds_velocity() && (self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0) {
+            self.restart();
+        } else if self.is_velocity_aided() && (self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0)
+        {
             self.status.diverged = true;
         }
     }
 
-    fn holds_velocity(&self) -> bool {
+    /// Is the velocity measured, or held by the zero-velocity update?
+    fn is_velocity_aided(&self) -> bool {
         let by = [Sensor::Flow, Sensor::Velocity, Sensor::Position];
         self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
     }
 
-    /// What gravity says where it is asked, and what is assumed where nobody can be.
-    fn assume(&mut self, accel: Vec3, dt: f32) {
+    /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.
+    fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
         if self.anchor.is_some() {
-            self.absorb_gravity(accel, &Vec3::zeros(), self.config.still_gravity_sigma);
-        } else if !self.holds_velocity() {
+            self.update_gravity(accel, &Vec3::zeros(), self.config.stationary_gravity_sigma);
+        } else if !self.is_velocity_aided() {
             if self.config.gravity_use == GravityUse::WhenUnaided {
-                self.absorb_gravity(accel, &Vec3::zeros(), self.config.gravity_sigma);
+                self.update_gravity(accel, &Vec3::zeros(), self.config.gravity_sigma);
             }
-            self.forget_motion();
+            self.reset_unobserved_motion();
         } else if self.state.cos_tilt() < self.config.min_cos_tilt
             && !self.gates.is_recent(Sensor::Velocity, self.now)
             && !self.gates.is_recent(Sensor::Position, self.now)
         {
-            self.absorb_blind(dt);
+            self.constrain_unobserved_velocity(dt);
         }
     }
 }

@@ -69,7 +69,7 @@ impl Fusion {
 /// [`Eskf`](crate::Eskf) compares them with the state of their own time, up to a tenth of a second ago, and refuses
 /// older ones.
 ///
-/// # Honesty
+/// # Validity
 /// [`estimate`](Self::estimate) marks every output that may not be used. Input that is not finite never reaches the
 /// state.
 pub trait Estimator {

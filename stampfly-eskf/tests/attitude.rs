@@ -107,7 +107,7 @@ fn rest_shows_a_bias_of_a_degree_a_second() {
     let (mut hand, mut filter) = (Hand::new(), AttitudeFilter::new(AttitudeConfig::default()));
     let bias = Vec3::new(0.017, -0.017, 0.017);
     carry(&mut hand, &mut filter, 10.0, false, EARTH, Vec3::zeros(), bias);
-    assert!(filter.is_at_rest());
+    assert!(filter.is_stationary());
     assert!((filter.gyro_bias() - bias).amax() < 5e-4, "{:?}", filter.gyro_bias());
     assert!(filter.gyro_bias_sigma() < 2.0 * AttitudeConfig::default().rest_bias_sigma);
 }
@@ -118,7 +118,7 @@ fn motion_shows_it_too_and_a_clean_field_its_vertical_part() {
     let mut hand = Hand::new();
     let mut filter = AttitudeFilter::new(AttitudeConfig::default());
     carry(&mut hand, &mut filter, 120.0, true, EARTH, Vec3::zeros(), bias);
-    assert!(!filter.is_at_rest());
+    assert!(!filter.is_stationary());
     let off = (filter.gyro_bias() - bias).amax();
     assert!(off < 3e-3, "{:?} for {bias:?}", filter.gyro_bias());
     let (errors, _) = carry(&mut hand, &mut filter, 20.0, true, EARTH, Vec3::zeros(), bias);
@@ -202,7 +202,7 @@ fn delays_of_the_sensors_are_made_up_for() {
 }
 
 #[test]
-fn as_an_estimator_it_is_honest() {
+fn as_an_estimator_it_reports_validity_and_refusals() {
     let mut filter = AttitudeFilter::new(AttitudeConfig::default());
     let imu = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };
     let mag = MagData { field: EARTH };

@@ -2,27 +2,35 @@
 //!
 //! h = −p_z + offset, so the only derivative by the states is −1. Pressure drifts by metres an hour, so the offset is an
 //! estimate of its own ([`Offset`]): a random walk with a variance, which adds to the sensor's noise as far as the
-//! filter is concerned, and learns from the same innovation. It is kept apart from the fifteen states: what couples
+//! filter is concerned, and is updated with the same innovation. It is kept apart from the fifteen states: what couples
 //! them is a drift of centimetres a minute beside a range that is good to a centimetre.
+//!
+//! | in [`Eskf`](crate::Eskf) | condition |
+//! |---|---|
+//! | start | `baro_enable`; the first altitude defines the offset |
+//! | continue | a test ratio of at most one: updates the height and the offset |
+//! | stop | not finite or not new: refused at once, inactive one second after the last accepted altitude |
+//! | reset | rejected for longer than `lockout`: the offset to the altitude, the state stays; not counted towards divergence |
+//! | origin reset by command | the offset shifts with the origin |
 
 use super::Row;
-use crate::filter::{Nominal, POSITION};
+use crate::filter::{NominalState, POSITION};
 
 /// Predicted altitude for an altitude `offset` of the origin, m.
 #[inline]
 #[must_use]
-pub fn altitude(state: &Nominal, offset: f32) -> Row {
+pub fn altitude(state: &NominalState, offset: f32) -> Row {
     Row::new(offset - state.position.z, [(POSITION + 2, -1.0)])
 }
 
-/// What the barometer reads at the origin, and how well that is known.
+/// Altitude that the barometer reads at the origin, with its variance.
 ///
 /// ```
 /// use stampfly_eskf::aid::baro::Offset;
 /// let mut offset = Offset::new(120.0, 0.1);
-/// // Ten minutes at 0.02 m/√s: half a metre of doubt, so an innovation of half a metre is mostly drift.
-/// offset.drift(600.0, 0.02);
-/// offset.learn(0.5, 0.01);
+/// // Ten minutes at 0.02 m/√s: a standard deviation of half a metre, so an innovation of half a metre is mostly drift.
+/// offset.propagate(600.0, 0.02);
+/// offset.update(0.5, 0.01);
 /// assert!((offset.value() - 120.45).abs() < 0.05);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,13 +64,13 @@ impl Offset {
         self.value -= down;
     }
 
-    /// Lets `seconds` of random walk pass, with `walk` in m/√s.
-    pub fn drift(&mut self, seconds: f32, walk: f32) {
+    /// Propagates the variance over `seconds` of random walk, with `walk` in m/√s.
+    pub fn propagate(&mut self, seconds: f32, walk: f32) {
         self.variance += walk * walk * seconds;
     }
 
-    /// Learns from an innovation whose variance, without this offset's own, is `others`.
-    pub fn learn(&mut self, innovation: f32, others: f32) {
+    /// Updates the offset with an innovation whose variance, without this offset's own, is `others`.
+    pub fn update(&mut self, innovation: f32, others: f32) {
         let gain = self.variance / (self.variance + others);
         self.value += gain * innovation;
         self.variance *= 1.0 - gain;

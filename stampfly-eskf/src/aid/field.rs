@@ -6,6 +6,14 @@
 //!
 //! For a vehicle whose motors do not bend the field: a rover, a hand-held sensor, a machine with its magnetometer on a
 //! mast. Otherwise use the [`heading`](super::heading), which leaves the tilt alone.
+//!
+//! | in [`Eskf`](crate::Eskf) | condition |
+//! |---|---|
+//! | start | `mag_enable` with [`MagModel::Field`](crate::MagModel::Field), a calibration with a field, 10 to 100 µT, a horizontal part above 1 µT |
+//! | continue | the same, and a joint test ratio of the three axes of at most one |
+//! | stop | one of these fails: refused at once, inactive one second after the last accepted field |
+//! | inflate | rejected for longer than `lockout`: the heading's variance grows, once per lock-out |
+//! | reset | none: the attitude is never set to the field |
 
 use super::Row;
 use crate::filter::ATTITUDE;

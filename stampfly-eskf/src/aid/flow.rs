@@ -8,15 +8,23 @@
 //! v_y + distance·b_x. The prediction has the same terms.
 //!
 //! The distance is taken as known; its error is part of the measurement noise (see the filter's configuration).
+//!
+//! | in [`Eskf`](crate::Eskf) | condition |
+//! |---|---|
+//! | start | valid, quality of at least `flow_min_quality`, an interval of 1 to 100 ms, tilt within `min_cos_tilt`, a known surface, a distance of at least `flow_min_distance` |
+//! | continue | the same, and a joint test ratio of both axes of at most one |
+//! | stop | one of these fails: refused at once, inactive one second after the last accepted sample |
+//! | inflate | the mean of its innovations is biased in flight: tilt and horizontal gyro bias inflated, accelerometer bias reset |
+//! | reset | rejected for longer than `lockout`: horizontal velocity to the sample, then the same inflation |
 
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
-use crate::filter::{ATTITUDE, GYRO_BIAS, Nominal, VELOCITY};
+use crate::filter::{ATTITUDE, GYRO_BIAS, NominalState, VELOCITY};
 
 /// Predicted velocity along body x and along body y, from `distance` metres to the surface along the beam.
 #[inline]
 #[must_use]
-pub fn body_velocity(state: &Nominal, rotation: &Rotation, distance: f32) -> [Row; 2] {
+pub fn body_velocity(state: &NominalState, rotation: &Rotation, distance: f32) -> [Row; 2] {
     let v = rotate_back(rotation, &state.velocity);
     let [north, east, down] = rotation;
     let columns = |c: usize| [(VELOCITY, north[c]), (VELOCITY + 1, east[c]), (VELOCITY + 2, down[c])];
@@ -52,16 +60,16 @@ mod tests {
     }
 
     #[test]
-    fn pure_rotation_is_no_velocity() {
+    fn pure_rotation_measures_no_velocity() {
         // Pitching up at 0.3 rad/s shows as +0.3 in x, rolling right at 0.2 rad/s as −0.2 in y.
         let measured = measured_velocity([0.3, -0.2], [0.2, 0.3], 0.5);
         assert!(measured.iter().all(|v| v.abs() < 1e-7));
     }
 
     #[test]
-    fn a_gyro_bias_is_explained() {
-        // Standing still, the gyro reads its bias: the reading is −d·b_y in x, as predicted.
-        let state = Nominal { gyro_bias: [0.02, 0.05, 0.0].into(), ..Nominal::default() };
+    fn a_gyro_bias_is_predicted_by_the_model() {
+        // A stationary gyro reads its bias: the reading is −d·b_y in x, as predicted.
+        let state = NominalState { gyro_bias: [0.02, 0.05, 0.0].into(), ..NominalState::default() };
         let rows = body_velocity(&state, &state.rotation(), 0.5);
         let measured = measured_velocity([0.0, 0.0], [0.02, 0.05], 0.5);
         assert!((rows[0].predicted - measured[0]).abs() < 1e-7);

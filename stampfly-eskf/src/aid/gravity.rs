@@ -1,21 +1,28 @@
-//! The accelerometer as an inclinometer.
+//! Gravity: the accelerometer as an inclinometer.
 //!
-//! The specific force is the body's own acceleration less gravity, seen from the body: f = Rᵀ·(a − g) + b. With
+//! The specific force is the body's own acceleration less gravity, updated from the body: f = Rᵀ·(a − g) + b. With
 //! f₀ = Rᵀ·(a − g), a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds itself.
 //!
-//! The acceleration a must come from elsewhere: zero for a body that stands or is carried gently, the change of a measured
+//! The acceleration a must come from elsewhere: zero for a body that is stationary or carried gently, the change of a measured
 //! velocity for one that flies (see [`Acceleration`]). Left at zero in flight the model pulls the attitude towards level,
 //! because a multicopter's accelerometer points along its thrust, whatever the tilt.
+//!
+//! | in [`Eskf`](crate::Eskf) | condition |
+//! |---|---|
+//! | start | stationary, or nothing holds the velocity ([`WhenUnaided`](crate::GravityUse::WhenUnaided)), both with every fourth sample; or at every sample in flight ([`Always`](crate::GravityUse::Always)) |
+//! | continue | the same, and a joint test ratio of the three axes of at most one |
+//! | stop | in flight with `WhenUnaided`: flow, velocity or position was accepted within the last second |
+//! | reset | rejected for longer than four times `lockout`: attitude inflated, velocity to zero with a large variance, accelerometer bias reset; once per lock-out |
 
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
-use crate::filter::{ACCEL_BIAS, ATTITUDE, Nominal};
+use crate::filter::{ACCEL_BIAS, ATTITUDE, NominalState};
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
 /// Predicted specific force along body x, y and z of a body that accelerates by `acceleration` (world, m/s²).
 #[inline]
 #[must_use]
-pub fn specific_force(state: &Nominal, rotation: &Rotation, acceleration: &Vec3) -> [Row; 3] {
+pub fn specific_force(state: &NominalState, rotation: &Rotation, acceleration: &Vec3) -> [Row; 3] {
     let force = Vec3::new(acceleration.x, acceleration.y, acceleration.z - GRAVITY);
     let f = rotate_back(rotation, &force);
     let bias = state.accel_bias;
@@ -29,12 +36,12 @@ pub fn specific_force(state: &Nominal, rotation: &Rotation, acceleration: &Vec3)
 /// Bandwidth and damping of the tracker, rad/s and 1: the α = 0.2 and β = 0.02 at 100 Hz of the StampFly's firmware.
 const BANDWIDTH: f32 = 14.0;
 const DAMPING: f32 = 0.7;
-/// No acceleration beyond this is believed, m/s².
-const LARGEST: f32 = 5.0;
-/// A velocity older than this says nothing about the acceleration.
-const FORGET: Duration = Duration::from_micros(200_000);
+/// Largest acceleration tracked, m/s².
+const MAX_ACCELERATION: f32 = 5.0;
+/// Without a velocity for this long the acceleration is zero.
+const TIMEOUT: Duration = Duration::from_micros(200_000);
 
-/// The acceleration of the body as a sensor of velocity shows it: an α-β tracker (Kalata, "The Tracking Index", IEEE TAES
+/// Tracks the acceleration of the body from measured velocities: an α-β tracker (Kalata, "The Tracking Index", IEEE TAES
 /// 20(2), 1984).
 ///
 /// ```
@@ -42,7 +49,7 @@ const FORGET: Duration = Duration::from_micros(200_000);
 /// use stampfly_types::{Instant, Vec3};
 /// let mut acceleration = Acceleration::default();
 /// for step in 0..100u64 {
-///     acceleration.see(Instant::from_micros(step * 10_000), Vec3::x() * (step as f32 * 0.02));
+///     acceleration.update(Instant::from_micros(step * 10_000), Vec3::x() * (step as f32 * 0.02));
 /// }
 /// assert!((acceleration.at(Instant::from_micros(990_000)) - 2.0 * Vec3::x()).amax() < 0.05);
 /// assert_eq!(acceleration.at(Instant::from_micros(2_000_000)), Vec3::zeros());
@@ -50,35 +57,39 @@ const FORGET: Duration = Duration::from_micros(200_000);
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Acceleration {
-    seen: Option<Instant>,
+    updated: Option<Instant>,
     velocity: Vec3,
     acceleration: Vec3,
 }
 
 impl Acceleration {
-    /// Takes a measured velocity, world, m/s. A gap starts it again.
-    pub fn see(&mut self, at: Instant, velocity: Vec3) {
-        match self.seen {
-            Some(seen) if at <= seen => return,
-            Some(seen) if at.since(seen) <= FORGET => {
-                let dt = at.since(seen).seconds();
+    /// Updates with a measured velocity, world, m/s. Restarts after a gap.
+    pub fn update(&mut self, at: Instant, velocity: Vec3) {
+        match self.updated {
+            Some(updated) if at <= updated => return,
+            Some(updated) if at.since(updated) <= TIMEOUT => {
+                let dt = at.since(updated).seconds();
                 let predicted = self.velocity + self.acceleration * dt;
                 let error = velocity - predicted;
                 // Stable for every step that is taken: both gains stay below one.
-                let turn = (BANDWIDTH * dt).min(0.7);
-                self.velocity = predicted + error * (2.0 * DAMPING * turn).min(1.0);
-                let acceleration = self.acceleration + error * (turn * turn / dt);
-                self.acceleration = acceleration.map(|v| v.clamp(-LARGEST, LARGEST));
+                let phase = (BANDWIDTH * dt).min(0.7);
+                self.velocity = predicted + error * (2.0 * DAMPING * phase).min(1.0);
+                let acceleration = self.acceleration + error * (phase * phase / dt);
+                self.acceleration = acceleration.map(|v| v.clamp(-MAX_ACCELERATION, MAX_ACCELERATION));
             }
             _ => (self.velocity, self.acceleration) = (velocity, Vec3::zeros()),
         }
-        self.seen = Some(at);
+        self.updated = Some(at);
     }
 
-    /// The acceleration, world, m/s²; zero when nothing was seen lately.
+    /// The acceleration, world, m/s²; zero without a recent velocity.
     #[must_use]
     pub fn at(&self, now: Instant) -> Vec3 {
-        if self.seen.is_some_and(|seen| now.since(seen) <= FORGET) { self.acceleration } else { Vec3::zeros() }
+        if self.updated.is_some_and(|updated| now.since(updated) <= TIMEOUT) {
+            self.acceleration
+        } else {
+            Vec3::zeros()
+        }
     }
 }
 

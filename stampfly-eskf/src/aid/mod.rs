@@ -1,7 +1,9 @@
 //! Measurement models, one a file: what a sensor should read in a given state, and how that changes with the state.
 //!
 //! A model returns rows: the predicted reading and the non-zero entries of its Jacobian with respect to the fifteen
-//! error states. Each file derives its Jacobian in a comment and tests it against numerical differentiation.
+//! error states. Each file derives its Jacobian in a comment, tests it against numerical differentiation, and lists when
+//! [`Eskf`](crate::Eskf) starts, continues, stops and resets with it. Beyond those conditions every measurement must be
+//! finite, newer than the sensor's last, at most 0.1 s old and at most 0.02 s ahead of the last inertial sample.
 
 pub mod attitude;
 pub mod baro;
@@ -43,17 +45,17 @@ impl Row {
 pub(crate) mod numeric {
     //! The check every Jacobian has to pass.
     use super::Row;
-    use crate::filter::{N, Nominal};
+    use crate::filter::{N, NominalState};
     use stampfly_types::Vec3;
 
     /// A state away from every symmetry.
-    pub fn awkward_state() -> Nominal {
-        let mut state = Nominal {
+    pub fn awkward_state() -> NominalState {
+        let mut state = NominalState {
             position: Vec3::new(0.3, -0.2, -0.8),
             velocity: Vec3::new(0.4, -0.3, 0.2),
             gyro_bias: Vec3::new(0.01, -0.02, 0.03),
             accel_bias: Vec3::new(0.1, 0.05, -0.1),
-            ..Nominal::default()
+            ..NominalState::default()
         };
         let mut turn = [0.0; N];
         turn[6..9].copy_from_slice(&[0.2, -0.25, 0.7]);
@@ -62,7 +64,7 @@ pub(crate) mod numeric {
     }
 
     /// Compares a row with central differences over all fifteen states.
-    pub fn check(model: impl Fn(&Nominal) -> Row) {
+    pub fn check(model: impl Fn(&NominalState) -> Row) {
         let state = awkward_state();
         let row = model(&state);
         for i in 0..N {

@@ -8,7 +8,7 @@
 //!
 //! Of the vertical axis gravity says nothing. There the bias is drawn, very gently, to where the calibration had it; the
 //! vertical
-//! axis is also what a clean magnetic field keeps turning the heading back by (`drift`).
+//! axis is also what a clean magnetic field keeps turning the heading back by (`update_vertical`).
 //!
 //! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.3; the leaning rate is taken from the filter's own
 //! derivative instead of the corrections of single samples, which in `f32` would be mostly rounding.
@@ -21,7 +21,7 @@ use stampfly_types::Vec3;
 /// Share of the weight of a level axis that the pull on the vertical one has.
 const VERTICAL_WEIGHT: f32 = 1e-4;
 
-/// The heading's drift is believed when it comes from clean fields by more than this share.
+/// The heading's drift updates the bias when it comes from clean fields by more than this share.
 const CLEAN: f32 = 0.8;
 
 /// Estimates the gyro's bias.
@@ -74,12 +74,12 @@ impl GyroBias {
         stampfly_types::math::sqrt(axis.dot(&(self.covariance * axis)))
     }
 
-    /// Time passes: the bias may have moved. Also keeps what [`motion`](Self::motion) needs, at rest as well.
+    /// Propagates the variance by the bias' random walk. Also keeps what [`update_moving`](Self::update_moving) needs, at rest as well.
     pub fn predict(&mut self, config: &AttitudeConfig, level: &Matrix3<f32>, dt: f32) {
         let limit = config.initial_bias_sigma * config.initial_bias_sigma;
         for axis in 0..3 {
             if let Some(variance) = self.covariance.get_mut((axis, axis)) {
-                // A doubt that calibration left above the limit stays; it does not grow.
+                // A variance that the calibration left above the limit stays; it does not grow.
                 *variance = (*variance + config.bias_walk * config.bias_walk * dt).min(limit.max(*variance));
             }
         }
@@ -89,38 +89,38 @@ impl GyroBias {
         self.rotated.step(&SVector::<f32, 11>::from_iterator(channels), dt);
     }
 
-    /// At rest: this is what the gyro shows.
-    pub fn rest(&mut self, config: &AttitudeConfig, rate: &Vec3, dt: f32) {
+    /// Update while stationary: the gyro measures its bias.
+    pub fn update_stationary(&mut self, config: &AttitudeConfig, rate: &Vec3, dt: f32) {
         let noise = noise(config, config.rest_bias_sigma, dt);
         for (axis, shown) in [Vec3::x(), Vec3::y(), Vec3::z()].iter().zip(rate.iter()) {
-            self.correct(config, axis, *shown, noise);
+            self.update(config, axis, *shown, noise);
         }
     }
 
-    /// In motion: the filtered specific force leans over at these rates about the level frame's x and y.
-    pub fn motion(&mut self, config: &AttitudeConfig, leaning: [f32; 2], dt: f32) {
+    /// Update in motion: the filtered specific force leans over at these rates about the level frame's x and y.
+    pub fn update_moving(&mut self, config: &AttitudeConfig, leaning: [f32; 2], dt: f32) {
         if !self.rotated.is_settled() {
             return;
         }
         let &[r11, r12, r13, r21, r22, r23, r31, r32, r33, bx, by] = self.rotated.value().as_ref();
         let noise = noise(config, config.motion_bias_sigma, dt);
         let [x, y] = leaning;
-        self.correct(config, &Vec3::new(r11, r12, r13), x + bx, noise);
-        self.correct(config, &Vec3::new(r21, r22, r23), y + by, noise);
+        self.update(config, &Vec3::new(r11, r12, r13), x + bx, noise);
+        self.update(config, &Vec3::new(r21, r22, r23), y + by, noise);
         let vertical = Vec3::new(r31, r32, r33);
-        self.correct(config, &vertical, vertical.dot(&self.calibrated), noise / VERTICAL_WEIGHT);
+        self.update(config, &vertical, vertical.dot(&self.calibrated), noise / VERTICAL_WEIGHT);
     }
 
-    /// In motion: a clean field turned the heading by `share` of a disagreement of `off` rad. A heading that keeps
+    /// Update of the vertical axis in motion: a clean field turned the heading by `share` of a disagreement of `off` rad. A heading that keeps
     /// being turned the same way drifts: to the averaging of the correction this is what leaning is to that of the force.
-    pub fn drift(&mut self, config: &AttitudeConfig, vertical: &Vec3, share: f32, off: f32, dt: f32) {
+    pub fn update_vertical(&mut self, config: &AttitudeConfig, vertical: &Vec3, share: f32, off: f32, dt: f32) {
         self.vertical += (vertical - self.vertical) * share;
         self.vertical_bias += (vertical.dot(&self.value) - self.vertical_bias) * share;
         self.clean += (1.0 - self.clean) * share;
         if self.clean > CLEAN {
             let row = self.vertical;
             let noise = noise(config, config.mag_bias_sigma, dt);
-            self.correct(config, &row, share * off / dt + self.vertical_bias, noise);
+            self.update(config, &row, share * off / dt + self.vertical_bias, noise);
         }
     }
 
@@ -130,7 +130,7 @@ impl GyroBias {
     }
 
     /// The scalar measurement `row · bias = measured`.
-    fn correct(&mut self, config: &AttitudeConfig, row: &Vec3, measured: f32, noise: f32) {
+    fn update(&mut self, config: &AttitudeConfig, row: &Vec3, measured: f32, noise: f32) {
         let spread = self.covariance * row;
         let gain = spread / (row.dot(&spread) + noise);
         // Not `clamp`, which panics when a configured limit is negative or no number.
@@ -155,40 +155,40 @@ mod tests {
     const DT: f32 = 0.0025;
 
     #[test]
-    fn rest_shows_the_bias_and_the_doubt_settles_where_it_is_told() {
+    fn stationary_updates_find_the_bias_and_settle_at_the_configured_sigma() {
         let config = AttitudeConfig::default();
         let mut bias = GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma);
         let truth = Vec3::new(0.01, -0.02, 0.015);
         for _ in 0..20_000 {
             bias.predict(&config, &Matrix3::identity(), DT);
-            bias.rest(&config, &truth, DT);
+            bias.update_stationary(&config, &truth, DT);
         }
         assert!((bias.value() - truth).amax() < 2e-4, "{:?}", bias.value());
         assert!((bias.sigma() / config.rest_bias_sigma - 1.0).abs() < 0.1, "{}", bias.sigma());
     }
 
     #[test]
-    fn no_measurement_takes_it_beyond_its_limit() {
+    fn no_update_moves_the_bias_beyond_its_limit() {
         let config = AttitudeConfig::default();
         let calibrated = Vec3::new(0.5, 0.0, 0.0);
         let mut bias = GyroBias::new(&config, calibrated, config.initial_bias_sigma);
         for step in 0..4_000u16 {
             bias.predict(&config, &Matrix3::identity(), DT);
-            bias.motion(&config, [f32::from(step), -1e6], DT);
+            bias.update_moving(&config, [f32::from(step), -1e6], DT);
         }
         assert!((bias.value() - calibrated).amax() <= config.bias_limit * 1.001, "{:?}", bias.value());
     }
 
     #[test]
-    fn the_doubt_stays_positive_over_hours() {
+    fn the_covariance_stays_positive_over_hours() {
         let config = AttitudeConfig::default();
         let mut bias = GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma);
         for step in 0..1_000_000u32 {
             bias.predict(&config, &Matrix3::identity(), DT);
             if step % 4_000 < 2_000 {
-                bias.rest(&config, &Vec3::zeros(), DT);
+                bias.update_stationary(&config, &Vec3::zeros(), DT);
             } else {
-                bias.motion(&config, [0.0; 2], DT);
+                bias.update_moving(&config, [0.0; 2], DT);
             }
         }
         assert!(bias.covariance.symmetric_eigenvalues().min() > 0.0, "{}", bias.covariance);

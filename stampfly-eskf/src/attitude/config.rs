@@ -16,14 +16,14 @@ pub struct AttitudeConfig {
     /// The same of a magnetometer sample, s: conversion time and averaging.
     pub mag_delay: f32,
 
-    /// Doubt of the gyro's bias without a calibration, rad/s. Half a degree a second: what sensors have after they
+    /// Standard deviation of the gyro's bias without a calibration, rad/s. Half a degree a second: what sensors have after they
     /// have been calibrated once, some day, at some temperature.
     pub initial_bias_sigma: f32,
     /// Random walk of the bias, rad/s/√s. A fifth of a degree a second in a hundred seconds: warming up.
     pub bias_walk: f32,
-    /// Doubt of the bias after long motion, rad/s; sets how much leaning gravity is believed.
+    /// Standard deviation of the bias after long motion, rad/s; sets the weight of the leaning of gravity.
     pub motion_bias_sigma: f32,
-    /// Doubt of the bias after long rest, rad/s; also the doubt that a complete calibration leaves.
+    /// Standard deviation of the bias after a long time at rest, rad/s; also the one that a complete calibration leaves.
     pub rest_bias_sigma: f32,
     /// Farthest from the calibration that the bias may go, rad/s. Two degrees a second: beyond it lies slow motion, not
     /// bias.
@@ -61,13 +61,13 @@ pub struct AttitudeConfig {
     pub mag_disturbed_sigma: f32,
     /// Direction of the field in a new place, rad, where it is as different as it takes to be a new reference.
     pub mag_place_sigma: f32,
-    /// Doubt of the vertical gyro bias after long motion in a clean field, rad/s; sets how much a drifting heading is
-    /// believed to be bias.
+    /// Standard deviation of the vertical gyro bias after long motion in a clean field, rad/s; sets how much of a drifting
+    /// heading is taken for bias.
     pub mag_bias_sigma: f32,
 
     /// Estimate magnetised parts that turn with the sensor, and take their field out.
     pub hard_iron: bool,
-    /// Doubt of their field at the start, µT.
+    /// Standard deviation of their field at the start, µT.
     pub hard_iron_sigma: f32,
     /// Random walk of their field, µT/√s: a motor's current, a phone put on top.
     pub hard_iron_walk: f32,

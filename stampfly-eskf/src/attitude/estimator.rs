@@ -1,4 +1,4 @@
-//! The attitude filter as an [`Estimator`]: steps from time stamps, and honest about what it does not know.
+//! The attitude filter as an [`Estimator`]: steps from time stamps, and validity of each output.
 //!
 //! It has no position, no velocity and no height, says so in every estimate, and answers the sensors for them with
 //! [`Refusal::NotUsed`]. For a vehicle that must fly on something, when everything else is gone.
@@ -121,14 +121,17 @@ impl Estimator for AttitudeFilter {
             sensors: SensorMask::NONE
                 .set(SensorMask::IMU | SensorMask::ACCEL_ATTITUDE, book.initialized)
                 .set(SensorMask::MAG, recent)
-                .set(SensorMask::STATIONARY, self.is_at_rest()),
+                .set(SensorMask::STATIONARY, self.is_stationary()),
             ..StateEstimate::default()
         }
     }
 
     fn status(&self) -> EstimatorStatus {
         let down = self.attitude_without_field().inverse() * Vec3::z();
-        let seen = -self.specific_force();
-        EstimatorStatus { accel_innovation: math::atan2(seen.cross(&down).norm(), seen.dot(&down)), ..self.book.status }
+        let measured = -self.specific_force();
+        EstimatorStatus {
+            accel_innovation: math::atan2(measured.cross(&down).norm(), measured.dot(&down)),
+            ..self.book.status
+        }
     }
 }

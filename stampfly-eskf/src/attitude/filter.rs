@@ -26,8 +26,8 @@ use super::hard_iron::HardIron;
 use super::heading::Heading;
 use super::low_pass::LowPass;
 use super::magnetic::Magnetic;
-use super::rest::RestDetector;
 use super::rotation::{from_vector, product, upwards, within};
+use super::stationary::StationaryDetector;
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::CalibrationResult;
 use stampfly_types::{Quat, Vec3, frame};
@@ -40,8 +40,8 @@ const LARGEST_FIELD: f32 = 10_000.0;
 const LARGEST_BIAS: f32 = 0.5;
 /// A longer step is taken for this, s: what happened meanwhile is not known anyway.
 const LONGEST_STEP: f32 = 0.5;
-/// Doubt of a heading that was defined while the body moved, rad.
-const MOVING_START: f32 = 1.0;
+/// Standard deviation of a heading that was defined while the body moved, rad.
+const MOVING_START_SIGMA: f32 = 1.0;
 
 /// Attitude from gyro, accelerometer and, if there is one, magnetometer.
 ///
@@ -70,7 +70,7 @@ pub struct AttitudeFilter {
     /// Specific force in the drifting frame.
     force: LowPass<3>,
     bias: GyroBias,
-    rest: RestDetector,
+    stationary: StationaryDetector,
     magnetic: Magnetic,
     heading: Heading,
     hard_iron: HardIron,
@@ -93,7 +93,7 @@ impl AttitudeFilter {
             level: Quat::identity(),
             force: LowPass::new(config.accel_time),
             bias: GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma),
-            rest: RestDetector::new(&config),
+            stationary: StationaryDetector::new(&config),
             magnetic: Magnetic::new(None),
             heading: Heading::unknown(),
             hard_iron: HardIron::new(&config),
@@ -127,7 +127,7 @@ impl AttitudeFilter {
         if within(field, LARGEST_FIELD) && field.norm() > 1.0 {
             let field = level * field;
             filter.magnetic = Magnetic::new(complete.then_some(&field));
-            let sigma = if *complete { config.mag_start_sigma } else { MOVING_START };
+            let sigma = if *complete { config.mag_start_sigma } else { MOVING_START_SIGMA };
             filter.heading = Heading::defined_by(&field, sigma);
         }
         filter.started = true;
@@ -162,13 +162,13 @@ impl AttitudeFilter {
         self.bias.predict(config, turn.matrix(), dt);
         let vertical = turn.matrix().row(2).transpose();
         self.heading.predict(self.bias.sigma_along(&vertical), self.rate.norm(), dt);
-        self.rest.step(config, accel, gyro, self.bias.calibrated(), dt);
-        if self.rest.is_at_rest(config) {
-            self.bias.rest(config, self.rest.rate(), dt);
+        self.stationary.step(config, accel, gyro, self.bias.calibrated(), dt);
+        if self.stationary.is_stationary(config) {
+            self.bias.update_stationary(config, self.stationary.rate(), dt);
         } else if self.force.is_settled() {
             let leaning = self.level * self.force.rate();
             let norm = self.force.value().norm().max(1.0);
-            self.bias.motion(config, [leaning.y / norm, -leaning.x / norm], dt);
+            self.bias.update_moving(config, [leaning.y / norm, -leaning.x / norm], dt);
         }
     }
 
@@ -211,8 +211,8 @@ impl AttitudeFilter {
 
     /// Is the body at rest?
     #[must_use]
-    pub fn is_at_rest(&self) -> bool {
-        self.rest.is_at_rest(&self.config)
+    pub fn is_stationary(&self) -> bool {
+        self.stationary.is_stationary(&self.config)
     }
 
     /// One standard deviation of the heading against magnetic north, rad. Above one it is not known.

@@ -19,8 +19,8 @@ use stampfly_types::Vec3;
 
 /// Squared distance, in variances, beyond which a component of a sample is an outlier.
 const GATE: f32 = 16.0;
-/// Outliers for so long, s, and the doubt grows until they are none.
-const PATIENCE: f32 = 3.0;
+/// Outliers for so long, s, and the variance is inflated until they are none.
+const LOCKOUT: f32 = 3.0;
 /// Over how long the strength of the field is watched, s.
 const WATCH: f32 = 15.0;
 /// An offset is used when it takes out so much of the strength's variance, and no longer when it leaves so much.
@@ -80,9 +80,9 @@ impl HardIron {
             return Vec3::zeros();
         }
         let offset = self.state.fixed_rows::<3>(3).into_owned();
-        let doubt = self.covariance.diagonal().fixed_rows::<3>(3).sum();
-        let chance = config.hard_iron_least * config.hard_iron_least + doubt;
-        // James and Stein's estimator, positive part: zero while the offset is no longer than its own doubt.
+        let variance = self.covariance.diagonal().fixed_rows::<3>(3).sum();
+        let chance = config.hard_iron_least * config.hard_iron_least + variance;
+        // James and Stein's estimator, positive part: zero while the offset is no longer than its own deviation.
         offset * (1.0 - chance / offset.norm_squared().max(1e-6)).max(0.0)
     }
 
@@ -115,7 +115,7 @@ impl HardIron {
             self.state.fixed_rows_mut::<3>(0).copy_from(&turned);
         }
         let walk = |sigma: f32| sigma * sigma * dt;
-        let patience = if self.outliers_for > PATIENCE { 400.0 } else { 1.0 };
+        let patience = if self.outliers_for > LOCKOUT { 400.0 } else { 1.0 };
         let walks = [walk(config.field_walk), walk(config.hard_iron_walk)].map(|walk| walk * patience);
         for state in 0..6 {
             if let Some(variance) = self.covariance.get_mut((state, state)) {
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn turning_tells_it_and_rest_does_not() {
+    fn hard_iron_is_found_by_turning_and_not_while_stationary() {
         let config = AttitudeConfig::default();
         let offset = Vec3::new(10.0, -20.0, 5.0);
         let mut hard_iron = HardIron::new(&config);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_doubt_stays_positive_over_an_hour() {
+    fn the_covariance_stays_positive_over_an_hour() {
         let config = AttitudeConfig::default();
         let mut hard_iron = HardIron::new(&config);
         for round in 0..36u8 {

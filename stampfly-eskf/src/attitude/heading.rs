@@ -6,7 +6,7 @@
 //! gyro has been alone for so long that it knows even less.
 //!
 //! When another field becomes the reference, its direction disagrees with the heading by some angle. How much of
-//! that is the heading's drift and how much is the direction of the new field, is again a matter of the two doubts: the
+//! that is the heading's drift and how much is the direction of the new field, follows from the two variances: the
 //! heading takes its share at once and the rest becomes the declination of the new place. When the
 //! first field is back, the declination is dropped.
 
@@ -20,8 +20,8 @@ const SCALE_ERROR: f32 = 0.002;
 const TURN_TIME: f32 = 0.5;
 /// For how long a bend stays the same at rest, s.
 const REST_TIME: f32 = 30.0;
-/// More doubt than this, rad², is none: any heading is as likely.
-const NO_IDEA: f32 = 3.0;
+/// Largest variance, rad²: from here on any heading is as likely.
+const MAX_VARIANCE: f32 = 3.0;
 
 /// Heading of the level frame in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ pub(super) struct Heading {
 impl Heading {
     /// Nothing is known; north is where the field points.
     pub fn unknown() -> Self {
-        Self { north: 0.0, declination: 0.0, value: 0.0, variance: NO_IDEA, off: 0.0 }
+        Self { north: 0.0, declination: 0.0, value: 0.0, variance: MAX_VARIANCE, off: 0.0 }
     }
 
     /// The heading is zero by definition, and this is the field then, in the level frame. `sigma`: how far that
@@ -64,25 +64,25 @@ impl Heading {
         self.off
     }
 
-    /// Time passes: the gyro is wrong by a bias of this doubt and by its scale at this rate, rad/s.
+    /// Propagates the variance: the gyro is wrong by a bias of this standard deviation and by its scale at this rate, rad/s.
     pub fn predict(&mut self, bias_sigma: f32, rate: f32, dt: f32) {
         let scale = SCALE_ERROR * rate;
         let walk = bias_sigma * bias_sigma * BIAS_TIME + scale * scale * TURN_TIME;
-        self.variance = (self.variance + walk * dt).min(NO_IDEA);
+        self.variance = (self.variance + walk * dt).min(MAX_VARIANCE);
     }
 
-    /// The field has been wrong by something of this size, rad.
-    pub fn doubt(&mut self, sigma: f32) {
-        self.variance = (self.variance + sigma * sigma).min(NO_IDEA);
+    /// Inflates the variance by an error of the field of this standard deviation, rad.
+    pub fn inflate(&mut self, sigma: f32) {
+        self.variance = (self.variance + sigma * sigma).min(MAX_VARIANCE);
     }
 
     /// The first reference is back.
-    pub fn come_back(&mut self) {
+    pub fn clear_declination(&mut self) {
         self.declination = 0.0;
     }
 
     /// Another field, in the level frame, is the reference from now on.
-    pub fn move_to(&mut self, config: &AttitudeConfig, field: &Vec3) {
+    pub fn change_reference(&mut self, config: &AttitudeConfig, field: &Vec3) {
         self.declination = 0.0;
         let off = self.disagreement(field);
         let share = self.share(config);
@@ -91,20 +91,27 @@ impl Heading {
         self.variance *= 1.0 - share;
     }
 
-    /// Uses a field in the level frame that may be bent by `sigma`, rad. Gives the share of the disagreement, which is
+    /// Update with a field in the level frame that may be bent by `sigma`, rad. Gives the share of the disagreement, which is
     /// the second number, rad, that went into the heading.
     ///
     /// At rest the bend is the same in every sample: what is known does not become more.
-    pub fn correct(&mut self, config: &AttitudeConfig, field: &Vec3, sigma: f32, rest: bool, dt: f32) -> (f32, f32) {
+    pub fn update(
+        &mut self,
+        config: &AttitudeConfig,
+        field: &Vec3,
+        sigma: f32,
+        stationary: bool,
+        dt: f32,
+    ) -> (f32, f32) {
         let off = self.disagreement(field);
         self.off = off;
-        // A field that has turned by more than the heading is in doubt, is bent by that.
+        // A field that has turned by more than the heading's deviation is bent by that.
         let sigma = sigma.max(off.abs() * (1.0 - self.share(config)));
-        let time = if rest { REST_TIME } else { config.field_time };
+        let time = if stationary { REST_TIME } else { config.field_time };
         let noise = sigma * sigma * (time / dt).max(1.0);
         let share = self.variance / (self.variance + noise);
         self.value = math::wrap_angle(self.value - share * off);
-        let least = if rest { self.variance.min(config.mag_start_sigma * config.mag_start_sigma) } else { 0.0 };
+        let least = if stationary { self.variance.min(config.mag_start_sigma * config.mag_start_sigma) } else { 0.0 };
         self.variance = (self.variance * (1.0 - share)).max(least);
         (share, off)
     }
@@ -137,7 +144,7 @@ mod tests {
         let mut heading = Heading::defined_by(&pointing(0.0), config.mag_start_sigma);
         for _ in 0..2_000 {
             heading.predict(config.rest_bias_sigma, 0.5, DT);
-            heading.correct(&config, &pointing(0.0), config.mag_sigma, false, DT);
+            heading.update(&config, &pointing(0.0), config.mag_sigma, false, DT);
         }
         (config, heading)
     }
@@ -148,7 +155,7 @@ mod tests {
             let (config, mut heading) = settled();
             for _ in 0..500 {
                 heading.predict(bias_sigma, 0.5, DT);
-                heading.correct(&config, &pointing(4.0), config.mag_sigma, false, DT);
+                heading.update(&config, &pointing(4.0), config.mag_sigma, false, DT);
             }
             -heading.value() / DEGREE
         };
@@ -157,34 +164,34 @@ mod tests {
     }
 
     #[test]
-    fn rest_adds_nothing_to_what_is_known() {
+    fn a_stationary_body_does_not_reduce_the_variance() {
         let config = AttitudeConfig::default();
         let mut heading = Heading::defined_by(&pointing(0.0), config.mag_start_sigma);
         for _ in 0..6_000 {
             heading.predict(0.0, 0.0, DT);
-            heading.correct(&config, &pointing(0.0), config.mag_sigma, true, DT);
+            heading.update(&config, &pointing(0.0), config.mag_sigma, true, DT);
         }
         assert!((heading.sigma() / config.mag_start_sigma - 1.0).abs() < 1e-3, "{}", heading.sigma());
     }
 
     #[test]
-    fn what_a_new_place_adds_is_forgotten_at_home() {
+    fn the_declination_of_another_place_is_cleared_at_the_first_one() {
         let (config, mut heading) = settled();
-        heading.move_to(&config, &pointing(50.0));
+        heading.change_reference(&config, &pointing(50.0));
         assert!(heading.value().abs() < 2.0 * DEGREE, "{}", heading.value());
-        let (_, off) = heading.correct(&config, &pointing(50.0), config.mag_sigma, false, DT);
+        let (_, off) = heading.update(&config, &pointing(50.0), config.mag_sigma, false, DT);
         assert!(off.abs() < 1e-3, "{off}");
-        heading.come_back();
-        let (_, off) = heading.correct(&config, &pointing(0.0), config.mag_sigma, false, DT);
+        heading.clear_declination();
+        let (_, off) = heading.update(&config, &pointing(0.0), config.mag_sigma, false, DT);
         assert!(off.abs() < 2.0 * DEGREE, "{off}");
     }
 
     #[test]
-    fn an_unknown_heading_takes_the_field_for_it() {
+    fn an_unknown_heading_follows_the_field() {
         let config = AttitudeConfig::default();
         let mut heading = Heading::unknown();
         for _ in 0..100 {
-            heading.correct(&config, &pointing(-170.0), config.mag_sigma, false, DT);
+            heading.update(&config, &pointing(-170.0), config.mag_sigma, false, DT);
         }
         assert!((heading.value() / DEGREE - 170.0).abs() < 1.0, "{}", heading.value());
     }

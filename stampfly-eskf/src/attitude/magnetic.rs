@@ -46,7 +46,7 @@ impl Field {
 
 /// What a field is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum FieldStatus {
     /// It is the reference, as far as can be told.
     Clean {
         /// Distance from the reference, one at the limit.
@@ -57,19 +57,19 @@ pub(super) enum Verdict {
         /// Distance from the reference, above one unless it has only just begun to agree again.
         ratio: f32,
     },
-    /// There is no reference yet to judge it by.
-    Unjudged,
+    /// There is no reference yet to compare it with.
+    NoReference,
     /// It has become the first reference with this sample.
-    Found,
+    FirstReference,
     /// Another field than before has become the reference with this sample.
-    Renewed,
+    NewReference,
     /// The first one is the reference again.
-    Back,
+    ReferenceReturned,
     /// It has no level part to tell a heading by.
     Vertical,
 }
 
-/// Watches the field.
+/// Compares the field with the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Magnetic {
@@ -84,7 +84,7 @@ pub(super) struct Magnetic {
 }
 
 impl Magnetic {
-    /// Watches for fields like this one in the level frame; without one, waits until a field stays the same.
+    /// Expects fields like this one in the level frame; without one, waits until a field stays the same.
     pub fn new(reference: Option<&Vec3>) -> Self {
         Self {
             current: LowPass::new(SMOOTHING),
@@ -99,9 +99,9 @@ impl Magnetic {
     }
 
     /// Takes a field in the level frame, `dt` seconds after the one before; `rate` is how fast the body turns, rad/s.
-    pub fn step(&mut self, config: &AttitudeConfig, field: &Vec3, rate: f32, dt: f32) -> Verdict {
-        let Some(seen) = Field::of(field) else { return Verdict::Vertical };
-        self.current.step(&Vector2::new(seen.strength, seen.dip), dt);
+    pub fn step(&mut self, config: &AttitudeConfig, field: &Vec3, rate: f32, dt: f32) -> FieldStatus {
+        let Some(measured) = Field::of(field) else { return FieldStatus::Vertical };
+        self.current.step(&Vector2::new(measured.strength, measured.dip), dt);
         let &[strength, dip] = self.current.value().as_ref();
         let now = Field { strength, dip };
         let follow = (dt / config.mag_reference_time).min(1.0);
@@ -122,7 +122,7 @@ impl Magnetic {
             if self.home_agrees_for >= config.mag_agree_time {
                 (self.reference, self.home) = (Some(home), None);
                 self.agrees_for = self.home_agrees_for;
-                return Verdict::Back;
+                return FieldStatus::ReferenceReturned;
             }
         }
         match &mut self.candidate {
@@ -142,12 +142,12 @@ impl Magnetic {
             let before = core::mem::replace(&mut self.reference, self.candidate);
             self.home = self.home.or(before);
             (self.agrees_for, self.home_agrees_for) = (config.mag_agree_time, 0.0);
-            return if before.is_some() { Verdict::Renewed } else { Verdict::Found };
+            return if before.is_some() { FieldStatus::NewReference } else { FieldStatus::FirstReference };
         }
         match (clean, self.reference) {
-            (true, _) => Verdict::Clean { ratio },
-            (false, Some(_)) => Verdict::Disturbed { ratio },
-            (false, None) => Verdict::Unjudged,
+            (true, _) => FieldStatus::Clean { ratio },
+            (false, Some(_)) => FieldStatus::Disturbed { ratio },
+            (false, None) => FieldStatus::NoReference,
         }
     }
 }
@@ -160,16 +160,16 @@ mod tests {
     const DT: f32 = 0.01;
 
     /// Verdicts over so many seconds of one field, the body turning at `rate`: how many were clean, and the others' kinds.
-    fn seconds(watch: &mut Magnetic, time: f32, field: Vec3, rate: f32) -> (u32, [u32; 4]) {
+    fn seconds(magnetic: &mut Magnetic, time: f32, field: Vec3, rate: f32) -> (u32, [u32; 4]) {
         let config = AttitudeConfig::default();
         let (mut clean, mut others) = (0, [0; 4]);
         for _ in 0..(time / DT) as u32 {
-            match watch.step(&config, &field, rate, DT) {
-                Verdict::Clean { .. } => clean += 1,
-                Verdict::Disturbed { .. } => others[0] += 1,
-                Verdict::Renewed | Verdict::Found => others[1] += 1,
-                Verdict::Back => others[2] += 1,
-                Verdict::Unjudged | Verdict::Vertical => others[3] += 1,
+            match magnetic.step(&config, &field, rate, DT) {
+                FieldStatus::Clean { .. } => clean += 1,
+                FieldStatus::Disturbed { .. } => others[0] += 1,
+                FieldStatus::NewReference | FieldStatus::FirstReference => others[1] += 1,
+                FieldStatus::ReferenceReturned => others[2] += 1,
+                FieldStatus::NoReference | FieldStatus::Vertical => others[3] += 1,
             }
         }
         (clean, others)
@@ -177,41 +177,41 @@ mod tests {
 
     #[test]
     fn a_turning_body_finds_its_first_reference_and_a_still_one_waits() {
-        let mut watch = Magnetic::new(None);
-        assert_eq!(seconds(&mut watch, 30.0, EARTH, 0.0), (0, [0, 0, 0, 3_000]));
-        let (clean, others) = seconds(&mut watch, 10.0, EARTH, 1.0);
+        let mut magnetic = Magnetic::new(None);
+        assert_eq!(seconds(&mut magnetic, 30.0, EARTH, 0.0), (0, [0, 0, 0, 3_000]));
+        let (clean, others) = seconds(&mut magnetic, 10.0, EARTH, 1.0);
         assert!(clean > 400 && others[1] == 1, "{clean} {others:?}");
     }
 
     #[test]
     fn stronger_and_steeper_fields_are_disturbed_and_turned_ones_are_not() {
-        let mut watch = Magnetic::new(Some(&EARTH));
-        assert_eq!(seconds(&mut watch, 2.0, EARTH, 1.0), (200, [0; 4]));
-        let (clean, others) = seconds(&mut watch, 5.0, EARTH * 1.2, 1.0);
+        let mut magnetic = Magnetic::new(Some(&EARTH));
+        assert_eq!(seconds(&mut magnetic, 2.0, EARTH, 1.0), (200, [0; 4]));
+        let (clean, others) = seconds(&mut magnetic, 5.0, EARTH * 1.2, 1.0);
         assert!(clean < 20 && others[0] > 480, "{clean} {others:?}");
-        let (clean, _) = seconds(&mut watch, 5.0, Vec3::new(0.0, 16.0, 42.0), 1.0);
+        let (clean, _) = seconds(&mut magnetic, 5.0, Vec3::new(0.0, 16.0, 42.0), 1.0);
         assert!(clean > 430, "{clean}: no one can tell");
-        let (clean, _) = seconds(&mut watch, 5.0, Vec3::new(4.0, 0.0, 44.8), 1.0);
+        let (clean, _) = seconds(&mut magnetic, 5.0, Vec3::new(4.0, 0.0, 44.8), 1.0);
         assert!(clean < 20, "{clean}");
     }
 
     #[test]
     fn another_place_is_learned_in_motion_only_and_left_again() {
         let config = AttitudeConfig::default();
-        let mut watch = Magnetic::new(Some(&EARTH));
+        let mut magnetic = Magnetic::new(Some(&EARTH));
         let elsewhere = EARTH * 1.3;
-        let (_, others) = seconds(&mut watch, 60.0, elsewhere, 0.0);
+        let (_, others) = seconds(&mut magnetic, 60.0, elsewhere, 0.0);
         assert_eq!(others[1], 0, "beside a magnet on the table");
-        let (clean, others) = seconds(&mut watch, 2.0 * config.mag_renew_time, elsewhere, 1.0);
+        let (clean, others) = seconds(&mut magnetic, 2.0 * config.mag_renew_time, elsewhere, 1.0);
         assert!(clean > 1_000 && others[1] == 1, "{clean} {others:?}");
-        let (clean, others) = seconds(&mut watch, 2.0, EARTH, 1.0);
+        let (clean, others) = seconds(&mut magnetic, 2.0, EARTH, 1.0);
         assert!(clean > 100 && others[2] == 1, "{clean} {others:?}");
     }
 
     #[test]
     fn a_field_without_a_level_part_has_no_heading() {
-        let mut watch = Magnetic::new(Some(&EARTH));
-        let verdict = watch.step(&AttitudeConfig::default(), &Vec3::new(0.0, 0.5, 50.0), 0.0, DT);
-        assert_eq!(verdict, Verdict::Vertical);
+        let mut magnetic = Magnetic::new(Some(&EARTH));
+        let verdict = magnetic.step(&AttitudeConfig::default(), &Vec3::new(0.0, 0.5, 50.0), 0.0, DT);
+        assert_eq!(verdict, FieldStatus::Vertical);
     }
 }

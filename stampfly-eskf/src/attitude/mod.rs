@@ -17,8 +17,8 @@ mod heading;
 mod low_pass;
 mod magnetic;
 mod mahony;
-mod rest;
 mod rotation;
+mod stationary;
 
 pub use config::AttitudeConfig;
 pub use filter::AttitudeFilter;

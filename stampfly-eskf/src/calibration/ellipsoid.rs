@@ -10,8 +10,8 @@
 //! fitting", GMP 2004, for quadrics in general), solved by a triangular factor that takes one sample after the other.
 //! Coordinates are counted from the first sample, so hard iron of any size costs no digits.
 
+use super::least_squares::LeastSquares;
 use super::principal_axes::principal_axes;
-use super::triangle::Triangle;
 use nalgebra::Matrix3;
 use stampfly_types::{Vec3, math};
 
@@ -178,7 +178,7 @@ pub struct EllipsoidFit {
     /// The first sample, and the last one taken, µT.
     origin: Vec3,
     last: Vec3,
-    quadric: Triangle<{ UNKNOWNS + 1 }>,
+    quadric: LeastSquares<{ UNKNOWNS + 1 }>,
     /// Least and most along each direction, from the first sample.
     extent: [[f32; 2]; 13],
     samples: u32,
@@ -198,7 +198,7 @@ impl EllipsoidFit {
             config,
             origin: Vec3::zeros(),
             last: Vec3::zeros(),
-            quadric: Triangle::default(),
+            quadric: LeastSquares::default(),
             extent: [[0.0; 2]; 13],
             samples: 0,
         }

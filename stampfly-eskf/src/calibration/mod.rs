@@ -16,13 +16,13 @@
 //! [`CalibrationResult`]: stampfly_types::messages::CalibrationResult
 
 mod ellipsoid;
+mod least_squares;
 mod level_trim;
 mod principal_axes;
 mod six_position;
 mod still;
 mod stillness;
 mod temperature;
-mod triangle;
 
 pub use ellipsoid::{EllipsoidConfig, EllipsoidFailure, EllipsoidFit, EllipsoidQuality, MagCorrection, MagRefusal};
 pub use level_trim::{LevelTrim, LevelTrimQuality, LevelTrimRefusal, Trim};
@@ -31,4 +31,4 @@ pub use six_position::{
 };
 pub use still::{StillCalibration, StillQuality};
 pub use stillness::{NotStill, StillAverage, StillMean, StillnessConfig};
-pub use temperature::{Reach, TemperatureBias, TemperatureQuality, TemperatureRefusal, TemperatureTable};
+pub use temperature::{Coverage, TemperatureBias, TemperatureQuality, TemperatureRefusal, TemperatureTable};

@@ -10,7 +10,7 @@
 //! Method: Gauss-Newton on the lengths; D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU
 //! calibration without external equipments", ICRA 2014, with three scales and three biases for unknowns.
 
-use super::triangle::Triangle;
+use super::least_squares::LeastSquares;
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{GRAVITY, Instant, Vec3, math};
@@ -234,7 +234,7 @@ impl SixPosition {
         let mut correction = none;
         // Converges to the last bit in four.
         for _ in 0..8 {
-            let mut equations = Triangle::<7>::default();
+            let mut equations = LeastSquares::<7>::default();
             for measured in self.forces() {
                 let force = correction.correct(*measured);
                 let up = force / force.norm();

@@ -41,7 +41,7 @@ pub enum TemperatureRefusal {
 
 /// Whether the table knows the temperature that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reach {
+pub enum Coverage {
     /// Between two temperatures it has seen.
     Inside,
     /// Outside by up to one bin of 5 °C: the outermost slope is continued.
@@ -58,7 +58,7 @@ pub struct TemperatureBias {
     /// Change of the accelerometer's bias, body FRD, m/s².
     pub accel: Vec3,
     /// How far the table can be trusted with it.
-    pub reach: Reach,
+    pub coverage: Coverage,
     /// Still samples behind it: of the poorer of the two bins used.
     pub samples: u32,
 }
@@ -106,7 +106,7 @@ impl Bin {
 /// The table. Plain data: keep it over power-offs, and feed it after each power-on.
 ///
 /// ```
-/// use stampfly_eskf::calibration::{Reach, TemperatureTable};
+/// use stampfly_eskf::calibration::{Coverage, TemperatureTable};
 /// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut table = TemperatureTable::default();
 /// for k in 0..60_000 {
@@ -116,8 +116,8 @@ impl Bin {
 ///     table.step(Instant::from_micros(2_500 * k), &ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro, temperature }).unwrap();
 /// }
 /// let bias = table.bias(33.0).unwrap();
-/// assert!((bias.gyro.x - 0.0026).abs() < 2e-5 && bias.reach == Reach::Inside);
-/// assert_eq!(table.bias(80.0).unwrap().reach, Reach::Clamped);
+/// assert!((bias.gyro.x - 0.0026).abs() < 2e-5 && bias.coverage == Coverage::Inside);
+/// assert_eq!(table.bias(80.0).unwrap().coverage, Coverage::Clamped);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -176,7 +176,7 @@ impl TemperatureTable {
         let anchor = match (self.anchor, self.bias(temperature)) {
             (Some(anchor), _) => anchor,
             (None, None) => mean.accel,
-            (None, Some(known)) if known.reach != Reach::Clamped => mean.accel - known.accel,
+            (None, Some(known)) if known.coverage != Coverage::Clamped => mean.accel - known.accel,
             (None, Some(_)) => return Err(TemperatureRefusal::Moved),
         };
         self.anchor = Some(anchor);
@@ -200,10 +200,10 @@ impl TemperatureTable {
             return None;
         }
         let [low, high] = self.span;
-        let reach = match (low - temperature).max(temperature - high) {
-            outside if outside <= 0.0 => Reach::Inside,
-            outside if outside <= WIDTH => Reach::Beside,
-            _ => Reach::Clamped,
+        let coverage = match (low - temperature).max(temperature - high) {
+            outside if outside <= 0.0 => Coverage::Inside,
+            outside if outside <= WIDTH => Coverage::Beside,
+            _ => Coverage::Clamped,
         };
         let temperature = temperature.max(low - WIDTH).min(high + WIDTH);
         // The two bins around it; outside, the outermost and the nearest that is far enough for a slope.
@@ -223,7 +223,7 @@ impl TemperatureTable {
         Some(TemperatureBias {
             gyro: a.gyro + (b.gyro - a.gyro) * share,
             accel: a.accel + (b.accel - a.accel) * share,
-            reach,
+            coverage,
             samples: a.samples.min(b.samples),
         })
     }

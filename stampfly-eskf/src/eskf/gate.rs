@@ -1,19 +1,26 @@
-//! Who has been heard lately, who has been refused for too long, and what follows from that.
+//! Innovation gates: which sensor was fused lately, which has been locked out, and how often the state was reset.
 //!
-//! A measurement whose squared distance from the prediction is beyond the gate is left out. That is right for an
-//! outlier and wrong for a filter that has gone astray: its gates would keep out the very sensors that could put it
-//! right. So a sensor that keeps disagreeing for [`lockout`](crate::EskfConfig::lockout) seconds is believed, and
-//! a filter that has to be put right again and again says that it is lost.
+//! A measurement with a test ratio above one is rejected. That is right for an outlier and wrong for a filter that has
+//! diverged: its gates would reject the very sensors that could correct it. So the state is reset to a sensor that has
+//! been rejected for longer than [`lockout`](crate::EskfConfig::lockout), and many resets in a row report divergence.
+//!
+//! | of any sensor | condition |
+//! |---|---|
+//! | start | its first measurement with a test ratio of at most one |
+//! | continue ([`Gates::is_recent`]) | the last accepted measurement is less than a second old |
+//! | stop | a second without an accepted measurement |
+//! | reset ([`GateResult::Reset`]) | every measurement rejected for longer than `lockout` |
+//! | divergence ([`Gates::count_reset`]) | eight resets, each within 1.5 s of the one before |
 
 use stampfly_types::{Duration, Instant};
 
-/// A sensor counts as taking part this long after its last accepted sample.
+/// A sensor counts as active this long after its last accepted measurement.
 const AIDING_TIMEOUT: Duration = Duration::from_micros(1_000_000);
-/// So many resets, each within [`CALM`] of the one before, and the estimate is lost.
-const TOO_MANY_RESETS: u32 = 8;
-const CALM: Duration = Duration::from_micros(1_500_000);
+/// So many resets, each within [`RESET_INTERVAL`] of the one before, mean divergence.
+const MAX_RESETS: u32 = 8;
+const RESET_INTERVAL: Duration = Duration::from_micros(1_500_000);
 
-/// The measurements, by what they are kept apart for.
+/// The measurements that are gated, each by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sensor {
     Tof,
@@ -29,42 +36,42 @@ pub(super) enum Sensor {
 /// Number of [`Sensor`]s.
 const SENSORS: usize = Sensor::Attitude as usize + 1;
 
-/// What one sensor has been doing.
+/// Time stamps of one sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Record {
+struct SensorRecord {
     /// Stamp of its newest measurement.
     stamp: Option<Instant>,
-    /// When one was accepted last.
+    /// When one was last accepted.
     fused: Option<Instant>,
-    /// Since when it has been refused without a break.
+    /// Since when every one has been rejected.
     gated_since: Option<Instant>,
 }
 
-/// What to do with a measurement.
+/// What the gate decides about a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Verdict {
-    /// Absorb it.
+pub(super) enum GateResult {
+    /// Update with it.
     Fuse,
-    /// Leave it out.
-    Leave,
-    /// It has been left out for too long: believe it.
-    Believe,
+    /// Reject it.
+    Reject,
+    /// The sensor has been locked out: reset the state to it.
+    Reset,
 }
 
-/// The records of all sensors.
+/// The gates of all sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gates {
-    records: [Record; SENSORS],
+    records: [SensorRecord; SENSORS],
     last_reset: Instant,
-    /// Resets since things were last calm.
+    /// Resets, each within [`RESET_INTERVAL`] of the one before.
     resets: u32,
 }
 
 impl Gates {
     #[inline]
-    fn record(&mut self, sensor: Sensor) -> &mut Record {
+    fn record(&mut self, sensor: Sensor) -> &mut SensorRecord {
         &mut self.records[sensor as usize]
     }
 
@@ -85,19 +92,19 @@ impl Gates {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
     }
 
-    /// Judges a measurement by its test ratio.
+    /// Tests a measurement's ratio against its gate, with a lock-out time in seconds.
     #[inline]
-    pub(super) fn judge(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32) -> Verdict {
+    pub(super) fn test(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32) -> GateResult {
         let record = self.record(sensor);
         if ratio <= 1.0 {
             self.accept(sensor, now);
-            return Verdict::Fuse;
+            return GateResult::Fuse;
         }
         let since = *record.gated_since.get_or_insert(now);
-        if now.since(since).seconds() > lockout { Verdict::Believe } else { Verdict::Leave }
+        if now.since(since).seconds() > lockout { GateResult::Reset } else { GateResult::Reject }
     }
 
-    /// Notes that a measurement went in.
+    /// Records an accepted measurement.
     #[inline]
     pub(super) fn accept(&mut self, sensor: Sensor, now: Instant) {
         let record = self.record(sensor);
@@ -105,22 +112,22 @@ impl Gates {
         record.gated_since = None;
     }
 
-    /// Gives a sensor that was locked out another [`lockout`](crate::EskfConfig::lockout) to fit in by itself.
-    pub(super) fn wait(&mut self, sensor: Sensor, now: Instant) {
+    /// Restarts the lock-out time of a sensor, after an inflation that should let it pass.
+    pub(super) fn restart_lockout(&mut self, sensor: Sensor, now: Instant) {
         self.record(sensor).gated_since = Some(now);
     }
 
-    /// Notes that the state was moved to a sensor. True when that has happened too often: the estimate is lost.
-    pub(super) fn reset(&mut self, sensor: Sensor, now: Instant) -> bool {
+    /// Records a reset of the state to a sensor. True when the resets mean divergence.
+    pub(super) fn record_reset(&mut self, sensor: Sensor, now: Instant) -> bool {
         self.accept(sensor, now);
-        self.doubt(now)
+        self.count_reset(now)
     }
 
-    /// Notes that the estimate could not be right as it was. True when that has happened too often: it is lost.
-    pub(super) fn doubt(&mut self, now: Instant) -> bool {
-        self.resets = if now.since(self.last_reset) > CALM { 1 } else { self.resets.saturating_add(1) };
+    /// Counts a reset or an inflation. True when there were too many in a row: divergence.
+    pub(super) fn count_reset(&mut self, now: Instant) -> bool {
+        self.resets = if now.since(self.last_reset) > RESET_INTERVAL { 1 } else { self.resets.saturating_add(1) };
         self.last_reset = now;
-        self.resets >= TOO_MANY_RESETS
+        self.resets >= MAX_RESETS
     }
 }
 
@@ -129,31 +136,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lockout_ends_in_belief() {
+    fn a_sensor_rejected_for_the_lockout_time_resets_the_state() {
         let mut gates = Gates::default();
         let at = |millis: u64| Instant::from_millis(millis);
-        assert_eq!(gates.judge(Sensor::Tof, at(0), 0.5, 0.2), Verdict::Fuse);
+        assert_eq!(gates.test(Sensor::Tof, at(0), 0.5, 0.2), GateResult::Fuse);
         assert!(gates.is_recent(Sensor::Tof, at(900)) && !gates.is_recent(Sensor::Tof, at(1_100)));
         for millis in [1_100, 1_200, 1_300] {
-            assert_eq!(gates.judge(Sensor::Tof, at(millis), 9.0, 0.2), Verdict::Leave, "{millis}");
+            assert_eq!(gates.test(Sensor::Tof, at(millis), 9.0, 0.2), GateResult::Reject, "{millis}");
         }
-        assert_eq!(gates.judge(Sensor::Tof, at(1_301), 9.0, 0.2), Verdict::Believe);
+        assert_eq!(gates.test(Sensor::Tof, at(1_301), 9.0, 0.2), GateResult::Reset);
         // One that fits in between starts the count anew.
-        gates.judge(Sensor::Tof, at(1_310), 0.1, 0.2);
-        assert_eq!(gates.judge(Sensor::Tof, at(1_600), 9.0, 0.2), Verdict::Leave);
+        gates.test(Sensor::Tof, at(1_310), 0.1, 0.2);
+        assert_eq!(gates.test(Sensor::Tof, at(1_600), 9.0, 0.2), GateResult::Reject);
     }
 
     #[test]
-    fn resets_in_a_row_are_a_lost_estimate_and_rare_ones_are_not() {
-        let lost = |period: u64| {
+    fn many_resets_in_a_row_report_divergence_and_rare_ones_do_not() {
+        let diverged = |period: u64| {
             let mut gates = Gates::default();
-            (1..20u64).any(|n| gates.reset(Sensor::Flow, Instant::from_millis(10_000 + n * period)))
+            (1..20u64).any(|n| gates.record_reset(Sensor::Flow, Instant::from_millis(10_000 + n * period)))
         };
-        assert!(lost(220) && lost(1_000) && !lost(2_000));
+        assert!(diverged(220) && diverged(1_000) && !diverged(2_000));
     }
 
     #[test]
-    fn a_stamp_counts_once() {
+    fn a_stamp_is_new_only_once_per_sensor() {
         let mut gates = Gates::default();
         assert!(
             gates.is_new(Sensor::Baro, Instant::from_micros(10))

@@ -1,4 +1,4 @@
-//! The filter as an [`Estimator`]: started, told, moved, asked.
+//! The filter as an [`Estimator`]: initialise, command, predict, estimate.
 
 use super::gate::Sensor;
 use super::*;
@@ -9,7 +9,7 @@ impl Estimator for Eskf {
         if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
             return;
         }
-        // Field by field would forget one; a whole one beside this one would be a second estimator on the stack.
+        // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the stack.
         let command = self.command;
         *self = Self::new(self.config);
         self.now = at;
@@ -18,11 +18,12 @@ impl Estimator for Eskf {
         self.command = command;
         self.state.gyro_bias = calibration.gyro_bias;
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
-        self.start = self.state.rotation();
-        self.baro_seen = at;
-        self.field = (calibration.field.norm() > 1.0).then(|| rotate(&self.start, &calibration.field.normalize()));
+        self.pending_rotation = self.state.rotation();
+        self.baro_updated = at;
+        self.field =
+            (calibration.field.norm() > 1.0).then(|| rotate(&self.pending_rotation, &calibration.field.normalize()));
         self.anchor = self.command.on_ground.then(Vec3::zeros);
-        self.know_heading();
+        self.constrain_heading();
     }
 
     fn command(&mut self, at: Instant, command: &EstimatorCommand) {
@@ -65,85 +66,85 @@ impl Estimator for Eskf {
         }
         self.now = at;
         if dt > MAX_STEP {
-            self.forget_past();
+            self.reset_history();
         }
         let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
         self.history.add(&motion);
-        let [force, rate] = &mut self.roughness;
+        let [force, rate] = &mut self.vibration;
         force.add(&imu.accel, motion.dt);
         rate.add(&imu.gyro, motion.dt);
-        self.pending.extend(&motion);
-        if self.pending.duration > DOUBT_STEP {
-            let [force, rate] = self.roughness.map(|roughness| roughness.mean_square() * motion.dt);
+        self.pending_step.extend(&motion);
+        if self.pending_step.duration > COVARIANCE_STEP {
+            let [force, rate] = self.vibration.map(|vibration| vibration.mean_square() * motion.dt);
             let noise = ProcessNoise {
-                velocity: self.noise.velocity + self.config.accel_roughness * force,
-                attitude: self.noise.attitude + self.config.gyro_roughness * rate,
+                velocity: self.noise.velocity + self.config.accel_vibration * force,
+                attitude: self.noise.attitude + self.config.gyro_vibration * rate,
                 ..self.noise
             };
-            self.covariance.propagate(&self.start, &self.pending, &noise);
-            self.pending = Passage::default();
-            self.start = self.state.rotation();
+            self.covariance.propagate(&self.pending_rotation, &self.pending_step, &noise);
+            self.pending_step = PropagationStep::default();
+            self.pending_rotation = self.state.rotation();
         }
         self.rate = motion.rate;
         self.force = motion.force;
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
-        // Half way between two looks at gravity, so that no step does both.
+        // Half way between two updates with gravity, so that no step does both.
         if let Some(anchor) = self.anchor
-            && self.steps % STILL_DIVIDER == STILL_DIVIDER / 2
+            && self.steps % PSEUDO_MEASUREMENT_DIVIDER == PSEUDO_MEASUREMENT_DIVIDER / 2
         {
-            self.absorb_standing(anchor);
+            self.constrain_stationary(anchor);
         }
-        if self.steps.is_multiple_of(STILL_DIVIDER)
+        if self.steps.is_multiple_of(PSEUDO_MEASUREMENT_DIVIDER)
             && let Some(accel) = self.accels.take()
         {
-            self.assume(accel, dt * STILL_DIVIDER as f32);
+            self.apply_pseudo_measurements(accel, dt * PSEUDO_MEASUREMENT_DIVIDER as f32);
         }
         if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() {
-            self.absorb_gravity(imu.accel, &self.acceleration.at(at), self.config.gravity_sigma);
+            self.update_gravity(imu.accel, &self.acceleration.at(at), self.config.gravity_sigma);
         }
-        self.watch();
+        self.check_health();
     }
 
     fn fuse_tof(&mut self, at: Instant, tof: &TofData) -> Fusion {
-        let fusion = self.try_tof(at, tof).unwrap_or_else(Fusion::Refused);
+        let fusion = self.update_tof(at, tof).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Tof, fusion)
     }
 
     fn fuse_flow(&mut self, at: Instant, flow: &FlowData) -> Fusion {
-        let fusion = self.try_flow(at, flow).unwrap_or_else(Fusion::Refused);
+        let fusion = self.update_flow(at, flow).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Flow, fusion)
     }
 
     fn fuse_baro(&mut self, at: Instant, baro: &BaroData) -> Fusion {
-        let fusion = self.try_baro(at, baro).unwrap_or_else(Fusion::Refused);
+        let fusion = self.update_baro(at, baro).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Baro, fusion)
     }
 
     fn fuse_mag(&mut self, at: Instant, mag: &MagData) -> Fusion {
-        let fusion = self.try_mag(at, mag).unwrap_or_else(Fusion::Refused);
+        let fusion = self.update_mag(at, mag).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Mag, fusion)
     }
 
     fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Fusion {
-        self.try_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
+        self.update_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
     }
 
     fn fuse_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Fusion {
-        self.try_position(at, position, sigma).unwrap_or_else(Fusion::Refused)
+        self.update_position(at, position, sigma).unwrap_or_else(Fusion::Refused)
     }
 
     fn fuse_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Fusion {
-        self.try_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused)
+        self.update_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused)
     }
 
     fn estimate(&self) -> StateEstimate {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
-        let standing = self.anchor.is_some();
+        let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let outside = recent(Sensor::Velocity) || recent(Sensor::Position);
-        let horizontal = sound && self.holds_velocity();
-        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || outside || standing);
+        let external = recent(Sensor::Velocity) || recent(Sensor::Position);
+        let horizontal = sound && self.is_velocity_aided();
+        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || external || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
             .set(Validity::HEADING, self.initialized)
@@ -157,8 +158,8 @@ impl Estimator for Eskf {
             .set(SensorMask::BARO, recent(Sensor::Baro))
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
-            .set(SensorMask::STATIONARY, standing)
-            .set(SensorMask::EXTERNAL, outside || recent(Sensor::Attitude));
+            .set(SensorMask::STATIONARY, stationary)
+            .set(SensorMask::EXTERNAL, external || recent(Sensor::Attitude));
         let p = &self.covariance;
         StateEstimate {
             attitude: self.state.quat(),

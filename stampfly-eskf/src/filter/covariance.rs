@@ -4,12 +4,12 @@
 //! turns them into vector instructions on a host and into tight loops on a microcontroller. Propagation uses the
 //! block structure of F: of the fifteen rows nine change, and of those the last six columns change only by the row
 //! operation; the other triangle is a mirror of the first. An update of several axes is sequential and scalar, so no
-//! matrix is inverted, but it makes its directions independent of each other first and then passes over the matrix
+//! matrix is inverted, but it whitens the innovations first and then passes over the matrix
 //! once. The matrix stays exactly symmetric by construction: the update subtracts w·wᵀ, the propagation mirrors.
 
 pub use super::layout::N;
 use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY};
-use super::passage::Passage;
+use super::propagation::PropagationStep;
 use super::state::{Rotation, rotation_matrix};
 use stampfly_types::math;
 
@@ -39,34 +39,34 @@ pub struct ProcessNoise {
     pub accel_bias: f32,
 }
 
-/// What a measurement of `M` axes would do to the state.
+/// The innovation of a measurement of `M` axes, whitened, and the gain that goes with it.
 ///
 /// The axes are made independent by a Cholesky factorisation of their innovation covariance S = L·Lᵀ: the innovations
 /// become L⁻¹·y, each of variance one, and P·Hᵀ becomes P·Hᵀ·L⁻ᵀ. This is the sequential update (Bierman,
 /// "Factorization Methods for Discrete Sequential Estimation", 1977, section V.3) without touching P before the
 /// measurement has passed its gate.
 #[derive(Clone, Copy, Debug)]
-pub struct Projection<const M: usize> {
-    /// Columns of P·Hᵀ·L⁻ᵀ.
-    directions: [Row; M],
+pub struct Innovation<const M: usize> {
+    /// Square-root gain, the columns of P·Hᵀ·L⁻ᵀ.
+    gain: [Row; M],
     /// L⁻¹·y.
-    innovations: [f32; M],
+    whitened: [f32; M],
 }
 
-impl<const M: usize> Projection<M> {
-    /// The innovations, independent of each other and each of variance one when the filter is consistent.
+impl<const M: usize> Innovation<M> {
+    /// The whitened innovations: independent of each other and each of variance one when the filter is consistent.
     #[inline]
     #[must_use]
-    pub fn innovations(&self) -> &[f32; M] {
-        &self.innovations
+    pub fn whitened(&self) -> &[f32; M] {
+        &self.whitened
     }
 
-    /// Squared Mahalanobis distance yᵀ·S⁻¹·y of the measurement (NIS): χ²-distributed with `M` degrees of freedom when
+    /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with `M` degrees of freedom when
     /// the filter is consistent.
     #[inline]
     #[must_use]
-    pub fn distance(&self) -> f32 {
-        self.innovations.iter().map(|v| v * v).sum()
+    pub fn nis(&self) -> f32 {
+        self.whitened.iter().map(|v| v * v).sum()
     }
 }
 
@@ -86,7 +86,7 @@ const WHOLE_ROWS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64
 /// Adds multiples of rows to columns `FIRST` to `N` of a row, one after the other. By `WHOLE` rows, the columns before
 /// `FIRST` are written as well.
 #[inline]
-fn add_all<const FIRST: usize, const K: usize, const WHOLE: bool>(to: &mut Row, parts: [(f32, &Row); K]) {
+fn add_multiples<const FIRST: usize, const K: usize, const WHOLE: bool>(to: &mut Row, parts: [(f32, &Row); K]) {
     if WHOLE {
         for (factor, row) in parts {
             for (cell, value) in to.iter_mut().zip(row) {
@@ -122,7 +122,7 @@ impl Covariance {
         self.rows.get(row).and_then(|r| r.get(column)).copied().unwrap_or(0.0)
     }
 
-    /// Replaces the variance of one state and forgets its correlations.
+    /// Replaces the variance of one state and sets its covariances to zero.
     pub fn reset(&mut self, state: usize, variance: f32) {
         for (i, row) in self.rows.iter_mut().enumerate() {
             if i == state {
@@ -134,7 +134,7 @@ impl Covariance {
         }
     }
 
-    /// Adds to the variance of one state.
+    /// Inflates the variance of one state by `variance`.
     pub fn inflate(&mut self, state: usize, variance: f32) {
         if let Some(cell) = self.rows.get_mut(state).and_then(|row| row.get_mut(state)) {
             *cell += variance;
@@ -148,30 +148,30 @@ impl Covariance {
         sum.is_finite() && self.rows.iter().enumerate().all(|(i, row)| row[i] > 0.0)
     }
 
-    /// P ← F·P·Fᵀ + Q over a short passage that began in the attitude `rotation`.
+    /// P ← F·P·Fᵀ + Q over a short step that begins in the attitude `rotation`.
     ///
     /// F = I, plus τ in position ← velocity, −\[s\]×·R in velocity ← attitude, −R·τ in velocity ← accelerometer bias,
-    /// ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s and ΔR of the [`Passage`]. Terms of second
+    /// ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s and ΔR of the [`PropagationStep`]. Terms of second
     /// order in τ are left out of the position.
     #[inline]
-    pub fn propagate(&mut self, rotation: &Rotation, passage: &Passage, noise: &ProcessNoise) {
-        self.propagate_by::<WHOLE_ROWS>(rotation, passage, noise);
+    pub fn propagate(&mut self, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) {
+        self.propagate_with::<WHOLE_ROWS>(rotation, step, noise);
     }
 
     #[inline]
-    fn propagate_by<const WHOLE: bool>(&mut self, rotation: &Rotation, passage: &Passage, noise: &ProcessNoise) {
-        let Passage { duration: dt, impulse, .. } = *passage;
+    fn propagate_with<const WHOLE: bool>(&mut self, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) {
+        let PropagationStep { duration: dt, delta_velocity, .. } = *step;
         let [north, east, down] = rotation;
         let cross = |a: f32, x: &[f32; 3], b: f32, y: &[f32; 3]| {
             [a * x[0] - b * y[0], a * x[1] - b * y[1], a * x[2] - b * y[2]]
         };
         let by_attitude = [
-            cross(impulse.z, east, impulse.y, down),
-            cross(impulse.x, down, impulse.z, north),
-            cross(impulse.y, north, impulse.x, east),
+            cross(delta_velocity.z, east, delta_velocity.y, down),
+            cross(delta_velocity.x, down, delta_velocity.z, north),
+            cross(delta_velocity.y, north, delta_velocity.x, east),
         ];
         let by_bias = rotation.map(|row| row.map(|v| -dt * v));
-        let [a, b, c] = rotation_matrix(passage.turn);
+        let [a, b, c] = rotation_matrix(step.delta_rotation);
         let turn = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
 
         let driving = [0.0, noise.velocity, noise.attitude, noise.gyro_bias, noise.accel_bias];
@@ -184,15 +184,15 @@ impl Covariance {
             let [x, y, z] = [0, 1, 2].map(|axis| &p[ATTITUDE + axis]);
             let bias = [0, 1, 2].map(|axis| &p[ACCEL_BIAS + axis]);
             let mut row = p[POSITION + i];
-            add_all::<POSITION, 1, WHOLE>(&mut row, [(dt, &p[VELOCITY + i])]);
+            add_multiples::<POSITION, 1, WHOLE>(&mut row, [(dt, &p[VELOCITY + i])]);
             t[i] = row;
             let mut row = p[VELOCITY + i];
-            add_all::<VELOCITY, 3, WHOLE>(&mut row, [(a[0], x), (a[1], y), (a[2], z)]);
-            add_all::<VELOCITY, 3, WHOLE>(&mut row, [(b[0], bias[0]), (b[1], bias[1]), (b[2], bias[2])]);
+            add_multiples::<VELOCITY, 3, WHOLE>(&mut row, [(a[0], x), (a[1], y), (a[2], z)]);
+            add_multiples::<VELOCITY, 3, WHOLE>(&mut row, [(b[0], bias[0]), (b[1], bias[1]), (b[2], bias[2])]);
             t[3 + i] = row;
             let mut row = [0.0; WIDTH];
-            add_all::<ATTITUDE, 3, WHOLE>(&mut row, [(c[0], x), (c[1], y), (c[2], z)]);
-            add_all::<ATTITUDE, 1, WHOLE>(&mut row, [(-dt, &p[GYRO_BIAS + i])]);
+            add_multiples::<ATTITUDE, 3, WHOLE>(&mut row, [(c[0], x), (c[1], y), (c[2], z)]);
+            add_multiples::<ATTITUDE, 1, WHOLE>(&mut row, [(-dt, &p[GYRO_BIAS + i])]);
             t[6 + i] = row;
         }
 
@@ -212,7 +212,7 @@ impl Covariance {
                 row[6 + i] = c[0] * t[6] + c[1] * t[7] + c[2] * t[8] - dt * t[9 + i];
             }
         }
-        // Mirror: the upper triangle is the truth.
+        // Mirror: the upper triangle is the one computed.
         for i in 1..N {
             for j in 0..i.min(9) {
                 self.rows[i][j] = self.rows[j][i];
@@ -224,17 +224,17 @@ impl Covariance {
         }
     }
 
-    /// Projects a measurement of `M` axes: Jacobians by the error states, innovations, and the variance of each axis'
-    /// noise, which must be positive. Entries of a Jacobian that are zero cost next to nothing.
+    /// The innovation of a measurement of `M` axes from its Jacobians by the error states, its innovations, and the
+    /// variance of each axis' noise, which must be positive. The covariance stays as it is. Entries of a Jacobian that are zero cost next to nothing.
     #[inline]
     #[must_use]
-    pub fn project<const M: usize>(
+    pub fn innovation<const M: usize>(
         &self,
         jacobians: &[[f32; N]; M],
         innovations: [f32; M],
         variances: [f32; M],
-    ) -> Projection<M> {
-        let mut projection = Projection { directions: [[0.0; WIDTH]; M], innovations };
+    ) -> Innovation<M> {
+        let mut result = Innovation { gain: [[0.0; WIDTH]; M], whitened: innovations };
         for (axis, (jacobian, noise)) in jacobians.iter().zip(variances).enumerate() {
             // Models touch few blocks of three states: the others are skipped whole.
             let blocks = jacobian.as_chunks::<3>().0;
@@ -247,63 +247,64 @@ impl Covariance {
                 }
                 sum
             };
-            let mut direction = [0.0; WIDTH];
+            let mut column = [0.0; WIDTH];
             for ([a, b, c], [x, y, z]) in blocks.iter().zip(self.rows.as_chunks::<3>().0) {
                 if [*a, *b, *c] != [0.0; 3] {
-                    add_all::<0, 3, WHOLE_ROWS>(&mut direction, [(*a, x), (*b, y), (*c, z)]);
+                    add_multiples::<0, 3, WHOLE_ROWS>(&mut column, [(*a, x), (*b, y), (*c, z)]);
                 }
             }
-            // What the axes before it already say about this one.
-            let mut innovation = projection.innovations[axis];
+            // Decorrelate from the axes before it.
+            let mut innovation = result.whitened[axis];
             for before in 0..axis {
-                let known = &projection.directions[before];
-                let shared = dot(known);
-                add_all::<0, 1, WHOLE_ROWS>(&mut direction, [(-shared, known)]);
-                innovation -= shared * projection.innovations[before];
+                let earlier = &result.gain[before];
+                let shared = dot(earlier);
+                add_multiples::<0, 1, WHOLE_ROWS>(&mut column, [(-shared, earlier)]);
+                innovation -= shared * result.whitened[before];
             }
-            let variance = dot(&direction) + noise;
+            let variance = dot(&column) + noise;
             let scale = 1.0 / math::sqrt(variance.max(noise));
-            projection.directions[axis] = direction.map(|v| v * scale);
-            projection.innovations[axis] = innovation * scale;
+            result.gain[axis] = column.map(|v| v * scale);
+            result.whitened[axis] = innovation * scale;
         }
-        projection
+        result
     }
 
-    /// Absorbs a projected measurement: P ← P − P·Hᵀ·S⁻¹·H·P. Returns the correction of the error state, which goes to
-    /// [`Nominal::correct`](super::Nominal::correct).
+    /// Updates the covariance with a measurement: P ← P − P·Hᵀ·S⁻¹·H·P, in the square-root form P − D·Dᵀ with
+    /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
+    /// [`NominalState::correct`](super::NominalState::correct).
     ///
-    /// Must follow [`Self::project`] directly; a change of P in between makes the projection stale.
+    /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
     #[inline]
-    pub fn absorb<const M: usize>(&mut self, projection: &Projection<M>) -> [f32; N] {
-        self.absorb_by::<M, WHOLE_ROWS>(projection)
+    pub fn update<const M: usize>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
+        self.update_with::<M, WHOLE_ROWS>(innovation)
     }
 
     #[inline]
-    fn absorb_by<const M: usize, const WHOLE: bool>(&mut self, projection: &Projection<M>) -> [f32; N] {
-        let Projection { directions, innovations } = projection;
-        // What is not a number is not spread: a sum with one in it is none.
-        if directions.iter().flatten().sum::<f32>().is_nan() {
+    fn update_with<const M: usize, const WHOLE: bool>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
+        let Innovation { gain, whitened } = innovation;
+        // A NaN must not spread into the covariance: any NaN makes the sum one.
+        if gain.iter().flatten().sum::<f32>().is_nan() {
             return [f32::NAN; N];
         }
         if WHOLE {
             for (i, place) in self.rows.iter_mut().enumerate() {
                 let mut row = *place;
-                for direction in directions {
+                for column in gain {
                     // Never; it keeps the compiler from working down the columns.
-                    if direction[i].is_nan() {
+                    if column[i].is_nan() {
                         return [f32::NAN; N];
                     }
-                    add_all::<0, 1, WHOLE>(&mut row, [(-direction[i], direction)]);
+                    add_multiples::<0, 1, WHOLE>(&mut row, [(-column[i], column)]);
                 }
                 *place = row;
             }
         } else {
             // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
-            self.shrink::<POSITION, M>(directions);
-            self.shrink::<VELOCITY, M>(directions);
-            self.shrink::<ATTITUDE, M>(directions);
-            self.shrink::<GYRO_BIAS, M>(directions);
-            self.shrink::<ACCEL_BIAS, M>(directions);
+            self.subtract_outer_products::<POSITION, M>(gain);
+            self.subtract_outer_products::<VELOCITY, M>(gain);
+            self.subtract_outer_products::<ATTITUDE, M>(gain);
+            self.subtract_outer_products::<GYRO_BIAS, M>(gain);
+            self.subtract_outer_products::<ACCEL_BIAS, M>(gain);
             for i in 3..N {
                 for j in 0..i / 3 * 3 {
                     self.rows[i][j] = self.rows[j][i];
@@ -311,8 +312,8 @@ impl Covariance {
             }
         }
         let mut correction = [0.0; N];
-        for (direction, innovation) in directions.iter().zip(innovations) {
-            for (cell, value) in correction.iter_mut().zip(direction) {
+        for (column, innovation) in gain.iter().zip(whitened) {
+            for (cell, value) in correction.iter_mut().zip(column) {
                 *cell += innovation * value;
             }
         }
@@ -321,11 +322,11 @@ impl Covariance {
 }
 
 impl Covariance {
-    /// Subtracts the directions' w·wᵀ from the three rows from `FIRST` on, on the diagonal block and to its right.
+    /// Subtracts w·wᵀ of each column w of the gain from the three rows from `FIRST` on, on the diagonal block and to its right.
     #[inline]
-    fn shrink<const FIRST: usize, const M: usize>(&mut self, directions: &[Row; M]) {
+    fn subtract_outer_products<const FIRST: usize, const M: usize>(&mut self, gain: &[Row; M]) {
         for (i, row) in self.rows.iter_mut().enumerate().skip(FIRST).take(3) {
-            add_all::<FIRST, M, false>(row, directions.each_ref().map(|direction| (-direction[i], direction)));
+            add_multiples::<FIRST, M, false>(row, gain.each_ref().map(|column| (-column[i], column)));
         }
     }
 }
@@ -333,7 +334,7 @@ impl Covariance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::state::Nominal;
+    use crate::filter::state::NominalState;
     use nalgebra::SMatrix;
     use proptest::prelude::*;
     use stampfly_types::Vec3;
@@ -345,16 +346,16 @@ mod tests {
     }
 
     /// The same step in the text book's form, dense and in double precision.
-    fn reference(p: &Dense, rotation: &Rotation, passage: &Passage, noise: &ProcessNoise) -> Dense {
-        let dt = f64::from(passage.duration);
+    fn reference(p: &Dense, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) -> Dense {
+        let dt = f64::from(step.duration);
         let matrix = |m: &Rotation| nalgebra::Matrix3::from_fn(|i, j| f64::from(m[i][j]));
         let r = matrix(rotation);
         let mut transition = Dense::identity();
         let eye = nalgebra::Matrix3::identity();
         transition.fixed_view_mut::<3, 3>(0, 3).copy_from(&(eye * dt));
-        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&-(passage.impulse.map(f64::from).cross_matrix() * r));
+        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&-(step.delta_velocity.map(f64::from).cross_matrix() * r));
         transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&(-r * dt));
-        transition.fixed_view_mut::<3, 3>(6, 6).copy_from(&matrix(&rotation_matrix(passage.turn)).transpose());
+        transition.fixed_view_mut::<3, 3>(6, 6).copy_from(&matrix(&rotation_matrix(step.delta_rotation)).transpose());
         transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&(-eye * dt));
         let mut next = transition * p * transition.transpose();
         for i in 0..3 {
@@ -397,17 +398,17 @@ mod tests {
             // The other way through the rows, which this machine does not take by itself.
             let mut other = p;
             let mut exact = dense(&p);
-            let mut state = Nominal::default();
-            for step in 0..1000usize {
-                let (x, y, z, a) = rates[step / 50];
-                let (rotation, mut passage) = (state.rotation(), Passage::default());
+            let mut state = NominalState::default();
+            for n in 0..1000usize {
+                let (x, y, z, a) = rates[n / 50];
+                let (rotation, mut step) = (state.rotation(), PropagationStep::default());
                 for _ in 0..2 {
-                    passage.extend(&state.propagate(&Vec3::new(a, -a, -9.8 + z), &Vec3::new(x, y, z), 0.0025));
+                    step.extend(&state.propagate(&Vec3::new(a, -a, -9.8 + z), &Vec3::new(x, y, z), 0.0025));
                 }
-                exact = reference(&exact, &rotation, &passage, &NOISE);
-                p.propagate_by::<true>(&rotation, &passage, &NOISE);
-                other.propagate_by::<false>(&rotation, &passage, &NOISE);
-                if step % 4 == 0 {
+                exact = reference(&exact, &rotation, &step, &NOISE);
+                p.propagate_with::<true>(&rotation, &step, &NOISE);
+                other.propagate_with::<false>(&rotation, &step, &NOISE);
+                if n % 4 == 0 {
                     let h = [
                         jacobian(&[(0, 0.2), (4, 0.9), (6, a), (7, x), (10, 0.3)]),
                         jacobian(&[(3, 0.7), (4, -0.2), (8, z)]),
@@ -420,11 +421,11 @@ mod tests {
                     let s = (dense_h * exact * dense_h.transpose() + noise).try_inverse().unwrap();
                     let gain = exact * dense_h.transpose() * s;
 
-                    let projection = p.project(&h, y, r);
+                    let whitened = p.innovation(&h, y, r);
                     let distance = (innovation.transpose() * s * innovation)[0];
-                    prop_assert!((f64::from(projection.distance()) / distance - 1.0).abs() < 1e-2);
-                    let correction = p.absorb_by::<3, true>(&projection);
-                    prop_assert_eq!(correction, other.absorb_by::<3, false>(&projection));
+                    prop_assert!((f64::from(whitened.nis()) / distance - 1.0).abs() < 1e-2);
+                    let correction = p.update_with::<3, true>(&whitened);
+                    prop_assert_eq!(correction, other.update_with::<3, false>(&whitened));
                     for (i, (ours, theirs)) in correction.iter().zip((gain * innovation).iter()).enumerate() {
                         let sigma = exact[(i, i)].sqrt();
                         prop_assert!((f64::from(*ours) - theirs).abs() < 5e-3 * sigma, "{i}: {ours}, not {theirs}");
@@ -441,9 +442,9 @@ mod tests {
     }
 
     #[test]
-    fn reset_forgets_correlations() {
+    fn reset_clears_the_covariances_of_the_state() {
         let mut p = Covariance::from_sigmas([1.0; 5]);
-        p.absorb(&p.project(&[jacobian(&[(0, 1.0), (3, 1.0)])], [0.0], [0.1]));
+        p.update(&p.innovation(&[jacobian(&[(0, 1.0), (3, 1.0)])], [0.0], [0.1]));
         assert!(p.get(0, 3) != 0.0);
         p.reset(3, 4.0);
         assert_eq!((p.get(0, 3), p.get(3, 0), p.get(3, 3)), (0.0, 0.0, 4.0));

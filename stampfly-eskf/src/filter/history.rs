@@ -2,134 +2,143 @@
 //!
 //! A flow sensor reports what it saw a picture or two ago, a camera system what it saw fifty milliseconds ago. This
 //! ring keeps how the body turned and what its specific force added, not states: a correction of the present state
-//! is a correction of the past ones, too, without touching them. (Impulses keep the attitude they were added with: a
-//! correction by θ leaves an error of θ times the impulse until they are forgotten.) Samples that come faster than every
-//! 2.5 ms are merged, so the memory reaches back [`REACH`] at any rate of the inertial sensor.
+//! is a correction of the past ones, too, without touching them. (Velocity changes keep the attitude they were added with: a
+//! correction by θ leaves an error of θ times the change until they are forgotten.) Samples that come faster than every
+//! 2.5 ms are merged, so the memory reaches back [`MAX_AGE`] at any rate of the inertial sensor.
 
-use super::Passage;
+use super::PropagationStep;
 use super::state::{Motion, multiply, small_rotation};
 use stampfly_types::Vec3;
 
-/// How far back measurements can be placed, s.
-pub const REACH: f32 = 0.1;
-/// A stretch shorter than this takes in the next sample, s. A little less than the 2.5 ms of 400 Hz, for clocks that
+/// Largest age of a measurement that can be placed in time, s.
+pub const MAX_AGE: f32 = 0.1;
+/// An interval shorter than this takes in the next sample, s. A little less than the 2.5 ms of 400 Hz, for clocks that
 /// run fast.
-const SHORTEST: f32 = 2.4e-3;
-/// Stretches kept: with the one being filled they always reach back far enough.
+const MIN_INTERVAL: f32 = 2.4e-3;
+/// Intervals kept: with the one being filled they always reach back far enough.
 const DEPTH: usize = 48;
-const _: () = assert!((DEPTH - 1) as f32 * SHORTEST > REACH);
+const _: () = assert!((DEPTH - 1) as f32 * MIN_INTERVAL > MAX_AGE);
 
-/// A stretch of time and what happened in it.
+/// An interval of time and the motion in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Stretch {
+struct Interval {
     length: f32,
     /// Mean rate without bias, body.
     rate: Vec3,
-    turn: [f32; 4],
+    delta_rotation: [f32; 4],
     /// World.
-    impulse: Vec3,
+    delta_velocity: Vec3,
 }
 
-const NOTHING: Stretch = Stretch {
+const EMPTY: Interval = Interval {
     length: 0.0,
     rate: Vec3::new(0.0, 0.0, 0.0),
-    turn: [1.0, 0.0, 0.0, 0.0],
-    impulse: Vec3::new(0.0, 0.0, 0.0),
+    delta_rotation: [1.0, 0.0, 0.0, 0.0],
+    delta_velocity: Vec3::new(0.0, 0.0, 0.0),
 };
 
 /// The last tenth of a second. See the [module](self) documentation.
 ///
 /// ```
-/// use stampfly_eskf::filter::{History, Nominal};
+/// use stampfly_eskf::filter::{History, NominalState};
 /// use stampfly_types::Vec3;
-/// let (mut state, mut history) = (Nominal::default(), History::default());
+/// let (mut state, mut history) = (NominalState::default(), History::default());
 /// for _ in 0..10 {
 ///     history.add(&state.propagate(&Vec3::new(0.0, 0.0, -9.80665), &Vec3::x(), 0.0025));
 /// }
 /// // 20 ms ago it had turned by five milliradians.
-/// let then = history.since(0.02).unwrap().before(&state);
+/// let then = history.since(0.02).unwrap().state_at_start(&state);
 /// assert!((then.quat().angle() - 0.005).abs() < 1e-5);
 /// assert!((history.mean_rate(0.0, 0.01).unwrap() - Vec3::x()).amax() < 1e-5);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct History {
-    #[cfg_attr(feature = "serde", serde(with = "stored::stretches"))]
-    stretches: [Stretch; DEPTH],
+    #[cfg_attr(feature = "serde", serde(with = "stored::intervals"))]
+    intervals: [Interval; DEPTH],
     #[cfg_attr(feature = "serde", serde(deserialize_with = "stored::place"))]
     newest: usize,
 }
 
 impl Default for History {
     fn default() -> Self {
-        Self { stretches: [NOTHING; DEPTH], newest: 0 }
+        Self { intervals: [EMPTY; DEPTH], newest: 0 }
     }
 }
 
 impl History {
-    /// Remembers what an inertial sample did.
+    /// Appends the motion of one inertial sample.
     #[inline]
     pub fn add(&mut self, motion: &Motion) {
-        if let Some(newest) = self.stretches.get_mut(self.newest)
-            && newest.length < SHORTEST
+        if let Some(newest) = self.intervals.get_mut(self.newest)
+            && newest.length < MIN_INTERVAL
         {
             let length = newest.length + motion.dt;
             newest.rate = (newest.rate * newest.length + motion.rate * motion.dt) / length;
-            newest.turn = multiply(newest.turn, motion.turn);
-            newest.impulse += motion.impulse;
+            newest.delta_rotation = multiply(newest.delta_rotation, motion.delta_rotation);
+            newest.delta_velocity += motion.delta_velocity;
             newest.length = length;
             return;
         }
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
-        if let Some(place) = self.stretches.get_mut(self.newest) {
-            *place = Stretch { length: motion.dt, rate: motion.rate, turn: motion.turn, impulse: motion.impulse };
+        if let Some(place) = self.intervals.get_mut(self.newest) {
+            *place = Interval {
+                length: motion.dt,
+                rate: motion.rate,
+                delta_rotation: motion.delta_rotation,
+                delta_velocity: motion.delta_velocity,
+            };
         }
     }
 
     /// Newest first.
     #[inline]
-    fn backwards(&self) -> impl Iterator<Item = &Stretch> {
-        let all = (&self.stretches[..], &[][..]);
-        let (older, newer) = self.stretches.split_at_checked(self.newest + 1).unwrap_or(all);
-        older.iter().rev().chain(newer.iter().rev()).take_while(|stretch| stretch.length > 0.0)
+    fn backwards(&self) -> impl Iterator<Item = &Interval> {
+        let all = (&self.intervals[..], &[][..]);
+        let (older, newer) = self.intervals.split_at_checked(self.newest + 1).unwrap_or(all);
+        older.iter().rev().chain(newer.iter().rev()).take_while(|interval| interval.length > 0.0)
     }
 
-    /// What happened in the last `age` seconds; for a negative age, what will happen if nothing changes. `None` when
-    /// that is longer ago than is remembered.
+    /// The step over the last `age` seconds; for a negative age, the last motion extrapolated. `None` when the history
+    /// does not go back so far.
     #[inline]
     #[must_use]
-    pub fn since(&self, age: f32) -> Option<Passage> {
-        let mut passage = Passage::default();
-        for stretch in self.backwards() {
-            let left = age - passage.duration;
-            if left >= stretch.length {
-                passage.prepend(stretch.length, stretch.turn, stretch.impulse);
-                if passage.duration >= age {
-                    return Some(passage);
+    pub fn since(&self, age: f32) -> Option<PropagationStep> {
+        let mut step = PropagationStep::default();
+        for interval in self.backwards() {
+            let left = age - step.duration;
+            if left >= interval.length {
+                step.prepend(interval.length, interval.delta_rotation, interval.delta_velocity);
+                if step.duration >= age {
+                    return Some(step);
                 }
             } else {
-                passage.prepend(left, small_rotation(stretch.rate * left), stretch.impulse * (left / stretch.length));
-                return Some(passage);
+                step.prepend(
+                    left,
+                    small_rotation(interval.rate * left),
+                    interval.delta_velocity * (left / interval.length),
+                );
+                return Some(step);
             }
         }
         None
     }
 
-    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as they are remembered.
-    /// `None` when no part of them is.
+    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as the history covers them.
+    /// `None` when it covers no part of them.
     #[inline]
     #[must_use]
     pub fn mean_rate(&self, age: f32, length: f32) -> Option<Vec3> {
         let (mut sum, mut time, mut end) = (Vec3::zeros(), 0.0, 0.0f32);
-        for stretch in self.backwards() {
-            let begin = end + stretch.length;
+        for interval in self.backwards() {
+            let begin = end + interval.length;
             // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
             let from = if end > age { end } else { age };
             let to = if begin < age + length { begin } else { age + length };
             let overlap = to - from;
             if overlap > 0.0 {
-                sum += stretch.rate * overlap;
+                sum += interval.rate * overlap;
                 time += overlap;
             }
             if begin >= age + length {
@@ -144,28 +153,28 @@ impl History {
 /// What serde does not derive.
 #[cfg(feature = "serde")]
 mod stored {
-    use super::{DEPTH, NOTHING, Stretch};
+    use super::{DEPTH, EMPTY, Interval};
     use core::fmt;
     use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 
-    /// The place of a stretch; any other number is refused.
+    /// The index of an interval; any other number is refused.
     pub fn place<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
         let place = usize::deserialize(deserializer)?;
         if place < DEPTH { Ok(place) } else { Err(D::Error::custom("beyond the memory of the last tenth of a second")) }
     }
 
     /// Arrays of more than 32 elements.
-    pub mod stretches {
+    pub mod intervals {
         use super::*;
         use serde::ser::{SerializeTuple, Serializer};
 
-        pub fn serialize<S: Serializer>(stretches: &[Stretch; DEPTH], serializer: S) -> Result<S::Ok, S::Error> {
+        pub fn serialize<S: Serializer>(intervals: &[Interval; DEPTH], serializer: S) -> Result<S::Ok, S::Error> {
             let mut tuple = serializer.serialize_tuple(DEPTH)?;
-            stretches.iter().try_for_each(|stretch| tuple.serialize_element(stretch))?;
+            intervals.iter().try_for_each(|interval| tuple.serialize_element(interval))?;
             tuple.end()
         }
 
-        pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Stretch; DEPTH], D::Error> {
+        pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Interval; DEPTH], D::Error> {
             deserializer.deserialize_tuple(DEPTH, All)
         }
     }
@@ -173,18 +182,18 @@ mod stored {
     struct All;
 
     impl<'de> Visitor<'de> for All {
-        type Value = [Stretch; DEPTH];
+        type Value = [Interval; DEPTH];
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            write!(f, "{DEPTH} stretches")
+            write!(f, "{DEPTH} intervals")
         }
 
         fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Self::Value, A::Error> {
-            let mut stretches = [NOTHING; DEPTH];
-            for (index, stretch) in stretches.iter_mut().enumerate() {
-                *stretch = sequence.next_element()?.ok_or_else(|| A::Error::invalid_length(index, &self))?;
+            let mut intervals = [EMPTY; DEPTH];
+            for (index, interval) in intervals.iter_mut().enumerate() {
+                *interval = sequence.next_element()?.ok_or_else(|| A::Error::invalid_length(index, &self))?;
             }
-            Ok(stretches)
+            Ok(intervals)
         }
     }
 }
@@ -192,12 +201,12 @@ mod stored {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::Nominal;
+    use crate::filter::NominalState;
     use proptest::prelude::*;
 
     /// A rate that grows evenly, 1 rad/s², sampled at this rate: the state, its history and the time after about 0.3 s.
-    fn spun_up(rate: f32) -> (Nominal, History, f32) {
-        let (mut state, mut history) = (Nominal::default(), History::default());
+    fn spun_up(rate: f32) -> (NominalState, History, f32) {
+        let (mut state, mut history) = (NominalState::default(), History::default());
         let dt = 1.0 / rate;
         let steps = (0.3 * rate) as u32;
         for step in 0..steps {
@@ -209,32 +218,32 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_tenth_of_a_second_is_remembered_at_any_rate(
+        fn the_history_covers_a_tenth_of_a_second_at_any_sample_rate(
             rate in prop::sample::select(&[100f32, 200.0, 385.0, 400.0, 415.0, 800.0, 1000.0, 1600.0, 8000.0][..]),
-            age in 0.0f32..REACH,
+            age in 0.0f32..MAX_AGE,
         ) {
             let (state, history, now) = spun_up(rate);
-            let passage = history.since(age);
-            prop_assert!(passage.is_some(), "{age} s at {rate} Hz");
-            let passage = passage.unwrap();
-            prop_assert!((passage.duration - age).abs() < 1e-6);
+            let step = history.since(age);
+            prop_assert!(step.is_some(), "{age} s at {rate} Hz");
+            let step = step.unwrap();
+            prop_assert!((step.duration - age).abs() < 1e-6);
             let then = now - age;
-            let roll = 2.0 * stampfly_types::math::asin(passage.before(&state).attitude[1]);
+            let roll = 2.0 * stampfly_types::math::asin(step.state_at_start(&state).attitude[1]);
             prop_assert!((roll - 0.5 * then * then).abs() < 1e-4, "{roll} rad, {age} s ago at {rate} Hz");
         }
 
         #[test]
-        fn an_even_change_is_averaged_exactly(age in 0.0f32..0.08, length in 0.004f32..0.02) {
+        fn mean_rate_of_a_constant_acceleration_is_exact(age in 0.0f32..0.08, length in 0.004f32..0.02) {
             let (_, history, now) = spun_up(400.0);
             let expected = now - age - 0.5 * length;
-            let mean = history.mean_rate(age, length).expect("remembered").x;
+            let mean = history.mean_rate(age, length).expect("covered").x;
             // Inside a step the rate is taken as constant.
             prop_assert!((mean - expected).abs() < 0.0013, "{mean}, not {expected}");
         }
     }
 
     #[test]
-    fn what_was_never_seen_is_not_made_up() {
+    fn times_before_the_history_give_none() {
         let history = History::default();
         assert!(history.since(0.01).is_none() && history.mean_rate(0.0, 0.01).is_none());
         let (_, history, _) = spun_up(400.0);
@@ -242,9 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn a_look_ahead_goes_on_as_before() {
+    fn a_negative_age_extrapolates_the_last_motion() {
         let (state, history, _) = spun_up(400.0);
-        let ahead = history.since(-0.01).expect("remembered").before(&state);
+        let ahead = history.since(-0.01).expect("covered").state_at_start(&state);
         assert!((ahead.attitude[1] - state.attitude[1] - 0.5 * 0.01 * 0.3).abs() < 1e-4);
         assert!((ahead.velocity.x - state.velocity.x - 0.003).abs() < 1e-4);
     }

@@ -10,20 +10,20 @@
 //! | [`layout`] | number and places of the error states |
 //! | [`state`] | nominal state, small rotations, injection of a correction |
 //! | [`covariance`] | storage, propagation, update |
-//! | [`roughness`] | how much the inertial signals change between samples: noise that follows vibration |
-//! | [`passage`] | what happened between two instants: how errors move, and how to go back |
+//! | [`vibration`] | how much the inertial signals change between samples, which adds to the process noise |
+//! | [`propagation`] | inertial samples between two instants, pre-integrated: how errors move, and how to go back |
 //! | [`history`] | the last tenth of a second, for measurements that are late |
 
 pub mod covariance;
 pub mod history;
 pub mod layout;
-pub mod passage;
-pub mod roughness;
+pub mod propagation;
 pub mod state;
+pub mod vibration;
 
 pub use covariance::Covariance;
 pub use history::History;
 pub use layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
-pub use passage::Passage;
-pub use roughness::Roughness;
-pub use state::Nominal;
+pub use propagation::PropagationStep;
+pub use state::NominalState;
+pub use vibration::Vibration;

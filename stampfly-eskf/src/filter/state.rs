@@ -3,10 +3,10 @@
 use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
 use stampfly_types::{GRAVITY, Quat, Vec3};
 
-/// The nominal state: what the filter believes, without its doubt.
+/// The nominal state: the estimate, without its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Nominal {
+pub struct NominalState {
     /// World NED, m.
     pub position: Vec3,
     /// World NED, m/s.
@@ -19,7 +19,7 @@ pub struct Nominal {
     pub accel_bias: Vec3,
 }
 
-impl Default for Nominal {
+impl Default for NominalState {
     fn default() -> Self {
         Self {
             position: Vec3::zeros(),
@@ -34,23 +34,23 @@ impl Default for Nominal {
 /// A rotation matrix in row order, body → world.
 pub type Rotation = [[f32; 3]; 3];
 
-/// What one inertial sample did: everything else that has to follow the state uses these numbers.
+/// The motion of one inertial sample: the covariance and the history are propagated with the same numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Specific force without bias, body, m/s².
     pub force: Vec3,
     /// Angular rate without bias, body, rad/s.
     pub rate: Vec3,
-    /// Rotation of the body over the step: attitude after = attitude before ⊗ turn.
-    pub turn: [f32; 4],
+    /// Rotation of the body over the step: attitude after = attitude before ⊗ delta_rotation.
+    pub delta_rotation: [f32; 4],
     /// Specific force times the length of the step, world, m/s.
-    pub impulse: Vec3,
+    pub delta_velocity: Vec3,
     /// Length of the step, s.
     pub dt: f32,
 }
 
-impl Nominal {
-    /// Moves the state by one inertial sample: attitude by half a step, velocity and position with that attitude,
+impl NominalState {
+    /// Propagates the state by one inertial sample: attitude by half a step, velocity and position with that attitude,
     /// attitude by the other half. Second order in `dt`.
     #[inline]
     pub fn propagate(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) -> Motion {
@@ -58,12 +58,12 @@ impl Nominal {
         let rate = gyro - self.gyro_bias;
         let half = small_rotation(rate * (0.5 * dt));
         let middle = multiply(self.attitude, half);
-        let impulse = rotate(&rotation_matrix(middle), &force) * dt;
-        let gained = impulse + Vec3::new(0.0, 0.0, GRAVITY * dt);
+        let delta_velocity = rotate(&rotation_matrix(middle), &force) * dt;
+        let gained = delta_velocity + Vec3::new(0.0, 0.0, GRAVITY * dt);
         self.position += (self.velocity + gained * 0.5) * dt;
         self.velocity += gained;
         self.attitude = normalize(multiply(middle, half));
-        Motion { force, rate, turn: twice(half), impulse, dt }
+        Motion { force, rate, delta_rotation: twice(half), delta_velocity, dt }
     }
 
     /// Adds an error-state correction to the nominal state.
@@ -191,7 +191,7 @@ mod tests {
 
         #[test]
         fn quaternion_stays_unit(rates in prop::collection::vec((-35f32..35.0, -35f32..35.0, -35f32..35.0), 1..200)) {
-            let mut state = Nominal::default();
+            let mut state = NominalState::default();
             for (x, y, z) in rates {
                 state.propagate(&Vec3::new(0.0, 0.0, -9.8), &Vec3::new(x, y, z), 0.0025);
             }
@@ -201,27 +201,27 @@ mod tests {
     }
 
     #[test]
-    fn a_step_says_what_it_did() {
+    fn motion_reports_the_change_of_the_state() {
         let before = crate::aid::numeric::awkward_state();
         let mut after = before;
         let motion = after.propagate(&Vec3::new(1.0, -2.0, -9.0), &Vec3::new(0.5, 1.0, -3.0), 0.0025);
-        let turned = multiply(before.attitude, motion.turn);
+        let turned = multiply(before.attitude, motion.delta_rotation);
         for (a, b) in turned.iter().zip(after.attitude) {
             assert!((a - b).abs() < 1e-6);
         }
         let gained = after.velocity - before.velocity - Vec3::new(0.0, 0.0, GRAVITY * motion.dt);
-        assert!((gained - motion.impulse).amax() < 1e-6);
+        assert!((gained - motion.delta_velocity).amax() < 1e-6);
     }
 
     #[test]
-    fn free_fall_and_rest() {
-        let mut state = Nominal::default();
+    fn free_fall_accelerates_and_a_stationary_body_does_not_move() {
+        let mut state = NominalState::default();
         for _ in 0..400 {
             state.propagate(&Vec3::zeros(), &Vec3::zeros(), 0.0025);
         }
         assert!((state.velocity.z - GRAVITY).abs() < 1e-3);
         assert!((state.position.z - 0.5 * GRAVITY).abs() < 1e-3);
-        let mut state = Nominal::default();
+        let mut state = NominalState::default();
         for _ in 0..400 {
             state.propagate(&Vec3::new(0.0, 0.0, -GRAVITY), &Vec3::zeros(), 0.0025);
         }

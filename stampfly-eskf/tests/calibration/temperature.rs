@@ -1,7 +1,7 @@
 //! The temperature table.
 
 use super::{Errors, Random, still};
-use stampfly_eskf::calibration::{Reach, TemperatureRefusal, TemperatureTable};
+use stampfly_eskf::calibration::{Coverage, TemperatureRefusal, TemperatureTable};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
@@ -38,18 +38,18 @@ fn a_bias_that_moves_with_temperature_is_tabulated() {
         for temperature in 17..=53u8 {
             let temperature = f32::from(temperature);
             let found = table.bias(temperature).unwrap();
-            assert!(found.reach == Reach::Inside && found.samples >= 400, "{found:?}");
+            assert!(found.coverage == Coverage::Inside && found.samples >= 400, "{found:?}");
             inside.0.push((found.gyro - bias(&gyro, temperature)).amax());
             accels.0.push((found.accel - bias(&accel, temperature) + zero).amax());
         }
         for temperature in [11.0, 59.0] {
             let found = table.bias(temperature).unwrap();
-            assert_eq!(found.reach, Reach::Beside);
+            assert_eq!(found.coverage, Coverage::Beside);
             beside.0.push((found.gyro - bias(&gyro, temperature)).amax());
         }
         for (far, edge) in [(-40.0, quality.span[0] - 5.0), (1e30, quality.span[1] + 5.0)] {
             let (far, edge) = (table.bias(far).unwrap(), table.bias(edge).unwrap());
-            assert_eq!((far.reach, far.gyro, far.accel), (Reach::Clamped, edge.gyro, edge.accel));
+            assert_eq!((far.coverage, far.gyro, far.accel), (Coverage::Clamped, edge.gyro, edge.accel));
         }
     }
     assert!(inside.report("temperature: gyro, inside", "rad/s").1 < 5e-4);

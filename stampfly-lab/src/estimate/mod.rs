@@ -84,21 +84,21 @@ pub fn suite(kind: Kind) -> Suite {
             config.eskf.gyro_noise = 0.12;
             config.eskf.accel_noise = 0.15;
         }
-        // Carried by hand with the motors off: the noise is the data sheet's and what the signals' roughness adds. A hand
+        // Carried by hand with the motors off: the noise is the data sheet's and what their vibration adds. A hand
         // tilts the beam, so ranges are worth less; a count at 3 cm is rough, so is flow; the still-calibration is good.
         // The logger put a flow reading beside an inertial sample that was 14 ms younger: there rotation and flow fit.
         Kind::StampFlyLog => {
             config.eskf.accel_noise = 0.0016;
             config.eskf.gyro_noise = 0.003;
-            config.eskf.accel_roughness = 1.0;
-            config.eskf.gyro_roughness = 0.1;
+            config.eskf.accel_vibration = 1.0;
+            config.eskf.gyro_vibration = 0.1;
             config.eskf.initial_gyro_bias = 0.0015;
             config.eskf.initial_accel_bias = 0.02;
             config.eskf.tof_sigma = 0.025;
             config.eskf.flow_sigma = 0.4;
             config.eskf.flow_scale_sigma = 0.4;
             config.eskf.flow_delay = 0.0137;
-            config.eskf.blind_velocity = 0.06;
+            config.eskf.unobserved_velocity = 0.06;
             config.eskf.gate = 6.7;
         }
         Kind::StampFlyFlight | Kind::Px4Replay => {}

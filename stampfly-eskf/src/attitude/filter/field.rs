@@ -1,11 +1,11 @@
 //! What a magnetic field does to the attitude filter.
 //!
-//! First it is freed of the sensor's own magnetised parts, then judged, and then it may turn the heading, as
-//! far as the verdict allows. Nothing here touches the tilt.
+//! First it is freed of the sensor's own magnetised parts, then compared with the reference, and then it may correct the
+//! heading, as far as its status allows. Nothing here touches the tilt.
 
-use super::super::magnetic::{Magnetic, Verdict};
+use super::super::magnetic::{FieldStatus, Magnetic};
 use super::super::rotation::{from_vector, product, within};
-use super::{AttitudeFilter, LARGEST_FIELD, LONGEST_STEP, MOVING_START};
+use super::{AttitudeFilter, LARGEST_FIELD, LONGEST_STEP, MOVING_START_SIGMA};
 use crate::estimator::{Fusion, Refusal};
 use nalgebra::Matrix3;
 use stampfly_types::Vec3;
@@ -13,8 +13,8 @@ use stampfly_types::Vec3;
 /// A magnetometer sample may be this late, s.
 const OLDEST: f32 = 0.1;
 /// Bend of a field that there is no reference for, rad.
-const UNJUDGED: f32 = 0.2;
-/// A new idea of the hard iron is taken into use when it differs by this share of the field.
+const NO_REFERENCE_SIGMA: f32 = 0.2;
+/// A new estimate of the hard iron is taken into use when it differs by this share of the field.
 const NEW_OFFSET: f32 = 0.05;
 /// Smaller changes are followed within this time, s, and the reference field with them.
 const OFFSET_TIME: f32 = 10.0;
@@ -46,49 +46,49 @@ impl AttitudeFilter {
         let turn = (self.level * then).to_rotation_matrix();
         self.remove_hard_iron(turn.matrix(), field, dt);
         let config = &self.config;
-        let rest = self.rest.is_at_rest(config);
+        let stationary = self.stationary.is_stationary(config);
         let level = turn * (field - self.offset);
         let vertical = turn.matrix().row(2).transpose();
-        let verdict = self.magnetic.step(config, &level, self.rate.norm(), dt);
-        match verdict {
-            Verdict::Clean { ratio } => {
-                let (share, off) = self.heading.correct(config, &level, config.mag_sigma, rest, dt);
-                self.bias.drift(config, &vertical, share, off, dt);
+        let status = self.magnetic.step(config, &level, self.rate.norm(), dt);
+        match status {
+            FieldStatus::Clean { ratio } => {
+                let (share, off) = self.heading.update(config, &level, config.mag_sigma, stationary, dt);
+                self.bias.update_vertical(config, &vertical, share, off, dt);
                 Fusion::Fused { ratio }
             }
-            Verdict::Disturbed { ratio } => {
-                self.heading.correct(config, &level, config.mag_disturbed_sigma, rest, dt);
+            FieldStatus::Disturbed { ratio } => {
+                self.heading.update(config, &level, config.mag_disturbed_sigma, stationary, dt);
                 self.bias.interrupt(dt / config.mag_agree_time);
                 Fusion::Gated { ratio }
             }
-            Verdict::Unjudged => {
-                // Better than nothing, and nothing is what there is; no more than that while the tilt settles.
+            FieldStatus::NoReference => {
+                // The only heading there is; with a large variance while the tilt settles.
                 if !self.force.is_settled() {
-                    self.heading.doubt(MOVING_START);
+                    self.heading.inflate(MOVING_START_SIGMA);
                 }
-                self.heading.correct(config, &level, UNJUDGED, rest, dt);
+                self.heading.update(config, &level, NO_REFERENCE_SIGMA, stationary, dt);
                 Fusion::Fused { ratio: 1.0 }
             }
-            Verdict::Found => {
-                self.heading.doubt(MOVING_START);
+            FieldStatus::FirstReference => {
+                self.heading.inflate(MOVING_START_SIGMA);
                 self.bias.interrupt(1.0);
                 Fusion::Reset
             }
-            Verdict::Renewed => {
-                self.heading.move_to(config, &level);
+            FieldStatus::NewReference => {
+                self.heading.change_reference(config, &level);
                 self.bias.interrupt(1.0);
                 Fusion::Reset
             }
-            Verdict::Back => {
-                self.heading.come_back();
+            FieldStatus::ReferenceReturned => {
+                self.heading.clear_declination();
                 self.bias.interrupt(1.0);
                 Fusion::Reset
             }
-            Verdict::Vertical => Fusion::Refused(Refusal::Missing),
+            FieldStatus::Vertical => Fusion::Refused(Refusal::Missing),
         }
     }
 
-    /// Learns hard iron, and takes a new idea of it into use when it is new enough to matter.
+    /// Estimates hard iron, and takes a new estimate into use when it differs enough to matter.
     fn remove_hard_iron(&mut self, level: &Matrix3<f32>, field: &Vec3, dt: f32) {
         // A tilt that is still settling would pass for hard iron.
         if !self.config.hard_iron || !self.force.is_settled() {
@@ -102,8 +102,8 @@ impl AttitudeFilter {
         if change > NEW_OFFSET * earth.norm() {
             self.offset = offset;
             self.magnetic = Magnetic::new(Some(&earth));
-            self.heading.doubt(change / earth.xy().norm().max(1.0));
-            self.heading.come_back();
+            self.heading.inflate(change / earth.xy().norm().max(1.0));
+            self.heading.clear_declination();
             self.bias.interrupt(1.0);
         } else {
             self.offset += (offset - self.offset) * (dt / OFFSET_TIME).min(1.0);

@@ -9,7 +9,7 @@ use stampfly_types::math;
 /// A pivot below this share of its column means that the column depends on the ones before it.
 const DEPENDENT: f32 = 1e-4;
 
-/// Equations in `WIDTH` − 1 unknowns, as the triangle they come down to. The right-hand side is the last column; in its
+/// Equations in `WIDTH` − 1 unknowns, as the triangular factor of their QR decomposition. The right-hand side is the last column; in its
 /// last place stands the norm of the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -20,17 +20,17 @@ const DEPENDENT: f32 = 1e-4;
         deserialize = "[[f32; WIDTH]; WIDTH]: serde::Deserialize<'de>"
     ))
 )]
-pub(super) struct Triangle<const WIDTH: usize> {
+pub(super) struct LeastSquares<const WIDTH: usize> {
     rows: [[f32; WIDTH]; WIDTH],
 }
 
-impl<const WIDTH: usize> Default for Triangle<WIDTH> {
+impl<const WIDTH: usize> Default for LeastSquares<WIDTH> {
     fn default() -> Self {
         Self { rows: [[0.0; WIDTH]; WIDTH] }
     }
 }
 
-impl<const WIDTH: usize> Triangle<WIDTH> {
+impl<const WIDTH: usize> LeastSquares<WIDTH> {
     /// Rotates an equation in: the factors of the unknowns, the right-hand side behind them.
     pub(super) fn add(&mut self, mut equation: [f32; WIDTH]) {
         for (i, row) in self.rows.iter_mut().enumerate() {
@@ -87,19 +87,19 @@ mod tests {
     }
 
     #[test]
-    fn the_solution_and_what_it_leaves_are_found() {
-        let mut triangle = Triangle::<WIDTH>::default();
+    fn solution_and_residual_of_known_equations_are_found() {
+        let mut fit = LeastSquares::<WIDTH>::default();
         for n in 0..8 {
-            triangle.add(equation(n, 0.0));
+            fit.add(equation(n, 0.0));
         }
-        assert_eq!(triangle.solve(), None, "eight equations in nine unknowns");
+        assert_eq!(fit.solve(), None, "eight equations in nine unknowns");
         for n in 8..400 {
-            triangle.add(equation(n, if n % 2 == 0 { 0.1 } else { -0.1 }));
+            fit.add(equation(n, if n % 2 == 0 { 0.1 } else { -0.1 }));
         }
-        for (found, true_value) in triangle.solve().unwrap().iter().take(UNKNOWNS).zip(1u8..) {
+        for (found, true_value) in fit.solve().unwrap().iter().take(UNKNOWNS).zip(1u8..) {
             assert!((found - f32::from(true_value)).abs() < 0.02, "{found} for {true_value}");
         }
-        let rms = triangle.residual() / math::sqrt(400.0);
+        let rms = fit.residual() / math::sqrt(400.0);
         assert!((rms - 0.1).abs() < 0.005, "{rms}");
     }
 }

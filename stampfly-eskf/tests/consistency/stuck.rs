@@ -67,7 +67,7 @@ fn a_range_that_is_said_to_be_none_is_no_range() {
 }
 
 #[test]
-fn no_flow_in_the_dark_is_not_standing_still() {
+fn flow_of_low_quality_is_refused_and_velocity_becomes_invalid() {
     let flow = |flow: FlowData| FlowData { delta_x: 0.0, delta_y: 0.0, quality: 10, ..flow };
     let mut refused = 0;
     let (eskf, _) = fly(Broken { flow, ..SOUND }, 3, |told| {
@@ -80,9 +80,9 @@ fn no_flow_in_the_dark_is_not_standing_still() {
 }
 
 #[test]
-fn no_flow_in_good_light_is_bounded() {
+fn stuck_flow_of_good_quality_does_bounded_harm() {
     // A sensor that says "nothing moves" and vouches for it, over half a metre a second of swinging: nothing else on
-    // board measures velocity, so it is believed. That costs the velocity and must not cost the tilt.
+    // board measures velocity, so the state is reset to it. That costs the velocity and must not cost the tilt.
     let flow = |flow: FlowData| FlowData { delta_x: 0.0, delta_y: 0.0, ..flow };
     let (eskf, [tilt, velocity, height]) = fly(Broken { flow, ..SOUND }, 30, |_| {});
     let reported = eskf.status().diverged || eskf.status().resets > 0;

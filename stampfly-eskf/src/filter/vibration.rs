@@ -1,6 +1,6 @@
-//! How rough the inertial signals are: what happens between two samples and is not in either.
+//! Vibration of the inertial signals, measured as their change from sample to sample.
 //!
-//! A sample stands for the stretch of time until the next. Where the signal changes by Δ from one to the next, that is
+//! A sample stands for the interval until the next. Where the signal changes by Δ from one to the next, that is
 //! wrong by some share of Δ: vibration, aliasing, a jerk, the samples that a logger left out. So the noise that drives
 //! the filter is the sensor's own plus a share of what the signal is doing, and one tuning serves a vehicle that
 //! stands, one that is carried and one whose propellers are out of balance.
@@ -9,36 +9,36 @@
 
 use stampfly_types::Vec3;
 
-/// Time over which changes are averaged, s: some samples, so that it is there when a jerk is, and a few periods of a
+/// Time constant of the average, s: some samples, so that it is there when a jerk is, and a few periods of a
 /// propeller.
-const MEMORY: f32 = 0.05;
+const TIME_CONSTANT: f32 = 0.05;
 
 /// Mean square of a signal's change from sample to sample, per axis.
 ///
 /// ```
-/// use stampfly_eskf::filter::Roughness;
+/// use stampfly_eskf::filter::Vibration;
 /// use stampfly_types::Vec3;
-/// let mut roughness = Roughness::default();
+/// let mut vibration = Vibration::default();
 /// for n in 0..400 {
-///     roughness.add(&Vec3::new(if n % 2 == 0 { 0.1 } else { -0.1 }, 0.0, -9.8), 0.0025);
+///     vibration.add(&Vec3::new(if n % 2 == 0 { 0.1 } else { -0.1 }, 0.0, -9.8), 0.0025);
 /// }
 /// // One axis of three changes by 0.2 at every sample.
-/// assert!((roughness.mean_square() - 0.04 / 3.0).abs() < 1e-4);
+/// assert!((vibration.mean_square() - 0.04 / 3.0).abs() < 1e-4);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Roughness {
+pub struct Vibration {
     last: Option<Vec3>,
     mean_square: f32,
 }
 
-impl Roughness {
+impl Vibration {
     /// Takes the next sample, `dt` seconds after the last.
     #[inline]
     pub fn add(&mut self, sample: &Vec3, dt: f32) {
         if let Some(last) = self.last.replace(*sample) {
             let change = (sample - last).norm_squared() * (1.0 / 3.0);
-            self.mean_square += (change - self.mean_square) * (dt / (MEMORY + dt));
+            self.mean_square += (change - self.mean_square) * (dt / (TIME_CONSTANT + dt));
         }
     }
 

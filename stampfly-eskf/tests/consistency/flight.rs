@@ -1,4 +1,4 @@
-//! A made-up flight with honest sensors: smooth, for ever, everything known.
+//! A simulated flight with sensors of the modelled noise: smooth, endless, with a known truth.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng;

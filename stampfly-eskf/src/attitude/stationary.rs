@@ -1,4 +1,4 @@
-//! Is the body at rest? Then the gyro shows its bias.
+//! Stationary detection (VQF's rest detection): a stationary body's gyro measures its bias.
 //!
 //! Gyro and accelerometer stay close to their own low-passed selves for a while, and the gyro's mean is small enough to be
 //! a bias. A turn that is slower than the largest bias, and perfectly smooth, is taken for rest: no inertial sensor can
@@ -10,16 +10,16 @@ use super::config::AttitudeConfig;
 use super::low_pass::LowPass;
 use stampfly_types::Vec3;
 
-/// Watches for rest.
+/// Detects a stationary body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct RestDetector {
+pub(super) struct StationaryDetector {
     gyro: LowPass<3>,
     accel: LowPass<3>,
     quiet_for: f32,
 }
 
-impl RestDetector {
+impl StationaryDetector {
     pub fn new(config: &AttitudeConfig) -> Self {
         let low_pass = LowPass::new(config.rest_filter_time);
         Self { gyro: low_pass, accel: low_pass, quiet_for: 0.0 }
@@ -36,7 +36,7 @@ impl RestDetector {
     }
 
     /// Has it been quiet for long enough?
-    pub fn is_at_rest(&self, config: &AttitudeConfig) -> bool {
+    pub fn is_stationary(&self, config: &AttitudeConfig) -> bool {
         self.quiet_for >= config.rest_time
     }
 
@@ -51,14 +51,14 @@ mod tests {
     use super::*;
     use stampfly_types::GRAVITY;
 
-    /// Time until rest is seen, s, if it is within five seconds.
-    fn seen_after(rate: impl Fn(u16) -> f32, force: impl Fn(u16) -> f32) -> Option<f32> {
+    /// Time until a stationary body is detected, s, if it is within five seconds.
+    fn detected_after(rate: impl Fn(u16) -> f32, force: impl Fn(u16) -> f32) -> Option<f32> {
         let config = AttitudeConfig::default();
-        let mut detector = RestDetector::new(&config);
+        let mut detector = StationaryDetector::new(&config);
         (0..2_000u16).find_map(|step| {
             let accel = Vec3::new(force(step), 0.0, -GRAVITY);
             detector.step(&config, &accel, &Vec3::new(0.0, rate(step), 0.0), &Vec3::zeros(), 0.0025);
-            detector.is_at_rest(&config).then(|| f32::from(step) * 0.0025)
+            detector.is_stationary(&config).then(|| f32::from(step) * 0.0025)
         })
     }
 
@@ -67,12 +67,12 @@ mod tests {
     }
 
     #[test]
-    fn rest_is_seen_in_time_and_motion_is_not_rest() {
+    fn a_stationary_body_is_detected_in_time_and_motion_is_not() {
         let time = AttitudeConfig::default().rest_time;
-        let seen = seen_after(|step| 0.01 + 0.005 * noise(step), |step| 0.1 * noise(step)).unwrap();
-        assert!(seen >= time - 0.01 && seen < time + 0.6, "{seen} s");
-        assert!(seen_after(|step| 0.2 * noise(step / 40), |_| 0.0).is_none(), "a trembling hand");
-        assert!(seen_after(|_| 0.0, |step| 1.5 * noise(step)).is_none(), "a running motor");
-        assert!(seen_after(|_| 0.2, |_| 0.0).is_none(), "a steady turn");
+        let after = detected_after(|step| 0.01 + 0.005 * noise(step), |step| 0.1 * noise(step)).unwrap();
+        assert!(after >= time - 0.01 && after < time + 0.6, "{after} s");
+        assert!(detected_after(|step| 0.2 * noise(step / 40), |_| 0.0).is_none(), "a trembling hand");
+        assert!(detected_after(|_| 0.0, |step| 1.5 * noise(step)).is_none(), "a running motor");
+        assert!(detected_after(|_| 0.2, |_| 0.0).is_none(), "a steady turn");
     }
 }

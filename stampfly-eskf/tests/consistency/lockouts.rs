@@ -1,6 +1,6 @@
-//! From any error out of a box the filter recovers, or says that it is lost, within a stated time.
+//! From any error out of a box the filter recovers, or reports divergence, within a stated time.
 //!
-//! The box, at one instant of a flight whose sensors are all honest:
+//! The box, at one instant of a flight whose sensors have the modelled noise:
 //!
 //! | error | up to |
 //! |---|---|
@@ -10,7 +10,7 @@
 //! | gyro bias | 0.05 rad/s about each axis |
 //! | accelerometer bias | 0.5 m/s² along each axis |
 //!
-//! The errors come in through the front door: a still-calibration that was none, and a range from before a jump.
+//! The errors come in through the interface: a still-calibration that was none, and a range from before a jump.
 //! Recovered means within [`LIMITS`] from then on.
 
 use super::flight::{Flight, is_sound};
@@ -90,7 +90,7 @@ fn box_of_errors() -> impl Strategy<Value = Wrong> {
 }
 
 #[test]
-fn any_error_of_the_box_is_overcome_or_reported() {
+fn any_error_of_the_box_is_corrected_or_reported_as_divergence() {
     let mut runner = TestRunner::deterministic();
     let mut times: Vec<f64> = (0..500)
         .map(|seed| {

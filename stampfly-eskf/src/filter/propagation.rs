@@ -1,0 +1,193 @@
+//! Propagation over the time between two instants, from the inertial samples in it.
+//!
+//! Pre-integration (Forster et al., "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", IEEE TRO
+//! 33(1), 2017) in its smallest form: how far the body turned, and what its specific force added to velocity and
+//! position. Two things need it. The covariance is propagated over a few inertial samples at once. And a measurement
+//! that is late is compared with the state of its own time: the present state and the step since give the state of
+//! that time ([`PropagationStep::state_at_start`]) and the Jacobian by the present errors
+//! ([`PropagationStep::propagate_jacobian`]).
+//!
+//! With τ the duration, s `delta_velocity`, r `delta_position`, ΔR `delta_rotation` and R the attitude at the beginning:
+//!
+//! | at the beginning | from the end, "now" |
+//! |---|---|
+//! | attitude | R = R(now)·ΔRᵀ |
+//! | velocity | v = v(now) − s − g·τ |
+//! | position | p = p(now) − v·τ − r − g·τ²/2 |
+//! | δθ | ΔR·(δθ(now) + τ·δb_g) |
+//! | δv | δv(now) + \[s\]×·R·δθ + τ·R·δb_a |
+//! | δp | δp(now) − τ·δv + \[r\]×·R·δθ + τ²/2·R·δb_a |
+//!
+//! What is neglected: that a bias acts along the changing, not the first, attitude, and the process noise of the
+//! step itself. Within a tenth of a second both are far below any sensor's noise.
+
+use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
+use super::state::{Motion, NominalState, Rotation, multiply, rotate_back, rotation_matrix};
+use stampfly_types::{GRAVITY, Vec3};
+
+/// The inertial samples between two instants, pre-integrated. See the [module](self) documentation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PropagationStep {
+    /// Duration τ, s. Negative for an extrapolation.
+    pub duration: f32,
+    /// Rotation of the body, as w, x, y, z: attitude at the end = attitude at the beginning ⊗ delta_rotation.
+    pub delta_rotation: [f32; 4],
+    /// Integral s of the specific force, world, m/s: the change of velocity without gravity's part.
+    pub delta_velocity: Vec3,
+    /// Integral r of that, world, m: the change of position without the first velocity's and gravity's parts.
+    pub delta_position: Vec3,
+}
+
+impl Default for PropagationStep {
+    fn default() -> Self {
+        Self {
+            duration: 0.0,
+            delta_rotation: [1.0, 0.0, 0.0, 0.0],
+            delta_velocity: Vec3::zeros(),
+            delta_position: Vec3::zeros(),
+        }
+    }
+}
+
+impl PropagationStep {
+    /// Appends one inertial sample.
+    #[inline]
+    pub fn extend(&mut self, motion: &Motion) {
+        self.delta_position += (self.delta_velocity + motion.delta_velocity * 0.5) * motion.dt;
+        self.delta_velocity += motion.delta_velocity;
+        self.delta_rotation = multiply(self.delta_rotation, motion.delta_rotation);
+        self.duration += motion.dt;
+    }
+
+    /// Prepends an interval of constant rate and force: `length` seconds in which the body turned by `delta_rotation`
+    /// and gained `delta_velocity`.
+    #[inline]
+    pub(crate) fn prepend(&mut self, length: f32, delta_rotation: [f32; 4], delta_velocity: Vec3) {
+        self.delta_position += delta_velocity * (self.duration + 0.5 * length);
+        self.delta_velocity += delta_velocity;
+        self.delta_rotation = multiply(delta_rotation, self.delta_rotation);
+        self.duration += length;
+    }
+
+    /// The state at the beginning of a step that ends in the state `now`.
+    #[inline]
+    #[must_use]
+    pub fn state_at_start(&self, now: &NominalState) -> NominalState {
+        let [w, x, y, z] = self.delta_rotation;
+        let tau = self.duration;
+        let gravity = Vec3::new(0.0, 0.0, GRAVITY * tau);
+        let velocity = now.velocity - self.delta_velocity - gravity;
+        NominalState {
+            attitude: multiply(now.attitude, [w, -x, -y, -z]),
+            velocity,
+            position: now.position - velocity * tau - self.delta_position - gravity * (0.5 * tau),
+            ..*now
+        }
+    }
+
+    /// A Jacobian by the errors at the beginning, as a Jacobian by the errors at the end. `rotation` is the attitude
+    /// at the beginning.
+    #[inline]
+    #[must_use]
+    pub fn propagate_jacobian(&self, rotation: &Rotation, jacobian: &[f32; N]) -> [f32; N] {
+        let block = |first: usize| Vec3::new(jacobian[first], jacobian[first + 1], jacobian[first + 2]);
+        let tau = self.duration;
+        let position = block(POSITION);
+        let velocity = block(VELOCITY) - position * tau;
+        let by_turn = position.cross(&self.delta_position) + velocity.cross(&self.delta_velocity);
+        let attitude =
+            rotate_back(&rotation_matrix(self.delta_rotation), &(block(ATTITUDE) + rotate_back(rotation, &by_turn)));
+        let gyro_bias = block(GYRO_BIAS) + attitude * tau;
+        let pushed = velocity * tau + position * (0.5 * tau * tau);
+        let accel_bias = block(ACCEL_BIAS) + rotate_back(rotation, &pushed);
+        let [p, v, a, g, b] = [position, velocity, attitude, gyro_bias, accel_bias];
+        [p.x, p.y, p.z, v.x, v.y, v.z, a.x, a.y, a.z, g.x, g.y, g.z, b.x, b.y, b.z]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aid::{self, numeric};
+    use proptest::prelude::*;
+
+    fn propagated(samples: &[(f32, f32, f32, f32)]) -> (NominalState, NominalState, PropagationStep) {
+        let first = numeric::awkward_state();
+        let mut state = first;
+        let mut step = PropagationStep::default();
+        for (x, y, z, a) in samples {
+            step.extend(&state.propagate(&Vec3::new(*a, -*a, -9.8 + a), &Vec3::new(*x, *y, *z), 0.0025));
+        }
+        (first, state, step)
+    }
+
+    proptest! {
+        #[test]
+        fn state_at_start_inverts_the_propagation(
+            samples in prop::collection::vec((-4f32..4.0, -4f32..4.0, -4f32..4.0, -5f32..5.0), 1..40),
+        ) {
+            let (first, last, step) = propagated(&samples);
+            let back = step.state_at_start(&last);
+            prop_assert!((back.position - first.position).amax() < 1e-5);
+            prop_assert!((back.velocity - first.velocity).amax() < 1e-5);
+            for (a, b) in back.attitude.iter().zip(first.attitude) {
+                prop_assert!((a - b).abs() < 1e-5);
+            }
+        }
+
+        /// The propagated Jacobian is the derivative of "go back, then measure". Biases change what the inertial samples
+        /// meant, so they are moved before the flight, not after.
+        #[test]
+        fn propagated_jacobian_matches_numerical_differentiation(
+            samples in prop::collection::vec((-2f32..2.0, -2f32..2.0, -2f32..2.0, -3f32..3.0), 1..40),
+        ) {
+            let (_, last, step) = propagated(&samples);
+            let measure = |state: &NominalState| aid::tof::range(state, &state.rotation(), 0.05);
+            let start = step.state_at_start(&last);
+            let propagated = step.propagate_jacobian(&start.rotation(), &measure(&start).jacobian);
+            for (i, stated) in propagated.iter().enumerate().take(GYRO_BIAS) {
+                let delta = 1e-2;
+                let shifted = |sign: f32| {
+                    let mut by = [0.0; N];
+                    by[i] = sign * delta;
+                    let mut moved = last;
+                    moved.correct(&by);
+                    // An error of the attitude now is one of the whole step: it rotates what was gained, too.
+                    let mut turned = step;
+                    let rotation = multiply(moved.attitude, conjugate(last.attitude));
+                    let rotation = rotation_matrix(rotation);
+                    turned.delta_velocity = super::super::state::rotate(&rotation, &step.delta_velocity);
+                    turned.delta_position = super::super::state::rotate(&rotation, &step.delta_position);
+                    measure(&turned.state_at_start(&moved)).predicted
+                };
+                let numeric = (shifted(1.0) - shifted(-1.0)) / (2.0 * delta);
+                prop_assert!((numeric - stated).abs() < 3e-3, "state {i}: numeric {numeric}, stated {stated}");
+            }
+            // A bias changes every sample, so it is applied from the beginning.
+            for i in GYRO_BIAS..N {
+                let delta = 2e-2;
+                let shifted = |sign: f32| {
+                    let mut state = numeric::awkward_state();
+                    let mut by = [0.0; N];
+                    by[i] = sign * delta;
+                    state.correct(&by);
+                    let mut step = PropagationStep::default();
+                    for (x, y, z, a) in &samples {
+                        step.extend(&state.propagate(&Vec3::new(*a, -*a, -9.8 + a), &Vec3::new(*x, *y, *z), 0.0025));
+                    }
+                    let rotation = rotation_matrix(multiply(last.attitude, conjugate(state.attitude)));
+                    step.delta_velocity = super::super::state::rotate(&rotation, &step.delta_velocity);
+                    step.delta_position = super::super::state::rotate(&rotation, &step.delta_position);
+                    measure(&step.state_at_start(&last)).predicted
+                };
+                let numeric = (shifted(1.0) - shifted(-1.0)) / (2.0 * delta);
+                prop_assert!((numeric - propagated[i]).abs() < 6e-3, "state {i}: numeric {numeric}, stated {}", propagated[i]);
+            }
+        }
+    }
+
+    fn conjugate([w, x, y, z]: [f32; 4]) -> [f32; 4] {
+        [w, -x, -y, -z]
+    }
+}
