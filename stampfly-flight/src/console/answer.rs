@@ -178,7 +178,7 @@ fn say<R>(reply: &mut dyn Write, what: &dyn fmt::Display) -> Result<Request<R>, 
 fn show(parameters: &dyn Parameters, index: usize, reply: &mut dyn Write) -> fmt::Result {
     let (Some(info), Some(value)) = (parameters.describe(index), parameters.get(index)) else { return Ok(()) };
     let ParameterInfo { name, min, max, unit, .. } = info;
-    write!(reply, "{name:<28}{value:<12} {min} to {max}")?;
+    write!(reply, "{name:<30}{value:<12} {min} to {max}")?;
     if unit != "1" {
         write!(reply, " {unit}")?;
     }
