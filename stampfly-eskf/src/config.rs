@@ -5,8 +5,8 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EskfConfig {
-    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and axes;
-    /// vibration is `accel_vibration`.
+    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and
+    /// axes; vibration is `accel_vibration`.
     pub accel_noise: f32,
     /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
     pub gyro_noise: f32,
@@ -51,8 +51,8 @@ pub struct EskfConfig {
     /// Part of the flow error that grows with the image's motion, as a share. A PMW3901 sees 121 frames a second and is
     /// read a hundred times: a reading holds one frame's motion or two, so it is 17 % low or 65 % high.
     pub flow_scale_sigma: f32,
-    /// How long before its stamp a flow sample's stretch of time ended, s: pictures wait to be compared and read. 4 ms by
-    /// the data sheet, 17 in recorded logs, where the logger is part of it.
+    /// How long before its stamp a flow sample's stretch of time ended, s: pictures wait to be compared and read. 4 ms
+    /// by the data sheet, 17 in recorded logs, where the logger is part of it.
     pub flow_delay: f32,
     /// Smallest surface quality used.
     pub flow_min_quality: u8,
@@ -83,8 +83,8 @@ pub struct EskfConfig {
     /// Standard deviation of "is where it stood" while stationary, m.
     pub stationary_position_sigma: f32,
 
-    /// Standard deviation of "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the accelerometer noise it is
-    /// the time in which the velocity fades.
+    /// Standard deviation of "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the
+    /// accelerometer noise it is the time in which the velocity fades.
     pub unobserved_velocity: f32,
 
     /// Gates, in standard deviations.
@@ -94,8 +94,8 @@ pub struct EskfConfig {
 }
 
 impl EskfConfig {
-    /// Squared Mahalanobis distance at which the gate of a measurement of so many axes lies. A vector of more axes is more
-    /// often far away by chance: its gate is wider, for the same chance (6·10⁻⁵ at four standard deviations).
+    /// Squared Mahalanobis distance at which the gate of a measurement of so many axes lies. A vector of more axes is
+    /// more often far away by chance: its gate is wider, for the same chance (6·10⁻⁵ at four standard deviations).
     ///
     /// ```
     /// let config = stampfly_eskf::EskfConfig { gate: 4.0, ..Default::default() };

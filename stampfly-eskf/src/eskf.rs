@@ -47,7 +47,8 @@ const SIMULTANEOUS: f32 = 0.5e-3;
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
 /// The state is propagated with every inertial sample, the covariance with the first sample after this much time, s: at
-/// 400 Hz with every second one. A hundredth of the time in which the covariance changes, and half the work. (PX4's EKF2 takes 10 ms.)
+/// 400 Hz with every second one. A hundredth of the time in which the covariance changes, and half the work. (PX4's
+/// EKF2 takes 10 ms.)
 const COVARIANCE_STEP: f32 = 4e-3;
 /// Standard deviations added to tilt and gyro bias when flow's innovations are biased, and after a reset to flow: rad
 /// and rad/s.
@@ -205,8 +206,8 @@ impl Eskf {
         DelayedState { state: self.state, rotation: self.state.rotation(), step: PropagationStep::default(), age: 0.0 }
     }
 
-    /// The state at the time of a measurement. Refuses measurements before initialisation, and those that are not finite,
-    /// not new, too old or from the future.
+    /// The state at the time of a measurement. Refuses measurements before initialisation, and those that are not
+    /// finite, not new, too old or from the future.
     fn time_align(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<DelayedState, Refusal> {
         if !self.initialized {
             return Err(Refusal::NotInitialized);
@@ -278,8 +279,8 @@ impl Eskf {
         self.update(&innovation, ratio);
     }
 
-    /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time is
-    /// wrong. Late measurements are refused until it has filled again.
+    /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time
+    /// is wrong. Late measurements are refused until it has filled again.
     fn reset_history(&mut self) {
         self.history = History::default();
         self.pending_step = PropagationStep::default();
@@ -293,8 +294,8 @@ impl Eskf {
         Fusion::Reset
     }
 
-    /// Inflates tilt and gyro bias because flow's innovations are biased. Counts as a reset: many in a row mean that the
-    /// estimate has diverged.
+    /// Inflates tilt and gyro bias because flow's innovations are biased. Counts as a reset: many in a row mean that
+    /// the estimate has diverged.
     fn inflate_on_innovation_bias(&mut self) {
         self.inflate_tilt();
         self.status.diverged |= self.gates.count_reset(self.now);

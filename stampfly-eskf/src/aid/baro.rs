@@ -1,7 +1,7 @@
 //! Barometric altitude as vertical position.
 //!
-//! h = −p_z + offset, so the only derivative by the states is −1. Pressure drifts by metres an hour, so the offset is an
-//! estimate of its own ([`Offset`]): a random walk with a variance, which adds to the sensor's noise as far as the
+//! h = −p_z + offset, so the only derivative by the states is −1. Pressure drifts by metres an hour, so the offset is
+//! an estimate of its own ([`Offset`]): a random walk with a variance, which adds to the sensor's noise as far as the
 //! filter is concerned, and is updated with the same innovation. It is kept apart from the fifteen states: what couples
 //! them is a drift of centimetres a minute beside a range that is good to a centimetre.
 //!

@@ -1,11 +1,11 @@
 //! Gravity: the accelerometer as an inclinometer.
 //!
-//! The specific force is the body's own acceleration less gravity, updated from the body: f = Rᵀ·(a − g) + b. With
+//! The specific force is the body's own acceleration less gravity, in body axes: f = Rᵀ·(a − g) + b. With
 //! f₀ = Rᵀ·(a − g), a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds itself.
 //!
-//! The acceleration a must come from elsewhere: zero for a body that is stationary or carried gently, the change of a measured
-//! velocity for one that flies (see [`Acceleration`]). Left at zero in flight the model pulls the attitude towards level,
-//! because a multicopter's accelerometer points along its thrust, whatever the tilt.
+//! The acceleration a must come from elsewhere: zero for a body that is stationary or carried gently, the change of a
+//! measured velocity for one that flies (see [`Acceleration`]). Left at zero in flight the model pulls the attitude
+//! towards level, because a multicopter's accelerometer points along its thrust, whatever the tilt.
 //!
 //! | in [`Eskf`](crate::Eskf) | condition |
 //! |---|---|
@@ -41,8 +41,8 @@ const MAX_ACCELERATION: f32 = 5.0;
 /// Without a velocity for this long the acceleration is zero.
 const TIMEOUT: Duration = Duration::from_micros(200_000);
 
-/// Tracks the acceleration of the body from measured velocities: an α-β tracker (Kalata, "The Tracking Index", IEEE TAES
-/// 20(2), 1984).
+/// Tracks the acceleration of the body from measured velocities: an α-β tracker (Kalata, "The Tracking Index", IEEE
+/// TAES 20(2), 1984).
 ///
 /// ```
 /// use stampfly_eskf::aid::gravity::Acceleration;

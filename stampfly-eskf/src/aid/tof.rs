@@ -17,8 +17,8 @@ use super::Row;
 use crate::filter::state::Rotation;
 use crate::filter::{ATTITUDE, NominalState, POSITION};
 
-/// The range a level `surface` (world down coordinate, m) should give. `rotation[2][2]` must be positive: the caller has
-/// checked the tilt.
+/// The range a level `surface` (world down coordinate, m) should give. `rotation[2][2]` must be positive: the caller
+/// has checked the tilt.
 #[inline]
 #[must_use]
 pub fn range(state: &NominalState, rotation: &Rotation, surface: f32) -> Row {

@@ -1,14 +1,13 @@
 //! The gyro's bias, at rest and in motion: a Kalman filter of three states.
 //!
 //! At rest the gyro shows it. In motion gravity does: the attitude drifts with the bias, the filtered specific force
-//! leans over with the attitude, and the rate at which it leans is what the bias does to the two level axes, low-passed.
-//! With R the rotation into the level frame and LP the filter of the specific force:
+//! leans over with the attitude, and the rate at which it leans is what the bias does to the two level axes,
+//! low-passed. With R the rotation into the level frame and LP the filter of the specific force:
 //!
 //! > rate of leaning = LP(R·(b − b̂)), so LP(R)·b = rate of leaning + LP(R·b̂)
 //!
-//! Of the vertical axis gravity says nothing. There the bias is drawn, very gently, to where the calibration had it; the
-//! vertical
-//! axis is also what a clean magnetic field keeps turning the heading back by (`update_vertical`).
+//! Of the vertical axis gravity says nothing. There the bias is drawn, very gently, to where the calibration had it;
+//! the vertical axis is also what a clean magnetic field keeps turning the heading back by (`update_vertical`).
 //!
 //! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.3; the leaning rate is taken from the filter's own
 //! derivative instead of the corrections of single samples, which in `f32` would be mostly rounding.
@@ -74,7 +73,8 @@ impl GyroBias {
         stampfly_types::math::sqrt(axis.dot(&(self.covariance * axis)))
     }
 
-    /// Propagates the variance by the bias' random walk. Also keeps what [`update_moving`](Self::update_moving) needs, at rest as well.
+    /// Propagates the variance by the bias' random walk. Also keeps what [`update_moving`](Self::update_moving) needs,
+    /// at rest as well.
     pub fn predict(&mut self, config: &AttitudeConfig, level: &Matrix3<f32>, dt: f32) {
         let limit = config.initial_bias_sigma * config.initial_bias_sigma;
         for axis in 0..3 {
@@ -111,8 +111,9 @@ impl GyroBias {
         self.update(config, &vertical, vertical.dot(&self.calibrated), noise / VERTICAL_WEIGHT);
     }
 
-    /// Update of the vertical axis in motion: a clean field turned the heading by `share` of a disagreement of `off` rad. A heading that keeps
-    /// being turned the same way drifts: to the averaging of the correction this is what leaning is to that of the force.
+    /// Update of the vertical axis in motion: a clean field turned the heading by `share` of a disagreement of `off`
+    /// rad. A heading that keeps being turned the same way drifts: to the averaging of the correction this is what
+    /// leaning is to that of the force.
     pub fn update_vertical(&mut self, config: &AttitudeConfig, vertical: &Vec3, share: f32, off: f32, dt: f32) {
         self.vertical += (vertical - self.vertical) * share;
         self.vertical_bias += (vertical.dot(&self.value) - self.vertical_bias) * share;

@@ -16,14 +16,15 @@ pub struct AttitudeConfig {
     /// The same of a magnetometer sample, s: conversion time and averaging.
     pub mag_delay: f32,
 
-    /// Standard deviation of the gyro's bias without a calibration, rad/s. Half a degree a second: what sensors have after they
-    /// have been calibrated once, some day, at some temperature.
+    /// Standard deviation of the gyro's bias without a calibration, rad/s. Half a degree a second: what sensors have
+    /// after they have been calibrated once, some day, at some temperature.
     pub initial_bias_sigma: f32,
     /// Random walk of the bias, rad/s/√s. A fifth of a degree a second in a hundred seconds: warming up.
     pub bias_walk: f32,
     /// Standard deviation of the bias after long motion, rad/s; sets the weight of the leaning of gravity.
     pub motion_bias_sigma: f32,
-    /// Standard deviation of the bias after a long time at rest, rad/s; also the one that a complete calibration leaves.
+    /// Standard deviation of the bias after a long time at rest, rad/s; also the one that a complete calibration
+    /// leaves.
     pub rest_bias_sigma: f32,
     /// Farthest from the calibration that the bias may go, rad/s. Two degrees a second: beyond it lies slow motion, not
     /// bias.
@@ -46,8 +47,8 @@ pub struct AttitudeConfig {
     pub mag_reference_time: f32,
     /// After a disturbance the field must agree again for this long, s.
     pub mag_agree_time: f32,
-    /// A different field that stays the same for so long, while the body turns, is the new reference, s. Turning is asked
-    /// for because a body that lies beside a magnet sees a constant field too.
+    /// A different field that stays the same for so long, while the body turns, is the new reference, s. Turning is
+    /// asked for because a body that lies beside a magnet sees a constant field too.
     pub mag_renew_time: f32,
     /// Without any reference, a field that stays the same for so long is it, s.
     pub mag_first_time: f32,
@@ -61,8 +62,8 @@ pub struct AttitudeConfig {
     pub mag_disturbed_sigma: f32,
     /// Direction of the field in a new place, rad, where it is as different as it takes to be a new reference.
     pub mag_place_sigma: f32,
-    /// Standard deviation of the vertical gyro bias after long motion in a clean field, rad/s; sets how much of a drifting
-    /// heading is taken for bias.
+    /// Standard deviation of the vertical gyro bias after long motion in a clean field, rad/s; sets how much of a
+    /// drifting heading is taken for bias.
     pub mag_bias_sigma: f32,
 
     /// Estimate magnetised parts that turn with the sensor, and take their field out.

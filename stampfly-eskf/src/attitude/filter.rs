@@ -1,7 +1,7 @@
 //! The attitude filter: gyro, accelerometer and magnetometer in, attitude out.
 //!
-//! Use it for a body without a position sensor: a handheld device, a head tracker, a rover's or a glider's attitude, the
-//! fallback of a flying vehicle. Three rotations in a row, each from the sensor that knows it:
+//! Use it for a body without a position sensor: a handheld device, a head tracker, a rover's or a glider's attitude,
+//! the fallback of a flying vehicle. Three rotations in a row, each from the sensor that knows it:
 //!
 //! | rotation | from | changes |
 //! |---|---|---|
@@ -10,7 +10,8 @@
 //! | level → world | magnetic field without hard iron, if it is the earth's | slowly, about the vertical only |
 //!
 //! Tilt therefore owes nothing to the magnetometer but a little gyro bias, and acceleration is averaged over seconds
-//! however fast the body turns. Not for a vehicle whose velocity is measured: the [`Eskf`](crate::Eskf) knows which acceleration is motion.
+//! however fast the body turns. Not for a vehicle whose velocity is measured: the [`Eskf`](crate::Eskf) knows which
+//! acceleration is motion.
 //!
 //! Structure after Laidig, Seel, "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic
 //! disturbance rejection", Information Fusion 91, 2023. Different here: sensor delays, hard iron estimated in motion, a

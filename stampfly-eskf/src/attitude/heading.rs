@@ -64,7 +64,8 @@ impl Heading {
         self.off
     }
 
-    /// Propagates the variance: the gyro is wrong by a bias of this standard deviation and by its scale at this rate, rad/s.
+    /// Propagates the variance: the gyro is wrong by a bias of this standard deviation and by its scale at this rate,
+    /// rad/s.
     pub fn predict(&mut self, bias_sigma: f32, rate: f32, dt: f32) {
         let scale = SCALE_ERROR * rate;
         let walk = bias_sigma * bias_sigma * BIAS_TIME + scale * scale * TURN_TIME;
@@ -91,8 +92,8 @@ impl Heading {
         self.variance *= 1.0 - share;
     }
 
-    /// Update with a field in the level frame that may be bent by `sigma`, rad. Gives the share of the disagreement, which is
-    /// the second number, rad, that went into the heading.
+    /// Update with a field in the level frame that may be bent by `sigma`, rad. Gives the share of the disagreement,
+    /// which is the second number, rad, that went into the heading.
     ///
     /// At rest the bend is the same in every sample: what is known does not become more.
     pub fn update(

@@ -9,8 +9,8 @@ use stampfly_types::math;
 /// A pivot below this share of its column means that the column depends on the ones before it.
 const DEPENDENT: f32 = 1e-4;
 
-/// Equations in `WIDTH` − 1 unknowns, as the triangular factor of their QR decomposition. The right-hand side is the last column; in its
-/// last place stands the norm of the residual.
+/// Equations in `WIDTH` − 1 unknowns, as the triangular factor of their QR decomposition. The right-hand side is the last
+/// column; in its last place stands the norm of the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(

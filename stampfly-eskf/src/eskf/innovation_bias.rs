@@ -1,14 +1,15 @@
 //! Monitor of the mean innovation: a mean that is not zero shows a filter whose covariance is too small.
 //!
-//! A gate tests single innovations. A gyro bias far beyond its standard deviation never reaches the gate: the tilt it makes
-//! settles where flow corrects as fast as the bias tilts, with every innovation within its standard deviation and all of
-//! one sign. The innovations of a consistent filter are white (Mehra, "On the identification of variances and adaptive Kalman filtering",
-//! IEEE TAC 15(2), 1970), so their mean over some time is near zero; a mean that is not asks for an inflation of the
-//! states behind it.
+//! A gate tests single innovations. A gyro bias far beyond its standard deviation never reaches the gate: the tilt it
+//! makes settles where flow corrects as fast as the bias tilts, with every innovation within its standard deviation and
+//! all of one sign. The innovations of a consistent filter are white (Mehra, "On the identification of variances and
+//! adaptive Kalman filtering", IEEE TAC 15(2), 1970), so their mean over some time is near zero; a mean that is not
+//! asks for an inflation of the states behind it.
 
 /// Time constant of the mean, s.
 const TIME_CONSTANT: f32 = 0.3;
-/// Mean, in standard deviations of one innovation, beyond which it counts as biased: five times its own deviation at 100 Hz.
+/// Mean, in standard deviations of one innovation, beyond which it counts as biased: five times its own deviation at
+/// 100 Hz.
 const MAX_MEAN: f32 = 0.8;
 
 /// Mean of a sensor's whitened innovations.
@@ -49,6 +50,6 @@ mod tests {
         }
         let first = (0..100).find(|_| monitor.update(&[1.0, 0.8], 0.01)).expect("found");
         assert!((20..50).contains(&first), "after {first} readings");
-        assert!(!monitor.update(&[1.0, 0.8], 0.01), "it begins anew");
+        assert!(!monitor.update(&[1.0, 0.8], 0.01), "the mean starts again from zero");
     }
 }

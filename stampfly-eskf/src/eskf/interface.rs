@@ -9,7 +9,8 @@ impl Estimator for Eskf {
         if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
             return;
         }
-        // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the stack.
+        // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the
+        // stack.
         let command = self.command;
         *self = Self::new(self.config);
         self.now = at;

@@ -1,5 +1,5 @@
-//! One update a sensor: time alignment, innovation, gate, then update, rejection, or reset after a lock-out. The models,
-//! and the conditions of each sensor, are in [`aid`](crate::aid).
+//! One update a sensor: time alignment, innovation, gate, then update, rejection, or reset after a lock-out. The
+//! models, and the conditions of each sensor, are in [`aid`](crate::aid).
 
 use super::gate::{GateResult, Sensor};
 use super::*;
@@ -28,8 +28,8 @@ impl Eskf {
         }
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
         let row = aid::tof::range(&delayed.state, &delayed.rotation, surface);
-        // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the axis
-        // and the one straight down.
+        // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the
+        // axis and the one straight down.
         let cone = tof.distance * (1.0 - cos_tilt);
         let sigma = self.config.tof_sigma.max(tof.sigma) + cone;
         let variance = sigma * sigma;
@@ -96,7 +96,8 @@ impl Eskf {
         match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => {
                 let fusion = self.update(&innovation, ratio);
-                // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows nothing.
+                // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
+                // nothing.
                 if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
                     self.inflate_on_innovation_bias();
                 }
@@ -142,7 +143,8 @@ impl Eskf {
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
-                // A jump of the air pressure does not move the vehicle: reset the offset, which is no sign of divergence.
+                // A jump of the air pressure does not move the vehicle: reset the offset, which is no sign of
+                // divergence.
                 self.baro_offset = Some(Offset::new(here, noise));
                 self.gates.accept(Sensor::Baro, self.now);
                 self.status.resets = self.status.resets.wrapping_add(1);
@@ -189,7 +191,8 @@ impl Eskf {
             return self.update(innovation, ratio);
         }
         if verdict == GateResult::Reset {
-            // No other sensor corrects the heading: inflate it, once per lock-out, until the field passes the gate again.
+            // No other sensor corrects the heading: inflate it, once per lock-out, until the field passes the gate
+            // again.
             self.gates.restart_lockout(Sensor::Mag, self.now);
             let vertical = self.state.rotation()[2];
             for (axis, part) in vertical.iter().enumerate() {

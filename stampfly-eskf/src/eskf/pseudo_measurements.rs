@@ -41,7 +41,8 @@ impl Eskf {
             GateResult::Fuse => self.update(&innovation, ratio),
             GateResult::Reject => Fusion::Gated { ratio },
             GateResult::Reset => {
-                // Nothing else corrects the attitude: inflate it, once per lock-out, until gravity passes the gate again.
+                // Nothing else corrects the attitude: inflate it, once per lock-out, until gravity passes the gate
+                // again.
                 self.gates.restart_lockout(Sensor::Gravity, self.now);
                 for axis in 0..3 {
                     self.covariance.inflate(ATTITUDE + axis, 0.1);
@@ -62,17 +63,17 @@ impl Eskf {
         self.covariance.reset(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
     }
 
-    /// Constrains the heading at initialisation, where it is zero by definition. With a larger variance every error of the
-    /// flow sensor would turn it.
+    /// Constrains the heading at initialisation, where it is zero by definition. With a larger variance every error of
+    /// the flow sensor would turn it.
     pub(super) fn constrain_heading(&mut self) {
         let [x, y, z] = self.state.rotation()[2];
         let row = Row::new(0.0, [(ATTITUDE, x), (ATTITUDE + 1, y), (ATTITUDE + 2, z)]);
         self.constrain([row], [0.0], HEADING_SIGMA);
     }
 
-    /// Limits the variance of velocity and position, and sets a velocity at its limit to zero. Without a measurement the
-    /// velocity is the integral of a small tilt error and soon larger than any that the vehicle can fly; at zero it waits
-    /// for the next measurement.
+    /// Limits the variance of velocity and position, and sets a velocity at its limit to zero. Without a measurement
+    /// the velocity is the integral of a small tilt error and soon larger than any that the vehicle can fly; at zero it
+    /// waits for the next measurement.
     pub(super) fn reset_unobserved_motion(&mut self) {
         const LIMITS: [(usize, f32); 2] = [(VELOCITY, MAX_VELOCITY_SIGMA), (POSITION, MAX_POSITION_SIGMA)];
         for (block, limit) in LIMITS {
@@ -88,8 +89,8 @@ impl Eskf {
     }
 
     /// Constrains the velocity near zero, for `dt` seconds, while the tilt hides the ground from range and flow: the
-    /// integral of a tilt error grows by the second. Vehicles that use their velocity do not fly like this; they are carried
-    /// so by hand, slowly.
+    /// integral of a tilt error grows by the second. Vehicles that use their velocity do not fly like this; they are
+    /// carried so by hand, slowly.
     pub(super) fn constrain_unobserved_velocity(&mut self, dt: f32) {
         let sigma = self.config.unobserved_velocity / math::sqrt(dt.max(1e-3));
         self.constrain(aid::velocity::world(&self.state), [0.0; 3], sigma);

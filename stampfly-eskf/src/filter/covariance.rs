@@ -61,8 +61,8 @@ impl<const M: usize> Innovation<M> {
         &self.whitened
     }
 
-    /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with `M` degrees of freedom when
-    /// the filter is consistent.
+    /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with
+    /// `M` degrees of freedom when the filter is consistent.
     #[inline]
     #[must_use]
     pub fn nis(&self) -> f32 {
@@ -79,8 +79,8 @@ const FLOOR: [f32; N] = [
     1e-9, 1e-9, 1e-9, // accelerometer bias, (0.03 mm/s²)²
 ];
 
-/// Does a row fit a few vector registers? Then whole rows cost less than the half of them that is needed. The sums are the
-/// same, term by term and bit by bit.
+/// Does a row fit a few vector registers? Then whole rows cost less than the half of them that is needed. The sums are
+/// the same, term by term and bit by bit.
 const WHOLE_ROWS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
 /// Adds multiples of rows to columns `FIRST` to `N` of a row, one after the other. By `WHOLE` rows, the columns before
@@ -151,8 +151,8 @@ impl Covariance {
     /// P ← F·P·Fᵀ + Q over a short step that begins in the attitude `rotation`.
     ///
     /// F = I, plus τ in position ← velocity, −\[s\]×·R in velocity ← attitude, −R·τ in velocity ← accelerometer bias,
-    /// ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s and ΔR of the [`PropagationStep`]. Terms of second
-    /// order in τ are left out of the position.
+    /// ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s and ΔR of the [`PropagationStep`]. Terms
+    /// of second order in τ are left out of the position.
     #[inline]
     pub fn propagate(&mut self, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) {
         self.propagate_with::<WHOLE_ROWS>(rotation, step, noise);
@@ -225,7 +225,8 @@ impl Covariance {
     }
 
     /// The innovation of a measurement of `M` axes from its Jacobians by the error states, its innovations, and the
-    /// variance of each axis' noise, which must be positive. The covariance stays as it is. Entries of a Jacobian that are zero cost next to nothing.
+    /// variance of each axis' noise, which must be positive. The covariance stays as it is. Entries of a Jacobian that
+    /// are zero cost next to nothing.
     #[inline]
     #[must_use]
     pub fn innovation<const M: usize>(
@@ -322,7 +323,8 @@ impl Covariance {
 }
 
 impl Covariance {
-    /// Subtracts w·wᵀ of each column w of the gain from the three rows from `FIRST` on, on the diagonal block and to its right.
+    /// Subtracts w·wᵀ of each column w of the gain from the three rows from `FIRST` on, on the diagonal block and to
+    /// its right.
     #[inline]
     fn subtract_outer_products<const FIRST: usize, const M: usize>(&mut self, gain: &[Row; M]) {
         for (i, row) in self.rows.iter_mut().enumerate().skip(FIRST).take(3) {

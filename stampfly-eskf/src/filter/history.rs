@@ -2,9 +2,9 @@
 //!
 //! A flow sensor reports what it saw a picture or two ago, a camera system what it saw fifty milliseconds ago. This
 //! ring keeps how the body turned and what its specific force added, not states: a correction of the present state
-//! is a correction of the past ones, too, without touching them. (Velocity changes keep the attitude they were added with: a
-//! correction by θ leaves an error of θ times the change until they are forgotten.) Samples that come faster than every
-//! 2.5 ms are merged, so the memory reaches back [`MAX_AGE`] at any rate of the inertial sensor.
+//! is a correction of the past ones, too, without touching them. (Velocity changes keep the attitude they were added
+//! with: a correction by θ leaves an error of θ times the change until they are forgotten.) Samples that come faster
+//! than every 2.5 ms are merged, so the memory reaches back [`MAX_AGE`] at any rate of the inertial sensor.
 
 use super::PropagationStep;
 use super::state::{Motion, multiply, small_rotation};
@@ -125,7 +125,8 @@ impl History {
         None
     }
 
-    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as the history covers them.
+    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as the history covers
+    /// them.
     /// `None` when it covers no part of them.
     #[inline]
     #[must_use]

@@ -7,7 +7,8 @@
 //! that time ([`PropagationStep::state_at_start`]) and the Jacobian by the present errors
 //! ([`PropagationStep::propagate_jacobian`]).
 //!
-//! With τ the duration, s `delta_velocity`, r `delta_position`, ΔR `delta_rotation` and R the attitude at the beginning:
+//! With τ the duration, s `delta_velocity`, r `delta_position`, ΔR `delta_rotation` and R the attitude at the
+//! beginning:
 //!
 //! | at the beginning | from the end, "now" |
 //! |---|---|
@@ -136,8 +137,8 @@ mod tests {
             }
         }
 
-        /// The propagated Jacobian is the derivative of "go back, then measure". Biases change what the inertial samples
-        /// meant, so they are moved before the flight, not after.
+        /// The propagated Jacobian is the derivative of "go back, then measure". Biases change what the inertial
+        /// samples meant, so they are moved before the flight, not after.
         #[test]
         fn propagated_jacobian_matches_numerical_differentiation(
             samples in prop::collection::vec((-2f32..2.0, -2f32..2.0, -2f32..2.0, -3f32..3.0), 1..40),

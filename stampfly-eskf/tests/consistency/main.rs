@@ -1,5 +1,5 @@
-//! Consistency of the error-state Kalman filter: it recovers or reports divergence, takes no harm from bad time, stays sound
-//! for hours, and tells what a stuck sensor is worth.
+//! Consistency of the error-state Kalman filter: it recovers or reports divergence, takes no harm from bad time, stays
+//! sound for hours, and tells what a stuck sensor is worth.
 
 mod flight;
 mod lockouts;

@@ -1,7 +1,7 @@
 //! What a magnetic field does to the attitude filter.
 //!
-//! First it is freed of the sensor's own magnetised parts, then compared with the reference, and then it may correct the
-//! heading, as far as its status allows. Nothing here touches the tilt.
+//! First it is freed of the sensor's own magnetised parts, then compared with the reference, and then it may correct
+//! the heading, as far as its status allows. Nothing here touches the tilt.
 
 use super::super::magnetic::{FieldStatus, Magnetic};
 use super::super::rotation::{from_vector, product, within};
