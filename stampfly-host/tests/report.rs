@@ -107,7 +107,7 @@ fn states_have_names_and_alerts_have_times() {
     let states: Vec<_> = bands[0]["stretches"].as_array().unwrap().iter().map(|s| s[2].as_str().unwrap()).collect();
     assert_eq!(states, ["Init", "IdleGround", "Armed", "TakeOff", "Flying", "Landing", "IdleGround"]);
     let titles: Vec<_> = bands.iter().map(|band| band["title"].as_str().unwrap()).collect();
-    assert_eq!(titles, ["State", "Mode", "low battery", "flow lost"]);
+    assert_eq!(titles, ["Phase", "Mode", "low battery", "flow lost"]);
     let lost = &bands[3]["stretches"][0];
     assert!(
         (lost[0].as_f64().unwrap() - 31.0).abs() < 0.11 && (lost[1].as_f64().unwrap() - 31.4).abs() < 0.11,
