@@ -152,7 +152,7 @@ fn main() {
         println!(
             "  {temperature:2.0} °C: off by {:.2} mrad/s, {:?}, {} samples",
             off.amax() * 1e3,
-            bias.reach,
+            bias.coverage,
             bias.samples
         );
     }
