@@ -148,7 +148,7 @@ parameters! {
     "failsafe.mismatch.time" [0.1, 5.0] "s" failsafe.tilt_mismatch_time => "for this long apart is an alert";
 
     "landing.descent.speed" [0.2, 1.0] "m/s" landing.descent => "descent";
-    "landing.touchdown.speed" [0.12, 0.5] "m/s" landing.touchdown => "descent at the ground";
+    "landing.touchdown.speed" [0.12, 0.2] "m/s" landing.touchdown => "descent at the ground";
     "landing.flare.height" [0.05, 2.0] "m" landing.flare_height => "below this height the descent slows down";
     "landing.ceiling.height" [0.04, 0.2] "m" landing.ceiling_height => "below this height the thrust ceiling falls";
     "landing.ceiling.share" [0.3, 0.75] "1" landing.ceiling_share => "where the thrust ceiling ends, share of hover thrust";
@@ -175,18 +175,18 @@ parameters! {
     "navigator.waypoint.radius" [0.03, 1.0] "m" navigator.reached => "a way-point is reached this close";
     "navigator.leash.length" [0.2, 5.0] "m" navigator.leash => "the path waits for a vehicle farther away";
     "navigator.landing.lead" [0.05, 1.0] "m" navigator.landing_lead => "while landing the path is this far below at most";
-    "navigator.horizontal.speed" [0.1, 5.0] "m/s" navigator.limits.horizontal.speed => "bound of the path";
-    "navigator.horizontal.accel" [0.1, 5.0] "m/s^2" navigator.limits.horizontal.acceleration => "bound of the path";
-    "navigator.horizontal.jerk" [1.0, 50.0] "m/s^3" navigator.limits.horizontal.jerk => "bound of the path";
-    "navigator.vertical.speed" [0.1, 2.0] "m/s" navigator.limits.vertical.speed => "bound of the path";
-    "navigator.vertical.accel" [0.1, 5.0] "m/s^2" navigator.limits.vertical.acceleration => "bound of the path";
-    "navigator.vertical.jerk" [1.0, 50.0] "m/s^3" navigator.limits.vertical.jerk => "bound of the path";
-    "navigator.heading.rate" [0.1, 6.0] "rad/s" navigator.limits.heading.speed => "bound of the path";
-    "navigator.heading.accel" [0.5, 20.0] "rad/s^2" navigator.limits.heading.acceleration => "bound of the path";
-    "navigator.heading.jerk" [5.0, 200.0] "rad/s^3" navigator.limits.heading.jerk => "bound of the path";
+    "navigator.horizontal.speed" [0.1, 5.0] "m/s" navigator.limits.horizontal.speed => "largest speed north and east";
+    "navigator.horizontal.accel" [0.1, 5.0] "m/s^2" navigator.limits.horizontal.acceleration => "largest acceleration north and east";
+    "navigator.horizontal.jerk" [1.0, 50.0] "m/s^3" navigator.limits.horizontal.jerk => "largest jerk north and east";
+    "navigator.vertical.speed" [0.2, 2.0] "m/s" navigator.limits.vertical.speed => "largest speed up and down";
+    "navigator.vertical.accel" [0.1, 5.0] "m/s^2" navigator.limits.vertical.acceleration => "largest acceleration up and down";
+    "navigator.vertical.jerk" [1.0, 50.0] "m/s^3" navigator.limits.vertical.jerk => "largest jerk up and down";
+    "navigator.heading.rate" [0.1, 6.0] "rad/s" navigator.limits.heading.speed => "largest rate of turn";
+    "navigator.heading.accel" [0.5, 20.0] "rad/s^2" navigator.limits.heading.acceleration => "largest acceleration of the turn";
+    "navigator.heading.jerk" [5.0, 200.0] "rad/s^3" navigator.limits.heading.jerk => "largest jerk of the turn";
 
-    "authority.stick.dead_band" [0.0, 0.2] "1" authority.dead_band => "sticks this close to their centre are centred";
-    "authority.stick.take_over" [0.05, 0.9] "1" authority.take_over => "deflection that takes over from guidance";
+    "authority.stick.dead_band" [0.0, 0.1] "1" authority.dead_band => "sticks this close to their centre are centred";
+    "authority.stick.take_over" [0.1, 0.9] "1" authority.take_over => "deflection that takes over from guidance";
     "authority.pilot.timeout" [0.1, 5.0] "s" authority.stale => "a pilot's frame as old as this counts as none";
 }
 
