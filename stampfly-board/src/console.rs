@@ -24,8 +24,6 @@ use stampfly_types::{Duration, Instant};
 pub const TEST_TIME: Duration = Duration::from_secs(2);
 /// Largest duty in a test, share: enough to turn without propellers, too little to lift with them.
 pub const TEST_DUTY: f32 = 0.3;
-/// Room for the longest reply, the list of parameters, bytes. A longer one would end early.
-pub const REPLY: usize = 12 * 1024;
 /// Motors that can be tested.
 const MOTORS: u8 = 4;
 

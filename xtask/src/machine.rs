@@ -4,6 +4,7 @@
 //! [`provide`]; the step `machine` asks for all of them before anything is built.
 
 use crate::repository::{Failure, Repository, run};
+use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -54,6 +55,13 @@ pub fn missing(tools: &[&Tool]) -> Vec<&'static str> {
 
 /// Installs what is not there.
 pub fn provide(repository: &Repository, tools: &[&Tool]) -> Result<(), Failure> {
+    if missing(tools).is_empty() {
+        return Ok(());
+    }
+    // The steps of both lanes of `ci` install; Debian's installer refuses to run twice at once.
+    let place = repository.target("apt.lock");
+    let lock = File::create(&place).map_err(|e| format!("{}: {e}", place.display()))?;
+    lock.lock().map_err(|e| format!("{}: {e}", place.display()))?;
     let packages = missing(tools);
     if packages.is_empty() {
         return Ok(());

@@ -19,7 +19,7 @@ use repository::Repository;
 use std::process::ExitCode;
 use step::Step;
 
-/// In the order of `ci`: fast and frequent failures first.
+/// In the order of `ci`: fast and frequent failures first. `panic-calls` and `memory` look at what `esp32` has built.
 const STEPS: &[Step] = &[
     Step::new("machine", "List the missing programs that the steps need", steps::machine::run),
     Step::new("fmt", "Check the formatting", steps::fmt::run),
@@ -30,8 +30,8 @@ const STEPS: &[Step] = &[
     Step::new("examples", "Run every example to its end", steps::examples::run),
     Step::new("doc", "Build the documentation; a warning fails", steps::doc::run),
     Step::new("no-std", "Build the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
-    Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).accepting(&[Rest]),
-    Step::new("consumers", "Build and run one program per crate outside the workspace", steps::consumers::run),
+    Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
+    Step::new("consumers", "Build and run one program per crate outside the workspace", steps::consumers::run).beside(),
     Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
         .accepting(&[Seconds]),
     Step::new("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run).accepting(&[File]),
@@ -41,21 +41,27 @@ const STEPS: &[Step] = &[
         "Count the estimator's instructions on a Cortex-M4F, compare its bits",
         steps::cortex_m4f::run,
     ),
-    Step::new("panic-proof", "Link the flight code without a panic handler", steps::panic_proof::run),
-    Step::new("esp32", "Type-check the ESP32-S3 firmware, build it for the ESP32-C6", steps::esp32::run).within(300.0),
+    Step::new("panic-proof", "Link the flight code without a panic handler", steps::panic_proof::run).beside(),
+    Step::new("esp32", "Type-check the ESP32-S3 firmware, build it for the ESP32-C6", steps::esp32::run)
+        .beside()
+        .within(300.0),
     Step::new("memory", "Hold the firmware's (or FILE's) flash, memory and stack to their budgets", steps::memory::run)
+        .beside()
         .accepting(&[Fix, File]),
     Step::new(
         "panic-calls",
         "Find calls that panic in the firmware's (or FILE's) flight code",
         steps::panic_calls::run,
     )
+    .beside()
     .accepting(&[File]),
-    Step::new("package", "Build each crate from its package, as committed", steps::package::run),
+    Step::new("package", "Build each crate from its package, as committed", steps::package::run).beside(),
+    Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
     Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run),
     Step::new("golden", "Compare the golden flight with a new recording", steps::golden::run).accepting(&[Fix]),
     Step::new("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
+        .beside()
         .accepting(&[Fix]),
     Step::new("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
         .accepting(&[Fix]),

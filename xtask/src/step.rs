@@ -18,6 +18,8 @@ pub struct Step {
     pub accepts: &'static [Accepts],
     /// Is it part of `ci`?
     pub in_ci: bool,
+    /// Does it build in folders of its own, so that `ci` runs it beside the others?
+    pub beside: bool,
     /// Most seconds it may take.
     pub limit: Option<f64>,
     pub run: Run,
@@ -26,7 +28,7 @@ pub struct Step {
 impl Step {
     /// A step of `ci` without arguments.
     pub const fn new(name: &'static str, about: &'static str, run: Run) -> Self {
-        Self { name, about, accepts: &[], in_ci: true, limit: None, run }
+        Self { name, about, accepts: &[], in_ci: true, beside: false, limit: None, run }
     }
 
     pub const fn accepting(self, accepts: &'static [Accepts]) -> Self {
@@ -35,6 +37,11 @@ impl Step {
 
     pub const fn within(self, seconds: f64) -> Self {
         Self { limit: Some(seconds), ..self }
+    }
+
+    /// Builds in folders of its own: `ci` runs it beside the others.
+    pub const fn beside(self) -> Self {
+        Self { beside: true, ..self }
     }
 
     /// Not part of `ci`.

@@ -14,15 +14,17 @@ use esp_hal::Async;
 use esp_hal::peripherals::USB_DEVICE;
 use esp_hal::usb::usb_serial_jtag::{UsbSerialJtag, UsbSerialJtagTx};
 use heapless::String;
-use stampfly_board::console::{self, Command, Profile, REPLY};
+use stampfly_board::console::{self, Command, Profile};
 use stampfly_board::golden::Outcome;
 use stampfly_board::{VehicleConfig, black_box, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::black_box::{DumpError, Refused, dump};
-use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
+use stampfly_flight::console::{LineEditor, Piece, Request, SensorLine, answer};
 use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
+/// Replies are made and sent in pieces of this many bytes. Only the list of parameters is longer.
+const PIECE: usize = 4096;
 /// A terminal that takes nothing for this long is none.
 const PATIENCE: Duration = Duration::from_millis(200);
 /// A terminal in the middle of a log is one, and may be busy.
@@ -117,10 +119,15 @@ struct Console {
 
 impl Console {
     async fn obey(&mut self, line: &str) {
-        let mut reply = String::<REPLY>::new();
-        // A reply that is too long ends early.
-        let request = self.answer(line, &mut reply).unwrap_or(Request::Nothing);
-        self.screen.show(&reply).await;
+        let mut piece = Piece::starting_at(0);
+        let mut sent = 0;
+        // An error is the end of the piece. Longer replies than one only show something: those lines are answered again.
+        let request = self.answer(line, &mut piece).unwrap_or(Request::Nothing);
+        while self.screen.offer(piece.bytes(), PATIENCE).await.is_ok() && piece.is_cut() {
+            sent += piece.bytes().len();
+            piece = Piece::starting_at(sent);
+            let _ = self.answer(line, &mut piece);
+        }
         let memory = self.memory;
         let mode = || newest_mode(memory);
         let busy = &mut self.storage_ends.storage_busy;
@@ -151,7 +158,7 @@ impl Console {
     }
 
     /// Answers a line with what is known now.
-    fn answer(&mut self, line: &str, reply: &mut String<REPLY>) -> Result<Request<Command>, core::fmt::Error> {
+    fn answer(&mut self, line: &str, reply: &mut Piece<PIECE>) -> Result<Request<Command>, core::fmt::Error> {
         let sensors = self.health.all();
         let errors = sensors.map(|(_, health)| health.last_error());
         let lines: [SensorLine<'_>; 7] = core::array::from_fn(|index| {
@@ -186,7 +193,7 @@ impl Console {
         let mut cursor = memory.borrow().black_box.begin();
         // Borrowed for one record at a time, so that nothing is while the terminal takes its time.
         let next = || memory.borrow().black_box.next(&mut cursor);
-        let show = async |line: &str| screen.offer(line, PATIENCE_WITH_LOG).await;
+        let show = async |line: &str| screen.offer(line.as_bytes(), PATIENCE_WITH_LOG).await;
         let dumped = dump(next, |sink, at| black_box::open(sink, at, flown, version), show).await;
         if let Err(error) = dumped {
             self.report(Err::<(), DumpError>(error), "").await;
@@ -222,13 +229,13 @@ impl Screen {
     /// Shows a text. Without a terminal it is lost.
     async fn show(&mut self, text: &str) {
         if !text.is_empty() {
-            let _ = self.offer(text, PATIENCE).await;
+            let _ = self.offer(text.as_bytes(), PATIENCE).await;
         }
     }
 
     /// Shows a text to a terminal that takes it in this time.
-    async fn offer(&mut self, text: &str, patience: Duration) -> Result<(), Refused> {
-        match with_timeout(patience, self.0.write_all(text.as_bytes())).await {
+    async fn offer(&mut self, text: &[u8], patience: Duration) -> Result<(), Refused> {
+        match with_timeout(patience, self.0.write_all(text)).await {
             Ok(Ok(())) => Ok(()),
             _ => Err(Refused),
         }

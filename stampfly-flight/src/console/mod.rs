@@ -5,6 +5,7 @@
 //! | [`LineEditor`] | bytes as they are typed → a line |
 //! | [`Command::parse`] | a line → a command |
 //! | [`answer`] | a line → a reply, and a [`Request`] for what only the board can do |
+//! | [`Piece`] | a long reply, part by part |
 //! | [`Vehicle`] | what a vehicle knows, and its own commands |
 //!
 //! Nothing here touches hardware: an answer is a function of the line and of what the vehicle knows. Not for programs:
@@ -14,10 +15,12 @@ mod answer;
 mod command;
 mod error;
 mod line_editor;
+mod piece;
 mod vehicle;
 
 pub use answer::{Request, answer};
 pub use command::{COMMANDS, Command};
 pub use error::{CommandError, MAX_WORDS};
 pub use line_editor::LineEditor;
+pub use piece::Piece;
 pub use vehicle::{SensorLine, Vehicle};

@@ -24,6 +24,7 @@ pub mod package;
 pub mod panic_calls;
 pub mod panic_proof;
 pub mod peers;
+pub mod python;
 pub mod qemu;
 pub mod test;
 pub mod ulog;
