@@ -23,8 +23,8 @@ use stampfly_flight::console::{LineEditor, Piece, Request, SensorLine, answer};
 use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
-/// Replies are made and sent in pieces of this many bytes. Only the list of parameters is longer.
-const PIECE: usize = 4096;
+/// Replies are made and sent in pieces of this many bytes. Only lists are longer.
+const PIECE: usize = 2048;
 /// A terminal that takes nothing for this long is none.
 const PATIENCE: Duration = Duration::from_millis(200);
 /// A terminal in the middle of a log is one, and may be busy.
@@ -119,13 +119,13 @@ struct Console {
 
 impl Console {
     async fn obey(&mut self, line: &str) {
-        let mut piece = Piece::starting_at(0);
+        let mut piece = Piece::default();
         let mut sent = 0;
         // An error is the end of the piece. Longer replies than one only show something: those lines are answered again.
         let request = self.answer(line, &mut piece).unwrap_or(Request::Nothing);
         while self.screen.offer(piece.bytes(), PATIENCE).await.is_ok() && piece.is_cut() {
             sent += piece.bytes().len();
-            piece = Piece::starting_at(sent);
+            piece.start_at(sent);
             let _ = self.answer(line, &mut piece);
         }
         let memory = self.memory;

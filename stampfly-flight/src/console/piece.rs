@@ -3,7 +3,7 @@
 use core::fmt;
 use heapless::Vec;
 
-/// The part of a text that begins at some byte and is at most `N` bytes long.
+/// The part of a text that begins at some byte, by default the first, and is at most `N` bytes long.
 ///
 /// A board makes its reply into a piece, sends it, and while the piece is cut makes the reply again for the next one. So a
 /// reply longer than `N` has to be one that changes nothing, such as the list of parameters. Not needed where a whole
@@ -13,20 +13,19 @@ use heapless::Vec;
 /// use core::fmt::Write;
 /// use stampfly_flight::console::Piece;
 ///
-/// let (mut sent, mut from) = (Vec::new(), 0);
+/// let (mut sent, mut piece) = (Vec::new(), Piece::<8>::default());
 /// loop {
-///     let mut piece = Piece::<8>::starting_at(from);
 ///     // Fails at the end of the piece, so that nothing is formatted in vain.
 ///     let _ = write!(piece, "roll {}, pitch {}", 0.25, -0.125);
 ///     sent.extend_from_slice(piece.bytes());
-///     from += piece.bytes().len();
 ///     if !piece.is_cut() {
 ///         break;
 ///     }
+///     piece.start_at(sent.len());
 /// }
 /// assert_eq!(sent, b"roll 0.25, pitch -0.125");
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Piece<const N: usize> {
     /// Bytes still to be left out.
     skip: usize,
@@ -35,10 +34,11 @@ pub struct Piece<const N: usize> {
 }
 
 impl<const N: usize> Piece<N> {
-    /// Leaves out the first `skip` bytes of what is written to it.
-    #[must_use]
-    pub const fn starting_at(skip: usize) -> Self {
-        Self { skip, bytes: Vec::new(), is_cut: false }
+    /// Becomes another piece of the text: the one after its first `skip` bytes.
+    pub fn start_at(&mut self, skip: usize) {
+        self.skip = skip;
+        self.bytes.clear();
+        self.is_cut = false;
     }
 
     /// What was kept. It may begin and end within a character.

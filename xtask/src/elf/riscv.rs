@@ -143,7 +143,12 @@ impl Reader {
             // Loads and arithmetic.
             (0, 2) => self.known[8 + field(word, 2, 3, 0) as usize] = None,
             (1, 4) => self.known[8 + field(word, 7, 3, 0) as usize] = None,
-            (2, 0 | 2) => self.known[register] = None,
+            (2, 2) => self.known[register] = None,
+            // c.slli
+            (2, 0) => {
+                let by = field(word, 2, 5, 0);
+                self.known[register] = self.known[register].map(|value| value << by);
+            }
             (0, 0) => self.known[8 + field(word, 2, 3, 0) as usize] = None,
             _ => {}
         }
@@ -207,6 +212,9 @@ mod tests {
         // lui t0, 13; addi t0, t0, -16; sub sp, sp, t0; jalr ra, a5
         let code = read(&words(&[0x0000_d2b7, 0xff02_8293, 0x4051_0133, 0x0007_80e7]), 0x1000);
         assert_eq!(code, Code { frame: 0xd000 - 16, indirect: 1, ..Code::default() });
+        // c.li a2, 27; c.slli a2, 8; sub sp, sp, a2
+        let code = read(&words(&[0x0622_466d, 0x40c1_0133]), 0x1000);
+        assert_eq!(code, Code { frame: 27 << 8, ..Code::default() });
         // lui a0, 13; addi a0, a0, -16; auipc ra, 1; jalr ra, 8(ra)
         let code = read(&words(&[0x0000_d537, 0xff05_0513, 0x0000_1097, 0x0080_80e7]), 0x1000);
         assert_eq!(code.constants, [(0x2010, vec![0xd000 - 16])]);
