@@ -3,7 +3,7 @@
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Format, Message, Reader, Topic};
 use stampfly_types::Message as _;
-use stampfly_types::messages::{ImuData, StateEstimate, FlightStatus};
+use stampfly_types::messages::{FlightStatus, ImuData, StateEstimate};
 
 const TOPICS: [Topic; 3] = [
     Topic { name: "sensor_imu", fields: ImuData::FIELDS },
