@@ -8,6 +8,7 @@ use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository};
 use crate::step::Step;
 use std::fs::{self, File};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -39,12 +40,19 @@ pub fn run(repository: &Repository, steps: &'static [Step]) -> Result<(), Failur
         }
         (rows, failures)
     };
+    // Held by the second lane while one of its steps runs, and by a step of the first that wants to be alone.
+    let busy = Mutex::new(());
     let here = |step: &Step| {
         eprintln!("\n=== {}: {}", step.name, step.about);
+        let _alone = step.alone.then(|| busy.lock());
         step.check(repository, &Arguments::default())
     };
+    let beside = |step: &Step| {
+        let _busy = busy.lock();
+        in_a_process(repository, step)
+    };
     let ((mut rows, mut failures), (others, their_failures)) = std::thread::scope(|scope| {
-        let second = scope.spawn(|| lane(true, &|step| in_a_process(repository, step)));
+        let second = scope.spawn(|| lane(true, &beside));
         let first = lane(false, &here);
         (first, second.join().unwrap_or_else(|_| (Vec::new(), vec!["the second lane panicked".to_owned()])))
     });

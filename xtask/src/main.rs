@@ -58,7 +58,7 @@ const STEPS: &[Step] = &[
     Step::new("package", "Build each crate from its package, as committed", steps::package::run).beside(),
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
-    Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run),
+    Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).alone(),
     Step::new("golden", "Compare the golden flight with a new recording", steps::golden::run).accepting(&[Fix]),
     Step::new("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
         .beside()

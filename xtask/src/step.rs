@@ -20,6 +20,8 @@ pub struct Step {
     pub in_ci: bool,
     /// Does it build in folders of its own, so that `ci` runs it beside the others?
     pub beside: bool,
+    /// Does it measure speed, so that `ci` runs nothing beside it?
+    pub alone: bool,
     /// Most seconds it may take.
     pub limit: Option<f64>,
     pub run: Run,
@@ -28,7 +30,7 @@ pub struct Step {
 impl Step {
     /// A step of `ci` without arguments.
     pub const fn new(name: &'static str, about: &'static str, run: Run) -> Self {
-        Self { name, about, accepts: &[], in_ci: true, beside: false, limit: None, run }
+        Self { name, about, accepts: &[], in_ci: true, beside: false, alone: false, limit: None, run }
     }
 
     pub const fn accepting(self, accepts: &'static [Accepts]) -> Self {
@@ -42,6 +44,11 @@ impl Step {
     /// Builds in folders of its own: `ci` runs it beside the others.
     pub const fn beside(self) -> Self {
         Self { beside: true, ..self }
+    }
+
+    /// Measures speed: `ci` runs nothing beside it.
+    pub const fn alone(self) -> Self {
+        Self { alone: true, ..self }
     }
 
     /// Not part of `ci`.
