@@ -148,8 +148,7 @@ fn parameters_can_be_listed_changed_and_not_broken() {
     let mut rover = Rover::new(Some(true));
     assert_eq!(rover.says("param list").lines().count(), 3);
     assert!(rover.says("param list drive").lines().all(|line| line.starts_with("drive.") && line.ends_with(" 1/m")));
-    let said = rover.says("param set drive.far 0.75");
-    assert_eq!(said.split_whitespace().take(2).collect::<Vec<_>>(), ["drive.far", "0.75"]);
+    assert!(rover.says("param set drive.far 0.75").starts_with(&format!("{:30}0.75 ", "drive.far")));
     assert_eq!(rover.gains.0, [0.5, 0.75, 1.5]);
     for hopeless in ["2.1", "nan", "inf", "-1", "1e39", "fast", ""] {
         rover.says(&format!("param set drive.far {hopeless}"));

@@ -276,28 +276,12 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Only a turn that comes a little earlier or later may change nothing.
         #[test]
         fn a_damaged_record_is_noticed(place in 16..FLIGHT.len(), flip in 1u8..) {
             let mut record = FLIGHT.to_vec();
             record[place] ^= flip;
-            let (mut turns, mut undamaged) = (Turns::default(), Turns::default());
-            let outcome = played(&record, &mut turns);
-            played(FLIGHT, &mut undamaged).expect("plays");
-            let is_identical = outcome.is_ok_and(|report| report.verdict == Verdict::Identical);
-            prop_assert!(!is_identical || turns.0 != undamaged.0);
-        }
-    }
-
-    /// When each turn was.
-    #[derive(Default)]
-    struct Turns(Vec<Instant>);
-
-    impl Observer for Turns {}
-
-    impl PlayObserver for Turns {
-        fn band_starts(&mut self, _: Band, clock: Instant) {
-            self.0.push(clock);
+            let outcome = played(&record, &mut ());
+            prop_assert!(outcome.is_err() || outcome.is_ok_and(|report| report.verdict != Verdict::Identical));
         }
     }
 }

@@ -19,7 +19,7 @@ const FLIGHTS: &str = "100";
 const SPEEDS: [(&[&str], f64); 2] = [(&[], 300.0), (&["--chips"], 100.0)];
 /// Flights of a run that is timed, and the most runs.
 const TIMED: &str = "8";
-const RUNS: usize = 20;
+const RUNS: usize = 5;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
