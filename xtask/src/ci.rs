@@ -6,7 +6,7 @@
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository};
-use crate::step::Step;
+use crate::step::{Lane, Step};
 use std::fs::{self, File};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,9 +22,9 @@ struct Row {
 pub fn run(repository: &Repository, steps: &'static [Step]) -> Result<(), Failure> {
     let started = Instant::now();
     let failed = AtomicBool::new(false);
-    let lane = |beside: bool, check: &dyn Fn(&Step) -> Result<(), Failure>| {
+    let run_all = |lanes: &[Lane], check: &dyn Fn(&Step) -> Result<(), Failure>| {
         let (mut rows, mut failures) = (Vec::new(), Vec::new());
-        for step in steps.iter().filter(|step| step.in_ci && step.beside == beside) {
+        for step in steps.iter().filter(|step| lanes.contains(&step.lane)) {
             if failed.load(Ordering::Relaxed) {
                 rows.push(Row { name: step.name, outcome: "not run", seconds: 0.0 });
                 continue;
@@ -44,7 +44,7 @@ pub fn run(repository: &Repository, steps: &'static [Step]) -> Result<(), Failur
     let busy = Mutex::new(());
     let here = |step: &Step| {
         eprintln!("\n=== {}: {}", step.name, step.about);
-        let _alone = step.alone.then(|| busy.lock());
+        let _alone = (step.lane == Lane::Alone).then(|| busy.lock());
         step.check(repository, &Arguments::default())
     };
     let beside = |step: &Step| {
@@ -52,8 +52,8 @@ pub fn run(repository: &Repository, steps: &'static [Step]) -> Result<(), Failur
         in_a_process(repository, step)
     };
     let ((mut rows, mut failures), (others, their_failures)) = std::thread::scope(|scope| {
-        let second = scope.spawn(|| lane(true, &beside));
-        let first = lane(false, &here);
+        let second = scope.spawn(|| run_all(&[Lane::Second], &beside));
+        let first = run_all(&[Lane::First, Lane::Alone], &here);
         (first, second.join().unwrap_or_else(|_| (Vec::new(), vec!["the second lane panicked".to_owned()])))
     });
     rows.extend(others);

@@ -10,18 +10,26 @@ const CI: &str = "ci";
 /// What a step runs.
 pub type Run = fn(&Repository, &Arguments) -> Result<(), Failure>;
 
+/// Where `ci` runs a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lane {
+    /// One after the other, in the workspace's own build folder.
+    First,
+    /// The same, with nothing beside it, because it measures speed.
+    Alone,
+    /// Beside the first lane, in build folders of its own.
+    Second,
+    /// Not at all.
+    Manual,
+}
+
 /// One check.
 pub struct Step {
     pub name: &'static str,
     /// For `--help`.
     pub about: &'static str,
     pub accepts: &'static [Accepts],
-    /// Is it part of `ci`?
-    pub in_ci: bool,
-    /// Does it build in folders of its own, so that `ci` runs it beside the others?
-    pub beside: bool,
-    /// Does it measure speed, so that `ci` runs nothing beside it?
-    pub alone: bool,
+    pub lane: Lane,
     /// Most seconds it may take.
     pub limit: Option<f64>,
     pub run: Run,
@@ -30,7 +38,7 @@ pub struct Step {
 impl Step {
     /// A step of `ci` without arguments.
     pub const fn new(name: &'static str, about: &'static str, run: Run) -> Self {
-        Self { name, about, accepts: &[], in_ci: true, beside: false, alone: false, limit: None, run }
+        Self { name, about, accepts: &[], lane: Lane::First, limit: None, run }
     }
 
     pub const fn accepting(self, accepts: &'static [Accepts]) -> Self {
@@ -43,17 +51,17 @@ impl Step {
 
     /// Builds in folders of its own: `ci` runs it beside the others.
     pub const fn beside(self) -> Self {
-        Self { beside: true, ..self }
+        Self { lane: Lane::Second, ..self }
     }
 
     /// Measures speed: `ci` runs nothing beside it.
     pub const fn alone(self) -> Self {
-        Self { alone: true, ..self }
+        Self { lane: Lane::Alone, ..self }
     }
 
     /// Not part of `ci`.
     pub const fn manual(self) -> Self {
-        Self { in_ci: false, ..self }
+        Self { lane: Lane::Manual, ..self }
     }
 
     /// Runs it and compares the time it took with its limit.
@@ -74,7 +82,7 @@ impl Step {
 pub fn command(steps: &'static [Step]) -> Command {
     let ci = Command::new(CI).about("* Run every step marked *, in this order, until one fails");
     let steps = steps.iter().map(|step| {
-        let mark = if step.in_ci { '*' } else { ' ' };
+        let mark = if step.lane == Lane::Manual { ' ' } else { '*' };
         Command::new(step.name)
             .about(format!("{mark} {}", step.about))
             .args(step.accepts.iter().map(|argument| argument.arg()))
