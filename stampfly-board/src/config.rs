@@ -8,54 +8,27 @@ use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
+use stampfly_types::message_enum;
 
-/// Which estimator flies. The numbers are those of the parameter `estimator.type`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
-pub enum EstimatorKind {
-    /// Error-state Kalman filter.
-    #[default]
-    Eskf = 0,
-    /// Complementary filter.
-    Complementary = 1,
-}
-
-impl EstimatorKind {
-    /// The estimator with this number; `None` for any other.
-    #[must_use]
-    pub fn from_number(number: f32) -> Option<Self> {
-        [Self::Eskf, Self::Complementary].into_iter().find(|kind| kind.number() == number)
-    }
-
-    /// Its number.
-    #[must_use]
-    pub const fn number(self) -> f32 {
-        self as u8 as f32
+message_enum! {
+    /// Which estimator flies. The numbers are those of the parameter `estimator.type`.
+    pub enum EstimatorKind {
+        /// Error-state Kalman filter.
+        #[default]
+        Eskf = 0,
+        /// Complementary filter.
+        Complementary = 1,
     }
 }
 
-/// Which controller flies. The numbers are those of the parameter `controller.type`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
-pub enum ControllerKind {
-    /// Cascade of loops.
-    #[default]
-    Cascade = 0,
-    /// Geometric controller.
-    Geometric = 1,
-}
-
-impl ControllerKind {
-    /// The controller with this number; `None` for any other.
-    #[must_use]
-    pub fn from_number(number: f32) -> Option<Self> {
-        [Self::Cascade, Self::Geometric].into_iter().find(|kind| kind.number() == number)
-    }
-
-    /// Its number.
-    #[must_use]
-    pub const fn number(self) -> f32 {
-        self as u8 as f32
+message_enum! {
+    /// Which controller flies. The numbers are those of the parameter `controller.type`.
+    pub enum ControllerKind {
+        /// Cascade of loops.
+        #[default]
+        Cascade = 0,
+        /// Geometric controller.
+        Geometric = 1,
     }
 }
 

@@ -52,10 +52,10 @@ macro_rules! kinds {
     ($($Kind:ident)+) => { $(
         impl Value for $Kind {
             fn number(self) -> f32 {
-                Self::number(self)
+                self as u8 as f32
             }
             fn from_number(number: f32) -> Option<Self> {
-                Self::from_number(number)
+                Self::ALL.iter().copied().find(|kind| kind.number() == number)
             }
         }
     )+ };
