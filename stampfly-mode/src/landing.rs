@@ -178,7 +178,7 @@ impl TakeoffLanding {
         if input.phase != self.phase {
             self.enter(now, input);
         }
-        let config = self.config;
+        let config = &self.config;
         let estimate = input.estimate;
         let height_known = estimate.valid.contains(Validity::HEIGHT);
         let mut land_detected =

@@ -1,0 +1,195 @@
+//! What the failsafe finds and what it does not.
+
+use super::*;
+use proptest::prelude::*;
+use stampfly_types::GRAVITY;
+use std::vec::Vec;
+
+struct Rig {
+    failsafe: Failsafe,
+    mode: FlightStatus,
+    now: Instant,
+}
+
+impl Rig {
+    fn flying() -> Self {
+        let mode =
+            FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
+        Self { failsafe: Failsafe::default(), mode, now: Instant::ZERO }
+    }
+
+    fn sample(&mut self, accel: Vec3, gyro: Vec3) -> Alerts {
+        self.now += Duration::from_micros(2_500);
+        let now = self.now;
+        let imu = ImuData { accel, gyro, temperature: 25.0 };
+        let input = FailsafeInput {
+            imu: Some((now, &imu)),
+            estimate: &StateEstimate { valid: Validity::ALL, ..Default::default() },
+            status: &EstimatorStatus::default(),
+            power: Some((now, &PowerData { voltage: 4.1, ..Default::default() })),
+            command: Some(now),
+            tof: Some(now),
+            flow: Some(now),
+            self_test: SelfTestVerdict::NotRun,
+            flight_status: &self.mode,
+        };
+        self.failsafe.step(now, &input).active
+    }
+}
+
+const REST: Vec3 = Vec3::new(0.0, 0.0, -GRAVITY);
+
+#[test]
+fn a_crash_is_seen_within_some_samples_and_stays() {
+    let mut rig = Rig::flying();
+    for _ in 0..400 {
+        assert!(rig.sample(REST, Vec3::zeros()).is_empty());
+    }
+    assert!(rig.sample(REST * 8.0, Vec3::zeros()).is_empty(), "one sample is a glitch");
+    assert!(rig.sample(REST, Vec3::zeros()).is_empty());
+    let seen_after = (0..8).find(|_| rig.sample(REST * 6.0, Vec3::zeros()).contains(Alerts::IMPACT));
+    assert!(seen_after.is_some_and(|samples| samples <= 4), "{seen_after:?}");
+    assert!(rig.sample(REST, Vec3::zeros()).contains(Alerts::IMPACT), "latched");
+    rig.mode.armed = false;
+    assert!(rig.sample(REST, Vec3::zeros()).is_empty(), "until disarmed");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+    /// Gaussian vibration of up to four times what was recorded is no crash, once the motors have run a moment.
+    #[test]
+    fn vibration_is_no_impact(seed: u32, sigma in 0.5f32..15.0) {
+        let mut rig = Rig::flying();
+        let mut state = seed | 1;
+        let mut noise = || {
+            let mut sum = 0.0;
+            for _ in 0..12 {
+                state ^= state << 13; state ^= state >> 17; state ^= state << 5;
+                sum += state as f32 / u32::MAX as f32;
+            }
+            sum - 6.0
+        };
+        for k in 0..8_000u32 {
+            // Rotors take some tenths of a second to spin up.
+            let strength = sigma * (k as f32 / 200.0).min(1.0);
+            let accel = REST + Vec3::new(noise(), noise() * 0.3, noise()) * strength;
+            prop_assert!(rig.sample(accel, Vec3::zeros()).is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_firm_touchdown_is_no_crash() {
+    let mut rig = Rig::flying();
+    rig.mode.phase = FlightPhase::Landing;
+    for _ in 0..400 {
+        rig.sample(REST, Vec3::zeros());
+    }
+    for force in [3.0, 6.0, 5.0, 2.0, 1.0, 1.0] {
+        assert!(rig.sample(REST * force, Vec3::zeros()).is_empty());
+    }
+}
+
+#[test]
+fn the_battery_warns_before_it_lands() {
+    let mut failsafe = Failsafe::default();
+    let mode = FlightStatus { armed: true, ..Default::default() };
+    let mut step = |k: u64, voltage: f32| {
+        let at = Instant::from_micros(k * 100_000);
+        let power = PowerData { voltage, ..Default::default() };
+        let imu = ImuData { accel: REST, ..Default::default() };
+        let input = FailsafeInput {
+            imu: Some((at, &imu)),
+            estimate: &StateEstimate::default(),
+            status: &EstimatorStatus::default(),
+            power: Some((at, &power)),
+            command: Some(at),
+            tof: None,
+            flow: None,
+            self_test: SelfTestVerdict::NotRun,
+            flight_status: &mode,
+        };
+        failsafe.step(at, &input).active
+    };
+    for k in 0..50 {
+        assert!(step(k, 3.7).is_empty());
+    }
+    assert!((50..100).map(|k| step(k, 3.35)).last().is_some_and(|a| a == Alerts::LOW_BATTERY));
+    assert!((100..200).map(|k| step(k, 2.9)).last().is_some_and(|a| a.contains(Alerts::CRITICAL_BATTERY)));
+    assert!((200..300).map(|k| step(k, 3.05)).last().is_some_and(|a| a.contains(Alerts::CRITICAL_BATTERY)));
+    assert!((300..400).map(|k| step(k, 3.2)).last().is_some_and(|a| a == Alerts::LOW_BATTERY), "hysteresis");
+}
+
+/// Alerts of a disarmed vehicle at `millis`, with a command and a battery sample at these instants.
+fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Option<(u64, f32)>) -> Alerts {
+    let imu = ImuData { accel: REST, ..Default::default() };
+    let battery = PowerData { voltage: power.map_or(0.0, |(_, voltage)| voltage), ..Default::default() };
+    let now = Instant::from_millis(millis);
+    let input = FailsafeInput {
+        imu: Some((now, &imu)),
+        estimate: &StateEstimate::default(),
+        status: &EstimatorStatus::default(),
+        power: power.map(|(at, _)| (Instant::from_millis(at), &battery)),
+        command: command.map(Instant::from_millis),
+        tof: None,
+        flow: None,
+        self_test: SelfTestVerdict::NotRun,
+        flight_status: &FlightStatus::default(),
+    };
+    failsafe.step(now, &input).active
+}
+
+#[test]
+fn a_link_that_never_was_is_lost() {
+    let mut failsafe = Failsafe::default();
+    let battery = |now| Some((now, 4.1));
+    for now in (0..3_000).step_by(10) {
+        assert_eq!(quiet(&mut failsafe, now, None, battery(now)), Alerts::COMM_LOST, "{now}");
+    }
+    assert_eq!(quiet(&mut failsafe, 3_000, Some(3_000), battery(3_000)), Alerts::NONE);
+    assert_eq!(quiet(&mut failsafe, 3_490, Some(3_000), battery(3_490)), Alerts::NONE);
+    assert_eq!(quiet(&mut failsafe, 3_500, Some(3_000), battery(3_500)), Alerts::COMM_LOST);
+}
+
+#[test]
+fn a_battery_monitor_that_says_nothing_is_lost() {
+    let lost_at = |battery: fn(u64) -> Option<(u64, f32)>| {
+        let mut failsafe = Failsafe::default();
+        let lost: Vec<u64> = (0..5_000)
+            .step_by(10)
+            .filter(|now| quiet(&mut failsafe, *now, Some(*now), battery(*now)).contains(Alerts::POWER_LOST))
+            .collect();
+        lost.first().copied().zip(lost.last().copied())
+    };
+    assert_eq!(lost_at(|_| None), Some((1_000, 4_990)), "never");
+    assert_eq!(lost_at(|now| Some((now.min(2_000), 4.1))), Some((3_000, 4_990)), "the same sample, again and again");
+    assert_eq!(lost_at(|now| Some((now, f32::NAN))), Some((1_000, 4_990)), "no number");
+    assert_eq!(lost_at(|now| Some((if now < 3_000 { 0 } else { now }, 4.1))), Some((1_000, 2_990)), "it returns");
+    assert_eq!(lost_at(|now| Some((now / 100 * 100, 4.1))), None);
+    assert_eq!(lost_at(|now| Some((now / 100 * 100, 0.0))), None, "no meter is fitted");
+}
+
+#[test]
+fn a_failed_self_test_is_an_alert_for_good() {
+    let (estimate, status, mode) = Default::default();
+    let mut failsafe = Failsafe::default();
+    let mut step = |self_test| {
+        let (estimate, status, mode): (&StateEstimate, &EstimatorStatus, &FlightStatus) = (&estimate, &status, &mode);
+        let power = None;
+        let input = FailsafeInput {
+            imu: None,
+            estimate,
+            status,
+            power,
+            command: Some(Instant::ZERO),
+            tof: None,
+            flow: None,
+            self_test,
+            flight_status: mode,
+        };
+        failsafe.step(Instant::ZERO, &input).active
+    };
+    assert_eq!(step(SelfTestVerdict::Identical), Alerts::NONE);
+    assert_eq!(step(SelfTestVerdict::WithinTolerance), Alerts::SELF_TEST_DIFFERS);
+    assert_eq!(step(SelfTestVerdict::Failed), Alerts::SELF_TEST_FAILED);
+}
