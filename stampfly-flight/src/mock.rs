@@ -4,6 +4,7 @@
 //! runnables together use the [flight loop](crate::FlightLoop), which knows when each is due.
 
 use crate::flight_loop::{Assembled, FlightLoop};
+use crate::newest::message;
 use stampfly_bus::{AnyTopic, PublishWords, Schedule, TopicTable};
 use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 
@@ -60,9 +61,7 @@ impl<'b, R: Schedule> Mock<'b, R> {
         let topic: &dyn AnyTopic = *self.flight_loop.heads().get(Self::place::<M>(topic)?)?;
         let (generation, mut newest) = (topic.head(), None);
         topic.copy(generation, &mut |at, words| {
-            let mut copied = M::ZERO;
-            copied.as_mut().copy_from_slice(words);
-            newest = M::from_words(&copied).map(|data| Stamped { at, generation, data });
+            newest = message(words).map(|data| Stamped { at, generation, data });
         });
         newest
     }

@@ -6,6 +6,7 @@
 use super::{Around, Outside, Surroundings};
 use crate::time::{Clock, Tasks};
 use stampfly_bus::Schedule;
+use stampfly_flight::newest::message;
 use stampfly_types::{Instant, Message};
 
 /// Who drives a vehicle, for how long, and how well it did.
@@ -73,10 +74,8 @@ impl<S: Script> Around for Following<'_, S> {
     fn drive(&mut self, _: Instant) {}
 
     fn published(&mut self, topic: usize, _: Instant, words: &[u32]) {
-        if topic == S::LOG && words.len() == S::Line::WORDS {
-            let mut copied = S::Line::ZERO;
-            copied.as_mut().copy_from_slice(words);
-            self.lines.extend(S::Line::from_words(&copied));
+        if topic == S::LOG {
+            self.lines.extend(message::<S::Line>(words));
         }
     }
 
