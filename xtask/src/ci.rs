@@ -45,7 +45,7 @@ pub fn run(repository: &Repository, steps: &'static [Step]) -> Result<(), Failur
     let here = |step: &Step| {
         eprintln!("\n=== {}: {}", step.name, step.about);
         let _alone = (step.lane == Lane::Alone).then(|| busy.lock());
-        step.check(repository, &Arguments::default())
+        (step.run)(repository, &Arguments::default())
     };
     let beside = |step: &Step| {
         let _busy = busy.lock();

@@ -30,23 +30,17 @@ pub struct Step {
     pub about: &'static str,
     pub accepts: &'static [Accepts],
     pub lane: Lane,
-    /// Most seconds it may take.
-    pub limit: Option<f64>,
     pub run: Run,
 }
 
 impl Step {
     /// A step of `ci` without arguments.
     pub const fn new(name: &'static str, about: &'static str, run: Run) -> Self {
-        Self { name, about, accepts: &[], lane: Lane::First, limit: None, run }
+        Self { name, about, accepts: &[], lane: Lane::First, run }
     }
 
     pub const fn accepting(self, accepts: &'static [Accepts]) -> Self {
         Self { accepts, ..self }
-    }
-
-    pub const fn within(self, seconds: f64) -> Self {
-        Self { limit: Some(seconds), ..self }
     }
 
     /// Builds in folders of its own: `ci` runs it beside the others.
@@ -62,19 +56,6 @@ impl Step {
     /// Not part of `ci`.
     pub const fn manual(self) -> Self {
         Self { lane: Lane::Manual, ..self }
-    }
-
-    /// Runs it and compares the time it took with its limit.
-    pub fn check(&self, repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-        let begun = std::time::Instant::now();
-        (self.run)(repository, arguments)?;
-        self.in_time(begun.elapsed().as_secs_f64())
-    }
-
-    fn in_time(&self, seconds: f64) -> Result<(), Failure> {
-        let Some(limit) = self.limit else { return Ok(()) };
-        println!("{}: {seconds:.0} s of {limit} s", self.name);
-        if seconds > limit { Err(format!("took {seconds:.0} s, more than {limit} s")) } else { Ok(()) }
     }
 }
 
@@ -155,12 +136,5 @@ mod tests {
     #[test]
     fn the_table_of_steps_makes_a_valid_command_line() {
         command(crate::STEPS).debug_assert();
-    }
-
-    #[test]
-    fn a_limit_is_kept() {
-        let limited = Step::new("limited", "", |_, _| Ok(())).within(300.0);
-        assert!(limited.in_time(300.0).is_ok() && limited.in_time(301.0).is_err());
-        assert!(Step::new("free", "", |_, _| Ok(())).in_time(1e6).is_ok());
     }
 }
