@@ -7,7 +7,7 @@
 use stampfly_host::{Report, report::Metric};
 use stampfly_lab::{Flight, dataset, flight_log};
 
-#[path = "../tests/made_up/mod.rs"]
+#[path = "../tests/host/made_up.rs"]
 mod made_up;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

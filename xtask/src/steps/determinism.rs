@@ -5,7 +5,7 @@
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, json};
 
-const PROFILES: [&str; 2] = ["release", "unoptimised"];
+const PROFILES: [&str; 2] = ["release", "dev"];
 const SEEDS: [&str; 2] = ["1", "2"];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {

@@ -13,7 +13,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     names.sort();
     // All of the workspace's at once, as `cargo test` has built them: for one package alone, features and with them all
     // dependencies would be others.
-    run_program(repository.cargo().args(["build", "--quiet", "--examples"]))?;
+    run_program(repository.cargo().args(["build", "--quiet", "--profile", "test", "--examples"]))?;
     for name in &names {
         let program = repository.target("debug/examples").join(name);
         let (printed, _) = capture(&mut repository.command(&program.to_string_lossy()))?;

@@ -9,7 +9,7 @@ use std::fs;
 use std::process::Command;
 
 const RECORD: &str = "stampfly-board/golden/flight.bin";
-const PROFILES: [&str; 2] = ["release", "unoptimised"];
+const PROFILES: [&str; 2] = ["release", "dev"];
 /// A flight that grows beyond this is no longer what a repository and a flash memory should hold.
 const MOST_BYTES: usize = 150_000;
 

@@ -14,7 +14,7 @@ use std::process::Command;
 const PACKAGE: &str = "stampfly-board/panic-proof";
 const BUDGET: &str = "stampfly-board/panic-proof/budget.toml";
 const TARGETS: [&str; 3] = [FOR_SIZE, "riscv32imafc-unknown-none-elf", "riscv32imac-unknown-none-elf"];
-/// Where the calls in the program optimised for size are counted.
+/// Where the calls in the program optimised for size are counted, and the control is built.
 const FOR_SIZE: &str = "thumbv7em-none-eabihf";
 /// The function that does not exist.
 const MISSING: &str = "undefined symbol: a_panic_can_be_reached";
@@ -49,6 +49,10 @@ fn prove(repository: &Repository, target: &str) -> Result<(), Failure> {
     run_program(&mut build(repository, target))
         .map_err(|e| format!("{target}: a panic can be reached, or the build failed: {e}"))?;
     println!("{target}: no panic can be reached");
+    // How a panic is noticed does not depend on the target: one control is enough.
+    if target != FOR_SIZE {
+        return Ok(());
+    }
     match capture(build(repository, target).args(["--features", "control"])) {
         Err(said) if said.contains(MISSING) => println!("{target}: an unchecked index is noticed"),
         Err(said) => return Err(format!("{target}: the control failed for another reason: {said}")),

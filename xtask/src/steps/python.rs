@@ -1,6 +1,6 @@
 //! `python`: the tests of the Python example, and its types.
 //!
-//! They need no rover but their own. That the package drives the real one is asked by `stampfly-host/tests/rover.rs`.
+//! They need no rover but their own. That the package drives the real one is asked by `stampfly-host/tests/host/rover.rs`.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, python_tool, run as run_program};

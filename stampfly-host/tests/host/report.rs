@@ -1,7 +1,6 @@
 //! The page holds what the flight has, refers to nothing outside, and is small.
 
-mod made_up;
-
+use crate::made_up;
 use serde_json::Value;
 use stampfly_host::{Report, report::Metric};
 use stampfly_lab::Flight;

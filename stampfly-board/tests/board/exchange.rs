@@ -1,9 +1,6 @@
 //! What the board and the flight stack tell each other beside sensors and motors: motor test, flash, cut-off, restart.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod bench;
-
-use bench::{Bench, OLD};
+use crate::bench::{Bench, OLD};
 use stampfly_board::console::{Command, TEST_TIME};
 use stampfly_board::messages::{CutoffState, MotorTest, StorageBusy};
 use stampfly_board::topics;

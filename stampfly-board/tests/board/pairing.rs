@@ -1,9 +1,6 @@
 //! Button, mode machine, radio and arm switch together, as the firmware joins them: a vehicle changes its transmitter.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod bench;
-
-use bench::{Bench, NEW, OLD, VEHICLE};
+use crate::bench::{Bench, NEW, OLD, VEHICLE};
 use stampfly_board::console::Command;
 use stampfly_board::topics::{self, Id};
 use stampfly_link::{Address, PairingPacket, Rejected, TelemetryPacket};

@@ -9,7 +9,7 @@ use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_host::campaign::{self, run};
 
 /// Mission, figure, statistic, bar.
-const BARS: [(&str, &str, &str, f64); 7] = include!("../bars.rs");
+const BARS: [(&str, &str, &str, f64); 7] = include!("../../bars.rs");
 /// A flight that was not watched.
 type Flight = campaign::Flight<StampFly, ()>;
 

@@ -2,7 +2,7 @@
 //! have to end with a vehicle that stands where it was sent and is disarmed.
 //!
 //! Every mission follows from its number. To fly one alone, with its log written to the target folder's `tmp`:
-//! `MISSION=17 cargo test -p stampfly-host --test missions -- --nocapture`.
+//! `MISSION=17 cargo test -p stampfly-host --test host missions -- --nocapture`.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

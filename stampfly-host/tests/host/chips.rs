@@ -9,7 +9,7 @@ use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
 
 /// Mission, figure, statistic, bar.
-const BARS: [(&str, &str, &str, f64); 7] = include!("../bars.rs");
+const BARS: [(&str, &str, &str, f64); 7] = include!("../../bars.rs");
 
 fn setup(seed: u64) -> Setup {
     Setup { sensing: Sensing::Chips, ..Setup::reference(seed) }

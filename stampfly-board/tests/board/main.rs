@@ -1,0 +1,11 @@
+//! The vehicle's flight stack, joined as the firmware joins it. One binary, because each would build the stack again:
+//! `cargo test -p stampfly-board --test board pairing` runs one file.
+
+mod bench;
+mod configuration;
+mod console;
+mod exchange;
+mod golden;
+mod pairing;
+mod self_test;
+mod state;

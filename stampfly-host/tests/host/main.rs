@@ -1,0 +1,20 @@
+//! What the program does, flown and typed. One binary, because each would build the whole flight stack again:
+//! `cargo test -p stampfly-host --test host replay` runs one file.
+
+mod black_box;
+mod cameras;
+mod chips;
+mod command_line;
+mod determinism;
+mod estimate;
+mod faults;
+mod figures;
+mod flight_task;
+mod losses;
+mod made_up;
+mod missions;
+mod reference;
+mod replay;
+mod report;
+mod rover;
+mod swap;
