@@ -16,7 +16,7 @@ impl Landing {
     /// Standing.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        Self { manager: TakeoffLanding::new(config.cascade.altitude.hover_thrust, config.landing) }
+        Self { manager: TakeoffLanding::new(config.landing) }
     }
 }
 

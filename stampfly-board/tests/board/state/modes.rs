@@ -87,7 +87,7 @@ fn failsafe_goes_on() {
 
 #[test]
 fn landing_goes_on() {
-    goes_on(TakeoffLanding::new(AIRFRAME.hover_thrust(), LandingConfig::default()), 600, |manager, k, n| {
+    goes_on(TakeoffLanding::new(LandingConfig::default()), 600, |manager, k, n| {
         let height = 0.5 * stampfly_types::math::sin(k as f32 * 0.02).abs();
         let estimate = StateEstimate { height, velocity: n.vector(0.05), valid: Validity::ALL, ..Default::default() };
         let setpoint = Setpoint { position: Vec3::new(0.0, 0.0, -0.5), ..Default::default() };

@@ -1,0 +1,195 @@
+//! A body with a weight, a floor and rotors that lag, below a manager that is told the truth, or is not.
+
+use super::*;
+use stampfly_types::{GRAVITY, Vec3, math};
+
+const DT: f32 = 0.0025;
+/// Of the motors, s.
+const LAG: f32 = 0.02;
+/// Vertical drag, 1/s.
+const DRAG: f32 = 1.4;
+
+/// What the estimate says of a body at this height, m, and this climb rate, m/s.
+type Told = fn(height: f32, climb: f32, time: f32) -> StateEstimate;
+
+fn everything(height: f32, climb: f32, _: f32) -> StateEstimate {
+    StateEstimate {
+        height: height + 0.03,
+        velocity: Vec3::new(0.0, 0.0, -climb),
+        valid: Validity::ALL,
+        ..Default::default()
+    }
+}
+
+fn nothing(_: f32, _: f32, _: f32) -> StateEstimate {
+    StateEstimate { height: 7.0, valid: Validity::TILT, ..Default::default() }
+}
+
+/// One landing: how it is flown.
+struct Landing {
+    height: f32,
+    told: Told,
+    /// Weight over what the controller takes for hover thrust.
+    weight: f32,
+    /// Bias of the accelerometer upwards, m/s².
+    bias: f32,
+    /// Amplitude of vibration, m/s².
+    vibration: f32,
+}
+
+const NOMINAL: Landing = Landing { height: 0.5, told: everything, weight: 1.0, bias: 0.0, vibration: 0.0 };
+
+/// How it ended: seconds until it counted as landed, height above the floor then, speed at the first touch.
+#[derive(Debug)]
+struct Ended {
+    after: f32,
+    height: f32,
+    touch: f32,
+}
+
+impl Landing {
+    fn fly(&self, seconds: f32) -> Option<Ended> {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        // Thrusts as shares of what the controller takes for hover thrust.
+        let (mut height, mut climb, mut thrust, mut demand) = (self.height, 0.0f32, self.weight, self.weight);
+        let mut touch = None;
+        let mut integral = self.weight - 1.0;
+        for k in 0..(seconds / DT) as u64 {
+            let time = k as f32 * DT;
+            thrust += DT / (LAG + DT) * (demand - thrust);
+            let lift = GRAVITY * thrust / self.weight - DRAG * climb;
+            let mut acceleration = lift - GRAVITY;
+            if height <= 0.0 && acceleration <= 0.0 {
+                touch.get_or_insert(-climb);
+                (height, climb, acceleration) = (0.0, 0.0, 0.0);
+            }
+            climb += acceleration * DT;
+            height += climb * DT;
+            let shaken = self.vibration * math::sin(2.0 * core::f32::consts::PI * 83.0 * time);
+            let force = acceleration + GRAVITY + self.bias + shaken;
+            let mut estimate = (self.told)(height, climb, time);
+            estimate.specific_force = Vec3::new(0.0, 0.0, -force);
+            let land_detected = manager.step(
+                Instant::from_micros(2_500 * k),
+                &LandingInput {
+                    estimate: &estimate,
+                    phase: FlightPhase::Landing,
+                    setpoint: &Setpoint::default(),
+                    demand: &ControlOutput { thrust: demand, ..Default::default() },
+                },
+            );
+            if land_detected.landed {
+                return Some(Ended { after: time, height, touch: touch.unwrap_or(0.0) });
+            }
+            // The vertical loop: on climb rate where there is one, else the share of hover thrust of a blind descent.
+            let wanted = if estimate.valid.contains(Validity::VELOCITY_Z) {
+                let error = -land_detected.descent_rate + estimate.velocity.z;
+                integral = (integral + 7.0 / 0.8 * error * DT / GRAVITY).clamp(-0.5, 0.5);
+                1.0 + integral + 7.0 * error / GRAVITY
+            } else {
+                0.96
+            };
+            let ceiling = if land_detected.thrust_ceiling <= 1.0 { land_detected.thrust_ceiling } else { 1.6 };
+            demand = wanted.clamp(0.2, ceiling.max(0.2));
+        }
+        None
+    }
+
+    /// Flies, and is on the floor when it counts as landed.
+    fn lands(&self, seconds: f32) -> Ended {
+        let ended = self.fly(seconds).expect("it lands");
+        assert!(ended.height < 0.01, "{ended:?}");
+        ended
+    }
+}
+
+#[test]
+fn a_landing_is_gentle_and_is_noticed() {
+    let ended = NOMINAL.lands(10.0);
+    assert!(ended.touch < 0.25 && ended.after < 5.0, "{ended:?}");
+}
+
+#[test]
+fn vibration_hides_no_touchdown_and_makes_none() {
+    for vibration in [3.0, 10.0] {
+        Landing { vibration, ..NOMINAL }.lands(10.0);
+        Landing { vibration, told: nothing, ..NOMINAL }.lands(20.0);
+    }
+}
+
+/// D3 a: a blind estimate that neither rises nor sinks made motors stop in the air.
+#[test]
+fn a_vehicle_without_height_and_climb_rate_comes_down_to_the_floor() {
+    for height in [0.3, 1.0, 2.0, 3.0] {
+        for weight in [0.97, 1.0, 1.03] {
+            let ended = Landing { height, weight, told: nothing, ..NOMINAL }.lands(60.0);
+            assert!(ended.touch < 1.0, "{height} m, weight {weight}: {ended:?}");
+            // I10 of the invariants: three seconds and the height at 0.3 m/s; and one to find the floor.
+            assert!(ended.after < 4.0 + height / 0.3 || weight < 1.0, "{height} m, weight {weight}: {ended:?}");
+        }
+    }
+}
+
+/// D3 d: standing on the floor, asked to land without height.
+#[test]
+fn a_vehicle_that_stands_and_knows_nothing_has_landed_within_two_seconds() {
+    let ended = Landing { height: 0.0, told: nothing, ..NOMINAL }.lands(10.0);
+    assert!(ended.after < 2.0, "{ended:?}");
+}
+
+/// D3 e: a bias of the accelerometer makes the estimate sink for as long as it stands.
+#[test]
+fn a_biased_accelerometer_does_not_keep_the_motors_on() {
+    let sinking = |height: f32, climb: f32, time: f32| StateEstimate {
+        velocity: Vec3::new(0.0, 0.0, -climb + 0.5),
+        ..everything(height, climb, time)
+    };
+    for bias in [-2.0, 2.0] {
+        Landing { bias, height: 0.02, told: sinking, ..NOMINAL }.lands(10.0);
+    }
+}
+
+/// D1, its last part: the range finder says 3 cm, the filter believes it, and the vehicle is at 16 m.
+#[test]
+fn a_height_that_lies_does_not_land_a_vehicle_in_the_air() {
+    let stuck = |_: f32, _: f32, _: f32| StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
+    let ended = Landing { height: 16.0, told: stuck, ..NOMINAL }.fly(120.0);
+    assert!(ended.is_none_or(|ended| ended.height < 0.01), "in the air");
+}
+
+#[test]
+fn hovering_low_in_flight_is_never_landed() {
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    let estimate = StateEstimate {
+        height: 0.04,
+        specific_force: Vec3::new(0.0, 0.0, -GRAVITY),
+        valid: Validity::ALL,
+        ..Default::default()
+    };
+    for k in 0..8_000 {
+        let input = LandingInput {
+            estimate: &estimate,
+            phase: FlightPhase::Flying,
+            setpoint: &Setpoint::default(),
+            demand: &ControlOutput { thrust: 1.0, ..Default::default() },
+        };
+        assert!(!manager.step(Instant::from_micros(2_500 * k), &input).landed);
+    }
+}
+
+/// D15: something holds it, and after eight seconds it counted as flying.
+#[test]
+fn a_vehicle_that_is_held_never_completes_its_take_off() {
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    let held = everything(0.0, 0.0, 0.0);
+    for k in 0..8_000 {
+        let input = LandingInput {
+            estimate: &held,
+            phase: FlightPhase::TakeOff,
+            setpoint: &Setpoint::default(),
+            demand: &ControlOutput { thrust: 1.5, ..Default::default() },
+        };
+        let land_detected = manager.step(Instant::from_micros(2_500 * k), &input);
+        assert!(!land_detected.takeoff_complete && land_detected.contact == GroundContact::Ground);
+    }
+}
