@@ -13,7 +13,7 @@
 //!
 //! Not for a vehicle whose climb rate is known: that one sinks at the speed it is asked for.
 
-use super::weight::{Support, lasting};
+use super::weight::{Answers, Support, lasting};
 use stampfly_types::{Duration, Instant};
 
 /// Share of hover thrust at the start.
@@ -44,8 +44,8 @@ pub struct BlindDescent {
 
 impl BlindDescent {
     /// The ceiling of thrust as a share of hover thrust, and whether the vehicle has stood for `touchdown_time`.
-    /// `support` is what the weight test said in this step.
-    pub fn step(&mut self, now: Instant, support: Support, touchdown_time: Duration) -> (f32, bool) {
+    /// `weight` is what the weight test said in this step.
+    pub fn step(&mut self, now: Instant, weight: Answers, touchdown_time: Duration) -> (f32, bool) {
         let began = *self.began.get_or_insert(now);
         let tested = *self.tested.get_or_insert(now);
         if !self.is_testing && now.since(tested) >= PAUSE {
@@ -53,11 +53,11 @@ impl BlindDescent {
         }
         let age = now.since(self.tested.unwrap_or(now));
         if self.is_testing && age >= SETTLE {
-            let standing = lasting(&mut self.stands, now, support == Support::Stands);
+            let standing = lasting(&mut self.stands, now, weight.quick == Support::Stands);
             if standing >= touchdown_time {
                 return (TEST_SHARE, true);
             }
-            if support == Support::Falls || (self.stands.is_none() && age >= TEST) {
+            if weight.quick == Support::Falls || (self.stands.is_none() && age >= TEST) {
                 self.is_testing = false;
             }
         }

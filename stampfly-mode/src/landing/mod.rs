@@ -18,7 +18,7 @@ use stampfly_types::messages::{
     ControlOutput, FlightPhase, GroundContact, LandDetected, Setpoint, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant};
-use weight::{Support, WeightTest, lasting};
+use weight::{Answers, Support, WeightTest, lasting};
 
 /// What the manager looks at.
 #[derive(Clone, Copy, Debug)]
@@ -121,7 +121,7 @@ impl TakeoffLanding {
         }
         let config = self.config;
         let estimate = input.estimate;
-        let support = self.weight.step(now, -estimate.specific_force.z, input.demand.thrust, self.is_testing);
+        let weight = self.weight.step(now, -estimate.specific_force.z, input.demand.thrust, self.is_testing);
         let mut land_detected =
             LandDetected { thrust_ceiling: UNLIMITED, descent_rate: config.descent, ..LandDetected::default() };
         match self.phase {
@@ -133,10 +133,10 @@ impl TakeoffLanding {
             FlightPhase::Landing => {
                 let climb_known = estimate.valid.contains(Validity::VELOCITY_Z);
                 let landed = if climb_known && self.blind.is_none() {
-                    self.land(now, estimate, support, &mut land_detected)
+                    self.land(now, estimate, weight, &mut land_detected)
                 } else {
                     let blind = self.blind.get_or_insert_default();
-                    let (ceiling, landed) = blind.step(now, support, config.touchdown_time);
+                    let (ceiling, landed) = blind.step(now, weight, config.touchdown_time);
                     (land_detected.thrust_ceiling, self.is_testing) = (ceiling, blind.is_testing());
                     land_detected.descent_rate = config.touchdown;
                     landed
@@ -172,7 +172,7 @@ impl TakeoffLanding {
     }
 
     /// One step of a landing whose climb rate is known. Has the vehicle landed?
-    fn land(&mut self, now: Instant, estimate: &StateEstimate, support: Support, asked: &mut LandDetected) -> bool {
+    fn land(&mut self, now: Instant, estimate: &StateEstimate, weight: Answers, asked: &mut LandDetected) -> bool {
         let config = &self.config;
         let height_known = estimate.valid.contains(Validity::HEIGHT);
         asked.descent_rate = if height_known {
@@ -190,12 +190,12 @@ impl TakeoffLanding {
             let fallen = (ramp.seconds() / config.ceiling_time.seconds()).min(1.0);
             asked.thrust_ceiling = 1.0 - (1.0 - config.ceiling_share) * fallen;
         }
-        if lasting(&mut self.falling, now, support == Support::Falls) >= FREE_FALL {
+        if lasting(&mut self.falling, now, weight.quick == Support::Falls) >= FREE_FALL {
             // Low, or not sinking, it says, and it falls: neither height nor climb rate is to be believed.
             (self.blind, self.is_testing) = (Some(BlindDescent::default()), false);
             return false;
         }
-        lasting(&mut self.still, now, support == Support::Stands) >= config.touchdown_time
+        lasting(&mut self.still, now, weight.steady == Support::Stands) >= config.touchdown_time
     }
 }
 

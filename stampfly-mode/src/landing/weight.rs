@@ -20,61 +20,44 @@ pub enum Support {
     Falls,
 }
 
-/// Time constant that stands for the motors' lag (20 ms on small ones) and for the filter of the specific force, s.
+/// Motors' lag, s: 20 ms on small ones.
 const LAG: f32 = 0.02;
-/// Time constant of the reference, s: some periods of what shakes a vehicle, and shorter than a descent.
-const REFERENCE: f32 = 0.15;
-/// Less than this share of the thrust taken away tells nothing: vibration leaves 0.05 g in the mean over [`LAG`].
+/// Time constant of the quick answer, s: before a vehicle in the air has become fast.
+const QUICK: f32 = 0.02;
+/// Time constant of the steady answer, s: a bent propeller's beat, some hertz and a third of a g, is averaged out.
+const STEADY: f32 = 0.15;
+/// Less than this share of the thrust taken away tells nothing: vibration leaves 0.05 g in the mean over [`QUICK`].
 const LEAST_SHARE: f32 = 0.15;
 /// The specific force follows thrust by less than this: it stands. Legs that spring back follow for a moment.
 const STANDS: f32 = 0.4;
-/// By more than this: it falls. The air cushion near the ground carries up to a fifth.
-const FALLS: f32 = 0.65;
+/// By more than this: it falls. The air carries the rest, a fifth by its cushion near the ground, more by drag with speed.
+const FALLS: f32 = 0.5;
 /// A step that lasts longer is treated as this long, s.
 const LONGEST_STEP: f32 = 0.02;
 
-/// Filtered thrust and specific force, and what both were before thrust was taken away.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Specific force upwards along the body's z axis, m/s², and thrust, N, through the same filter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct WeightTest {
-    last: Option<Instant>,
-    /// Specific force upwards along the body's z axis, m/s², and its average.
+struct Pair {
     force: f32,
-    force_before: f32,
-    /// Thrust in two stages, as motors and filter delay it, N, and its average.
-    thrust: [f32; 2],
-    thrust_before: f32,
+    thrust: f32,
 }
 
-impl WeightTest {
-    /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
-    /// reference stays.
-    pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Support {
-        if !(force.is_finite() && thrust.is_finite()) {
-            return Support::Unknown;
-        }
-        let Some(last) = self.last.replace(now) else {
-            (self.force, self.force_before) = (force, force);
-            (self.thrust, self.thrust_before) = ([thrust; 2], thrust);
-            return Support::Unknown;
-        };
-        let dt = now.since(last).seconds().min(LONGEST_STEP);
-        let fast = dt / (LAG + dt);
-        self.force += fast * (force - self.force);
-        self.thrust[0] += fast * (thrust - self.thrust[0]);
-        self.thrust[1] += fast * (self.thrust[0] - self.thrust[1]);
-        if !testing {
-            let slow = dt / (REFERENCE + dt);
-            self.force_before += slow * (self.force - self.force_before);
-            self.thrust_before += slow * (self.thrust[1] - self.thrust_before);
-            return Support::Unknown;
-        }
+impl Pair {
+    fn filter(&mut self, input: Self, time: f32, dt: f32) {
+        let share = dt / (time + dt);
+        self.force += share * (input.force - self.force);
+        self.thrust += share * (input.thrust - self.thrust);
+    }
+
+    /// What this says, compared with what both were before.
+    fn support(self, before: Self) -> Support {
         // Positive: both were there before.
-        if !(self.thrust_before > 0.0 && self.force_before > 0.0) {
+        if !(before.thrust > 0.0 && before.force > 0.0) {
             return Support::Unknown;
         }
-        let taken = 1.0 - self.thrust[1] / self.thrust_before;
-        let missing = 1.0 - self.force / self.force_before;
+        let taken = 1.0 - self.thrust / before.thrust;
+        let missing = 1.0 - self.force / before.force;
         if taken < LEAST_SHARE {
             Support::Unknown
         } else if missing < STANDS * taken {
@@ -84,6 +67,54 @@ impl WeightTest {
         } else {
             Support::Unknown
         }
+    }
+}
+
+/// Two answers to the same question.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answers {
+    /// Within 60 ms of thrust being taken away.
+    pub quick: Support,
+    /// Within half a second, through strong vibration.
+    pub steady: Support,
+}
+
+const UNKNOWN: Answers = Answers { quick: Support::Unknown, steady: Support::Unknown };
+
+/// Filtered thrust and specific force, and what both were before thrust was taken away.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct WeightTest {
+    last: Option<Instant>,
+    /// Thrust as the motors deliver it, N.
+    delivered: f32,
+    quick: Pair,
+    steady: Pair,
+    before: Pair,
+}
+
+impl WeightTest {
+    /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
+    /// reference stays.
+    pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Answers {
+        if !(force.is_finite() && thrust.is_finite()) {
+            return UNKNOWN;
+        }
+        let Some(last) = self.last.replace(now) else {
+            let first = Pair { force, thrust };
+            (self.delivered, self.quick, self.steady, self.before) = (thrust, first, first, first);
+            return UNKNOWN;
+        };
+        let dt = now.since(last).seconds().min(LONGEST_STEP);
+        self.delivered += dt / (LAG + dt) * (thrust - self.delivered);
+        let input = Pair { force, thrust: self.delivered };
+        self.quick.filter(input, QUICK, dt);
+        self.steady.filter(input, STEADY, dt);
+        if !testing {
+            self.before = self.steady;
+            return UNKNOWN;
+        }
+        Answers { quick: self.quick.support(self.before), steady: self.steady.support(self.before) }
     }
 }
 
