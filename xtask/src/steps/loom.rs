@@ -10,7 +10,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
             .cargo()
             .env("RUSTFLAGS", "--cfg loom")
             .env("RUST_BACKTRACE", "0")
-            .args(["test", "--release", "-p", "stampfly-bus", "--test", "loom", "--target-dir"])
+            .args(["test", "-p", "stampfly-bus", "--test", "loom", "--target-dir"])
             .arg(repository.target("loom"))
             .arg("--")
             .args(&arguments.rest),

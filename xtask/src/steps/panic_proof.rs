@@ -1,7 +1,7 @@
 //! `panic-proof`: the flight code links without its panic handler, and would not if it could panic.
 //!
-//! Built as it is shipped: optimised for speed, with link-time optimisation, for an ARM core with an FPU and RISC-V cores
-//! with and without. Another core is another proof: compilers unroll and merge differently for each. What is optimised for
+//! Built as it is shipped: optimised for speed, with link-time optimisation, for an ARM core with an FPU and a RISC-V
+//! core without. Another core is another proof: compilers unroll and merge differently for each. What is optimised for
 //! size keeps a few index checks that are never hit; where they are is said, and there may not be more of them.
 
 use crate::arguments::Arguments;
@@ -13,7 +13,7 @@ use std::process::Command;
 
 const PACKAGE: &str = "stampfly-board/panic-proof";
 const BUDGET: &str = "stampfly-board/panic-proof/budget.toml";
-const TARGETS: [&str; 3] = [FOR_SIZE, "riscv32imafc-unknown-none-elf", "riscv32imac-unknown-none-elf"];
+const TARGETS: [&str; 2] = [FOR_SIZE, "riscv32imac-unknown-none-elf"];
 /// Where the calls in the program optimised for size are counted, and the control is built.
 const FOR_SIZE: &str = "thumbv7em-none-eabihf";
 /// The function that does not exist.

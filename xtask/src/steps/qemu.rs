@@ -50,11 +50,11 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     provide(repository, &[&EMULATED_ARM, &EMULATED_OTHERS])?;
     run_program(inside(repository, repository.cargo()).args(["fmt", "--check"]))?;
     let mut clippy = inside(repository, repository.cargo());
-    clippy.args(["clippy", "--quiet", "--release", "--locked", "--target-dir"]).arg(repository.target("qemu"));
+    clippy.args(["clippy", "--quiet", "--locked", "--target-dir"]).arg(repository.target("qemu"));
     run_program(clippy.args(["--", "-D", "warnings"]))?;
 
     let mut host = inside(repository, repository.cargo());
-    host.args(["run", "--quiet", "--release", "--locked", "--target-dir"]).arg(repository.target("qemu"));
+    host.args(["run", "--quiet", "--locked", "--target-dir"]).arg(repository.target("qemu"));
     let (host, _) = capture(&mut host)?;
     let expected = bits(&host);
     if expected.is_empty() {
