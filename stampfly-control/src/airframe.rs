@@ -122,7 +122,17 @@ pub struct Airframe {
     pub cells: u8,
 }
 
+/// Time constant of the motors up to which the rate and attitude loops have their full bandwidth, s. Slower motors lower them
+/// in proportion: what their pole leaves after the lead grows with it, and a step of the lean would overshoot by more than 15 %.
+pub const QUICK_MOTOR: f32 = 0.02;
+
 impl Airframe {
+    /// Share of the loops' full bandwidth that the motors allow: 1 up to [`QUICK_MOTOR`], less for slower ones.
+    #[must_use]
+    pub fn quickness(&self) -> f32 {
+        (QUICK_MOTOR / self.motor_lag).min(1.0)
+    }
+
     /// A quadrotor of half a kilogram that nobody built, in round numbers: for examples, tests and benchmarks. A vehicle
     /// describes itself.
     pub const EXAMPLE: Self = Self {

@@ -12,7 +12,6 @@ use stampfly_types::{Quat, Vec3, math};
 
 use crate::airframe::Airframe;
 use crate::bound::symmetric;
-use crate::rate;
 
 /// Gains and limits of the attitude loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +31,7 @@ impl AttitudeConfig {
     /// The default gains, lowered with the rate loop's bandwidth when the airframe's motors are slow.
     #[must_use]
     pub fn for_airframe(airframe: &Airframe) -> Self {
-        let (quickness, quick) = (rate::quickness(airframe), Self::default());
+        let (quickness, quick) = (airframe.quickness(), Self::default());
         Self { tilt_gain: quickness * quick.tilt_gain, heading_gain: quickness * quick.heading_gain, ..quick }
     }
 }

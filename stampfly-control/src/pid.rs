@@ -63,6 +63,7 @@ pub enum Integration {
 pub struct Pid<T = f32> {
     gains: PidGains<T>,
     limit: T,
+    integral_limit: T,
     integral: T,
     derivative: T,
     error: T,
@@ -104,6 +105,7 @@ impl<T: FloatCore> Pid<T> {
         Self {
             gains,
             limit: limit.abs(),
+            integral_limit: limit.abs(),
             integral: zero,
             derivative: zero,
             error: zero,
@@ -111,6 +113,12 @@ impl<T: FloatCore> Pid<T> {
             output: zero,
             discrete: Discrete { dt: zero, integral: zero, derivative_decay: zero, derivative_gain: zero },
         }
+    }
+
+    /// The same, with an integral that stays within ±`limit`: what it may have learned while something held the plant.
+    #[must_use]
+    pub fn with_integral_limit(self, limit: T) -> Self {
+        Self { integral_limit: limit.abs().min(self.limit), ..self }
     }
 
     /// One step of `dt` seconds. Inputs that are not finite, or a `dt` that is not positive, change nothing and
@@ -143,19 +151,19 @@ impl<T: FloatCore> Pid<T> {
         let before = direct + self.integral;
         let winds_up = (before >= self.limit && step > T::zero()) || (before <= -self.limit && step < T::zero());
         if allowed && !winds_up && step.is_finite() {
-            self.integral = self.clamp(self.integral + step);
+            self.integral = clamp(self.integral + step, self.integral_limit);
         }
 
         let output = direct + self.integral;
         if !output.is_nan() {
-            self.output = self.clamp(output);
+            self.output = clamp(output, self.limit);
         }
         self.output
     }
 
     /// Forgets everything but gains and limit.
     pub fn reset(&mut self) {
-        *self = Self::new(self.gains, self.limit);
+        *self = Self::new(self.gains, self.limit).with_integral_limit(self.integral_limit);
     }
 
     /// The integral, in output units.
@@ -166,7 +174,7 @@ impl<T: FloatCore> Pid<T> {
 
     /// Sets the integral, for a take-over without a jump. Clamped to the limit; not finite counts as zero.
     pub fn set_integral(&mut self, integral: T) {
-        self.integral = if integral.is_finite() { self.clamp(integral) } else { T::zero() };
+        self.integral = if integral.is_finite() { clamp(integral, self.integral_limit) } else { T::zero() };
     }
 
     /// Changes the gains in flight. The integral stays, so the output moves only by what the gains change.
@@ -180,16 +188,16 @@ impl<T: FloatCore> Pid<T> {
     pub fn limit(&self) -> T {
         self.limit
     }
+}
 
-    fn clamp(&self, value: T) -> T {
-        // Comparisons, not `max` and `min`: those spend instructions on NaN, which does not get here.
-        if value > self.limit {
-            self.limit
-        } else if value < -self.limit {
-            -self.limit
-        } else {
-            value
-        }
+/// Within ±`limit`. Comparisons, not `max` and `min`: those spend instructions on NaN, which does not get here.
+fn clamp<T: FloatCore>(value: T, limit: T) -> T {
+    if value > limit {
+        limit
+    } else if value < -limit {
+        -limit
+    } else {
+        value
     }
 }
 

@@ -3,11 +3,12 @@
 //! With the derivative time near the motor's time constant the zero of the loop cancels the motor's pole and what remains
 //! is close to an integrator with 7 ms of delay (filter, sampling, computing). That sets the gain: Kp = I·ω, the moment of
 //! inertia about the axis times the crossover ω. [`TILT_BANDWIDTH`] and [`YAW_BANDWIDTH`] are that ω, lowered for motors
-//! slower than [`QUICK_MOTOR`]; [`RateConfig::for_airframe`] applies the rule.
+//! slower than [`QUICK_MOTOR`](crate::airframe::QUICK_MOTOR); [`RateConfig::for_airframe`] applies the rule.
 
 use stampfly_types::Vec3;
 
 use crate::airframe::Airframe;
+use crate::attitude::AttitudeConfig;
 use crate::pid::{Integration, Pid, PidGains};
 
 /// Crossover of the roll and pitch rate loops, rad/s: with 7 ms of delay in the loop it keeps 55° of phase when the motor
@@ -16,14 +17,14 @@ pub const TILT_BANDWIDTH: f32 = 43.6;
 /// Crossover of the yaw rate loop, rad/s. Half of roll and pitch: the rotors' drag is weak, and more gain only drives the
 /// motors into their limits.
 pub const YAW_BANDWIDTH: f32 = 22.0;
-/// Time constant of the motors up to which these bandwidths hold, s. Slower motors lower them in proportion: what their pole
-/// leaves after the lead grows with it, and a step of the lean would overshoot by more than 15 %.
-pub const QUICK_MOTOR: f32 = 0.02;
 /// Derivative time of roll and pitch over the motors' time constant: a little less than all of it, since a motor is
 /// quicker above hover.
 pub const TILT_LEAD: f32 = 8.0 / 9.0;
 /// The same for yaw, where a rotor's own inertia already acts as a lead.
 pub const YAW_LEAD: f32 = 5.0 / 9.0;
+
+/// How far a full integral of roll or pitch leans a vehicle, rad: 8°.
+const LEAN: f32 = 0.14;
 
 /// Gains and limits of the body-rate loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,9 @@ pub struct RateConfig {
     pub yaw: PidGains,
     /// Largest torque per axis, N·m.
     pub torque_max: Vec3,
+    /// Largest integral per axis, N·m: what a propeller that is a third too weak needs, and no more. A vehicle that something
+    /// holds fills its integrals; this is what is left in them when it is let go.
+    pub integral_max: Vec3,
 }
 
 impl RateConfig {
@@ -45,20 +49,19 @@ impl RateConfig {
     #[must_use]
     pub fn for_airframe(airframe: &Airframe) -> Self {
         let (inertia, lag) = (airframe.inertia, airframe.motor_lag);
-        let (tilt, yaw) = (quickness(airframe) * TILT_BANDWIDTH, quickness(airframe) * YAW_BANDWIDTH);
+        let (tilt, yaw) = (airframe.quickness() * TILT_BANDWIDTH, airframe.quickness() * YAW_BANDWIDTH);
         let tilt = |inertia| PidGains { kp: tilt * inertia, ti: 0.5, td: TILT_LEAD * lag, eta: 0.2 };
+        let (roll, pitch) = (tilt(inertia.x), tilt(inertia.y));
+        // The attitude loop holds a constant torque T off with a tilt of T / (Kp · its gain).
+        let leaning = LEAN * AttitudeConfig::for_airframe(airframe).tilt_gain;
         Self {
-            roll: tilt(inertia.x),
-            pitch: tilt(inertia.y),
+            integral_max: Vec3::new(leaning * roll.kp, leaning * pitch.kp, airframe.torque_limit().z),
+            roll,
+            pitch,
             yaw: PidGains { kp: yaw * inertia.z, ti: 0.8, td: YAW_LEAD * lag, eta: 0.2 },
             torque_max: airframe.torque_limit(),
         }
     }
-}
-
-/// Share of the bandwidths that the airframe's motors allow: 1 up to [`QUICK_MOTOR`], less for slower ones.
-pub(crate) fn quickness(airframe: &Airframe) -> f32 {
-    (QUICK_MOTOR / airframe.motor_lag).min(1.0)
 }
 
 /// The body-rate loops.
@@ -83,9 +86,14 @@ impl RateController {
     /// Loops at rest.
     #[must_use]
     pub fn new(config: &RateConfig) -> Self {
-        let limit = config.torque_max;
+        let (limit, integral) = (config.torque_max, config.integral_max);
+        let axis = |gains, limit, integral| Pid::new(gains, limit).with_integral_limit(integral);
         Self {
-            axes: [Pid::new(config.roll, limit.x), Pid::new(config.pitch, limit.y), Pid::new(config.yaw, limit.z)],
+            axes: [
+                axis(config.roll, limit.x, integral.x),
+                axis(config.pitch, limit.y, integral.y),
+                axis(config.yaw, limit.z, integral.z),
+            ],
             torque: Vec3::zeros(),
         }
     }
@@ -141,6 +149,22 @@ mod tests {
         assert_eq!(integration(-0.5, 1e-3, false), Integration::NotDown, "delivered more than asked");
         assert_eq!(integration(0.001, 1e-3, false), Integration::Free);
         assert_eq!(integration(0.0, 1e-3, true), Integration::Hold);
+    }
+
+    /// D15: a minute in a hand, and the integral alone would have turned it over.
+    #[test]
+    fn an_integral_that_something_held_leans_the_vehicle_by_eight_degrees() {
+        let config = RateConfig::for_airframe(&Airframe::EXAMPLE);
+        let mut rate = RateController::new(&config);
+        for _ in 0..24_000 {
+            rate.step(&Vec3::new(1.0, -1.0, 0.0), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+        }
+        let left = rate.step(&Vec3::zeros(), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+        let gain = AttitudeConfig::for_airframe(&Airframe::EXAMPLE).tilt_gain;
+        for (torque, kp) in [(left.x, config.roll.kp), (-left.y, config.pitch.kp)] {
+            let lean = (torque / (kp * gain)).to_degrees();
+            assert!((7.0..9.0).contains(&lean), "{lean}");
+        }
     }
 
     #[test]
