@@ -4,7 +4,7 @@
 //! and the recent past is kept, so a sensor may report what was true in the middle of its exposure although another
 //! one has already been read later. Many worlds fit in one process; none knows of another.
 
-use crate::plant::{DT, Motion, Plant, ROTORS, STEP};
+use crate::plant::{DT, Motion, Plant, ROTORS, RotorFault, STEP};
 use core::cell::RefCell;
 use stampfly_types::{Instant, Quat, Vec3, message};
 use std::rc::Rc;
@@ -112,6 +112,13 @@ impl World {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
         state.plant.set_duty(duty);
+    }
+
+    /// Breaks or mends a rotor, in motor order from 0, from `instant` on.
+    pub fn set_rotor_fault(&self, instant: Instant, rotor: usize, fault: RotorFault) {
+        let mut state = self.0.borrow_mut();
+        state.advance_to(instant);
+        state.plant.set_rotor_fault(rotor, fault);
     }
 
     /// Looks at the plant as it is after the last step.

@@ -14,7 +14,7 @@ mod wind;
 
 pub use battery::Battery;
 pub use ground::Ground;
-pub use motor::{ROTORS, Rotors};
+pub use motor::{ROTORS, RotorFault, Rotors};
 pub use parameters::{ParameterError, ParameterInfo, PlantParameters};
 pub use wind::{Wind, WindConfig};
 
@@ -150,6 +150,11 @@ impl Plant {
     /// Sets the duty cycles of the motors, 0 to 1: front right, rear right, rear left, front left.
     pub fn set_duty(&mut self, duty: [f64; ROTORS]) {
         self.rotors.set_duty(duty);
+    }
+
+    /// Breaks or mends a rotor, in motor order from 0.
+    pub fn set_rotor_fault(&mut self, rotor: usize, fault: RotorFault) {
+        self.rotors.set_fault(rotor, fault);
     }
 
     /// Advances by one [`STEP`].
