@@ -93,7 +93,7 @@ pub const FAULTS: &[FaultKind] = &[
 ];
 
 /// Where a fault acts, and how.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 enum Act {
     Imu(Distortion),
     Tof(Distortion),
