@@ -73,8 +73,9 @@ const IMU_SILENCE: Duration = Duration::from_micros(32_500);
 const LAND_WITHIN: Duration = Duration::from_secs(3);
 /// Of I10, m/s.
 const LAND_RATE: f32 = 0.3;
-/// Motors that were off for so long after a fault stay off; the second is for a vehicle that has not been armed yet.
-const OVER: [Duration; 2] = [Duration::from_secs(3), Duration::from_secs(10)];
+/// Motors that were off for so long after a fault stay off; the second is for a vehicle that has not been armed yet, the third
+/// for one that still falls.
+const OVER: [Duration; 3] = [Duration::from_secs(3), Duration::from_secs(10), Duration::from_secs(30)];
 
 /// An alert's time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -277,7 +278,8 @@ impl Judge {
             let (was, is) = (self.alerts.bits() & bit != 0, active.bits() & bit != 0);
             if is && !was {
                 self.spans.push(AlertSpan { name, since: seconds, until: None });
-                self.new_alert |= after_fault;
+                // Before the first command nobody has been heard, and sensors start.
+                self.new_alert |= after_fault && (self.turned || self.injector.faults().next().is_some());
             } else if was && !is
                 && let Some(span) = self.spans.iter_mut().rev().find(|span| span.name == name)
             {
@@ -396,8 +398,10 @@ impl Judge {
     pub fn is_over(&self, now: Instant) -> bool {
         let Some(begun) = self.injector.first_begun(now) else { return false };
         let since = self.stopped.map_or(begun, |(at, _)| at.max(begun));
-        let [off, idle] = OVER;
-        !self.motors_on && now.since(since) >= if self.turned { off } else { idle }
+        let [off, idle, fallen] = OVER;
+        let in_air = self.last.is_some_and(|truth| !truth.contact);
+        let enough = if !self.turned { idle } else if in_air { fallen } else { off };
+        !self.motors_on && now.since(since) >= enough
     }
 
     pub fn finish(mut self) -> Judgement {
@@ -416,8 +420,12 @@ impl Judge {
         self.require("I12", faults.iter().all(|span| span.since.is_some() && span.changes > 0));
         let expected = self.injector.faults().map(|fault| fault.expected()).max().unwrap_or(Class::Transparent);
         let outcome = self.class(begun);
-        let since_fault = |at: Instant| begun.map_or(0.0, |begun| at.since(begun).seconds_f64());
-        let stopped = self.stopped.or_else(|| Some((begun?, 0.0)).filter(|_| !self.turned));
+        // Motors that were off already stayed off from the beginning of the fault.
+        let stopped = if self.turned { self.stopped } else { Some((self.now, 0.0)) };
+        let stopped = begun.zip(stopped).map(|(begun, (at, height))| {
+            let at = if self.turned { at } else { begun };
+            (at.since(begun).seconds_f64(), f64::from(height.max(0.0)))
+        });
         let touch = self.touches.iter().find(|touch| begun.is_none_or(|begun| touch.at >= begun));
         Judgement {
             outcome: outcome.name(),
@@ -428,8 +436,8 @@ impl Judge {
             max_above_m: if self.above.is_finite() { self.above.into() } else { 0.0 },
             max_distance_m: self.beside.into(),
             touch_speed_mps: touch.map(|touch| touch.speed.into()),
-            cut_after_s: stopped.map(|(at, _)| since_fault(at)),
-            cut_height_m: stopped.map(|(_, height)| height.max(0.0).into()),
+            cut_after_s: stopped.map(|(after, _)| after),
+            cut_height_m: stopped.map(|(_, height)| height),
             alerts: self.spans,
             faults,
         }

@@ -37,6 +37,8 @@ pub enum Command {
     Topics(TopicsOptions),
     /// List the runnables: what activates them, budget, response time.
     Schedule(TopicsOptions),
+    /// List what can go wrong in a flight: value, the worst end that is acceptable, meaning.
+    Faults(TopicsOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
     /// Run the estimator over recorded sensor data and say how good it is.
@@ -194,7 +196,7 @@ pub struct ReplayOptions {
     pub json: bool,
 }
 
-/// Options of `topics`.
+/// Options of `topics`, `schedule` and `faults`.
 #[derive(Clone, Debug, Args)]
 pub struct TopicsOptions {
     #[command(flatten)]
@@ -202,7 +204,7 @@ pub struct TopicsOptions {
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
-    /// Print Markdown, as in `docs/topics.md`.
+    /// Print Markdown, as in `docs`.
     #[arg(long, conflicts_with = "json")]
     pub markdown: bool,
 }
