@@ -34,7 +34,7 @@ const fn number(
 
 /// A motor's faults.
 const fn thrust(name: &'static str) -> FaultKind {
-    number(name, ("", 0.5, 0.0, 1.0), Cut, "The motor's propeller has this share of its thrust and drag.")
+    number(name, ("", 0.5, 0.0, 1.0), Cut, "The motor's propeller has this share of its thrust, and all of its drag.")
 }
 
 const fn on(name: &'static str) -> FaultKind {
@@ -52,7 +52,7 @@ pub const FAULTS: &[FaultKind] = &[
     plain("gyro-stuck", Cut, "Rates repeat the last ones."),
     plain("gyro-zero", Cut, "Rates are zero."),
     number("gyro-bias", ("rad/s", 1.0, -35.0, 35.0), Landed, "The roll rate is too high by this."),
-    number("gyro-spikes", ("rad/s", 20.0, 0.0, 35.0), Degraded, "One rate in twenty is off by this."),
+    number("gyro-spikes", ("rad/s", 20.0, 0.0, 35.0), Cut, "One rate in twenty is off by this."),
     plain("accel-stuck", Cut, "Accelerations repeat the last ones."),
     plain("accel-zero", Cut, "Accelerations are zero."),
     number("accel-bias", ("m/s^2", 2.0, -80.0, 80.0), Degraded, "The vertical acceleration is too high by this."),

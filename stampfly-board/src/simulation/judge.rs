@@ -10,7 +10,7 @@
 //! | `kept-on` | the motors were on at the end |
 //! | `cut` | the motors stopped for good within 0.3 s of the fault |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end |
-//! | `landed` | it began to land, or its motors stopped, before the mission asked for landing |
+//! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
 //! | `transparent` | anything else |
 //!
@@ -53,6 +53,8 @@ const CLIMBED: f32 = 0.15;
 const AWAY: [f32; 2] = [1.0, 5.0];
 /// Bounds of `transparent`, in the same order, m.
 const EXACT: [f32; 2] = [0.15, 0.5];
+/// It has been at a place of the mission that it came as near as this, m.
+const VISITED: f32 = 1.0;
 /// A pilot's bounds are this many times as wide.
 const PILOT: f32 = 2.0;
 /// Motors that stop within this time of a fault were cut.
@@ -181,10 +183,16 @@ pub(super) struct Judge {
     new_alert: bool,
     /// Steps of the mission that are done.
     done: usize,
+    /// Places of the mission, and has it been there?
+    places: Vec<([f32; 2], bool)>,
 }
 
 impl Judge {
     pub fn new(injector: &Injector, mission: &Mission, piloted: bool, hover_without_link: Duration) -> Self {
+        let places = mission.steps.iter().filter_map(|step| match *step {
+            Step::GoTo { place: [north, east, _], .. } => Some(([north, east], false)),
+            Step::Arm | Step::TakeOff { .. } | Step::Hover { .. } | Step::Land => None,
+        });
         Self {
             injector: injector.clone(),
             mission: mission.clone(),
@@ -216,6 +224,7 @@ impl Judge {
             other_mode: false,
             new_alert: false,
             done: 0,
+            places: places.collect(),
         }
     }
 
@@ -337,6 +346,10 @@ impl Judge {
         if touches && (after_fault && self.injector.faults().next().is_some() || landing) {
             let tilt = frame::tilt(&truth.attitude).to_degrees();
             self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt });
+        }
+        for ([north, east], visited) in &mut self.places {
+            let away = truth.position.xy() - Vec3::new(*north, *east, 0.0).xy();
+            *visited |= away.norm() < VISITED;
         }
         let (top, beside) = self.commanded(done, truth.position);
         self.highest = self.highest.max(up);
@@ -460,7 +473,7 @@ impl Judge {
             Class::Cut
         } else if lies || self.touches.iter().any(hard) {
             Class::Crashed
-        } else if self.early {
+        } else if self.early || self.places.iter().any(|(_, visited)| !visited) {
             Class::Landed
         } else if self.new_alert || self.other_mode || above > wide * EXACT[0] || beside > wide * EXACT[1] {
             Class::Degraded

@@ -42,7 +42,7 @@ pub(crate) struct RotorLoads {
 /// What is wrong with one rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFault {
-    /// Share of thrust and drag that its propeller still has: 0 when it is lost.
+    /// Share of its thrust that the propeller still has, at the same speed and with the same drag.
     pub thrust: f64,
     /// The duty it has whatever is commanded, 0 to 1: a transistor that does not switch.
     pub duty: Option<f64>,
@@ -139,7 +139,7 @@ impl Rotors {
             let fault = self.faults[i];
             let (speed, duty) = (self.speed[i], fault.duty.unwrap_or(self.duty[i]));
             let current = ((duty * voltage - self.motor_constant * speed) / self.resistance).max(0.0);
-            let drag = self.torque_coefficient * fault.thrust * speed * speed;
+            let drag = self.torque_coefficient * speed * speed;
             let net = self.motor_constant * current - drag - self.viscous * speed - self.friction;
             let next = (speed + net / self.inertia * dt).max(0.0);
             let acceleration = (next - speed) / dt;
@@ -165,6 +165,23 @@ mod tests {
 
     fn ideal() -> Rotors {
         Rotors::new(&IDEAL, &mut Noise::new(0, 0))
+    }
+
+    #[test]
+    fn a_weak_propeller_pushes_less_and_a_stuck_transistor_ignores_its_duty() {
+        let settled = |fault: RotorFault, duty: f64| {
+            let mut rotors = ideal();
+            rotors.set_fault(1, fault);
+            rotors.set_duty([duty; ROTORS]);
+            let loads = (0..1600).map(|_| rotors.step(625e-6, 4.0, 1.0)).last().expect("steps");
+            (rotors.speed(), loads)
+        };
+        let (healthy, all) = settled(RotorFault::NONE, 0.6);
+        let (speed, loads) = settled(RotorFault { thrust: 0.5, duty: None }, 0.6);
+        assert_eq!(speed, healthy, "it turns as before");
+        assert!((loads.thrust / all.thrust - 0.875).abs() < 1e-3 && loads.torque.x.abs() > 1e-4, "{loads:?}");
+        let (speed, _) = settled(RotorFault { duty: Some(1.0), ..RotorFault::NONE }, 0.0);
+        assert!(speed[1] > healthy[1] && speed[0] < 1.0, "{speed:?}");
     }
 
     /// The steady voltage at a speed.
