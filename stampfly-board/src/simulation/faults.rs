@@ -6,16 +6,14 @@
 use super::flight::Setup;
 use crate::messages::TelemetryFrame;
 use stampfly_bus::Band;
-use stampfly_sim::chips::{AttachedChips, Faults};
 use stampfly_sim::World;
+use stampfly_sim::chips::{AttachedChips, Faults};
 use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
 use stampfly_sim::plant::RotorFault;
 use stampfly_types::Instant;
-use stampfly_types::messages::{
-    BaroData, FlowData, GuidedCommand, ImuData, MagData, PilotInput, PowerData, TofData,
-};
-use std::vec::Vec;
+use stampfly_types::messages::{BaroData, FlowData, GuidedCommand, ImuData, MagData, PilotInput, PowerData, TofData};
 use std::vec;
+use std::vec::Vec;
 
 use Class::{Cut, Degraded, Landed, Transparent};
 
@@ -48,7 +46,12 @@ pub const FAULTS: &[FaultKind] = &[
     plain("imu-zero", Cut, "Inertial samples are zero."),
     plain("imu-nan", Cut, "Inertial samples are no numbers."),
     number("imu-scale", ("", 0.5, 0.0, 2.0), Cut, "Rates and accelerations are this many times as large."),
-    number("imu-garbage", ("samples", 2.0, 1.0, 400.0), Degraded, "So many inertial samples are at the negative end of the range."),
+    number(
+        "imu-garbage",
+        ("samples", 2.0, 1.0, 400.0),
+        Degraded,
+        "So many inertial samples are at the negative end of the range.",
+    ),
     plain("gyro-stuck", Cut, "Rates repeat the last ones."),
     plain("gyro-zero", Cut, "Rates are zero."),
     number("gyro-bias", ("rad/s", 1.0, -35.0, 35.0), Landed, "The roll rate is too high by this."),
@@ -57,7 +60,12 @@ pub const FAULTS: &[FaultKind] = &[
     plain("accel-zero", Cut, "Accelerations are zero."),
     number("accel-bias", ("m/s^2", 2.0, -80.0, 80.0), Degraded, "The vertical acceleration is too high by this."),
     plain("tof-silent", Degraded, "No range arrives."),
-    FaultKind::or_last("tof-stuck", ("m", 0.0, 10.0), Degraded, "The range stays at this, or at the last one, as valid as before."),
+    FaultKind::or_last(
+        "tof-stuck",
+        ("m", 0.0, 10.0),
+        Degraded,
+        "The range stays at this, or at the last one, as valid as before.",
+    ),
     number("tof-bias", ("m", -0.3, -10.0, 10.0), Degraded, "The range is too long by this."),
     number("tof-scale", ("", 0.5, 0.0, 10.0), Degraded, "The range is this many times as long."),
     number("tof-alias", ("m", 0.25, 0.01, 10.0), Degraded, "The range wraps around at this."),
@@ -86,9 +94,15 @@ pub const FAULTS: &[FaultKind] = &[
     thrust("motor-4-thrust"),
     on("motor-4-stuck"),
     plain("link-lost", Landed, "The radio is silent in both directions."),
-    number("link-flap", ("s", 2.9, 0.1, 60.0), Landed, "The radio is silent for this long, works for 0.2 s, and so on."),
+    number(
+        "link-flap",
+        ("s", 2.9, 0.1, 60.0),
+        Landed,
+        "The radio is silent for this long, works for 0.2 s, and so on.",
+    ),
     plain("pilot-nan", Landed, "The pilot's sticks are no numbers."),
-    number("stall", ("ms", 20.0, 0.0, 10_000.0), Degraded, "The flight band does not run for this long.").above(24.0, Cut),
+    number("stall", ("ms", 20.0, 0.0, 10_000.0), Degraded, "The flight band does not run for this long.")
+        .above(24.0, Cut),
     plain("starve", Landed, "The background band does not run."),
 ];
 
@@ -246,8 +260,7 @@ impl Wrong {
     }
 
     fn line<M: stampfly_types::Message>(&self, on_it: impl Fn(&Act) -> Option<Distortion>) -> Line<M> {
-        let distortions: Vec<_> =
-            self.acts.iter().filter_map(|(place, act)| Some((*place, on_it(act)?))).collect();
+        let distortions: Vec<_> = self.acts.iter().filter_map(|(place, act)| Some((*place, on_it(act)?))).collect();
         Line::new(&self.injector, &distortions, self.seed)
     }
 

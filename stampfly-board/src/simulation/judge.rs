@@ -5,7 +5,7 @@
 //!
 //! | end | rule |
 //! |---|---|
-//! | `refused` | the motors never turned, or stopped for good before the vehicle was 0.05 m above the ground |
+//! | `refused` | the motors never turned |
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
 //! | `cut` | the motors stopped for good within 0.3 s of the fault |
@@ -31,7 +31,7 @@
 //! | `I12` | every fault began, and changed something |
 
 use super::mission::{Mission, Step};
-use crate::topics::{Id, COUNT};
+use crate::topics::{COUNT, Id};
 use serde::Serialize;
 use stampfly_flight::newest::message;
 use stampfly_mode::transitions::{self, Event};
@@ -289,7 +289,8 @@ impl Judge {
                 self.spans.push(AlertSpan { name, since: seconds, until: None });
                 // Before the first command nobody has been heard, and sensors start.
                 self.new_alert |= after_fault && (self.turned || self.injector.faults().next().is_some());
-            } else if was && !is
+            } else if was
+                && !is
                 && let Some(span) = self.spans.iter_mut().rev().find(|span| span.name == name)
             {
                 span.until = Some(seconds);
@@ -413,7 +414,13 @@ impl Judge {
         let since = self.stopped.map_or(begun, |(at, _)| at.max(begun));
         let [off, idle, fallen] = OVER;
         let in_air = self.last.is_some_and(|truth| !truth.contact);
-        let enough = if !self.turned { idle } else if in_air { fallen } else { off };
+        let enough = if !self.turned {
+            idle
+        } else if in_air {
+            fallen
+        } else {
+            off
+        };
         !self.motors_on && now.since(since) >= enough
     }
 
@@ -463,7 +470,7 @@ impl Judge {
         let from = begun.or(self.start).unwrap_or(self.now);
         let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
         let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
-        if !self.turned || (!self.motors_on && self.highest < OFF_GROUND) {
+        if !self.turned {
             Class::Refused
         } else if above > AWAY[0] || beside > AWAY[1] {
             Class::FlownAway
@@ -497,8 +504,7 @@ fn is_sound(estimate: &StateEstimate, words: &[u32]) -> bool {
     let mut numbers = fields
         .filter(|(_, field)| field.kind == FieldKind::F32)
         .flat_map(|(start, field)| words.get(start..start + field.words).unwrap_or_default());
-    numbers.all(|word| f32::from_bits(*word).is_finite())
-        && (estimate.attitude.into_inner().norm() - 1.0).abs() <= 1e-4
+    numbers.all(|word| f32::from_bits(*word).is_finite()) && (estimate.attitude.into_inner().norm() - 1.0).abs() <= 1e-4
 }
 
 /// Every alert with its bit.

@@ -266,7 +266,8 @@ impl<'b> Pilot<'b> {
             if share.abs() < 0.005 { 0.0 } else { beyond.clamp(-1.0, 1.0) }
         };
         let yaw = stick(limit(-seen.yaw, 0.8) / turn);
-        self.input = PilotInput { roll: stick(roll), pitch: stick(pitch), yaw, throttle: stick(throttle), ..self.input };
+        self.input =
+            PilotInput { roll: stick(roll), pitch: stick(pitch), yaw, throttle: stick(throttle), ..self.input };
     }
 }
 

@@ -3,8 +3,8 @@
 use core::cell::{Cell, RefCell};
 use stampfly_board::schedule::{COUNT, Runnables};
 use stampfly_board::simulation::ground_station::{self, Progress};
-use stampfly_board::simulation::radio::Radio;
 use stampfly_board::simulation::mission::Mission;
+use stampfly_board::simulation::radio::Radio;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_board::topics::{self, Bus};
 use stampfly_bus::{Activation, Taps};

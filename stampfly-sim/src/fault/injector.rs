@@ -76,9 +76,10 @@ impl Injector {
     #[must_use]
     pub fn is_active(&self, place: usize, now: Instant) -> bool {
         self.0.get(place).is_some_and(|entry| {
-            entry.begun.get().is_some_and(|begun| {
-                begun <= now && entry.fault.lasts.is_none_or(|lasts| now < begun + lasts)
-            })
+            entry
+                .begun
+                .get()
+                .is_some_and(|begun| begun <= now && entry.fault.lasts.is_none_or(|lasts| now < begun + lasts))
         })
     }
 

@@ -28,9 +28,9 @@ pub use scenario::Scenario;
 pub use scripted::{Following, Script, Scripted};
 pub use witness::Witness;
 
+use crate::fault::{Fault, FaultKind};
 use crate::time::{Clock, Tasks};
 use serde::{Serialize, de::DeserializeOwned};
-use crate::fault::{Fault, FaultKind};
 use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_types::Instant;

@@ -284,9 +284,11 @@ fn north_and_east(text: &str) -> Result<[f32; 2], String> {
 impl SceneOptions {
     /// The flight these options describe.
     pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>, live: Option<Live>) -> Result<V::Setup, Failure> {
-        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } = self.clone();
+        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } =
+            self.clone();
         let pilot = pilot.then(|| mode.unwrap_or_default());
-        let options = Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live };
+        let options =
+            Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live };
         Ok(V::setup(&options, seed)?)
     }
 
