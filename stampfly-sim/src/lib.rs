@@ -4,6 +4,7 @@
 //! * [`plant`]: the vehicle as a body with motors, a battery, a floor and the air;
 //! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
 //! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
+//! * [`fault`]: what goes wrong in a flight, when, and for how long;
 //! * [`vehicle`]: a whole vehicle with its flight stack, on virtual time;
 //! * [`Simulation`]: all of it from one [`SimulationConfig`].
 //!
@@ -15,6 +16,7 @@
 //! feel, are the StampFly's.
 
 pub mod chips;
+pub mod fault;
 mod noise;
 pub mod plant;
 pub mod sensors;

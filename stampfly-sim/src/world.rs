@@ -4,7 +4,7 @@
 //! and the recent past is kept, so a sensor may report what was true in the middle of its exposure although another
 //! one has already been read later. Many worlds fit in one process; none knows of another.
 
-use crate::plant::{DT, Motion, Plant, ROTORS, STEP};
+use crate::plant::{DT, Motion, Plant, ROTORS, RotorFault, STEP, Scene};
 use core::cell::RefCell;
 use stampfly_types::{Instant, Quat, Vec3, message};
 use std::rc::Rc;
@@ -112,6 +112,27 @@ impl World {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
         state.plant.set_duty(duty);
+    }
+
+    /// Breaks or mends a rotor, in motor order from 0, from `instant` on.
+    pub fn set_rotor_fault(&self, instant: Instant, rotor: usize, fault: RotorFault) {
+        let mut state = self.0.borrow_mut();
+        state.advance_to(instant);
+        state.plant.set_rotor_fault(rotor, fault);
+    }
+
+    /// Changes what stands around the vehicle, from `instant` on. `change` gets the motion there.
+    pub fn change_scene(&self, instant: Instant, change: impl FnOnce(&mut Scene, &Motion)) {
+        let mut state = self.0.borrow_mut();
+        let motion = state.motion_at(instant);
+        change(state.plant.scene_mut(), &motion);
+    }
+
+    /// Height above the floor below the vehicle at `instant`, m.
+    #[must_use]
+    pub fn height_at(&self, instant: Instant) -> f64 {
+        let motion = self.motion_at(instant);
+        self.inspect(|plant| plant.scene().floor(&motion.position)) - motion.position.z
     }
 
     /// Looks at the plant as it is after the last step.

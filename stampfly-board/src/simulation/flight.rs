@@ -1,16 +1,24 @@
 //! One flight of the StampFly: what is started around it, what is watched, and what came of it.
 
+use super::faults::Wrong;
 use super::ground_station::{self, Progress};
+use super::judge::{Judge, Judgement, Sight};
 use super::metrics::{Collector, FIGURES, Metrics, Snapshot};
 use super::mission::{self, Mission};
+use super::pilot::{Meaning, Pilot};
 use super::plant::PLANT;
+use super::radio::Radio;
 use super::sensing::{self, Healths, Others, Sensing, Shared};
 use crate::config::VehicleConfig;
-use crate::messages::ButtonContact;
+use crate::messages::{ButtonContact, CutoffState};
 use crate::schedule::Runnables;
 use crate::topics::{self, Id};
+use serde::Serialize;
+use stampfly_bus::Band;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
+use stampfly_flight::Watchdog;
 use stampfly_sim::chips;
+use stampfly_sim::fault::{Fault, Moment};
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, Figure, Verdict};
@@ -32,6 +40,10 @@ pub struct Setup {
     pub mission: Mission,
     /// What the sensor tasks read.
     pub sensing: Sensing,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
+    /// The mission is flown by a pilot in this mode; `None` for a ground station.
+    pub pilot: Option<FlightMode>,
     /// Is the vehicle watched by a motion capture system?
     pub cameras: bool,
     /// Seed of the executor's delays; `None` for an executor that is never late.
@@ -49,6 +61,8 @@ impl Setup {
             vehicle: VehicleConfig::default(),
             mission: Mission::parse(mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
             sensing: Sensing::Models,
+            faults: Vec::new(),
+            pilot: None,
             cameras: false,
             jitter: None,
             limit: Duration::from_secs(180),
@@ -83,9 +97,23 @@ pub struct Outcome {
     pub battery: [f32; 2],
     /// Was every duty a number from 0 to 1, and 0 while the vehicle was not armed?
     pub motors_sane: bool,
+    /// What came of faults, and what never may happen.
+    pub judgement: Judgement,
 }
 
 impl Verdict for Outcome {
+    /// Without faults the mission has to be flown; with faults the end has to be acceptable. Either way every invariant has
+    /// to hold.
+    fn succeeded(&self) -> bool {
+        let flown = self.facts().iter().all(|(_, holds)| *holds);
+        let Judgement { faults, as_expected, violations, .. } = &self.judgement;
+        violations.is_empty() && if faults.is_empty() { flown } else { *as_expected }
+    }
+
+    fn findings(&self) -> impl Serialize {
+        &self.judgement
+    }
+
     fn facts(&self) -> Vec<(&'static str, bool)> {
         vec![
             ("landed", self.metrics.landed),
@@ -110,10 +138,29 @@ impl Verdict for Outcome {
             format!("largest tilt {:.3} deg", self.worst_tilt_deg),
             format!("battery {first:.2} V at the start, {last:.2} V at the end"),
         ];
-        phases.chain(extremes).collect()
+        let Judgement { outcome, expected, violations, faults, .. } = &self.judgement;
+        let faults = faults.iter().map(|span| match span.since {
+            Some(since) => format!("{since:>9.3} s  fault {}, {} changes", span.fault, span.changes),
+            None => format!("  fault {} never began", span.fault),
+        });
+        let alerts = self.judgement.alerts.iter().map(|span| format!("{:>9.3} s  alert {}", span.since, span.name));
+        let mut told: Vec<_> = phases.chain(faults).chain(alerts).collect();
+        told.sort();
+        told.extend(extremes);
+        if !self.judgement.faults.is_empty() {
+            told.push(format!("outcome {outcome}, acceptable up to {expected}"));
+        }
+        if !violations.is_empty() {
+            told.push(format!("VIOLATED {}", violations.join(", ")));
+        }
+        told
     }
 
     fn sentence(&self) -> String {
+        if !self.judgement.faults.is_empty() {
+            let word = if self.succeeded() { "as expected" } else { "NOT ACCEPTABLE" };
+            return format!("{}, {word}", self.judgement.outcome);
+        }
         let sentence = match (self.metrics.landed, self.metrics.disarmed) {
             (true, true) => "landed and disarmed",
             (true, false) => "landed, still armed",
@@ -136,6 +183,8 @@ pub struct Surroundings {
     board: Option<chips::Board>,
     progress: Progress,
     health: Healths,
+    wrong: Option<Wrong>,
+    watchdog: Watchdog,
 }
 
 impl Surroundings {
@@ -153,6 +202,8 @@ impl Surroundings {
             board: Some(board),
             progress: Progress::default(),
             health: Healths::default(),
+            wrong: Some(Wrong::new(setup)),
+            watchdog: Watchdog::new(CUT_OFF),
         }
     }
 }
@@ -167,29 +218,80 @@ impl vehicle::Surroundings for Surroundings {
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
-        let Self { setup, clock, world, sensors, shared, board, progress, health } = self;
+        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog } = self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
+        let wrong = wrong.take().expect("surroundings are started once");
+        let lines = wrong.sensor_lines();
         let cameras = setup.cameras;
-        let Others { motors, indicator, button, link } = match setup.sensing {
-            Sensing::Models => sensing::start_models(tasks, clock, sensors, outside, cameras, health),
-            Sensing::Chips => sensing::start_drivers(tasks, clock, (board, shared), sensors, outside, cameras, health),
+        let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
+        let Others { motors, indicator, button, link, cutoff } = match setup.sensing {
+            Sensing::Models => sensing::start_models(tasks, clock, sensors, outside, lines, cameras, health),
+            Sensing::Chips => {
+                sensing::start_drivers(tasks, clock, (board, shared), sensors, outside, lines, cameras, health)
+            }
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
-        let station = ground_station::fly(clock.clone(), &setup.mission, link.command_guided, link.telemetry, progress);
-        tasks.spawn(station);
+        let home = Home::new(&world.truth_at(setup.simulation.start));
+        let radio = Radio::new(clock, link, wrong.radio_lines());
+        let waits = wrong.injector.wants(Moment::Ground);
+        match setup.pilot {
+            None => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
+            Some(mode) => {
+                let meaning = Meaning::new(&setup.vehicle.navigator, &setup.vehicle.cascade);
+                tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
+            }
+        }
+        let hover_without_link = setup.vehicle.mode.hover_without_link;
+        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot.is_some(), hover_without_link);
         Around {
+            clock: clock.clone(),
             world: world.clone(),
             steps: setup.mission.steps.len(),
             progress,
-            watch: Watch::new(&world.truth_at(setup.simulation.start)),
+            watch: Watch::new(home),
+            judge,
+            wrong,
+            chips,
+            seen_at: setup.simulation.start,
             duties: motors.1.actuator_motor,
             motors: motors.0,
+            watchdog,
+            cutoff: cutoff.cutoff_state,
+            is_cut_off: false,
             signals: indicator.1.signal,
             indicator: indicator.0,
             finished_at: None,
         }
     }
 }
+
+/// Motors that are not confirmed for this long are stopped, as by the firmware.
+const CUT_OFF: Duration = Duration::from_millis(25);
+
+/// Where the vehicle stood at the start, and how it was turned.
+///
+/// Nothing on board knows north: the vehicle's world begins where it stood and ahead of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Home {
+    origin: Vec3,
+    turn: Quat,
+}
+
+impl Home {
+    /// Of a vehicle that stands like this at the start.
+    fn new(start: &Truth) -> Self {
+        Self { origin: start.position, turn: frame::from_yaw(-frame::yaw(&start.attitude)) }
+    }
+
+    /// Turns and moves the truth into the vehicle's world.
+    pub fn bring(&self, truth: &mut Truth) {
+        truth.position = self.turn * (truth.position - self.origin);
+        truth.velocity = self.turn * truth.velocity;
+        truth.wind = self.turn * truth.wind;
+        truth.attitude = self.turn * truth.attitude;
+    }
+}
+
 /// What is watched beside the bus: truth, and the newest of what it is compared with.
 struct Watch {
     collector: Collector,
@@ -200,16 +302,14 @@ struct Watch {
     worst_tilt: f32,
     battery: Option<[f32; 2]>,
     motors_sane: bool,
-    origin: Vec3,
-    turn: Quat,
+    home: Home,
     truths: u32,
     /// The instant of a set-point that has not been compared with the truth yet.
     due: Option<Instant>,
 }
 
 impl Watch {
-    /// Watches a vehicle that stands like this at the start.
-    fn new(start: &Truth) -> Self {
+    fn new(home: Home) -> Self {
         Self {
             collector: Collector::default(),
             setpoint: Setpoint::default(),
@@ -219,8 +319,7 @@ impl Watch {
             worst_tilt: 0.0,
             battery: None,
             motors_sane: true,
-            origin: start.position,
-            turn: frame::from_yaw(-frame::yaw(&start.attitude)),
+            home,
             truths: 0,
             due: None,
         }
@@ -261,15 +360,9 @@ impl Watch {
         }
     }
 
-    /// Compares with the truth at the instant of a set-point.
-    ///
-    /// Nothing on board knows north: the vehicle's world begins where it stood and ahead of it, so the truth is turned
-    /// and moved into that world first.
+    /// Compares with the truth at the instant of a set-point, in the vehicle's world.
     fn compare(&mut self, at: Instant, truth: &mut Truth, record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {
-        truth.position = self.turn * (truth.position - self.origin);
-        truth.velocity = self.turn * truth.velocity;
-        truth.wind = self.turn * truth.wind;
-        truth.attitude = self.turn * truth.attitude;
+        self.home.bring(truth);
         self.truths += 1;
         record(0, at, self.truths, truth.to_words().as_ref());
         self.worst_tilt = self.worst_tilt.max(frame::tilt(&truth.attitude));
@@ -282,13 +375,22 @@ impl Watch {
 
 /// The world during a flight, and what is watched of it.
 pub struct Around<'a> {
+    clock: Clock,
     world: World,
     /// Of the mission.
     steps: usize,
     progress: &'a Progress,
     watch: Watch,
+    judge: Judge,
+    wrong: Wrong,
+    chips: Option<chips::AttachedChips>,
+    /// When the judge last saw the truth.
+    seen_at: Instant,
     duties: topics::ActuatorMotorRx<'a>,
     motors: MotorModel,
+    watchdog: &'a Watchdog,
+    cutoff: topics::CutoffStateTx<'a>,
+    is_cut_off: bool,
     signals: topics::SignalRx<'a>,
     indicator: IndicatorRecorder,
     finished_at: Option<Instant>,
@@ -297,15 +399,31 @@ pub struct Around<'a> {
 impl vehicle::Around for Around<'_> {
     type Outcome = Outcome;
 
-    fn drive(&mut self, _: Instant) {
+    fn drive(&mut self, now: Instant) {
         if self.duties.has_new()
             && let Some(output) = self.duties.latest()
         {
-            let Ok(()) = self.motors.write(&output.data);
+            self.watchdog.feed(now, output.data.armed);
+            // Motors that were cut off get their pins back when the vehicle is disarmed.
+            let off = self.watchdog.has_expired() && (output.data.armed || !self.watchdog.reset());
+            self.write(now, &MotorOutput { armed: output.data.armed && !off, ..output.data });
         }
     }
 
-    fn show(&mut self, _: Instant) {
+    fn is_held_up(&mut self, band: Band, now: Instant) -> bool {
+        self.wrong.is_held_up(band, now)
+    }
+
+    fn show(&mut self, now: Instant) {
+        self.wrong.act(now, &self.world, self.chips.as_ref());
+        let expired = self.watchdog.expired(|| now);
+        if expired {
+            self.write(now, &MotorOutput::default());
+        }
+        if self.is_cut_off != expired {
+            self.is_cut_off = expired;
+            self.cutoff.publish(now, &CutoffState { tripped: expired });
+        }
         if let Some(signal) = self.signals.has_new().then(|| self.signals.latest()).flatten() {
             self.indicator.show(&signal.data);
         }
@@ -314,12 +432,22 @@ impl vehicle::Around for Around<'_> {
     fn published(&mut self, topic: usize, at: Instant, words: &[u32]) {
         if let Some(id) = Id::ALL.get(topic) {
             self.watch.note(*id, at, words);
+            self.judge.published(*id, at, words);
         }
     }
 
     fn beside(&mut self, record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {
         if let Some(at) = self.watch.due.take() {
-            self.watch.compare(at, &mut self.world.truth_at(at), record);
+            let mut truth = self.world.truth_at(at);
+            self.watch.compare(at, &mut truth, record);
+            self.see(at, &truth);
+        }
+        // Whatever has stopped: the judge looks on.
+        let now = self.clock.now();
+        if now.since(self.seen_at) > UNSEEN {
+            let mut truth = self.world.truth_at(now);
+            self.watch.home.bring(&mut truth);
+            self.see(now, &truth);
         }
     }
 
@@ -329,6 +457,9 @@ impl vehicle::Around for Around<'_> {
     }
 
     fn is_over(&mut self, now: Instant) -> bool {
+        if self.judge.is_over(now) {
+            return true;
+        }
         if !self.progress.finished.get() {
             return false;
         }
@@ -345,7 +476,24 @@ impl vehicle::Around for Around<'_> {
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),
             motors_sane: watch.motors_sane,
+            judgement: self.judge.finish(),
         }
+    }
+}
+
+/// The judge looks at least this often.
+const UNSEEN: Duration = Duration::from_millis(5);
+
+impl Around<'_> {
+    fn write(&mut self, now: Instant, output: &MotorOutput) {
+        let Ok(()) = self.motors.write(output);
+        self.judge.motors(now, output.armed && output.duty.iter().any(|duty| *duty > 0.0));
+    }
+
+    fn see(&mut self, now: Instant, truth: &Truth) {
+        self.seen_at = now;
+        let done = self.progress.done.get();
+        self.judge.see(&Sight { now, truth, status: &self.watch.mode, done });
     }
 }
 

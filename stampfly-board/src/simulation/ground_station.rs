@@ -4,9 +4,8 @@
 //! knows the link is there.
 
 use super::mission::{Mission, Step};
+use super::radio::Radio;
 use crate::messages::TelemetryFrame;
-use crate::topics;
-use stampfly_sim::time::Clock;
 use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Vec3};
 use std::cell::Cell;
@@ -28,32 +27,34 @@ pub struct Progress {
     pub finished: Cell<bool>,
 }
 
-struct Link<'b> {
-    clock: Clock,
-    commands: topics::CommandGuidedTx<'b>,
-    telemetry: topics::TelemetryRx<'b>,
-    frame: TelemetryFrame,
+struct Station<'b> {
+    radio: Radio<'b>,
     looks: u32,
 }
 
-impl Link<'_> {
+impl Station<'_> {
     /// Waits for the next look; sends a sign of life now and then.
     async fn look(&mut self) -> TelemetryFrame {
-        self.clock.sleep_until(self.clock.now() + PERIOD).await;
+        let clock = self.radio.clock().clone();
+        clock.sleep_until(clock.now() + PERIOD).await;
         self.looks += 1;
         if self.looks.is_multiple_of(LIFE_DIVIDER) {
             // A vehicle that takes no more commands misses a sign of life, which is what it should notice.
-            let _ = self.commands.publish(self.clock.now(), GuidedCommand::default());
+            self.radio.command(GuidedCommand::default());
         }
-        if let Some(frame) = self.telemetry.latest() {
-            self.frame = frame.data;
-        }
-        self.frame
+        self.radio.telemetry()
     }
 
     /// Sends a command, again and again while the vehicle's queue is full.
     async fn send(&mut self, command: GuidedCommand) {
-        while self.commands.publish(self.clock.now(), command).is_err() {
+        while !self.radio.command(command) {
+            self.look().await;
+        }
+    }
+
+    async fn wait(&mut self, time: Duration) {
+        let until = self.radio.clock().now() + time;
+        while self.radio.clock().now() < until {
             self.look().await;
         }
     }
@@ -63,20 +64,20 @@ impl Link<'_> {
     }
 }
 
-/// Flies the mission. Never gives up: whoever runs it bounds the time.
-pub async fn fly(
-    clock: Clock,
-    mission: &Mission,
-    commands: topics::CommandGuidedTx<'_>,
-    telemetry: topics::TelemetryRx<'_>,
-    progress: &Progress,
-) {
-    let mut link = Link { clock, commands, telemetry, frame: TelemetryFrame::default(), looks: 0 };
+/// Flies the mission. Never gives up: whoever runs it bounds the time. With `waits`, two seconds pass between the vehicle's
+/// permission to arm and arming.
+pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Progress) {
+    let mut link = Station { radio, looks: 0 };
+    let ready = |frame: &TelemetryFrame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty();
     let mut yaw = 0.0f32;
     for step in &mission.steps {
         match *step {
             Step::Arm => {
-                link.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
+                link.wait_for(ready).await;
+                if waits {
+                    link.wait(Duration::from_secs(2)).await;
+                    link.wait_for(ready).await;
+                }
                 link.send(GuidedCommand { kind: GuidedKind::Arm, ..Default::default() }).await;
                 link.wait_for(|frame| frame.armed).await;
             }
@@ -101,12 +102,7 @@ pub async fn fly(
                 }
                 link.wait_for(|frame| frame.remaining == 0 || frame.phase != FlightPhase::Flying).await;
             }
-            Step::Hover { seconds } => {
-                let until = link.clock.now() + Duration::from_seconds(seconds);
-                while link.clock.now() < until {
-                    link.look().await;
-                }
-            }
+            Step::Hover { seconds } => link.wait(Duration::from_seconds(seconds)).await,
             Step::Land => {
                 link.send(GuidedCommand { kind: GuidedKind::Land, ..Default::default() }).await;
                 link.wait_for(|frame| !frame.armed).await;

@@ -5,17 +5,23 @@
 //! | [`plant`] | the vehicle as a body |
 //! | [`sensing`] | what feeds the bus: models of the sensors, or the drivers over emulated chips |
 //! | [`mission`], [`ground_station`] | what to fly, and the program that asks the vehicle for it |
+//! | [`pilot`], [`radio`] | a person with a transmitter instead; what carries commands and telemetry |
+//! | [`faults`], [`judge`] | what can go wrong, and what came of it |
 //! | [`metrics`] | how good a flight was |
 //! | [`flight`] | one flight: what is started, what is watched, what came of it |
 //!
 //! For programs on a PC (feature `simulation`); nothing of it is in the firmware.
 
+pub mod faults;
 pub mod flight;
 pub mod ground_station;
+pub mod judge;
 pub mod metrics;
 pub mod mission;
 mod page;
+pub mod pilot;
 pub mod plant;
+pub mod radio;
 pub mod sensing;
 
 pub use flight::{Outcome, PhaseChange, Setup};
@@ -31,6 +37,7 @@ use sensing::Sensing;
 use stampfly_flight::parameters::{self, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
+use stampfly_sim::fault::FaultKind;
 use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Page, Setting, SetupError, Vehicle};
 use stampfly_types::Message;
 use std::fmt::Display;
@@ -44,6 +51,7 @@ pub struct StampFly;
 impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
+    const FAULTS: &'static [FaultKind] = faults::FAULTS;
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
@@ -82,6 +90,12 @@ impl Vehicle for StampFly {
         }
         for (name, value) in options.parameters()? {
             parameters::set(&mut setup.vehicle, name, value).map_err(|error| format!("--param {name}: {error}"))?;
+        }
+        setup.faults = options.faults(faults::FAULTS)?;
+        if let Some(name) = &options.pilot {
+            let mode = pilot::mode_named(name);
+            let unknown = || format!("--mode '{name}' is none of stabilize, acro, althold, poshold");
+            setup.pilot = Some(mode.ok_or_else(unknown)?);
         }
         setup.sensing = if options.chips { Sensing::Chips } else { Sensing::Models };
         setup.cameras = options.cameras;

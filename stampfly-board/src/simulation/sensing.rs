@@ -1,5 +1,6 @@
 //! The tasks that feed the bus: models of the sensors, or the real drivers over emulated chips.
 
+use super::faults::SensorLines;
 use crate::{devices, topics};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
@@ -7,6 +8,7 @@ use stampfly_drivers::slot::Slots;
 use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_sim::chips::{self, I2cBus, stand_in_image};
+use stampfly_sim::fault::Line;
 use stampfly_sim::sensors::{ButtonModel, IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use std::sync::LazyLock;
@@ -28,14 +30,16 @@ pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
 /// How the sensors do, in the order in which they were started.
 pub type Healths = [SensorHealth; 8];
 
-/// A task that publishes a sensor's samples for as long as the vehicle is on.
+/// A task that publishes a sensor's samples, as far as they come through its line, for as long as the vehicle is on.
 macro_rules! spawn {
-    ($tasks:ident, $clock:ident, $health:ident, $backoff:ident, $sensor:expr => $publisher:expr) => {{
-        let (mut sensor, mut publisher) = ($sensor, $publisher);
+    ($tasks:ident, $clock:ident, $health:ident, $backoff:ident, $sensor:expr => $line:expr => $publisher:expr) => {{
+        let (mut sensor, mut line, mut publisher) = ($sensor, $line, $publisher);
         let (clock, health): (_, &SensorHealth) = ($clock.clone(), $health.next().expect("one for each sensor"));
         $tasks.spawn(async move {
             let publish = |at, data: &_| {
-                publisher.publish(at, data);
+                if let Some(data) = line.pass(at, data) {
+                    publisher.publish(at, &data);
+                }
             };
             match run_sensor(async || sensor.next().await, publish, clock, Backoff::$backoff, health).await {}
         });
@@ -48,6 +52,7 @@ pub(super) struct Others<'b> {
     pub indicator: (IndicatorRecorder, topics::IndicatorEnds<'b>),
     pub button: (ButtonModel, topics::ButtonPinEnds<'b>),
     pub link: topics::LinkEnds<'b>,
+    pub cutoff: topics::CutoffEnds<'b>,
 }
 
 /// What the drivers of one vehicle share; to be made before the tasks.
@@ -75,24 +80,26 @@ pub(super) fn start_models<'a>(
     clock: &Clock,
     models: Sensors,
     ends: topics::Outside<'a>,
+    lines: SensorLines,
     cameras: bool,
     health: &'a Healths,
 ) -> Others<'a> {
     let mut health = health.iter();
-    spawn!(tasks, clock, health, CRITICAL, models.imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, SHARED, models.tof => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, SHARED, models.flow => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, SHARED, models.mag => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, SHARED, models.baro => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, SHARED, models.power => ends.power.sensor_power);
+    spawn!(tasks, clock, health, CRITICAL, models.imu => lines.imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, SHARED, models.tof => lines.tof => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, SHARED, models.flow => lines.flow => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, SHARED, models.mag => lines.mag => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, SHARED, models.baro => lines.baro => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, SHARED, models.power => lines.power => ends.power.sensor_power);
     if cameras {
-        spawn!(tasks, clock, health, SHARED, models.cameras => ends.cameras.external_pose);
+        spawn!(tasks, clock, health, SHARED, models.cameras => Line::clear() => ends.cameras.external_pose);
     }
     Others {
         motors: (models.motors, ends.motors),
         indicator: (models.indicator, ends.indicator),
         button: (models.button, ends.button_pin),
         link: ends.link,
+        cutoff: ends.cutoff,
     }
 }
 
@@ -103,6 +110,7 @@ pub(super) fn start_drivers<'a>(
     (board, shared): (chips::Board, &'a mut Shared),
     models: Sensors,
     ends: topics::Outside<'a>,
+    lines: SensorLines,
     cameras: bool,
     health: &'a Healths,
 ) -> Others<'a> {
@@ -115,20 +123,21 @@ pub(super) fn start_drivers<'a>(
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
     let imu = devices::imu(imu, time(), &IMAGE).with_interrupt(ready);
-    spawn!(tasks, clock, health, CRITICAL, imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, SHARED, down => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, SHARED, ahead => ends.tof_front.sensor_tof_front);
-    spawn!(tasks, clock, health, SHARED, devices::flow(flow, time()) => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, SHARED, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, SHARED, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, SHARED, devices::power(to_power, time()) => ends.power.sensor_power);
+    spawn!(tasks, clock, health, CRITICAL, imu => lines.imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, SHARED, down => lines.tof => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, SHARED, ahead => Line::clear() => ends.tof_front.sensor_tof_front);
+    spawn!(tasks, clock, health, SHARED, devices::flow(flow, time()) => lines.flow => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, SHARED, devices::magnetometer(to_mag, time()) => lines.mag => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, SHARED, devices::barometer(to_baro, time()) => lines.baro => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, SHARED, devices::power(to_power, time()) => lines.power => ends.power.sensor_power);
     if cameras {
-        spawn!(tasks, clock, health, SHARED, models.cameras => ends.cameras.external_pose);
+        spawn!(tasks, clock, health, SHARED, models.cameras => Line::clear() => ends.cameras.external_pose);
     }
     Others {
         motors: (models.motors, ends.motors),
         indicator: (models.indicator, ends.indicator),
         button: (models.button, ends.button_pin),
         link: ends.link,
+        cutoff: ends.cutoff,
     }
 }

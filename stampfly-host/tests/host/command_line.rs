@@ -295,6 +295,16 @@ fn nonsense_is_refused_by_name() {
         (&["fly", "--mission", "."], &["mission ."]),
         (&["fly", "--out", "file/below"], &["file/below"]),
         (&["fly", "--json", "--out", "file"], &["file"]),
+        (&["fly", "--fault", "tof-late@hover"], &["tof-late", "tof-silent", "stall"]),
+        (&["fly", "--fault", "tof-stuck=-1@hover"], &["tof-stuck", "'-1'", "from 0 to 10 m"]),
+        (&["fly", "--fault", "imu-silent=1@hover"], &["imu-silent takes no value"]),
+        (&["fly", "--fault", "imu-silent"], &["the moment is missing"]),
+        (&["fly", "--fault", "imu-silent@noon"], &["'noon'", "ground, spool, takeoff"]),
+        (&["campaign", "--fault", "imu-silent@hover+long"], &["'long'"]),
+        (&["fly", "--vehicle", "rover", "--fault", "stall@hover"], &["this vehicle has no faults"]),
+        (&["fly", "--vehicle", "rover", "--pilot"], &["no pilot"]),
+        (&["fly", "--mode", "acro"], &["--pilot"]),
+        (&["fly", "--pilot", "--mode", "loop"], &["'loop'", "stabilize, acro, althold, poshold"]),
         (&["campaign", "--flights", "0"], &["--flights", "0"]),
         (&["campaign", "--flights", "3", "--seed", "18446744073709551615"], &["--seed"]),
         (&["campaign", "--flights", "many"], &["--flights", "many"]),
@@ -308,6 +318,38 @@ fn nonsense_is_refused_by_name() {
     for (arguments, words) in cases {
         refuses(&folder, arguments, words);
     }
+}
+
+#[test]
+fn faults_are_listed_and_what_came_of_one_is_in_the_json() {
+    let folder = folder("faults");
+    std::fs::write(folder.join("hop"), HOP).expect("written");
+    let table = json(&run(&folder, &["faults", "--json"]));
+    let rows = table["faults"].as_array().expect("rows");
+    let row = |name: &str| rows.iter().find(|row| row["name"] == name).expect("a row");
+    assert_eq!((&row("stall")["default"], &row("stall")["unit"]), (&Value::from(20.0), &Value::from("ms")));
+    assert_eq!((&row("tof-stuck")["default"], &row("imu-silent")["expected"]), (&Value::Null, &Value::from("cut")));
+    let listed = run(&folder, &["faults"]).out;
+    assert!(rows.iter().all(|row| listed.contains(row["name"].as_str().expect("a name"))), "{listed}");
+    let none = json(&run(&folder, &["faults", "--vehicle", "rover", "--json"]));
+    assert_eq!(none["faults"], Value::Array(Vec::new()));
+
+    let fault = ["--mission", "hop", "--json", "--fault", "imu-silent@hover"];
+    let value = json(&run(&folder, &[&["fly"][..], &fault].concat()));
+    assert_eq!((&value["outcome"], &value["violations"]), (&Value::from("cut"), &Value::Array(Vec::new())));
+    for name in ["max_height_m", "max_distance_m", "touch_speed_mps", "cut_after_s", "cut_height_m"] {
+        assert!(value[name].as_f64().is_some_and(|number| (0.0..5.0).contains(&number)), "{name}: {value}");
+    }
+    let alert = &value["alerts"].as_array().expect("a list").iter().find(|alert| alert["name"] == "IMU_LOST");
+    assert!(alert.is_some_and(|alert| alert["since"].as_f64().is_some()), "{value}");
+
+    let campaign = json(&run(&folder, &[&["campaign", "--flights", "2"][..], &fault].concat()));
+    let each = campaign["each"].as_array().expect("a list");
+    assert_eq!(each.len(), 2);
+    assert!(each.iter().all(|flight| flight["outcome"] == "cut" && flight["seed"].is_u64()), "{campaign}");
+
+    let healthy = json(&run(&folder, &["fly", "--mission", "hop", "--json"]));
+    assert_eq!((&healthy["outcome"], &healthy["cut_after_s"]), (&Value::from("transparent"), &Value::Null));
 }
 
 /// `stampfly … | head -0`: the reader is gone before the first line.

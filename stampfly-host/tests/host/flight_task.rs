@@ -4,6 +4,7 @@ use core::cell::{Cell, RefCell};
 use stampfly_board::schedule::{COUNT, Runnables};
 use stampfly_board::simulation::ground_station::{self, Progress};
 use stampfly_board::simulation::mission::Mission;
+use stampfly_board::simulation::radio::Radio;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_board::topics::{self, Bus};
 use stampfly_bus::{Activation, Taps};
@@ -79,7 +80,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
             time.sleep_until(time.now() + Duration::from_millis(20)).await;
         }
     });
-    tasks.spawn(ground_station::fly(clock.clone(), &setup.mission, link.command_guided, link.telemetry, &progress));
+    tasks.spawn(ground_station::fly(Radio::undisturbed(&clock, link), &setup.mission, false, &progress));
     let publish = |at, data: &_| {
         to_imu.publish(at, data);
     };

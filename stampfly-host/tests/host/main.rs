@@ -10,6 +10,7 @@ mod estimate;
 mod faults;
 mod figures;
 mod flight_task;
+mod in_flight;
 mod losses;
 mod made_up;
 mod missions;

@@ -1,9 +1,9 @@
-//! A flat floor at world z = 0, the four feet that stand on it and the four corners that hit it in a crash.
+//! A flat floor at world z = 0, or where the [scene](super::Scene) has it, the four feet that stand on it and the four corners that hit it in a crash.
 //!
 //! Each point is a spring and a damper along the vertical, and a spring to the place where it stuck with Coulomb's
 //! limit along the horizontal: a vehicle that stands, stands still instead of creeping. The floor does not pull.
 
-use super::PlantParameters;
+use super::{DT, PlantParameters, Scene};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Feet and corners, in units of their offset (x, y).
@@ -71,21 +71,37 @@ impl Ground {
         velocity: &Vector3<f64>,
         attitude: &UnitQuaternion<f64>,
         rate: &Vector3<f64>,
+        scene: &Scene,
     ) -> (Vector3<f64>, Vector3<f64>) {
         let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-        if -position.z > self.reach {
+        if !scene.is_empty() {
+            for point in &self.points {
+                let place = position + attitude * point;
+                let speed = velocity + attitude * rate.cross(point);
+                for (depth, out) in scene.inside(&place) {
+                    // As hard as the floor, without its friction.
+                    let here = out * (self.stiffness * depth - self.damping * speed.dot(&out)).max(0.0);
+                    force += here;
+                    torque += point.cross(&attitude.inverse_transform_vector(&here));
+                }
+            }
+        }
+        if scene.floor(position) - position.z > self.reach && scene.edge.is_none() {
             self.anchors = [None; POINTS];
             return (force, torque);
         }
+        let [floor_north, floor_east] = scene.floor_velocity;
         for (point, anchor) in self.points.iter().zip(&mut self.anchors) {
             let place = position + attitude * point;
-            if place.z <= 0.0 {
+            let depth = place.z - scene.floor(&place);
+            if depth <= 0.0 {
                 *anchor = None;
                 continue;
             }
-            let speed = velocity + attitude * rate.cross(point);
-            let normal = (self.stiffness * place.z + self.damping * speed.z).max(0.0);
+            let speed = velocity + attitude * rate.cross(point) - Vector3::new(floor_north, floor_east, 0.0);
+            let normal = (self.stiffness * depth + self.damping * speed.z).max(0.0);
             let stuck = anchor.get_or_insert((place.x, place.y));
+            *stuck = (stuck.0 + floor_north * DT, stuck.1 + floor_east * DT);
             let (mut x, mut y) = (
                 self.stiffness * (stuck.0 - place.x) - self.damping * speed.x,
                 self.stiffness * (stuck.1 - place.y) - self.damping * speed.y,

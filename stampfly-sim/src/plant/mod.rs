@@ -10,12 +10,14 @@ mod battery;
 mod ground;
 mod motor;
 mod parameters;
+mod scene;
 mod wind;
 
 pub use battery::Battery;
 pub use ground::Ground;
-pub use motor::{ROTORS, Rotors};
+pub use motor::{ROTORS, RotorFault, Rotors};
 pub use parameters::{ParameterError, ParameterInfo, PlantParameters};
+pub use scene::{Beyond, Hand, Scene};
 pub use wind::{Wind, WindConfig};
 
 use crate::noise::{Noise, Stream};
@@ -115,6 +117,7 @@ pub struct Plant {
     battery: Battery,
     ground: Ground,
     wind: Wind,
+    scene: Scene,
 }
 
 impl Plant {
@@ -144,6 +147,7 @@ impl Plant {
             ground: Ground::new(p),
             wind: Wind::new(wind, DT, Noise::stream(seed, Stream::Wind)),
             parameters: p.clone(),
+            scene: Scene::default(),
         }
     }
 
@@ -152,12 +156,17 @@ impl Plant {
         self.rotors.set_duty(duty);
     }
 
+    /// Breaks or mends a rotor, in motor order from 0.
+    pub fn set_rotor_fault(&mut self, rotor: usize, fault: RotorFault) {
+        self.rotors.set_fault(rotor, fault);
+    }
+
     /// Advances by one [`STEP`].
     pub fn step(&mut self) {
         let p = &self.parameters;
         let m = &self.motion;
         self.wind.step();
-        let lift = self.ground.lift(-m.position.z);
+        let lift = self.ground.lift(self.scene.floor(&m.position) - m.position.z);
         let loads = self.rotors.step(DT, self.battery.voltage(), lift);
         let current = loads.current + p.board_current;
         self.battery.step(DT, current);
@@ -169,7 +178,13 @@ impl Plant {
         let linear = Vector3::new(p.drag_horizontal, p.drag_horizontal, p.drag_vertical) * share;
         let drag = -(air.component_mul(&linear) + air * (p.drag_quadratic * air.norm()));
 
-        let (floor_force, floor_torque) = self.ground.push(&m.position, &m.velocity, &m.attitude, &m.rate);
+        let (mut floor_force, mut floor_torque) =
+            self.ground.push(&m.position, &m.velocity, &m.attitude, &m.rate, &self.scene);
+        if self.scene.hand.is_some() {
+            let (force, torque) = self.scene.hold(m);
+            floor_force += force;
+            floor_torque += torque;
+        }
         let body_force =
             drag + Vector3::new(0.0, 0.0, -loads.thrust) + m.attitude.inverse_transform_vector(&floor_force);
         let specific_force = body_force / p.mass;
@@ -211,6 +226,17 @@ impl Plant {
     #[must_use]
     pub fn ground(&self) -> &Ground {
         &self.ground
+    }
+
+    /// What stands around it.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// What stands around it, to be changed.
+    pub fn scene_mut(&mut self) -> &mut Scene {
+        &mut self.scene
     }
 
     /// The air.

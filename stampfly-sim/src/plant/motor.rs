@@ -39,6 +39,20 @@ pub(crate) struct RotorLoads {
     pub current: f64,
 }
 
+/// What is wrong with one rotor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorFault {
+    /// Share of its thrust that the propeller still has, at the same speed and with the same drag.
+    pub thrust: f64,
+    /// The duty it has whatever is commanded, 0 to 1: a transistor that does not switch.
+    pub duty: Option<f64>,
+}
+
+impl RotorFault {
+    /// Nothing.
+    pub const NONE: Self = Self { thrust: 1.0, duty: None };
+}
+
 /// The four motors with their propellers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rotors {
@@ -51,6 +65,7 @@ pub struct Rotors {
     viscous: f64,
     friction: f64,
     inertia: f64,
+    faults: [RotorFault; ROTORS],
     /// Rotor places relative to the centre of mass.
     places: [(f64, f64); ROTORS],
     hover_speed: f64,
@@ -76,6 +91,7 @@ impl Rotors {
             viscous: ((p.motor_voltage_b - motor_constant) * per_volt).max(0.0),
             friction: p.motor_voltage_c * per_volt,
             inertia: p.rotor_inertia,
+            faults: [RotorFault::NONE; ROTORS],
             places: PLACES.map(|(x, y)| (x * p.rotor_offset - centre.0, y * p.rotor_offset - centre.1)),
             hover_speed: (p.mass * f64::from(GRAVITY) / (ROTORS as f64 * p.thrust_coefficient)).sqrt(),
         }
@@ -84,6 +100,13 @@ impl Rotors {
     /// Sets the duty cycles, 0 to 1.
     pub(crate) fn set_duty(&mut self, duty: [f64; ROTORS]) {
         self.duty = duty;
+    }
+
+    /// Breaks or mends a rotor; one that does not exist is ignored.
+    pub(crate) fn set_fault(&mut self, rotor: usize, fault: RotorFault) {
+        if let Some(place) = self.faults.get_mut(rotor) {
+            *place = fault;
+        }
     }
 
     /// Sets the rotor speeds, rad/s.
@@ -113,7 +136,8 @@ impl Rotors {
     pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64) -> RotorLoads {
         let mut loads = RotorLoads::default();
         for (i, spin) in SPINS.into_iter().enumerate() {
-            let (speed, duty) = (self.speed[i], self.duty[i]);
+            let fault = self.faults[i];
+            let (speed, duty) = (self.speed[i], fault.duty.unwrap_or(self.duty[i]));
             let current = ((duty * voltage - self.motor_constant * speed) / self.resistance).max(0.0);
             let drag = self.torque_coefficient * speed * speed;
             let net = self.motor_constant * current - drag - self.viscous * speed - self.friction;
@@ -121,7 +145,7 @@ impl Rotors {
             let acceleration = (next - speed) / dt;
             self.speed[i] = next;
 
-            let thrust = self.thrust_coefficient[i] * speed * speed * lift;
+            let thrust = self.thrust_coefficient[i] * fault.thrust * speed * speed * lift;
             let (x, y) = self.places[i];
             loads.thrust += thrust;
             loads.torque += Vector3::new(-y * thrust, x * thrust, -spin * (drag + self.inertia * acceleration));
@@ -141,6 +165,23 @@ mod tests {
 
     fn ideal() -> Rotors {
         Rotors::new(&IDEAL, &mut Noise::new(0, 0))
+    }
+
+    #[test]
+    fn a_weak_propeller_pushes_less_and_a_stuck_transistor_ignores_its_duty() {
+        let settled = |fault: RotorFault, duty: f64| {
+            let mut rotors = ideal();
+            rotors.set_fault(1, fault);
+            rotors.set_duty([duty; ROTORS]);
+            let loads = (0..1600).map(|_| rotors.step(625e-6, 4.0, 1.0)).last().expect("steps");
+            (rotors.speed(), loads)
+        };
+        let (healthy, all) = settled(RotorFault::NONE, 0.6);
+        let (speed, loads) = settled(RotorFault { thrust: 0.5, duty: None }, 0.6);
+        assert_eq!(speed, healthy, "it turns as before");
+        assert!((loads.thrust / all.thrust - 0.875).abs() < 1e-3 && loads.torque.x.abs() > 1e-4, "{loads:?}");
+        let (speed, _) = settled(RotorFault { duty: Some(1.0), ..RotorFault::NONE }, 0.0);
+        assert!(speed[1] > healthy[1] && speed[0] < 1.0, "{speed:?}");
     }
 
     /// The steady voltage at a speed.

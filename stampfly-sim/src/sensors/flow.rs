@@ -94,7 +94,7 @@ impl FlowPhysics {
         let period = self.frames.period();
         let begin = end - Duration::from_micros(period as u64);
         let middle = begin + end.since(begin) / 2;
-        let motions = [begin, middle, end].map(|instant| self.world.motion_at(instant));
+        let motions = [begin, middle, end].map(|instant| over_floor(&self.world, instant));
         let rates = motions.map(|motion| angular_flow(&motion));
         let height = slant_height(&motions[1]);
         let sharp = ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
@@ -111,7 +111,7 @@ impl FlowPhysics {
 
     /// Features found in the picture, the chip's SQUAL.
     pub(crate) fn quality(&mut self, instant: Instant) -> u8 {
-        let height = slant_height(&self.world.motion_at(instant));
+        let height = slant_height(&over_floor(&self.world, instant));
         let near = 0.5 + 0.5 * ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
         let far = 1.0 - ((height - DIM) / (FAR - DIM)).clamp(0.0, 1.0);
         (self.texture * near * far * (1.0 + 0.04 * self.noise.normal())) as u8
@@ -123,6 +123,17 @@ impl FlowModel {
         let (physics, reads) = FlowPhysics::new(world, clock.now(), seed);
         Self { physics, reads, last_read: clock.now(), clock: clock.clone() }
     }
+}
+
+/// The motion relative to the floor below.
+fn over_floor(world: &World, instant: Instant) -> Motion {
+    let mut motion = world.motion_at(instant);
+    world.inspect(|plant| {
+        let [north, east] = plant.scene().floor_velocity;
+        motion.position.z -= plant.scene().floor(&motion.position);
+        motion.velocity -= nalgebra::Vector3::new(north, east, 0.0);
+    });
+    motion
 }
 
 /// Distance along the optical axis to the floor, m; very large when the sensor looks at the horizon.

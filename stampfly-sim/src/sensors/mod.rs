@@ -2,7 +2,8 @@
 //!
 //! Each model implements the trait of `stampfly-drivers` that the hardware's driver implements, and holds a handle
 //! to the world. Rates, ranges and resolutions are the chips'; each chip's clock is off by up to 2 %; noise,
-//! offsets and mounting errors are drawn from the seed. No model ever fails: faults are wrapped around them.
+//! offsets and mounting errors are drawn from the seed. No model ever fails: faults act on what comes out of
+//! them ([`fault`](crate::fault)).
 //!
 //! | model | chip | rate | trait |
 //! |---|---|---|---|

@@ -62,8 +62,13 @@ impl RangePhysics {
 
     fn true_distance(&self, instant: Instant) -> Option<f64> {
         let motion = self.world.motion_at(instant);
-        let slope = (motion.attitude * self.beam).z;
-        (slope > 1e-3).then(|| -motion.position.z / slope)
+        let beam = motion.attitude * self.beam;
+        // A beam that passes over an edge meets the lower floor.
+        let meets = |floor: f64| motion.position + beam * ((floor - motion.position.z) / beam.z);
+        (beam.z > 1e-3).then(|| {
+            let floor = self.world.inspect(|plant| plant.scene().floor(&meets(0.0)));
+            (floor - motion.position.z) / beam.z
+        })
     }
 
     /// A measurement around `instant`.

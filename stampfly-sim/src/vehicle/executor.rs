@@ -65,7 +65,8 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
             tasks.next_deadline(),
             // A tick that has passed is waiting for an executor that is late.
             flight_loop.next_tick().filter(|tick| *tick > clock.now()),
-            flight_at,
+            // One that has passed waits for a processor that is held up.
+            flight_at.filter(|at| *at > clock.now()),
             interrupted.as_ref().map(|(at, _)| *at),
         ];
         let Some(next) = deadlines.into_iter().flatten().min() else { break };
@@ -75,10 +76,11 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
         drain(&mut taps, &mut around, witness);
 
         witness.turn(now);
+        let held_up = around.is_held_up(Band::Flight, now);
         if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
             flight_at = Some(now + jitter.flight());
         }
-        if flight_at.is_some_and(|at| at <= now) {
+        if !held_up && flight_at.is_some_and(|at| at <= now) {
             flight_at = None;
             flight_loop.run_band(Band::Flight, now, witness);
             around.drive(now);
@@ -86,6 +88,7 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
         match interrupted.take() {
             Some((at, pending)) if at <= now => flight_loop.finish(pending, witness),
             Some(pending) => interrupted = Some(pending),
+            None if around.is_held_up(Band::Background, now) => {}
             None => {
                 while let Some(pending) = flight_loop.start_next(Band::Background, now, witness) {
                     let takes = jitter.background();

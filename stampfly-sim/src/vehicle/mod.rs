@@ -28,9 +28,10 @@ pub use scenario::Scenario;
 pub use scripted::{Following, Script, Scripted};
 pub use witness::Witness;
 
+use crate::fault::{Fault, FaultKind};
 use crate::time::{Clock, Tasks};
 use serde::{Serialize, de::DeserializeOwned};
-use stampfly_bus::{Schedule, TopicTable};
+use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_types::Instant;
 
@@ -62,6 +63,11 @@ pub trait Around {
 
     /// The flight band has run: hands its outputs to the actuators.
     fn drive(&mut self, now: Instant);
+
+    /// Is this band's processor held up, so that nothing of the band runs now? Never by default.
+    fn is_held_up(&mut self, _band: Band, _now: Instant) -> bool {
+        false
+    }
 
     /// A turn of the executor has ended: hands slower outputs on (lights, sound). Nothing by default.
     fn show(&mut self, _now: Instant) {}
@@ -107,6 +113,12 @@ pub trait Verdict {
     /// The figures, the same names in the same order for every flight of the vehicle.
     fn figures(&self) -> Vec<Figure>;
 
+    /// What came of faults, or whatever else scripts want to know: fields of the JSON object that describes the flight.
+    /// None by default.
+    fn findings(&self) -> impl Serialize {
+        NoFindings {}
+    }
+
     /// What else people want to read after a flight, one line each: phases, extremes.
     fn story(&self) -> Vec<String>;
 
@@ -118,6 +130,10 @@ pub trait Verdict {
         Vec::new()
     }
 }
+
+/// [`Verdict::findings`] of a vehicle that has none.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct NoFindings {}
 
 /// Why a flight cannot be set up: a sentence for whoever typed the options.
 pub type SetupError = String;
@@ -143,11 +159,24 @@ pub struct Options {
     pub cameras: bool,
     /// Seed of the executor's delays.
     pub jitter: Option<u64>,
+    /// Faults, as [`Fault::parse`](crate::fault::Fault::parse) reads them.
+    pub fault: Vec<String>,
+    /// Fly with a pilot's sticks, in this flight mode; empty is the vehicle's own choice.
+    pub pilot: Option<String>,
     /// Fly what other programs ask for.
     pub live: Option<Live>,
 }
 
 impl Options {
+    /// The faults, as this vehicle's table has them.
+    ///
+    /// # Errors
+    /// When one is not in the table, or not as the table says.
+    pub fn faults(&self, table: &'static [FaultKind]) -> Result<Vec<Fault>, SetupError> {
+        let faults = self.fault.iter().map(|text| Fault::parse(text, table));
+        faults.collect::<Result<_, _>>().map_err(|error| format!("--fault {error}"))
+    }
+
     /// Names and values of [`param`](Self::param).
     ///
     /// # Errors
@@ -198,6 +227,8 @@ pub trait Vehicle: 'static {
     const NAME: &'static str;
     /// Topics that its surroundings add to the log. None by default.
     const BESIDE: &'static [Topic] = &[];
+    /// What can go wrong in its flights. None by default.
+    const FAULTS: &'static [FaultKind] = &[];
     /// What a page about a flight shows of it. By default a plot per topic and unit.
     const PAGE: Page = Page::EMPTY;
     /// Its runnables. Serialisable, so that a log can hold key frames.

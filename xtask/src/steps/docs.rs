@@ -44,6 +44,16 @@ const GENERATED: &[(&str, &str, &str)] = &[
          that is the time from an inertial sample to the motors. The compiler computes it (`stampfly-bus/src/response.rs`) \
          and refuses a table in which a runnable could be late.",
     ),
+    (
+        "docs/faults.md",
+        "faults",
+        "# Faults\n\nWhat can go wrong in a simulated flight of the StampFly: `stampfly fly --fault NAME[=VALUE]@WHEN[+SECONDS]`. \
+         Printed from the table in `stampfly-board/src/simulation/faults.rs` by `cargo xtask docs --fix`.\n\nWHEN is `ground`, \
+         `spool`, `takeoff`, `hover`, `move`, `landing`, `touch`, or a number of seconds after power-on; a fault lasts for \
+         SECONDS, or to the end of the flight. How a flight may end, from best to worst: refused, transparent, degraded, \
+         landed, cut; crashed, flown-away and kept-on are never acceptable. The rules are in \
+         `stampfly-board/src/simulation/judge.rs`.",
+    ),
 ];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {

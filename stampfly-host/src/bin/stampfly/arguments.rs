@@ -37,6 +37,8 @@ pub enum Command {
     Topics(TopicsOptions),
     /// List the runnables: what activates them, budget, response time.
     Schedule(TopicsOptions),
+    /// List what can go wrong in a flight: value, the worst end that is acceptable, meaning.
+    Faults(TopicsOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
     /// Run the estimator over recorded sensor data and say how good it is.
@@ -95,6 +97,16 @@ pub struct SceneOptions {
     /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
     #[arg(long)]
     pub cameras: bool,
+    /// Let something go wrong; may be repeated. WHEN is ground, spool, takeoff, hover, move, landing, touch, or a number of
+    /// seconds; +SECONDS is how long it lasts (see `stampfly faults`).
+    #[arg(long, value_name = "NAME[=VALUE]@WHEN[+SECONDS]")]
+    pub fault: Vec<String>,
+    /// Fly the mission with the sticks of a simulated pilot.
+    #[arg(long)]
+    pub pilot: bool,
+    /// The pilot's flight mode (StampFly: stabilize, acro, althold, poshold).
+    #[arg(long, value_name = "MODE", requires = "pilot")]
+    pub mode: Option<String>,
     /// Delay and interrupt the executor, by this seed.
     #[arg(long, value_name = "SEED")]
     pub jitter: Option<u64>,
@@ -184,7 +196,7 @@ pub struct ReplayOptions {
     pub json: bool,
 }
 
-/// Options of `topics`.
+/// Options of `topics`, `schedule` and `faults`.
 #[derive(Clone, Debug, Args)]
 pub struct TopicsOptions {
     #[command(flatten)]
@@ -192,7 +204,7 @@ pub struct TopicsOptions {
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
-    /// Print Markdown, as in `docs/topics.md`.
+    /// Print Markdown, as in `docs`.
     #[arg(long, conflicts_with = "json")]
     pub markdown: bool,
 }
@@ -272,8 +284,11 @@ fn north_and_east(text: &str) -> Result<[f32; 2], String> {
 impl SceneOptions {
     /// The flight these options describe.
     pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>, live: Option<Live>) -> Result<V::Setup, Failure> {
-        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, .. } = self.clone();
-        let options = Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, live };
+        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } =
+            self.clone();
+        let pilot = pilot.then(|| mode.unwrap_or_default());
+        let options =
+            Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live };
         Ok(V::setup(&options, seed)?)
     }
 

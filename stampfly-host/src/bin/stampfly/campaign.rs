@@ -3,8 +3,9 @@
 
 use crate::arguments::CampaignOptions;
 use crate::failure::Failure;
+use crate::fly::add_findings;
 use crate::terminal;
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 use stampfly_board::simulation::StampFly;
 use stampfly_host::campaign::{self, Flight, spreads, workers};
 use stampfly_host::vehicles::{self, ForVehicle};
@@ -100,11 +101,12 @@ fn print<V: Vehicle, W>(
         for (name, _, spread) in spreads(flights) {
             object.insert(name.into(), json!(spread));
         }
+        object.insert("each".into(), flights.iter().map(each).collect());
         if let Some(summary) = consistency {
             object.insert("consistency".into(), json!(summary));
         }
         object.insert("realtime_factor".into(), json!(factor));
-        outln!("{}", serde_json::Value::Object(object));
+        outln!("{}", Value::Object(object));
         return;
     }
     outln!("{:<22} {:>9} {:>9} {:>9}", "", "median", "95 %", "worst");
@@ -123,6 +125,15 @@ fn print<V: Vehicle, W>(
     if let Some(summary) = consistency {
         print_consistency(summary);
     }
+}
+
+/// One flight, for scripts.
+fn each<V: Vehicle, W>(flight: &Flight<V, W>) -> Value {
+    let mut object = Map::new();
+    object.insert("seed".into(), json!(flight.seed));
+    object.insert("succeeded".into(), json!(flight.succeeded()));
+    add_findings(&mut object, &flight.flown.outcome);
+    Value::Object(object)
 }
 
 /// How many flights each of the vehicle's yes-or-no results held in.

@@ -4,7 +4,7 @@
 use crate::arguments::{FlyOptions, ServeOptions};
 use crate::failure::Failure;
 use crate::terminal;
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 use stampfly_bus::Schedule;
 use stampfly_host::flown::{Flown, fly};
 use stampfly_host::recorder::{Recorder, Timing};
@@ -105,10 +105,18 @@ fn print_json(flown: &Flown<impl Verdict>, hash: u64) {
     for figure in flown.outcome.figures() {
         object.insert(figure.name.into(), json!(figure.value));
     }
+    add_findings(&mut object, &flown.outcome);
     object.insert("duration_s".into(), json!(flown.duration.seconds_f64()));
     object.insert("realtime_factor".into(), json!(flown.realtime_factor));
     object.insert("log_hash".into(), json!(format!("{hash:016x}")));
-    outln!("{}", serde_json::Value::Object(object));
+    outln!("{}", Value::Object(object));
+}
+
+/// Adds what came of faults.
+pub(crate) fn add_findings(object: &mut Map<String, Value>, outcome: &impl Verdict) {
+    if let Ok(Value::Object(findings)) = serde_json::to_value(outcome.findings()) {
+        object.extend(findings);
+    }
 }
 
 fn print_screen<V: Vehicle>(flown: &Flown<V::Outcome>, recorder: &Recorder<V>, log: &Path, page: &Path) {

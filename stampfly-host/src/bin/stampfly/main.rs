@@ -9,6 +9,7 @@ mod arguments;
 mod campaign;
 mod estimate;
 mod failure;
+mod faults;
 mod fly;
 mod golden;
 mod replay;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),
+        Command::Faults(options) => faults::run(&options),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
         Command::Golden(options) => golden::run(&options),

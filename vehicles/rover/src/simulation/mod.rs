@@ -36,7 +36,11 @@ impl Vehicle for Rover {
     type Outcome = Drive;
 
     fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
-        let Options { mission, plant, vibration, gust, wind, chips, cameras, jitter, live, .. } = options;
+        let Options { mission, plant, vibration, gust, wind, chips, cameras, jitter, live, pilot, .. } = options;
+        options.faults(Self::FAULTS)?;
+        if pilot.is_some() {
+            return Err("the rover has no pilot: its missions say who drives".into());
+        }
         if !plant.is_empty() || vibration.is_some() || gust.is_some() || wind.is_some() || *chips || *cameras {
             return Err("the rover has no plant, vibration, wind, chips or cameras".into());
         }

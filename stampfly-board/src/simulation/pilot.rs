@@ -1,0 +1,283 @@
+//! A simulated pilot: flies a mission with the sticks and switches of a transmitter.
+//!
+//! The pilot sees where the vehicle really is, 0.2 s late, and reads the transmitter's display. What is not seen in time
+//! is not corrected, and nothing is done in an emergency: what the vehicle does by itself is what is to be known.
+//!
+//! | mode | sticks |
+//! |---|---|
+//! | POS_HOLD | velocities; centred within 0.1 m of the place |
+//! | ALT_HOLD | lean angles; throttle is climb rate |
+//! | STABILIZE | lean angles; throttle is thrust |
+//! | ACRO | rates; throttle is thrust |
+//!
+//! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
+//! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
+
+use super::flight::Home;
+use super::ground_station::Progress;
+use super::mission::{Mission, Step};
+use super::radio::Radio;
+use stampfly_control::CascadeConfig;
+use stampfly_control::guidance::NavigatorConfig;
+use stampfly_sim::World;
+use stampfly_types::messages::{FlightMode, FlightPhase, PilotInput};
+use stampfly_types::{Duration, Vec3, frame};
+use std::collections::VecDeque;
+
+/// Of the transmitter's frames.
+const PERIOD: Duration = Duration::from_millis(20);
+/// Frames until a pilot reacts: 0.2 s, a trained person's reaction to what is seen.
+const REACTION: usize = 10;
+/// Sticks closer to their centre than this do nothing, as the vehicle's arbitration has it.
+const DEAD_BAND: f32 = 0.05;
+/// A place is reached within these distances, m: beside and above.
+const REACHED: [f32; 2] = [0.25, 0.15];
+/// And stays so for this long.
+const SETTLED: Duration = Duration::from_millis(500);
+/// How fast the pilot climbs and sinks, m/s.
+const CLIMB: f32 = 0.3;
+/// Highest speed to a place, m/s.
+const SPEED: f32 = 0.4;
+
+/// What the pilot wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Aim {
+    /// Stand, with the throttle at rest.
+    Stand,
+    /// Be at this place, world NED of the take-off spot.
+    Be(Vec3),
+    /// Sink to the ground over this place.
+    Sink(Vec3),
+    /// Leave the vehicle to itself, sticks centred.
+    LetGo,
+}
+
+/// What full stick means to this vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meaning {
+    navigator: NavigatorConfig,
+    lean: f32,
+    tilt_rate: f32,
+    yaw_rate: f32,
+    /// The throttle at which it hovers.
+    hover: f32,
+}
+
+impl Meaning {
+    pub fn new(navigator: &NavigatorConfig, cascade: &CascadeConfig) -> Self {
+        Self {
+            navigator: *navigator,
+            lean: cascade.sticks.lean_max,
+            tilt_rate: cascade.sticks.tilt_rate_max,
+            yaw_rate: cascade.sticks.yaw_rate_max,
+            hover: cascade.altitude.hover_thrust / cascade.altitude.thrust_max,
+        }
+    }
+}
+
+/// What the pilot has seen.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    position: Vec3,
+    velocity: Vec3,
+    yaw: f32,
+    /// Where the thrust pushes it, horizontally: forward and right, in units of gravity.
+    lean: [f32; 2],
+    contact: bool,
+}
+
+pub(super) struct Pilot<'b> {
+    radio: Radio<'b>,
+    world: World,
+    home: Home,
+    meaning: Meaning,
+    past: VecDeque<Seen>,
+    input: PilotInput,
+    /// What the pilot has learned of the throttle that hovers, share.
+    trim: f32,
+}
+
+impl<'b> Pilot<'b> {
+    pub fn new(radio: Radio<'b>, world: &World, home: Home, meaning: Meaning, mode: FlightMode) -> Self {
+        let input = PilotInput { mode, ..PilotInput::default() };
+        Self { radio, world: world.clone(), home, meaning, past: VecDeque::new(), input, trim: 0.0 }
+    }
+
+    /// Flies the mission. Never gives up: whoever runs it bounds the time. With `waits`, two seconds pass between the
+    /// display's permission and arming.
+    pub async fn fly(mut self, mission: &Mission, waits: bool, progress: &Progress) {
+        let mut place = Vec3::zeros();
+        for step in &mission.steps {
+            match *step {
+                Step::Arm => {
+                    while !self.may_arm() {
+                        self.frame(Aim::Stand).await;
+                    }
+                    if waits {
+                        self.keep(Aim::Stand, Duration::from_secs(2)).await;
+                    }
+                    while !self.may_arm() {
+                        self.frame(Aim::Stand).await;
+                    }
+                    self.input.arm = true;
+                    while !self.radio.telemetry().armed {
+                        self.frame(Aim::Stand).await;
+                    }
+                }
+                Step::TakeOff { height } => {
+                    place.z = -height;
+                    // It takes off by itself where the mode holds height.
+                    while !self.input.mode.is_manual() && self.radio.telemetry().phase != FlightPhase::Flying {
+                        self.frame(Aim::LetGo).await;
+                    }
+                    self.fly_to(place).await;
+                }
+                Step::GoTo { place: [north, east, up], dwell, .. } => {
+                    place = Vec3::new(north, east, -up);
+                    self.fly_to(place).await;
+                    self.keep(Aim::Be(place), Duration::from_seconds(dwell)).await;
+                }
+                Step::Hover { seconds } => self.keep(Aim::Be(place), Duration::from_seconds(seconds)).await,
+                Step::Land => self.land(place).await,
+            }
+            progress.done.set(progress.done.get() + 1);
+        }
+        progress.finished.set(true);
+        loop {
+            self.frame(Aim::Stand).await;
+        }
+    }
+
+    fn may_arm(&mut self) -> bool {
+        let frame = self.radio.telemetry();
+        frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()
+    }
+
+    async fn keep(&mut self, aim: Aim, time: Duration) {
+        let until = self.radio.clock().now() + time;
+        while self.radio.clock().now() < until {
+            self.frame(aim).await;
+        }
+    }
+
+    async fn fly_to(&mut self, place: Vec3) {
+        let mut since = self.radio.clock().now();
+        loop {
+            let seen = self.frame(Aim::Be(place)).await;
+            let away = seen.position - place;
+            let now = self.radio.clock().now();
+            if away.xy().norm() > REACHED[0] || away.z.abs() > REACHED[1] {
+                since = now;
+            }
+            // A vehicle that is not flying any more goes nowhere.
+            if now.since(since) >= SETTLED || !self.radio.telemetry().armed {
+                return;
+            }
+        }
+    }
+
+    async fn land(&mut self, place: Vec3) {
+        if self.input.mode.is_manual() {
+            while !self.frame(Aim::Sink(place)).await.contact && self.radio.telemetry().armed {}
+            self.keep(Aim::Stand, Duration::from_millis(300)).await;
+        }
+        self.input.arm = false;
+        while self.radio.telemetry().armed {
+            let aim = if self.input.mode == FlightMode::AltHold { Aim::Be(place) } else { Aim::LetGo };
+            self.frame(aim).await;
+        }
+    }
+
+    /// Looks, sends a frame, and waits for the next.
+    async fn frame(&mut self, aim: Aim) -> Seen {
+        let now = self.radio.clock().now();
+        let seen = self.look(now);
+        self.steer(aim, &seen);
+        self.radio.sticks(&self.input);
+        let clock = self.radio.clock().clone();
+        clock.sleep_until(now + PERIOD).await;
+        seen
+    }
+
+    fn look(&mut self, now: stampfly_types::Instant) -> Seen {
+        let mut truth = self.world.truth_at(now);
+        self.home.bring(&mut truth);
+        let yaw = frame::yaw(&truth.attitude);
+        let up = truth.attitude * Vec3::new(0.0, 0.0, -1.0);
+        let ahead = frame::from_yaw(-yaw) * up;
+        let seen = Seen {
+            position: truth.position,
+            velocity: truth.velocity,
+            yaw,
+            lean: [ahead.x, ahead.y],
+            contact: truth.contact,
+        };
+        self.past.push_back(seen);
+        if self.past.len() > REACTION { self.past.pop_front().unwrap_or(seen) } else { seen }
+    }
+
+    fn steer(&mut self, aim: Aim, seen: &Seen) {
+        let mode = self.input.mode;
+        let rest = if mode.is_manual() { -1.0 } else { 0.0 };
+        let (place, sinks) = match aim {
+            Aim::Stand | Aim::LetGo => {
+                self.input = PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: rest, ..self.input };
+                return;
+            }
+            Aim::Be(place) => (place, false),
+            Aim::Sink(place) => (place, true),
+        };
+        let error = frame::from_yaw(-seen.yaw) * (place - seen.position);
+        let velocity = frame::from_yaw(-seen.yaw) * seen.velocity;
+        let limit = |speed: f32, most: f32| speed.clamp(-most, most);
+
+        let [pitch, roll] = [(error.x, velocity.x, seen.lean[0]), (error.y, velocity.y, seen.lean[1])].map(
+            |(error, velocity, lean)| match mode {
+                // Within reach the stick is let go: the vehicle holds its place.
+                FlightMode::PosHold if error.abs() < 0.1 => 0.0,
+                FlightMode::PosHold => limit(0.8 * error, SPEED) / self.meaning.navigator.stick_speed,
+                FlightMode::AltHold | FlightMode::Stabilize => {
+                    // 1.2 1/s of damping: a quarter of what the reaction time would bear.
+                    let wanted = 1.2 * (limit(0.5 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
+                    wanted / self.meaning.lean
+                }
+                FlightMode::Acro => {
+                    let wanted = 0.7 * (limit(0.3 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
+                    2.0 * (limit(wanted, 0.2) - lean) / self.meaning.tilt_rate
+                }
+            },
+        );
+        let turn = if mode == FlightMode::PosHold { self.meaning.navigator.turn_rate } else { self.meaning.yaw_rate };
+        let climb = if sinks { -CLIMB } else { limit(-0.8 * error.z, CLIMB) };
+        let throttle = if mode.is_manual() {
+            // 2 1/s of damping, and what is left over is learned in some seconds.
+            let wrong = climb + velocity.z;
+            self.trim = limit(self.trim + 0.001 * wrong, 0.2);
+            (self.meaning.hover + self.trim + 0.12 * wrong).clamp(0.15, 1.0)
+        } else if error.z.abs() < 0.06 {
+            0.0
+        } else if climb > 0.0 {
+            climb / self.meaning.navigator.climb_rate
+        } else {
+            climb / self.meaning.navigator.sink_rate
+        };
+        let stick = |share: f32| {
+            let beyond = share.signum() * (DEAD_BAND + (1.0 - DEAD_BAND) * share.abs());
+            if share.abs() < 0.005 { 0.0 } else { beyond.clamp(-1.0, 1.0) }
+        };
+        let yaw = stick(limit(-seen.yaw, 0.8) / turn);
+        self.input =
+            PilotInput { roll: stick(roll), pitch: stick(pitch), yaw, throttle: stick(throttle), ..self.input };
+    }
+}
+
+/// The flight mode of this name, as options give it; POS_HOLD when it is empty.
+pub(super) fn mode_named(name: &str) -> Option<FlightMode> {
+    match name {
+        "" | "poshold" => Some(FlightMode::PosHold),
+        "althold" => Some(FlightMode::AltHold),
+        "stabilize" => Some(FlightMode::Stabilize),
+        "acro" => Some(FlightMode::Acro),
+        _ => None,
+    }
+}

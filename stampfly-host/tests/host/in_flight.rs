@@ -1,0 +1,127 @@
+//! Faults in flight: every one of the table does something, begins when it should, and repeats; a pilot flies every mode.
+
+use stampfly_board::simulation::mission::Mission;
+use stampfly_board::simulation::sensing::Sensing;
+use stampfly_board::simulation::{Outcome, Setup, StampFly};
+use stampfly_host::flown::fly;
+use stampfly_host::recorder::Recorder;
+use stampfly_sim::fault::{Fault, FaultKind, Moment};
+use stampfly_sim::vehicle::{Vehicle, Verdict};
+use stampfly_types::Duration;
+use stampfly_types::messages::FlightMode;
+
+const FAULTS: &[FaultKind] = StampFly::FAULTS;
+
+fn setup(mission: &str, faults: &[&str]) -> Setup {
+    let mission = Mission::parse(mission).expect("a mission");
+    let faults = faults.iter().map(|text| Fault::parse(text, FAULTS).expect("a fault")).collect();
+    Setup { mission, faults, ..Setup::reference(1) }
+}
+
+fn flown(setup: &Setup) -> (Outcome, u64) {
+    let mut recorder = Recorder::<StampFly>::hash_only();
+    let outcome = fly::<StampFly>(setup, &mut recorder, &mut |_, _| {}).outcome;
+    (outcome, recorder.hash())
+}
+
+/// Flies until two seconds after take-off.
+fn hop(fault: &str) -> Setup {
+    Setup { limit: Duration::from_secs(7), ..setup("arm\ntakeoff 0.5\nhover 5\nland\n", &[fault]) }
+}
+
+#[test]
+fn every_fault_changes_something_and_what_the_vehicle_publishes() {
+    let pilot = Some(FlightMode::PosHold);
+    let healthy = hop("baro-step=0@takeoff");
+    let healthy = [&healthy, &Setup { pilot, ..healthy.clone() }].map(|setup| flown(setup).1);
+    for kind in FAULTS {
+        let mut setup = hop(&format!("{}@takeoff", kind.name));
+        let by_pilot = kind.name.starts_with("pilot");
+        setup.pilot = pilot.filter(|_| by_pilot);
+        let (outcome, hash) = flown(&setup);
+        let span = &outcome.judgement.faults[0];
+        assert!(span.since.is_some() && span.changes > 0, "{span:?}");
+        assert!(!outcome.judgement.violations.contains(&"I12"), "{}", kind.name);
+        assert_ne!(hash, healthy[usize::from(by_pilot)], "{} is not seen", kind.name);
+    }
+}
+
+#[test]
+fn a_fault_that_changes_nothing_is_found() {
+    for fault in ["baro-step=0@takeoff", "baro-step@6.9", "pilot-nan@takeoff", "baro-step@touch"] {
+        let (outcome, _) = flown(&hop(fault));
+        let vacuous = fault != "baro-step@6.9";
+        assert_eq!(outcome.judgement.violations.contains(&"I12"), vacuous, "{fault}");
+        assert!(!vacuous || !outcome.succeeded(), "{fault}");
+    }
+}
+
+#[test]
+fn every_moment_comes_in_its_order() {
+    let faults: Vec<_> = Moment::ALL.iter().map(|moment| format!("mag-bent=5@{}+0.1", moment.name())).collect();
+    let faults: Vec<_> = faults.iter().map(String::as_str).collect();
+    let mission = "arm\ntakeoff 0.4\nhover 2\ngoto 0.8 0 0.4\nland\n";
+    for pilot in [None, Some(FlightMode::PosHold), Some(FlightMode::Stabilize)] {
+        let (outcome, _) = flown(&Setup { pilot, ..setup(mission, &faults) });
+        let begun: Vec<_> = outcome.judgement.faults.iter().map(|span| span.since.expect("it begins")).collect();
+        assert!(begun.is_sorted_by(|a, b| a < b), "{pilot:?}: {begun:?}");
+        assert!(begun[1] - begun[0] >= 2.0, "there is time to notice before arming: {begun:?}");
+    }
+}
+
+#[test]
+fn a_flight_with_faults_repeats_bit_for_bit() {
+    for fault in ["gyro-spikes@takeoff", "tof-outliers@spool+1", "stall=30@takeoff", "motor-2-thrust=0.7@takeoff"] {
+        let [first, again] = [(); 2].map(|()| flown(&hop(fault)));
+        assert_eq!((first.1, &first.0.judgement), (again.1, &again.0.judgement), "{fault}");
+    }
+}
+
+#[test]
+fn a_fault_that_ends_leaves_no_trace_behind() {
+    let (outcome, _) = flown(&setup("arm\ntakeoff 0.4\nhover 2\nland\n", &["power-silent@hover+0.15"]));
+    let judgement = &outcome.judgement;
+    assert!(outcome.succeeded() && judgement.violations.is_empty(), "{judgement:?}");
+}
+
+#[test]
+fn silence_of_the_inertial_sensor_cuts_the_motors() {
+    let (outcome, _) = flown(&hop("imu-silent@takeoff"));
+    let judgement = &outcome.judgement;
+    assert_eq!((judgement.outcome, judgement.as_expected), ("cut", true), "{judgement:?}");
+    assert!(judgement.cut_after_s.is_some_and(|after| (0.02..0.0325).contains(&after)), "{judgement:?}");
+    assert!(judgement.cut_height_m.is_some_and(|height| height > 0.1), "{judgement:?}");
+    assert!(judgement.alerts.iter().any(|alert| alert.name == "IMU_LOST"), "{judgement:?}");
+}
+
+#[test]
+fn a_flight_band_that_stalls_is_cut_off_from_outside() {
+    let (outcome, _) = flown(&hop("stall=200@takeoff"));
+    let judgement = &outcome.judgement;
+    assert_eq!(judgement.outcome, "cut");
+    assert!(judgement.cut_after_s.is_some_and(|after| (0.02..0.0325).contains(&after)), "{judgement:?}");
+}
+
+#[test]
+fn a_dead_bus_is_one_behind_drivers_and_emulated_chips_too() {
+    for fault in ["spi-dead@takeoff", "i2c-dead@takeoff"] {
+        let (outcome, _) = flown(&Setup { sensing: Sensing::Chips, ..hop(fault) });
+        assert!(outcome.judgement.faults[0].changes > 0, "{:?}", outcome.judgement);
+    }
+    let (outcome, _) = flown(&Setup { sensing: Sensing::Chips, ..hop("spi-dead@takeoff") });
+    assert_eq!(outcome.judgement.outcome, "cut");
+}
+
+#[test]
+fn a_pilot_flies_a_mission_in_every_mode() {
+    let mission = "arm\ntakeoff 0.5\nhover 2\ngoto 0.8 0 0.6\nland\n";
+    for mode in [FlightMode::PosHold, FlightMode::AltHold, FlightMode::Stabilize, FlightMode::Acro] {
+        let (outcome, _) = flown(&Setup { pilot: Some(mode), ..setup(mission, &[]) });
+        let judgement = &outcome.judgement;
+        assert!(outcome.succeeded() && judgement.violations.is_empty(), "{mode:?}: {judgement:?}");
+        assert!(judgement.max_height_m > 0.5 && judgement.max_distance_m < 1.5, "{mode:?}: {judgement:?}");
+        assert!(judgement.touch_speed_mps.is_some_and(|speed| speed < 0.6), "{mode:?}: {judgement:?}");
+        let flown_in = |change: &stampfly_board::simulation::PhaseChange| change.mode == mode;
+        assert!(outcome.phases.iter().any(flown_in), "{mode:?}: {:?}", outcome.phases);
+    }
+}

@@ -1,0 +1,98 @@
+//! Which faults of a flight are active, and how often each has changed something.
+
+use super::{Fault, Moment, When};
+use core::cell::Cell;
+use stampfly_types::Instant;
+use std::rc::Rc;
+
+#[derive(Debug)]
+struct Entry {
+    fault: Fault,
+    begun: Cell<Option<Instant>>,
+    changed: Cell<u64>,
+}
+
+/// The faults of one flight, a handle: clones share them. Everything that a fault can act on holds one and asks it.
+///
+/// ```
+/// use stampfly_sim::fault::{Class, Fault, FaultKind, Injector, Moment};
+/// use stampfly_types::{Duration, Instant};
+/// const TABLE: &[FaultKind] = &[FaultKind::plain("tof-silent", Class::Degraded, "No range comes.")];
+/// let fault = Fault::parse("tof-silent@hover+2", TABLE)?;
+/// let injector = Injector::new(Instant::ZERO, &[fault]);
+/// assert!(!injector.is_active(0, Instant::from_secs(3)), "it does not hover yet");
+/// injector.reached(Moment::Hover, Instant::from_secs(4));
+/// assert!(injector.is_active(0, Instant::from_secs(5)) && !injector.is_active(0, Instant::from_secs(6)));
+/// # Ok::<(), stampfly_sim::fault::FaultError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Injector(Rc<[Entry]>);
+
+impl Injector {
+    /// The faults of a flight that begins at `start`.
+    #[must_use]
+    pub fn new(start: Instant, faults: &[Fault]) -> Self {
+        let entry = |fault: &Fault| {
+            let begun = match fault.when {
+                When::After(time) => Some(start + time),
+                When::Moment(_) => None,
+            };
+            Entry { fault: *fault, begun: Cell::new(begun), changed: Cell::new(0) }
+        };
+        Self(faults.iter().map(entry).collect())
+    }
+
+    /// The faults, in the order in which they were given: their places are what the other functions take.
+    pub fn faults(&self) -> impl Iterator<Item = &Fault> {
+        self.0.iter().map(|entry| &entry.fault)
+    }
+
+    /// Does a fault wait for this moment, or has one?
+    #[must_use]
+    pub fn wants(&self, moment: Moment) -> bool {
+        self.faults().any(|fault| fault.when == When::Moment(moment))
+    }
+
+    /// A moment has come. Only the first time counts.
+    pub fn reached(&self, moment: Moment, now: Instant) {
+        for entry in self.0.iter().filter(|entry| entry.fault.when == When::Moment(moment)) {
+            entry.begun.set(entry.begun.get().or(Some(now)));
+        }
+    }
+
+    /// When the fault at this place begins or began; `None` when its moment has not come.
+    #[must_use]
+    pub fn begins(&self, place: usize) -> Option<Instant> {
+        self.0.get(place)?.begun.get()
+    }
+
+    /// When the first fault began; `None` when none has.
+    #[must_use]
+    pub fn first_begun(&self, now: Instant) -> Option<Instant> {
+        self.0.iter().filter_map(|entry| entry.begun.get()).filter(|begun| *begun <= now).min()
+    }
+
+    /// Does the fault at this place act now?
+    #[must_use]
+    pub fn is_active(&self, place: usize, now: Instant) -> bool {
+        self.0.get(place).is_some_and(|entry| {
+            entry
+                .begun
+                .get()
+                .is_some_and(|begun| begun <= now && entry.fault.lasts.is_none_or(|lasts| now < begun + lasts))
+        })
+    }
+
+    /// Notes that the fault at this place has changed something.
+    pub fn note_change(&self, place: usize) {
+        if let Some(entry) = self.0.get(place) {
+            entry.changed.set(entry.changed.get() + 1);
+        }
+    }
+
+    /// How often the fault at this place has changed something.
+    #[must_use]
+    pub fn changes(&self, place: usize) -> u64 {
+        self.0.get(place).map_or(0, |entry| entry.changed.get())
+    }
+}

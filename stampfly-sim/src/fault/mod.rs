@@ -1,0 +1,312 @@
+//! Faults of a simulated vehicle, as data: what goes wrong, when, and for how long.
+//!
+//! A vehicle lists its faults in a table of [`FaultKind`]s. A [`Fault`] is one of them at a moment, written as text:
+//!
+//! ```text
+//! NAME[=VALUE]@WHEN[+SECONDS]      tof-stuck=0.03@hover+2
+//! ```
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`FaultKind`], [`Fault`] | a row of a vehicle's table; one fault of one flight |
+//! | [`When`], [`Moment`] | when it begins |
+//! | [`Injector`] | which faults are active now, and how often each has changed something |
+//! | [`Distortion`], [`Line`] | what happens to samples on their way to the bus |
+//!
+//! Use it for faults of sensors, links and actuators in flight. Faults of a chip's registers, for testing one driver,
+//! are in [`chips::Faults`](crate::chips::Faults).
+
+mod class;
+mod distortion;
+mod injector;
+mod line;
+mod when;
+
+pub use class::Class;
+pub use distortion::{Distortion, Effect};
+pub use injector::Injector;
+pub use line::Line;
+pub use when::{Moment, When};
+
+use core::fmt;
+use stampfly_types::Duration;
+
+/// What the number of a fault means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultValue {
+    /// There is none.
+    None,
+    /// A number; without one, the default.
+    Number {
+        /// Unit, empty where there is none.
+        unit: &'static str,
+        /// When none is given.
+        default: f64,
+        /// Lowest and highest.
+        range: [f64; 2],
+    },
+    /// A number, or none: then the last value before the fault stays.
+    OrLast {
+        /// Unit, empty where there is none.
+        unit: &'static str,
+        /// Lowest and highest.
+        range: [f64; 2],
+    },
+}
+
+impl FaultValue {
+    /// The unit; empty where there is none.
+    #[must_use]
+    pub const fn unit(&self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Number { unit, .. } | Self::OrLast { unit, .. } => unit,
+        }
+    }
+
+    /// The value of a fault that is given without one.
+    #[must_use]
+    pub const fn default(&self) -> Option<f64> {
+        match self {
+            Self::Number { default, .. } => Some(*default),
+            Self::None | Self::OrLast { .. } => None,
+        }
+    }
+
+    /// Lowest and highest value.
+    #[must_use]
+    pub const fn range(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::None => None,
+            Self::Number { range, .. } | Self::OrLast { range, .. } => Some(*range),
+        }
+    }
+}
+
+/// One row of a vehicle's table of faults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultKind {
+    /// Its name in texts.
+    pub name: &'static str,
+    /// What its number means.
+    pub value: FaultValue,
+    /// The worst end that is acceptable with the default value.
+    pub expected: Class,
+    /// The worst end that is acceptable above a value, where it is another.
+    pub above: Option<(f64, Class)>,
+    /// What happens.
+    pub meaning: &'static str,
+}
+
+impl FaultKind {
+    /// A fault without a number.
+    #[must_use]
+    pub const fn plain(name: &'static str, expected: Class, meaning: &'static str) -> Self {
+        Self { name, value: FaultValue::None, expected, above: None, meaning }
+    }
+
+    /// A fault with a number: unit, default, lowest, highest.
+    #[must_use]
+    pub const fn number(
+        name: &'static str,
+        (unit, default, low, high): (&'static str, f64, f64, f64),
+        expected: Class,
+        meaning: &'static str,
+    ) -> Self {
+        Self { name, value: FaultValue::Number { unit, default, range: [low, high] }, expected, above: None, meaning }
+    }
+
+    /// A fault with a number, which without one keeps the last value: unit, lowest, highest.
+    #[must_use]
+    pub const fn or_last(
+        name: &'static str,
+        (unit, low, high): (&'static str, f64, f64),
+        expected: Class,
+        meaning: &'static str,
+    ) -> Self {
+        Self { name, value: FaultValue::OrLast { unit, range: [low, high] }, expected, above: None, meaning }
+    }
+
+    /// The same, with another acceptable end above a value.
+    #[must_use]
+    pub const fn above(self, value: f64, expected: Class) -> Self {
+        Self { above: Some((value, expected)), ..self }
+    }
+}
+
+/// One fault of one flight. Its text is what [`parse`](Self::parse) reads.
+///
+/// ```
+/// use stampfly_sim::fault::{Class, Fault, FaultKind, Moment, When};
+/// const TABLE: &[FaultKind] = &[FaultKind::or_last("tof-stuck", ("m", 0.0, 10.0), Class::Degraded, "The range stays.")];
+/// let fault = Fault::parse("tof-stuck=0.03@hover+2", TABLE)?;
+/// assert_eq!((fault.value, fault.when), (Some(0.03), When::Moment(Moment::Hover)));
+/// assert_eq!(fault.to_string(), "tof-stuck=0.03@hover+2");
+/// assert!(Fault::parse("tof-late@hover", TABLE).unwrap_err().to_string().contains("tof-stuck"));
+/// # Ok::<(), stampfly_sim::fault::FaultError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What it is.
+    pub kind: &'static FaultKind,
+    /// Its number; `None` when it has none or keeps the last value.
+    pub value: Option<f64>,
+    /// When it begins.
+    pub when: When,
+    /// How long it lasts; `None` to the end of the flight.
+    pub lasts: Option<Duration>,
+}
+
+impl Fault {
+    /// Reads a fault of this table.
+    ///
+    /// # Errors
+    /// Names what is wrong, and what would be right.
+    pub fn parse(text: &str, table: &'static [FaultKind]) -> Result<Self, FaultError> {
+        let wrong = |problem| FaultError { text: text.into(), problem };
+        let (what, rest) = text.split_once('@').ok_or_else(|| wrong(Problem::NoMoment))?;
+        let (name, value) = match what.split_once('=') {
+            Some((name, value)) => (name, Some(value)),
+            None => (what, None),
+        };
+        let kind = table.iter().find(|kind| kind.name == name.trim());
+        let kind = kind.ok_or_else(|| wrong(Problem::Unknown(name.trim().into(), table)))?;
+        let value = match (value, kind.value.range()) {
+            (None, _) => kind.value.default(),
+            (Some(_), None) => return Err(wrong(Problem::NoValue(kind.name))),
+            (Some(value), Some([low, high])) => {
+                let number = number(value).filter(|value| (low..=high).contains(value));
+                Some(number.ok_or_else(|| wrong(Problem::Value(value.into(), kind)))?)
+            }
+        };
+        let (when, lasts) = match rest.split_once('+') {
+            Some((when, lasts)) => (when, Some(lasts)),
+            None => (rest, None),
+        };
+        let when = When::parse(when.trim()).ok_or_else(|| wrong(Problem::When(when.into())))?;
+        let lasts = lasts.map(|lasts| seconds(lasts).ok_or_else(|| wrong(Problem::Lasts(lasts.into())))).transpose()?;
+        Ok(Self { kind, value, when, lasts })
+    }
+
+    /// The worst end that is acceptable.
+    #[must_use]
+    pub fn expected(&self) -> Class {
+        match (self.kind.above, self.value) {
+            (Some((limit, class)), Some(value)) if value > limit => class,
+            _ => self.kind.expected,
+        }
+    }
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// Up to an hour.
+fn seconds(text: &str) -> Option<Duration> {
+    let seconds = number(text).filter(|seconds| (0.0..=3600.0).contains(seconds))?;
+    Some(Duration::from_micros((seconds * 1e6).round() as u64))
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.kind.name)?;
+        if let Some(value) = self.value {
+            write!(f, "={value}")?;
+        }
+        write!(f, "@{}", self.when)?;
+        self.lasts.map_or(Ok(()), |lasts| write!(f, "+{}", lasts.seconds_f64()))
+    }
+}
+
+/// Why a text is no fault of a vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaultError {
+    text: String,
+    problem: Problem,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Problem {
+    NoMoment,
+    Unknown(String, &'static [FaultKind]),
+    NoValue(&'static str),
+    Value(String, &'static FaultKind),
+    When(String),
+    Lasts(String),
+}
+
+impl fmt::Display for FaultError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}': ", self.text)?;
+        match &self.problem {
+            Problem::NoMoment => write!(f, "a fault is NAME[=VALUE]@WHEN[+SECONDS]; the moment is missing"),
+            Problem::Unknown(name, []) => write!(f, "there is no fault '{name}': this vehicle has no faults"),
+            Problem::Unknown(name, table) => {
+                let names: Vec<_> = table.iter().map(|kind| kind.name).collect();
+                write!(f, "there is no fault '{name}'; there are: {}", names.join(", "))
+            }
+            Problem::NoValue(name) => write!(f, "{name} takes no value"),
+            Problem::Value(value, kind) => {
+                let [low, high] = kind.value.range().unwrap_or_default();
+                write!(f, "{}: '{value}' is no number from {low} to {high} {}", kind.name, kind.value.unit())
+            }
+            Problem::When(when) => {
+                let names: Vec<_> = Moment::ALL.iter().map(|moment| moment.name()).collect();
+                write!(f, "'{when}' is none of {}, and no number of seconds up to 3600", names.join(", "))
+            }
+            Problem::Lasts(lasts) => write!(f, "'{lasts}' is no number of seconds up to 3600"),
+        }
+    }
+}
+
+impl core::error::Error for FaultError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TABLE: &[FaultKind] = &[
+        FaultKind::plain("silent", Class::Cut, "Nothing comes."),
+        FaultKind::number("bias", ("m", 0.5, -1.0, 1.0), Class::Degraded, "It is off.").above(0.8, Class::Landed),
+        FaultKind::or_last("stuck", ("m", 0.0, 2.0), Class::Degraded, "It stays."),
+    ];
+
+    #[test]
+    fn a_fault_survives_its_text() {
+        for moment in Moment::ALL {
+            for what in ["silent", "bias=-0.25", "stuck", "stuck=0.03"] {
+                for lasts in ["", "+2", "+0.0025"] {
+                    let text = format!("{what}@{}{lasts}", moment.name());
+                    assert_eq!(Fault::parse(&text, TABLE).expect(&text).to_string(), text);
+                }
+            }
+        }
+        let fault = Fault::parse("silent@12.5+0.1", TABLE).expect("a fault");
+        assert_eq!(fault.when, When::After(Duration::from_micros(12_500_000)));
+        assert_eq!(fault.to_string(), "silent@12.5+0.1");
+        assert_eq!(Fault::parse("bias@touch", TABLE).expect("a fault").to_string(), "bias=0.5@touch", "the default");
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let message = |text: &str| Fault::parse(text, TABLE).expect_err("a mistake").to_string();
+        assert!(message("silent").contains("the moment is missing"));
+        assert!(message("loud@hover").contains("no fault 'loud'; there are: silent, bias, stuck"));
+        assert!(message("silent=1@hover").contains("silent takes no value"));
+        for value in ["2", "x", "NaN", "inf", ""] {
+            assert!(message(&format!("bias={value}@hover")).contains("is no number from -1 to 1 m"), "{value}");
+        }
+        assert!(message("silent@noon").contains("'noon' is none of ground, spool"));
+        assert!(message("silent@-1").contains("'-1' is none of"));
+        assert!(message("silent@hover+x").contains("'x' is no number of seconds"));
+        let nothing = Fault::parse("silent@hover", &[]).expect_err("a mistake").to_string();
+        assert!(nothing.contains("this vehicle has no faults"), "{nothing}");
+    }
+
+    #[test]
+    fn a_larger_value_may_have_another_acceptable_end() {
+        let expected = |text| Fault::parse(text, TABLE).expect("a fault").expected();
+        assert_eq!([expected("bias@1"), expected("bias=0.9@1")], [Class::Degraded, Class::Landed]);
+    }
+}

@@ -1,0 +1,152 @@
+//! What stands around the vehicle beside the floor: an edge, a ceiling, a wall, a hand.
+//!
+//! Nothing by default. For faults in flight: whoever changes the scene does it between two steps, relative to where the
+//! vehicle is. Range finder and flow sensor see the edge and the floor's motion; nothing sees walls, ceilings and hands, as on
+//! the vehicle, whose range finder looks down.
+
+use super::Motion;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// A vertical half space: everything beyond a line on the floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beyond {
+    /// A point of the line, world north and east, m.
+    pub point: [f64; 2],
+    /// Where beyond is, a unit vector, world north and east.
+    pub ahead: [f64; 2],
+}
+
+impl Beyond {
+    /// The half space that begins `distance` metres ahead of the vehicle on its way; ahead of its nose when it stands.
+    #[must_use]
+    pub fn ahead_of(motion: &Motion, distance: f64) -> Self {
+        let nose = motion.attitude * Vector3::x();
+        // Slower than this it has no way.
+        let way = if motion.velocity.xy().norm() > 0.1 { motion.velocity } else { nose };
+        let length = way.xy().norm().max(1e-6);
+        let ahead = [way.x / length, way.y / length];
+        Self { point: [motion.position.x + distance * ahead[0], motion.position.y + distance * ahead[1]], ahead }
+    }
+
+    /// How far a place is inside, m; negative outside.
+    fn depth(&self, place: &Vector3<f64>) -> f64 {
+        (place.x - self.point[0]) * self.ahead[0] + (place.y - self.point[1]) * self.ahead[1]
+    }
+}
+
+/// A hand that holds the vehicle where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hand {
+    /// World NED, m.
+    pub position: Vector3<f64>,
+    /// Body FRD → world NED.
+    pub attitude: UnitQuaternion<f64>,
+}
+
+/// Spring and damper of an arm's muscles: 60 N/m for some tens of grams lets it give way by some millimetres.
+const ARM: [f64; 2] = [60.0, 1.5];
+/// The same about the fingers, N·m/rad and N·m·s/rad.
+const WRIST: [f64; 2] = [0.02, 3.0e-4];
+
+/// The surroundings. The default is a flat floor at rest and nothing else.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scene {
+    /// Where the floor is lower (or higher, when negative), and by how much, m.
+    pub edge: Option<(Beyond, f64)>,
+    /// The floor's velocity, world north and east, m/s.
+    pub floor_velocity: [f64; 2],
+    /// Height of a ceiling, m.
+    pub ceiling: Option<f64>,
+    /// A wall.
+    pub wall: Option<Beyond>,
+    /// A hand.
+    pub hand: Option<Hand>,
+}
+
+impl Scene {
+    /// The floor's z at a place, world NED, m.
+    #[must_use]
+    pub fn floor(&self, place: &Vector3<f64>) -> f64 {
+        match &self.edge {
+            Some((beyond, drop)) if beyond.depth(place) > 0.0 => *drop,
+            _ => 0.0,
+        }
+    }
+
+    /// How deep a place is in the ceiling or the wall, with the direction out of it.
+    pub(super) fn inside(&self, place: &Vector3<f64>) -> impl Iterator<Item = (f64, Vector3<f64>)> {
+        let ceiling = self.ceiling.map(|height| (-place.z - height, Vector3::new(0.0, 0.0, 1.0)));
+        let wall = self.wall.map(|wall| (wall.depth(place), Vector3::new(-wall.ahead[0], -wall.ahead[1], 0.0)));
+        [ceiling, wall].into_iter().flatten().filter(|(depth, _)| *depth > 0.0)
+    }
+
+    /// Is there anything that can push, beside the floor?
+    pub(super) fn is_empty(&self) -> bool {
+        self.ceiling.is_none() && self.wall.is_none()
+    }
+
+    /// Force (world) and torque (body) of the hand.
+    pub(super) fn hold(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
+        let Some(hand) = &self.hand else { return (Vector3::zeros(), Vector3::zeros()) };
+        let force = (hand.position - motion.position) * ARM[0] - motion.velocity * ARM[1];
+        let turn = (motion.attitude.inverse() * hand.attitude).scaled_axis();
+        (force, turn * WRIST[0] - motion.rate * WRIST[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{Plant, PlantParameters, Pose, WindConfig};
+
+    fn plant(height: f64) -> Plant {
+        let parameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
+        let pose = Pose { rotors: 0.0, ..Pose::hovering(height) };
+        Plant::new(&parameters, &WindConfig::CALM, Some(&pose), 1)
+    }
+
+    #[test]
+    fn beyond_an_edge_it_falls_deeper() {
+        let mut plant = plant(0.3);
+        let beyond = Beyond { point: [-1.0, 0.0], ahead: [1.0, 0.0] };
+        plant.scene_mut().edge = Some((beyond, 0.5));
+        (0..3200).for_each(|_| plant.step());
+        assert!((plant.motion().position.z - 0.5).abs() < 0.1 && plant.ground().contact(), "{:?}", plant.motion());
+        assert_eq!(plant.scene().floor(&Vector3::new(-1.1, 0.0, 0.0)), 0.0);
+    }
+
+    #[test]
+    fn a_hand_holds_and_a_ceiling_and_a_wall_stop() {
+        let mut held = plant(1.0);
+        let Motion { position, attitude, .. } = *held.motion();
+        held.scene_mut().hand = Some(Hand { position, attitude });
+        (0..1600).for_each(|_| held.step());
+        assert!((held.motion().position.z + 1.0).abs() < 0.02, "{:?}", held.motion());
+
+        let mut under = plant(0.5);
+        under.scene_mut().ceiling = Some(0.8);
+        under.set_duty([1.0; 4]);
+        let highest = (0..800).map(|_| {
+            under.step();
+            -under.motion().position.z
+        });
+        assert!(highest.fold(0.0, f64::max) < 0.85);
+
+        let parameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
+        let pose = Pose { velocity: Vector3::new(1.0, 0.0, 0.0), ..Pose::hovering(2.0) };
+        let mut flies = Plant::new(&parameters, &WindConfig::CALM, Some(&pose), 1);
+        let wall = Beyond::ahead_of(flies.motion(), 0.3);
+        flies.scene_mut().wall = Some(wall);
+        (0..960).for_each(|_| flies.step());
+        assert!(flies.motion().position.x < 0.35, "{:?}", flies.motion());
+    }
+
+    #[test]
+    fn a_floor_that_moves_takes_along_what_stands_on_it() {
+        let mut plant = plant(0.05);
+        (0..1600).for_each(|_| plant.step());
+        plant.scene_mut().floor_velocity = [0.2, 0.0];
+        (0..3200).for_each(|_| plant.step());
+        assert!((plant.motion().velocity.x - 0.2).abs() < 0.02, "{:?}", plant.motion());
+    }
+}
