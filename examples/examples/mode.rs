@@ -1,6 +1,6 @@
 //! A flight through the state table, told by its transitions.
 
-use stampfly_mode::{ModeInput, ModeMachine};
+use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
 use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
@@ -50,8 +50,18 @@ fn main() {
             change(&mut world);
         }
         let World { alerts, estimate, calibration, land_detected, commands } = &world;
-        let input =
-            ModeInput { alerts: *alerts, estimate, calibration, land_detected, pilot: None, commands, button: None };
+        let input = ModeInput {
+            alerts: *alerts,
+            estimate,
+            calibration,
+            land_detected,
+            sensors: SensorTimes::all(now),
+            pilot: None,
+            sticks: CommandSource::Guided,
+            commands,
+            button: None,
+            cut_off: false,
+        };
         let mode = machine.step(now, &input).flight_status;
         if mode.phase != before.phase {
             println!(

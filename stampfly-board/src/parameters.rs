@@ -120,6 +120,8 @@ parameters! {
     "mode.takeoff.throttle" [0.1, 0.5] "1" mode.throttle_take_off => "throttle that takes off in a manual mode";
     "mode.takeoff.delay" [0.1, 2.0] "s" mode.spool => "time between arming and a take-off by itself";
     "mode.armed.timeout" [3.0, 60.0] "s" mode.armed_timeout => "armed without a take-off, it disarms after this long";
+    "mode.link.back" [0.2, 10.0] "s" mode.link_back => "a lost link counts as back when heard for this long";
+    "mode.blind.timeout" [0.0, 3.0] "s" mode.blind => "without height it lands after this long";
     "mode.link.timeout" [0.0, 60.0] "s" mode.hover_without_link => "without a link it hovers this long, then lands";
     "mode.held.height" [0.11, 0.5] "m" mode.held_height => "above this height somebody holds it";
     "mode.standing.height" [0.05, 0.1] "m" mode.standing_height => "below this height it stands again";
@@ -186,7 +188,10 @@ parameters! {
     "navigator.heading.jerk" [5.0, 200.0] "rad/s^3" navigator.limits.heading.jerk => "largest jerk of the turn";
 
     "authority.stick.dead_band" [0.0, 0.1] "1" authority.dead_band => "sticks this close to their centre are centred";
-    "authority.stick.take_over" [0.1, 0.9] "1" authority.take_over => "deflection that takes over from guidance";
+    "authority.stick.take_over" [0.1, 0.9] "1" mode.take_over => "deflection that takes over from a program";
+    "authority.stick.time" [0.0, 1.0] "s" mode.take_over_time => "the sticks take over after this long";
+    "authority.switch.debounce" [0.04, 0.5] "s" mode.switch_debounce => "a switch counts after this long";
+    "authority.pilot.back" [0.2, 10.0] "s" authority.back => "after a silence, sticks count when heard for this long";
     "authority.pilot.timeout" [0.1, 5.0] "s" authority.stale => "a pilot's frame as old as this counts as none";
 }
 

@@ -1,108 +1,248 @@
-//! May the motors be armed, and if not, why not: every reason at once, so that nobody has to guess.
+//! May the motors be armed, and if not, why not: every reason at once, each with the value that was found and its limit.
 
 use crate::config::ModeConfig;
-use crate::input::ModeInput;
-use stampfly_types::frame;
-use stampfly_types::messages::{Alerts, ArmBlocks, FlightPhase, FlightStatus, Validity};
+use crate::decision::{CUT, State};
+use crate::facts::Facts;
+use stampfly_types::Instant;
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, Validity};
 
-/// Sensors without which nobody takes off.
+/// A reason against arming.
+#[derive(Clone, Copy, Debug)]
+pub struct Check {
+    /// Its bit.
+    pub block: ArmBlocks,
+    /// What it refuses, in words: for `docs/modes.md`.
+    pub refuses: &'static str,
+    /// Unit of value and limit; `""` for a condition, whose value is 1.
+    pub unit: &'static str,
+    /// The value that was found and its limit, when it refuses.
+    test: fn(&ModeConfig, &State, &Facts) -> Option<(f32, f32)>,
+}
+
+/// A refusal: which check, what it found, and since when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Refusal {
+    /// The check, as its bit.
+    pub check: ArmBlocks,
+    /// The value that was found; 1 for a condition.
+    pub value: f32,
+    /// The limit it is beyond; 0 for a condition.
+    pub limit: f32,
+    /// Since when.
+    pub since: Instant,
+}
+
+/// A condition that refuses.
+const fn when(refuses: bool) -> Option<(f32, f32)> {
+    if refuses { Some((1.0, 0.0)) } else { None }
+}
+
+/// A value that must not be above its limit. NaN refuses.
+fn above(value: f32, limit: f32) -> Option<(f32, f32)> {
+    let allowed = value <= limit;
+    if allowed { None } else { Some((value, limit)) }
+}
+
+/// A sensor that a mode needs must not be silent.
+fn silent(needed: bool, age: stampfly_types::Duration, config: &ModeConfig) -> Option<(f32, f32)> {
+    let (age, limit) = (age.seconds(), config.sensor_silence.seconds());
+    if needed && age >= limit { Some((age, limit)) } else { None }
+}
+
+/// Alerts of sensors without which no vehicle takes off.
 const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::POWER_LOST);
 
-/// The reasons against arming in this situation; empty when there is none.
-///
-/// | block | stands for |
-/// |---|---|
-/// | `CALIBRATING` | still-calibration has not finished |
-/// | `NOT_ON_GROUND` | the phase is not IDLE on the ground |
-/// | `NO_BATTERY`, `LOW_BATTERY` | alerts of the failsafe |
-/// | `ATTITUDE`, `TILTED` | tilt unknown or in disagreement with gravity; more than [`ModeConfig::arming_tilt`] |
-/// | `SENSOR` | the inertial sensor or the battery monitor is silent |
-/// | `ESTIMATE` | the estimate is lost |
-/// | `PAIRING` | pairing with a transmitter |
-/// | `THROTTLE` | the throttle is above [`ModeConfig::throttle_rest`], and the mode in force or the pilot's makes thrust of it |
-/// | `ARM_SWITCH` | the arm switch has been on since before the vehicle saw it off |
-/// | `SELF_TEST` | the self test at power-on failed |
-/// | `CRASHED` | a crash nobody has acknowledged by a disarm command or the button |
-/// | `NO_LINK` | nobody who could stop the vehicle is heard: no pilot, no program |
-///
-/// State, pairing and the mode in force are read from `mode`.
-#[must_use]
-pub fn blocks(
-    config: &ModeConfig,
-    mode: &FlightStatus,
-    crashed: bool,
-    stale_switch: bool,
-    input: &ModeInput<'_>,
-) -> ArmBlocks {
-    let alerts = input.alerts;
-    // The mode in force may be a fallback, and may be left for the pilot's at any time.
-    let throttle_up = input.pilot.is_some_and(|pilot| {
-        (mode.mode.is_manual() || pilot.mode.is_manual()) && pilot.throttle > config.throttle_rest
-    });
+macro_rules! checks {
+    ($($block:ident [$unit:literal] $refuses:literal => |$config:ident, $state:ident, $facts:ident| $test:expr;)+) => {
+        /// Every check, in the order in which refusals are listed.
+        pub const CHECKS: &[Check] = &[$(Check {
+            block: ArmBlocks::$block,
+            refuses: $refuses,
+            unit: $unit,
+            test: {
+                // Not every check looks at everything.
+                fn test($config: &ModeConfig, $state: &State, $facts: &Facts) -> Option<(f32, f32)> {
+                    let _ = ($config, $state, $facts);
+                    $test
+                }
+                test
+            },
+        }),+];
+    };
+}
+
+checks! {
+    CUT_OFF [""] "the cut-off has stopped the motors, not acknowledged" => |config, state, facts|
+        when(facts.cut_off || state.unacknowledged.contains(ArmBlocks::CUT_OFF));
+    CRASHED [""] "a crash, or motors stopped in the air, not acknowledged by arm switch off, `Disarm` or the button" =>
+        |config, state, facts| when(state.unacknowledged.contains(ArmBlocks::CRASHED)
+            || facts.alerts.intersects(CUT.without(Alerts::IMU_LOST)));
+    KILL [""] "the pilot's kill switch is on" => |config, state, facts|
+        when(facts.pilot.frame.is_some_and(|(_, input)| input.kill));
+    SELF_TEST [""] "the self test at power-on failed" => |config, state, facts|
+        when(facts.alerts.contains(Alerts::SELF_TEST_FAILED));
+    SENSOR [""] "the inertial sensor or the battery monitor is silent" => |config, state, facts|
+        when(facts.alerts.intersects(SILENT_SENSOR));
+    CALIBRATING ["1"] "still-calibration has not finished" => |config, state, facts|
+        if facts.calibrated { None } else { Some((facts.calibration, 1.0)) };
+    ATTITUDE [""] "tilt unknown, or in disagreement with gravity" => |config, state, facts|
+        when(!facts.valid.contains(Validity::TILT) || facts.alerts.contains(Alerts::TILT_MISMATCH));
+    TILTED ["rad"] "tilted too far" => |config, state, facts| above(facts.tilt, config.arming_tilt);
+    ESTIMATE [""] "the estimate is lost, or has no vertical velocity in a mode that holds height" => |config, state, facts|
+        when(facts.alerts.contains(Alerts::ESTIMATE_DIVERGED) || (holds_height(state) && !facts.valid.contains(Validity::VELOCITY_Z)));
+    NO_RANGE ["s"] "no usable range, in a mode that holds height" => |config, state, facts|
+        silent(holds_height(state), facts.ages.range, config);
+    NO_BARO ["s"] "no air pressure, in a mode that holds height" => |config, state, facts|
+        silent(holds_height(state), facts.ages.baro, config);
+    NO_FLOW ["s"] "no usable optical flow, in POS_HOLD" => |config, state, facts|
+        silent(state.wanted == FlightMode::PosHold, facts.ages.flow, config);
+    NO_BATTERY [""] "powered from USB" => |config, state, facts| when(facts.alerts.contains(Alerts::USB_POWER));
+    LOW_BATTERY [""] "the battery is low" => |config, state, facts|
+        when(facts.alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY));
+    NOT_ON_GROUND [""] "the phase is not IDLE_GROUND" => |config, state, facts| when(state.phase != FlightPhase::IdleGround);
+    PAIRING [""] "looking for a transmitter" => |config, state, facts| when(state.pairing.is_some());
     // A command in hand is a sign of life, also when it came after the failsafe looked.
-    let silent = alerts.contains(Alerts::COMM_LOST) && input.commands.is_empty();
-    ArmBlocks::NONE
-        .set(ArmBlocks::CALIBRATING, !input.calibration.complete)
-        .set(ArmBlocks::NOT_ON_GROUND, mode.phase != FlightPhase::IdleGround)
-        .set(ArmBlocks::NO_BATTERY, alerts.contains(Alerts::USB_POWER))
-        .set(ArmBlocks::LOW_BATTERY, alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY))
-        .set(
-            ArmBlocks::ATTITUDE,
-            !input.estimate.valid.contains(Validity::TILT) || alerts.contains(Alerts::TILT_MISMATCH),
-        )
-        .set(ArmBlocks::TILTED, frame::tilt(&input.estimate.attitude) > config.arming_tilt)
-        .set(ArmBlocks::SENSOR, alerts.intersects(SILENT_SENSOR))
-        .set(ArmBlocks::ESTIMATE, alerts.contains(Alerts::ESTIMATE_DIVERGED))
-        .set(ArmBlocks::SELF_TEST, alerts.contains(Alerts::SELF_TEST_FAILED))
-        .set(ArmBlocks::PAIRING, mode.pairing)
-        .set(ArmBlocks::THROTTLE, throttle_up)
-        .set(ArmBlocks::ARM_SWITCH, stale_switch)
-        .set(ArmBlocks::NO_LINK, silent)
-        .set(ArmBlocks::CRASHED, crashed || alerts.intersects(Alerts::IMPACT | Alerts::GYRO_ANOMALY | Alerts::TUMBLED))
+    NO_LINK [""] "neither a pilot nor a program is heard" => |config, state, facts|
+        when(facts.alerts.contains(Alerts::COMM_LOST) && !facts.asked.any && state.pairing.is_none());
+    ARM_SWITCH [""] "the arm switch has been on since before it was seen off" => |config, state, facts|
+        when(facts.pilot.switch.is_stale);
+    // The mode in force may be left for the pilot's at any time.
+    THROTTLE ["1"] "the throttle is raised, and the mode in force or the pilot's makes thrust of it" => |config, state, facts| {
+        let thrust = |pilot: FlightMode| state.mode.is_manual() || pilot.is_manual();
+        facts.pilot.frame.filter(|(_, input)| thrust(input.mode)).and_then(|(_, input)| above(input.throttle, config.throttle_rest))
+    };
+}
+
+fn holds_height(state: &State) -> bool {
+    !state.wanted.is_manual()
+}
+
+/// The reasons against arming; empty when there is none.
+#[must_use]
+pub fn blocks(config: &ModeConfig, state: &State, facts: &Facts) -> ArmBlocks {
+    let refuses = |check: &&Check| (check.test)(config, state, facts).is_some();
+    CHECKS.iter().filter(refuses).fold(ArmBlocks::NONE, |blocks, check| blocks | check.block)
+}
+
+/// Remembers since when each check has refused.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Refusals {
+    since: [Option<Instant>; CHECKS.len()],
+    found: [(f32, f32); CHECKS.len()],
+}
+
+impl Refusals {
+    pub fn step(&mut self, config: &ModeConfig, state: &State, facts: &Facts) {
+        for ((check, since), found) in CHECKS.iter().zip(&mut self.since).zip(&mut self.found) {
+            let result = (check.test)(config, state, facts);
+            *since = result.map(|_| since.unwrap_or(facts.now));
+            *found = result.unwrap_or_default();
+        }
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = Refusal> {
+        let found = CHECKS.iter().zip(&self.since).zip(&self.found);
+        found.filter_map(|((check, since), (value, limit))| {
+            Some(Refusal { check: check.block, value: *value, limit: *limit, since: (*since)? })
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::messages::{
-        CalibrationResult, FlightMode, GuidedKind, LandDetected, PilotInput, StateEstimate,
-    };
+    use crate::facts::{Ages, Asked};
+    use crate::pilot::Heard;
+    use stampfly_types::Duration;
+    use stampfly_types::messages::PilotInput;
 
-    /// What blocks a vehicle that stands ready.
-    fn ready(mode: FlightMode, alerts: Alerts, pilot: Option<&PilotInput>, commands: &[GuidedKind]) -> ArmBlocks {
-        let input = ModeInput {
-            alerts,
-            estimate: &StateEstimate { valid: Validity::ALL, ..Default::default() },
-            calibration: &CalibrationResult { complete: true, ..Default::default() },
-            land_detected: &LandDetected::default(),
-            pilot,
-            commands,
-            button: None,
-        };
-        let mode = FlightStatus { phase: FlightPhase::IdleGround, mode, ..Default::default() };
-        blocks(&ModeConfig::default(), &mode, false, false, &input)
+    fn ready(mode: FlightMode) -> (State, Facts) {
+        let state = State { phase: FlightPhase::IdleGround, wanted: mode, mode, ..State::default() };
+        (state, Facts { valid: Validity::ALL, calibrated: true, ..Facts::default() })
+    }
+
+    fn found(state: &State, facts: &Facts) -> ArmBlocks {
+        blocks(&ModeConfig::default(), state, facts)
+    }
+
+    #[test]
+    fn every_block_has_one_check() {
+        let bits = CHECKS.iter().fold(ArmBlocks::NONE, |bits, check| {
+            assert!(!bits.intersects(check.block), "{:?} twice", check.block);
+            bits | check.block
+        });
+        assert_eq!(bits, ArmBlocks::ALL);
+        assert_eq!(CHECKS.len(), ArmBlocks::NAMES.len());
     }
 
     #[test]
     fn a_raised_throttle_blocks_where_it_is_thrust_whichever_mode_the_pilot_wants() {
         for &in_force in FlightMode::ALL {
             for &wanted in FlightMode::ALL {
-                let pilot = |throttle| PilotInput { throttle, mode: wanted, ..Default::default() };
-                let raised = ready(in_force, Alerts::NONE, Some(&pilot(0.6)), &[]);
-                let expected = ArmBlocks::NONE.set(ArmBlocks::THROTTLE, in_force.is_manual() || wanted.is_manual());
-                assert_eq!(raised, expected, "{in_force:?}, wanted {wanted:?}");
-                assert_eq!(ready(in_force, Alerts::NONE, Some(&pilot(0.0)), &[]), ArmBlocks::NONE);
+                let (state, mut facts) = ready(in_force);
+                for throttle in [0.0, 0.6] {
+                    let frame = PilotInput { throttle, mode: wanted, ..Default::default() };
+                    facts.pilot = Heard { frame: Some((Instant::ZERO, frame)), ..Heard::default() };
+                    let thrust = throttle > 0.0 && (in_force.is_manual() || wanted.is_manual());
+                    let expected = ArmBlocks::NONE.set(ArmBlocks::THROTTLE, thrust);
+                    assert_eq!(found(&state, &facts), expected, "{in_force:?}, wanted {wanted:?}");
+                }
             }
         }
     }
 
     #[test]
     fn silence_and_silent_sensors_block() {
-        let ready = |alerts, commands| ready(FlightMode::PosHold, alerts, None, commands);
-        assert_eq!(ready(Alerts::COMM_LOST, &[]), ArmBlocks::NO_LINK);
-        assert_eq!(ready(Alerts::COMM_LOST, &[GuidedKind::Arm]), ArmBlocks::NONE, "it is a sign of life itself");
+        let (state, facts) = ready(FlightMode::PosHold);
+        let silent = Facts { alerts: Alerts::COMM_LOST, ..facts };
+        assert_eq!(found(&state, &silent), ArmBlocks::NO_LINK);
+        let spoken = Facts { asked: Asked { any: true, ..Asked::default() }, ..silent };
+        assert_eq!(found(&state, &spoken), ArmBlocks::NONE, "a command is a sign of life itself");
         for sensor in [Alerts::IMU_DEGRADED, Alerts::IMU_LOST, Alerts::POWER_LOST] {
-            assert_eq!(ready(sensor, &[GuidedKind::Arm]), ArmBlocks::SENSOR, "{sensor:?}");
+            assert_eq!(found(&state, &Facts { alerts: sensor, ..facts }), ArmBlocks::SENSOR, "{sensor:?}");
         }
+        let pairing = State { pairing: Some(Instant::ZERO), ..state };
+        assert_eq!(found(&pairing, &silent), ArmBlocks::PAIRING, "d16: no other transmitter is to be heard");
+    }
+
+    #[test]
+    fn d9_arming_asks_for_the_sensors_of_the_mode_and_names_them() {
+        let (old, fresh) = (Duration::from_secs(1), Duration::from_millis(999));
+        let (range, flow, baro) = (ArmBlocks::NO_RANGE, ArmBlocks::NO_FLOW, ArmBlocks::NO_BARO);
+        for (mode, needed) in [
+            (FlightMode::PosHold, range | flow | baro),
+            (FlightMode::AltHold, range | baro),
+            (FlightMode::Stabilize, ArmBlocks::NONE),
+            (FlightMode::Acro, ArmBlocks::NONE),
+        ] {
+            let (state, facts) = ready(mode);
+            for (ages, missing) in [
+                (Ages { range: fresh, flow: fresh, baro: fresh }, ArmBlocks::NONE),
+                (Ages { range: old, ..Ages::default() }, range),
+                (Ages { flow: old, ..Ages::default() }, flow),
+                (Ages { baro: Duration::MAX, ..Ages::default() }, baro),
+            ] {
+                let expected = if needed.contains(missing) { missing } else { ArmBlocks::NONE };
+                assert_eq!(found(&state, &Facts { ages, ..facts }), expected, "{mode:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_refusal_names_value_limit_and_since() {
+        let config = ModeConfig::default();
+        let (state, mut facts) = ready(FlightMode::Stabilize);
+        let mut refusals = Refusals::default();
+        for second in 0..4 {
+            facts.now = Instant::from_secs(second);
+            facts.tilt = [0.0, 0.5, f32::NAN, 0.6][second as usize];
+            refusals.step(&config, &state, &facts);
+            assert_eq!(refusals.iter().count(), usize::from(second > 0));
+        }
+        let expected =
+            Refusal { check: ArmBlocks::TILTED, value: 0.6, limit: config.arming_tilt, since: Instant::from_secs(1) };
+        assert_eq!(refusals.iter().next(), Some(expected));
     }
 }

@@ -1,7 +1,8 @@
-//! Whose sticks count.
+//! The sticks of the commander, as the controllers get them.
 //!
-//! A pilot who moves a stick has the vehicle, at once, and keeps it: guidance does not take it back by itself but has
-//! to be given a new command. Without a fresh frame from anybody the set-point is the failsafe's: level, no climb.
+//! The [mode machine](crate::machine) decides who has authority; this keeps what each source sent last. A commander who falls
+//! silent is replaced by the failsafe: level, no climb. After a silence, the pilot's sticks count again when they have been
+//! heard for [`AuthorityConfig::back`]: a link that lets single frames through would throw the vehicle about.
 
 use stampfly_types::messages::{CommandSetpoint, CommandSource, PilotInput, stick};
 use stampfly_types::{Duration, Instant};
@@ -12,41 +13,42 @@ use stampfly_types::{Duration, Instant};
 pub struct AuthorityConfig {
     /// Sticks closer to their centre than this are centred, share.
     pub dead_band: f32,
-    /// Deflection with which a pilot takes over from guidance, share.
-    pub take_over: f32,
-    /// A pilot's frame older than this is no frame.
+    /// A frame or sign of life older than this is none.
     pub stale: Duration,
+    /// After a silence, the pilot's sticks count when frames have come for this long.
+    pub back: Duration,
 }
 
 impl Default for AuthorityConfig {
     fn default() -> Self {
-        Self { dead_band: 0.05, take_over: 0.15, stale: Duration::from_millis(500) }
+        Self { dead_band: 0.05, stale: Duration::from_millis(500), back: Duration::from_secs(1) }
     }
 }
 
-/// The arbitration.
+/// The sticks of the commander.
 ///
 /// ```
 /// use stampfly_mode::Authority;
 /// use stampfly_types::{Instant, messages::{CommandSource, PilotInput}};
 /// let mut authority = Authority::default();
-/// authority.guided(Instant::ZERO);
-/// assert_eq!(authority.step(Instant::from_micros(1_000)).source, CommandSource::Guided);
-/// authority.pilot(Instant::from_micros(2_000), &PilotInput { pitch: 0.5, ..Default::default() });
-/// assert_eq!(authority.step(Instant::from_micros(3_000)).source, CommandSource::Pilot);
+/// authority.pilot(Instant::ZERO, &PilotInput { pitch: 1.0, ..Default::default() });
+/// let sticks = authority.step(Instant::from_millis(100), CommandSource::Pilot);
+/// assert_eq!((sticks.source, sticks.pitch), (CommandSource::Pilot, 1.0));
+/// let sticks = authority.step(Instant::from_millis(500), CommandSource::Pilot);
+/// assert_eq!((sticks.source, sticks.pitch), (CommandSource::Failsafe, 0.0));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Authority {
     config: AuthorityConfig,
     pilot: Option<(Instant, PilotInput)>,
+    /// When the first frame after a silence came; `None` before the first silence.
+    pilot_back: Option<Instant>,
     guided: Option<Instant>,
-    /// The pilot has taken over and no command has come since.
-    pilot_holds: bool,
 }
 
 impl Authority {
-    /// Nobody has commanded anything yet.
+    /// No source has been heard yet.
     #[must_use]
     pub fn new(config: AuthorityConfig) -> Self {
         Self { config, ..Self::default() }
@@ -61,44 +63,36 @@ impl Authority {
             throttle: stick(input.throttle),
             ..*input
         };
-        let deflected =
-            [input.roll, input.pitch, input.yaw, input.throttle].iter().any(|s| s.abs() > self.config.take_over);
-        self.pilot_holds |= deflected;
+        if self.pilot.is_some_and(|(last, _)| at.since(last) >= self.config.stale) {
+            self.pilot_back = Some(at);
+        }
         self.pilot = Some((at, input));
     }
 
-    /// A command from a program, other than a sign of life.
+    /// A command from a program, or a sign of life.
     pub fn guided(&mut self, at: Instant) {
         self.guided = Some(at);
-        self.pilot_holds = false;
     }
 
-    /// A sign of life from a program.
-    pub fn guided_alive(&mut self, at: Instant) {
-        if self.guided.is_some() {
-            self.guided = Some(at);
-        }
-    }
-
-    /// The set-point now.
+    /// The set-point now, of the source that has authority.
     #[must_use]
-    pub fn step(&self, now: Instant) -> CommandSetpoint {
+    pub fn step(&self, now: Instant, commander: CommandSource) -> CommandSetpoint {
         let fresh = |at: Instant| now.since(at) < self.config.stale;
         let pilot = self.pilot.filter(|(at, _)| fresh(*at)).map(|(_, input)| input);
-        let guided = self.guided.is_some_and(fresh) && !self.pilot_holds;
-        match pilot {
-            _ if guided => CommandSetpoint { source: CommandSource::Guided, ..Default::default() },
-            Some(input) => CommandSetpoint {
+        let settled = self.pilot_back.is_none_or(|back| now.since(back) >= self.config.back);
+        match (commander, pilot.filter(|_| settled)) {
+            (CommandSource::Pilot, Some(input)) => CommandSetpoint {
                 throttle: self.centred(input.throttle),
                 roll: self.centred(input.roll),
                 pitch: self.centred(input.pitch),
                 yaw: self.centred(input.yaw),
                 source: CommandSource::Pilot,
             },
-            None if self.pilot.is_some() || self.guided.is_some() => {
-                CommandSetpoint { source: CommandSource::Failsafe, ..Default::default() }
+            (CommandSource::Guided, _) if self.guided.is_some_and(fresh) => {
+                CommandSetpoint { source: CommandSource::Guided, ..Default::default() }
             }
-            None => CommandSetpoint::default(),
+            (CommandSource::None, _) => CommandSetpoint::default(),
+            _ => CommandSetpoint { source: CommandSource::Failsafe, ..Default::default() },
         }
     }
 
@@ -113,24 +107,63 @@ impl Authority {
 mod tests {
     use super::*;
 
+    const HALF: PilotInput = PilotInput {
+        roll: 0.5,
+        pitch: 0.0,
+        yaw: 0.0,
+        throttle: 0.0,
+        mode: stampfly_types::messages::FlightMode::PosHold,
+        arm: true,
+        kill: false,
+    };
+
     #[test]
-    fn guidance_does_not_retake_by_being_alive() {
+    fn only_the_commander_is_followed() {
         let mut authority = Authority::default();
+        let now = Instant::from_millis(10);
+        for commander in [CommandSource::Pilot, CommandSource::Guided, CommandSource::Failsafe] {
+            assert_eq!(authority.step(now, commander).source, CommandSource::Failsafe, "never heard");
+        }
         authority.guided(Instant::ZERO);
-        authority.pilot(Instant::from_micros(10), &PilotInput { roll: 0.5, ..Default::default() });
-        authority.guided_alive(Instant::from_micros(20));
-        assert_eq!(authority.step(Instant::from_micros(30)).source, CommandSource::Pilot);
-        authority.guided(Instant::from_micros(40));
-        assert_eq!(authority.step(Instant::from_micros(50)).source, CommandSource::Guided, "a new command does");
+        authority.pilot(Instant::ZERO, &HALF);
+        for commander in [CommandSource::None, CommandSource::Pilot, CommandSource::Guided] {
+            let sticks = authority.step(now, commander);
+            assert_eq!(sticks.source, commander);
+            assert_eq!(sticks.roll > 0.0, commander == CommandSource::Pilot);
+        }
     }
 
     #[test]
-    fn silence_is_the_failsafe_and_nan_is_centre() {
+    fn d13_one_source_does_not_speak_for_another() {
         let mut authority = Authority::default();
-        assert_eq!(authority.step(Instant::ZERO).source, CommandSource::None);
+        authority.pilot(Instant::ZERO, &HALF);
+        authority.guided(Instant::from_millis(900));
+        let now = Instant::from_secs(1);
+        assert_eq!(authority.step(now, CommandSource::Pilot).source, CommandSource::Failsafe);
+        assert_eq!(authority.step(now, CommandSource::Guided).source, CommandSource::Guided);
+    }
+
+    #[test]
+    fn d13_sticks_count_a_second_after_a_silence() {
+        let mut authority = Authority::default();
+        let mut first = None;
+        for ms in (0..4_000u64).step_by(20).filter(|ms| !(1_000..1_600).contains(ms)) {
+            let now = Instant::from_millis(ms);
+            authority.pilot(now, &HALF);
+            let piloted = authority.step(now, CommandSource::Pilot).source == CommandSource::Pilot;
+            assert!(piloted || ms >= 1_600, "a short gap is none: {ms}");
+            if ms >= 1_600 && piloted {
+                first.get_or_insert(ms);
+            }
+        }
+        assert_eq!(first, Some(2_600));
+    }
+
+    #[test]
+    fn nan_is_centre() {
+        let mut authority = Authority::default();
         authority.pilot(Instant::ZERO, &PilotInput { roll: f32::NAN, pitch: 9.0, ..Default::default() });
-        let setpoint = authority.step(Instant::from_micros(1));
+        let setpoint = authority.step(Instant::from_micros(1), CommandSource::Pilot);
         assert_eq!((setpoint.roll, setpoint.pitch), (0.0, 1.0));
-        assert_eq!(authority.step(Instant::from_millis(500)).source, CommandSource::Failsafe);
     }
 }

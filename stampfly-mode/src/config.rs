@@ -24,8 +24,36 @@ pub struct ModeConfig {
     pub spool: Duration,
     /// An armed vehicle that is not told to take off is disarmed after this long.
     pub armed_timeout: Duration,
+    /// A take-off that takes longer ends in a landing.
+    pub take_off_timeout: Duration,
     /// How long the vehicle hovers without a link before it lands.
     pub hover_without_link: Duration,
+    /// A link that was lost counts as back when it has been heard for this long; it is lost once in twice this time at most.
+    pub link_back: Duration,
+    /// How long a mode that holds height goes on without one before the vehicle lands.
+    pub blind: Duration,
+    /// Below this height above the ground an arm switch turned off stops the motors of a landing vehicle, m.
+    pub stop_height: f32,
+    /// Longest landing without a known height.
+    pub landing_blind: Duration,
+    /// Longest landing from a known height: this time, and the height at [`Self::landing_slowest`].
+    pub landing_spare: Duration,
+    /// Slowest descent of a landing that still comes down, m/s.
+    pub landing_slowest: f32,
+    /// A pilot's switch counts in its new position when frames have shown it there for this long.
+    pub switch_debounce: Duration,
+    /// Deflection with which a pilot takes over from a program, share.
+    pub take_over: f32,
+    /// For how long the sticks have to be deflected so far.
+    pub take_over_time: Duration,
+    /// Arming refuses a sensor whose newest usable sample is older.
+    pub sensor_silence: Duration,
+    /// A vehicle that hears no new transmitter for this long stops looking.
+    pub pairing_timeout: Duration,
+    /// After this time in pairing, every frame is a new transmitter's.
+    pub pairing_settle: Duration,
+    /// A lifted vehicle that does not know its height for this long counts as standing.
+    pub height_unknown: Duration,
     /// Height above the ground over which a disarmed vehicle has been lifted by somebody, m.
     pub held_height: f32,
     /// Height above the ground below which a vehicle that was lifted stands again, m.
@@ -48,8 +76,33 @@ impl Default for ModeConfig {
             spool: Duration::from_millis(300),
             // Time to look at the vehicle once more. One that was forgotten must not stay armed.
             armed_timeout: Duration::from_secs(10),
+            // A take-off to three metres at 0.4 m/s takes 8 s. One that takes twice that is none.
+            take_off_timeout: Duration::from_secs(15),
             // A link that is gone for longer seldom comes back by itself, and indoors the vehicle blocks a room.
             hover_without_link: Duration::from_secs(3),
+            // A jammed link lets bursts of some tenths of a second through.
+            link_back: Duration::from_secs(1),
+            // A sensor that restarts is back within half of it. Inertial data alone holds a height for about as long.
+            blind: Duration::from_secs(1),
+            // The height above which the StampFly's reference firmware calls a vehicle airborne.
+            stop_height: 0.15,
+            // At 0.15 m/s, the slowest descent of a landing, 9 m. The navigator's ceiling is a third of that.
+            landing_blind: Duration::from_secs(60),
+            landing_spare: Duration::from_secs(30),
+            landing_slowest: 0.15,
+            // Four frames at 50 Hz: more than two bad ones, and not felt by a thumb.
+            switch_debounce: Duration::from_millis(60),
+            take_over: 0.15,
+            // Longer than a bump against the transmitter, shorter than a person's reaction to what the vehicle does.
+            take_over_time: Duration::from_millis(100),
+            // Thirty periods of the slowest of them.
+            sensor_silence: Duration::from_secs(1),
+            // Time to switch on a transmitter and to put it into pairing.
+            pairing_timeout: Duration::from_secs(60),
+            // The radio follows within 20 ms.
+            pairing_settle: Duration::from_millis(200),
+            // The range finder gives thirty samples a second, so all of sixty were unusable.
+            height_unknown: Duration::from_secs(2),
             // The range finder of a standing vehicle reads some centimetres; a hand lifts it higher than that.
             held_height: 0.15,
             standing_height: 0.08,

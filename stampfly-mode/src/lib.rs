@@ -2,12 +2,13 @@
 //!
 //! | module | decides | steps |
 //! |---|---|---|
-//! | [`machine`] | flight phase and flight mode: the only place where they change | 400 Hz |
+//! | [`machine`] | flight phase, flight mode, commander: the only place where they change | 400 Hz |
+//! | [`decision`] | the same as a function of state and facts | inside the machine |
 //! | [`transitions`] | which event leads to which phase | inside the machine |
 //! | [`arming`] | whether the motors may be armed, and if not, why | inside the machine |
 //! | [`failsafe`] | what is wrong: detects, never acts | 400 Hz |
 //! | [`landing`] | contact with the ground, take-off and landing | 400 Hz |
-//! | [`authority`] | whose sticks count | 50 Hz |
+//! | [`authority`] | the sticks of the commander | 50 Hz |
 //! | [`button`] | what a press meant | 50 Hz |
 //! | [`signal`] | what people see and hear | 30 Hz |
 //!
@@ -18,23 +19,28 @@
 #[cfg(test)]
 extern crate std;
 
-mod arm_switch;
 pub mod arming;
 pub mod authority;
 pub mod button;
 mod config;
+pub mod decision;
+mod facts;
 pub mod failsafe;
 mod input;
 pub mod landing;
 pub mod machine;
+mod pilot;
 pub mod signal;
 mod stop_button;
 pub mod transitions;
 
+pub use arming::Refusal;
 pub use authority::{Authority, AuthorityConfig};
 pub use button::{ButtonConfig, ButtonDecoder};
 pub use config::ModeConfig;
+pub use facts::{Ages, Asked, Facts};
 pub use failsafe::{Failsafe, FailsafeConfig, FailsafeInput};
 pub use landing::{LandingConfig, LandingInput, TakeoffLanding};
-pub use machine::{Command, ModeInput, ModeMachine, ModeOutput};
+pub use machine::{Command, ModeInput, ModeMachine, ModeOutput, SensorTimes};
+pub use pilot::{Heard, Switched};
 pub use signal::Signaller;

@@ -1,13 +1,14 @@
-//! Which event leads from which phase to which: the whole table, as one total function.
+//! Which event leads from which phase to which: the whole table.
 //!
 //! ```text
 //! INIT ─ready─► IDLE_GROUND ◄─lifted/set down─► IDLE_HELD
-//!                 │ arm                 ▲ disarm, emergency
+//!                 │ arm                 ▲ stop, emergency
 //!                 ▼                     │ (from every phase below)
 //!               ARMED ─take off─► TAKEOFF ─complete─► FLYING ─land─► LANDING ─touchdown─► IDLE_GROUND
 //! ```
 //!
-//! Who finds out that an event has happened is the [mode machine](crate::machine).
+//! [`decide`](crate::decision::decide) finds out which events have happened. `docs/modes.md` is printed from [`TABLE`] and
+//! [`Event::guard`].
 
 use stampfly_types::messages::FlightPhase;
 
@@ -16,7 +17,7 @@ use stampfly_types::messages::FlightPhase;
 pub enum Event {
     /// Sensors, calibration and estimate are ready.
     Ready,
-    /// A hand has lifted the vehicle.
+    /// The vehicle was lifted by a person.
     Lifted,
     /// It stands again.
     SetDown,
@@ -26,21 +27,21 @@ pub enum Event {
     TakeOff,
     /// The take-off height is reached.
     TakeOffComplete,
-    /// Landing was asked for, or the failsafe demands it.
+    /// Landing was asked for, or is demanded by a fault.
     Land,
     /// Touchdown is sure.
     Touchdown,
-    /// Disarming was asked for.
-    Disarm,
+    /// Motors off, because a person or program asked for it or the phase took too long.
+    Stop,
     /// Motors off now.
     Emergency,
 }
 
 impl Event {
-    /// Every event, most urgent first: the order in which [`ModeMachine::step`](crate::ModeMachine::step) looks at them.
+    /// Every event, most urgent first: the order in which [`decide`](crate::decision::decide) looks at them.
     pub const ALL: [Self; 10] = [
         Self::Emergency,
-        Self::Disarm,
+        Self::Stop,
         Self::Touchdown,
         Self::Land,
         Self::TakeOffComplete,
@@ -50,40 +51,102 @@ impl Event {
         Self::Lifted,
         Self::Ready,
     ];
+
+    /// When it happens, in words: for `docs/modes.md`.
+    #[must_use]
+    pub const fn guard(self) -> &'static str {
+        match self {
+            Self::Emergency => {
+                "kill from any link, a press of the button, the cut-off, or `IMPACT`, `GYRO_ANOMALY`, `TUMBLED`, `IMU_LOST`"
+            }
+            Self::Stop => {
+                "ARMED: arm switch off, `Disarm`, or armed for too long. TAKEOFF, FLYING: arm switch off in a manual mode. \
+                 LANDING: arm switch off or `Disarm` at the ground, a second deliberate switch-off of the pilot whose switch \
+                 began the landing, or a landing that takes too long"
+            }
+            Self::Touchdown => "the land detector is sure",
+            Self::Land => {
+                "`Land` or `Disarm` from any program, arm switch off in a mode that holds height, link lost for too long (at \
+                 once without height), height lost for too long, a take-off that takes too long, or `CRITICAL_BATTERY`, \
+                 `ESTIMATE_DIVERGED`"
+            }
+            Self::TakeOffComplete => "the land detector says so, or in a manual mode the vehicle has left the ground",
+            Self::TakeOff => {
+                "`TakeOff`, the spool-up time after arming in a mode that holds height, or the pilot's throttle raised from \
+                 rest"
+            }
+            Self::Arm => {
+                "arm switch on, a click, or `Arm`, with an empty list of blocks and nothing in the same step that kills, \
+                 disarms or lands"
+            }
+            Self::SetDown => "height below `standing_height`, or unknown for `height_unknown`",
+            Self::Lifted => "height above `held_height`",
+            Self::Ready => "still-calibration complete and tilt known",
+        }
+    }
 }
 
-/// The transition table. `holds_height` says whether the flight mode holds height by itself: then a disarm in the air
-/// lands first.
+/// A row of the table: in this phase, this event leads to that phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Transition {
+    /// The phase before.
+    pub from: FlightPhase,
+    /// What happens.
+    pub event: Event,
+    /// The phase after.
+    pub to: FlightPhase,
+}
+
+const fn row(from: FlightPhase, event: Event, to: FlightPhase) -> Transition {
+    Transition { from, event, to }
+}
+
+use Event as E;
+use FlightPhase as S;
+
+/// Every transition there is. A phase ignores an event without a row.
+pub const TABLE: &[Transition] = &[
+    row(S::Init, E::Ready, S::IdleGround),
+    row(S::IdleGround, E::Lifted, S::IdleHeld),
+    row(S::IdleHeld, E::SetDown, S::IdleGround),
+    row(S::IdleGround, E::Arm, S::Armed),
+    row(S::Armed, E::TakeOff, S::TakeOff),
+    row(S::Armed, E::Emergency, S::IdleGround),
+    row(S::Armed, E::Stop, S::IdleGround),
+    row(S::Armed, E::Land, S::IdleGround),
+    row(S::TakeOff, E::TakeOffComplete, S::Flying),
+    row(S::TakeOff, E::Emergency, S::IdleGround),
+    row(S::TakeOff, E::Stop, S::IdleGround),
+    row(S::TakeOff, E::Land, S::Landing),
+    row(S::Flying, E::Emergency, S::IdleGround),
+    row(S::Flying, E::Stop, S::IdleGround),
+    row(S::Flying, E::Land, S::Landing),
+    row(S::Landing, E::Emergency, S::IdleGround),
+    row(S::Landing, E::Stop, S::IdleGround),
+    row(S::Landing, E::Touchdown, S::IdleGround),
+];
+
+/// Where an event leads; `None` when the phase ignores it.
+///
+/// ```
+/// use stampfly_mode::transitions::{Event, next};
+/// use stampfly_types::messages::FlightPhase;
+/// assert_eq!(next(FlightPhase::Flying, Event::Land), Some(FlightPhase::Landing));
+/// assert_eq!(next(FlightPhase::Flying, Event::Arm), None);
+/// ```
 #[must_use]
-pub const fn next(phase: FlightPhase, event: Event, holds_height: bool) -> Option<FlightPhase> {
-    use Event as E;
-    use FlightPhase as S;
-    match (phase, event) {
-        (S::Init, E::Ready) => Some(S::IdleGround),
-        (S::IdleGround, E::Lifted) => Some(S::IdleHeld),
-        (S::IdleHeld, E::SetDown) => Some(S::IdleGround),
-        (S::IdleGround, E::Arm) => Some(S::Armed),
-        (S::Armed, E::TakeOff) => Some(S::TakeOff),
-        (S::TakeOff, E::TakeOffComplete) => Some(S::Flying),
-        (S::TakeOff | S::Flying, E::Land) => Some(S::Landing),
-        (S::TakeOff | S::Flying, E::Disarm) => Some(if holds_height { S::Landing } else { S::IdleGround }),
-        (S::Landing, E::Touchdown | E::Disarm) | (S::Armed, E::Disarm | E::Land) => Some(S::IdleGround),
-        (S::Armed | S::TakeOff | S::Flying | S::Landing, E::Emergency) => Some(S::IdleGround),
-        (S::Init, E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
-        | (S::Init, E::Disarm | E::Emergency)
-        | (S::IdleGround, E::Ready | E::SetDown | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
-        | (S::IdleGround, E::Disarm | E::Emergency)
-        | (S::IdleHeld, E::Ready | E::Lifted | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land | E::Touchdown)
-        | (S::IdleHeld, E::Disarm | E::Emergency)
-        | (S::Armed, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOffComplete | E::Touchdown)
-        | (S::TakeOff, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::Touchdown)
-        | (S::Flying, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Touchdown)
-        | (S::Landing, E::Ready | E::Lifted | E::SetDown | E::Arm | E::TakeOff | E::TakeOffComplete | E::Land) => None,
-    }
+pub fn next(phase: FlightPhase, event: Event) -> Option<FlightPhase> {
+    TABLE.iter().find(|row| row.from == phase && row.event == event).map(|row| row.to)
 }
 
 /// May the motors turn in this phase?
 #[must_use]
 pub const fn is_armed(phase: FlightPhase) -> bool {
     matches!(phase, FlightPhase::Armed | FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing)
+}
+
+/// Has the vehicle been sent into the air?
+#[must_use]
+pub const fn is_airborne(phase: FlightPhase) -> bool {
+    matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing)
 }

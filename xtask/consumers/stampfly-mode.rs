@@ -1,6 +1,6 @@
 //! A stranger's program: a vehicle that becomes ready.
 
-use stampfly_mode::{ModeInput, ModeMachine};
+use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
 use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
@@ -12,9 +12,12 @@ fn main() {
         estimate: &estimate,
         calibration: &calibration,
         land_detected: &LandDetected::default(),
+        sensors: SensorTimes::all(Instant::ZERO),
         pilot: None,
+        sticks: CommandSource::None,
         commands: &[],
         button: None,
+        cut_off: false,
     };
     assert_eq!(ModeMachine::default().step(Instant::from_micros(2_500), &input).flight_status.phase, FlightPhase::IdleGround);
 }

@@ -2,9 +2,22 @@
 
 use crate::config::VehicleConfig;
 use crate::topics::CommandEnds;
-use stampfly_bus::{Activation, Runnable};
+use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::Authority;
-use stampfly_types::messages::GuidedKind;
+use stampfly_types::messages::{CommandSetpoint, CommandSource};
+use stampfly_types::{Duration, Instant};
+
+/// Sticks that are older than this are nobody's: five periods of this runnable, which has a slow band and may be starved.
+const OLDEST: Duration = Duration::from_millis(100);
+
+/// The sticks as their readers may use them: those of the failsafe, level and no climb, when they are too old.
+pub(super) fn present(sample: Option<&Stamped<CommandSetpoint>>, now: Instant) -> CommandSetpoint {
+    match sample {
+        Some(sample) if sample.age(now) < OLDEST => sample.data,
+        Some(_) => CommandSetpoint { source: CommandSource::Failsafe, ..CommandSetpoint::default() },
+        None => CommandSetpoint::default(),
+    }
+}
 
 /// Command: every source of commands in, one arbitrated set of sticks out.
 #[derive(Clone, Debug)]
@@ -29,13 +42,9 @@ impl Runnable for Command {
             self.authority.pilot(frame.at, &frame.data);
         }
         for command in ends.command_guided.iter() {
-            if command.data.kind == GuidedKind::None {
-                self.authority.guided_alive(command.at);
-            } else {
-                self.authority.guided(command.at);
-            }
+            self.authority.guided(command.at);
         }
-        let setpoint = self.authority.step(activation.now());
+        let setpoint = self.authority.step(activation.now(), ends.flight_status.get().commander);
         ends.command_setpoint.publish(activation.now(), &setpoint);
     }
 }

@@ -1,5 +1,6 @@
 //! Control: state and set-point in, thrust and torque out.
 
+use super::command::present;
 use crate::config::{ControllerKind, VehicleConfig};
 use crate::topics::ControlEnds;
 use stampfly_bus::{Activation, Runnable};
@@ -37,10 +38,11 @@ impl Runnable for Control {
     type Ends<'b> = ControlEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut ControlEnds<'_>) {
+        let command = present(ends.command_setpoint.sample(), activation.now());
         // Until a topic has its first sample its message's default stands in: nothing valid, not armed.
         let input = ControlInput {
             estimate: ends.estimate_state.get(),
-            command: ends.command_setpoint.get(),
+            command: &command,
             setpoint: ends.setpoint.get(),
             flight_status: ends.flight_status.get(),
             land_detected: ends.land_detected.get(),

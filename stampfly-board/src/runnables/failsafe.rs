@@ -5,13 +5,15 @@ use crate::topics::FailsafeEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::FailsafeInput;
 use stampfly_types::Instant;
+use stampfly_types::messages::CommandSource;
 
 /// Failsafe: everything that can go wrong in, alerts out.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Failsafe {
     failsafe: stampfly_mode::Failsafe,
-    last_command: Option<Instant>,
+    last_pilot: Option<Instant>,
+    last_guided: Option<Instant>,
     last_tof: Option<Instant>,
     last_flow: Option<Instant>,
 }
@@ -22,7 +24,8 @@ impl Failsafe {
     pub fn new(config: &VehicleConfig) -> Self {
         Self {
             failsafe: stampfly_mode::Failsafe::new(config.failsafe),
-            last_command: None,
+            last_pilot: None,
+            last_guided: None,
             last_tof: None,
             last_flow: None,
         }
@@ -40,14 +43,22 @@ impl Runnable for Failsafe {
         self.last_flow = self.last_flow.max(flow);
         let pilot = ends.command_pilot.last().map(|sample| sample.at);
         let guided = ends.command_guided.last().map(|sample| sample.at);
-        self.last_command = self.last_command.max(pilot).max(guided);
+        (self.last_pilot, self.last_guided) = (self.last_pilot.max(pilot), self.last_guided.max(guided));
+        // Who does not fly the vehicle does not speak for the one who does.
+        let heard = match ends.flight_status.get().commander {
+            CommandSource::Pilot => self.last_pilot,
+            CommandSource::Guided => self.last_guided,
+            CommandSource::None | CommandSource::Failsafe => self.last_pilot.max(self.last_guided),
+        };
+        // Commands that do not get through on board are not heard, either.
+        let command = heard.min(ends.command_setpoint.sample().map(|sticks| sticks.at));
 
         let input = |imu| FailsafeInput {
             imu,
             estimate: ends.estimate_state.get(),
             status: ends.estimate_status.get(),
             power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
-            command: self.last_command,
+            command,
             tof: self.last_tof,
             flow: self.last_flow,
             self_test: ends.self_test.get().verdict,

@@ -1,11 +1,12 @@
 //! State management: alerts, commands and facts in, the vehicle's state out.
 
+use super::command::present;
 use crate::config::VehicleConfig;
 use crate::messages::RestartRequest;
 use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
-use stampfly_mode::{ModeInput, ModeMachine};
+use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
 use stampfly_types::messages::{ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
@@ -17,6 +18,7 @@ pub struct Mode {
     /// A pilot's frame as old as this counts as none.
     stale_pilot: Duration,
     pilot: Option<Stamped<PilotInput>>,
+    sensors: SensorTimes,
     published: Option<EstimatorCommand>,
     /// The decision of the step before.
     last: FlightStatus,
@@ -33,6 +35,7 @@ impl Mode {
             // The frames that count for the sticks count here, too.
             stale_pilot: config.authority.stale,
             pilot: None,
+            sensors: SensorTimes::default(),
             published: None,
             last: FlightStatus::default(),
             armed_at: Instant::ZERO,
@@ -46,14 +49,19 @@ impl Runnable for Mode {
     fn run(&mut self, activation: &mut Activation, ends: &mut ModeEnds<'_>) {
         let now = activation.now();
         self.pilot = ends.command_pilot.last().copied().or(self.pilot);
-        // As many as the queue holds, and one of the cut-off's.
-        let mut commands = Vec::<GuidedKind, 17>::new();
+        let range = ends.sensor_tof.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
+        let flow = ends.sensor_flow.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
+        let baro =
+            ends.sensor_baro.iter().filter(|sample| sample.data.altitude.is_finite()).map(|sample| sample.at).max();
+        self.sensors = SensorTimes {
+            range: self.sensors.range.max(range),
+            flow: self.sensors.flow.max(flow),
+            baro: self.sensors.baro.max(baro),
+        };
+        // As many as the queue holds.
+        let mut commands = Vec::<GuidedKind, 16>::new();
         for command in ends.command_guided.iter() {
             let _ = commands.push(command.data.kind);
-        }
-        // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on without them.
-        if self.last.armed && ends.cutoff_state.get().tripped {
-            let _ = commands.push(GuidedKind::Kill);
         }
         // There is one event in a step, unless the loop was held up. Then the one that stops the motors counts.
         let newest = ends.button_event.last().map(|event| event.data.gesture);
@@ -68,9 +76,17 @@ impl Runnable for Mode {
             estimate: ends.estimate_state.get(),
             calibration: ends.calibration.get(),
             land_detected: ends.land_detected.get(),
-            pilot: self.pilot.as_ref().filter(|frame| frame.age(now) < self.stale_pilot).map(|frame| &frame.data),
+            sensors: self.sensors,
+            pilot: self
+                .pilot
+                .as_ref()
+                .filter(|frame| frame.age(now) < self.stale_pilot)
+                .map(|frame| (frame.at, &frame.data)),
+            sticks: present(ends.command_setpoint.sample(), now).source,
             commands: &commands,
             button,
+            // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on without them.
+            cut_off: ends.cutoff_state.get().tripped,
         };
         let output = self.machine.step(now, &input);
         ends.flight_status.publish(now, &output.flight_status);

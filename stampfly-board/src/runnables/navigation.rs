@@ -1,5 +1,6 @@
 //! Navigator: commands and state in, the vehicle's path out.
 
+use super::command::present;
 use crate::config::VehicleConfig;
 use crate::topics::NavigationEnds;
 use stampfly_bus::{Activation, Runnable};
@@ -28,11 +29,12 @@ impl Runnable for Navigation {
             // The navigator counts a refusal; the sender sees it in `remaining`.
             let _ = self.navigator.accept(&command.data);
         }
+        let command = present(ends.command_setpoint.sample(), activation.now());
         let input = NavigatorInput {
             flight_status: ends.flight_status.get(),
             estimate: ends.estimate_state.get(),
             land_detected: ends.land_detected.get(),
-            command: ends.command_setpoint.get(),
+            command: &command,
         };
         let setpoint = self.navigator.step(activation.now(), &input);
         ends.setpoint.publish(activation.now(), &setpoint);

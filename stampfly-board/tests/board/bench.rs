@@ -10,7 +10,8 @@ use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::{Address, ControlPacket, Rejected, Session};
 use stampfly_types::messages::{
-    ArmBlocks, FlightStatus, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput, PowerData, TofData,
+    ArmBlocks, BaroData, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput,
+    PowerData, TofData,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Message, Vec3};
 
@@ -22,6 +23,8 @@ pub const NEW: Address = Address([2, 0, 0, 0, 0, 2]);
 pub struct Ends<'b> {
     imu: topics::ImuEnds<'b>,
     tof: topics::TofEnds<'b>,
+    flow: topics::FlowEnds<'b>,
+    baro: topics::BaroEnds<'b>,
     power: topics::PowerEnds<'b>,
     button: topics::ButtonPinEnds<'b>,
     guided: topics::CommandGuidedTx<'b>,
@@ -49,10 +52,13 @@ impl<'b> Bench<'b> {
     pub fn new(bus: &'b mut topics::Bus, peer: Option<Address>) -> Self {
         let Assembled { flight_loop: flight, outside, taps } =
             Assembled::new(bus, None, &VehicleConfig::default(), Instant::ZERO);
-        let topics::Outside { imu, tof, power, link, button_pin, console, storage, cutoff, supervisor, .. } = outside;
+        let topics::Outside {
+            imu, tof, flow, baro, power, link, button_pin, console, storage, cutoff, supervisor, ..
+        } = outside;
         let topics::LinkEnds { command_pilot, command_guided: guided, flight_status, telemetry, link_peer } = link;
         let link = Link::new(Session::new(VEHICLE, 1, peer), command_pilot, link_peer, flight_status, telemetry);
-        let ends = Ends { imu, tof, power, button: button_pin, guided, console, storage, cutoff, supervisor };
+        let ends =
+            Ends { imu, tof, flow, baro, power, button: button_pin, guided, console, storage, cutoff, supervisor };
         let newest = Newest::new();
         Self { flight, ends, link, taps, newest, monitor: true, program: false, now: Instant::ZERO }
     }
@@ -97,6 +103,9 @@ impl<'b> Bench<'b> {
                 self.ends.button.button_contact.publish(now, &ButtonContact { pressed });
                 let range = TofData { distance: 0.03, valid: true, ..Default::default() };
                 self.ends.tof.sensor_tof.publish(now, &range);
+                let flow = FlowData { interval: 0.02, quality: 80, valid: true, ..Default::default() };
+                self.ends.flow.sensor_flow.publish(now, &flow);
+                self.ends.baro.sensor_baro.publish(now, &BaroData { pressure: 101_325.0, ..Default::default() });
                 if self.monitor {
                     self.ends.power.sensor_power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
                 }

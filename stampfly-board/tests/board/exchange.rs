@@ -92,6 +92,10 @@ fn a_cut_off_disarms() {
     bench.pass(5, false, &[(OLD, false)]);
     assert!(!bench.armed() && !bench.motors().armed);
     bench.ends.cutoff.cutoff_state.publish(bench.now, &CutoffState { tripped: false });
+    bench.pass(100, false, &[(OLD, false)]);
+    assert_eq!(bench.blocks(), ArmBlocks::CUT_OFF, "to be acknowledged");
+    bench.command(GuidedKind::Disarm);
+    bench.pass(20, false, &[(OLD, false)]);
     arm(&mut bench);
     bench.pass(100, false, &[(OLD, false)]);
     assert!(bench.armed());

@@ -18,4 +18,5 @@ mod reference;
 mod replay;
 mod report;
 mod rover;
+mod safety_mode;
 mod swap;

@@ -1,199 +1,536 @@
-//! The machine from outside, step by step: phases, events, the arm switch, the button, crashes.
+//! The machine from outside, step by step: phases, events, switches, the button, crashes, silence.
 
 use super::*;
 use stampfly_types::Duration;
-use stampfly_types::messages::{ArmBlocks, CalibrationResult, GuidedKind, LandDetected, PilotInput, StateEstimate};
-use std::collections::BTreeSet;
-use std::vec;
-use std::vec::Vec;
+use stampfly_types::messages::{
+    Alerts, CalibrationResult, FlightMode, GroundContact, GuidedKind, LandDetected, PilotInput, StateEstimate, Validity,
+};
+
+const STEP: Duration = Duration::from_micros(2_500);
 
 /// A situation the machine can be put into.
 #[derive(Clone)]
-struct World {
-    estimate: StateEstimate,
-    calibration: CalibrationResult,
-    land_detected: LandDetected,
-    alerts: Alerts,
-    pilot: Option<PilotInput>,
+pub(crate) struct World {
+    pub estimate: StateEstimate,
+    pub calibration: CalibrationResult,
+    pub land_detected: LandDetected,
+    pub alerts: Alerts,
+    /// Sends a frame every 20 ms.
+    pub pilot: Option<PilotInput>,
+    /// What the controllers follow; `None` for the commander's sticks, at once.
+    pub sticks: Option<CommandSource>,
+    pub sensors: Option<SensorTimes>,
     /// Happens in the next step, and not again.
-    button: Option<ButtonGesture>,
-    now: Instant,
+    pub button: Option<ButtonGesture>,
+    pub cut_off: bool,
+    pub now: Instant,
 }
 
 impl World {
-    fn ready() -> Self {
+    pub fn ready() -> Self {
         Self {
             estimate: StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() },
             calibration: CalibrationResult { complete: true, ..Default::default() },
             land_detected: LandDetected::default(),
             alerts: Alerts::NONE,
             pilot: None,
+            sticks: None,
+            sensors: None,
             button: None,
+            cut_off: false,
             now: Instant::ZERO,
         }
     }
 
-    fn step(&mut self, machine: &mut ModeMachine, commands: &[Command]) -> ModeOutput {
-        self.now += Duration::from_micros(2_500);
+    pub fn step(&mut self, machine: &mut ModeMachine, commands: &[Command]) -> ModeOutput {
+        self.now += STEP;
+        let frame_at = Instant::from_micros(self.now.as_micros() / 20_000 * 20_000);
         let input = ModeInput {
             alerts: self.alerts,
             estimate: &self.estimate,
             calibration: &self.calibration,
             land_detected: &self.land_detected,
-            pilot: self.pilot.as_ref(),
+            sensors: self.sensors.unwrap_or(SensorTimes::all(self.now)),
+            pilot: self.pilot.as_ref().map(|pilot| (frame_at, pilot)),
+            sticks: self.sticks.unwrap_or(machine.state.commander),
             commands,
             button: self.button.take(),
+            cut_off: self.cut_off,
         };
         machine.step(self.now, &input)
     }
+
+    /// Lets this time pass, and returns the last decision.
+    pub fn pass(&mut self, machine: &mut ModeMachine, millis: u64) -> FlightStatus {
+        let end = self.now + Duration::from_millis(millis);
+        let mut status = self.step(machine, &[]).flight_status;
+        while self.now < end {
+            status = self.step(machine, &[]).flight_status;
+        }
+        status
+    }
+
+    /// The pilot sends this for long enough to be believed.
+    pub fn sends(&mut self, machine: &mut ModeMachine, pilot: PilotInput) -> FlightStatus {
+        self.pilot = Some(pilot);
+        self.pass(machine, 120)
+    }
+
+    /// The vehicle is in the air, so high.
+    pub fn fly_at(&mut self, height: f32) {
+        self.estimate.height = height;
+        self.land_detected.contact = GroundContact::Air;
+    }
 }
 
-#[test]
-fn pairing_ends_with_the_first_frame_after_a_silence_and_its_arm_switch_must_be_seen_off() {
-    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    let hold = |world: &mut World, machine: &mut ModeMachine| {
-        world.button = Some(ButtonGesture::HoldPair);
-        world.step(machine, &[]).flight_status.pairing
-    };
-    world.pilot = Some(PilotInput::default());
-    world.step(&mut machine, &[]);
-    assert!(hold(&mut world, &mut machine));
-    assert!(world.step(&mut machine, &[]).flight_status.pairing, "a frame from before is still fresh");
-    assert!(!hold(&mut world, &mut machine), "the pilot has changed his mind");
-    assert!(hold(&mut world, &mut machine));
-    world.pilot = None;
-    assert!(world.step(&mut machine, &[]).flight_status.pairing);
-    world.pilot = Some(PilotInput { arm: true, ..Default::default() });
-    let paired = world.step(&mut machine, &[]).flight_status;
-    assert!(!paired.pairing && !paired.armed);
-    assert!(!world.step(&mut machine, &[]).flight_status.armed, "switched on before it was seen off");
-    world.pilot = Some(PilotInput::default());
-    world.step(&mut machine, &[]);
-    world.pilot = Some(PilotInput { arm: true, ..Default::default() });
-    assert!(world.step(&mut machine, &[]).flight_status.armed);
-}
-
-/// What happens to the world before a command.
-type Change = fn(&mut World);
-
-fn in_phase(phase: FlightPhase) -> (ModeMachine, World) {
+/// A phase reached by program, in a vehicle that flies at 1.5 m.
+pub(crate) fn in_phase(phase: FlightPhase) -> (ModeMachine, World) {
     let (mut machine, mut world) = (ModeMachine::default(), World::ready());
-    let path: &[(Command, Change)] = &[
-        (Command::None, |_| {}),
-        (Command::Arm, |_| {}),
-        (Command::TakeOff, |_| {}),
-        (Command::None, |world| world.land_detected.takeoff_complete = true),
-        (Command::Land, |world| world.land_detected.takeoff_complete = false),
-    ];
-    for (command, change) in path {
-        if machine.output.flight_status.phase == phase {
+    for command in [Command::None, Command::Arm, Command::TakeOff, Command::None, Command::Land] {
+        if machine.state.phase == phase {
             break;
         }
-        change(&mut world);
-        world.step(&mut machine, &[*command]);
+        if machine.state.phase == FlightPhase::TakeOff {
+            world.fly_at(1.5);
+            world.land_detected.takeoff_complete = true;
+        }
+        world.step(&mut machine, &[command]);
     }
+    world.land_detected.takeoff_complete = false;
     if phase == FlightPhase::IdleHeld {
         (machine, world) = in_phase(FlightPhase::IdleGround);
         world.estimate.height = 0.5;
         world.step(&mut machine, &[]);
     }
+    assert_eq!(machine.state.phase, phase);
+    (machine, world)
+}
+
+fn frame(mode: FlightMode, arm: bool, throttle: f32) -> PilotInput {
+    PilotInput { mode, arm, throttle, ..Default::default() }
+}
+
+/// The pilot has armed by switch and flies at 1.5 m in this mode.
+fn piloted(mode: FlightMode) -> (ModeMachine, World) {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.sends(&mut machine, frame(mode, false, 0.0));
+    assert!(world.sends(&mut machine, frame(mode, true, 0.0)).armed);
+    world.sends(&mut machine, frame(mode, true, 0.3));
+    world.pass(&mut machine, 300);
+    world.fly_at(1.5);
+    world.land_detected.takeoff_complete = true;
+    let status = world.pass(&mut machine, 10);
+    assert_eq!((status.phase, status.mode, status.commander), (FlightPhase::Flying, mode, CommandSource::Pilot));
     world.land_detected.takeoff_complete = false;
-    assert_eq!(machine.output.flight_status.phase, phase);
     (machine, world)
 }
 
 #[test]
-fn every_state_can_be_reached_and_every_armed_one_ends_on_the_ground() {
-    for &phase in FlightPhase::ALL {
-        let (mut machine, mut world) = in_phase(phase);
-        world.land_detected.landed = phase == FlightPhase::Landing;
-        for command in [Command::Kill, Command::None] {
-            world.step(&mut machine, &[command]);
+fn d11_what_ends_a_flight_wins_over_arming_in_any_order() {
+    for end in [Command::Kill, Command::Disarm, Command::Land] {
+        for commands in [[Command::Arm, end], [end, Command::Arm]] {
+            let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+            let output = world.step(&mut machine, &commands);
+            assert!(!output.flight_status.armed && output.refused, "{commands:?}");
+            assert!(!world.pass(&mut machine, 100).armed, "{commands:?}");
         }
-        assert!(!machine.output.flight_status.armed, "kill from {phase:?}");
     }
 }
 
-/// Every phase × every single alert and pair of alerts × every command and gesture: motors never start unasked, a
-/// cutting alert or a gesture always stops them within the step, and only transitions of the table are taken.
 #[test]
-fn exhaustive_single_step() {
-    let bits: Vec<Alerts> = Alerts::NAMES.iter().map(|(_, bit)| bits_to_alerts(*bit)).collect();
-    let mut sets = vec![Alerts::NONE];
-    for (i, a) in bits.iter().enumerate() {
-        sets.extend(bits[i..].iter().map(|b| *a | *b));
+fn d11_a_kill_switch_that_is_held_refuses_arming() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    for arm in [false, true] {
+        let killed = PilotInput { kill: true, ..frame(FlightMode::PosHold, arm, 0.0) };
+        assert_eq!(world.sends(&mut machine, killed).blocks, ArmBlocks::KILL);
     }
-    let mut seen = BTreeSet::new();
-    for &phase in FlightPhase::ALL {
-        let start = in_phase(phase);
-        for &alerts in &sets {
-            let commands = GuidedKind::ALL.iter().map(|command| (Some(*command), ButtonGesture::None));
-            for (command, gesture) in commands.chain(ButtonGesture::ALL.iter().map(|gesture| (None, *gesture))) {
-                let (mut machine, mut world) = start.clone();
-                (world.alerts, world.button) = (alerts, Some(gesture));
-                let output = world.step(&mut machine, command.as_slice()).flight_status;
-                assert_eq!(output.armed, is_armed(output.phase));
-                if alerts.intersects(CUT) {
-                    assert!(!output.armed, "{phase:?} {alerts:?} {command:?}");
-                }
-                if gesture != ButtonGesture::None && is_armed(phase) {
-                    assert_eq!(output.phase, FlightPhase::IdleGround, "{phase:?} {alerts:?} {gesture:?}");
-                }
-                if output.armed && !is_armed(phase) {
-                    let heard = command.is_some() || !alerts.contains(Alerts::COMM_LOST);
-                    assert!(heard && phase == FlightPhase::IdleGround && output.blocks.is_empty());
-                    assert!(command == Some(Command::Arm) || gesture == ButtonGesture::Click);
-                }
-                let legal = Event::ALL.iter().any(|e| next(phase, *e, true) == Some(output.phase));
-                assert!(output.phase == phase || legal, "{phase:?} → {:?}", output.phase);
-                seen.insert((phase, output.phase));
-            }
-        }
-    }
-    assert!(seen.len() > 12, "the exploration moved: {seen:?}");
+    assert!(!world.step(&mut machine, &[Command::Arm]).flight_status.armed, "nor does a program");
 }
 
-fn bits_to_alerts(mask: u32) -> Alerts {
-    use stampfly_types::Field;
-    Alerts::read(&[mask]).expect("a named bit")
+#[test]
+fn d4_a_pilot_lost_in_a_manual_mode_is_replaced_by_a_hold_and_a_landing() {
+    for mode in [FlightMode::Stabilize, FlightMode::Acro] {
+        for (valid, expected) in
+            [(Validity::ALL, FlightMode::PosHold), (Validity::ALL.without(Validity::VELOCITY_XY), FlightMode::AltHold)]
+        {
+            let (mut machine, mut world) = piloted(mode);
+            world.estimate.valid = valid;
+            assert_eq!(world.pass(&mut machine, 400).mode, mode, "a short gap is none");
+            (world.pilot, world.alerts, world.sticks) = (None, Alerts::COMM_LOST, Some(CommandSource::Failsafe));
+            let status = world.step(&mut machine, &[]).flight_status;
+            assert_eq!((status.phase, status.mode), (FlightPhase::Flying, expected));
+            assert_eq!(world.pass(&mut machine, 2_900).phase, FlightPhase::Flying);
+            assert_eq!(world.pass(&mut machine, 200).phase, FlightPhase::Landing);
+        }
+        let (mut machine, mut world) = piloted(mode);
+        world.estimate.valid = Validity::TILT;
+        assert_eq!(world.pass(&mut machine, 5_000).mode, mode, "a manual mode needs no height");
+        (world.pilot, world.alerts, world.sticks) = (None, Alerts::COMM_LOST, Some(CommandSource::Failsafe));
+        let status = world.step(&mut machine, &[]).flight_status;
+        assert_eq!((status.phase, status.mode.is_manual()), (FlightPhase::Landing, false), "at once without height");
+    }
+}
+
+#[test]
+fn d4_a_pilot_who_comes_back_chooses_the_manual_mode_again() {
+    let (mut machine, mut world) = piloted(FlightMode::Stabilize);
+    let sent = world.pilot.take().expect("frames");
+    (world.alerts, world.sticks) = (Alerts::COMM_LOST, Some(CommandSource::Failsafe));
+    world.pass(&mut machine, 1_000);
+    (world.alerts, world.sticks) = (Alerts::NONE, None);
+    assert_eq!(world.sends(&mut machine, sent).mode, FlightMode::PosHold);
+    world.sends(&mut machine, PilotInput { mode: FlightMode::PosHold, ..sent });
+    assert_eq!(world.sends(&mut machine, sent).mode, FlightMode::Stabilize);
+}
+
+#[test]
+fn d14_sticks_that_do_not_arrive_on_board_end_a_manual_mode() {
+    let (mut machine, mut world) = piloted(FlightMode::Stabilize);
+    world.sticks = Some(CommandSource::Failsafe);
+    let status = world.step(&mut machine, &[]).flight_status;
+    assert_eq!((status.phase, status.mode), (FlightPhase::Flying, FlightMode::PosHold));
+}
+
+#[test]
+fn d2_a_mode_that_holds_height_never_becomes_a_throttle() {
+    for mode in [FlightMode::AltHold, FlightMode::PosHold] {
+        for lost in [Validity::VELOCITY_Z | Validity::HEIGHT, Validity::ALL.without(Validity::TILT)] {
+            let (mut machine, mut world) = piloted(mode);
+            world.estimate.valid = Validity::ALL.without(lost);
+            for _ in 0..360 {
+                let status = world.step(&mut machine, &[]).flight_status;
+                assert!(!status.mode.is_manual() && status.phase == FlightPhase::Flying);
+            }
+            assert_eq!(world.pass(&mut machine, 200).phase, FlightPhase::Landing, "after a second");
+        }
+        let (mut machine, mut world) = piloted(mode);
+        world.estimate.valid = Validity::TILT;
+        world.pass(&mut machine, 900);
+        world.estimate.valid = Validity::ALL;
+        assert_eq!(world.pass(&mut machine, 3_000).phase, FlightPhase::Flying, "back in time");
+    }
+}
+
+#[test]
+fn d13_a_link_that_flaps_is_lost() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    let mut phase = FlightPhase::Flying;
+    for _ in 0..3 {
+        world.alerts = Alerts::COMM_LOST;
+        phase = world.pass(&mut machine, 2_400).phase;
+        world.alerts = Alerts::NONE;
+        phase = phase.max(world.pass(&mut machine, 700).phase);
+    }
+    assert_eq!(phase, FlightPhase::Landing);
+}
+
+#[test]
+fn d13_a_link_that_is_back_for_a_second_is_back() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    for _ in 0..5 {
+        world.alerts = Alerts::COMM_LOST;
+        assert_eq!(world.pass(&mut machine, 2_000).phase, FlightPhase::Flying);
+        world.alerts = Alerts::NONE;
+        assert_eq!(world.pass(&mut machine, 1_100).phase, FlightPhase::Flying);
+    }
+}
+
+#[test]
+fn d6_one_switch_off_lands_and_only_a_second_one_stops_the_motors() {
+    let (mut machine, mut world) = piloted(FlightMode::PosHold);
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    assert_eq!(world.sends(&mut machine, off).phase, FlightPhase::Landing);
+    assert_eq!(world.pass(&mut machine, 1_000).phase, FlightPhase::Landing);
+    assert_eq!(world.sends(&mut machine, on).phase, FlightPhase::Landing);
+    let stopped = world.sends(&mut machine, off);
+    assert!(!stopped.armed);
+    let crashed = world.step(&mut machine, &[]).flight_status.blocks.contains(ArmBlocks::CRASHED);
+    assert!(crashed, "stopped in the air");
+    world.estimate.height = 0.03;
+    world.land_detected.contact = GroundContact::Ground;
+    assert!(!world.sends(&mut machine, on).armed, "to be acknowledged");
+    world.sends(&mut machine, off);
+    assert!(world.sends(&mut machine, on).armed);
+}
+
+#[test]
+fn d6_a_switch_off_in_a_landing_for_another_reason_does_not_stop_the_motors() {
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    let landing = || {
+        let (mut machine, mut world) = piloted(FlightMode::PosHold);
+        world.alerts = Alerts::CRITICAL_BATTERY;
+        assert_eq!(world.pass(&mut machine, 300).phase, FlightPhase::Landing);
+        (machine, world)
+    };
+    let (mut machine, mut world) = landing();
+    assert_eq!(world.sends(&mut machine, off).phase, FlightPhase::Landing);
+    assert_eq!(world.pass(&mut machine, 1_000).phase, FlightPhase::Landing);
+    world.sends(&mut machine, on);
+    assert!(!world.sends(&mut machine, off).armed, "off, on, off is meant");
+
+    let (mut machine, mut world) = landing();
+    world.estimate.height = 0.14;
+    assert!(!world.sends(&mut machine, off).armed, "at the ground");
+}
+
+#[test]
+fn d6_a_transmitter_that_restarts_never_stops_the_motors_in_the_air() {
+    for (mode, phase) in [
+        (FlightMode::PosHold, FlightPhase::Landing),
+        (FlightMode::PosHold, FlightPhase::Flying),
+        (FlightMode::Stabilize, FlightPhase::Flying),
+    ] {
+        let (mut machine, mut world) = piloted(mode);
+        world.pilot = None;
+        (world.alerts, world.sticks) = (Alerts::COMM_LOST, Some(CommandSource::Failsafe));
+        world.pass(&mut machine, if phase == FlightPhase::Landing { 3_100 } else { 1_000 });
+        assert_eq!(machine.state.phase, phase);
+        (world.alerts, world.sticks) = (Alerts::NONE, None);
+        let status = world.sends(&mut machine, frame(mode, false, 0.0));
+        assert_eq!((status.phase, status.armed), (FlightPhase::Landing, true), "{mode:?}");
+        assert!(world.pass(&mut machine, 2_000).armed);
+    }
+}
+
+#[test]
+fn d6_bad_frames_do_not_drop_a_flight() {
+    for mode in [FlightMode::Stabilize, FlightMode::PosHold] {
+        let (mut machine, mut world) = piloted(mode);
+        let sent = world.pilot.expect("frames");
+        for _ in 0..5 {
+            world.pilot = Some(PilotInput { arm: false, ..sent });
+            world.pass(&mut machine, 40);
+            world.pilot = Some(sent);
+            assert_eq!(world.pass(&mut machine, 60).phase, FlightPhase::Flying, "{mode:?}");
+        }
+        let status = world.sends(&mut machine, PilotInput { arm: false, ..sent });
+        assert_eq!(status.armed, !mode.is_manual(), "turned off");
+    }
+}
+
+#[test]
+fn d5_a_transmitter_that_is_merely_heard_takes_nothing_over() {
+    for mode in FlightMode::ALL {
+        for arm in [false, true] {
+            let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+            let parked = PilotInput { yaw: 0.1, ..frame(*mode, arm, -1.0) };
+            world.pilot = Some(parked);
+            let status = world.pass(&mut machine, 5_000);
+            assert_eq!(
+                (status.phase, status.mode, status.commander),
+                (FlightPhase::Flying, FlightMode::PosHold, CommandSource::Guided)
+            );
+        }
+    }
+}
+
+#[test]
+fn d5_a_pilot_takes_over_by_acting() {
+    let parked = frame(FlightMode::Stabilize, false, 0.0);
+    for (acts, mode) in [
+        (PilotInput { roll: 0.4, ..parked }, FlightMode::PosHold),
+        (PilotInput { mode: FlightMode::AltHold, ..parked }, FlightMode::AltHold),
+        (PilotInput { mode: FlightMode::Acro, ..parked }, FlightMode::Acro),
+        (PilotInput { arm: true, ..parked }, FlightMode::PosHold),
+    ] {
+        let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+        world.sends(&mut machine, parked);
+        let status = world.sends(&mut machine, acts);
+        assert_eq!((status.mode, status.commander), (mode, CommandSource::Pilot), "{acts:?}");
+        world.step(&mut machine, &[Command::None]);
+        assert_eq!(machine.state.commander, CommandSource::Pilot, "a sign of life is no command");
+        world.pilot = Some(parked);
+        world.step(&mut machine, &[Command::WayPoint]);
+        let expected = if mode.is_manual() { CommandSource::Pilot } else { CommandSource::Guided };
+        assert_eq!(machine.state.commander, expected, "no program takes over a manual flight");
+    }
+}
+
+#[test]
+fn d5_a_manual_mode_waits_for_its_throttle() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    world.sends(&mut machine, frame(FlightMode::PosHold, false, 0.0));
+    world.sticks = Some(CommandSource::Guided);
+    let status = world.sends(&mut machine, frame(FlightMode::Stabilize, false, 0.0));
+    assert_eq!((status.mode, status.commander), (FlightMode::PosHold, CommandSource::Pilot));
+    world.sticks = None;
+    assert_eq!(world.step(&mut machine, &[]).flight_status.mode, FlightMode::Stabilize);
+}
+
+/// The table of `decision`: what a turned mode switch, and one that merely differs, do in every phase.
+#[test]
+fn d5_mode_arbitration_table() {
+    use FlightPhase as S;
+    for (phase, turned, differs) in [
+        (S::Init, false, false),
+        (S::IdleGround, true, true),
+        (S::IdleHeld, false, false),
+        (S::Armed, true, false),
+        (S::TakeOff, false, false),
+        (S::Flying, true, false),
+        (S::Landing, false, false),
+    ] {
+        let start = || {
+            let (mut machine, mut world) = in_phase(phase);
+            world.calibration.complete = phase != S::Init;
+            machine.state.wanted = FlightMode::PosHold;
+            (machine, world)
+        };
+        let (mut machine, mut world) = start();
+        world.sends(&mut machine, frame(FlightMode::AltHold, false, 0.0));
+        assert_eq!(machine.state.wanted == FlightMode::AltHold, differs, "{phase:?}");
+
+        let (mut machine, mut world) = start();
+        world.sends(&mut machine, frame(FlightMode::PosHold, false, 0.0));
+        world.sends(&mut machine, frame(FlightMode::AltHold, false, 0.0));
+        assert_eq!(machine.state.wanted == FlightMode::AltHold, turned, "{phase:?}");
+        assert_eq!(machine.state.pending.is_some(), !turned, "kept in {phase:?}");
+        if phase == S::TakeOff {
+            world.land_detected.takeoff_complete = true;
+            let status = world.pass(&mut machine, 10);
+            assert_eq!((status.phase, status.mode), (S::Flying, FlightMode::AltHold), "applied later");
+        }
+    }
+    for (phase, set) in [(S::IdleGround, true), (S::Armed, true), (S::Flying, false)] {
+        let (mut machine, mut world) = in_phase(phase);
+        machine.state.wanted = FlightMode::AltHold;
+        world.sensors = Some(SensorTimes::default());
+        world.step(&mut machine, &[Command::Hold]);
+        assert_eq!(machine.state.wanted == FlightMode::PosHold, set, "a program in {phase:?}");
+    }
+}
+
+#[test]
+fn d9_a_vehicle_without_its_sensors_does_not_arm() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.sensors = Some(SensorTimes::default());
+    let output = world.step(&mut machine, &[Command::Arm]);
+    let missing = ArmBlocks::NO_RANGE | ArmBlocks::NO_FLOW | ArmBlocks::NO_BARO;
+    assert_eq!((output.flight_status.armed, output.flight_status.blocks, output.refused), (false, missing, true));
+    assert_eq!(machine.refusals().count(), 3);
+}
+
+#[test]
+fn d16_pairing_ends_when_the_new_transmitter_talks_though_it_always_did() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.sends(&mut machine, frame(FlightMode::PosHold, false, 0.0));
+    world.button = Some(ButtonGesture::HoldPair);
+    assert!(world.step(&mut machine, &[]).flight_status.pairing);
+    assert!(world.pass(&mut machine, 100).pairing, "a frame from before is still fresh");
+    world.alerts = Alerts::COMM_LOST;
+    assert_eq!(machine.refusals().map(|refusal| refusal.check).next(), Some(ArmBlocks::PAIRING));
+    assert!(!world.pass(&mut machine, 200).pairing);
+}
+
+#[test]
+fn d16_pairing_ends_by_itself_and_by_the_button() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    for again in [false, true] {
+        world.button = Some(ButtonGesture::HoldPair);
+        assert!(world.step(&mut machine, &[]).flight_status.pairing);
+        if again {
+            world.button = Some(ButtonGesture::HoldPair);
+            assert!(!world.step(&mut machine, &[]).flight_status.pairing);
+        } else {
+            assert!(world.pass(&mut machine, 59_900).pairing);
+            assert!(!world.pass(&mut machine, 200).pairing);
+        }
+    }
+}
+
+#[test]
+fn the_arm_switch_of_a_new_transmitter_must_be_seen_off() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.sends(&mut machine, frame(FlightMode::PosHold, false, 0.0));
+    world.button = Some(ButtonGesture::HoldPair);
+    world.step(&mut machine, &[]);
+    world.pilot = None;
+    world.pass(&mut machine, 1_000);
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    assert!(!world.sends(&mut machine, on).pairing);
+    assert!(!world.sends(&mut machine, on).armed, "switched on before it was seen off");
+    world.sends(&mut machine, off);
+    assert!(world.sends(&mut machine, on).armed);
+}
+
+#[test]
+fn d17_a_lifted_vehicle_that_does_not_know_its_height_stands_again() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleHeld);
+    let resets = machine.state.full_resets;
+    world.estimate.valid = Validity::NONE;
+    assert_eq!(world.pass(&mut machine, 1_900).phase, FlightPhase::IdleHeld);
+    assert_eq!(world.pass(&mut machine, 200).phase, FlightPhase::IdleGround);
+    assert_eq!(machine.state.full_resets, resets + 1, "and the estimator begins anew");
+}
+
+#[test]
+fn d17_take_off_and_landing_end_by_themselves() {
+    let (mut machine, mut world) = in_phase(FlightPhase::TakeOff);
+    assert_eq!(world.pass(&mut machine, 14_900).phase, FlightPhase::TakeOff);
+    assert_eq!(world.pass(&mut machine, 200).phase, FlightPhase::Landing);
+    for (valid, seconds) in [(Validity::ALL, 40), (Validity::TILT, 60)] {
+        let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+        world.estimate.valid = valid;
+        world.step(&mut machine, &[Command::Land]);
+        assert_eq!(world.pass(&mut machine, seconds * 1_000 - 100).phase, FlightPhase::Landing);
+        let status = world.pass(&mut machine, 300);
+        assert!(!status.armed && status.blocks.contains(ArmBlocks::CRASHED));
+    }
+}
+
+#[test]
+fn d20_a_throttle_that_is_no_number_does_not_take_off() {
+    for bad in [f32::INFINITY, f32::NAN] {
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+        world.sends(&mut machine, frame(FlightMode::Stabilize, false, bad));
+        assert!(world.sends(&mut machine, frame(FlightMode::Stabilize, true, bad)).armed);
+        assert_eq!(world.pass(&mut machine, 1_000).phase, FlightPhase::Armed);
+        assert!(machine.unreadable_frames() > 50);
+    }
+}
+
+#[test]
+fn turning_the_mode_switch_of_an_armed_vehicle_does_not_take_off() {
+    for (from, to, throttle) in
+        [(FlightMode::Stabilize, FlightMode::AltHold, 0.0), (FlightMode::AltHold, FlightMode::Stabilize, 0.6)]
+    {
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+        world.sends(&mut machine, frame(from, false, throttle));
+        assert!(world.sends(&mut machine, frame(from, true, throttle)).armed);
+        machine.state.takes_off = false;
+        let status = world.sends(&mut machine, frame(to, true, throttle));
+        assert_eq!(status.mode, to);
+        assert_eq!(world.pass(&mut machine, 2_000).phase, FlightPhase::Armed, "{from:?} to {to:?}");
+        world.sends(&mut machine, frame(to, true, 0.0));
+        assert_eq!(world.sends(&mut machine, frame(to, true, 0.3)).phase, FlightPhase::TakeOff);
+    }
+}
+
+#[test]
+fn a_cut_off_is_a_block_until_it_is_acknowledged() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    world.cut_off = true;
+    assert_eq!(world.step(&mut machine, &[]).flight_status.phase, FlightPhase::IdleGround);
+    world.cut_off = false;
+    world.estimate.height = 0.03;
+    assert_eq!(world.pass(&mut machine, 1_000).blocks, ArmBlocks::CUT_OFF);
+    assert!(!world.step(&mut machine, &[Command::Arm]).flight_status.armed);
+    world.step(&mut machine, &[Command::Disarm]);
+    assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
 }
 
 #[test]
 fn a_switch_that_was_on_at_boot_does_not_arm() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
-    for _ in 0..10 {
-        assert!(!world.step(&mut machine, &[]).flight_status.armed);
-    }
-    world.pilot = Some(PilotInput { arm: false, mode: FlightMode::PosHold, ..Default::default() });
-    world.step(&mut machine, &[]);
-    world.pilot = Some(PilotInput { arm: true, mode: FlightMode::PosHold, ..Default::default() });
-    assert!(world.step(&mut machine, &[]).flight_status.armed, "off, then on");
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    assert!(!world.sends(&mut machine, on).armed);
+    assert!(machine.refusals().any(|refusal| refusal.check == ArmBlocks::ARM_SWITCH));
+    world.sends(&mut machine, off);
+    assert!(world.sends(&mut machine, on).armed, "off, then on");
 }
 
 #[test]
-fn a_switch_that_moved_while_nobody_was_heard_does_not_arm() {
-    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    let frame = |arm| Some(PilotInput { arm, ..Default::default() });
-    for pilot in [frame(false), None, frame(true)] {
-        world.pilot = pilot;
-        assert!(!world.step(&mut machine, &[]).flight_status.armed);
-    }
-    assert!(world.step(&mut machine, &[]).flight_status.blocks.contains(ArmBlocks::ARM_SWITCH));
-    for pilot in [frame(false), frame(true)] {
-        world.pilot = pilot;
-        world.step(&mut machine, &[]);
-    }
-    assert!(machine.output.flight_status.armed, "seen off, then on");
-    for pilot in [None, frame(false)] {
-        world.pilot = pilot;
-        world.step(&mut machine, &[]);
-    }
-    assert!(!machine.output.flight_status.armed, "but it disarms");
-}
-
-#[test]
-fn nobody_arms_a_vehicle_that_hears_nobody() {
+fn a_vehicle_that_hears_neither_pilot_nor_program_does_not_arm() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
     world.alerts = Alerts::COMM_LOST;
     for gesture in [ButtonGesture::Press, ButtonGesture::Click] {
@@ -201,12 +538,6 @@ fn nobody_arms_a_vehicle_that_hears_nobody() {
         let mode = world.step(&mut machine, &[]).flight_status;
         assert_eq!((mode.armed, mode.blocks), (false, ArmBlocks::NO_LINK), "{gesture:?}");
     }
-    world.pilot = Some(PilotInput::default());
-    world.step(&mut machine, &[]);
-    world.pilot = Some(PilotInput { arm: true, ..Default::default() });
-    assert!(!world.step(&mut machine, &[]).flight_status.armed, "the failsafe decides who is heard");
-    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    world.alerts = Alerts::COMM_LOST;
     assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed, "a command is a sign of life itself");
 }
 
@@ -226,6 +557,7 @@ fn a_press_stops_the_motors_in_every_state_and_means_nothing_else() {
             let (mut machine, mut world) = in_phase(phase);
             let stopped = press(&mut world, &mut machine, Duration::ZERO, Press);
             assert_eq!((stopped.phase, stopped.armed), (FlightPhase::IdleGround, false), "{phase:?}");
+            world.estimate.height = 0.03;
             let later = press(&mut world, &mut machine, millis(3_000), rest);
             assert!(!later.armed && !later.pairing, "{phase:?} {rest:?}");
             // A hand in a hurry presses again.
@@ -243,7 +575,8 @@ fn a_press_stops_the_motors_in_every_state_and_means_nothing_else() {
 #[test]
 fn a_press_while_a_command_arms_stops_the_motors() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    assert!(!press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Press).armed);
+    world.button = Some(ButtonGesture::Press);
+    assert!(!world.step(&mut machine, &[Command::Arm]).flight_status.armed, "in the same step");
     assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
     assert!(!press(&mut world, &mut machine, Duration::from_millis(500), ButtonGesture::Click).armed);
 }
@@ -254,6 +587,7 @@ fn a_press_that_acknowledges_a_crash_does_not_arm() {
     world.alerts = Alerts::IMPACT;
     world.step(&mut machine, &[]);
     world.alerts = Alerts::NONE;
+    world.estimate.height = 0.03;
     let millis = Duration::from_millis;
     press(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
     assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::CRASHED, "not yet");
@@ -264,31 +598,27 @@ fn a_press_that_acknowledges_a_crash_does_not_arm() {
 }
 
 #[test]
-fn a_raised_stick_does_not_arm_a_vehicle_that_cannot_hold_height() {
+fn a_mode_that_holds_height_does_not_arm_without_one() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    let frame = |arm| Some(PilotInput { arm, throttle: 0.6, mode: FlightMode::AltHold, ..Default::default() });
     world.estimate.valid = Validity::TILT;
     for arm in [false, true] {
-        world.pilot = frame(arm);
-        let mode = world.step(&mut machine, &[]).flight_status;
-        assert_eq!((mode.armed, mode.mode, mode.blocks), (false, FlightMode::Stabilize, ArmBlocks::THROTTLE));
+        let mode = world.sends(&mut machine, frame(FlightMode::AltHold, arm, 0.6));
+        assert_eq!((mode.armed, mode.mode, mode.blocks), (false, FlightMode::AltHold, ArmBlocks::ESTIMATE));
     }
     world.estimate.valid = Validity::ALL;
     for arm in [false, true] {
-        world.pilot = frame(arm);
-        world.step(&mut machine, &[]);
+        world.sends(&mut machine, frame(FlightMode::AltHold, arm, 0.6));
     }
-    assert!(machine.output.flight_status.armed, "where the stick is a climb rate, it does");
+    assert!(machine.state.is_armed(), "a raised stick is a climb rate, and no reason");
 }
 
 #[test]
 fn a_click_takes_off_and_holds_the_place() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    machine.wanted = FlightMode::Stabilize;
+    world.sends(&mut machine, frame(FlightMode::Stabilize, false, 0.0));
     let clicked = press(&mut world, &mut machine, Duration::ZERO, ButtonGesture::Click);
     assert_eq!((clicked.phase, clicked.mode), (FlightPhase::Armed, FlightMode::PosHold));
-    world.now += ModeConfig::default().spool;
-    let later = world.step(&mut machine, &[]).flight_status;
+    let later = world.pass(&mut machine, 310);
     assert_eq!((later.phase, later.mode), (FlightPhase::TakeOff, FlightMode::PosHold));
 }
 
@@ -336,22 +666,23 @@ fn the_machine_blocks_arming_at_the_tilt_of_its_configuration() {
 }
 
 #[test]
-fn modes_fall_back_to_what_is_known() {
-    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
-    assert_eq!(machine.output.flight_status.mode, FlightMode::PosHold);
-    world.estimate.valid = Validity::ALL.without(Validity::VELOCITY_XY);
-    assert_eq!(world.step(&mut machine, &[]).flight_status.mode, FlightMode::AltHold);
-    world.estimate.valid = Validity::TILT;
-    assert_eq!(world.step(&mut machine, &[]).flight_status.mode, FlightMode::Stabilize);
-}
-
-#[test]
 fn a_crash_has_to_be_acknowledged() {
     let (mut machine, mut world) = in_phase(FlightPhase::Flying);
     world.alerts = Alerts::IMPACT;
     world.step(&mut machine, &[]);
     world.alerts = Alerts::NONE;
+    world.estimate.height = 0.03;
     assert!(!world.step(&mut machine, &[Command::Arm]).flight_status.armed);
     world.step(&mut machine, &[Command::Disarm]);
     assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
+}
+
+#[test]
+fn a_program_that_repeats_disarm_does_not_fall() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    for _ in 0..10 {
+        assert_eq!(world.step(&mut machine, &[GuidedKind::Disarm]).flight_status.phase, FlightPhase::Landing);
+    }
+    world.estimate.height = 0.1;
+    assert!(!world.step(&mut machine, &[GuidedKind::Disarm]).flight_status.armed);
 }

@@ -1,5 +1,6 @@
 //! State of the whole vehicle: mode, alerts, contact with the ground, signals to people.
 
+use super::command::CommandSource;
 use crate::{message, message_enum, message_flags};
 
 message_enum! {
@@ -81,12 +82,22 @@ message_flags! {
         THROTTLE = 9,
         /// The arm switch was on before the vehicle saw it off.
         ARM_SWITCH = 10,
-        /// A crash was detected and nobody has acknowledged it.
+        /// The vehicle crashed, or its motors were stopped in the air, and this was not acknowledged.
         CRASHED = 11,
         /// The self test at power-on failed.
         SELF_TEST = 12,
         /// Neither a pilot nor a program is heard.
         NO_LINK = 13,
+        /// The mode holds height, and the range finder gives no usable range.
+        NO_RANGE = 14,
+        /// The mode holds the place, and the flow sensor gives no usable flow.
+        NO_FLOW = 15,
+        /// The mode holds height, and the barometer is silent.
+        NO_BARO = 16,
+        /// The cut-off has stopped the motors, and this was not acknowledged.
+        CUT_OFF = 17,
+        /// The pilot's kill switch is on.
+        KILL = 18,
     }
 }
 
@@ -99,6 +110,8 @@ message! {
         mode: FlightMode,
         /// May the motors turn?
         armed: bool,
+        /// Who has authority over the armed vehicle, also while silent; nobody over a disarmed one or one armed by a click.
+        commander: CommandSource,
         /// Pairing with a transmitter.
         pairing: bool,
         /// Why arming would be refused right now.

@@ -3,8 +3,8 @@
 use super::{Numbers, at, goes_on};
 use stampfly_board::airframe::AIRFRAME;
 use stampfly_mode::{
-    Authority, ButtonDecoder, Failsafe, FailsafeInput, LandingConfig, LandingInput, ModeInput, ModeMachine, Signaller,
-    TakeoffLanding,
+    Authority, ButtonDecoder, Failsafe, FailsafeInput, LandingConfig, LandingInput, ModeInput, ModeMachine,
+    SensorTimes, Signaller, TakeoffLanding,
 };
 use stampfly_types::Vec3;
 use stampfly_types::messages::*;
@@ -49,9 +49,12 @@ fn mode_machine_goes_on() {
             estimate: &estimate,
             calibration: &calibration,
             land_detected: &land_detected,
-            pilot: Some(&pilot).filter(|_| k % 400 < 330),
+            sensors: SensorTimes::all(at(k)),
+            pilot: Some((at(k - k % 8), &pilot)).filter(|_| k % 400 < 330),
+            sticks: CommandSource::Pilot,
             commands,
             button: n.once_in(150).then_some(ButtonGesture::Click),
+            cut_off: false,
         };
         let output = machine.step(at(k), &input);
         (output.flight_status, output.estimator)
@@ -106,7 +109,7 @@ fn authority_goes_on() {
         if k.is_multiple_of(50) {
             authority.guided(at(k));
         }
-        authority.step(at(k))
+        authority.step(at(k), if k % 100 < 70 { CommandSource::Pilot } else { CommandSource::Guided })
     });
 }
 

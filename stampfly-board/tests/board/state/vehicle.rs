@@ -31,6 +31,9 @@ fn publish(outside: &mut topics::Outside<'_>, k: u64, n: &mut Numbers) {
         let flow = FlowData { delta_x: n.number(1e-3), delta_y: 0.0, interval: 0.01, quality: 200, valid: true };
         outside.flow.sensor_flow.publish(at(k), &flow);
     }
+    if k.is_multiple_of(16) {
+        outside.baro.sensor_baro.publish(at(k), &BaroData { pressure: 101_325.0, ..Default::default() });
+    }
     if k.is_multiple_of(28) {
         outside.power.sensor_power.publish(at(k), &PowerData { voltage: 4.0 + n.number(0.01), ..Default::default() });
     }

@@ -1,0 +1,215 @@
+//! Who may do what, on the whole vehicle: a pilot who falls silent, transmitters that are only heard, switches that bounce,
+//! sources that speak for each other. Every test is named after the defect that it keeps out.
+
+use crate::losses::harness::{Hands, Seen, run};
+use stampfly_types::messages::{ArmBlocks, CommandSource, FlightMode, FlightPhase, GuidedKind, PilotInput};
+use stampfly_types::{Duration, Instant};
+use std::cell::Cell;
+use std::rc::Rc;
+
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
+
+const STICKS: PilotInput =
+    PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: 0.0, mode: FlightMode::PosHold, arm: false, kill: false };
+
+/// The pilot sends this for so long.
+async fn send(hands: &mut Hands<'_>, seconds: f32, frame: PilotInput) {
+    for _ in 0..(seconds / 0.02) as u32 {
+        hands.frame(&frame);
+        hands.sleep(0.02).await;
+    }
+}
+
+/// The pilot arms by switch in position hold and climbs for so long.
+async fn climb(hands: &mut Hands<'_>, seconds: f32) {
+    while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
+        send(hands, 0.1, STICKS).await;
+    }
+    while hands.telemetry().phase != FlightPhase::Flying {
+        send(hands, 0.1, PilotInput { arm: true, ..STICKS }).await;
+    }
+    send(hands, seconds, PilotInput { arm: true, throttle: 1.0, ..STICKS }).await;
+    send(hands, 2.0, PilotInput { arm: true, ..STICKS }).await;
+}
+
+/// Where a script leaves an instant.
+fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
+    let cell = Rc::new(Cell::new(Instant::ZERO));
+    (cell.clone(), cell)
+}
+
+/// Speed with which the vehicle first touches the ground after this instant, m/s; it has to end there, disarmed.
+fn touches(what: &str, seen: &Seen, since: Instant) -> f32 {
+    let (mode, truth) = seen.end();
+    assert!(!mode.armed && truth.contact, "{what}: ends {mode:?} at {} m", -truth.position.z);
+    let mut before = 0.0f32;
+    for (_, truth) in seen.truths.iter().filter(|(at, _)| *at >= since) {
+        if truth.contact {
+            return before;
+        }
+        before = truth.velocity.z;
+    }
+    panic!("{what}: never touched the ground");
+}
+
+/// The mode in force at an instant.
+fn at(seen: &Seen, instant: Instant) -> (FlightPhase, FlightMode, CommandSource) {
+    let (_, status) = seen.modes.iter().rfind(|(at, _)| *at <= instant).expect("it ran");
+    (status.phase, status.mode, status.commander)
+}
+
+#[test]
+fn d4_a_pilot_lost_in_stabilize_or_acro_is_levelled_and_landed() {
+    for mode in [FlightMode::Stabilize, FlightMode::Acro] {
+        for seed in SEEDS {
+            let (since, note) = instant();
+            let seen = run(seed, 40.0, |mut hands| {
+                Box::pin(async move {
+                    climb(&mut hands, 2.0).await;
+                    // About the throttle that carries it, and a little lean.
+                    let flown = PilotInput { mode, arm: true, throttle: 0.55, pitch: 0.1, ..STICKS };
+                    send(&mut hands, 0.2, flown).await;
+                    note.set(hands.frame(&flown));
+                })
+            });
+            let what = format!("{mode:?}, seed {seed}");
+            let since = since.get();
+            assert_eq!(at(&seen, since).1, mode, "{what}");
+            assert_eq!(at(&seen, since + Duration::from_millis(600)).1, FlightMode::PosHold, "{what}");
+            let landing = seen.entered(FlightPhase::Landing, since).expect("it lands").since(since).seconds();
+            assert!((3.4..3.7).contains(&landing), "{what}: after {landing} s");
+            let speed = touches(&what, &seen, since);
+            assert!(speed < 0.6, "{what}: {speed} m/s");
+        }
+    }
+}
+
+#[test]
+fn d5_a_transmitter_switched_on_while_a_program_flies_changes_nothing() {
+    for mode in [FlightMode::Stabilize, FlightMode::Acro, FlightMode::AltHold] {
+        for arm in [false, true] {
+            let (since, note) = instant();
+            let seen = run(1, 30.0, |mut hands| {
+                Box::pin(async move {
+                    hands.take_off().await;
+                    note.set(hands.clock.now());
+                    for _ in 0..40 {
+                        hands.command(GuidedKind::None);
+                        send(&mut hands, 0.1, PilotInput { mode, arm, throttle: -1.0, ..STICKS }).await;
+                    }
+                    hands.command(GuidedKind::Land);
+                    for _ in 0..100 {
+                        hands.command(GuidedKind::None);
+                        send(&mut hands, 0.1, PilotInput { mode, arm, throttle: -1.0, ..STICKS }).await;
+                    }
+                })
+            });
+            let what = format!("{mode:?}, {arm}");
+            let flown = at(&seen, since.get() + Duration::from_secs(3));
+            assert_eq!(flown, (FlightPhase::Flying, FlightMode::PosHold, CommandSource::Guided), "{what}");
+            assert!(seen.drift(since.get(), since.get() + Duration::from_secs(4)) < 0.25, "{what}");
+            assert!(touches(&what, &seen, since.get()) < 0.4, "{what}");
+        }
+    }
+}
+
+#[test]
+fn d6_a_transmitter_that_restarts_while_landing_does_not_stop_the_motors() {
+    for seed in SEEDS {
+        let (since, note) = instant();
+        let seen = run(seed, 45.0, |mut hands| {
+            Box::pin(async move {
+                climb(&mut hands, 2.0).await;
+                note.set(hands.clock.now());
+                // Silent until it has begun to land.
+                hands.sleep(4.0).await;
+                send(&mut hands, 20.0, STICKS).await;
+            })
+        });
+        let what = format!("seed {seed}");
+        assert!(seen.entered(FlightPhase::Landing, since.get()).is_some(), "{what}");
+        assert!(touches(&what, &seen, since.get()) < 0.4, "{what}");
+    }
+}
+
+#[test]
+fn d6_a_switch_turned_off_lands_and_bad_frames_do_nothing() {
+    let (since, note) = instant();
+    let seen = run(1, 45.0, |mut hands| {
+        Box::pin(async move {
+            climb(&mut hands, 2.0).await;
+            let on = PilotInput { arm: true, ..STICKS };
+            for _ in 0..10 {
+                send(&mut hands, 0.05, STICKS).await;
+                send(&mut hands, 0.1, on).await;
+            }
+            note.set(hands.clock.now());
+            send(&mut hands, 20.0, STICKS).await;
+        })
+    });
+    let landing = seen.entered(FlightPhase::Landing, Instant::ZERO).expect("it lands");
+    assert!(landing > since.get() && landing.since(since.get()) < Duration::from_millis(120), "{landing}");
+    assert!(touches("switched off", &seen, since.get()) < 0.4);
+}
+
+#[test]
+fn d13_the_one_who_flies_is_missed_however_others_chatter() {
+    for program_flies in [false, true] {
+        let (since, note) = instant();
+        let seen = run(2, 45.0, |mut hands| {
+            Box::pin(async move {
+                if program_flies {
+                    hands.take_off().await;
+                    note.set(hands.command(GuidedKind::None));
+                    send(&mut hands, 25.0, PilotInput { mode: FlightMode::AltHold, ..STICKS }).await;
+                } else {
+                    climb(&mut hands, 1.0).await;
+                    note.set(hands.clock.now());
+                    for _ in 0..250 {
+                        hands.command(GuidedKind::None);
+                        hands.sleep(0.1).await;
+                    }
+                }
+            })
+        });
+        let what = format!("program {program_flies}");
+        let landing = seen.entered(FlightPhase::Landing, since.get()).expect("it lands").since(since.get());
+        assert!((3.4..3.7).contains(&landing.seconds()), "{what}: {landing}");
+        assert!(touches(&what, &seen, since.get()) < 0.4, "{what}");
+        assert!(seen.drift(since.get(), Instant::MAX) < 0.5, "{what}");
+    }
+}
+
+#[test]
+fn d13_a_link_that_flaps_ends_in_a_landing() {
+    let (since, note) = instant();
+    let seen = run(3, 45.0, |mut hands| {
+        Box::pin(async move {
+            climb(&mut hands, 1.0).await;
+            note.set(hands.clock.now());
+            for _ in 0..8 {
+                hands.sleep(2.9).await;
+                send(&mut hands, 0.2, PilotInput { arm: true, ..STICKS }).await;
+            }
+        })
+    });
+    let landing = seen.entered(FlightPhase::Landing, since.get()).expect("it lands").since(since.get());
+    assert!(landing < Duration::from_secs(4), "{landing}");
+    assert!(touches("flapping", &seen, since.get()) < 0.4);
+}
+
+#[test]
+fn d11_a_kill_beside_an_arm_wins() {
+    for [first, second] in [[GuidedKind::Arm, GuidedKind::Kill], [GuidedKind::Kill, GuidedKind::Arm]] {
+        let seen = run(1, 12.0, |mut hands| {
+            Box::pin(async move {
+                hands.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
+                hands.command(first);
+                hands.command(second);
+                hands.wait_for(|_| false).await;
+            })
+        });
+        assert!(seen.modes.iter().all(|(_, mode)| !mode.armed));
+        assert_eq!(seen.end().0.blocks, ArmBlocks::NONE);
+    }
+}

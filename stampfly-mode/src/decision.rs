@@ -1,0 +1,371 @@
+//! The decision: what the vehicle does next, as a function of its state and the facts, and of nothing else.
+//!
+//! [`decide`] is total and has no memory of its own. [`ModeMachine`](crate::ModeMachine) keeps the [`State`] and turns inputs
+//! into [`Facts`]; use `decide` directly to explore states, not to fly.
+//!
+//! # Who has authority
+//! The pilot whose switch armed the vehicle, or the program whose command did. In flight the pilot takes over by acting:
+//! turning the arm or the mode switch, or moving the sticks. Frames alone do nothing. A program takes over with a new
+//! command, unless the pilot flies in a manual mode.
+//!
+//! # Which mode
+//! | phase | mode switch turned | switch and mode differ | program or click |
+//! |---|---|---|---|
+//! | INIT, IDLE_HELD | kept for later | ignored | ignored |
+//! | IDLE_GROUND | applied | the switch is applied | POS_HOLD |
+//! | ARMED | applied | ignored | POS_HOLD |
+//! | FLYING | applied | ignored | ignored |
+//! | TAKEOFF, LANDING | kept for later | ignored | ignored |
+//!
+//! A height-holding mode that loses the height stays what it is: the controller comes down without it, and after
+//! [`ModeConfig::blind`] the vehicle lands. It never becomes a mode in which the stick is thrust. A manual mode whose sticks
+//! fall silent becomes POS_HOLD.
+
+use crate::arming;
+use crate::config::ModeConfig;
+use crate::facts::Facts;
+use crate::transitions::{Event, is_airborne, is_armed, next};
+use stampfly_types::messages::{
+    Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, GroundContact, Validity,
+};
+use stampfly_types::{Duration, Instant};
+
+/// Alerts that stop the motors in any phase.
+pub const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
+/// Alerts that demand a landing at once.
+pub const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
+
+/// A silence of the commander.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Silence {
+    /// When it began.
+    pub since: Instant,
+    /// Since when the commander has been heard again.
+    pub heard_since: Option<Instant>,
+}
+
+/// All that the machine remembers between two decisions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct State {
+    /// The flight phase.
+    pub phase: FlightPhase,
+    /// When it was entered.
+    pub entered: Instant,
+    /// The mode asked for.
+    pub wanted: FlightMode,
+    /// The mode in force: the one asked for, or what the estimate allows of it.
+    pub mode: FlightMode,
+    /// A mode that the pilot has switched to and that is not applied yet.
+    pub pending: Option<FlightMode>,
+    /// Who has authority.
+    pub commander: CommandSource,
+    /// The vehicle takes off by itself after spool-up.
+    pub takes_off: bool,
+    /// The throttle has been at rest since the mode was chosen on the ground.
+    pub throttle_rested: bool,
+    /// The pilot's arm switch has asked for this landing.
+    pub landing_by_switch: bool,
+    /// The longest time this landing may take.
+    pub landing_limit: Duration,
+    /// What has to be acknowledged before arming.
+    pub unacknowledged: ArmBlocks,
+    /// Since when the vehicle has been looking for a transmitter.
+    pub pairing: Option<Instant>,
+    /// The commander is silent, or was a moment ago.
+    pub silence: Option<Silence>,
+    /// Since when a mode that holds height has had none.
+    pub blind: Option<Instant>,
+    /// Since when the height has been unknown to a lifted vehicle.
+    pub unmeasured: Option<Instant>,
+    /// Transitions since power-on.
+    pub transitions: u32,
+    /// A change of this number resets the controller.
+    pub control_resets: u32,
+    /// A change of this number moves the estimator's origin here.
+    pub origin_resets: u32,
+    /// A change of this number starts the estimator anew.
+    pub full_resets: u32,
+    /// The estimate was lost in the step before.
+    pub diverged: bool,
+}
+
+impl State {
+    /// May the motors turn?
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        is_armed(self.phase)
+    }
+
+    /// Is the vehicle so close to the ground that the motors may be stopped?
+    #[must_use]
+    fn is_low(&self, config: &ModeConfig, facts: &Facts) -> bool {
+        facts.contact == GroundContact::Ground || facts.known_height().is_some_and(|height| height < config.stop_height)
+    }
+}
+
+/// The next state.
+///
+/// ```
+/// use stampfly_mode::decision::{State, decide};
+/// use stampfly_mode::{Facts, ModeConfig};
+/// use stampfly_types::messages::{CommandSource, FlightMode, FlightPhase, GroundContact, Validity};
+///
+/// let flying = State {
+///     phase: FlightPhase::Flying,
+///     wanted: FlightMode::Stabilize,
+///     commander: CommandSource::Pilot,
+///     ..State::default()
+/// };
+/// // The pilot has fallen silent.
+/// let facts = Facts { valid: Validity::ALL, contact: GroundContact::Air, sticks: CommandSource::Failsafe, ..Facts::default() };
+/// let next = decide(&ModeConfig::default(), &flying, &facts);
+/// assert_eq!((next.phase, next.mode), (FlightPhase::Flying, FlightMode::PosHold));
+/// ```
+#[must_use]
+pub fn decide(config: &ModeConfig, state: &State, facts: &Facts) -> State {
+    let before = state;
+    let mut state = *before;
+    watch_link(config, &mut state, facts);
+    choose_commander(before, &mut state, facts);
+    choose_mode(config, &mut state, facts);
+    watch_pairing(config, &mut state, facts);
+    watch_height(&mut state, facts);
+    let crashed = state.unacknowledged;
+    // A person has come to look at the vehicle. A press alone is no sign of it: what it becomes may be a click, which must not
+    // find the crash acknowledged and arm.
+    let gesture = facts.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
+    if !before.is_armed() && (facts.pilot.switch.falls || gesture || facts.asked.disarm) {
+        state.unacknowledged = ArmBlocks::NONE;
+    }
+    // What is acknowledged in this step does not arm in it.
+    let present = State { unacknowledged: crashed, ..state };
+    let happened = |event: &Event| happens(*event, config, before, &present, facts);
+    let transition = Event::ALL.into_iter().filter(happened).find_map(|e| next(state.phase, e).map(|to| (e, to)));
+    if let Some((event, phase)) = transition {
+        leave_and_enter(config, &mut state, facts, event, phase);
+    } else if state.phase == FlightPhase::Landing && facts.pilot.switch.falls {
+        // The pilot wants this landing, whatever began it. The next switch-off means more.
+        state.landing_by_switch = true;
+    }
+    let diverged = facts.alerts.contains(Alerts::ESTIMATE_DIVERGED);
+    if diverged && !state.diverged {
+        state.full_resets = state.full_resets.wrapping_add(1);
+    }
+    state.diverged = diverged;
+    state
+}
+
+/// A silence ends when the commander has been heard for a while: a link that flaps is none.
+fn watch_link(config: &ModeConfig, state: &mut State, facts: &Facts) {
+    let silent = facts.alerts.contains(Alerts::COMM_LOST);
+    state.silence = match state.silence {
+        _ if !state.is_armed() => None,
+        None if silent => Some(Silence { since: facts.now, heard_since: None }),
+        Some(silence) if silent => Some(Silence { heard_since: None, ..silence }),
+        Some(silence) => {
+            let heard = silence.heard_since.unwrap_or(facts.now);
+            let over =
+                facts.now.since(heard) >= config.link_back && facts.now.since(silence.since) >= config.link_back * 2;
+            (!over).then_some(Silence { heard_since: Some(heard), ..silence })
+        }
+        None => None,
+    };
+}
+
+fn choose_commander(before: &State, state: &mut State, facts: &Facts) {
+    if !state.is_armed() {
+        state.commander = CommandSource::None;
+        return;
+    }
+    let pilot = &facts.pilot;
+    let acts = pilot.deflected || pilot.mode_turned || pilot.switch.rises || pilot.switch.falls;
+    let retakes = facts.asked.flies() && !before.wanted.is_manual();
+    // On the ground no flight is interrupted.
+    let starts = facts.asked.flies() && state.phase == FlightPhase::Armed;
+    if acts {
+        state.commander = CommandSource::Pilot;
+    } else if retakes || starts {
+        state.commander = CommandSource::Guided;
+    }
+}
+
+fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
+    let pilot = &facts.pilot;
+    if pilot.mode_turned {
+        state.pending = pilot.mode;
+    }
+    let piloted = facts.sticks == CommandSource::Pilot;
+    let wanted = match state.phase {
+        FlightPhase::IdleGround => {
+            // A program or a click holds the place: they have no sticks.
+            let click = facts.button == Some(ButtonGesture::Click);
+            state.pending = None;
+            let program = facts.asked.flies() || click;
+            Some(pilot.mode.filter(|_| !program).unwrap_or(FlightMode::PosHold))
+        }
+        FlightPhase::Armed | FlightPhase::Flying => {
+            let on_ground = state.phase == FlightPhase::Armed;
+            // Until the pilot's throttle has arrived, a mode that makes thrust of it would make none.
+            let ready = |mode: &FlightMode| on_ground || piloted || !mode.is_manual();
+            let turned = state.pending.filter(|mode| state.commander == CommandSource::Pilot && ready(mode));
+            if turned.is_some() {
+                state.pending = None;
+            }
+            let guided = on_ground && facts.asked.flies() && state.commander == CommandSource::Guided;
+            if guided { Some(FlightMode::PosHold) } else { turned }
+        }
+        FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::TakeOff | FlightPhase::Landing => None,
+    };
+    if let Some(wanted) = wanted.filter(|wanted| *wanted != state.wanted) {
+        state.wanted = wanted;
+        state.throttle_rested = false;
+    }
+    if is_airborne(state.phase) && state.phase != FlightPhase::Landing && state.wanted.is_manual() && !piloted {
+        // The throttle of a pilot who is not heard is no thrust. The pilot has to choose the manual mode again.
+        (state.wanted, state.pending) = (FlightMode::PosHold, None);
+    }
+    state.mode = match state.wanted {
+        FlightMode::PosHold if !facts.valid.contains(Validity::VELOCITY_XY) => FlightMode::AltHold,
+        wanted => wanted,
+    };
+    let blind = !facts.valid.contains(Validity::VELOCITY_Z);
+    let blind = blind && !state.mode.is_manual() && is_airborne(state.phase);
+    state.blind = blind.then(|| state.blind.unwrap_or(facts.now));
+    let rests = facts.pilot.frame.is_none_or(|(_, input)| input.throttle <= config.throttle_rest);
+    state.throttle_rested |= rests;
+}
+
+/// Pairing ends with the new transmitter's first frame, by the button, or after a time. The link refuses the old
+/// transmitter's frames while the vehicle looks for another one, so after a moment every frame is a new one's.
+fn watch_pairing(config: &ModeConfig, state: &mut State, facts: &Facts) {
+    if facts.button == Some(ButtonGesture::HoldPair) {
+        state.pairing = if state.pairing.is_some() { None } else { Some(facts.now) };
+    }
+    state.pairing = state.pairing.filter(|since| {
+        let paired = facts.pilot.frame.is_some_and(|(at, _)| at > *since + config.pairing_settle);
+        !paired && facts.now.since(*since) < config.pairing_timeout
+    });
+}
+
+fn watch_height(state: &mut State, facts: &Facts) {
+    let unmeasured = state.phase == FlightPhase::IdleHeld && facts.known_height().is_none();
+    state.unmeasured = unmeasured.then(|| state.unmeasured.unwrap_or(facts.now));
+}
+
+/// Has this event happened? The words are in [`Event::guard`].
+fn happens(event: Event, config: &ModeConfig, before: &State, state: &State, facts: &Facts) -> bool {
+    let (asked, pilot, phase) = (&facts.asked, &facts.pilot, state.phase);
+    let waited = facts.now.since(state.entered);
+    let lasts = |since: Option<Instant>, time: Duration| since.is_some_and(|since| facts.now.since(since) >= time);
+    let kill = asked.kill
+        || facts.stop_button
+        || facts.cut_off
+        || pilot.frame.is_some_and(|(_, input)| input.kill)
+        || facts.alerts.intersects(CUT);
+    let throttle = pilot.frame.map_or(0.0, |(_, input)| input.throttle);
+    match event {
+        Event::Emergency => kill,
+        Event::Stop => match phase {
+            FlightPhase::Armed => {
+                asked.disarm || pilot.switch.falls || pilot.switch.found_off || waited >= config.armed_timeout
+            }
+            // A transmitter that restarts turns both switches at once; that is no wish to fall.
+            FlightPhase::TakeOff | FlightPhase::Flying => {
+                pilot.switch.falls && before.mode.is_manual() && state.mode.is_manual()
+            }
+            FlightPhase::Landing => {
+                let low = state.is_low(config, facts) && (asked.disarm || pilot.switch.falls);
+                low || (pilot.switch.falls && state.landing_by_switch) || waited >= state.landing_limit
+            }
+            FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld => false,
+        },
+        Event::Touchdown => facts.landed,
+        Event::Land => {
+            let silent = facts.alerts.contains(Alerts::COMM_LOST);
+            let unheard = silent && (lasts(state.silence.map(|s| s.since), config.hover_without_link));
+            let unled = silent || facts.sticks == CommandSource::Failsafe;
+            let blind = lasts(state.blind, config.blind) || (state.blind.is_some() && unled);
+            let overdue = phase == FlightPhase::TakeOff && waited >= config.take_off_timeout;
+            asked.land
+                || asked.disarm
+                || pilot.switch.falls
+                || pilot.switch.found_off
+                || unheard
+                || blind
+                || overdue
+                || facts.alerts.intersects(LAND)
+        }
+        Event::TakeOffComplete => {
+            facts.takeoff_complete || (state.mode.is_manual() && facts.contact == GroundContact::Air)
+        }
+        Event::TakeOff => {
+            let piloted = state.commander == CommandSource::Pilot && facts.sticks == CommandSource::Pilot;
+            let raised = piloted && state.throttle_rested && throttle > config.throttle_take_off;
+            let by_itself = !state.mode.is_manual() && state.takes_off && waited >= config.spool;
+            asked.take_off || by_itself || raised
+        }
+        Event::Arm => {
+            let wanted = asked.arm || pilot.switch.rises || facts.button == Some(ButtonGesture::Click);
+            let refused = kill || asked.disarm || asked.land || pilot.switch.falls || facts.pressed();
+            wanted && !refused && arming::blocks(config, state, facts).is_empty()
+        }
+        Event::SetDown => {
+            facts.known_height().is_some_and(|height| height < config.standing_height)
+                || lasts(state.unmeasured, config.height_unknown)
+        }
+        Event::Lifted => facts.known_height().is_some_and(|height| height > config.held_height),
+        Event::Ready => facts.calibrated && facts.valid.contains(Validity::TILT),
+    }
+}
+
+/// All that leaving one phase and entering another means, in one place.
+fn leave_and_enter(config: &ModeConfig, state: &mut State, facts: &Facts, event: Event, phase: FlightPhase) {
+    let (left, low) = (state.phase, state.is_low(config, facts));
+    // On exit.
+    if left == FlightPhase::IdleHeld {
+        state.full_resets = state.full_resets.wrapping_add(1);
+    }
+    if is_armed(left) && !is_armed(phase) {
+        let crashed = facts.alerts.intersects(CUT);
+        // By the button the vehicle is in a hand, whose owner knows.
+        let fell = is_airborne(left) && !low && event != Event::Touchdown && !facts.stop_button;
+        let block = if facts.cut_off { ArmBlocks::CUT_OFF } else { ArmBlocks::CRASHED };
+        if crashed || fell || facts.cut_off {
+            state.unacknowledged |= block;
+        }
+        state.commander = CommandSource::None;
+        (state.silence, state.blind, state.landing_by_switch) = (None, None, false);
+    }
+    // On enter.
+    match phase {
+        FlightPhase::IdleGround => state.control_resets = state.control_resets.wrapping_add(1),
+        FlightPhase::Armed => {
+            state.control_resets = state.control_resets.wrapping_add(1);
+            // Positions count from the take-off spot.
+            state.origin_resets = state.origin_resets.wrapping_add(1);
+            // Raised already, it does not take off.
+            state.throttle_rested = false;
+            state.takes_off = !facts.asked.arm && !state.mode.is_manual();
+            state.commander = match (facts.asked.arm, facts.pilot.frame) {
+                (true, _) => CommandSource::Guided,
+                (false, Some(_)) => CommandSource::Pilot,
+                // By a click, and only programs are heard.
+                (false, None) => CommandSource::None,
+            };
+        }
+        FlightPhase::Landing => {
+            state.landing_by_switch = facts.pilot.switch.falls;
+            state.landing_limit = facts.known_height().map_or(config.landing_blind, |height| {
+                config.landing_spare + Duration::from_seconds(height.max(0.0) / config.landing_slowest)
+            });
+        }
+        FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::TakeOff | FlightPhase::Flying => {}
+    }
+    (state.phase, state.entered) = (phase, facts.now);
+    state.transitions = state.transitions.wrapping_add(1);
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+//! What is true in one step, as plain data: all that [`decide`](crate::decision::decide) looks at beside its state.
+
+use crate::input::ModeInput;
+use crate::pilot::Heard;
+use stampfly_types::messages::{Alerts, ButtonGesture, CommandSource, GroundContact, GuidedKind, Validity};
+use stampfly_types::{Duration, Instant, frame};
+
+/// What programs ask for in one step, as a set: the order of the commands does not matter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Asked {
+    /// Motors off now.
+    pub kill: bool,
+    /// Land if flying, then stop the motors.
+    pub disarm: bool,
+    /// Land.
+    pub land: bool,
+    /// Take off.
+    pub take_off: bool,
+    /// Allow the motors.
+    pub arm: bool,
+    /// Go somewhere, or stay.
+    pub route: bool,
+    /// Any command, a sign of life included.
+    pub any: bool,
+}
+
+impl Asked {
+    /// Reads the commands of a step.
+    #[must_use]
+    pub fn read(commands: &[GuidedKind]) -> Self {
+        let has = |kind: GuidedKind| commands.contains(&kind);
+        Self {
+            kill: has(GuidedKind::Kill),
+            disarm: has(GuidedKind::Disarm),
+            land: has(GuidedKind::Land),
+            take_off: has(GuidedKind::TakeOff),
+            arm: has(GuidedKind::Arm),
+            route: has(GuidedKind::WayPoint) || has(GuidedKind::Hold),
+            any: !commands.is_empty(),
+        }
+    }
+
+    /// Does a program want to fly? Commands that only end a flight need no authority.
+    #[must_use]
+    pub const fn flies(&self) -> bool {
+        self.arm || self.take_off || self.route
+    }
+}
+
+/// How old the newest usable sample of a sensor is; the longest duration for none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Ages {
+    /// Range to the ground.
+    pub range: Duration,
+    /// Optical flow.
+    pub flow: Duration,
+    /// Air pressure.
+    pub baro: Duration,
+}
+
+/// What is true in one step. The default is a vehicle that has just been switched on: nothing is known, and nothing was asked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Facts {
+    /// The instant of the step.
+    pub now: Instant,
+    /// The failsafe's findings.
+    pub alerts: Alerts,
+    /// What of the estimate may be used.
+    pub valid: Validity,
+    /// Height above the surface, m. A number only with [`Validity::HEIGHT`].
+    pub height: f32,
+    /// Tilt, rad.
+    pub tilt: f32,
+    /// The still-calibration is complete.
+    pub calibrated: bool,
+    /// How far the still-calibration is, 0 to 1.
+    pub calibration: f32,
+    /// Contact with the ground.
+    pub contact: GroundContact,
+    /// Take-off has reached its height.
+    pub takeoff_complete: bool,
+    /// Touchdown is sure.
+    pub landed: bool,
+    /// Sensors that arming asks for.
+    pub ages: Ages,
+    /// What programs ask for.
+    pub asked: Asked,
+    /// What the pilot's transmitter says.
+    pub pilot: Heard,
+    /// Whose sticks the controllers follow.
+    pub sticks: CommandSource,
+    /// A press of the button stops the motors.
+    pub stop_button: bool,
+    /// A gesture on the button that stopped nothing.
+    pub button: Option<ButtonGesture>,
+    /// The cut-off has stopped the motors.
+    pub cut_off: bool,
+}
+
+impl Facts {
+    pub(crate) fn read(now: Instant, input: &ModeInput<'_>, pilot: Heard) -> Self {
+        let age = |last: Option<Instant>| last.map_or(Duration::MAX, |at| now.since(at));
+        Self {
+            now,
+            alerts: input.alerts,
+            valid: input.estimate.valid,
+            height: input.estimate.height,
+            tilt: frame::tilt(&input.estimate.attitude),
+            calibrated: input.calibration.complete,
+            calibration: input.calibration.progress,
+            contact: input.land_detected.contact,
+            takeoff_complete: input.land_detected.takeoff_complete,
+            landed: input.land_detected.landed,
+            ages: Ages {
+                range: age(input.sensors.range),
+                flow: age(input.sensors.flow),
+                baro: age(input.sensors.baro),
+            },
+            asked: Asked::read(input.commands),
+            pilot,
+            sticks: input.sticks,
+            stop_button: false,
+            button: None,
+            cut_off: input.cut_off,
+        }
+    }
+
+    /// The height, if it is known.
+    #[must_use]
+    pub fn known_height(&self) -> Option<f32> {
+        (self.valid.contains(Validity::HEIGHT) && self.height.is_finite()).then_some(self.height)
+    }
+
+    /// Has the button just been pressed, by a person at the vehicle?
+    #[must_use]
+    pub fn pressed(&self) -> bool {
+        self.stop_button || self.button == Some(ButtonGesture::Press)
+    }
+}
