@@ -6,7 +6,8 @@ use stampfly_types::frame;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightPhase, FlightStatus, Validity};
 
 /// Sensors without which nobody takes off.
-const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::POWER_LOST);
+const SILENT_SENSOR: Alerts =
+    Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY).with(Alerts::POWER_LOST);
 
 /// The reasons against arming in this situation; empty when there is none.
 ///
@@ -16,7 +17,7 @@ const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(A
 /// | `NOT_ON_GROUND` | the phase is not IDLE on the ground |
 /// | `NO_BATTERY`, `LOW_BATTERY` | alerts of the failsafe |
 /// | `ATTITUDE`, `TILTED` | tilt unknown or in disagreement with gravity; more than [`ModeConfig::arming_tilt`] |
-/// | `SENSOR` | the inertial sensor or the battery monitor is silent |
+/// | `SENSOR` | the inertial sensor is silent or does not measure, or the battery monitor is silent |
 /// | `ESTIMATE` | the estimate is lost |
 /// | `PAIRING` | pairing with a transmitter |
 /// | `THROTTLE` | the throttle is above [`ModeConfig::throttle_rest`], and the mode in force or the pilot's makes thrust of it |

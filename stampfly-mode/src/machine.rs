@@ -26,7 +26,8 @@ pub struct ModeOutput {
 }
 
 /// Alerts that stop the motors in any phase.
-const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
+const CUT: Alerts =
+    Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY);
 /// Alerts that demand a landing at once.
 const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
 

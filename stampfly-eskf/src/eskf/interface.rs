@@ -30,8 +30,12 @@ impl Estimator for Eskf {
     fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.command, *command);
         if command.full_resets != previous.full_resets && self.initialized {
-            let calibration = self.calibration;
-            self.initialize(at, &calibration);
+            if command.on_ground || self.anchor.is_some() {
+                let calibration = self.calibration;
+                self.initialize(at, &calibration);
+            } else {
+                self.restart_motion();
+            }
         }
         if command.origin_resets != previous.origin_resets {
             self.surface = self.surface.map(|surface| surface - self.state.position.z);
@@ -62,9 +66,17 @@ impl Estimator for Eskf {
     fn predict(&mut self, at: Instant, imu: &ImuData) {
         let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
         let dt = at.since(self.now).seconds();
+        if !usable {
+            self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
+        }
         if !self.initialized || !usable || dt <= 0.0 {
             return;
         }
+        let bridged = self.bridge.step(&self.config, at, imu);
+        if bridged.is_some() {
+            self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
+        }
+        let imu = &bridged.unwrap_or(*imu);
         self.now = at;
         if dt > MAX_STEP {
             self.reset_history();
