@@ -13,14 +13,18 @@
 //! | `eskf/measurements.rs` | one update a sensor |
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, initial heading, unobserved velocity |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
+//! | `eskf/vertical.rs` | range against inertia and barometer |
+//! | `eskf/flow_monitor.rs` | flow against inertia |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
 mod bridge;
+mod flow_monitor;
 mod gate;
 mod innovation_bias;
 mod interface;
 mod measurements;
 mod pseudo_measurements;
+mod vertical;
 
 use crate::aid::baro::Offset;
 use crate::aid::gravity::Acceleration;
@@ -35,6 +39,7 @@ use crate::filter::{
 };
 use crate::level::attitude_from_specific_force;
 use bridge::Bridge;
+use flow_monitor::FlowMonitor;
 use gate::{Gates, Sensor};
 use innovation_bias::InnovationBiasMonitor;
 use stampfly_types::messages::{
@@ -42,6 +47,7 @@ use stampfly_types::messages::{
     StateEstimate, TofData, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
+use vertical::{Verdict, VerticalMonitor};
 
 /// Measurements from farther ahead than this are refused, s.
 const MAX_AHEAD: f32 = 0.02;
@@ -138,6 +144,8 @@ pub struct Eskf {
     accels: Mean,
     gates: Gates,
     flow_innovation_bias: InnovationBiasMonitor,
+    flow_monitor: FlowMonitor,
+    vertical: VerticalMonitor,
     /// Last specific force used as the vertical, and what it should have been.
     gravity: [Vec3; 2],
     status: EstimatorStatus,
@@ -193,6 +201,8 @@ impl Eskf {
             accels: Mean::default(),
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
+            flow_monitor: FlowMonitor::default(),
+            vertical: VerticalMonitor::default(),
             gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
@@ -364,6 +374,9 @@ impl Eskf {
         self.accels = Mean::default();
         self.gates = Gates::default();
         self.flow_innovation_bias = InnovationBiasMonitor::default();
+        self.flow_monitor = FlowMonitor::default();
+        self.vertical = VerticalMonitor::default();
+        self.vertical.stand(-self.state.accel_bias.z);
         self.reset_history();
         self.status.diverged = false;
     }
@@ -398,8 +411,31 @@ impl Eskf {
 
     /// Is the velocity measured, or held by the zero-velocity update?
     fn is_velocity_aided(&self) -> bool {
-        let by = [Sensor::Flow, Sensor::Velocity, Sensor::Position];
-        self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
+        let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.flow_monitor.is_implausible();
+        let by = [Sensor::Velocity, Sensor::Position];
+        self.anchor.is_some() || flow || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
+    }
+
+    /// Does a range hold the height?
+    fn is_range_aided(&self) -> bool {
+        self.gates.is_recent(Sensor::Tof, self.now) && !self.vertical.is_implausible()
+    }
+
+    /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
+    fn judge_range(&mut self) {
+        self.vertical.restart(-self.state.velocity.z);
+        if let Verdict::Range { climb, bias, higher } = self.vertical.judge(self.now) {
+            self.state.velocity.z = -climb;
+            self.state.position.z -= higher;
+            self.state.accel_bias.z = -bias;
+            self.covariance.reset(VELOCITY + 2, 0.1);
+            self.covariance.inflate(POSITION + 2, 0.1);
+            self.covariance.reset(ACCEL_BIAS + 2, 0.1);
+            // The barometer holds the height from here.
+            self.baro_offset = None;
+            self.status.resets = self.status.resets.wrapping_add(1);
+        }
+        self.status.range_implausible = self.vertical.is_implausible();
     }
 
     /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.

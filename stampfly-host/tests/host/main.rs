@@ -17,4 +17,5 @@ mod reference;
 mod replay;
 mod report;
 mod rover;
+mod safety_sensors;
 mod swap;
