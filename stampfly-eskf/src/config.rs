@@ -15,6 +15,11 @@ pub struct EskfConfig {
     pub accel_vibration: f32,
     /// The same for the gyro.
     pub gyro_vibration: f32,
+    /// Largest angular acceleration of the body, rad/s². An inertial sample that asks for more is garbage, unless it goes
+    /// on: up to three running are bridged with the last sample before them.
+    pub angular_acceleration: f32,
+    /// Full scale of the accelerometer, m/s²: a sample with every axis there is garbage in the same way.
+    pub accel_full_scale: f32,
     /// Gyro bias random walk, rad/s/√s.
     pub gyro_bias_walk: f32,
     /// Accelerometer bias random walk, m/s²/√s.
@@ -142,6 +147,8 @@ impl Default for EskfConfig {
             gyro_noise: 5e-4,
             accel_vibration: 0.35,
             gyro_vibration: 0.25,
+            angular_acceleration: 3_000.0,
+            accel_full_scale: 78.4,
             gyro_bias_walk: 3e-5,
             accel_bias_walk: 1e-3,
             initial_position: 0.01,

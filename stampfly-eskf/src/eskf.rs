@@ -9,16 +9,22 @@
 //! |---|---|
 //! | `eskf.rs` | the filter's state, time alignment, update, inflation and resets |
 //! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
+//! | `eskf/bridge.rs` | inertial samples that are garbage |
 //! | `eskf/measurements.rs` | one update a sensor |
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, initial heading, unobserved velocity |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
+//! | `eskf/vertical.rs` | range against inertia and barometer |
+//! | `eskf/flow_monitor.rs` | flow against inertia |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
+mod bridge;
+mod flow_monitor;
 mod gate;
 mod innovation_bias;
 mod interface;
 mod measurements;
 mod pseudo_measurements;
+mod vertical;
 
 use crate::aid::baro::Offset;
 use crate::aid::gravity::Acceleration;
@@ -32,6 +38,8 @@ use crate::filter::{
     ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, NominalState, POSITION, PropagationStep, VELOCITY, Vibration,
 };
 use crate::level::attitude_from_specific_force;
+use bridge::Bridge;
+use flow_monitor::FlowMonitor;
 use gate::{Gates, Sensor};
 use innovation_bias::InnovationBiasMonitor;
 use stampfly_types::messages::{
@@ -39,6 +47,7 @@ use stampfly_types::messages::{
     StateEstimate, TofData, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
+use vertical::{Verdict, VerticalMonitor};
 
 /// Measurements from farther ahead than this are refused, s.
 const MAX_AHEAD: f32 = 0.02;
@@ -54,6 +63,10 @@ const COVARIANCE_STEP: f32 = 4e-3;
 /// and rad/s.
 const TILT_INFLATION: f32 = 0.1;
 const GYRO_BIAS_INFLATION: f32 = 0.03;
+/// Standard deviation of the velocity after a restart in flight, m/s.
+const RESTART_VELOCITY: f32 = 3.0;
+/// A position beyond this does not survive a restart in flight, m.
+const KEPT_POSITION: f32 = 50.0;
 /// Pseudo-measurements are made on every n-th inertial sample.
 const PSEUDO_MEASUREMENT_DIVIDER: u32 = 4;
 
@@ -125,11 +138,14 @@ pub struct Eskf {
     field: Option<Vec3>,
     acceleration: Acceleration,
     steps: u32,
+    bridge: Bridge,
     rate: Vec3,
     force: Vec3,
     accels: Mean,
     gates: Gates,
     flow_innovation_bias: InnovationBiasMonitor,
+    flow_monitor: FlowMonitor,
+    vertical: VerticalMonitor,
     /// Last specific force used as the vertical, and what it should have been.
     gravity: [Vec3; 2],
     status: EstimatorStatus,
@@ -179,11 +195,14 @@ impl Eskf {
             field: None,
             acceleration: Acceleration::default(),
             steps: 0,
+            bridge: Bridge::default(),
             rate: Vec3::zeros(),
             force: Vec3::zeros(),
             accels: Mean::default(),
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
+            flow_monitor: FlowMonitor::default(),
+            vertical: VerticalMonitor::default(),
             gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
@@ -324,20 +343,67 @@ impl Eskf {
         fusion
     }
 
-    /// Starts again from the last calibration.
+    /// Starts position and velocity again, in flight. Attitude, heading and biases are better than those of the
+    /// calibration at power-on, so they stay; their variance grows by what drove the estimate away.
+    fn restart_motion(&mut self) {
+        let mut variances = initial_covariance(&self.config);
+        for axis in 0..3 {
+            for (block, limit) in [(ATTITUDE, 1.0), (GYRO_BIAS, 0.1), (ACCEL_BIAS, 2.0)] {
+                // A covariance that is not sound says nothing.
+                let before = self.covariance.get(block + axis, block + axis);
+                let before = if before.is_finite() { before.clamp(0.0, limit) } else { limit };
+                variances.reset(block + axis, before);
+            }
+            variances.reset(VELOCITY + axis, RESTART_VELOCITY * RESTART_VELOCITY);
+        }
+        self.covariance = variances;
+        for axis in 0..2 {
+            self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
+        }
+        for axis in 0..3 {
+            self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
+            self.covariance.inflate(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
+        }
+        // Where that is, is a matter of definition; a jump would be flown back.
+        self.state.position = self.state.position.map(|axis| if axis.abs() < KEPT_POSITION { axis } else { 0.0 });
+        self.state.velocity = Vec3::zeros();
+        self.surface = None;
+        self.baro_offset = None;
+        self.baro_updated = self.now;
+        self.acceleration = Acceleration::default();
+        self.accels = Mean::default();
+        self.gates = Gates::default();
+        self.flow_innovation_bias = InnovationBiasMonitor::default();
+        self.flow_monitor = FlowMonitor::default();
+        self.vertical = VerticalMonitor::default();
+        self.vertical.stand(-self.state.accel_bias.z);
+        self.reset_history();
+        self.status.diverged = false;
+    }
+
+    /// Starts again: on the ground, or where the attitude is no number, from the last calibration; in flight position and
+    /// velocity only.
     fn restart(&mut self) {
-        let (at, calibration, resets) = (self.now, self.calibration, self.status.resets);
-        self.initialize(at, &calibration);
-        self.status.resets = resets.wrapping_add(1);
+        let (at, calibration, status) = (self.now, self.calibration, self.status);
+        if self.anchor.is_some() || !self.state.is_finite() {
+            self.initialize(at, &calibration);
+            self.status = status;
+        } else {
+            self.restart_motion();
+        }
+        self.status.resets = status.resets.wrapping_add(1);
         self.status.diverged = true;
     }
 
     /// Restarts a filter that is not finite or whose covariance is not sound; a position or velocity beyond any flight
-    /// means divergence.
+    /// means divergence, whatever holds it. Where nothing measures the horizontal position it is nobody's claim.
     fn check_health(&mut self) {
+        let NominalState { position, velocity, .. } = &self.state;
         if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
             self.restart();
-        } else if self.is_velocity_aided() && (self.state.position.amax() > 100.0 || self.state.velocity.amax() > 50.0)
+        } else if velocity.amax() > 50.0
+            || position.z.abs() > 100.0
+            || (position.xy().amax() > 100.0 && self.is_velocity_aided())
         {
             self.status.diverged = true;
         }
@@ -345,8 +411,31 @@ impl Eskf {
 
     /// Is the velocity measured, or held by the zero-velocity update?
     fn is_velocity_aided(&self) -> bool {
-        let by = [Sensor::Flow, Sensor::Velocity, Sensor::Position];
-        self.anchor.is_some() || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
+        let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.flow_monitor.is_implausible();
+        let by = [Sensor::Velocity, Sensor::Position];
+        self.anchor.is_some() || flow || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
+    }
+
+    /// Does a range hold the height?
+    fn is_range_aided(&self) -> bool {
+        self.gates.is_recent(Sensor::Tof, self.now) && !self.vertical.is_implausible()
+    }
+
+    /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
+    fn judge_range(&mut self) {
+        self.vertical.restart(-self.state.velocity.z);
+        if let Verdict::Range { climb, bias, higher } = self.vertical.judge(self.now) {
+            self.state.velocity.z = -climb;
+            self.state.position.z -= higher;
+            self.state.accel_bias.z = -bias;
+            self.covariance.reset(VELOCITY + 2, 0.1);
+            self.covariance.inflate(POSITION + 2, 0.1);
+            self.covariance.reset(ACCEL_BIAS + 2, 0.1);
+            // The barometer holds the height from here.
+            self.baro_offset = None;
+            self.status.resets = self.status.resets.wrapping_add(1);
+        }
+        self.status.range_implausible = self.vertical.is_implausible();
     }
 
     /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.

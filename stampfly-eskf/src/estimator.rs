@@ -35,6 +35,8 @@ pub enum Refusal {
     NotInitialized,
     /// The driver does not vouch for it, or its quality is too low.
     Quality,
+    /// The sensor contradicts the others, and is left out until it agrees with them.
+    Implausible,
     /// A number in it is not finite.
     NotFinite,
     /// Outside the sensor's range.

@@ -51,7 +51,8 @@ fn silent(needed: bool, age: stampfly_types::Duration, config: &ModeConfig) -> O
 }
 
 /// Alerts of sensors without which no vehicle takes off.
-const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::POWER_LOST);
+const SILENT_SENSOR: Alerts =
+    Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY).with(Alerts::POWER_LOST);
 
 macro_rules! checks {
     ($($block:ident [$unit:literal] $refuses:literal => |$config:ident, $state:ident, $facts:ident| $test:expr;)+) => {
@@ -77,12 +78,12 @@ checks! {
         when(facts.cut_off || state.unacknowledged.contains(ArmBlocks::CUT_OFF));
     CRASHED [""] "a crash, or motors stopped in the air, not acknowledged by arm switch off, `Disarm` or the button" =>
         |config, state, facts| when(state.unacknowledged.contains(ArmBlocks::CRASHED)
-            || facts.alerts.intersects(CUT.without(Alerts::IMU_LOST)));
+            || facts.alerts.intersects(CUT.without(Alerts::IMU_LOST | Alerts::IMU_FAULTY)));
     KILL [""] "the pilot's kill switch is on" => |config, state, facts|
         when(facts.pilot.frame.is_some_and(|(_, input)| input.kill));
     SELF_TEST [""] "the self test at power-on failed" => |config, state, facts|
         when(facts.alerts.contains(Alerts::SELF_TEST_FAILED));
-    SENSOR [""] "the inertial sensor or the battery monitor is silent" => |config, state, facts|
+    SENSOR [""] "the inertial sensor is silent or does not measure, or the battery monitor is silent" => |config, state, facts|
         when(facts.alerts.intersects(SILENT_SENSOR));
     CALIBRATING ["1"] "still-calibration has not finished" => |config, state, facts|
         if facts.calibrated { None } else { Some((facts.calibration, 1.0)) };

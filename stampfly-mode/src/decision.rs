@@ -31,7 +31,8 @@ use stampfly_types::messages::{
 use stampfly_types::{Duration, Instant};
 
 /// Alerts that stop the motors in any phase.
-pub const CUT: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
+pub const CUT: Alerts =
+    Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY);
 /// Alerts that demand a landing at once.
 pub const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
 

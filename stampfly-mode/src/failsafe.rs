@@ -4,36 +4,48 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing), and above six sigma of the present vibration, in two samples running | when disarmed |
-//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running | when disarmed |
-//! | `TUMBLED` | tilt above 60° for 300 ms, except in ACRO | when disarmed |
-//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms | with the next sample; `IMU_LOST` when disarmed |
+//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
+//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground; in ACRO above 120° for a second | disarmed |
+//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
+//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity ([`imu`]) | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
 //! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
-//! | `POWER_LOST` | no battery sample for 1 s; a voltage below 0.1 V is one: no meter is fitted | with the next one |
+//! | `POWER_LOST` | no finite battery sample for 1 s; a voltage below 0.1 V is one: no meter is fitted | with the next one |
+//! | `POWER_IMPLAUSIBLE` | armed, and the voltage changes as no battery's does, or is none ([`power`]) | with a plausible one, or disarmed |
 //! | `USB_POWER` | voltage below 3.3 V while disarmed | 0.1 V higher |
 //! | `TOF_LOST`, `FLOW_LOST` | no usable sample for 1 s in the air | with the next one |
+//! | `RANGE_IMPLAUSIBLE`, `FLOW_IMPLAUSIBLE` | the estimator finds that they contradict the other sensors | when it no longer does |
 //! | `TILT_MISMATCH` | gravity and estimated tilt 10° apart for 0.5 s on the ground | with agreement |
-//! | `ESTIMATE_DIVERGED` | the estimator says so | when it no longer does |
+//! | `ESTIMATE_DIVERGED` | the estimator says so | disarmed |
+//!
+//! What clears when disarmed stays for at least two seconds, so that lights (30 Hz) and telemetry (50 Hz) show it.
 //!
 //! Numbers: `safety.*` parameters of the StampFly's reference firmware. Its recorded flights show 2–3 m/s² of
 //! vibration, peaks of 18; the six-sigma condition keeps a badly balanced propeller from looking like a crash.
 
+mod attitude;
 mod config;
+mod imu;
+mod motion;
+mod power;
 
 pub use config::FailsafeConfig;
 
+use attitude::AttitudeMonitor;
+use imu::ImuMonitor;
+use motion::MotionMonitor;
+use power::PowerMonitor;
 use stampfly_types::messages::{
-    Alerts, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate,
-    SystemAlert, Validity,
+    Alerts, EstimatorStatus, FlightPhase, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate, SystemAlert,
 };
-use stampfly_types::{Duration, Instant, Vec3, frame, math};
+use stampfly_types::{Duration, Instant, Stamped};
 
 /// What the failsafe looks at. Times are those of the newest sample, usable or authentic.
 #[derive(Clone, Copy, Debug)]
 pub struct FailsafeInput<'a> {
-    /// Newest inertial sample.
-    pub imu: Option<(Instant, &'a ImuData)>,
+    /// The inertial samples since the step before, oldest first: every one counts for the detection of impacts.
+    pub imu: &'a [Stamped<ImuData>],
     /// The estimate.
     pub estimate: &'a StateEstimate,
     /// The estimator's own opinion.
@@ -56,16 +68,18 @@ pub struct FailsafeInput<'a> {
 ///
 /// ```
 /// use stampfly_mode::{Failsafe, FailsafeInput};
-/// use stampfly_types::{Instant, Vec3, messages::*};
+/// use stampfly_types::{Instant, Stamped, Vec3, messages::*};
 /// let mut failsafe = Failsafe::default();
-/// let imu = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), ..Default::default() };
+/// let data = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), ..Default::default() };
+/// let imu = [Stamped { at: Instant::ZERO, generation: 1, data }];
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
-///     imu: Some((Instant::ZERO, &imu)), estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
+///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
 ///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
+/// let quiet = FailsafeInput { imu: &[], ..quiet };
 /// assert!(failsafe.step(Instant::from_micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,24 +88,24 @@ pub struct Failsafe {
     config: FailsafeConfig,
     active: Alerts,
     seen: Alerts,
+    /// Stamp of the newest inertial sample, and when the sensor was last heard: no later than now.
     last_imu: Option<Instant>,
-    last_step: Option<Instant>,
-    impacts: u32,
-    overspeeds: u32,
-    /// Specific force over the length of a blow.
-    blow: Option<Vec3>,
-    /// Running mean and variance of its norm.
-    force: [f32; 2],
-    /// Specific force for the tilt on the ground.
-    gravity: Option<Vec3>,
-    tumbled: Option<Instant>,
-    mismatch: Option<Instant>,
-    voltage: Option<f32>,
-    last_power: Option<Instant>,
+    heard_imu: Instant,
+    /// When one of the latched conditions was last present.
+    latched_at: Instant,
+    imu: ImuMonitor,
+    motion: MotionMonitor,
+    attitude: AttitudeMonitor,
+    power: PowerMonitor,
 }
 
-/// Alerts that stay until the vehicle is disarmed.
-const LATCHED: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST);
+/// Alerts that stay until the vehicle is disarmed, and long enough to be seen.
+const LATCHED: Alerts = Alerts::IMPACT
+    .with(Alerts::GYRO_ANOMALY)
+    .with(Alerts::TUMBLED)
+    .with(Alerts::IMU_LOST)
+    .with(Alerts::IMU_FAULTY)
+    .with(Alerts::ESTIMATE_DIVERGED);
 
 impl Failsafe {
     /// Nothing wrong yet.
@@ -102,113 +116,60 @@ impl Failsafe {
 
     /// One step; runs on a deadline when there are no samples.
     pub fn step(&mut self, now: Instant, input: &FailsafeInput<'_>) -> SystemAlert {
-        let disarmed = !input.flight_status.armed;
-        let mut active = if disarmed { self.active.without(LATCHED) } else { self.active };
-        if let Some((at, imu)) = input.imu
-            && self.last_imu != Some(at)
-        {
-            self.last_imu = Some(at);
-            active = self.inspect_motion(active, imu, input.flight_status.phase);
+        let status = input.flight_status;
+        let mut found = Alerts::NONE;
+        for sample in input.imu {
+            found |= self.inspect(now, sample, status);
         }
-        let silence = self.last_imu.map_or(now.since(Instant::ZERO), |at| now.since(at));
-        active = active.set(Alerts::IMU_DEGRADED, silence >= self.config.imu_degraded);
-        if silence >= self.config.imu_lost {
-            active |= Alerts::IMU_LOST;
+        let config = &self.config;
+        let silence = now.since(self.heard_imu);
+        let [tumbled, mismatch] = self.attitude.step(config, now, input);
+        found = found
+            .set(Alerts::IMU_LOST, silence >= config.imu_lost)
+            .set(Alerts::TUMBLED, tumbled)
+            .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
+        if !found.is_empty() {
+            self.latched_at = now;
         }
-        active = self.inspect_attitude(active, now, input);
-        active = self.inspect_power(active, now, input, disarmed);
-        let airborne = matches!(input.flight_status.phase, FlightPhase::Flying | FlightPhase::Landing);
+        let forgotten = !status.armed && now.since(self.latched_at) >= config.shown;
+        let kept = if forgotten { self.active.without(LATCHED) } else { self.active };
+        let active = self.power.step(config, kept | found, now, input.power, status.armed);
+        let airborne = matches!(status.phase, FlightPhase::Flying | FlightPhase::Landing);
         let silent = |last: Option<Instant>, limit| last.is_none_or(|at| now.since(at) >= limit);
-        active = active
-            .set(Alerts::COMM_LOST, silent(input.command, self.config.link_silence))
-            .set(Alerts::TOF_LOST, airborne && silent(input.tof, self.config.aiding_silence))
-            .set(Alerts::FLOW_LOST, airborne && silent(input.flow, self.config.aiding_silence))
-            .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged)
+        let active = active
+            .set(Alerts::IMU_DEGRADED, silence >= config.imu_degraded)
+            .set(Alerts::TILT_MISMATCH, mismatch)
+            .set(Alerts::COMM_LOST, silent(input.command, config.link_silence))
+            .set(Alerts::TOF_LOST, airborne && silent(input.tof, config.aiding_silence))
+            .set(Alerts::FLOW_LOST, airborne && silent(input.flow, config.aiding_silence))
+            .set(Alerts::RANGE_IMPLAUSIBLE, input.status.range_implausible)
+            .set(Alerts::FLOW_IMPLAUSIBLE, input.status.flow_implausible)
             .set(Alerts::SELF_TEST_FAILED, input.self_test == SelfTestVerdict::Failed)
             .set(Alerts::SELF_TEST_DIFFERS, input.self_test == SelfTestVerdict::WithinTolerance);
-        self.last_step = Some(now);
         self.active = active;
         self.seen |= active;
         SystemAlert { active, seen: self.seen }
     }
 
-    fn inspect_motion(&mut self, active: Alerts, imu: &ImuData, phase: FlightPhase) -> Alerts {
-        let config = &self.config;
-        let rate = imu.gyro.norm();
-        if !imu.accel.norm_squared().is_finite() || !rate.is_finite() {
-            return active;
+    /// Looks at one inertial sample.
+    fn inspect(&mut self, now: Instant, sample: &Stamped<ImuData>, status: &FlightStatus) -> Alerts {
+        let Stamped { at, data: imu, .. } = sample;
+        // A sum of squares that overflows is no measurement either.
+        let finite = (imu.accel.norm_squared() + imu.gyro.norm_squared()).is_finite();
+        if self.last_imu.replace(*at) == Some(*at) || !finite {
+            return Alerts::NONE;
         }
-        let blow = self.blow.get_or_insert(imu.accel);
-        *blow += (imu.accel - *blow) * config.blow_weight;
-        let force = blow.norm();
-        let [mean, variance] = self.force;
-        let landing = phase == FlightPhase::Landing;
-        let impact = if landing { config.landing_impact } else { config.impact };
-        let limit = impact.max(mean + config.impact_sigmas * math::sqrt(variance));
-        self.impacts = if force >= limit { self.impacts.saturating_add(1) } else { 0 };
-        self.overspeeds = if rate >= config.rate { self.overspeeds.saturating_add(1) } else { 0 };
-        // An impact must not raise its own threshold: outliers enter clipped.
-        let off = force.min(limit) - mean;
-        let weight = config.vibration_weight;
-        self.force = [mean + weight * off, variance + weight * (off * off - variance)];
-        let gravity = self.gravity.get_or_insert(imu.accel);
-        *gravity += (imu.accel - *gravity) * config.gravity_weight;
-        let mut active = active;
-        if self.impacts >= config.motion_samples {
-            active |= Alerts::IMPACT;
+        // A stamp in the future must not stand for samples that never come.
+        self.heard_imu = self.heard_imu.max((*at).min(now));
+        let flies = matches!(status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
+        let landing = status.phase == FlightPhase::Landing;
+        let (found, suspect) = self.motion.step(&self.config, *at, imu, landing);
+        let holds_height = flies && !status.mode.is_manual();
+        let faulty = self.imu.step(&self.config, *at, imu, suspect, holds_height);
+        if !suspect {
+            self.attitude.add(&self.config, imu);
         }
-        if self.overspeeds >= config.motion_samples {
-            active |= Alerts::GYRO_ANOMALY;
-        }
-        active
-    }
-
-    fn inspect_attitude(&mut self, active: Alerts, now: Instant, input: &FailsafeInput<'_>) -> Alerts {
-        let known = input.estimate.valid.contains(Validity::TILT);
-        let flying =
-            matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
-        let config = &self.config;
-        let over = flying
-            && known
-            && input.flight_status.mode != FlightMode::Acro
-            && frame::tilt(&input.estimate.attitude) > config.tumble_tilt;
-        let tumbled = lasts(&mut self.tumbled, now, over, config.tumble_time);
-        let standing = input.flight_status.phase == FlightPhase::IdleGround && known;
-        let apart = standing
-            && self.gravity.is_some_and(|force| {
-                let up = input.estimate.attitude.inverse_transform_vector(&-Vec3::z());
-                math::acos(force.dot(&up) / force.norm().max(1e-3)) > config.tilt_mismatch
-            });
-        let mismatch = lasts(&mut self.mismatch, now, apart, config.tilt_mismatch_time);
-        let active = active.set(Alerts::TILT_MISMATCH, mismatch);
-        if tumbled { active | Alerts::TUMBLED } else { active }
-    }
-
-    fn inspect_power(&mut self, active: Alerts, now: Instant, input: &FailsafeInput<'_>, disarmed: bool) -> Alerts {
-        let last = self.last_power;
-        let fresh = input.power.filter(|(at, power)| last != Some(*at) && power.voltage.is_finite());
-        let Some((at, power)) = fresh else {
-            // At power-on the monitor gets as long for its first sample.
-            let silence = last.map_or(now.since(Instant::ZERO), |at| now.since(at));
-            return active.set(Alerts::POWER_LOST, silence >= self.config.power_silence);
-        };
-        self.last_power = Some(at);
-        let active = active.set(Alerts::POWER_LOST, now.since(at) >= self.config.power_silence);
-        if power.voltage < self.config.no_meter {
-            return active;
-        }
-        let dt = last.map_or(0.0, |last| at.since(last).seconds());
-        let before = self.voltage.unwrap_or(power.voltage);
-        let voltage = before + (power.voltage - before) * (dt / (self.config.battery_time + dt));
-        self.voltage = Some(voltage);
-        let below = |alert: Alerts, limit: f32| {
-            let hysteresis = if active.contains(alert) { self.config.battery_hysteresis } else { 0.0 };
-            voltage <= limit + hysteresis
-        };
-        active
-            .set(Alerts::USB_POWER, below(Alerts::USB_POWER, self.config.usb) && disarmed)
-            .set(Alerts::LOW_BATTERY, below(Alerts::LOW_BATTERY, self.config.battery_low))
-            .set(Alerts::CRITICAL_BATTERY, below(Alerts::CRITICAL_BATTERY, self.config.battery_critical))
+        found.set(Alerts::IMU_FAULTY, faulty)
     }
 }
 

@@ -48,8 +48,11 @@ pub struct Signaller {
 }
 
 /// What the vehicle should not fly with.
-const FAULT: Alerts =
-    Alerts::IMU_LOST.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::TILT_MISMATCH).with(Alerts::POWER_LOST);
+const FAULT: Alerts = Alerts::IMU_LOST
+    .with(Alerts::IMU_FAULTY)
+    .with(Alerts::ESTIMATE_DIVERGED)
+    .with(Alerts::TILT_MISMATCH)
+    .with(Alerts::POWER_LOST);
 /// A low battery is called out again after this long.
 const REPEAT: Duration = Duration::from_secs(10);
 

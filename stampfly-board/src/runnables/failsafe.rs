@@ -37,13 +37,15 @@ impl Runnable for Failsafe {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut FailsafeEnds<'_>) {
         let now = activation.now();
+        // A stamp in the future must not stand for samples that never come.
+        let newest = |last: Option<Instant>, at: Option<Instant>| last.max(at.map(|at| at.min(now)));
         let range = ends.sensor_tof.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
-        self.last_tof = self.last_tof.max(range);
+        self.last_tof = newest(self.last_tof, range);
         let flow = ends.sensor_flow.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
-        self.last_flow = self.last_flow.max(flow);
+        self.last_flow = newest(self.last_flow, flow);
         let pilot = ends.command_pilot.last().map(|sample| sample.at);
         let guided = ends.command_guided.last().map(|sample| sample.at);
-        (self.last_pilot, self.last_guided) = (self.last_pilot.max(pilot), self.last_guided.max(guided));
+        (self.last_pilot, self.last_guided) = (newest(self.last_pilot, pilot), newest(self.last_guided, guided));
         // Who does not fly the vehicle does not speak for the one who does.
         let heard = match ends.flight_status.get().commander {
             CommandSource::Pilot => self.last_pilot,
@@ -53,23 +55,20 @@ impl Runnable for Failsafe {
         // Commands that do not get through on board are not heard, either.
         let command = heard.min(ends.command_setpoint.sample().map(|sticks| sticks.at));
 
-        let input = |imu| FailsafeInput {
-            imu,
-            estimate: ends.estimate_state.get(),
-            status: ends.estimate_status.get(),
-            power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
-            command,
-            tof: self.last_tof,
-            flow: self.last_flow,
-            self_test: ends.self_test.get().verdict,
-            flight_status: ends.flight_status.get(),
-        };
-        // Every sample counts for the impact detector, also those that came while something else ran.
-        let mut alert = None;
-        for sample in ends.sensor_imu.iter() {
-            alert = Some(self.failsafe.step(now, &input(Some((sample.at, &sample.data)))));
-        }
-        let alert = alert.unwrap_or_else(|| self.failsafe.step(now, &input(None)));
+        let alert = self.failsafe.step(
+            now,
+            &FailsafeInput {
+                imu: &ends.sensor_imu,
+                estimate: ends.estimate_state.get(),
+                status: ends.estimate_status.get(),
+                power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
+                command,
+                tof: self.last_tof,
+                flow: self.last_flow,
+                self_test: ends.self_test.get().verdict,
+                flight_status: ends.flight_status.get(),
+            },
+        );
         ends.system_alert.publish(now, &alert);
     }
 }

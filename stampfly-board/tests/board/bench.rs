@@ -97,7 +97,10 @@ impl<'b> Bench<'b> {
         while self.now < end {
             self.now += Duration::from_micros(2_500);
             let now = self.now;
-            let still = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };
+            // A sensor has noise: one that repeats itself does not measure.
+            let noise = Vec3::repeat(1e-3 * (now.as_micros() / 2_500 % 7) as f32);
+            let accel = Vec3::new(0.0, 0.0, -GRAVITY) + noise;
+            let still = ImuData { accel, gyro: noise, ..Default::default() };
             self.ends.imu.sensor_imu.publish(now, &still);
             if now.as_micros().is_multiple_of(link::PERIOD.as_micros()) {
                 self.ends.button.button_contact.publish(now, &ButtonContact { pressed });

@@ -28,8 +28,11 @@ pub struct StillQuality {
 /// use stampfly_eskf::calibration::StillCalibration;
 /// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut calibration = StillCalibration::default();
-/// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0 };
 /// for k in 0..1500 {
+///     // A sensor has noise: one that repeats itself does not measure, and never completes.
+///     let noise = Vec3::repeat(if k % 2 == 0 { 1e-3 } else { -1e-3 });
+///     let accel = Vec3::new(0.0, 0.0, -9.81) + noise;
+///     let still = ImuData { accel, gyro: Vec3::new(0.01, 0.0, 0.0) + noise, temperature: 25.0 };
 ///     calibration.step(Instant::from_micros(2_500 * k), &still).unwrap();
 /// }
 /// let result = calibration.result();
@@ -44,7 +47,14 @@ pub struct StillCalibration {
     field: Vec3,
     altitude: Option<f32>,
     result: CalibrationResult,
+    last: [f32; 6],
+    /// Samples running in which each axis repeated itself.
+    equal: [u32; 6],
 }
+
+/// An axis that repeats itself so often does not measure: 50 ms at 400 Hz. One axis repeats a sample by chance with a
+/// probability below 0.3, so often with 10⁻¹⁰.
+const FROZEN: u32 = 20;
 
 impl StillCalibration {
     /// Nothing collected yet.
@@ -56,13 +66,18 @@ impl StillCalibration {
     /// Takes an inertial sample. After completion nothing changes any more.
     ///
     /// # Errors
-    /// Why the sample does not count: the collection begins again, unless the sample was not finite.
+    /// Why the sample does not count: the collection begins again, unless the sample was not finite. It never ends while
+    /// an axis repeats itself.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<(), NotStill> {
         if self.result.complete {
             return Ok(());
         }
         let begun = self.average.progress() > 0.0;
-        let step = self.average.step(now, imu);
+        let mut step = self.average.step(now, imu);
+        if self.is_frozen(imu) {
+            self.average.drop_stretch(now);
+            step = Err(NotStill::Frozen);
+        }
         self.result.progress = self.average.progress();
         if step.is_err() && begun && self.result.progress == 0.0 {
             self.result.restarts = self.result.restarts.wrapping_add(1);
@@ -77,6 +92,16 @@ impl StillCalibration {
             self.result.complete = true;
         }
         Ok(())
+    }
+
+    /// Does an axis repeat itself?
+    fn is_frozen(&mut self, imu: &ImuData) -> bool {
+        let values = imu.accel.iter().chain(imu.gyro.iter());
+        for ((value, last), equal) in values.zip(&mut self.last).zip(&mut self.equal) {
+            *equal = if value.to_bits() == last.to_bits() { equal.saturating_add(1) } else { 0 };
+            *last = *value;
+        }
+        self.equal.iter().any(|equal| *equal >= FROZEN)
     }
 
     /// Takes a magnetometer sample.
@@ -116,28 +141,49 @@ impl StillCalibration {
 mod tests {
     use super::*;
 
-    fn still() -> ImuData {
-        ImuData { accel: Vec3::new(0.1, 0.0, -9.8), gyro: Vec3::new(0.01, -0.02, 0.005), temperature: 30.0 }
+    /// With a noise of the smallest size.
+    fn still(k: u64) -> ImuData {
+        let noise = Vec3::repeat(if k.is_multiple_of(2) { 1e-6 } else { -1e-6 });
+        let accel = Vec3::new(0.1, 0.0, -9.8) + noise;
+        ImuData { accel, gyro: Vec3::new(0.01, -0.02, 0.005) + noise, temperature: 30.0 }
+    }
+
+    #[test]
+    fn d7_a_sensor_that_repeats_itself_never_completes() {
+        let stuck: [fn(u64) -> ImuData; 4] = [
+            |_| still(0),
+            |k| ImuData { gyro: still(0).gyro, ..still(k) },
+            |k| ImuData { accel: still(0).accel, ..still(k) },
+            // It dies half way through.
+            |k| still(k.min(900)),
+        ];
+        for sensor in stuck {
+            let mut calibration = StillCalibration::default();
+            let frozen = (0..8_000u64)
+                .filter(|k| calibration.step(Instant::from_micros(2_500 * k), &sensor(*k)) == Err(NotStill::Frozen));
+            assert!(frozen.count() > 5_000);
+            assert!(!calibration.result().complete && calibration.result().progress < 0.6);
+        }
     }
 
     #[test]
     fn motion_starts_the_average_again() {
         let mut calibration = StillCalibration::default();
         for k in 0..1000u64 {
-            calibration.step(Instant::from_micros(2_500 * k), &still()).unwrap();
+            calibration.step(Instant::from_micros(2_500 * k), &still(k)).unwrap();
         }
         assert!(calibration.result().progress > 0.5);
         for k in 1000..1020u64 {
-            let turning = ImuData { gyro: Vec3::new(1.0, 0.0, 0.0), ..still() };
+            let turning = ImuData { gyro: Vec3::new(1.0, 0.0, 0.0), ..still(k) };
             assert!(calibration.step(Instant::from_micros(2_500 * k), &turning).is_err());
         }
         assert_eq!((calibration.result().progress, calibration.result().restarts), (0.0, 1));
         for k in 1020..4000u64 {
             // The running means forget within a few tenths of a second.
-            let _ = calibration.step(Instant::from_micros(2_500 * k), &still());
+            let _ = calibration.step(Instant::from_micros(2_500 * k), &still(k));
         }
         let result = calibration.result();
-        assert!(result.complete && (result.gyro_bias - still().gyro).norm() < 1e-5, "the motion left no trace");
+        assert!(result.complete && (result.gyro_bias - still(0).gyro).norm() < 1e-5, "the motion left no trace");
     }
 
     #[test]
@@ -146,7 +192,7 @@ mod tests {
         for k in 0..8000u64 {
             let swing = stampfly_types::math::sin(k as f32 * 0.03) * 0.2;
             let _ = calibration
-                .step(Instant::from_micros(2_500 * k), &ImuData { gyro: Vec3::new(swing, 0.0, 0.0), ..still() });
+                .step(Instant::from_micros(2_500 * k), &ImuData { gyro: Vec3::new(swing, 0.0, 0.0), ..still(k) });
         }
         assert!(!calibration.result().complete && calibration.quality().is_none());
     }
@@ -155,8 +201,8 @@ mod tests {
     fn a_sample_that_is_not_finite_is_left_out_and_ends_nothing() {
         let mut calibration = StillCalibration::default();
         for k in 0..1600u64 {
-            calibration.step(Instant::from_micros(2_500 * k), &still()).unwrap();
-            let broken = ImuData { accel: Vec3::new([f32::NAN, 1e30][k as usize % 2], 0.0, 0.0), ..still() };
+            calibration.step(Instant::from_micros(2_500 * k), &still(k)).unwrap();
+            let broken = ImuData { accel: Vec3::new([f32::NAN, 1e30][k as usize % 2], 0.0, 0.0), ..still(k) };
             assert!(k > 1300 || calibration.step(Instant::from_micros(2_500 * k), &broken) == Err(NotStill::NotFinite));
         }
         let quality = calibration.quality().unwrap();

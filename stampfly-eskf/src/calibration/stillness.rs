@@ -51,6 +51,11 @@ pub enum NotStill {
     Turning,
     /// It trembles: the variance of the angular rate is above the limit.
     Trembling,
+    /// An axis repeats the same number: noise forbids that, so the sensor does not measure. Only [`StillCalibration`]
+    /// looks for it.
+    ///
+    /// [`StillCalibration`]: super::StillCalibration
+    Frozen,
     /// The mean specific force is not that of gravity.
     NotGravity,
     /// It is shaken: the variance of the specific force is above the limit.
@@ -195,6 +200,12 @@ impl StillAverage {
         checks.iter().find(|(passed, _)| !passed).map_or(Ok(()), |(_, reason)| Err(*reason))
     }
 
+    /// Drops the stretch; the next one settles first.
+    pub(super) fn drop_stretch(&mut self, now: Instant) {
+        self.since = Some(now);
+        self.start_again();
+    }
+
     fn start_again(&mut self) {
         *self = Self { rate: self.rate, force: self.force, since: self.since, ..Self::new(self.config) };
     }
@@ -216,8 +227,7 @@ impl StillAverage {
         self.force.add(&imu.accel);
         let since = *self.since.get_or_insert(now);
         if let Err(reason) = self.check() {
-            self.since = Some(now);
-            self.start_again();
+            self.drop_stretch(now);
             return Err(reason);
         }
         if now.since(since).seconds() < self.config.settle {

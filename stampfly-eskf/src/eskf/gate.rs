@@ -112,6 +112,11 @@ impl Gates {
         record.gated_since = None;
     }
 
+    /// Was its last measurement rejected?
+    pub(super) fn is_rejected(&self, sensor: Sensor) -> bool {
+        self.records[sensor as usize].gated_since.is_some()
+    }
+
     /// Restarts the lock-out time of a sensor, after an inflation that should let it pass.
     pub(super) fn restart_lockout(&mut self, sensor: Sensor, now: Instant) {
         self.record(sensor).gated_since = Some(now);

@@ -30,8 +30,12 @@ impl Estimator for Eskf {
     fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.command, *command);
         if command.full_resets != previous.full_resets && self.initialized {
-            let calibration = self.calibration;
-            self.initialize(at, &calibration);
+            if command.on_ground || self.anchor.is_some() {
+                let calibration = self.calibration;
+                self.initialize(at, &calibration);
+            } else {
+                self.restart_motion();
+            }
         }
         if command.origin_resets != previous.origin_resets {
             self.surface = self.surface.map(|surface| surface - self.state.position.z);
@@ -62,15 +66,25 @@ impl Estimator for Eskf {
     fn predict(&mut self, at: Instant, imu: &ImuData) {
         let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
         let dt = at.since(self.now).seconds();
+        if !usable {
+            self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
+        }
         if !self.initialized || !usable || dt <= 0.0 {
             return;
         }
+        let bridged = self.bridge.step(&self.config, at, imu);
+        if bridged.is_some() {
+            self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
+        }
+        let imu = &bridged.unwrap_or(*imu);
         self.now = at;
         if dt > MAX_STEP {
             self.reset_history();
         }
+        let before = self.state.velocity;
         let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
         self.history.add(&motion);
+        self.watch(&(self.state.velocity - before), motion.dt);
         let [force, rate] = &mut self.vibration;
         force.add(&imu.accel, motion.dt);
         rate.add(&imu.gyro, motion.dt);
@@ -99,6 +113,9 @@ impl Estimator for Eskf {
         if self.steps.is_multiple_of(PSEUDO_MEASUREMENT_DIVIDER)
             && let Some(accel) = self.accels.take()
         {
+            if self.anchor.is_none() {
+                self.judge_range();
+            }
             self.apply_pseudo_measurements(accel, dt * PSEUDO_MEASUREMENT_DIVIDER as f32);
         }
         if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() {
@@ -145,7 +162,7 @@ impl Estimator for Eskf {
         let sound = self.initialized && !self.status.diverged;
         let external = recent(Sensor::Velocity) || recent(Sensor::Position);
         let horizontal = sound && self.is_velocity_aided();
-        let vertical = sound && (recent(Sensor::Tof) || recent(Sensor::Baro) || external || stationary);
+        let vertical = sound && (self.is_range_aided() || recent(Sensor::Baro) || external || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
             .set(Validity::HEADING, self.initialized)
@@ -154,8 +171,8 @@ impl Estimator for Eskf {
             .set(Validity::HEIGHT, sound && self.surface.is_some() && vertical);
         let sensors = SensorMask::NONE
             .set(SensorMask::IMU, self.initialized)
-            .set(SensorMask::TOF, recent(Sensor::Tof))
-            .set(SensorMask::FLOW, recent(Sensor::Flow))
+            .set(SensorMask::TOF, self.is_range_aided())
+            .set(SensorMask::FLOW, recent(Sensor::Flow) && !self.flow_monitor.is_implausible())
             .set(SensorMask::BARO, recent(Sensor::Baro))
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
@@ -180,6 +197,27 @@ impl Estimator for Eskf {
     fn status(&self) -> EstimatorStatus {
         let [measured, predicted] = &self.gravity;
         let apart = measured.cross(predicted).norm();
-        EstimatorStatus { accel_innovation: math::atan2(apart, measured.dot(predicted)), ..self.status }
+        let [a, b] = self.vertical.differences(-self.state.velocity.z);
+        EstimatorStatus {
+            mag_innovation: a,
+            mag_ratio: b,
+            accel_ratio: self.flow_monitor.difference(),
+            accel_innovation: math::atan2(apart, measured.dot(predicted)),
+            ..self.status
+        }
+    }
+}
+
+impl Eskf {
+    /// Shows a change of the velocity to those that watch range and flow.
+    #[inline]
+    fn watch(&mut self, change: &Vec3, dt: f32) {
+        let bias = self.state.accel_bias.z;
+        if self.anchor.is_some() {
+            self.vertical.stand(-bias);
+        } else {
+            self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias);
+            self.flow_monitor.predict(change);
+        }
     }
 }

@@ -5,6 +5,10 @@ use super::gate::{GateResult, Sensor};
 use super::*;
 use crate::config::MagModel;
 
+/// Where nothing but the barometer holds the height, the height is reset to one that is this near, m. Farther away one of
+/// them is wrong, and it is not known which: height and climb rate become invalid.
+const BARO_REACH: f32 = 2.0;
+
 impl Eskf {
     pub(super) fn update_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
         let delayed = self.time_align(Sensor::Tof, at, &[tof.distance])?;
@@ -26,6 +30,10 @@ impl Eskf {
             self.gates.accept(Sensor::Tof, self.now);
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
+        let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
+        if !self.vertical.range(self.now, tof.distance, expected) {
+            return Err(Refusal::Implausible);
+        }
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
         let row = aid::tof::range(&delayed.state, &delayed.rotation, surface);
         // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the
@@ -39,9 +47,15 @@ impl Eskf {
         self.status.tof_ratio = ratio;
         match self.gates.test(Sensor::Tof, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
-            GateResult::Reject => Ok(Fusion::Gated { ratio }),
+            GateResult::Reject => {
+                self.vertical.rejected(self.now);
+                Ok(Fusion::Gated { ratio })
+            }
             GateResult::Reset => {
-                self.state.position.z += surface - below - delayed.state.position.z;
+                let down = surface - below - delayed.state.position.z;
+                self.vertical.rejected(self.now);
+                self.vertical.moved(-down);
+                self.state.position.z += down;
                 self.covariance.reset(POSITION + 2, 4.0 * variance);
                 // A wrong height comes from a wrong climb rate: the next ranges estimate it anew.
                 self.covariance.reset(VELOCITY + 2, 1.0);
@@ -92,8 +106,27 @@ impl Eskf {
         // Flow measures two axes of the body's; along the beam the velocity is the estimated one.
         let along = rotate_back(&delayed.rotation, &delayed.state.velocity).z;
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
+        let counts = [flow.delta_x, flow.delta_y];
+        if self.anchor.is_some() {
+            self.flow_monitor.stand(measured.map(|velocity| velocity / distance), flow.interval);
+        } else {
+            let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof);
+            if self.flow_monitor.flow(counts, &world, distance, flow.interval, known) {
+                // It has moved tilt and biases, too.
+                self.inflate_tilt();
+                for axis in 0..2 {
+                    self.covariance.reset(VELOCITY + axis, 1.0);
+                }
+            }
+        }
+        self.status.flow_implausible = self.flow_monitor.is_implausible();
+        if self.status.flow_implausible {
+            return Err(Refusal::Implausible);
+        }
         self.acceleration.update(middle, world);
-        match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
+        let raw = self.force + self.state.accel_bias;
+        let before = rotate(&self.state.rotation(), &self.force);
+        let fusion = match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => {
                 let fusion = self.update(&innovation, ratio);
                 // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
@@ -101,9 +134,9 @@ impl Eskf {
                 if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
                     self.inflate_on_innovation_bias();
                 }
-                Ok(fusion)
+                fusion
             }
-            GateResult::Reject => Ok(Fusion::Gated { ratio }),
+            GateResult::Reject => return Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 self.state.velocity.x += world.x - delayed.state.velocity.x;
                 self.state.velocity.y += world.y - delayed.state.velocity.y;
@@ -112,9 +145,12 @@ impl Eskf {
                 }
                 // A wrong velocity comes from a wrong tilt or bias.
                 self.inflate_tilt();
-                Ok(self.finish_reset(Sensor::Flow))
+                self.finish_reset(Sensor::Flow)
             }
-        }
+        };
+        let after = rotate(&self.state.rotation(), &(raw - self.state.accel_bias));
+        self.flow_monitor.corrected(&(after - before));
+        Ok(fusion)
     }
 
     pub(super) fn update_baro(&mut self, at: Instant, baro: &BaroData) -> Result<Fusion, Refusal> {
@@ -122,6 +158,7 @@ impl Eskf {
             return Err(Refusal::NotUsed);
         }
         let delayed = self.time_align(Sensor::Baro, at, &[baro.altitude])?;
+        self.vertical.baro(self.now, baro.altitude, self.anchor.is_some());
         let noise = self.config.baro_sigma * self.config.baro_sigma;
         let here = baro.altitude + delayed.state.position.z;
         let since = core::mem::replace(&mut self.baro_updated, self.now);
@@ -143,12 +180,23 @@ impl Eskf {
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
-                // A jump of the air pressure does not move the vehicle: reset the offset, which is no sign of
-                // divergence.
-                self.baro_offset = Some(Offset::new(here, noise));
-                self.gates.accept(Sensor::Baro, self.now);
-                self.status.resets = self.status.resets.wrapping_add(1);
-                Ok(Fusion::Reset)
+                if self.is_range_aided() || self.anchor.is_some() {
+                    // A jump of the air pressure does not move the vehicle: reset the offset, which is no sign of
+                    // divergence, and no aiding either.
+                    self.baro_offset = Some(Offset::new(here, noise));
+                    self.gates.restart_lockout(Sensor::Baro, self.now);
+                    self.status.resets = self.status.resets.wrapping_add(1);
+                    return Ok(Fusion::Reset);
+                }
+                if residual.abs() > BARO_REACH {
+                    return Ok(Fusion::Gated { ratio });
+                }
+                // Nothing else holds the height: it was the filter that went astray.
+                self.state.position.z -= residual;
+                self.covariance.reset(POSITION + 2, 4.0 * noise);
+                self.covariance.reset(VELOCITY + 2, 1.0);
+                self.covariance.inflate(ACCEL_BIAS + 2, 0.04);
+                Ok(self.finish_reset(Sensor::Baro))
             }
         }
     }

@@ -3,6 +3,7 @@
 
 mod flight;
 mod lockouts;
+mod restart;
 mod soak;
 mod stuck;
 mod timing;

@@ -19,4 +19,5 @@ mod replay;
 mod report;
 mod rover;
 mod safety_mode;
+mod safety_sensors;
 mod swap;

@@ -53,6 +53,38 @@ pub struct FailsafeConfig {
     pub gravity_weight: f32,
     /// Samples running above a threshold of force or rate that are an alert: one alone is a glitch.
     pub motion_samples: u32,
+    /// Largest angular acceleration of the body, rad/s². A sample that asks for more is suspect.
+    pub angular_acceleration: f32,
+    /// So many suspect samples running are a garbled burst and are left out; one more, and all of them count.
+    pub garbled_samples: u32,
+    /// Full scale of the gyro, rad/s.
+    pub gyro_full_scale: f32,
+    /// Full scale of the accelerometer, m/s².
+    pub accel_full_scale: f32,
+    /// So many equal samples running of one axis, or so many at full scale, are a sensor that does not measure.
+    pub stuck_samples: u32,
+    /// Between these lies the mean specific force of a vehicle that flies by itself, m/s².
+    pub force_range: [f32; 2],
+    /// Weight of an inertial sample in that mean.
+    pub force_weight: f32,
+    /// Time for which the mean lies outside.
+    pub force_time: Duration,
+    /// Tilt of a vehicle that tumbles while armed on the ground, rad.
+    pub armed_tilt: f32,
+    /// Tilt of a vehicle that tumbles in ACRO, rad.
+    pub acro_tilt: f32,
+    /// For how long it is tilted so far in ACRO: a loop passes it in a fraction of a second.
+    pub acro_time: Duration,
+    /// An alert that switches the motors off stays for at least this long.
+    pub shown: Duration,
+    /// Voltages of a battery in flight lie between these, V.
+    pub voltage_range: [f32; 2],
+    /// Largest change of the voltage from one reading to the next that the current does not explain, V.
+    pub voltage_step: f32,
+    /// How much farther than that it changes in a second, V/s.
+    pub voltage_rate: f32,
+    /// Largest resistance of battery and leads, Ω: a rise of the current explains so much of a fall.
+    pub resistance: f32,
 }
 
 impl Default for FailsafeConfig {
@@ -84,6 +116,26 @@ impl Default for FailsafeConfig {
             vibration_weight: 0.02,
             gravity_weight: 0.0025,
             motion_samples: 2,
+            // Rotors of a vehicle of a palm's size do 1000.
+            angular_acceleration: 3_000.0,
+            garbled_samples: 3,
+            // A BMI270 at ±2000 °/s and ±8 g.
+            gyro_full_scale: 34.9,
+            accel_full_scale: 8.0 * GRAVITY,
+            // 50 ms. One axis repeats a sample by chance with a probability below 0.3: twenty times, 10⁻¹⁰.
+            stuck_samples: 20,
+            // Half a second beyond either end would be a climb rate that no mode which holds its height asks for.
+            force_range: [0.55 * GRAVITY, 1.8 * GRAVITY],
+            force_weight: 0.01,
+            force_time: Duration::from_millis(500),
+            armed_tilt: 1.31,
+            acro_tilt: 2.1,
+            acro_time: Duration::from_secs(1),
+            shown: Duration::from_secs(2),
+            voltage_range: [2.4, 4.5],
+            voltage_step: 0.35,
+            voltage_rate: 0.2,
+            resistance: 0.3,
         }
     }
 }

@@ -101,8 +101,14 @@ message! {
         refused: [u32; 5],
         /// Measurements offered since the start, in the same order.
         offered: [u32; 5],
+        /// Inertial samples refused since the start: not finite, or garbage that was bridged.
+        imu_refused: u32,
         /// Resets since the start.
         resets: u32,
+        /// Does the range contradict the accelerometer and the barometer?
+        range_implausible: bool,
+        /// Does the flow contradict the accelerometer?
+        flow_implausible: bool,
         /// Is the estimate lost?
         diverged: bool,
     }

@@ -159,6 +159,14 @@ message_flags! {
         SELF_TEST_DIFFERS = 14,
         /// No sample from the battery monitor.
         POWER_LOST = 15,
+        /// The inertial sensor delivers samples that no sensor which measures delivers: motors off.
+        IMU_FAULTY = 16,
+        /// The range contradicts the accelerometer or the barometer.
+        RANGE_IMPLAUSIBLE = 17,
+        /// The optical flow contradicts the accelerometer.
+        FLOW_IMPLAUSIBLE = 18,
+        /// The battery voltage changes as no battery's does.
+        POWER_IMPLAUSIBLE = 19,
     }
 }
 

@@ -1,13 +1,12 @@
 //! State management: modes, failsafe, landing, authority, signals, button.
 
 use super::{Numbers, at, goes_on};
-use stampfly_board::airframe::AIRFRAME;
 use stampfly_mode::{
     Authority, ButtonDecoder, Failsafe, FailsafeInput, LandingConfig, LandingInput, ModeInput, ModeMachine,
     SensorTimes, Signaller, TakeoffLanding,
 };
-use stampfly_types::Vec3;
 use stampfly_types::messages::*;
+use stampfly_types::{Stamped, Vec3};
 
 const PHASES: [FlightPhase; 4] = [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing];
 
@@ -66,15 +65,16 @@ fn mode_machine_goes_on() {
 fn failsafe_goes_on() {
     goes_on(Failsafe::default(), 800, |failsafe, k, n| {
         let blow = if k % 150 < 4 { 60.0 } else { 1.0 };
-        let imu =
+        let data =
             ImuData { accel: Vec3::new(0.0, 0.0, -9.81) + n.vector(blow), gyro: n.vector(2.0), temperature: 25.0 };
+        let imu = [Stamped { at: at(k), generation: 0, data }];
         let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
         let status = EstimatorStatus { accel_innovation: n.number(0.5).abs(), ..Default::default() };
         let power = PowerData { voltage: 3.7 - 0.0004 * k as f32 + n.number(0.1), ..Default::default() };
         let armed = k % 330 > 60;
         let phase = if armed { FlightPhase::Flying } else { FlightPhase::IdleGround };
         let input = FailsafeInput {
-            imu: (k % 200 > 15).then_some((at(k), &imu)),
+            imu: if k % 200 > 15 { &imu } else { &[] },
             estimate: &estimate,
             status: &status,
             power: (k.is_multiple_of(28)).then_some((at(k), &power)),

@@ -16,7 +16,8 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{
-    Alerts, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, MotorOutput, PilotInput, SystemAlert,
+    Alerts, BaroData, EstimatorStatus, FlightPhase, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData,
+    MagData, MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
 };
 use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
@@ -31,6 +32,21 @@ pub struct Hands<'b> {
     telemetry: topics::TelemetryRx<'b>,
     pub button: ButtonModel,
     pub imu_silent: &'b Cell<bool>,
+    /// Since when the sensors lie.
+    pub lying: &'b Cell<Option<Instant>>,
+}
+
+/// What a broken sensor makes of a sample, so many seconds after it broke.
+pub type Lie<T> = Option<Box<dyn FnMut(f32, &mut T)>>;
+
+/// What is wrong with the sensors once a script has said that they lie.
+#[derive(Default)]
+pub struct Lies {
+    pub imu: Lie<ImuData>,
+    pub tof: Lie<TofData>,
+    pub flow: Lie<FlowData>,
+    pub baro: Lie<BaroData>,
+    pub power: Lie<PowerData>,
 }
 
 impl Hands<'_> {
@@ -88,6 +104,8 @@ pub struct Seen {
     pub alerts: Vec<(Instant, Alerts)>,
     pub motors: Vec<(Instant, MotorOutput)>,
     pub truths: Vec<(Instant, Truth)>,
+    pub estimates: Vec<(Instant, StateEstimate)>,
+    pub estimator: Vec<(Instant, EstimatorStatus)>,
 }
 
 impl Seen {
@@ -129,11 +147,14 @@ impl Seen {
 type Script<'b> = Pin<Box<dyn Future<Output = ()> + 'b>>;
 
 macro_rules! pump {
-    ($sensor:expr, $publisher:expr, $silent:expr) => {{
-        let (mut sensor, mut publisher) = ($sensor, $publisher);
+    ($sensor:expr, $publisher:expr, $silent:expr, $lie:expr, $lying:expr) => {{
+        let (mut sensor, mut publisher, mut lie) = ($sensor, $publisher, $lie);
         async move {
             loop {
-                let Ok::<Sample<_>, Infallible>(sample) = sensor.next().await;
+                let Ok::<Sample<_>, Infallible>(mut sample) = sensor.next().await;
+                if let (Some(lie), Some(since)) = (&mut lie, $lying.get()) {
+                    lie(sample.at.since(since).seconds(), &mut sample.data);
+                }
                 if !$silent {
                     publisher.publish(sample.at, &sample.data);
                 }
@@ -148,6 +169,8 @@ struct Stage<S> {
     world: World,
     sensors: Option<Sensors>,
     imu_silent: Cell<bool>,
+    lying: Cell<Option<Instant>>,
+    lies: Lies,
     script: Option<S>,
     end: Instant,
 }
@@ -165,16 +188,17 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Watch<'a> {
-        let Self { clock, world, sensors, imu_silent, script, end } = self;
-        let imu_silent: &Cell<bool> = imu_silent;
+        let Self { clock, world, sensors, imu_silent, lying, lies, script, end } = self;
+        let (imu_silent, lying): (&Cell<bool>, &Cell<Option<Instant>>) = (imu_silent, lying);
+        let lies = std::mem::take(lies);
         let (sensors, script) = sensors.take().zip(script.take()).expect("started once");
         let Sensors { imu, tof, flow, mag, baro, power, motors, button, .. } = sensors;
-        tasks.spawn(pump!(imu, outside.imu.sensor_imu, imu_silent.get()));
-        tasks.spawn(pump!(tof, outside.tof.sensor_tof, false));
-        tasks.spawn(pump!(flow, outside.flow.sensor_flow, false));
-        tasks.spawn(pump!(mag, outside.mag.sensor_mag, false));
-        tasks.spawn(pump!(baro, outside.baro.sensor_baro, false));
-        tasks.spawn(pump!(power, outside.power.sensor_power, false));
+        tasks.spawn(pump!(imu, outside.imu.sensor_imu, imu_silent.get(), lies.imu, lying));
+        tasks.spawn(pump!(tof, outside.tof.sensor_tof, false, lies.tof, lying));
+        tasks.spawn(pump!(flow, outside.flow.sensor_flow, false, lies.flow, lying));
+        tasks.spawn(pump!(mag, outside.mag.sensor_mag, false, None::<Box<dyn FnMut(f32, &mut MagData)>>, lying));
+        tasks.spawn(pump!(baro, outside.baro.sensor_baro, false, lies.baro, lying));
+        tasks.spawn(pump!(power, outside.power.sensor_power, false, lies.power, lying));
         let (mut pin, mut contact, watch) = (button.clone(), outside.button_pin.button_contact, clock.clone());
         tasks.spawn(async move {
             loop {
@@ -189,6 +213,7 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
             telemetry: outside.link.telemetry,
             button,
             imu_silent,
+            lying,
         }));
         let (duties, world, end) = (outside.motors.actuator_motor, world.clone(), *end);
         Watch { world, duties, motors, end, seen: Seen::default() }
@@ -221,6 +246,8 @@ impl vehicle::Around for Watch<'_> {
         match Id::ALL[topic] {
             Id::flight_status => self.seen.modes.push((at, message(words).expect(what))),
             Id::system_alert => self.seen.alerts.push((at, message::<SystemAlert>(words).expect(what).active)),
+            Id::estimate_state => self.seen.estimates.push((at, message(words).expect(what))),
+            Id::estimate_status => self.seen.estimator.push((at, message(words).expect(what))),
             Id::actuator_motor => self.seen.motors.push((at, message(words).expect(what))),
             _ => {}
         }
@@ -241,12 +268,25 @@ impl vehicle::Around for Watch<'_> {
 
 /// Runs a vehicle for this long with this script.
 pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Script<'b>) -> Seen {
-    let config = SimulationConfig { seed, ..SimulationConfig::new(stampfly_board::simulation::PLANT) };
+    run_in(|_| {}, Lies::default(), seed, seconds, script)
+}
+
+/// The same in surroundings of the caller's, with sensors that lie.
+pub fn run_in(
+    surroundings: impl FnOnce(&mut SimulationConfig),
+    lies: Lies,
+    seed: u64,
+    seconds: f32,
+    script: impl for<'b> FnOnce(Hands<'b>) -> Script<'b>,
+) -> Seen {
+    let mut config = SimulationConfig { seed, ..SimulationConfig::new(stampfly_board::simulation::PLANT) };
+    surroundings(&mut config);
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let limit = Duration::from_seconds(seconds);
     let end = config.start + limit;
     let (sensors, script, imu_silent) = (Some(sensors), Some(script), Cell::new(false));
-    let mut stage = Stage { clock, world, sensors, imu_silent, script, end };
+    let lying = Cell::new(None);
+    let mut stage = Stage { clock, world, sensors, imu_silent, lying, lies, script, end };
     let options = FlightOptions { start: config.start, limit, jitter: None };
     let ended = vehicle::fly(&VehicleConfig::default(), &options, &mut stage, &mut (), &mut |_, _| {});
     assert_eq!(ended.log_lost, 0);

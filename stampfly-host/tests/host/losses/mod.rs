@@ -1,6 +1,6 @@
 //! What the vehicle does when something it relies on goes away in flight, and how fast.
 
-pub(crate) mod harness;
+pub mod harness;
 
 use harness::{Seen, run};
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, GuidedKind, PilotInput};

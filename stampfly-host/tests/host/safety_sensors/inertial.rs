@@ -1,0 +1,68 @@
+//! An inertial sensor that does not measure.
+
+use super::*;
+
+/// Deaths of an inertial sensor that goes on delivering, and the longest time until the motors stop, ms.
+fn deaths() -> Vec<(&'static str, Box<dyn FnMut(f32, &mut ImuData)>, u64)> {
+    let mut held: Option<ImuData> = None;
+    let (mut gyro, mut accel): (Option<Vec3>, Option<Vec3>) = (None, None);
+    vec![
+        ("stuck", Box::new(move |_, imu: &mut ImuData| *imu = *held.get_or_insert(*imu)), 60),
+        ("gyro stuck", Box::new(move |_, imu: &mut ImuData| imu.gyro = *gyro.get_or_insert(imu.gyro)), 60),
+        ("accel stuck", Box::new(move |_, imu: &mut ImuData| imu.accel = *accel.get_or_insert(imu.accel)), 60),
+        ("gyro zero", Box::new(|_, imu: &mut ImuData| imu.gyro = Vec3::zeros()), 60),
+        ("accel zero", Box::new(|_, imu: &mut ImuData| imu.accel = Vec3::zeros()), 60),
+        ("all zero", Box::new(|_, imu: &mut ImuData| (imu.accel, imu.gyro) = (Vec3::zeros(), Vec3::zeros())), 60),
+        ("not finite", Box::new(|_, imu: &mut ImuData| imu.gyro.x = f32::NAN), 33),
+        ("full scale", Box::new(|_, imu: &mut ImuData| imu.gyro = Vec3::repeat(-34.9)), 25),
+    ]
+}
+
+#[test]
+fn d7_an_inertial_sensor_that_dies_but_goes_on_delivering_stops_the_motors() {
+    use FlightPhase::{Flying, Landing, TakeOff};
+    for (k, phase) in [Flying, TakeOff, Landing, Flying].into_iter().enumerate() {
+        for (what, lie, limit) in deaths() {
+            let lies = Lies { imu: Some(lie), ..Lies::default() };
+            let seconds = if phase == Landing { 30.0 } else { 14.0 };
+            let (seen, since) = fly(k as u64 + 1, seconds, Onset::After(phase, 0.3), lies);
+            let took = seen.motors_off_after(since);
+            assert!(took <= Duration::from_millis(limit), "{what} in {phase:?}: {took}");
+        }
+    }
+}
+
+#[test]
+fn d7_an_inertial_sensor_dead_at_power_on_never_arms() {
+    for (what, lie, _) in deaths() {
+        let (seen, _) = fly(1, 12.0, Onset::PowerOn, Lies { imu: Some(lie), ..Lies::default() });
+        assert!(seen.modes.iter().all(|(_, mode)| !mode.armed), "{what}");
+    }
+}
+
+#[test]
+fn d21_two_garbled_samples_are_flown_through() {
+    let garbage = [
+        ImuData { accel: Vec3::repeat(-78.45), gyro: Vec3::repeat(-34.9), temperature: 25.0 },
+        ImuData { accel: Vec3::new(40.0, -75.0, 60.0), gyro: Vec3::new(-30.0, 12.0, 25.0), temperature: 25.0 },
+    ];
+    for seed in SEEDS {
+        for broken in garbage {
+            let mut count = 0;
+            let lie = move |_: f32, imu: &mut ImuData| {
+                // Two of every hundred.
+                count += 1;
+                if count % 100 < 2 {
+                    *imu = broken;
+                }
+            };
+            let lies = Lies { imu: Some(Box::new(lie)), ..Lies::default() };
+            let (seen, since) = fly(seed, 35.0, Onset::After(FlightPhase::Flying, 0.5), lies);
+            let cut = Alerts::IMPACT | Alerts::GYRO_ANOMALY | Alerts::IMU_FAULTY | Alerts::TUMBLED;
+            assert!(seen.alerts.iter().all(|(_, alerts)| !alerts.intersects(cut)), "seed {seed}");
+            let landing = seen.entered(FlightPhase::Landing, since).expect("it lands");
+            assert!(seen.entered(FlightPhase::IdleGround, landing).is_some() && seen.end().1.contact, "seed {seed}");
+            assert!(seen.drift(since, Instant::MAX) < 1.0, "seed {seed}");
+        }
+    }
+}

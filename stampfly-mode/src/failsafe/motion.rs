@@ -1,0 +1,119 @@
+//! Impact and excess rate, and which samples to believe about them.
+//!
+//! A blow shows in two samples running, and two samples of garbage (a shifted frame, a register of `0x8000`) look like
+//! a blow. What tells them apart is the gyro: a body with a moment of inertia does not change its rate by more than its
+//! torque allows, and a burst ends where it began. A sample is *suspect* when its rate asks for more than
+//! `angular_acceleration` since the last one believed, or all axes of the accelerometer are at full scale. Up to
+//! `garbled_samples` suspect samples running are set aside. One more, and it was no burst: all of them count. A blow
+//! so hard that it looks like garbage is therefore seen two samples later than any other.
+//!
+//! | evidence | motors off after |
+//! |---|---|
+//! | force or rate above its limit in two believed samples running | the second sample |
+//! | the same in two of four suspect samples running | the fourth sample |
+//! | up to three suspect samples, then the motion of before | never |
+
+use super::FailsafeConfig;
+use stampfly_types::messages::{Alerts, ImuData};
+use stampfly_types::{Instant, Vec3, math};
+
+/// Share of full scale at which the accelerometer's axes count as full.
+const FULL: f32 = 0.9;
+/// After a gap this long nothing is known about what the rate was.
+const GAP: f32 = 0.05;
+
+/// Samples above the limits, and the specific force over the length of a blow.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Evidence {
+    blow: Option<Vec3>,
+    impacts: u32,
+    overspeeds: u32,
+}
+
+impl Evidence {
+    /// Adds a sample; gives the force over the length of a blow.
+    fn add(&mut self, config: &FailsafeConfig, imu: &ImuData, limit: f32, runs: bool) -> f32 {
+        let blow = self.blow.get_or_insert(imu.accel);
+        *blow += (imu.accel - *blow) * config.blow_weight;
+        let force = blow.norm();
+        let count = |count: &mut u32, above: bool| {
+            *count = if above {
+                count.saturating_add(1)
+            } else if runs {
+                0
+            } else {
+                *count
+            };
+        };
+        count(&mut self.impacts, force >= limit);
+        count(&mut self.overspeeds, imu.gyro.norm() >= config.rate);
+        force
+    }
+
+    fn alerts(&self, config: &FailsafeConfig) -> Alerts {
+        Alerts::NONE
+            .set(Alerts::IMPACT, self.impacts >= config.motion_samples)
+            .set(Alerts::GYRO_ANOMALY, self.overspeeds >= config.motion_samples)
+    }
+}
+
+/// What is remembered of the motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct MotionMonitor {
+    believed: Evidence,
+    /// With the suspect samples that are running.
+    suspected: Evidence,
+    suspects: u32,
+    /// The last rate that was believed.
+    rate: Option<(Instant, Vec3)>,
+    /// Running mean and variance of the specific force's norm.
+    force: [f32; 2],
+}
+
+impl MotionMonitor {
+    /// Takes a finite sample: what it shows, and whether it is suspect.
+    pub(super) fn step(
+        &mut self,
+        config: &FailsafeConfig,
+        at: Instant,
+        imu: &ImuData,
+        landing: bool,
+    ) -> (Alerts, bool) {
+        let impact = if landing { config.landing_impact } else { config.impact };
+        let [mean, variance] = self.force;
+        let limit = impact.max(mean + config.impact_sigmas * math::sqrt(variance));
+        let suspect = self.is_suspect(config, at, imu);
+        if suspect {
+            if self.suspects == 0 {
+                self.suspected = self.believed;
+            }
+            self.suspects = self.suspects.saturating_add(1);
+            self.suspected.add(config, imu, limit, false);
+            if self.suspects <= config.garbled_samples {
+                return (Alerts::NONE, true);
+            }
+            self.believed = self.suspected;
+        } else {
+            let force = self.believed.add(config, imu, limit, true);
+            // An impact must not raise its own threshold: outliers enter clipped.
+            let off = force.min(limit) - mean;
+            let weight = config.vibration_weight;
+            self.force = [mean + weight * off, variance + weight * (off * off - variance)];
+        }
+        self.suspects = 0;
+        self.rate = Some((at, imu.gyro));
+        (self.believed.alerts(config), suspect)
+    }
+
+    fn is_suspect(&self, config: &FailsafeConfig, at: Instant, imu: &ImuData) -> bool {
+        let full = imu.accel.iter().all(|axis| axis.abs() >= FULL * config.accel_full_scale);
+        let jumps = self.rate.is_some_and(|(last, rate)| {
+            // Two samples that came together are a period apart.
+            let elapsed = at.since(last).seconds().max(2e-3);
+            elapsed < GAP && (imu.gyro - rate).amax() > config.angular_acceleration * elapsed
+        });
+        full || jumps
+    }
+}

@@ -1,0 +1,92 @@
+//! The battery: its level, its monitor's silence, and readings that no battery gives.
+//!
+//! While armed, a reading is implausible when it is not finite, outside `voltage_range`, or farther from the last
+//! plausible one than `voltage_step`, `voltage_rate` times the time since, and what the change of the current makes of
+//! `resistance` explain together. It then counts for nothing else. Disarmed everything is plausible: batteries are
+//! changed, and a board runs on USB.
+
+use super::FailsafeConfig;
+use stampfly_types::Instant;
+use stampfly_types::messages::{Alerts, PowerData};
+
+/// What is remembered of the battery.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct PowerMonitor {
+    /// Low-passed, V.
+    voltage: Option<f32>,
+    /// Stamp of the newest reading, of the newest finite one, and the newest plausible one, V and A.
+    newest: Option<Instant>,
+    finite: Option<Instant>,
+    plausible: Option<(Instant, f32, f32)>,
+}
+
+impl PowerMonitor {
+    /// The alerts of the battery, in place of those in `active`.
+    pub(super) fn step(
+        &mut self,
+        config: &FailsafeConfig,
+        active: Alerts,
+        now: Instant,
+        power: Option<(Instant, &PowerData)>,
+        armed: bool,
+    ) -> Alerts {
+        let fresh = power.filter(|(at, _)| self.newest != Some(*at));
+        self.newest = fresh.map_or(self.newest, |(at, _)| Some(at));
+        let active = active.set(Alerts::POWER_IMPLAUSIBLE, armed && active.contains(Alerts::POWER_IMPLAUSIBLE));
+        let active = match fresh {
+            Some((at, power)) if power.voltage.is_finite() => {
+                self.finite = Some(at.min(now));
+                self.reading(config, active, at, power, armed)
+            }
+            Some(_) => active.set(Alerts::POWER_IMPLAUSIBLE, armed),
+            None => active,
+        };
+        // At power-on the monitor gets as long for its first sample.
+        let silence = now.since(self.finite.unwrap_or(Instant::ZERO));
+        active.set(Alerts::POWER_LOST, silence >= config.power_silence)
+    }
+
+    fn reading(
+        &mut self,
+        config: &FailsafeConfig,
+        active: Alerts,
+        at: Instant,
+        power: &PowerData,
+        armed: bool,
+    ) -> Alerts {
+        // A vehicle that never had a meter may fly without one.
+        let no_meter = power.voltage < config.no_meter;
+        if no_meter && (!armed || self.voltage.is_none()) {
+            return active;
+        }
+        let plausible = !armed || self.is_plausible(config, at, power);
+        let active = active.set(Alerts::POWER_IMPLAUSIBLE, !plausible);
+        if !plausible {
+            return active;
+        }
+        let last = self.plausible.replace((at, power.voltage, power.current));
+        let dt = last.map_or(0.0, |(last, ..)| at.since(last).seconds());
+        let before = self.voltage.unwrap_or(power.voltage);
+        let voltage = before + (power.voltage - before) * (dt / (config.battery_time + dt));
+        self.voltage = Some(voltage);
+        let below = |alert: Alerts, limit: f32| {
+            let hysteresis = if active.contains(alert) { config.battery_hysteresis } else { 0.0 };
+            voltage <= limit + hysteresis
+        };
+        active
+            .set(Alerts::USB_POWER, below(Alerts::USB_POWER, config.usb) && !armed)
+            .set(Alerts::LOW_BATTERY, below(Alerts::LOW_BATTERY, config.battery_low))
+            .set(Alerts::CRITICAL_BATTERY, below(Alerts::CRITICAL_BATTERY, config.battery_critical))
+    }
+
+    fn is_plausible(&self, config: &FailsafeConfig, at: Instant, power: &PowerData) -> bool {
+        let [low, high] = config.voltage_range;
+        let Some((last, voltage, current)) = self.plausible else { return (low..=high).contains(&power.voltage) };
+        let free = config.voltage_step + config.voltage_rate * at.since(last).seconds();
+        // A current that is no number explains nothing.
+        let drop = config.resistance * Some(power.current - current).filter(|rise| rise.is_finite()).unwrap_or(0.0);
+        let [least, most] = [voltage - free - drop.max(0.0), voltage + free - drop.min(0.0)];
+        (low.max(least)..=high.min(most)).contains(&power.voltage)
+    }
+}

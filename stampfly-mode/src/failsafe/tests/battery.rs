@@ -1,0 +1,56 @@
+//! Battery readings that no battery gives.
+
+use super::*;
+
+/// Alerts of a flight whose battery monitor reads this, from a volt and an ampere per reading at 14 Hz.
+fn readings(rig: &mut Rig, list: impl IntoIterator<Item = (f32, f32)>) -> Vec<Alerts> {
+    let mut step = |(voltage, current)| {
+        rig.battery = PowerData { voltage, current, ..Default::default() };
+        (0..28).map(|_| rig.sample(REST, Vec3::zeros())).last().unwrap_or_default()
+    };
+    list.into_iter().map(&mut step).collect()
+}
+
+fn implausible(list: &[Alerts]) -> Option<usize> {
+    list.iter().position(|alerts| alerts.contains(Alerts::POWER_IMPLAUSIBLE))
+}
+
+#[test]
+fn d10_a_reading_of_nothing_in_flight_is_an_alert() {
+    let mut rig = Rig::flying().settled();
+    for lie in [0.0, f32::NAN, 2.55, 5.2] {
+        let list = readings(&mut rig, [(3.9, 4.0), (3.88, 4.1), (lie, 4.0), (lie, 4.0), (3.87, 4.0)]);
+        assert_eq!(implausible(&list), Some(2), "{lie} V, at the first reading");
+        assert_eq!(list.last(), Some(&Alerts::NONE), "{lie} V: a good one ends it");
+    }
+}
+
+#[test]
+fn d10_a_lie_does_not_reach_the_level() {
+    let mut rig = Rig::flying().settled();
+    readings(&mut rig, [(4.1, 4.0)]);
+    let list = readings(&mut rig, core::iter::repeat_n((2.55, 4.0), 70));
+    assert!(list.iter().all(|alerts| *alerts == Alerts::POWER_IMPLAUSIBLE), "five seconds: {:?}", list.last());
+}
+
+#[test]
+fn a_weak_battery_under_load_is_plausible() {
+    let mut rig = Rig::flying().settled();
+    rig.mode.armed = false;
+    // 0.25 Ω, and eight amperes at once.
+    readings(&mut rig, [(4.1, 0.3)]);
+    rig.mode.armed = true;
+    let list = readings(&mut rig, [(4.05, 0.5), (2.6, 6.0), (3.4, 3.0), (3.0, 4.5), (4.0, 0.5)]);
+    assert_eq!(implausible(&list), None, "{list:?}");
+    // As fast as a small cell empties, and faster than any meter's noise.
+    let falls = (0..200).map(|k| (4.0 - 0.01 * k as f32 + [0.05, -0.05][k % 2], 4.0));
+    assert_eq!(implausible(&readings(&mut rig, falls.take_while(|(v, _)| *v > 2.6))), None);
+}
+
+#[test]
+fn a_vehicle_without_a_meter_flies_without_one() {
+    let mut rig = Rig::flying();
+    rig.battery.voltage = 0.0;
+    let rig = rig.settled();
+    assert_eq!(rig.failsafe.active, Alerts::NONE);
+}

@@ -1,0 +1,184 @@
+//! An inertial sensor that does not measure, samples that are garbage, and what must still be seen.
+
+use super::*;
+
+/// The sample of a vehicle that stands, a millisecond a number.
+pub fn still(millis: u64) -> [Stamped<ImuData>; 1] {
+    let grain = 1e-3 * (millis % 7) as f32;
+    let small = Vec3::new(grain, -grain, 2.0 * grain);
+    let data = ImuData { accel: REST + small, gyro: small, temperature: 25.0 };
+    [Stamped { at: Instant::from_millis(millis), generation: 0, data }]
+}
+
+const GONE: Vec3 = Vec3::new(f32::NAN, 0.0, 0.0);
+/// What a register of 0x8000 is.
+const FULL: [Vec3; 2] = [Vec3::new(-78.45, -78.45, -78.45), Vec3::new(-34.9, -34.9, -34.9)];
+
+/// Samples until this alert, of a vehicle that flew well for a second.
+fn until(alert: Alerts, mut fault: impl FnMut(&mut Rig, usize) -> Alerts) -> Option<usize> {
+    let mut rig = Rig::flying().settled();
+    (1..=4_000).find(|k| fault(&mut rig, *k).contains(alert))
+}
+
+#[test]
+fn d7_an_inertial_sensor_that_is_stuck_stops_the_motors_within_50_ms() {
+    let [force, rate] = [REST * 1.01, Vec3::new(0.1, 0.2, 0.3)];
+    let cases: [(&str, fn(&mut Rig, Vec3, Vec3) -> Alerts); 4] = [
+        ("both", |rig, force, rate| rig.exactly(force, rate)),
+        ("gyro", |rig, force, rate| {
+            let noise = rig.noise(0.05);
+            rig.exactly(force + noise, rate)
+        }),
+        ("accelerometer", |rig, force, rate| {
+            let noise = rig.noise(0.005);
+            rig.exactly(force, rate + noise)
+        }),
+        ("one axis of the gyro", |rig, force, rate| {
+            let [n, m] = [rig.noise(0.05), rig.noise(0.005)];
+            rig.exactly(force + n, Vec3::new(rate.x, rate.y + m.y, rate.z + m.z))
+        }),
+    ];
+    for (what, fault) in cases {
+        let seen = until(Alerts::IMU_FAULTY, |rig, _| fault(rig, force, rate));
+        assert_eq!(seen, Some(21), "{what}: 50 ms after the first repetition");
+    }
+}
+
+#[test]
+fn d7_an_inertial_sensor_that_says_zero_stops_the_motors_within_60_ms() {
+    let all = until(Alerts::IMU_FAULTY, |rig, _| rig.exactly(Vec3::zeros(), Vec3::zeros()));
+    assert!(all.is_some_and(|samples| samples <= 22), "{all:?}");
+}
+
+#[test]
+fn d7_samples_that_are_not_finite_are_silence() {
+    for (accel, gyro) in
+        [(GONE, Vec3::zeros()), (REST, GONE), (REST * f32::INFINITY, Vec3::zeros()), (REST * 1e30, GONE)]
+    {
+        assert_eq!(until(Alerts::IMU_LOST, |rig, _| rig.exactly(accel, gyro)), Some(10), "25 ms");
+    }
+}
+
+#[test]
+fn d7_a_force_that_no_flight_has_is_a_fault_within_1_1_s() {
+    for factor in [0.0, 0.5, 2.2] {
+        let seen = until(Alerts::IMU_FAULTY, |rig, _| rig.sample(REST * factor, Vec3::zeros()));
+        assert!(seen.is_some_and(|samples| samples <= 440), "{factor}: {seen:?}");
+    }
+    // Falling with the motors at rest is allowed where the throttle is the pilot's.
+    let falls = until(Alerts::IMU_FAULTY, |rig, _| {
+        rig.mode.mode = FlightMode::Acro;
+        rig.sample(Vec3::zeros(), Vec3::zeros())
+    });
+    assert_eq!(falls, None);
+}
+
+#[test]
+fn d7_garbage_for_good_stops_the_motors_within_100_ms() {
+    let seen = until(Alerts::IMU_FAULTY, |rig, _| {
+        let [force, rate] = [rig.noise(150.0), rig.noise(69.0)];
+        rig.exactly(force, rate)
+    });
+    assert!(seen.is_some_and(|samples| samples <= 40), "{seen:?}");
+    let any = until(Alerts::GYRO_ANOMALY, |rig, _| {
+        let [force, rate] = [rig.noise(150.0), rig.noise(69.0)];
+        rig.exactly(force, rate)
+    });
+    assert!(any.is_some_and(|samples| samples <= 12), "{any:?}");
+}
+
+#[test]
+fn d7_full_scale_for_good_stops_the_motors() {
+    let seen = until(Alerts::GYRO_ANOMALY, |rig, _| rig.exactly(FULL[0], FULL[1]));
+    assert_eq!(seen, Some(4), "10 ms");
+}
+
+#[test]
+fn d21_two_garbled_samples_are_flown_through() {
+    let full = Vec3::new(78.4, -78.4, 78.4);
+    for (force, rate) in [(FULL[0], FULL[1]), (full, Vec3::zeros()), (REST * 5.0, FULL[1]), (REST, FULL[1] * 0.5)] {
+        for length in 1..=3 {
+            let mut rig = Rig::flying().settled();
+            for _ in 0..length {
+                assert!(rig.exactly(force, rate).is_empty(), "{force:?} {rate:?}");
+            }
+            for k in 0..400 {
+                assert!(rig.sample(REST, Vec3::zeros()).is_empty(), "{force:?} {rate:?}, {k} samples later");
+            }
+        }
+    }
+}
+
+#[test]
+fn d21_a_blow_is_still_seen_at_once() {
+    // Without a jump of the rate: in two samples. With one that looks like garbage: 5 ms after two samples.
+    for (jump, limit) in [(0.0, 4), (30.0, 4)] {
+        let mut rig = Rig::flying().settled();
+        let turning = Vec3::new(jump, -0.5 * jump, 0.0);
+        let blows = [REST * 9.0, REST * 7.0, REST * 2.0, REST];
+        let seen = blows.iter().position(|blow| rig.sample(*blow, turning).contains(Alerts::IMPACT));
+        assert!(seen.is_some_and(|samples| samples < limit), "{jump}: {seen:?}");
+        assert!(jump > 0.0 || seen == Some(1), "{seen:?}");
+    }
+}
+
+#[test]
+fn d21_a_spin_is_still_caught() {
+    // A propeller is gone: 100 rad/s² about the vertical.
+    let seen = until(Alerts::GYRO_ANOMALY, |rig, k| rig.sample(REST, Vec3::new(0.0, 0.0, 0.25 * k as f32)));
+    assert!(seen.is_some_and(|samples| samples <= 60), "{seen:?}");
+}
+
+#[test]
+fn a_backlog_of_samples_is_no_silence() {
+    let mut rig = Rig::flying().settled();
+    let start = rig.now;
+    let backlog: Vec<_> = (1..=14)
+        .map(|k| {
+            let at = start + PERIOD * k;
+            let data = ImuData { accel: REST + rig.noise(0.05), gyro: rig.noise(0.005), temperature: 25.0 };
+            Stamped { at, generation: 0, data }
+        })
+        .collect();
+    assert_eq!(rig.step(start + PERIOD * 14, &backlog), Alerts::NONE, "35 ms in one piece, the newest is fresh");
+}
+
+#[test]
+fn a_stamp_in_the_future_does_not_hide_silence() {
+    let mut rig = Rig::flying().settled();
+    let data = ImuData { accel: REST, gyro: rig.noise(0.1), temperature: 25.0 };
+    let late = Stamped { at: rig.now + Duration::from_secs(15), generation: 0, data };
+    let from = rig.now;
+    assert_eq!(rig.step(from, &[late]), Alerts::NONE);
+    let lost = (1..100).find(|k| rig.step(from + PERIOD * *k, &[]).contains(Alerts::IMU_LOST));
+    assert_eq!(lost, Some(10), "25 ms");
+}
+
+#[test]
+fn tumbling_is_watched_while_armed_and_in_acro() {
+    let tumbles = |phase, mode, tilt: f32| {
+        let mut rig = Rig::flying();
+        (rig.mode.phase, rig.mode.mode) = (phase, mode);
+        rig.estimate.attitude = stampfly_types::Quat::from_euler_angles(tilt, 0.0, 0.0);
+        (1..=800).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
+    };
+    use FlightPhase::{Armed, Flying};
+    assert_eq!(tumbles(Flying, FlightMode::Stabilize, 1.2), Some(121), "0.3 s");
+    assert_eq!(tumbles(Armed, FlightMode::PosHold, 1.2), None);
+    assert_eq!(tumbles(Armed, FlightMode::PosHold, 1.5), Some(121));
+    assert_eq!(tumbles(Flying, FlightMode::Acro, 2.0), None, "half way through a loop");
+    assert_eq!(tumbles(Flying, FlightMode::Acro, 3.0), Some(401), "a second on its back");
+}
+
+#[test]
+fn a_lost_estimate_stays_an_alert_after_the_reset() {
+    let mut rig = Rig::flying().settled();
+    rig.status.diverged = true;
+    assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::ESTIMATE_DIVERGED);
+    rig.status.diverged = false;
+    for _ in 0..4_000 {
+        assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::ESTIMATE_DIVERGED);
+    }
+    rig.mode.armed = false;
+    assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::NONE);
+}
