@@ -78,6 +78,7 @@ pub const FAULTS: &[FaultKind] = &[
     number("flow-bias", ("rad", 0.02, -1.0, 1.0), Landed, "Forward flow is too high by this in every sample."),
     plain("floor-dark", Landed, "The flow sensor sees no features and says so."),
     number("floor-moves", ("m/s", 0.3, -3.0, 3.0), Landed, "The floor moves north at this speed."),
+    number("slope", ("", 0.2, -2.0, 2.0), Degraded, "The floor rises by this for each metre to the north."),
     number("edge", ("m", 0.7, -0.5, 3.0), Degraded, "From 0.3 m ahead on, the floor is lower by this."),
     number("ceiling", ("m", 0.2, 0.02, 10.0), Cut, "There is a ceiling this far above the vehicle."),
     number("wall", ("m", 0.4, 0.05, 10.0), Cut, "There is a wall this far ahead of the vehicle."),
@@ -135,6 +136,7 @@ enum Act {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Thing {
     Edge(f64),
+    Slope(f64),
     FloorVelocity(f64),
     Ceiling(f64),
     Wall(f64),
@@ -146,11 +148,12 @@ impl Thing {
     fn put(self, scene: &mut Scene, motion: &Motion, there: bool) {
         match self {
             Self::Edge(drop) => scene.edge = there.then(|| (Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
+            Self::Slope(rise) => scene.slope = if there { [rise, 0.0] } else { [0.0; 2] },
             Self::FloorVelocity(north) => scene.floor_velocity = if there { [north, 0.0] } else { [0.0; 2] },
             Self::Ceiling(above) => scene.ceiling = there.then(|| above - motion.position.z),
             Self::Wall(ahead) => scene.wall = there.then(|| Beyond::ahead_of(motion, ahead)),
             Self::Hand => {
-                scene.hand = there.then(|| Hand { position: motion.position, attitude: motion.attitude });
+                scene.hand = there.then_some(Hand { position: motion.position, attitude: motion.attitude });
             }
         }
     }
@@ -216,6 +219,7 @@ fn acts(fault: &Fault) -> Vec<Act> {
             Act::Flow(Distortion::of(&["quality", "valid"], Effect::Word(0))),
         ],
         "floor-moves" => vec![Act::Scene(Thing::FloorVelocity(value))],
+        "slope" => vec![Act::Scene(Thing::Slope(value))],
         "edge" => vec![Act::Scene(Thing::Edge(value))],
         "ceiling" => vec![Act::Scene(Thing::Ceiling(value))],
         "wall" => vec![Act::Scene(Thing::Wall(value))],

@@ -225,9 +225,9 @@ impl vehicle::Surroundings for Surroundings {
         let cameras = setup.cameras;
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
         let Others { motors, indicator, button, link, cutoff } = match setup.sensing {
-            Sensing::Models => sensing::start_models(tasks, clock, sensors, outside, lines, cameras, health),
+            Sensing::Models => sensing::start_models(tasks, clock, (sensors, lines), outside, cameras, health),
             Sensing::Chips => {
-                sensing::start_drivers(tasks, clock, (board, shared), sensors, outside, lines, cameras, health)
+                sensing::start_drivers(tasks, clock, (board, shared), (sensors, lines), outside, cameras, health)
             }
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));

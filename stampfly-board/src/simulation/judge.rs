@@ -532,7 +532,7 @@ fn distance([x, y]: [f32; 2], [from_x, from_y]: [f32; 2], [to_x, to_y]: [f32; 2]
     let along = if square > 0.0 { ((x - from_x) * leg_x + (y - from_y) * leg_y) / square } else { 0.0 };
     let along = along.clamp(0.0, 1.0);
     let (dx, dy) = (x - from_x - along * leg_x, y - from_y - along * leg_y);
-    (dx * dx + dy * dy).sqrt()
+    stampfly_types::math::sqrt(dx * dx + dy * dy)
 }
 
 #[cfg(test)]
@@ -593,8 +593,7 @@ mod tests {
             publish(judge, Id::flight_status, at(1), &blocked);
         };
         assert_eq!(violated(&mut arms), ["I3"]);
-        let mut lost = StateEstimate::default();
-        lost.velocity.x = f32::INFINITY;
+        let lost = StateEstimate { velocity: Vec3::new(f32::INFINITY, 0.0, 0.0), ..Default::default() };
         assert_eq!(violated(&mut |judge| publish(judge, Id::estimate_state, at(1), &lost)), ["I4"]);
         let mut jumps = |judge: &mut Judge| publish(judge, Id::flight_status, at(1), &status(FlightPhase::Flying));
         assert_eq!(violated(&mut jumps), ["I5"]);

@@ -98,11 +98,11 @@ impl Ground {
             }
             self.strikes += u64::from(strikes);
         }
-        if scene.floor(position) - position.z > self.reach && scene.edge.is_none() {
+        if scene.is_level() && -position.z > self.reach {
             self.anchors = [None; POINTS];
             return (force, torque);
         }
-        let [floor_north, floor_east] = scene.floor_velocity;
+        let ([floor_north, floor_east], out) = (scene.floor_velocity, scene.normal());
         for (point, anchor) in self.points.iter().zip(&mut self.anchors) {
             let place = position + attitude * point;
             let depth = place.z - scene.floor(&place);
@@ -111,7 +111,7 @@ impl Ground {
                 continue;
             }
             let speed = velocity + attitude * rate.cross(point) - Vector3::new(floor_north, floor_east, 0.0);
-            let normal = (self.stiffness * depth + self.damping * speed.z).max(0.0);
+            let normal = (self.stiffness * (depth * -out.z) - self.damping * speed.dot(&out)).max(0.0);
             let stuck = anchor.get_or_insert((place.x, place.y));
             *stuck = (stuck.0 + floor_north * DT, stuck.1 + floor_east * DT);
             let (mut x, mut y) = (
@@ -124,7 +124,8 @@ impl Ground {
                 (x, y) = (x * limit / wanted, y * limit / wanted);
                 *stuck = (place.x + x / self.stiffness, place.y + y / self.stiffness);
             }
-            let here = Vector3::new(x, y, -normal);
+            // Along the floor, and out of it.
+            let here = Vector3::new(x, y, -scene.slope[0] * x - scene.slope[1] * y) + out * normal;
             force += here;
             torque += point.cross(&attitude.inverse_transform_vector(&here));
         }
