@@ -148,7 +148,10 @@ impl Thing {
     fn put(self, scene: &mut Scene, motion: &Motion, there: bool) {
         match self {
             Self::Edge(drop) => scene.edge = there.then(|| (Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
-            Self::Slope(rise) => scene.slope = if there { [rise, 0.0] } else { [0.0; 2] },
+            Self::Slope(rise) => {
+                scene.slope = if there { [rise, 0.0] } else { [0.0; 2] };
+                scene.pivot = [motion.position.x, motion.position.y];
+            }
             Self::FloorVelocity(north) => scene.floor_velocity = if there { [north, 0.0] } else { [0.0; 2] },
             Self::Ceiling(above) => scene.ceiling = there.then(|| above - motion.position.z),
             Self::Wall(ahead) => scene.wall = there.then(|| Beyond::ahead_of(motion, ahead)),

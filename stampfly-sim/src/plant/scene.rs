@@ -53,9 +53,10 @@ const WRIST: [f64; 2] = [0.02, 3.0e-4];
 pub struct Scene {
     /// Where the floor is lower (or higher, when negative), and by how much, m.
     pub edge: Option<(Beyond, f64)>,
-    /// The floor rises towards north and east by this, m/m; about the origin. Put there under a vehicle that stands, it is
-    /// a jolt.
+    /// The floor rises towards north and east by this, m/m. Put there under a vehicle that stands, it is a jolt.
     pub slope: [f64; 2],
+    /// Where the slope is as high as the level floor, world north and east, m.
+    pub pivot: [f64; 2],
     /// The floor's velocity, world north and east, m/s.
     pub floor_velocity: [f64; 2],
     /// Height of a ceiling, m.
@@ -74,7 +75,7 @@ impl Scene {
             Some((beyond, drop)) if beyond.depth(place) > 0.0 => *drop,
             _ => 0.0,
         };
-        level - self.slope[0] * place.x - self.slope[1] * place.y
+        level - self.slope[0] * (place.x - self.pivot[0]) - self.slope[1] * (place.y - self.pivot[1])
     }
 
     /// Distance from a place to the floor along a unit vector that points down, m.
