@@ -9,7 +9,7 @@ use stampfly_bus::Band;
 use stampfly_sim::World;
 use stampfly_sim::chips::{AttachedChips, Faults};
 use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
-use stampfly_sim::plant::RotorFault;
+use stampfly_sim::plant::{Beyond, Hand, Motion, RotorFault, Scene};
 use stampfly_types::Instant;
 use stampfly_types::messages::{BaroData, FlowData, GuidedCommand, ImuData, MagData, PilotInput, PowerData, TofData};
 use std::vec;
@@ -77,6 +77,12 @@ pub const FAULTS: &[FaultKind] = &[
     plain("flow-swapped", Landed, "Forward and right flow change places."),
     number("flow-bias", ("rad", 0.02, -1.0, 1.0), Landed, "Forward flow is too high by this in every sample."),
     plain("floor-dark", Landed, "The flow sensor sees no features and says so."),
+    number("floor-moves", ("m/s", 0.3, -3.0, 3.0), Landed, "The floor moves north at this speed."),
+    number("slope", ("", 0.2, -2.0, 2.0), Degraded, "The floor rises by this for each metre to the north."),
+    number("edge", ("m", 0.7, -0.5, 3.0), Degraded, "From 0.3 m ahead on, the floor is lower by this."),
+    number("ceiling", ("m", 0.2, 0.02, 10.0), Cut, "There is a ceiling this far above the vehicle."),
+    number("wall", ("m", 0.4, 0.05, 10.0), Cut, "There is a wall this far ahead of the vehicle."),
+    plain("hand", Landed, "A hand holds the vehicle where it is."),
     plain("baro-silent", Transparent, "No pressure arrives."),
     plain("baro-stuck", Transparent, "Pressure repeats the last sample."),
     number("baro-step", ("m", 3.0, -1000.0, 1000.0), Transparent, "The barometric altitude jumps up by this."),
@@ -122,8 +128,42 @@ enum Act {
     /// The chips on a bus do not answer: only where there are chips.
     Bus(fn(&AttachedChips) -> Vec<&stampfly_sim::chips::Attached>),
     Rotor(usize, RotorFault),
+    Scene(Thing),
     HoldUp(Band, Option<f64>),
 }
+
+/// What stands in the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Thing {
+    Edge(f64),
+    Slope(f64),
+    FloorVelocity(f64),
+    Ceiling(f64),
+    Wall(f64),
+    Hand,
+}
+
+impl Thing {
+    /// Puts it there, relative to the vehicle, or takes it away.
+    fn put(self, scene: &mut Scene, motion: &Motion, there: bool) {
+        match self {
+            Self::Edge(drop) => scene.edge = there.then(|| (Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
+            Self::Slope(rise) => {
+                scene.slope = if there { [rise, 0.0] } else { [0.0; 2] };
+                scene.pivot = [motion.position.x, motion.position.y];
+            }
+            Self::FloorVelocity(north) => scene.floor_velocity = if there { [north, 0.0] } else { [0.0; 2] },
+            Self::Ceiling(above) => scene.ceiling = there.then(|| above - motion.position.z),
+            Self::Wall(ahead) => scene.wall = there.then(|| Beyond::ahead_of(motion, ahead)),
+            Self::Hand => {
+                scene.hand = there.then_some(Hand { position: motion.position, attitude: motion.attitude });
+            }
+        }
+    }
+}
+
+/// How far ahead an edge is, m: no vehicle of this size stands on it.
+const EDGE_AHEAD: f64 = 0.3;
 
 const GYRO: &[&str] = &["gyro"];
 const ACCEL: &[&str] = &["accel"];
@@ -181,6 +221,12 @@ fn acts(fault: &Fault) -> Vec<Act> {
             Act::Flow(Distortion::of(FLOW, Effect::Set(0.0))),
             Act::Flow(Distortion::of(&["quality", "valid"], Effect::Word(0))),
         ],
+        "floor-moves" => vec![Act::Scene(Thing::FloorVelocity(value))],
+        "slope" => vec![Act::Scene(Thing::Slope(value))],
+        "edge" => vec![Act::Scene(Thing::Edge(value))],
+        "ceiling" => vec![Act::Scene(Thing::Ceiling(value))],
+        "wall" => vec![Act::Scene(Thing::Wall(value))],
+        "hand" => vec![Act::Scene(Thing::Hand)],
         "baro-silent" => vec![Act::Baro(silent)],
         "baro-stuck" => vec![Act::Baro(Distortion::whole(Effect::Stuck))],
         // 12 Pa a metre at sea level.
@@ -244,6 +290,8 @@ pub(super) struct Wrong {
     seed: u64,
     /// Which acts beside the bus were in force at the last look.
     in_force: Vec<bool>,
+    /// Steps in which an obstacle pushed, at the last look.
+    strikes: u64,
 }
 
 impl Wrong {
@@ -254,6 +302,7 @@ impl Wrong {
         Self {
             injector: Injector::new(setup.simulation.start, &setup.faults),
             in_force: vec![false; acts.len()],
+            strikes: 0,
             acts,
             seed: setup.simulation.seed,
         }
@@ -281,8 +330,15 @@ impl Wrong {
 
     /// Switches what acts beside the bus on and off. Call it every turn.
     pub fn act(&mut self, now: Instant, world: &World, chips: Option<&AttachedChips>) {
+        let strikes = world.inspect(|plant| plant.ground().strikes());
+        let struck = strikes > self.strikes;
+        self.strikes = strikes;
         for ((place, act), in_force) in self.acts.iter().zip(&mut self.in_force) {
             let active = self.injector.is_active(*place, now);
+            let is_obstacle = matches!(act, Act::Scene(Thing::Ceiling(_) | Thing::Wall(_)));
+            if struck && is_obstacle {
+                self.injector.note_change(*place);
+            }
             if active == *in_force {
                 continue;
             }
@@ -291,6 +347,7 @@ impl Wrong {
                 Act::Rotor(rotor, fault) => {
                     world.set_rotor_fault(now, *rotor, if active { *fault } else { RotorFault::NONE });
                 }
+                Act::Scene(thing) => world.change_scene(now, |scene, motion| thing.put(scene, motion, active)),
                 Act::Bus(attached) => {
                     let Some(chips) = chips else { continue };
                     let faults = Faults { dead: active, ..Faults::default() };
@@ -298,7 +355,7 @@ impl Wrong {
                 }
                 _ => continue,
             }
-            if active {
+            if active && !is_obstacle {
                 self.injector.note_change(*place);
             }
         }

@@ -225,9 +225,9 @@ impl vehicle::Surroundings for Surroundings {
         let cameras = setup.cameras;
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
         let Others { motors, indicator, button, link, cutoff } = match setup.sensing {
-            Sensing::Models => sensing::start_models(tasks, clock, sensors, outside, lines, cameras, health),
+            Sensing::Models => sensing::start_models(tasks, clock, (sensors, lines), outside, cameras, health),
             Sensing::Chips => {
-                sensing::start_drivers(tasks, clock, (board, shared), sensors, outside, lines, cameras, health)
+                sensing::start_drivers(tasks, clock, (board, shared), (sensors, lines), outside, cameras, health)
             }
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
@@ -252,6 +252,7 @@ impl vehicle::Surroundings for Surroundings {
             judge,
             wrong,
             chips,
+            standing: setup.simulation.plant.ground_height as f32,
             seen_at: setup.simulation.start,
             duties: motors.1.actuator_motor,
             motors: motors.0,
@@ -384,6 +385,8 @@ pub struct Around<'a> {
     judge: Judge,
     wrong: Wrong,
     chips: Option<chips::AttachedChips>,
+    /// Height of a vehicle that stands, m.
+    standing: f32,
     /// When the judge last saw the truth.
     seen_at: Instant,
     duties: topics::ActuatorMotorRx<'a>,
@@ -493,7 +496,9 @@ impl Around<'_> {
     fn see(&mut self, now: Instant, truth: &Truth) {
         self.seen_at = now;
         let done = self.progress.done.get();
-        self.judge.see(&Sight { now, truth, status: &self.watch.mode, done });
+        let clearance = self.world.height_at(now) as f32 - self.standing;
+        let struck = self.world.inspect(|plant| plant.ground().strikes() > 0);
+        self.judge.see(&Sight { now, truth, clearance, struck, status: &self.watch.mode, done });
     }
 }
 

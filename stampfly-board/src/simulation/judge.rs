@@ -8,7 +8,7 @@
 //! | `refused` | the motors never turned |
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
-//! | `cut` | the motors stopped for good within 0.3 s of the fault |
+//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of the first blow of a wall or a ceiling |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
@@ -135,6 +135,10 @@ pub(super) struct Sight<'a> {
     pub now: Instant,
     /// In the vehicle's world.
     pub truth: &'a Truth,
+    /// Height above the floor below, 0 when it stands, m.
+    pub clearance: f32,
+    /// Has it struck a wall or a ceiling?
+    pub struck: bool,
     pub status: &'a FlightStatus,
     /// Steps of the mission that are done.
     pub done: usize,
@@ -166,6 +170,9 @@ pub(super) struct Judge {
     stopped: Option<(Instant, f32)>,
     start: Option<Instant>,
     last: Option<Truth>,
+    /// Above the floor below, m.
+    clearance: f32,
+    struck: Option<Instant>,
     now: Instant,
     in_air: bool,
     highest: f32,
@@ -210,6 +217,8 @@ impl Judge {
             stopped: None,
             start: None,
             last: None,
+            clearance: 0.0,
+            struck: None,
             now: Instant::ZERO,
             in_air: false,
             highest: 0.0,
@@ -306,15 +315,14 @@ impl Judge {
         let abandoned = self.comm_lost_since.is_some_and(|since| at.since(since) >= self.hover_without_link);
         let lands = abandoned || active.intersects(Alerts::CRITICAL_BATTERY | Alerts::ESTIMATE_DIVERGED);
         self.must_be_off = (lands && self.motors_on).then(|| {
-            let height = self.last.map_or(0.0, |truth| height(&truth));
-            self.must_be_off.unwrap_or(at + LAND_WITHIN + Duration::from_seconds(height.max(0.0) / LAND_RATE))
+            self.must_be_off.unwrap_or(at + LAND_WITHIN + Duration::from_seconds(self.clearance.max(0.0) / LAND_RATE))
         });
     }
 
     /// What the motors are given, whoever decides it.
     pub fn motors(&mut self, now: Instant, on: bool) {
         if self.motors_on && !on {
-            self.stopped = Some((now, self.last.map_or(0.0, |truth| height(&truth))));
+            self.stopped = Some((now, self.clearance));
             self.early |= !self.is_landing_step(self.done);
         }
         if on {
@@ -330,7 +338,9 @@ impl Judge {
 
     /// Looks at the truth, at the control rate.
     pub fn see(&mut self, sight: &Sight<'_>) {
-        let Sight { now, truth, status, done } = *sight;
+        let Sight { now, truth, clearance, struck, status, done } = *sight;
+        self.struck = self.struck.or(struck.then_some(now));
+        self.clearance = clearance;
         (self.now, self.done) = (now, done);
         self.start = self.start.or(Some(now));
         let (up, sink) = (height(truth), self.last.map_or(0.0, |last| last.velocity.z));
@@ -340,7 +350,7 @@ impl Judge {
         }
         self.was_landing = landing;
         let touches = self.in_air && truth.contact;
-        self.in_air = (self.in_air || up > OFF_GROUND) && !truth.contact;
+        self.in_air = (self.in_air || clearance > OFF_GROUND) && !truth.contact;
         self.tell_moments(now, truth, status, landing, touches);
 
         let after_fault = self.has_begun(now);
@@ -375,7 +385,7 @@ impl Judge {
         let moments = [
             (Moment::Ground, status.phase == FlightPhase::IdleGround && status.blocks.is_empty()),
             (Moment::Spool, self.motors_on),
-            (Moment::TakeOff, height(truth) > CLIMBED),
+            (Moment::TakeOff, self.clearance > CLIMBED),
             (Moment::Hover, hovers),
             (Moment::Move, hovers && truth.velocity.xy().norm() > MOVES),
             (Moment::Landing, landing && self.in_air && truth.velocity.z > 0.1),
@@ -470,13 +480,14 @@ impl Judge {
         let from = begun.or(self.start).unwrap_or(self.now);
         let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
         let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
+        let at_once = |from: Option<Instant>, at: Instant| from.is_some_and(|from| at >= from && at.since(from) <= CUT);
         if !self.turned {
             Class::Refused
         } else if above > AWAY[0] || beside > AWAY[1] {
             Class::FlownAway
         } else if self.motors_on {
             Class::KeptOn
-        } else if begun.zip(self.stopped).is_some_and(|(begun, (at, _))| at >= begun && at.since(begun) <= CUT) {
+        } else if self.stopped.is_some_and(|(at, _)| at_once(begun, at) || at_once(self.struck, at)) {
             Class::Cut
         } else if lies || self.touches.iter().any(hard) {
             Class::Crashed
@@ -521,5 +532,148 @@ fn distance([x, y]: [f32; 2], [from_x, from_y]: [f32; 2], [to_x, to_y]: [f32; 2]
     let along = if square > 0.0 { ((x - from_x) * leg_x + (y - from_y) * leg_y) / square } else { 0.0 };
     let along = along.clamp(0.0, 1.0);
     let (dx, dy) = (x - from_x - along * leg_x, y - from_y - along * leg_y);
-    (dx * dx + dy * dy).sqrt()
+    stampfly_types::math::sqrt(dx * dx + dy * dy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::faults::FAULTS;
+    use stampfly_sim::fault::Fault;
+    use stampfly_types::messages::{ArmBlocks, ImuData};
+
+    fn judge(faults: &[&str]) -> Judge {
+        let faults: Vec<_> = faults.iter().filter_map(|text| Fault::parse(text, FAULTS).ok()).collect();
+        let injector = Injector::new(Instant::ZERO, &faults);
+        let mission = Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.8\nland\n").expect("a mission");
+        Judge::new(&injector, &mission, false, Duration::from_secs(3))
+    }
+
+    fn publish(judge: &mut Judge, id: Id, at: Instant, message: &impl Message) {
+        judge.published(id, at, message.to_words().as_ref());
+    }
+
+    fn status(phase: FlightPhase) -> FlightStatus {
+        FlightStatus { phase, armed: transitions::is_armed(phase), mode: FlightMode::PosHold, ..Default::default() }
+    }
+
+    /// Shows the judge a vehicle at this height, with this sink rate.
+    fn show(judge: &mut Judge, now: Instant, phase: FlightPhase, (up, sink): (f32, f32), done: usize) {
+        let truth = Truth {
+            position: Vec3::new(0.0, 0.0, -up),
+            velocity: Vec3::new(0.0, 0.0, sink),
+            contact: up <= 0.0,
+            ..Default::default()
+        };
+        judge.see(&Sight { now, truth: &truth, clearance: up, struck: false, status: &status(phase), done });
+    }
+
+    #[test]
+    fn every_invariant_of_a_topic_can_fail() {
+        let armed = status(FlightPhase::Armed);
+        let duties = |duty: f32| MotorOutput { duty: [duty; 8], count: 4, ..Default::default() };
+        let violated = |messages: &mut dyn FnMut(&mut Judge)| {
+            let mut judge = judge(&[]);
+            messages(&mut judge);
+            judge.violations.into_iter().collect::<Vec<_>>()
+        };
+        let at = Instant::from_secs;
+        assert_eq!(violated(&mut |_| {}), Vec::<&str>::new());
+        for duty in [f32::NAN, -0.1, 1.1] {
+            let mut broken = |judge: &mut Judge| {
+                judge.status = armed;
+                publish(judge, Id::actuator_motor, at(2), &duties(duty));
+            };
+            assert_eq!(violated(&mut broken), ["I1"]);
+        }
+        assert_eq!(violated(&mut |judge| publish(judge, Id::actuator_motor, at(1), &duties(0.5))), ["I2"]);
+        let blocked = FlightStatus { blocks: ArmBlocks::LOW_BATTERY, ..armed };
+        let mut arms = |judge: &mut Judge| {
+            judge.status = status(FlightPhase::IdleGround);
+            publish(judge, Id::flight_status, at(1), &blocked);
+        };
+        assert_eq!(violated(&mut arms), ["I3"]);
+        let lost = StateEstimate { velocity: Vec3::new(f32::INFINITY, 0.0, 0.0), ..Default::default() };
+        assert_eq!(violated(&mut |judge| publish(judge, Id::estimate_state, at(1), &lost)), ["I4"]);
+        let mut jumps = |judge: &mut Judge| publish(judge, Id::flight_status, at(1), &status(FlightPhase::Flying));
+        assert_eq!(violated(&mut jumps), ["I5"]);
+        let mut silent = |judge: &mut Judge| {
+            judge.status = armed;
+            publish(judge, Id::command_pilot, at(1), &stampfly_types::messages::PilotInput::default());
+            publish(judge, Id::system_alert, at(2), &SystemAlert::default());
+        };
+        assert_eq!(violated(&mut silent), ["I6"]);
+        let mut back = |judge: &mut Judge| {
+            publish(judge, Id::sensor_imu, at(2), &ImuData::default());
+            publish(judge, Id::sensor_imu, at(1), &ImuData::default());
+        };
+        assert_eq!(violated(&mut back), ["I9"]);
+    }
+
+    #[test]
+    fn motors_that_turn_without_samples_or_after_their_time_to_land_are_found() {
+        let mut judge = judge(&[]);
+        publish(&mut judge, Id::sensor_imu, Instant::from_millis(1000), &ImuData::default());
+        judge.motors(Instant::from_millis(1000), true);
+        show(&mut judge, Instant::from_millis(1032), FlightPhase::Flying, (0.6, 0.0), 1);
+        assert!(judge.violations.is_empty());
+        show(&mut judge, Instant::from_millis(1033), FlightPhase::Flying, (0.6, 0.0), 1);
+        assert_eq!(judge.violations, BTreeSet::from(["I7"]));
+
+        // 3 s, and 2 s for 0.6 m.
+        let alert = SystemAlert { active: Alerts::CRITICAL_BATTERY, seen: Alerts::CRITICAL_BATTERY };
+        judge.violations.clear();
+        publish(&mut judge, Id::system_alert, Instant::from_millis(1100), &alert);
+        for (milliseconds, expected) in [(6099, false), (6101, true)] {
+            let now = Instant::from_millis(milliseconds);
+            publish(&mut judge, Id::sensor_imu, now, &ImuData::default());
+            show(&mut judge, now, FlightPhase::Flying, (0.6, 0.0), 1);
+            assert_eq!(judge.violations.contains("I10"), expected, "{milliseconds}");
+        }
+    }
+
+    /// Flies up to 0.5 m, suffers the fault at 2 s, and stops the motors at `stop` seconds at this height.
+    fn flown(fault: &str, highest: f32, stop: Option<(f64, f32)>, touch: f32) -> Judgement {
+        let mut judge = judge(&[fault]);
+        let at = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
+        show(&mut judge, at(0.5), FlightPhase::Armed, (0.0, 0.0), 1);
+        judge.motors(at(1.0), true);
+        show(&mut judge, at(1.5), FlightPhase::Flying, (0.5, 0.0), 1);
+        show(&mut judge, at(2.1), FlightPhase::Flying, (highest, 0.0), 1);
+        if let Some((seconds, height)) = stop {
+            show(&mut judge, at(seconds), FlightPhase::Flying, (height, touch), 2);
+            judge.motors(at(seconds), false);
+            show(&mut judge, at(seconds + 0.5), FlightPhase::IdleGround, (0.0, 0.0), 2);
+        }
+        judge.finish()
+    }
+
+    #[test]
+    fn ends_are_told_apart() {
+        let fault = "baro-step@2";
+        let outcome = |highest, stop, touch| flown(fault, highest, stop, touch).outcome;
+        assert_eq!(outcome(1.6, Some((4.0, 0.1)), 0.3), "flown-away");
+        assert_eq!(outcome(0.5, None, 0.0), "kept-on");
+        assert_eq!(outcome(0.5, Some((2.25, 0.5)), 3.0), "cut");
+        assert_eq!(outcome(0.5, Some((2.35, 0.5)), 3.0), "crashed");
+        assert_eq!(outcome(0.5, Some((4.0, 0.0)), 0.3), "landed");
+        let cut = flown(fault, 0.5, Some((2.25, 0.4)), 3.0);
+        assert!((cut.cut_after_s.unwrap_or_default() - 0.25).abs() < 1e-6, "{cut:?}");
+        assert!((cut.cut_height_m.unwrap_or_default() - 0.4).abs() < 1e-6, "{cut:?}");
+        assert_eq!(cut.touch_speed_mps, Some(3.0));
+        assert!(cut.violations.contains(&"I12"), "nothing was changed: {cut:?}");
+        assert_eq!(judge(&[fault]).finish().outcome, "refused");
+    }
+
+    #[test]
+    fn distances_are_from_the_legs_that_are_flown() {
+        let judge = judge(&[]);
+        let place = Vec3::new(0.5, 0.3, 0.0);
+        let (top, beside) = judge.commanded(1, place);
+        assert!(top == 0.5 && (beside - place.xy().norm()).abs() < 1e-6);
+        let (top, beside) = judge.commanded(2, place);
+        assert!(top == 0.8 && (beside - 0.3).abs() < 1e-6);
+        assert_eq!(distance([2.0, 0.0], [0.0, 0.0], [1.0, 0.0]), 1.0, "beyond its end");
+        assert_eq!(distance([0.0, 2.0], [0.0, 0.0], [0.0, 0.0]), 2.0, "of no length");
+    }
 }

@@ -263,7 +263,7 @@ impl<'b> Pilot<'b> {
         };
         let stick = |share: f32| {
             let beyond = share.signum() * (DEAD_BAND + (1.0 - DEAD_BAND) * share.abs());
-            if share.abs() < 0.005 { 0.0 } else { beyond.clamp(-1.0, 1.0) }
+            if share.abs() < 0.001 { 0.0 } else { beyond.clamp(-1.0, 1.0) }
         };
         let yaw = stick(limit(-seen.yaw, 0.8) / turn);
         self.input =

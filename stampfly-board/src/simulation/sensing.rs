@@ -78,9 +78,8 @@ impl Shared {
 pub(super) fn start_models<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
-    models: Sensors,
+    (models, lines): (Sensors, SensorLines),
     ends: topics::Outside<'a>,
-    lines: SensorLines,
     cameras: bool,
     health: &'a Healths,
 ) -> Others<'a> {
@@ -108,9 +107,8 @@ pub(super) fn start_drivers<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
     (board, shared): (chips::Board, &'a mut Shared),
-    models: Sensors,
+    (models, lines): (Sensors, SensorLines),
     ends: topics::Outside<'a>,
-    lines: SensorLines,
     cameras: bool,
     health: &'a Healths,
 ) -> Others<'a> {

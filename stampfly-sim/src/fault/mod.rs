@@ -208,6 +208,11 @@ fn seconds(text: &str) -> Option<Duration> {
     Some(Duration::from_micros((seconds * 1e6).round() as u64))
 }
 
+/// Seconds with the digits that were given: a division rounds to the nearest number, a product with 1e-6 does not.
+fn shown(time: Duration) -> f64 {
+    time.as_micros() as f64 / 1e6
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.kind.name)?;
@@ -215,7 +220,7 @@ impl fmt::Display for Fault {
             write!(f, "={value}")?;
         }
         write!(f, "@{}", self.when)?;
-        self.lasts.map_or(Ok(()), |lasts| write!(f, "+{}", lasts.seconds_f64()))
+        self.lasts.map_or(Ok(()), |lasts| write!(f, "+{}", shown(lasts)))
     }
 }
 

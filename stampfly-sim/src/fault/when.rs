@@ -65,7 +65,7 @@ impl fmt::Display for When {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Moment(moment) => f.write_str(moment.name()),
-            Self::After(time) => write!(f, "{}", time.seconds_f64()),
+            Self::After(time) => write!(f, "{}", super::shown(*time)),
         }
     }
 }

@@ -18,6 +18,8 @@ pub struct Ground {
     /// Where each point stuck to the floor, world north and east; `None` in the air.
     anchors: [Option<(f64, f64)>; POINTS],
     points: [Vector3<f64>; POINTS],
+    /// Steps in which a ceiling or a wall pushed.
+    strikes: u64,
     /// Distance of the farthest point from the origin.
     reach: f64,
     stiffness: f64,
@@ -39,6 +41,7 @@ impl Ground {
         });
         Self {
             anchors: [None; POINTS],
+            strikes: 0,
             points,
             reach: points.iter().map(Vector3::norm).fold(0.0, f64::max),
             stiffness: p.foot_stiffness,
@@ -53,6 +56,12 @@ impl Ground {
     #[must_use]
     pub fn contact(&self) -> bool {
         self.anchors.iter().any(Option::is_some)
+    }
+
+    /// In how many steps a ceiling or a wall has pushed.
+    #[must_use]
+    pub fn strikes(&self) -> u64 {
+        self.strikes
     }
 
     /// Factor on the thrust of rotors at `height` metres above the floor.
@@ -75,22 +84,25 @@ impl Ground {
     ) -> (Vector3<f64>, Vector3<f64>) {
         let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
         if !scene.is_empty() {
+            let mut strikes = false;
             for point in &self.points {
                 let place = position + attitude * point;
                 let speed = velocity + attitude * rate.cross(point);
                 for (depth, out) in scene.inside(&place) {
+                    strikes = true;
                     // As hard as the floor, without its friction.
                     let here = out * (self.stiffness * depth - self.damping * speed.dot(&out)).max(0.0);
                     force += here;
                     torque += point.cross(&attitude.inverse_transform_vector(&here));
                 }
             }
+            self.strikes += u64::from(strikes);
         }
-        if scene.floor(position) - position.z > self.reach && scene.edge.is_none() {
+        if scene.is_level() && -position.z > self.reach {
             self.anchors = [None; POINTS];
             return (force, torque);
         }
-        let [floor_north, floor_east] = scene.floor_velocity;
+        let ([floor_north, floor_east], out) = (scene.floor_velocity, scene.normal());
         for (point, anchor) in self.points.iter().zip(&mut self.anchors) {
             let place = position + attitude * point;
             let depth = place.z - scene.floor(&place);
@@ -99,7 +111,7 @@ impl Ground {
                 continue;
             }
             let speed = velocity + attitude * rate.cross(point) - Vector3::new(floor_north, floor_east, 0.0);
-            let normal = (self.stiffness * depth + self.damping * speed.z).max(0.0);
+            let normal = (self.stiffness * (depth * -out.z) - self.damping * speed.dot(&out)).max(0.0);
             let stuck = anchor.get_or_insert((place.x, place.y));
             *stuck = (stuck.0 + floor_north * DT, stuck.1 + floor_east * DT);
             let (mut x, mut y) = (
@@ -112,7 +124,8 @@ impl Ground {
                 (x, y) = (x * limit / wanted, y * limit / wanted);
                 *stuck = (place.x + x / self.stiffness, place.y + y / self.stiffness);
             }
-            let here = Vector3::new(x, y, -normal);
+            // Along the floor, and out of it.
+            let here = Vector3::new(x, y, -scene.slope[0] * x - scene.slope[1] * y) + out * normal;
             force += here;
             torque += point.cross(&attitude.inverse_transform_vector(&here));
         }

@@ -1,4 +1,4 @@
-//! What stands around the vehicle beside the floor: an edge, a ceiling, a wall, a hand.
+//! What stands around the vehicle, and how the floor is: a slope, an edge, a ceiling, a wall, a hand.
 //!
 //! Nothing by default. For faults in flight: whoever changes the scene does it between two steps, relative to where the
 //! vehicle is. Range finder and flow sensor see the edge and the floor's motion; nothing sees walls, ceilings and hands, as on
@@ -53,6 +53,10 @@ const WRIST: [f64; 2] = [0.02, 3.0e-4];
 pub struct Scene {
     /// Where the floor is lower (or higher, when negative), and by how much, m.
     pub edge: Option<(Beyond, f64)>,
+    /// The floor rises towards north and east by this, m/m. Put there under a vehicle that stands, it is a jolt.
+    pub slope: [f64; 2],
+    /// Where the slope is as high as the level floor, world north and east, m.
+    pub pivot: [f64; 2],
     /// The floor's velocity, world north and east, m/s.
     pub floor_velocity: [f64; 2],
     /// Height of a ceiling, m.
@@ -67,10 +71,29 @@ impl Scene {
     /// The floor's z at a place, world NED, m.
     #[must_use]
     pub fn floor(&self, place: &Vector3<f64>) -> f64 {
-        match &self.edge {
+        let level = match &self.edge {
             Some((beyond, drop)) if beyond.depth(place) > 0.0 => *drop,
             _ => 0.0,
+        };
+        level - self.slope[0] * (place.x - self.pivot[0]) - self.slope[1] * (place.y - self.pivot[1])
+    }
+
+    /// Distance from a place to the floor along a unit vector that points down, m.
+    #[must_use]
+    pub fn distance(&self, place: &Vector3<f64>, beam: &Vector3<f64>) -> f64 {
+        let steepness = beam.z + self.slope[0] * beam.x + self.slope[1] * beam.y;
+        let meets = |from: &Vector3<f64>| (self.floor(from) - place.z) / beam.z;
+        if self.slope == [0.0; 2] {
+            // A beam that passes over an edge meets the lower floor.
+            return meets(&(place + beam * (-place.z / beam.z)));
         }
+        (self.floor(place) - place.z) / steepness.max(1e-3)
+    }
+
+    /// The floor's normal, up, world NED.
+    pub(super) fn normal(&self) -> Vector3<f64> {
+        let [north, east] = self.slope;
+        Vector3::new(-north, -east, -1.0) / (1.0 + north * north + east * east).sqrt()
     }
 
     /// How deep a place is in the ceiling or the wall, with the direction out of it.
@@ -80,7 +103,12 @@ impl Scene {
         [ceiling, wall].into_iter().flatten().filter(|(depth, _)| *depth > 0.0)
     }
 
-    /// Is there anything that can push, beside the floor?
+    /// Is the floor where it is by default?
+    pub(super) fn is_level(&self) -> bool {
+        self.edge.is_none() && self.slope == [0.0; 2]
+    }
+
+    /// Is there nothing that can push, beside the floor?
     pub(super) fn is_empty(&self) -> bool {
         self.ceiling.is_none() && self.wall.is_none()
     }
@@ -139,6 +167,28 @@ mod tests {
         flies.scene_mut().wall = Some(wall);
         (0..960).for_each(|_| flies.step());
         assert!(flies.motion().position.x < 0.35, "{:?}", flies.motion());
+    }
+
+    #[test]
+    fn on_a_slope_it_stands_tilted_and_slides_where_it_is_too_steep() {
+        let landed = |rise: f64| {
+            let mut plant = plant(0.1);
+            plant.scene_mut().slope = [rise, 0.0];
+            (0..4800).for_each(|_| plant.step());
+            *plant.motion()
+        };
+        let motion = landed(0.2);
+        let nose = motion.attitude * Vector3::x();
+        assert!((-nose.z - 0.2).abs() < 0.03 && motion.velocity.norm() < 0.02, "{motion:?}");
+        // Friction is 0.6.
+        assert!(landed(0.9).velocity.x < -0.5);
+        let scene = Scene { slope: [0.2, 0.0], ..Scene::default() };
+        let down = Vector3::new(0.0, 0.0, 1.0);
+        assert!((scene.distance(&Vector3::new(1.0, 0.0, -1.0), &down) - 0.8).abs() < 1e-9);
+        let beam = Vector3::new(0.2, 0.0, 1.0).normalize();
+        let (place, far) = (Vector3::new(0.0, 0.0, -1.0), scene.distance(&Vector3::new(0.0, 0.0, -1.0), &beam));
+        let met = place + beam * far;
+        assert!((met.z - scene.floor(&met)).abs() < 1e-9);
     }
 
     #[test]

@@ -63,12 +63,7 @@ impl RangePhysics {
     fn true_distance(&self, instant: Instant) -> Option<f64> {
         let motion = self.world.motion_at(instant);
         let beam = motion.attitude * self.beam;
-        // A beam that passes over an edge meets the lower floor.
-        let meets = |floor: f64| motion.position + beam * ((floor - motion.position.z) / beam.z);
-        (beam.z > 1e-3).then(|| {
-            let floor = self.world.inspect(|plant| plant.scene().floor(&meets(0.0)));
-            (floor - motion.position.z) / beam.z
-        })
+        (beam.z > 1e-3).then(|| self.world.inspect(|plant| plant.scene().distance(&motion.position, &beam)))
     }
 
     /// A measurement around `instant`.
