@@ -58,6 +58,8 @@ stampfly_bus::topics! {
     system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, notification, telemetry];
     /// State, mode, armed.
     flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
+    /// Why the vehicle did not arm when it was asked to; for people.
+    arm_refusals: ArmRefusals = latest @ on event from mode => [];
     /// Contact with the ground, and what take-off and landing ask for.
     land_detected: LandDetected = latest @ 400 Hz from landing => [mode, navigation, control];
 

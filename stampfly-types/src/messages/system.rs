@@ -1,7 +1,7 @@
 //! State of the whole vehicle: mode, alerts, contact with the ground, signals to people.
 
 use super::command::CommandSource;
-use crate::{message, message_enum, message_flags};
+use crate::{Instant, message, message_enum, message_flags};
 
 message_enum! {
     /// Where the vehicle is between power-on and landing. Failsafe is an event, never a phase.
@@ -98,6 +98,24 @@ message_flags! {
         CUT_OFF = 17,
         /// The pilot's kill switch is on.
         KILL = 18,
+    }
+}
+
+message! {
+    /// Why the vehicle refused to arm when it was last asked to: the first four reasons, the weightiest first.
+    pub struct ArmRefusals {
+        /// Refusals since power-on.
+        attempts: u32,
+        /// Every reason.
+        blocks: ArmBlocks,
+        /// The reasons, one an entry; none in an entry that is not used.
+        check: [ArmBlocks; 4],
+        /// The value that was found, in the unit of the check; 1 for a condition.
+        value: [f32; 4],
+        /// The limit it was beyond; 0 for a condition.
+        limit: [f32; 4],
+        /// Since when.
+        since: [Instant; 4],
     }
 }
 

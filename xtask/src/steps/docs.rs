@@ -44,6 +44,13 @@ const GENERATED: &[(&str, &str, &str)] = &[
          that is the time from an inertial sample to the motors. The compiler computes it (`stampfly-bus/src/response.rs`) \
          and refuses a table in which a runnable could be late.",
     ),
+    (
+        "docs/modes.md",
+        "modes",
+        "# Modes\n\nThe mode machine: its phases, who may do what, and what it asks for before arming. Printed from the tables of \
+         `stampfly-mode` by `cargo xtask docs --fix`. A test explores every phase with every relevant alert and every set of \
+         up to three events (`stampfly-mode/src/decision/tests.rs`).",
+    ),
 ];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {

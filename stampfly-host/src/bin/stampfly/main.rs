@@ -11,6 +11,7 @@ mod estimate;
 mod failure;
 mod fly;
 mod golden;
+mod modes;
 mod replay;
 mod schedule;
 mod terminal;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),
+        Command::Modes(_) => modes::run(),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
         Command::Golden(options) => golden::run(&options),
