@@ -31,6 +31,8 @@ pub struct Hands<'b> {
     telemetry: topics::TelemetryRx<'b>,
     pub button: ButtonModel,
     pub imu_silent: &'b Cell<bool>,
+    /// Range finder and barometer.
+    pub height_silent: &'b Cell<bool>,
 }
 
 impl Hands<'_> {
@@ -148,6 +150,7 @@ struct Stage<S> {
     world: World,
     sensors: Option<Sensors>,
     imu_silent: Cell<bool>,
+    height_silent: Cell<bool>,
     script: Option<S>,
     end: Instant,
 }
@@ -165,15 +168,15 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Watch<'a> {
-        let Self { clock, world, sensors, imu_silent, script, end } = self;
-        let imu_silent: &Cell<bool> = imu_silent;
+        let Self { clock, world, sensors, imu_silent, height_silent, script, end } = self;
+        let (imu_silent, height_silent): (&Cell<bool>, &Cell<bool>) = (imu_silent, height_silent);
         let (sensors, script) = sensors.take().zip(script.take()).expect("started once");
         let Sensors { imu, tof, flow, mag, baro, power, motors, button, .. } = sensors;
         tasks.spawn(pump!(imu, outside.imu.sensor_imu, imu_silent.get()));
-        tasks.spawn(pump!(tof, outside.tof.sensor_tof, false));
+        tasks.spawn(pump!(tof, outside.tof.sensor_tof, height_silent.get()));
         tasks.spawn(pump!(flow, outside.flow.sensor_flow, false));
         tasks.spawn(pump!(mag, outside.mag.sensor_mag, false));
-        tasks.spawn(pump!(baro, outside.baro.sensor_baro, false));
+        tasks.spawn(pump!(baro, outside.baro.sensor_baro, height_silent.get()));
         tasks.spawn(pump!(power, outside.power.sensor_power, false));
         let (mut pin, mut contact, watch) = (button.clone(), outside.button_pin.button_contact, clock.clone());
         tasks.spawn(async move {
@@ -189,6 +192,7 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
             telemetry: outside.link.telemetry,
             button,
             imu_silent,
+            height_silent,
         }));
         let (duties, world, end) = (outside.motors.actuator_motor, world.clone(), *end);
         Watch { world, duties, motors, end, seen: Seen::default() }
@@ -245,8 +249,9 @@ pub fn run(seed: u64, seconds: f32, script: impl for<'b> FnOnce(Hands<'b>) -> Sc
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let limit = Duration::from_seconds(seconds);
     let end = config.start + limit;
-    let (sensors, script, imu_silent) = (Some(sensors), Some(script), Cell::new(false));
-    let mut stage = Stage { clock, world, sensors, imu_silent, script, end };
+    let (sensors, script) = (Some(sensors), Some(script));
+    let (imu_silent, height_silent) = (Cell::new(false), Cell::new(false));
+    let mut stage = Stage { clock, world, sensors, imu_silent, height_silent, script, end };
     let options = FlightOptions { start: config.start, limit, jitter: None };
     let ended = vehicle::fly(&VehicleConfig::default(), &options, &mut stage, &mut (), &mut |_, _| {});
     assert_eq!(ended.log_lost, 0);
