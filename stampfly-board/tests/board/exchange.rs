@@ -105,6 +105,7 @@ fn a_cut_off_disarms() {
 fn d14_sticks_that_the_background_band_does_not_pass_on_are_a_lost_link() {
     let mut bus = topics::Bus::new();
     let mut bench = ready(&mut bus);
+    // With a program beside the pilot, whose signs of life must not fill the queue for its kill.
     bench.pass(200, false, &[(OLD, true)]);
     assert!(bench.armed());
     bench.background = false;
@@ -112,8 +113,9 @@ fn d14_sticks_that_the_background_band_does_not_pass_on_are_a_lost_link() {
     assert!(!bench.newest::<SystemAlert>(Id::system_alert).active.contains(Alerts::COMM_LOST));
     bench.pass(120, false, &[(OLD, true)]);
     assert!(bench.newest::<SystemAlert>(Id::system_alert).active.contains(Alerts::COMM_LOST), "though frames come in");
-    bench.pass(3_100, false, &[(OLD, true)]);
-    assert!(!bench.armed());
+    bench.command(GuidedKind::Kill);
+    bench.pass(5, false, &[(OLD, true)]);
+    assert!(!bench.armed(), "a kill gets through");
 }
 
 #[test]
