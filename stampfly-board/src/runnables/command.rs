@@ -7,7 +7,7 @@ use stampfly_mode::Authority;
 use stampfly_types::messages::{Alerts, CommandSetpoint, CommandSource};
 use stampfly_types::{Duration, Instant};
 
-/// Sticks that are older than this are nobody's: five periods of this runnable, which has a slow band and may be starved.
+/// Sticks that are older than this are none: five periods of this runnable, which has a slow band and may be starved.
 const OLDEST: Duration = Duration::from_millis(100);
 
 /// The sticks as their readers may use them: those of the failsafe, level and no climb, when they are too old.

@@ -99,13 +99,13 @@ fn d16_pairing_ends_though_the_new_transmitter_talks_all_the_while() {
 }
 
 #[test]
-fn d16_pairing_that_finds_nobody_ends_and_says_so_until_then() {
+fn d16_pairing_that_finds_no_transmitter_ends_and_says_so_until_then() {
     let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, Some(OLD));
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.console(Command::Pair(true));
     bench.pass(59_000, false, &[(OLD, false)]);
-    assert_eq!(bench.blocks(), ArmBlocks::PAIRING, "nobody is heard, because nobody is listened to");
+    assert_eq!(bench.blocks(), ArmBlocks::PAIRING, "not NO_LINK: no other transmitter is to be heard");
     bench.pass(2_000, false, &[(OLD, false)]);
     assert_eq!((bench.blocks(), bench.link.session().is_pairing()), (ArmBlocks::NONE, false), "the old one is back");
 }

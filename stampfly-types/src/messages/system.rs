@@ -128,7 +128,7 @@ message! {
         mode: FlightMode,
         /// May the motors turn?
         armed: bool,
-        /// Who has authority over the armed vehicle, also while silent; nobody over a disarmed one or one armed by a click.
+        /// Who has authority over the armed vehicle, also while silent; none for a disarmed one or one armed by a click.
         commander: CommandSource,
         /// Pairing with a transmitter.
         pairing: bool,

@@ -223,7 +223,8 @@ fn what_is_missing_is_found() {
     let log = &*FLIGHT;
     // Not when a key frame is made: it holds the samples that nothing has read yet, and shows the loss first.
     let at = Instant::from_millis(7_300);
-    for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "failsafe")] {
+    for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "failsafe")]
+    {
         let place = find(log, topic, at);
         let lossy = without(log, place.message());
         goes_on(&lossy, topic);
