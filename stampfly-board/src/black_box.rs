@@ -65,6 +65,7 @@ fn rate(topic: usize) -> LogRate {
         Id::storage_busy => LogRate::EverySample,
         Id::pairing_request => LogRate::EverySample,
         Id::link_peer => LogRate::EverySample,
+        Id::arm_refusals => LogRate::EverySample,
         Id::restart_request => LogRate::EverySample,
         Id::cutoff_state => LogRate::EverySample,
     }

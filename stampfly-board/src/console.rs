@@ -17,7 +17,7 @@ use stampfly_flight::console::{CommandError, SensorLine, Vehicle};
 use stampfly_flight::newest::longest_message;
 use stampfly_flight::parameters::Parameters;
 use stampfly_flight::profile::Rows;
-use stampfly_types::messages::{FlightStatus, PilotInput, PowerData, StateEstimate, SystemAlert};
+use stampfly_types::messages::{ArmRefusals, FlightStatus, PilotInput, PowerData, StateEstimate, SystemAlert};
 use stampfly_types::{Duration, Instant};
 
 /// How long a motor turns in a test.
@@ -125,6 +125,9 @@ impl Vehicle for Console<'_> {
         write!(reply, "state    {}, {}\r\n", mode.phase.name(), if mode.armed { "ARMED" } else { "disarmed" })?;
         write!(reply, "mode     {}\r\n", mode.mode.name())?;
         list(reply, "blocks", mode.blocks.names())?;
+        if let Some((at, refusals)) = newest.get::<ArmRefusals>(Id::arm_refusals as usize) {
+            refused(reply, now, at, &refusals)?;
+        }
         list(reply, "alerts", alert.active.names())?;
         if newest.get::<CutoffState>(Id::cutoff_state as usize).is_some_and(|(_, cutoff)| cutoff.tripped) {
             reply.write_str("motors   CUT OFF, until the vehicle is disarmed\r\n")?;
@@ -195,6 +198,23 @@ impl Vehicle for Console<'_> {
     fn needs_disarmed(request: &Command) -> bool {
         *request != Command::StopMotor
     }
+}
+
+/// The last time the vehicle did not arm although it was asked to, and why.
+fn refused(reply: &mut dyn fmt::Write, now: Instant, at: Instant, refusals: &ArmRefusals) -> fmt::Result {
+    write!(reply, "refused  {} times to arm, last {} s ago\r\n", refusals.attempts, now.since(at).as_millis() / 1_000)?;
+    let entries = refusals.check.iter().zip(&refusals.value).zip(&refusals.limit).zip(&refusals.since);
+    for (((check, value), limit), since) in entries.filter(|(((check, ..), _), _)| !check.is_empty()) {
+        reply.write_str("        ")?;
+        for name in check.names() {
+            write!(reply, " {name}")?;
+        }
+        if *limit != 0.0 {
+            write!(reply, " {value:.2}, limit {limit:.2},")?;
+        }
+        write!(reply, " for {} ms\r\n", at.since(*since).as_millis())?;
+    }
+    Ok(())
 }
 
 fn list(reply: &mut dyn fmt::Write, what: &str, mut names: impl Iterator<Item = &'static str>) -> fmt::Result {

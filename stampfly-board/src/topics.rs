@@ -34,8 +34,8 @@ stampfly_bus::topics! {
     // Commands.
     /// Frames from the pilot's transmitter.
     command_pilot: PilotInput = ring(8) @ 50 Hz from link => [command, failsafe, mode];
-    /// Commands from programs; none may be lost.
-    command_guided: GuidedCommand = queue(16) @ on event from link => [command, failsafe, mode, navigation];
+    /// Commands from programs; none may be lost. Read in the flight band alone: a slow reader would keep a kill out.
+    command_guided: GuidedCommand = queue(16) @ on event from link => [failsafe, mode, navigation];
     /// The button's pin.
     button_contact: ButtonContact = latest @ 50 Hz from button_pin => [button];
     /// What the button meant.
@@ -55,9 +55,11 @@ stampfly_bus::topics! {
 
     // Decisions.
     /// Conditions the failsafe has found.
-    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, notification, telemetry];
+    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, command, notification, telemetry];
     /// State, mode, armed.
     flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
+    /// Why the vehicle did not arm when it was asked to; for people.
+    arm_refusals: ArmRefusals = latest @ on event from mode => [];
     /// Contact with the ground, and what take-off and landing ask for.
     land_detected: LandDetected = latest @ 400 Hz from landing => [mode, navigation, control];
 

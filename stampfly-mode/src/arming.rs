@@ -3,8 +3,8 @@
 use crate::config::ModeConfig;
 use crate::decision::{CUT, State};
 use crate::facts::Facts;
-use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, Validity};
+use stampfly_types::{Duration, Instant};
 
 /// A reason against arming.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +45,10 @@ fn above(value: f32, limit: f32) -> Option<(f32, f32)> {
 }
 
 /// A sensor that a mode needs must not be silent.
-fn silent(needed: bool, age: stampfly_types::Duration, config: &ModeConfig) -> Option<(f32, f32)> {
-    let (age, limit) = (age.seconds(), config.sensor_silence.seconds());
+fn silent(needed: bool, age: Duration, config: &ModeConfig) -> Option<(f32, f32)> {
+    // A sensor that never spoke has no age.
+    let age = if age == Duration::MAX { f32::INFINITY } else { age.seconds() };
+    let limit = config.sensor_silence.seconds();
     if needed && age >= limit { Some((age, limit)) } else { None }
 }
 
@@ -156,7 +158,6 @@ mod tests {
     use super::*;
     use crate::facts::{Ages, Asked};
     use crate::pilot::Heard;
-    use stampfly_types::Duration;
     use stampfly_types::messages::PilotInput;
 
     fn ready(mode: FlightMode) -> (State, Facts) {

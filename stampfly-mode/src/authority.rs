@@ -32,9 +32,9 @@ impl Default for AuthorityConfig {
 /// use stampfly_types::{Instant, messages::{CommandSource, PilotInput}};
 /// let mut authority = Authority::default();
 /// authority.pilot(Instant::ZERO, &PilotInput { pitch: 1.0, ..Default::default() });
-/// let sticks = authority.step(Instant::from_millis(100), CommandSource::Pilot);
+/// let sticks = authority.step(Instant::from_millis(100), CommandSource::Pilot, true);
 /// assert_eq!((sticks.source, sticks.pitch), (CommandSource::Pilot, 1.0));
-/// let sticks = authority.step(Instant::from_millis(500), CommandSource::Pilot);
+/// let sticks = authority.step(Instant::from_millis(500), CommandSource::Pilot, true);
 /// assert_eq!((sticks.source, sticks.pitch), (CommandSource::Failsafe, 0.0));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +44,6 @@ pub struct Authority {
     pilot: Option<(Instant, PilotInput)>,
     /// When the first frame after a silence came; `None` before the first silence.
     pilot_back: Option<Instant>,
-    guided: Option<Instant>,
 }
 
 impl Authority {
@@ -69,14 +68,10 @@ impl Authority {
         self.pilot = Some((at, input));
     }
 
-    /// A command from a program, or a sign of life.
-    pub fn guided(&mut self, at: Instant) {
-        self.guided = Some(at);
-    }
-
-    /// The set-point now, of the source that has authority.
+    /// The set-point now, of the source that has authority. `heard` says whether the failsafe hears it: a program has no sticks
+    /// whose age this could know.
     #[must_use]
-    pub fn step(&self, now: Instant, commander: CommandSource) -> CommandSetpoint {
+    pub fn step(&self, now: Instant, commander: CommandSource, heard: bool) -> CommandSetpoint {
         let fresh = |at: Instant| now.since(at) < self.config.stale;
         let pilot = self.pilot.filter(|(at, _)| fresh(*at)).map(|(_, input)| input);
         let settled = self.pilot_back.is_none_or(|back| now.since(back) >= self.config.back);
@@ -88,7 +83,7 @@ impl Authority {
                 yaw: self.centred(input.yaw),
                 source: CommandSource::Pilot,
             },
-            (CommandSource::Guided, _) if self.guided.is_some_and(fresh) => {
+            (CommandSource::Guided, _) if heard => {
                 CommandSetpoint { source: CommandSource::Guided, ..Default::default() }
             }
             (CommandSource::None, _) => CommandSetpoint::default(),
@@ -122,12 +117,11 @@ mod tests {
         let mut authority = Authority::default();
         let now = Instant::from_millis(10);
         for commander in [CommandSource::Pilot, CommandSource::Guided, CommandSource::Failsafe] {
-            assert_eq!(authority.step(now, commander).source, CommandSource::Failsafe, "never heard");
+            assert_eq!(authority.step(now, commander, false).source, CommandSource::Failsafe, "never heard");
         }
-        authority.guided(Instant::ZERO);
         authority.pilot(Instant::ZERO, &HALF);
         for commander in [CommandSource::None, CommandSource::Pilot, CommandSource::Guided] {
-            let sticks = authority.step(now, commander);
+            let sticks = authority.step(now, commander, true);
             assert_eq!(sticks.source, commander);
             assert_eq!(sticks.roll > 0.0, commander == CommandSource::Pilot);
         }
@@ -137,10 +131,9 @@ mod tests {
     fn d13_one_source_does_not_speak_for_another() {
         let mut authority = Authority::default();
         authority.pilot(Instant::ZERO, &HALF);
-        authority.guided(Instant::from_millis(900));
         let now = Instant::from_secs(1);
-        assert_eq!(authority.step(now, CommandSource::Pilot).source, CommandSource::Failsafe);
-        assert_eq!(authority.step(now, CommandSource::Guided).source, CommandSource::Guided);
+        assert_eq!(authority.step(now, CommandSource::Pilot, true).source, CommandSource::Failsafe);
+        assert_eq!(authority.step(now, CommandSource::Guided, true).source, CommandSource::Guided);
     }
 
     #[test]
@@ -150,7 +143,7 @@ mod tests {
         for ms in (0..4_000u64).step_by(20).filter(|ms| !(1_000..1_600).contains(ms)) {
             let now = Instant::from_millis(ms);
             authority.pilot(now, &HALF);
-            let piloted = authority.step(now, CommandSource::Pilot).source == CommandSource::Pilot;
+            let piloted = authority.step(now, CommandSource::Pilot, true).source == CommandSource::Pilot;
             assert!(piloted || ms >= 1_600, "a short gap is none: {ms}");
             if ms >= 1_600 && piloted {
                 first.get_or_insert(ms);
@@ -163,7 +156,7 @@ mod tests {
     fn nan_is_centre() {
         let mut authority = Authority::default();
         authority.pilot(Instant::ZERO, &PilotInput { roll: f32::NAN, pitch: 9.0, ..Default::default() });
-        let setpoint = authority.step(Instant::from_micros(1), CommandSource::Pilot);
+        let setpoint = authority.step(Instant::from_micros(1), CommandSource::Pilot, true);
         assert_eq!((setpoint.roll, setpoint.pitch), (0.0, 1.0));
     }
 }

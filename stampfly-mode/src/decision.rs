@@ -330,7 +330,7 @@ fn leave_and_enter(config: &ModeConfig, state: &mut State, facts: &Facts, event:
     }
     if is_armed(left) && !is_armed(phase) {
         let crashed = facts.alerts.intersects(CUT);
-        // By the button the vehicle is in a hand, whose owner knows.
+        // A press of the button means that the vehicle is in a hand: no acknowledgement is missing.
         let fell = is_airborne(left) && !low && event != Event::Touchdown && !facts.stop_button;
         let block = if facts.cut_off { ArmBlocks::CUT_OFF } else { ArmBlocks::CRASHED };
         if crashed || fell || facts.cut_off {

@@ -1,9 +1,10 @@
 //! What people see and hear: one table for lights, one for tunes.
 //!
 //! The status light tells the phase, the two body lights the flight mode, as on the StampFly. Rows of a table are
-//! looked at from the top; the first one that applies wins.
+//! looked at from the top; the first one that applies wins. A vehicle that crashed or whose motors were cut off shows an error
+//! until this is acknowledged.
 
-use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, FlightStatus, Signal, Tone};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, Signal, Tone};
 use stampfly_types::{Duration, Instant};
 
 /// How a light shows its colour.
@@ -43,6 +44,8 @@ const LIME: Colour = [16, 32, 0];
 pub struct Signaller {
     last_phase: Option<FlightPhase>,
     last_warning: Option<Instant>,
+    was_error: bool,
+    was_pairing: bool,
     tone: Tone,
     tone_count: u32,
 }
@@ -53,6 +56,8 @@ const FAULT: Alerts = Alerts::IMU_LOST
     .with(Alerts::ESTIMATE_DIVERGED)
     .with(Alerts::TILT_MISMATCH)
     .with(Alerts::POWER_LOST);
+/// What a person has to look at before the vehicle flies again.
+const ERROR: ArmBlocks = ArmBlocks::CRASHED.with(ArmBlocks::CUT_OFF).with(ArmBlocks::SELF_TEST);
 /// A low battery is called out again after this long.
 const REPEAT: Duration = Duration::from_secs(10);
 
@@ -60,9 +65,12 @@ impl Signaller {
     /// What to show now; call at about 30 Hz.
     pub fn step(&mut self, now: Instant, mode: &FlightStatus, alerts: Alerts) -> Signal {
         let low = alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY);
-        let fault = alerts.intersects(FAULT);
+        let error = alerts.intersects(FAULT) || mode.blocks.intersects(ERROR);
         let silent = alerts.contains(Alerts::COMM_LOST);
-        if self.last_phase != Some(mode.phase) {
+        if error && !self.was_error && self.last_phase.is_some() {
+            (self.was_error, self.last_phase) = (true, Some(mode.phase));
+            self.start(Tone::Error);
+        } else if self.last_phase != Some(mode.phase) {
             let tone = match (self.last_phase, mode.phase) {
                 (None, _) => Tone::Start,
                 (Some(FlightPhase::Init), FlightPhase::IdleGround) => Tone::Ready,
@@ -73,13 +81,18 @@ impl Signaller {
             };
             self.last_phase = Some(mode.phase);
             self.start(tone);
+        } else if mode.pairing && !self.was_pairing {
+            self.start(Tone::Pair);
         } else if low && self.last_warning.is_none_or(|at| now.since(at) >= REPEAT) {
             self.last_warning = Some(now);
             self.start(Tone::LowBattery);
         }
 
+        self.was_error &= error;
+        self.was_pairing = mode.pairing;
+
         let status = [
-            (fault, RED, Blink::Fast),
+            (error, RED, Blink::Fast),
             (low, CYAN, Blink::Slow),
             (mode.pairing, BLUE, Blink::Fast),
             (mode.phase == FlightPhase::Init, MAGENTA, Blink::Slow),
@@ -153,6 +166,37 @@ mod tests {
         for phase in [FlightPhase::Armed, FlightPhase::TakeOff, FlightPhase::Flying, FlightPhase::Landing] {
             assert_eq!([0, 125].map(|millis| status(phase, true, millis)), [ORANGE, OFF], "{phase:?}");
         }
+    }
+
+    #[test]
+    fn a_crash_is_an_error_until_it_is_acknowledged() {
+        let mut signaller = Signaller::default();
+        let mut count = 0;
+        let mut shown = |phase, blocks, millis| {
+            let status = FlightStatus { phase, blocks, armed: phase == FlightPhase::Flying, ..Default::default() };
+            let signal = signaller.step(Instant::from_millis(millis), &status, Alerts::NONE);
+            let tone = if signal.tone_count == count { Tone::None } else { signal.tone };
+            count = signal.tone_count;
+            (signal.status, tone)
+        };
+        use FlightPhase::{Flying, IdleGround, IdleHeld};
+        shown(Flying, ArmBlocks::NONE, 0);
+        assert_eq!(shown(IdleGround, ArmBlocks::CRASHED, 1_000), (RED, Tone::Error));
+        for (phase, millis) in [(IdleHeld, 2_000), (IdleGround, 3_000)] {
+            assert_eq!(shown(phase, ArmBlocks::CRASHED, millis), (RED, Tone::None), "{phase:?}");
+        }
+        assert_eq!(shown(IdleGround, ArmBlocks::NONE, 4_000), (GREEN, Tone::None), "acknowledged");
+        assert_eq!(shown(IdleGround, ArmBlocks::CUT_OFF, 5_000), (RED, Tone::Error));
+    }
+
+    #[test]
+    fn pairing_is_heard_once() {
+        let mut signaller = Signaller::default();
+        let idle = FlightStatus { phase: FlightPhase::IdleGround, ..Default::default() };
+        let pairing = FlightStatus { pairing: true, ..idle };
+        signaller.step(Instant::ZERO, &idle, Alerts::NONE);
+        let signals = [1, 2].map(|second| signaller.step(Instant::from_secs(second), &pairing, Alerts::NONE));
+        assert_eq!(signals.map(|signal| (signal.tone, signal.tone_count)), [(Tone::Pair, 2); 2]);
     }
 
     #[test]

@@ -4,10 +4,10 @@ use crate::config::VehicleConfig;
 use crate::topics::CommandEnds;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::Authority;
-use stampfly_types::messages::{CommandSetpoint, CommandSource};
+use stampfly_types::messages::{Alerts, CommandSetpoint, CommandSource};
 use stampfly_types::{Duration, Instant};
 
-/// Sticks that are older than this are nobody's: five periods of this runnable, which has a slow band and may be starved.
+/// Sticks that are older than this are none: five periods of this runnable, which has a slow band and may be starved.
 const OLDEST: Duration = Duration::from_millis(100);
 
 /// The sticks as their readers may use them: those of the failsafe, level and no climb, when they are too old.
@@ -41,10 +41,8 @@ impl Runnable for Command {
         for frame in ends.command_pilot.iter() {
             self.authority.pilot(frame.at, &frame.data);
         }
-        for command in ends.command_guided.iter() {
-            self.authority.guided(command.at);
-        }
-        let setpoint = self.authority.step(activation.now(), ends.flight_status.get().commander);
+        let heard = !ends.system_alert.get().active.contains(Alerts::COMM_LOST);
+        let setpoint = self.authority.step(activation.now(), ends.flight_status.get().commander, heard);
         ends.command_setpoint.publish(activation.now(), &setpoint);
     }
 }

@@ -46,7 +46,7 @@ impl Runnable for Failsafe {
         let pilot = ends.command_pilot.last().map(|sample| sample.at);
         let guided = ends.command_guided.last().map(|sample| sample.at);
         (self.last_pilot, self.last_guided) = (newest(self.last_pilot, pilot), newest(self.last_guided, guided));
-        // Who does not fly the vehicle does not speak for the one who does.
+        // A source that does not fly the vehicle does not keep its flight going.
         let heard = match ends.flight_status.get().commander {
             CommandSource::Pilot => self.last_pilot,
             CommandSource::Guided => self.last_guided,

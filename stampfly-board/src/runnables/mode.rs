@@ -7,7 +7,7 @@ use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
-use stampfly_types::messages::{ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
+use stampfly_types::messages::{ArmRefusals, ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
 /// State management: alerts, commands and facts in, the vehicle's state out.
@@ -20,6 +20,8 @@ pub struct Mode {
     pilot: Option<Stamped<PilotInput>>,
     sensors: SensorTimes,
     published: Option<EstimatorCommand>,
+    /// Refusals to arm since power-on.
+    refused: u32,
     /// The decision of the step before.
     last: FlightStatus,
     /// When the vehicle was last armed.
@@ -37,6 +39,7 @@ impl Mode {
             pilot: None,
             sensors: SensorTimes::default(),
             published: None,
+            refused: 0,
             last: FlightStatus::default(),
             armed_at: Instant::ZERO,
         }
@@ -91,6 +94,19 @@ impl Runnable for Mode {
         let output = self.machine.step(now, &input);
         ends.flight_status.publish(now, &output.flight_status);
         self.last = output.flight_status;
+        if output.refused {
+            self.refused = self.refused.saturating_add(1);
+            let mut refusals = ArmRefusals { attempts: self.refused, ..ArmRefusals::default() };
+            for refusal in self.machine.refusals() {
+                refusals.blocks |= refusal.check;
+            }
+            let entries =
+                refusals.check.iter_mut().zip(&mut refusals.value).zip(&mut refusals.limit).zip(&mut refusals.since);
+            for (refusal, (((check, value), limit), since)) in self.machine.refusals().zip(entries) {
+                (*check, *value, *limit, *since) = (refusal.check, refusal.value, refusal.limit, refusal.since);
+            }
+            ends.arm_refusals.publish(now, &refusals);
+        }
         if output.flight_status.armed {
             self.armed_at = now;
         }

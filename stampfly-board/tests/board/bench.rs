@@ -43,6 +43,10 @@ pub struct Bench<'b> {
     newest: Newest,
     /// Does the battery monitor answer?
     pub monitor: bool,
+    /// Do range finder, flow sensor and barometer answer?
+    pub aiding: bool,
+    /// Does the background band get the processor?
+    pub background: bool,
     /// Does a program say that it is there?
     pub program: bool,
     pub now: Instant,
@@ -60,7 +64,18 @@ impl<'b> Bench<'b> {
         let ends =
             Ends { imu, tof, flow, baro, power, button: button_pin, guided, console, storage, cutoff, supervisor };
         let newest = Newest::new();
-        Self { flight, ends, link, taps, newest, monitor: true, program: false, now: Instant::ZERO }
+        Self {
+            flight,
+            ends,
+            link,
+            taps,
+            newest,
+            monitor: true,
+            aiding: true,
+            background: true,
+            program: false,
+            now: Instant::ZERO,
+        }
     }
 
     /// The newest sample of a topic.
@@ -104,11 +119,13 @@ impl<'b> Bench<'b> {
             self.ends.imu.sensor_imu.publish(now, &still);
             if now.as_micros().is_multiple_of(link::PERIOD.as_micros()) {
                 self.ends.button.button_contact.publish(now, &ButtonContact { pressed });
-                let range = TofData { distance: 0.03, valid: true, ..Default::default() };
-                self.ends.tof.sensor_tof.publish(now, &range);
-                let flow = FlowData { interval: 0.02, quality: 80, valid: true, ..Default::default() };
-                self.ends.flow.sensor_flow.publish(now, &flow);
-                self.ends.baro.sensor_baro.publish(now, &BaroData { pressure: 101_325.0, ..Default::default() });
+                if self.aiding {
+                    let range = TofData { distance: 0.03, valid: true, ..Default::default() };
+                    self.ends.tof.sensor_tof.publish(now, &range);
+                    let flow = FlowData { interval: 0.02, quality: 80, valid: true, ..Default::default() };
+                    self.ends.flow.sensor_flow.publish(now, &flow);
+                    self.ends.baro.sensor_baro.publish(now, &BaroData { pressure: 101_325.0, ..Default::default() });
+                }
                 if self.monitor {
                     self.ends.power.sensor_power.publish(now, &PowerData { voltage: 4.1, current: 0.1, power: 0.4 });
                 }
@@ -122,7 +139,7 @@ impl<'b> Bench<'b> {
                 }
                 self.link.transmit(now);
             }
-            for band in [Band::Flight, Band::Background] {
+            for band in [Band::Flight, Band::Background].into_iter().take(1 + usize::from(self.background)) {
                 self.flight.run_band(band, now, &mut ());
             }
             self.taps.drain(&mut |topic, at, _, words| self.newest.note(topic, at, words));

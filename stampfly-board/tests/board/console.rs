@@ -5,7 +5,7 @@ use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_flight::console::{Request, answer};
 use stampfly_types::messages::{
-    Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert,
+    Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert,
 };
 use stampfly_types::{Instant, Message};
 
@@ -44,6 +44,26 @@ fn status_says_what_blocks_arming() {
         assert!(said.contains(part), "{part} is missing:\n{said}");
     }
     assert!(ask(&Newest::new(), "status").0.contains("never heard"), "nothing published yet");
+}
+
+#[test]
+fn status_says_why_it_did_not_arm() {
+    let mut newest = vehicle(Some(false));
+    assert!(!ask(&newest, "status").0.contains("refused"));
+    let none = ArmBlocks::NONE;
+    let refusals = ArmRefusals {
+        attempts: 2,
+        blocks: ArmBlocks::TILTED | ArmBlocks::NO_LINK,
+        check: [ArmBlocks::TILTED, ArmBlocks::NO_LINK, none, none],
+        value: [0.5, 1.0, 0.0, 0.0],
+        limit: [0.35, 0.0, 0.0, 0.0],
+        since: [2_000, 1_500, 0, 0].map(Instant::from_millis),
+    };
+    newest.note(Id::arm_refusals as usize, Instant::from_secs(3), &refusals.to_words());
+    let (said, _) = ask(&newest, "status");
+    for part in ["2 times to arm, last 2 s ago", "TILTED 0.50, limit 0.35, for 1000 ms", "NO_LINK for 1500 ms"] {
+        assert!(said.contains(part), "{part} is missing:\n{said}");
+    }
 }
 
 #[test]

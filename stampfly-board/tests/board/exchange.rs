@@ -3,8 +3,8 @@
 use crate::bench::{Bench, OLD};
 use stampfly_board::console::{Command, TEST_TIME};
 use stampfly_board::messages::{CutoffState, MotorTest, StorageBusy};
-use stampfly_board::topics;
-use stampfly_types::messages::{ArmBlocks, GuidedKind};
+use stampfly_board::topics::{self, Id};
+use stampfly_types::messages::{Alerts, ArmBlocks, ArmRefusals, GuidedKind, SystemAlert};
 
 /// A vehicle that is ready to fly, with a program beside its pilot.
 fn ready(bus: &mut topics::Bus) -> Bench<'_> {
@@ -99,6 +99,39 @@ fn a_cut_off_disarms() {
     arm(&mut bench);
     bench.pass(100, false, &[(OLD, false)]);
     assert!(bench.armed());
+}
+
+#[test]
+fn d14_sticks_that_the_background_band_does_not_pass_on_are_a_lost_link() {
+    let mut bus = topics::Bus::new();
+    let mut bench = ready(&mut bus);
+    // With a program beside the pilot, whose signs of life must not fill the queue for its kill.
+    bench.pass(200, false, &[(OLD, true)]);
+    assert!(bench.armed());
+    bench.background = false;
+    bench.pass(400, false, &[(OLD, true)]);
+    assert!(!bench.newest::<SystemAlert>(Id::system_alert).active.contains(Alerts::COMM_LOST));
+    bench.pass(120, false, &[(OLD, true)]);
+    assert!(bench.newest::<SystemAlert>(Id::system_alert).active.contains(Alerts::COMM_LOST), "though frames come in");
+    bench.command(GuidedKind::Kill);
+    bench.pass(5, false, &[(OLD, true)]);
+    assert!(!bench.armed(), "a kill gets through");
+}
+
+#[test]
+fn d9_a_vehicle_whose_aiding_sensors_are_silent_says_which_and_does_not_arm() {
+    let mut bus = topics::Bus::new();
+    let mut bench = ready(&mut bus);
+    bench.aiding = false;
+    bench.pass(2_000, false, &[]);
+    bench.command(GuidedKind::Arm);
+    bench.pass(20, false, &[]);
+    let missing = ArmBlocks::NO_RANGE | ArmBlocks::NO_FLOW | ArmBlocks::NO_BARO;
+    assert!(!bench.armed() && bench.blocks().contains(missing), "{:?}", bench.blocks());
+    let refusals = bench.newest::<ArmRefusals>(Id::arm_refusals);
+    assert!(refusals.attempts == 1 && refusals.blocks.contains(missing), "{refusals:?}");
+    let range = refusals.check.iter().position(|check| *check == ArmBlocks::NO_RANGE).expect("in the list");
+    assert!(refusals.value[range] > 1.9 && refusals.limit[range] == 1.0, "{refusals:?}");
 }
 
 #[test]

@@ -85,6 +85,32 @@ fn at_the_console_pairing_is_asked_for_and_called_off() {
 }
 
 #[test]
+fn d16_pairing_ends_though_the_new_transmitter_talks_all_the_while() {
+    for old in [None, Some(OLD)] {
+        let mut bus = topics::Bus::new();
+        let mut bench = Bench::new(&mut bus, old);
+        let before: &[_] = &[(OLD, false), (NEW, false)];
+        bench.pass(6_000, false, &before[..usize::from(old.is_some())]);
+        // The new one is on while the button is still held: the session pairs with its next frame.
+        bench.pass(3_500, true, before);
+        bench.pass(500, false, before);
+        assert_eq!((bench.link.session().is_pairing(), bench.blocks()), (false, ArmBlocks::NONE));
+    }
+}
+
+#[test]
+fn d16_pairing_that_finds_no_transmitter_ends_and_says_so_until_then() {
+    let mut bus = topics::Bus::new();
+    let mut bench = Bench::new(&mut bus, Some(OLD));
+    bench.pass(6_000, false, &[(OLD, false)]);
+    bench.console(Command::Pair(true));
+    bench.pass(59_000, false, &[(OLD, false)]);
+    assert_eq!(bench.blocks(), ArmBlocks::PAIRING, "not NO_LINK: no other transmitter is to be heard");
+    bench.pass(2_000, false, &[(OLD, false)]);
+    assert_eq!((bench.blocks(), bench.link.session().is_pairing()), (ArmBlocks::NONE, false), "the old one is back");
+}
+
+#[test]
 fn a_new_transmitter_is_published_once_and_gets_telemetry() {
     let mut bus = topics::Bus::new();
     let mut bench = Bench::new(&mut bus, None);

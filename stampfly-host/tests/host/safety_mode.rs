@@ -84,6 +84,36 @@ fn d4_a_pilot_lost_in_stabilize_or_acro_is_levelled_and_landed() {
     }
 }
 
+/// The mode stays and the motors go on: how the vehicle comes down without a height is the landing's concern.
+#[test]
+fn d2_a_height_that_is_lost_is_no_reason_to_stop_the_motors() {
+    for mode in [FlightMode::AltHold, FlightMode::PosHold] {
+        for seed in SEEDS {
+            let (since, note) = instant();
+            let seen = run(seed, 25.0, |mut hands| {
+                Box::pin(async move {
+                    climb(&mut hands, 2.0).await;
+                    let flown = PilotInput { mode, arm: true, ..STICKS };
+                    send(&mut hands, 1.0, flown).await;
+                    note.set(hands.clock.now());
+                    hands.height_silent.set(true);
+                    send(&mut hands, 8.0, flown).await;
+                })
+            });
+            let what = format!("{mode:?}, seed {seed}");
+            let since = since.get();
+            assert_eq!(at(&seen, since).1, mode, "{what}");
+            let landing = seen.entered(FlightPhase::Landing, since).expect("it lands");
+            assert!(landing.since(since) < Duration::from_secs(4), "{what}: {}", landing.since(since));
+            let blind = || seen.modes.iter().filter(|(at, _)| (since..landing).contains(at));
+            assert!(blind().all(|(_, status)| !status.mode.is_manual()), "{what}");
+            let duties = seen.motors.iter().filter(|(at, _)| (since..landing).contains(at));
+            let weakest = duties.map(|(_, motors)| motors.duty.iter().sum::<f32>() / 4.0).fold(1.0, f32::min);
+            assert!(weakest > 0.3, "{what}: duty {weakest}");
+        }
+    }
+}
+
 #[test]
 fn d5_a_transmitter_switched_on_while_a_program_flies_changes_nothing() {
     for mode in [FlightMode::Stabilize, FlightMode::Acro, FlightMode::AltHold] {

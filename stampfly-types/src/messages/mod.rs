@@ -6,7 +6,7 @@
 //! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] |
 //! | [`command`] | [`PilotInput`] [`GuidedCommand`] [`ButtonEvent`] [`CommandSetpoint`] [`Setpoint`] |
 //! | [`control`] | [`ControlOutput`] [`MotorOutput`] |
-//! | [`system`] | [`FlightStatus`] [`SystemAlert`] [`LandDetected`] [`SelfTest`] [`Signal`] |
+//! | [`system`] | [`FlightStatus`] [`ArmRefusals`] [`SystemAlert`] [`LandDetected`] [`SelfTest`] [`Signal`] |
 //!
 //! No message carries a time stamp: the bus stamps every sample with the instant its data is valid for.
 
@@ -24,6 +24,6 @@ pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
 pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};
 pub use sensor::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
 pub use system::{
-    Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, SelfTest, SelfTestVerdict,
-    Signal, SystemAlert, Tone,
+    Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, SelfTest,
+    SelfTestVerdict, Signal, SystemAlert, Tone,
 };

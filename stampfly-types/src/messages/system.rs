@@ -1,7 +1,7 @@
 //! State of the whole vehicle: mode, alerts, contact with the ground, signals to people.
 
 use super::command::CommandSource;
-use crate::{message, message_enum, message_flags};
+use crate::{Instant, message, message_enum, message_flags};
 
 message_enum! {
     /// Where the vehicle is between power-on and landing. Failsafe is an event, never a phase.
@@ -102,6 +102,24 @@ message_flags! {
 }
 
 message! {
+    /// Why the vehicle refused to arm when it was last asked to: the first four reasons, the weightiest first.
+    pub struct ArmRefusals {
+        /// Refusals since power-on.
+        attempts: u32,
+        /// Every reason.
+        blocks: ArmBlocks,
+        /// The reasons, one an entry; none in an entry that is not used.
+        check: [ArmBlocks; 4],
+        /// The value that was found, in the unit of the check; 1 for a condition.
+        value: [f32; 4],
+        /// The limit it was beyond; 0 for a condition.
+        limit: [f32; 4],
+        /// Since when.
+        since: [Instant; 4],
+    }
+}
+
+message! {
     /// The mode machine's decision.
     pub struct FlightStatus {
         /// Where the vehicle is between power-on and landing.
@@ -110,7 +128,7 @@ message! {
         mode: FlightMode,
         /// May the motors turn?
         armed: bool,
-        /// Who has authority over the armed vehicle, also while silent; nobody over a disarmed one or one armed by a click.
+        /// Who has authority over the armed vehicle, also while silent; none for a disarmed one or one armed by a click.
         commander: CommandSource,
         /// Pairing with a transmitter.
         pairing: bool,

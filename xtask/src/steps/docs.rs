@@ -54,6 +54,13 @@ const GENERATED: &[(&str, &str, &str)] = &[
          landed, cut; crashed, flown-away and kept-on are never acceptable. The rules are in \
          `stampfly-board/src/simulation/judge.rs`.",
     ),
+    (
+        "docs/modes.md",
+        "modes",
+        "# Modes\n\nThe mode machine: its phases, who may do what, and what it asks for before arming. Printed from the tables of \
+         `stampfly-mode` by `cargo xtask docs --fix`. A test explores every phase with every relevant alert and every set of \
+         up to three events (`stampfly-mode/src/decision/tests.rs`).",
+    ),
 ];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {

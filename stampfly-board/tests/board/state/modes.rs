@@ -106,10 +106,7 @@ fn authority_goes_on() {
         if k.is_multiple_of(8) && k % 300 < 200 {
             authority.pilot(at(k), &pilot(k, n));
         }
-        if k.is_multiple_of(50) {
-            authority.guided(at(k));
-        }
-        authority.step(at(k), if k % 100 < 70 { CommandSource::Pilot } else { CommandSource::Guided })
+        authority.step(at(k), if k % 100 < 70 { CommandSource::Pilot } else { CommandSource::Guided }, k % 3 > 0)
     });
 }
 

@@ -39,6 +39,8 @@ pub enum Command {
     Schedule(TopicsOptions),
     /// List what can go wrong in a flight: value, the worst end that is acceptable, meaning.
     Faults(TopicsOptions),
+    /// Print the mode machine: phases, transitions, guards, checks before arming.
+    Modes(ModesOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
     /// Run the estimator over recorded sensor data and say how good it is.
@@ -65,6 +67,14 @@ impl Default for VehicleOption {
     fn default() -> Self {
         Self { name: vehicles::DEFAULT.into() }
     }
+}
+
+/// How the mode machine is printed.
+#[derive(Debug, Args)]
+pub struct ModesOptions {
+    /// As Markdown, which is the only form there is.
+    #[arg(long)]
+    pub markdown: bool,
 }
 
 /// What decides a simulated flight.

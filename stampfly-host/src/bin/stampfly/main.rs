@@ -12,6 +12,7 @@ mod failure;
 mod faults;
 mod fly;
 mod golden;
+mod modes;
 mod replay;
 mod schedule;
 mod terminal;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),
         Command::Faults(options) => faults::run(&options),
+        Command::Modes(_) => modes::run(),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
         Command::Golden(options) => golden::run(&options),

@@ -34,6 +34,8 @@ pub struct Hands<'b> {
     pub imu_silent: &'b Cell<bool>,
     /// Since when the sensors lie.
     pub lying: &'b Cell<Option<Instant>>,
+    /// Range finder and barometer.
+    pub height_silent: &'b Cell<bool>,
 }
 
 /// What a broken sensor makes of a sample, so many seconds after it broke.
@@ -171,6 +173,7 @@ struct Stage<S> {
     imu_silent: Cell<bool>,
     lying: Cell<Option<Instant>>,
     lies: Lies,
+    height_silent: Cell<bool>,
     script: Option<S>,
     end: Instant,
 }
@@ -188,16 +191,17 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Watch<'a> {
-        let Self { clock, world, sensors, imu_silent, lying, lies, script, end } = self;
-        let (imu_silent, lying): (&Cell<bool>, &Cell<Option<Instant>>) = (imu_silent, lying);
+        let Self { clock, world, sensors, imu_silent, height_silent, lying, lies, script, end } = self;
+        let (imu_silent, height_silent): (&Cell<bool>, &Cell<bool>) = (imu_silent, height_silent);
+        let lying: &Cell<Option<Instant>> = lying;
         let lies = std::mem::take(lies);
         let (sensors, script) = sensors.take().zip(script.take()).expect("started once");
         let Sensors { imu, tof, flow, mag, baro, power, motors, button, .. } = sensors;
         tasks.spawn(pump!(imu, outside.imu.sensor_imu, imu_silent.get(), lies.imu, lying));
-        tasks.spawn(pump!(tof, outside.tof.sensor_tof, false, lies.tof, lying));
+        tasks.spawn(pump!(tof, outside.tof.sensor_tof, height_silent.get(), lies.tof, lying));
         tasks.spawn(pump!(flow, outside.flow.sensor_flow, false, lies.flow, lying));
         tasks.spawn(pump!(mag, outside.mag.sensor_mag, false, None::<Box<dyn FnMut(f32, &mut MagData)>>, lying));
-        tasks.spawn(pump!(baro, outside.baro.sensor_baro, false, lies.baro, lying));
+        tasks.spawn(pump!(baro, outside.baro.sensor_baro, height_silent.get(), lies.baro, lying));
         tasks.spawn(pump!(power, outside.power.sensor_power, false, lies.power, lying));
         let (mut pin, mut contact, watch) = (button.clone(), outside.button_pin.button_contact, clock.clone());
         tasks.spawn(async move {
@@ -214,6 +218,7 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
             button,
             imu_silent,
             lying,
+            height_silent,
         }));
         let (duties, world, end) = (outside.motors.actuator_motor, world.clone(), *end);
         Watch { world, duties, motors, end, seen: Seen::default() }
@@ -284,9 +289,9 @@ pub fn run_in(
     let Simulation { clock, world, sensors } = Simulation::new(&config);
     let limit = Duration::from_seconds(seconds);
     let end = config.start + limit;
-    let (sensors, script, imu_silent) = (Some(sensors), Some(script), Cell::new(false));
-    let lying = Cell::new(None);
-    let mut stage = Stage { clock, world, sensors, imu_silent, lying, lies, script, end };
+    let (sensors, script) = (Some(sensors), Some(script));
+    let (imu_silent, height_silent, lying) = (Cell::new(false), Cell::new(false), Cell::new(None));
+    let mut stage = Stage { clock, world, sensors, imu_silent, height_silent, lying, lies, script, end };
     let options = FlightOptions { start: config.start, limit, jitter: None };
     let ended = vehicle::fly(&VehicleConfig::default(), &options, &mut stage, &mut (), &mut |_, _| {});
     assert_eq!(ended.log_lost, 0);

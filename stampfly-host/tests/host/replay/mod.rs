@@ -221,8 +221,10 @@ fn a_loss_that_is_marked_is_passed_over() {
 #[test]
 fn what_is_missing_is_found() {
     let log = &*FLIGHT;
-    let at = Instant::from_secs(7);
-    for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "command")] {
+    // Not when a key frame is made: it holds the samples that nothing has read yet, and shows the loss first.
+    let at = Instant::from_millis(7_300);
+    for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "failsafe")]
+    {
         let place = find(log, topic, at);
         let lossy = without(log, place.message());
         goes_on(&lossy, topic);
