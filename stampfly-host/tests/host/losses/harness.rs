@@ -16,8 +16,8 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{
-    Alerts, BaroData, EstimatorStatus, FlightPhase, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData, MagData,
-    MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
+    Alerts, BaroData, EstimatorStatus, FlightPhase, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData,
+    MagData, MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
 };
 use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
