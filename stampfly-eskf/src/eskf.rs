@@ -201,8 +201,8 @@ impl Eskf {
             accels: Mean::default(),
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
-            flow_monitor: FlowMonitor::default(),
-            vertical: VerticalMonitor::default(),
+            flow_monitor: FlowMonitor::airborne(),
+            vertical: VerticalMonitor::airborne(),
             gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
@@ -374,7 +374,7 @@ impl Eskf {
         self.accels = Mean::default();
         self.gates = Gates::default();
         self.flow_innovation_bias = InnovationBiasMonitor::default();
-        self.flow_monitor = FlowMonitor::default();
+        self.flow_monitor = FlowMonitor::airborne();
         self.vertical.restart(-self.state.accel_bias.z);
         self.reset_history();
         self.status.diverged = false;

@@ -16,7 +16,7 @@ const SMOOTH: f32 = 0.06;
 /// Time constant with which flow's corrections are forgotten, s.
 const FORGOTTEN: f32 = 2.0;
 /// Largest difference, m/s, for each metre of distance, and as a share of the velocity.
-const DIFFERENCE: f32 = 0.8;
+const DIFFERENCE: f32 = 0.55;
 const PER_METRE: f32 = 0.15;
 const SHARE: f32 = 0.25;
 /// For how long, s.
@@ -29,6 +29,8 @@ const TURNED: f32 = 0.007;
 const SHARP: f32 = 0.15;
 /// For so many readings running, at least.
 const ZEROS: u32 = 20;
+/// After a start in the air the filter first has to find tilt and biases, s.
+const UNKNOWN: f32 = 10.0;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
 const MOTION: f32 = 0.2;
 const AGREES_FOR: f32 = 0.5;
@@ -58,9 +60,22 @@ pub(super) struct FlowMonitor {
     turned: f32,
     standing: [f32; 2],
     implausible: bool,
+    /// How long it has to hold back, s.
+    waits: f32,
 }
 
 impl FlowMonitor {
+    /// Of a filter that starts in the air, with errors of every kind.
+    pub(super) fn airborne() -> Self {
+        Self { waits: UNKNOWN, ..Self::default() }
+    }
+
+    /// The vehicle stands: what moves it from here on is felt.
+    #[inline]
+    pub(super) fn ready(&mut self) {
+        self.waits = 0.0;
+    }
+
     /// Is flow not to be believed?
     pub(super) fn is_implausible(&self) -> bool {
         self.implausible
@@ -145,7 +160,8 @@ impl FlowMonitor {
             self.implausible = self.agrees < AGREES_FOR;
             return false;
         }
-        self.implausible = self.differs > LASTS || self.repeats >= REPEATED || blind;
+        self.waits = (self.waits - dt).max(0.0);
+        self.implausible = (self.differs > LASTS && self.waits == 0.0) || self.repeats >= REPEATED || blind;
         self.agrees = 0.0;
         self.implausible
     }

@@ -208,6 +208,7 @@ impl Eskf {
         let bias = self.state.accel_bias.z;
         if self.anchor.is_some() {
             self.vertical.stand(-bias);
+            self.flow_monitor.ready();
         } else {
             let height = self.height();
             self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias, height);

@@ -38,6 +38,8 @@ const CLEARANCE: f32 = 0.03;
 const MOVES: u32 = 3;
 /// Paths are compared this long after the take-off, s, because starting propellers change the pressure.
 const SETTLED: f32 = 4.0;
+/// As much later after a start in the air, s: first the filter has to find tilt and biases.
+const UNKNOWN: f32 = 6.0;
 /// A range so far from its predecessor jumps, m.
 const JUMP: f32 = 0.15;
 /// Jumps, less one for every [`JUMP_FADING`] seconds.
@@ -106,6 +108,11 @@ pub(super) struct VerticalMonitor {
 }
 
 impl VerticalMonitor {
+    /// Of a filter that starts in the air, with errors of every kind.
+    pub(super) fn airborne() -> Self {
+        Self { age: -UNKNOWN, restarted: true, ..Self::default() }
+    }
+
     /// Is the range not to be believed?
     pub(super) fn is_implausible(&self) -> bool {
         self.implausible
@@ -131,7 +138,6 @@ impl VerticalMonitor {
         self.height += (self.climb + 0.5 * change) * dt;
         self.climb += change;
         self.age += dt;
-        let differs = climb - self.climb;
         self.path += (climb - self.path * (1.0 / FADING)) * dt;
         if self.rejected.is_none() && !self.implausible {
             if height < NEAR {
@@ -208,7 +214,7 @@ impl VerticalMonitor {
     /// The filter starts again in flight; what is known of the range is still known.
     pub(super) fn restart(&mut self, bias: f32) {
         let (range, range_at, implausible) = (self.range, self.range_at, self.implausible);
-        *self = Self { bias, range, range_at, implausible, restarted: true, ..Self::default() };
+        *self = Self { bias, range, range_at, implausible, ..Self::airborne() };
     }
 
     /// Who is wrong, for a filter that believes in this height. After a verdict the observer goes on from there.
