@@ -201,8 +201,8 @@ impl Eskf {
             accels: Mean::default(),
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
-            flow_monitor: FlowMonitor::default(),
-            vertical: VerticalMonitor::default(),
+            flow_monitor: FlowMonitor::airborne(),
+            vertical: VerticalMonitor::airborne(),
             gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
@@ -374,9 +374,8 @@ impl Eskf {
         self.accels = Mean::default();
         self.gates = Gates::default();
         self.flow_innovation_bias = InnovationBiasMonitor::default();
-        self.flow_monitor = FlowMonitor::default();
-        self.vertical = VerticalMonitor::default();
-        self.vertical.stand(-self.state.accel_bias.z);
+        self.flow_monitor = FlowMonitor::airborne();
+        self.vertical.restart(-self.state.accel_bias.z);
         self.reset_history();
         self.status.diverged = false;
     }
@@ -416,6 +415,11 @@ impl Eskf {
         self.anchor.is_some() || flow || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
     }
 
+    /// Height above the surface; a surface that is not known is where the vehicle would stand.
+    fn height(&self) -> f32 {
+        self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z
+    }
+
     /// Does a range hold the height?
     fn is_range_aided(&self) -> bool {
         self.gates.is_recent(Sensor::Tof, self.now) && !self.vertical.is_implausible()
@@ -423,12 +427,11 @@ impl Eskf {
 
     /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
     fn judge_range(&mut self) {
-        self.vertical.restart(-self.state.velocity.z);
-        if let Verdict::Range { climb, bias, higher } = self.vertical.judge(self.now) {
+        if let Verdict::Range { climb, bias, higher } = self.vertical.judge(self.now, self.height()) {
             self.state.velocity.z = -climb;
             self.state.position.z -= higher;
             self.state.accel_bias.z = -bias;
-            self.covariance.reset(VELOCITY + 2, 0.1);
+            self.covariance.reset(VELOCITY + 2, 0.5);
             self.covariance.inflate(POSITION + 2, 0.1);
             self.covariance.reset(ACCEL_BIAS + 2, 0.1);
             // The barometer holds the height from here.

@@ -16,13 +16,21 @@ const SMOOTH: f32 = 0.06;
 /// Time constant with which flow's corrections are forgotten, s.
 const FORGOTTEN: f32 = 2.0;
 /// Largest difference, m/s, for each metre of distance, and as a share of the velocity.
-const DIFFERENCE: f32 = 0.35;
+const DIFFERENCE: f32 = 0.55;
 const PER_METRE: f32 = 0.15;
 const SHARE: f32 = 0.25;
 /// For how long, s.
 const LASTS: f32 = 0.1;
 /// Readings running that are equal and not zero: frozen. At 100 Hz 0.4 s.
 const REPEATED: u32 = 40;
+/// The picture cannot stand still while the body turns by this much, rad: three counts of a PMW3901. Nearer to the floor
+/// than [`SHARP`], m, it may be blurred.
+const TURNED: f32 = 0.007;
+const SHARP: f32 = 0.15;
+/// For so many readings running, at least.
+const ZEROS: u32 = 20;
+/// After a start in the air the filter first has to find tilt and biases, s.
+const UNKNOWN: f32 = 10.0;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
 const MOTION: f32 = 0.2;
 const AGREES_FOR: f32 = 0.5;
@@ -46,11 +54,28 @@ pub(super) struct FlowMonitor {
     agrees: f32,
     reading: [f32; 2],
     repeats: u32,
+    /// Readings of nothing, and the largest turn of the body beside them.
+    zeros: u32,
+    turn: [f32; 2],
+    turned: f32,
     standing: [f32; 2],
     implausible: bool,
+    /// How long it has to hold back, s.
+    waits: f32,
 }
 
 impl FlowMonitor {
+    /// Of a filter that starts in the air, with errors of every kind.
+    pub(super) fn airborne() -> Self {
+        Self { waits: UNKNOWN, ..Self::default() }
+    }
+
+    /// The vehicle stands: what moves it from here on is felt.
+    #[inline]
+    pub(super) fn ready(&mut self) {
+        self.waits = 0.0;
+    }
+
     /// Is flow not to be believed?
     pub(super) fn is_implausible(&self) -> bool {
         self.implausible
@@ -77,9 +102,18 @@ impl FlowMonitor {
         *self = Self { standing, implausible: x * x + y * y > STANDING_RATE * STANDING_RATE, ..Self::default() };
     }
 
-    /// Takes a reading: counts as they came, velocity, world, and the distance to the floor. `known` says that the distance is
+    /// Takes a reading: counts as they came, what the body's own turning makes of
+    /// the picture, rad/s, velocity, world, and the distance to the floor. `known` says that the distance is
     /// certain. True when it has just become implausible.
-    pub(super) fn flow(&mut self, counts: [f32; 2], velocity: &Vec3, distance: f32, dt: f32, known: bool) -> bool {
+    pub(super) fn flow(
+        &mut self,
+        counts: [f32; 2],
+        turning: [f32; 2],
+        velocity: &Vec3,
+        distance: f32,
+        dt: f32,
+        known: bool,
+    ) -> bool {
         let velocity = [velocity.x, velocity.y];
         let change = core::mem::take(&mut self.change);
         let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0) else {
@@ -104,26 +138,31 @@ impl FlowMonitor {
         let repeated = counts == self.reading && counts != [0.0; 2];
         self.repeats = if repeated { self.repeats.saturating_add(1) } else { 0 };
         self.reading = counts;
+        if counts == [0.0; 2] && distance > SHARP {
+            self.zeros = self.zeros.saturating_add(1);
+            for (turn, rate) in self.turn.iter_mut().zip(turning) {
+                *turn += rate * dt;
+                self.turned = self.turned.max(turn.abs());
+            }
+        } else {
+            (self.zeros, self.turn, self.turned) = Default::default();
+        }
+        let blind = self.zeros >= ZEROS && self.turned > TURNED;
         let limit = DIFFERENCE + PER_METRE * distance;
         // The share is of squares: a sum of both would do as well, and costs a root.
         let limit = limit * limit + SHARE * SHARE * speed;
         self.differs = if difference > limit { self.differs + dt } else { 0.0 };
         if self.implausible {
             if motion > MOTION * MOTION {
-                let agrees = difference < 0.2 * motion && self.repeats < REPEATED;
+                let agrees = difference < 0.2 * motion && self.repeats < REPEATED && self.zeros < ZEROS;
                 self.agrees = if agrees { self.agrees + dt } else { 0.0 };
             }
             self.implausible = self.agrees < AGREES_FOR;
             return false;
         }
-        self.implausible = self.differs > LASTS || self.repeats >= REPEATED;
+        self.waits = (self.waits - dt).max(0.0);
+        self.implausible = (self.differs > LASTS && self.waits == 0.0) || self.repeats >= REPEATED || blind;
         self.agrees = 0.0;
         self.implausible
-    }
-
-    /// For the tuning: squared difference.
-    pub(super) fn difference(&self) -> f32 {
-        let [x, y] = self.difference;
-        stampfly_types::math::sqrt(x * x + y * y)
     }
 }

@@ -187,7 +187,7 @@ impl Estimator for Eskf {
             specific_force: self.force,
             gyro_bias: self.state.gyro_bias,
             accel_bias: self.state.accel_bias,
-            height: self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z,
+            height: self.height(),
             position_std_xy: math::sqrt(p.get(POSITION, POSITION) + p.get(POSITION + 1, POSITION + 1)),
             valid,
             sensors,
@@ -197,14 +197,7 @@ impl Estimator for Eskf {
     fn status(&self) -> EstimatorStatus {
         let [measured, predicted] = &self.gravity;
         let apart = measured.cross(predicted).norm();
-        let [a, b] = self.vertical.differences(-self.state.velocity.z);
-        EstimatorStatus {
-            mag_innovation: a,
-            mag_ratio: b,
-            accel_ratio: self.flow_monitor.difference(),
-            accel_innovation: math::atan2(apart, measured.dot(predicted)),
-            ..self.status
-        }
+        EstimatorStatus { accel_innovation: math::atan2(apart, measured.dot(predicted)), ..self.status }
     }
 }
 
@@ -215,8 +208,10 @@ impl Eskf {
         let bias = self.state.accel_bias.z;
         if self.anchor.is_some() {
             self.vertical.stand(-bias);
+            self.flow_monitor.ready();
         } else {
-            self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias);
+            let height = self.height();
+            self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias, height);
             self.flow_monitor.predict(change);
         }
     }

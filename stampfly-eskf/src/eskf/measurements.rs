@@ -111,7 +111,7 @@ impl Eskf {
             self.flow_monitor.stand(measured.map(|velocity| velocity / distance), flow.interval);
         } else {
             let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof);
-            if self.flow_monitor.flow(counts, &world, distance, flow.interval, known) {
+            if self.flow_monitor.flow(counts, [raw.y, -raw.x], &world, distance, flow.interval, known) {
                 // It has moved tilt and biases, too.
                 self.inflate_tilt();
                 for axis in 0..2 {

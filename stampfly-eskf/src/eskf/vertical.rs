@@ -3,32 +3,43 @@
 //! An observer of height, climb rate and accelerometer bias integrates the vertical acceleration and follows the barometer
 //! slowly. The filter's own climb rate hangs on the range, which is a hundred times more precise and may lie: dirt on the
 //! glass reads 3 cm, a wrapped phase reads a quarter of a metre, a frozen register reads what was. A jump of the range
-//! is no lie by itself, because a table is one; a climb that range and inertia see differently is.
+//! is no lie by itself, because a table is one.
 //!
 //! | the range is implausible when | |
 //! |---|---|
-//! | it was rejected in the last three seconds, and the climb rates differ by [`CLIMB`] for 0.3 s | stuck, aliased, random |
-//! | it was rejected in the last three seconds, and the paths differ by [`HEIGHT`] over some seconds | ramp, scale |
-//! | it repeats itself while the observer moves by [`MOVED`] | stuck |
-//! | it jumps more than five times within about two seconds | outliers, alias, an edge below |
+//! | it repeats itself while the observer moves by [`MOVED`], or right after a jump | stuck |
+//! | the filter's path and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
+//! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
+//! | it jumps more than five times within about two seconds | outliers, an edge below |
 //!
-//! Climb rates that differ though the range was never rejected speak against the barometer: the observer starts again.
+//! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust changes. A range that is off by a
+//! constant is a table, and one that is off by a factor is found only where the path is long.
 //! The range is believed again after a second of readings that change, do not jump and lie within [`AGREES`] of where
 //! the filter expects them.
 
 use stampfly_types::{Duration, Instant};
 
-/// Difference of the climb rates, m/s.
-pub(super) const CLIMB: f32 = 0.7;
-/// Difference of the paths, which fades with [`FADING`], m.
-pub(super) const HEIGHT: f32 = 0.5;
-const FADING: f32 = 2.5;
-/// For how long the climb rates differ, s.
-const LASTS: f32 = 0.3;
+/// Difference of the paths, which fades with [`FADING`], m. A slope of 20° at 0.5 m/s makes 0.7.
+pub(super) const HEIGHT: f32 = 0.8;
+const FADING: f32 = 4.0;
 /// How far the observer moves while the range repeats itself, m.
 const MOVED: f32 = 0.2;
 /// Readings running that are equal are repeated: 0.5 s. Noise of a millimetre repeats one with a probability below 0.4.
 const REPEATED: u32 = 15;
+/// As many while the observer moves: a range that lives changes with it.
+const REPEATED_MOVING: u32 = 6;
+/// As many after a jump.
+const REPEATED_JUMPED: u32 = 8;
+/// Below this height the pressure under the propellers changes with it, m.
+const NEAR: f32 = 0.35;
+/// Height of the sensor on a vehicle that stands, m.
+const CLEARANCE: f32 = 0.03;
+/// Times that the height was moved to the range.
+const MOVES: u32 = 3;
+/// Paths are compared this long after the take-off, s, because starting propellers change the pressure.
+const SETTLED: f32 = 4.0;
+/// As much later after a start in the air, s: first the filter has to find tilt and biases.
+const UNKNOWN: f32 = 6.0;
 /// A range so far from its predecessor jumps, m.
 const JUMP: f32 = 0.15;
 /// Jumps, less one for every [`JUMP_FADING`] seconds.
@@ -46,6 +57,8 @@ const FOLLOWS_FIRST: f32 = 3.0;
 const FIRST: f32 = 2.0;
 /// Time constant with which its bias follows the filter's while nothing disagrees, s.
 const BIAS_FOLLOWS: f32 = 1.0;
+/// The same for the climb rate, until the observer has settled.
+const CLIMB_FOLLOWS: f32 = 1.0;
 /// The height of a pressure step that no climb makes between two readings, m.
 const PRESSURE_STEP: f32 = 1.5;
 
@@ -68,18 +81,25 @@ pub(super) struct VerticalMonitor {
     climb: f32,
     bias: f32,
     age: f32,
+    /// Its zero is not where the vehicle stood.
+    restarted: bool,
     /// Altitude of the barometer at the observer's zero.
     zero: Option<f32>,
     baro_at: Instant,
-    /// Difference of the paths, and for how long the climb rates have differed.
+    /// The filter's path less the barometer's, and the altitude it was last compared with.
     path: f32,
-    differs: f32,
+    altitude: Option<f32>,
+    /// Altitudes running that are equal.
+    baro_repeats: u32,
     rejected: Option<Instant>,
     /// Sum of the jumps that the filter's height was moved by lately.
     moved: f32,
+    moves: u32,
     range: f32,
     range_at: Instant,
     repeats: u32,
+    /// The first of these readings had jumped.
+    jumped: bool,
     /// Height of the observer when the range began to repeat itself.
     repeats_from: f32,
     jumps: f32,
@@ -88,6 +108,11 @@ pub(super) struct VerticalMonitor {
 }
 
 impl VerticalMonitor {
+    /// Of a filter that starts in the air, with errors of every kind.
+    pub(super) fn airborne() -> Self {
+        Self { age: -UNKNOWN, restarted: true, ..Self::default() }
+    }
+
     /// Is the range not to be believed?
     pub(super) fn is_implausible(&self) -> bool {
         self.implausible
@@ -105,19 +130,25 @@ impl VerticalMonitor {
         };
     }
 
-    /// Integrates a step: the change of the upward velocity without any bias removed, the filter's climb rate and bias.
+    /// Integrates a step: the change of the upward velocity without any bias removed, the filter's climb rate, bias and
+    /// height.
     #[inline]
-    pub(super) fn predict(&mut self, dt: f32, change: f32, climb: f32, bias: f32) {
+    pub(super) fn predict(&mut self, dt: f32, change: f32, climb: f32, bias: f32, height: f32) {
         let change = change - self.bias * dt;
         self.height += (self.climb + 0.5 * change) * dt;
         self.climb += change;
         self.age += dt;
-        let differs = climb - self.climb;
-        self.path += (differs - self.path * (1.0 / FADING)) * dt;
-        let limit = if self.age < FIRST { 1.7 * CLIMB } else { CLIMB };
-        self.differs = if differs.abs() > limit { self.differs + dt } else { 0.0 };
+        self.path += (climb - self.path * (1.0 / FADING)) * dt;
         if self.rejected.is_none() && !self.implausible {
+            if height < NEAR {
+                self.path = 0.0;
+            }
             self.bias += (bias - self.bias) * (dt / BIAS_FOLLOWS);
+            if self.age < SETTLED && self.repeats < REPEATED_MOVING {
+                // Starting propellers change the pressure and the accelerometer's zero; the range is what is left.
+                self.climb += (climb - self.climb) * (dt / CLIMB_FOLLOWS);
+                self.path = 0.0;
+            }
         }
     }
 
@@ -125,6 +156,11 @@ impl VerticalMonitor {
     pub(super) fn baro(&mut self, at: Instant, altitude: f32, stands: bool) {
         let dt = at.since(self.baro_at).seconds().min(0.2);
         self.baro_at = at;
+        let last = self.altitude.replace(altitude).unwrap_or(altitude);
+        self.baro_repeats = if altitude.to_bits() == last.to_bits() { self.baro_repeats.saturating_add(1) } else { 0 };
+        if (altitude - last).abs() < PRESSURE_STEP {
+            self.path -= altitude - last;
+        }
         let zero = self.zero.get_or_insert(altitude - self.height);
         let off = altitude - *zero - self.height;
         if stands {
@@ -148,7 +184,7 @@ impl VerticalMonitor {
         if distance.to_bits() == self.range.to_bits() {
             self.repeats = self.repeats.saturating_add(1);
         } else {
-            (self.repeats, self.repeats_from) = (0, self.height);
+            (self.repeats, self.repeats_from, self.jumped) = (0, self.height, jumps);
         }
         (self.range, self.range_at) = (distance, at);
         self.jumps = (self.jumps - dt / JUMP_FADING).max(0.0) + f32::from(u8::from(jumps));
@@ -157,7 +193,8 @@ impl VerticalMonitor {
             self.agrees = if agrees { self.agrees + dt } else { 0.0 };
             if self.agrees > AGREES_FOR {
                 // The second opinion has become a first one: it begins anew.
-                *self = Self { bias: self.bias, range: distance, range_at: at, ..Self::default() };
+                self.implausible = false;
+                self.restart(self.bias);
             }
         }
         !self.implausible
@@ -171,40 +208,36 @@ impl VerticalMonitor {
     /// The filter moved its height up by this much, to the range.
     pub(super) fn moved(&mut self, up: f32) {
         self.moved += up;
+        self.moves = self.moves.saturating_add(1);
     }
 
-    /// Who is wrong. After a verdict the observer goes on from there.
-    pub(super) fn judge(&mut self, now: Instant) -> Verdict {
+    /// The filter starts again in flight; what is known of the range is still known.
+    pub(super) fn restart(&mut self, bias: f32) {
+        let (range, range_at, implausible) = (self.range, self.range_at, self.implausible);
+        *self = Self { bias, range, range_at, implausible, ..Self::airborne() };
+    }
+
+    /// Who is wrong, for a filter that believes in this height. After a verdict the observer goes on from there.
+    pub(super) fn judge(&mut self, now: Instant, height: f32) -> Verdict {
         if self.rejected.is_some_and(|at| now.since(at) > REMEMBERED) {
-            (self.rejected, self.moved) = (None, 0.0);
+            (self.rejected, self.moved, self.moves) = (None, 0.0, 0);
         }
         if self.implausible || self.zero.is_none() {
             return Verdict::Agreement;
         }
-        let stuck = self.repeats >= REPEATED && (self.height - self.repeats_from).abs() > MOVED;
-        let apart = self.differs > LASTS || self.path.abs() > HEIGHT;
-        if stuck || self.jumps > JUMPS || (apart && self.rejected.is_some()) {
-            let higher = -self.path - self.moved;
-            (self.implausible, self.path, self.moved, self.differs) = (true, 0.0, 0.0, 0.0);
+        // Until it has settled the observer may drift while the vehicle still stands, where ranges repeat themselves.
+        let settled = self.age > SETTLED;
+        let repeated = if settled { REPEATED_MOVING } else { REPEATED };
+        let stuck = self.repeats >= repeated && (self.height - self.repeats_from).abs() > MOVED
+            || self.repeats >= REPEATED_JUMPED && self.jumped;
+        let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
+        if stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES) {
+            // Right after the take-off the observer knows how far it came.
+            let young = self.age < SETTLED && !self.restarted;
+            let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };
+            (self.implausible, self.path, self.moved, self.moves) = (true, 0.0, 0.0, 0);
             return Verdict::Range { climb: self.climb, bias: self.bias, higher };
         }
-        if apart {
-            // The barometer is wrong.
-            *self = Self { bias: self.bias, range: self.range, range_at: self.range_at, ..Self::default() };
-            self.climb = f32::NAN;
-        }
         Verdict::Agreement
-    }
-
-    /// The observer starts again from the filter's climb rate, where its own is of no use.
-    pub(super) fn restart(&mut self, climb: f32) {
-        if !self.climb.is_finite() {
-            (self.height, self.climb) = (0.0, climb);
-        }
-    }
-
-    /// For the tuning: differences of climb rate and path.
-    pub(super) fn differences(&self, climb: f32) -> [f32; 2] {
-        [climb - self.climb, self.path]
     }
 }

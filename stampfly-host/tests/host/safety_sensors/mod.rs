@@ -1,12 +1,15 @@
 //! What the whole vehicle does when a sensor lies in flight.
 
 use crate::losses::harness::{Lies, Seen, run_in};
-use stampfly_types::messages::{Alerts, FlightPhase, GuidedKind, ImuData, Validity};
+use stampfly_sim::SimulationConfig;
+use stampfly_types::messages::{Alerts, FlightPhase, FlowData, GuidedKind, ImuData, TofData, Validity};
 use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
 use std::rc::Rc;
 
+mod flows;
 mod inertial;
+mod nominal;
 mod ranges;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
@@ -20,51 +23,56 @@ enum Onset {
     After(FlightPhase, f32),
 }
 
-/// Takes off, hovers, flies sideways and up, hovers, lands; the sensors lie from `onset` on. Returns that instant.
+/// Takes off, hovers, lands; the sensors lie from `onset` on. Returns that instant.
 fn fly(seed: u64, seconds: f32, onset: Onset, lies: Lies) -> (Seen, Instant) {
+    fly_in(|_| {}, seed, seconds, onset, lies)
+}
+
+/// The same in other surroundings.
+fn fly_in(
+    surroundings: impl FnOnce(&mut SimulationConfig),
+    seed: u64,
+    seconds: f32,
+    onset: Onset,
+    lies: Lies,
+) -> (Seen, Instant) {
     let since = Rc::new(Cell::new(Instant::ZERO));
     let note = since.clone();
-    let seen = run_in(
-        |_| {},
-        lies,
-        seed,
-        seconds,
-        |mut hands| {
-            Box::pin(async move {
-                if onset == Onset::PowerOn {
+    let seen = run_in(surroundings, lies, seed, seconds, |mut hands| {
+        Box::pin(async move {
+            if onset == Onset::PowerOn {
+                hands.lying.set(Some(hands.clock.now()));
+            }
+            hands.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
+            hands.command(GuidedKind::Arm);
+            let mut wait = 400.0;
+            let mut phase = FlightPhase::IdleGround;
+            let mut asked = 0;
+            loop {
+                hands.sleep(0.02).await;
+                wait += 0.02;
+                let frame = hands.telemetry();
+                if frame.phase != phase {
+                    (phase, wait) = (frame.phase, 0.0);
+                }
+                if let Onset::After(of, delay) = onset
+                    && of == phase
+                    && wait >= delay
+                    && hands.lying.get().is_none()
+                {
                     hands.lying.set(Some(hands.clock.now()));
+                    note.set(hands.clock.now());
                 }
-                hands.wait_for(|frame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()).await;
-                hands.command(GuidedKind::Arm);
-                let mut wait = 400.0;
-                let mut phase = FlightPhase::IdleGround;
-                let mut asked = 0;
-                loop {
-                    hands.sleep(0.02).await;
-                    wait += 0.02;
-                    let frame = hands.telemetry();
-                    if frame.phase != phase {
-                        (phase, wait) = (frame.phase, 0.0);
-                    }
-                    if let Onset::After(of, delay) = onset
-                        && of == phase
-                        && wait >= delay
-                        && hands.lying.get().is_none()
-                    {
-                        hands.lying.set(Some(hands.clock.now()));
-                        note.set(hands.clock.now());
-                    }
-                    let kind = match phase {
-                        FlightPhase::Armed if asked == 0 && wait > 0.6 => GuidedKind::TakeOff,
-                        FlightPhase::Flying if asked == 1 && wait > 14.0 => GuidedKind::Land,
-                        _ => GuidedKind::None,
-                    };
-                    asked += u32::from(kind != GuidedKind::None);
-                    hands.command(kind);
-                }
-            })
-        },
-    );
+                let kind = match phase {
+                    FlightPhase::Armed if asked == 0 && wait > 0.6 => GuidedKind::TakeOff,
+                    FlightPhase::Flying if asked == 1 && wait > 14.0 => GuidedKind::Land,
+                    _ => GuidedKind::None,
+                };
+                asked += u32::from(kind != GuidedKind::None);
+                hands.command(kind);
+            }
+        })
+    });
     (seen, since.get())
 }
 
