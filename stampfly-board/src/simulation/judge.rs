@@ -183,8 +183,10 @@ pub(super) struct Judge {
     touches: Vec<Touch>,
     flying_since: Option<Instant>,
     was_landing: bool,
-    /// Landing, or the motors' stop, came before the mission asked for it.
+    /// Landing began before the mission asked for it.
     early: bool,
+    /// The motors stopped for good before the mission asked for landing.
+    stopped_early: bool,
     mode: Option<FlightMode>,
     other_mode: bool,
     new_alert: bool,
@@ -229,6 +231,7 @@ impl Judge {
             flying_since: None,
             was_landing: false,
             early: false,
+            stopped_early: false,
             mode: None,
             other_mode: false,
             new_alert: false,
@@ -323,10 +326,10 @@ impl Judge {
     pub fn motors(&mut self, now: Instant, on: bool) {
         if self.motors_on && !on {
             self.stopped = Some((now, self.clearance));
-            self.early |= !self.is_landing_step(self.done);
+            self.stopped_early = !self.is_landing_step(self.done);
         }
         if on {
-            self.stopped = None;
+            (self.stopped, self.stopped_early) = (None, false);
         }
         self.turned |= on;
         self.motors_on = on;
@@ -491,7 +494,7 @@ impl Judge {
             Class::Cut
         } else if lies || self.touches.iter().any(hard) {
             Class::Crashed
-        } else if self.early || self.places.iter().any(|(_, visited)| !visited) {
+        } else if self.early || self.stopped_early || self.places.iter().any(|(_, visited)| !visited) {
             Class::Landed
         } else if self.new_alert || self.other_mode || above > wide * EXACT[0] || beside > wide * EXACT[1] {
             Class::Degraded
