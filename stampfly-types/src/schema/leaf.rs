@@ -302,7 +302,7 @@ mod tests {
         let said: Vec<_> = leaves(FlightStatus::FIELDS).filter_map(|leaf| leaf.value(&words, 0)).collect();
         assert_eq!(said[0].to_string(), "Flying");
         assert_eq!((said[2], said[2].as_f64()), (Value::Bool(true), 1.0));
-        let blocks = leaves(FlightStatus::FIELDS).nth(4).expect("blocks");
+        let blocks = leaves(FlightStatus::FIELDS).nth(5).expect("blocks");
         let show = |bits| blocks.kind.value(&[bits]).map(|value| value.to_string());
         assert_eq!(show(0).as_deref(), Some("none"));
         assert_eq!(show(0b101).as_deref(), Some("CALIBRATING NO_BATTERY"));
