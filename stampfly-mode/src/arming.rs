@@ -1,8 +1,8 @@
 //! May the motors be armed, and if not, why not: every reason at once, each with the value that was found and its limit.
 
 use crate::config::ModeConfig;
-use crate::decision::{CUT, State};
 use crate::facts::Facts;
+use crate::state::{CUT, State};
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, Validity};
 use stampfly_types::{Duration, Instant};
 

@@ -24,81 +24,14 @@
 use crate::arming;
 use crate::config::ModeConfig;
 use crate::facts::Facts;
+pub use crate::state::{CUT, LAND, Silence, State};
 use crate::transitions::{Event, is_airborne, is_armed, next};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, GroundContact, Validity,
 };
 use stampfly_types::{Duration, Instant};
 
-/// Alerts that stop the motors in any phase.
-pub const CUT: Alerts =
-    Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY);
-/// Alerts that demand a landing at once.
-pub const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED);
-
-/// A silence of the commander.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Silence {
-    /// When it began.
-    pub since: Instant,
-    /// Since when the commander has been heard again.
-    pub heard_since: Option<Instant>,
-}
-
-/// All that the machine remembers between two decisions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct State {
-    /// The flight phase.
-    pub phase: FlightPhase,
-    /// When it was entered.
-    pub entered: Instant,
-    /// The mode asked for.
-    pub wanted: FlightMode,
-    /// The mode in force: the one asked for, or what the estimate allows of it.
-    pub mode: FlightMode,
-    /// A mode that the pilot has switched to and that is not applied yet.
-    pub pending: Option<FlightMode>,
-    /// Who has authority.
-    pub commander: CommandSource,
-    /// The vehicle takes off by itself after spool-up.
-    pub takes_off: bool,
-    /// The throttle has been at rest since the mode was chosen on the ground.
-    pub throttle_rested: bool,
-    /// The pilot's arm switch has asked for this landing.
-    pub landing_by_switch: bool,
-    /// The longest time this landing may take.
-    pub landing_limit: Duration,
-    /// What has to be acknowledged before arming.
-    pub unacknowledged: ArmBlocks,
-    /// Since when the vehicle has been looking for a transmitter.
-    pub pairing: Option<Instant>,
-    /// The commander is silent, or was a moment ago.
-    pub silence: Option<Silence>,
-    /// Since when a mode that holds height has had none.
-    pub blind: Option<Instant>,
-    /// Since when the height has been unknown to a lifted vehicle.
-    pub unmeasured: Option<Instant>,
-    /// Transitions since power-on.
-    pub transitions: u32,
-    /// A change of this number resets the controller.
-    pub control_resets: u32,
-    /// A change of this number moves the estimator's origin here.
-    pub origin_resets: u32,
-    /// A change of this number starts the estimator anew.
-    pub full_resets: u32,
-    /// The estimate was lost in the step before.
-    pub diverged: bool,
-}
-
 impl State {
-    /// May the motors turn?
-    #[must_use]
-    pub const fn is_armed(&self) -> bool {
-        is_armed(self.phase)
-    }
-
     /// Is the vehicle so close to the ground that the motors may be stopped?
     #[must_use]
     fn is_low(&self, config: &ModeConfig, facts: &Facts) -> bool {

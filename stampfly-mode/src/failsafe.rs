@@ -40,42 +40,19 @@
 mod attitude;
 mod config;
 mod imu;
+mod input;
 mod motion;
 mod power;
 
 pub use config::FailsafeConfig;
+pub use input::FailsafeInput;
 
 use attitude::AttitudeMonitor;
 use imu::ImuMonitor;
 use motion::MotionMonitor;
 use power::PowerMonitor;
-use stampfly_types::messages::{
-    Alerts, EstimatorStatus, FlightPhase, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate, SystemAlert,
-};
-use stampfly_types::{Duration, Instant, Stamped};
-
-/// What the failsafe looks at. Times are those of the newest sample, usable or authentic.
-#[derive(Clone, Copy, Debug)]
-pub struct FailsafeInput<'a> {
-    /// The inertial samples since the step before, oldest first: every one counts for the detection of impacts.
-    pub imu: &'a [Stamped<ImuData>],
-    /// The estimate.
-    pub estimate: &'a StateEstimate,
-    /// The estimator's own opinion.
-    pub status: &'a EstimatorStatus,
-    /// Newest battery sample.
-    pub power: Option<(Instant, &'a PowerData)>,
-    /// Newest command of any kind.
-    pub command: Option<Instant>,
-    /// Newest usable range.
-    pub tof: Option<Instant>,
-    /// Newest usable flow.
-    pub flow: Option<Instant>,
-    /// How the self test at power-on ended.
-    pub self_test: SelfTestVerdict,
-    /// State and mode one step ago.
-    pub flight_status: &'a FlightStatus,
-}
+use stampfly_types::messages::{Alerts, FlightPhase, FlightStatus, ImuData, SelfTestVerdict, SystemAlert};
+use stampfly_types::{Instant, Stamped};
 
 /// The failsafe.
 ///
@@ -184,15 +161,6 @@ impl Failsafe {
         }
         found.set(Alerts::IMU_FAULTY, faulty)
     }
-}
-
-/// Has the condition held for this time without a break?
-fn lasts(since: &mut Option<Instant>, now: Instant, holds: bool, time: Duration) -> bool {
-    if !holds {
-        *since = None;
-        return false;
-    }
-    now.since(*since.get_or_insert(now)) >= time
 }
 
 #[cfg(test)]

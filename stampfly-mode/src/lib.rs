@@ -28,9 +28,11 @@ mod facts;
 pub mod failsafe;
 mod input;
 pub mod landing;
+mod lasting;
 pub mod machine;
 mod pilot;
 pub mod signal;
+mod state;
 mod stop_button;
 pub mod transitions;
 

@@ -3,7 +3,6 @@
 //! `stampfly faults` and `docs/faults.md` print the table. Sensor faults act on samples on their way to the bus, behind
 //! models and behind drivers alike; a dead bus also silences emulated chips; motor faults act on the plant.
 
-use super::flight::Setup;
 use crate::messages::TelemetryFrame;
 use stampfly_bus::Band;
 use stampfly_sim::World;
@@ -295,17 +294,14 @@ pub(super) struct Wrong {
 }
 
 impl Wrong {
-    pub fn new(setup: &Setup) -> Self {
-        let faults = setup.faults.iter().enumerate();
-        let acts: Vec<_> =
-            faults.flat_map(|(place, fault)| acts(fault).into_iter().map(move |act| (place, act))).collect();
-        Self {
-            injector: Injector::new(setup.simulation.start, &setup.faults),
-            in_force: vec![false; acts.len()],
-            strikes: 0,
-            acts,
-            seed: setup.simulation.seed,
-        }
+    /// These faults, in a flight with this start and seed.
+    pub fn new(faults: &[Fault], start: Instant, seed: u64) -> Self {
+        let acts: Vec<_> = faults
+            .iter()
+            .enumerate()
+            .flat_map(|(place, fault)| acts(fault).into_iter().map(move |act| (place, act)))
+            .collect();
+        Self { injector: Injector::new(start, faults), in_force: vec![false; acts.len()], strikes: 0, acts, seed }
     }
 
     fn line<M: stampfly_types::Message>(&self, on_it: impl Fn(&Act) -> Option<Distortion>) -> Line<M> {
@@ -394,13 +390,11 @@ mod tests {
                 assert!((low..=high).contains(&default), "{}", kind.name);
             }
         }
-        let setup = Setup {
-            faults: FAULTS.iter().filter_map(|kind| Fault::parse(&format!("{}@1", kind.name), FAULTS).ok()).collect(),
-            ..Setup::reference(1)
-        };
-        assert_eq!(setup.faults.len(), FAULTS.len());
+        let faults: Vec<_> =
+            FAULTS.iter().filter_map(|kind| Fault::parse(&format!("{}@1", kind.name), FAULTS).ok()).collect();
+        assert_eq!(faults.len(), FAULTS.len());
         // Lines panic when a field does not exist.
-        let wrong = Wrong::new(&setup);
+        let wrong = Wrong::new(&faults, Instant::ZERO, 1);
         let _ = (wrong.sensor_lines(), wrong.radio_lines());
     }
 }

@@ -2,6 +2,7 @@
 
 use super::faults::Wrong;
 use super::ground_station::{self, Progress};
+use super::home::Home;
 use super::judge::{Judge, Judgement, Sight};
 use super::metrics::{Collector, FIGURES, Metrics, Snapshot};
 use super::mission::{self, Mission};
@@ -202,7 +203,7 @@ impl Surroundings {
             board: Some(board),
             progress: Progress::default(),
             health: Healths::default(),
-            wrong: Some(Wrong::new(setup)),
+            wrong: Some(Wrong::new(&setup.faults, setup.simulation.start, setup.simulation.seed)),
             watchdog: Watchdog::new(CUT_OFF),
         }
     }
@@ -268,30 +269,6 @@ impl vehicle::Surroundings for Surroundings {
 
 /// Motors that are not confirmed for this long are stopped, as by the firmware.
 const CUT_OFF: Duration = Duration::from_millis(25);
-
-/// Where the vehicle stood at the start, and how it was turned.
-///
-/// Nothing on board knows north: the vehicle's world begins where it stood and ahead of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Home {
-    origin: Vec3,
-    turn: Quat,
-}
-
-impl Home {
-    /// Of a vehicle that stands like this at the start.
-    fn new(start: &Truth) -> Self {
-        Self { origin: start.position, turn: frame::from_yaw(-frame::yaw(&start.attitude)) }
-    }
-
-    /// Turns and moves the truth into the vehicle's world.
-    pub fn bring(&self, truth: &mut Truth) {
-        truth.position = self.turn * (truth.position - self.origin);
-        truth.velocity = self.turn * truth.velocity;
-        truth.wind = self.turn * truth.wind;
-        truth.attitude = self.turn * truth.attitude;
-    }
-}
 
 /// What is watched beside the bus: truth, and the newest of what it is compared with.
 struct Watch {

@@ -15,6 +15,7 @@
 pub mod faults;
 pub mod flight;
 pub mod ground_station;
+mod home;
 pub mod judge;
 pub mod metrics;
 pub mod mission;

@@ -13,8 +13,8 @@
 //! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
 //! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
 
-use super::flight::Home;
 use super::ground_station::Progress;
+use super::home::Home;
 use super::mission::{Mission, Step};
 use super::radio::Radio;
 use stampfly_control::CascadeConfig;

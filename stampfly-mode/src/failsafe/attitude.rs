@@ -1,6 +1,8 @@
 //! Tumbling, and a tilt that gravity contradicts.
 
-use super::{FailsafeConfig, FailsafeInput, lasts};
+use super::config::FailsafeConfig;
+use super::input::FailsafeInput;
+use crate::lasting::lasts;
 use stampfly_types::messages::{FlightMode, FlightPhase, ImuData, Validity};
 use stampfly_types::{Instant, Vec3, frame, math};
 

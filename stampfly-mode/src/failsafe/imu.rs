@@ -10,7 +10,8 @@
 //! Samples that are not finite never get here: they count as silence. Not for small errors of scale and bias, which
 //! the estimator finds.
 
-use super::{FailsafeConfig, lasts};
+use super::config::FailsafeConfig;
+use crate::lasting::lasts;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3};
 

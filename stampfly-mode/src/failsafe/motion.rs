@@ -13,7 +13,7 @@
 //! | the same in two of four suspect samples running | the fourth sample |
 //! | up to three suspect samples, then the motion of before | never |
 
-use super::FailsafeConfig;
+use super::config::FailsafeConfig;
 use stampfly_types::messages::{Alerts, ImuData};
 use stampfly_types::{Instant, Vec3, math};
 

@@ -5,7 +5,7 @@
 //! `resistance` explain together. It then counts for nothing else. Disarmed everything is plausible: batteries are
 //! changed, and a board runs on USB.
 
-use super::FailsafeConfig;
+use super::config::FailsafeConfig;
 use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, PowerData};
 

@@ -13,7 +13,8 @@
 //!
 //! Not for a vehicle whose climb rate is known: that one sinks at the speed it is asked for.
 
-use super::weight::{Answers, Support, lasting};
+use super::weight::{Answers, Support};
+use crate::lasting::lasting;
 use stampfly_types::{Duration, Instant};
 
 /// Share of hover thrust at the start.

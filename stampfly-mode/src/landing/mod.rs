@@ -12,13 +12,14 @@ mod blind;
 mod config;
 mod weight;
 
+use crate::lasting::lasting;
 use blind::BlindDescent;
 pub use config::LandingConfig;
 use stampfly_types::messages::{
     ControlOutput, FlightPhase, GroundContact, LandDetected, Setpoint, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant};
-use weight::{Answers, Support, WeightTest, lasting};
+use weight::{Answers, Support, WeightTest};
 
 /// What the manager looks at.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@
 //!
 //! The test costs height: with 40 % of the thrust missing, a vehicle in the air has gained 0.2 m/s after 60 ms.
 
-use stampfly_types::{Duration, Instant};
+use stampfly_types::Instant;
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,13 +116,4 @@ impl WeightTest {
         }
         Answers { quick: self.quick.support(self.before), steady: self.steady.support(self.before) }
     }
-}
-
-/// How long a condition has held without a break.
-pub fn lasting(since: &mut Option<Instant>, now: Instant, holds: bool) -> Duration {
-    if !holds {
-        *since = None;
-        return Duration::ZERO;
-    }
-    now.since(*since.get_or_insert(now))
 }

@@ -3,7 +3,7 @@
 //! [`PilotInput`] and [`GuidedCommand`] come from links, [`ButtonEvent`] from the board's button. Arbitration
 //! turns them into one [`CommandSetpoint`]; the navigator turns goals into a jerk-limited [`Setpoint`].
 
-use super::system::FlightMode;
+use super::system::{CommandSource, FlightMode};
 use crate::{Vec3, message, message_enum, message_flags};
 
 message! {
@@ -103,21 +103,6 @@ message! {
         gesture: ButtonGesture,
         /// How long the button has been down, or was.
         held: f32 ["s"],
-    }
-}
-
-message_enum! {
-    /// Who has authority over the set-point.
-    pub enum CommandSource {
-        /// Nobody: level, hold, no climb.
-        #[default]
-        None = 0,
-        /// The pilot's sticks.
-        Pilot = 1,
-        /// Guided commands.
-        Guided = 2,
-        /// The failsafe.
-        Failsafe = 3,
     }
 }
 

@@ -17,13 +17,12 @@ pub mod sensor;
 pub mod system;
 
 pub use command::{
-    ButtonEvent, ButtonGesture, CommandSetpoint, CommandSource, GuidedCommand, GuidedKind, PilotInput, Setpoint,
-    SetpointAxes, stick,
+    ButtonEvent, ButtonGesture, CommandSetpoint, GuidedCommand, GuidedKind, PilotInput, Setpoint, SetpointAxes, stick,
 };
 pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
 pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};
 pub use sensor::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
 pub use system::{
-    Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected, SelfTest,
-    SelfTestVerdict, Signal, SystemAlert, Tone,
+    Alerts, ArmBlocks, ArmRefusals, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected,
+    SelfTest, SelfTestVerdict, Signal, SystemAlert, Tone,
 };

@@ -1,6 +1,5 @@
 //! State of the whole vehicle: mode, alerts, contact with the ground, signals to people.
 
-use super::command::CommandSource;
 use crate::{Instant, message, message_enum, message_flags};
 
 message_enum! {
@@ -116,6 +115,21 @@ message! {
         limit: [f32; 4],
         /// Since when.
         since: [Instant; 4],
+    }
+}
+
+message_enum! {
+    /// Who has authority over the set-point.
+    pub enum CommandSource {
+        /// Nobody: level, hold, no climb.
+        #[default]
+        None = 0,
+        /// The pilot's sticks.
+        Pilot = 1,
+        /// Guided commands.
+        Guided = 2,
+        /// The failsafe.
+        Failsafe = 3,
     }
 }
 

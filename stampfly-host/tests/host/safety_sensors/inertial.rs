@@ -2,8 +2,11 @@
 
 use super::*;
 
-/// Deaths of an inertial sensor that goes on delivering, and the longest time until the motors stop, ms.
-fn deaths() -> Vec<(&'static str, Box<dyn FnMut(f32, &mut ImuData)>, u64)> {
+/// The death of an inertial sensor that goes on delivering: name, what it does to a sample, and the longest time until the
+/// motors stop, ms.
+type Death = (&'static str, Box<dyn FnMut(f32, &mut ImuData)>, u64);
+
+fn deaths() -> Vec<Death> {
     let mut held: Option<ImuData> = None;
     let (mut gyro, mut accel): (Option<Vec3>, Option<Vec3>) = (None, None);
     vec![

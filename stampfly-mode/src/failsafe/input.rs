@@ -1,0 +1,27 @@
+//! What the failsafe looks at in one step. Everything is borrowed: whoever steps it keeps the newest of each.
+
+use stampfly_types::messages::{EstimatorStatus, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate};
+use stampfly_types::{Instant, Stamped};
+
+/// What the failsafe looks at. Times are those of the newest sample, usable or authentic.
+#[derive(Clone, Copy, Debug)]
+pub struct FailsafeInput<'a> {
+    /// The inertial samples since the step before, oldest first: every one counts for the detection of impacts.
+    pub imu: &'a [Stamped<ImuData>],
+    /// The estimate.
+    pub estimate: &'a StateEstimate,
+    /// The estimator's own opinion.
+    pub status: &'a EstimatorStatus,
+    /// Newest battery sample.
+    pub power: Option<(Instant, &'a PowerData)>,
+    /// Newest command of any kind.
+    pub command: Option<Instant>,
+    /// Newest usable range.
+    pub tof: Option<Instant>,
+    /// Newest usable flow.
+    pub flow: Option<Instant>,
+    /// How the self test at power-on ended.
+    pub self_test: SelfTestVerdict,
+    /// State and mode one step ago.
+    pub flight_status: &'a FlightStatus,
+}
