@@ -29,7 +29,7 @@
 //! | inertial sensor stuck, zero, one axis stuck | 50 ms; motors off within 60 ms |
 //! | samples that are not finite, silence | 25 ms; motors off within 33 ms |
 //! | full scale, garbage for good | 10 ms, 25 ms |
-//! | force of half a g, or of more than 1.8 g, for good | 1.1 s |
+//! | force below a fifth of g, or above 2.5 g, for good | 1.1 s |
 //! | range stuck at 3 cm, outliers, aliased, ramp | 0.3 s, 0.35 s, 2 s, 4.5 s |
 //! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.9 s, 0.4 s, 0.2 s, 1 to 2 s |
 //! | battery reading of nothing, or 0.35 V off | the first such reading |

@@ -8,6 +8,8 @@ use crate::config::MagModel;
 /// Where nothing but the barometer holds the height, the height is reset to one that is this near, m. Farther away one of
 /// them is wrong, and it is not known which: height and climb rate become invalid.
 const BARO_REACH: f32 = 2.0;
+/// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
+const SHAKEN: f32 = 100.0;
 
 impl Eskf {
     pub(super) fn update_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
@@ -110,7 +112,8 @@ impl Eskf {
         if self.anchor.is_some() {
             self.flow_monitor.stand(measured.map(|velocity| velocity / distance), flow.interval);
         } else {
-            let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof);
+            let shaken = self.vibration[0].mean_square() > SHAKEN;
+            let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && !shaken;
             if self.flow_monitor.flow(counts, [raw.y, -raw.x], &world, distance, flow.interval, known) {
                 // It has moved tilt and biases, too.
                 self.inflate_tilt();

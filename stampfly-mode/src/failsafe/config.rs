@@ -124,8 +124,9 @@ impl Default for FailsafeConfig {
             accel_full_scale: 8.0 * GRAVITY,
             // 50 ms. One axis repeats a sample by chance with a probability below 0.3: twenty times, 10⁻¹⁰.
             stuck_samples: 20,
-            // Half a second beyond either end would be a climb rate that no mode which holds its height asks for.
-            force_range: [0.55 * GRAVITY, 1.8 * GRAVITY],
+            // Half a second beyond either end would be a climb rate that no mode which holds its height asks for, and four times
+            // the recorded vibration moves the mean by less.
+            force_range: [0.2 * GRAVITY, 2.5 * GRAVITY],
             force_weight: 0.01,
             force_time: Duration::from_millis(500),
             armed_tilt: 1.31,

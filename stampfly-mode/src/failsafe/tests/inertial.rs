@@ -61,7 +61,7 @@ fn d7_samples_that_are_not_finite_are_silence() {
 
 #[test]
 fn d7_a_force_that_no_flight_has_is_a_fault_within_1_1_s() {
-    for factor in [0.0, 0.5, 2.2] {
+    for factor in [0.0, 0.1, 2.8] {
         let seen = until(Alerts::IMU_FAULTY, |rig, _| rig.sample(REST * factor, Vec3::zeros()));
         assert!(seen.is_some_and(|samples| samples <= 440), "{factor}: {seen:?}");
     }
