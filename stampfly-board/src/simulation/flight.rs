@@ -25,7 +25,7 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, Figure, Verdict};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, MotorOutput, Setpoint, StateEstimate};
-use stampfly_types::{Duration, Instant, Message, Quat, Vec3, frame};
+use stampfly_types::{Duration, Instant, Message, frame};
 use std::string::String;
 use std::vec::Vec;
 use std::{format, vec};

@@ -4,9 +4,9 @@ mod battery;
 mod inertial;
 
 use super::*;
-use stampfly_types::messages::{EstimatorStatus, PowerData, StateEstimate};
-use stampfly_types::Duration;
 use proptest::prelude::*;
+use stampfly_types::Duration;
+use stampfly_types::messages::{EstimatorStatus, PowerData, StateEstimate};
 use stampfly_types::messages::{FlightMode, Validity};
 use stampfly_types::{GRAVITY, Vec3};
 use std::vec::Vec;
