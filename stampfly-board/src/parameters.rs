@@ -122,6 +122,7 @@ parameters! {
     "mode.armed.timeout" [3.0, 60.0] "s" mode.armed_timeout => "armed without a take-off, it disarms after this long";
     "mode.link.back" [0.2, 10.0] "s" mode.link_back => "a lost link counts as back when heard for this long";
     "mode.blind.timeout" [0.0, 3.0] "s" mode.blind => "without height it lands after this long";
+    "mode.adrift.timeout" [0.0, 10.0] "s" mode.adrift => "without horizontal velocity and without a pilot it lands after this long";
     "mode.link.timeout" [0.0, 60.0] "s" mode.hover_without_link => "without a link it hovers this long, then lands";
     "mode.held.height" [0.11, 0.5] "m" mode.held_height => "above this height somebody holds it";
     "mode.standing.height" [0.05, 0.1] "m" mode.standing_height => "below this height it stands again";

@@ -32,6 +32,8 @@ pub struct ModeConfig {
     pub link_back: Duration,
     /// How long a mode that holds height goes on without one before the vehicle lands.
     pub blind: Duration,
+    /// How long a vehicle that no pilot flies goes on without knowing its horizontal velocity before it lands.
+    pub adrift: Duration,
     /// Below this height above the ground an arm switch turned off stops the motors of a landing vehicle, m.
     pub stop_height: f32,
     /// Longest landing without a known height.
@@ -84,6 +86,8 @@ impl Default for ModeConfig {
             link_back: Duration::from_secs(1),
             // A sensor that restarts is back within half of it. Inertial data alone holds a height for about as long.
             blind: Duration::from_secs(1),
+            // A few dark tiles are crossed in less. Level, it drifts by some tenths of a metre a second, faster every second.
+            adrift: Duration::from_secs(1),
             // The height above which the StampFly's reference firmware calls a vehicle airborne.
             stop_height: 0.15,
             // At 0.15 m/s, the slowest descent of a landing, 9 m. The navigator's ceiling is a third of that.

@@ -19,7 +19,8 @@
 //!
 //! A height-holding mode that loses the height stays what it is: the controller comes down without it, and after
 //! [`ModeConfig::blind`] the vehicle lands. It never becomes a mode in which the stick is thrust. A manual mode whose sticks
-//! fall silent becomes POS_HOLD.
+//! fall silent becomes POS_HOLD. A vehicle that no pilot flies and that no longer knows its horizontal velocity lands after
+//! [`ModeConfig::adrift`].
 
 use crate::arming;
 use crate::config::ModeConfig;
@@ -167,6 +168,10 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let blind = !facts.valid.contains(Validity::VELOCITY_Z);
     let blind = blind && !state.mode.is_manual() && is_airborne(state.phase);
     state.blind = blind.then(|| state.blind.unwrap_or(facts.now));
+    // A program does not see where the vehicle drifts; a pilot does, and has sticks.
+    let adrift = state.wanted == FlightMode::PosHold && state.mode != FlightMode::PosHold;
+    let adrift = adrift && state.commander != CommandSource::Pilot && is_airborne(state.phase);
+    state.adrift = adrift.then(|| state.adrift.unwrap_or(facts.now));
     let rests = facts.pilot.frame.is_none_or(|(_, input)| input.throttle <= config.throttle_rest);
     state.throttle_rested |= rests;
 }
@@ -228,6 +233,7 @@ fn happens(event: Event, config: &ModeConfig, before: &State, state: &State, fac
                 || pilot.switch.found_off
                 || unheard
                 || blind
+                || lasts(state.adrift, config.adrift)
                 || overdue
                 || facts.alerts.intersects(LAND)
         }
@@ -270,7 +276,7 @@ fn leave_and_enter(config: &ModeConfig, state: &mut State, facts: &Facts, event:
             state.unacknowledged |= block;
         }
         state.commander = CommandSource::None;
-        (state.silence, state.blind, state.landing_by_switch) = (None, None, false);
+        (state.silence, state.blind, state.adrift, state.landing_by_switch) = (None, None, None, false);
     }
     // On enter.
     match phase {

@@ -52,6 +52,8 @@ pub struct State {
     pub silence: Option<Silence>,
     /// Since when a mode that holds height has had none.
     pub blind: Option<Instant>,
+    /// Since when a vehicle that no pilot flies has not known its horizontal velocity.
+    pub adrift: Option<Instant>,
     /// Since when the height has been unknown to a lifted vehicle.
     pub unmeasured: Option<Instant>,
     /// Transitions since power-on.

@@ -57,7 +57,8 @@ impl Event {
     pub const fn guard(self) -> &'static str {
         match self {
             Self::Emergency => {
-                "kill from any link, a press of the button, the cut-off, or `IMPACT`, `GYRO_ANOMALY`, `TUMBLED`, `IMU_LOST`"
+                "kill from any link, a press of the button, the cut-off, or `IMPACT`, `GYRO_ANOMALY`, `TUMBLED`, `IMU_LOST`, \
+                 `IMU_FAULTY`"
             }
             Self::Stop => {
                 "ARMED: arm switch off, `Disarm`, or armed for too long. TAKEOFF, FLYING: arm switch off in a manual mode. \
@@ -67,7 +68,8 @@ impl Event {
             Self::Touchdown => "the land detector is sure",
             Self::Land => {
                 "`Land` or `Disarm` from any program, arm switch off in a mode that holds height, link lost for too long (at \
-                 once without height), height lost for too long, a take-off that takes too long, or `CRITICAL_BATTERY`, \
+                 once without height), height lost for too long, horizontal velocity lost for too long without a pilot, a \
+                 take-off that takes too long, or `CRITICAL_BATTERY`, \
                  `ESTIMATE_DIVERGED`"
             }
             Self::TakeOffComplete => "the land detector says so, or in a manual mode the vehicle has left the ground",

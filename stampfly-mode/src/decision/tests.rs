@@ -41,13 +41,14 @@ const HAPPENINGS: &[Happening] = &[
     ("height lost", |f| f.valid = Validity::TILT),
 ];
 
-const ALERTS: [Alerts; 8] = [
+const ALERTS: [Alerts; 9] = [
     Alerts::NONE,
     Alerts::COMM_LOST,
     Alerts::IMPACT,
     Alerts::GYRO_ANOMALY,
     Alerts::TUMBLED,
     Alerts::IMU_LOST,
+    Alerts::IMU_FAULTY,
     Alerts::CRITICAL_BATTERY,
     Alerts::ESTIMATE_DIVERGED,
 ];

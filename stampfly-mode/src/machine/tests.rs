@@ -211,6 +211,26 @@ fn d2_a_mode_that_holds_height_never_becomes_a_throttle() {
     }
 }
 
+/// D8: without flow a program's flight drifted for as long as it took.
+#[test]
+fn d8_a_vehicle_adrift_lands_unless_a_pilot_flies_it() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    world.estimate.valid = Validity::ALL.without(Validity::VELOCITY_XY | Validity::POSITION_XY);
+    assert_eq!(world.pass(&mut machine, 900).phase, FlightPhase::Flying);
+    assert_eq!(world.pass(&mut machine, 200).phase, FlightPhase::Landing, "after a second");
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    for _ in 0..3 {
+        world.estimate.valid = Validity::ALL.without(Validity::VELOCITY_XY | Validity::POSITION_XY);
+        world.pass(&mut machine, 900);
+        world.estimate.valid = Validity::ALL;
+        assert_eq!(world.pass(&mut machine, 100).phase, FlightPhase::Flying, "a dark tile");
+    }
+    let (mut machine, mut world) = piloted(FlightMode::PosHold);
+    world.estimate.valid = Validity::ALL.without(Validity::VELOCITY_XY | Validity::POSITION_XY);
+    let status = world.pass(&mut machine, 5_000);
+    assert_eq!((status.phase, status.mode), (FlightPhase::Flying, FlightMode::AltHold));
+}
+
 #[test]
 fn d13_a_link_that_flaps_is_lost() {
     let (mut machine, mut world) = in_phase(FlightPhase::Flying);
