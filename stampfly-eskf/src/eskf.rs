@@ -351,7 +351,7 @@ impl Eskf {
             for (block, limit) in [(ATTITUDE, 1.0), (GYRO_BIAS, 0.1), (ACCEL_BIAS, 2.0)] {
                 // A covariance that is not sound says nothing.
                 let before = self.covariance.get(block + axis, block + axis);
-                let before = if before.is_finite() { before.clamp(0.0, limit) } else { limit };
+                let before = if before.is_finite() { before.max(0.0).min(limit) } else { limit };
                 variances.reset(block + axis, before);
             }
             variances.reset(VELOCITY + axis, RESTART_VELOCITY * RESTART_VELOCITY);
