@@ -26,7 +26,7 @@ use crate::arming;
 use crate::config::ModeConfig;
 use crate::facts::Facts;
 pub use crate::state::{CUT, LAND, Silence, State};
-use crate::transitions::{Event, is_airborne, is_armed, next};
+use crate::transitions::{Event, TABLE, is_airborne, is_armed};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, GroundContact, Validity,
 };
@@ -76,10 +76,10 @@ pub fn decide(config: &ModeConfig, state: &State, facts: &Facts) -> State {
     }
     // What is acknowledged in this step does not arm in it.
     let present = State { unacknowledged: crashed, ..state };
-    let happened = |event: &Event| happens(*event, config, before, &present, facts);
-    let transition = Event::ALL.into_iter().filter(happened).find_map(|e| next(state.phase, e).map(|to| (e, to)));
-    if let Some((event, phase)) = transition {
-        leave_and_enter(config, &mut state, facts, event, phase);
+    // Rows of a phase stand in the order of their urgency.
+    let mut rows = TABLE.iter().filter(|row| row.from == state.phase);
+    if let Some(row) = rows.find(|row| happens(row.event, config, before, &present, facts)) {
+        leave_and_enter(config, &mut state, facts, row.event, row.to);
     } else if state.phase == FlightPhase::Landing && facts.pilot.switch.falls {
         // The pilot wants this landing, whatever began it. The next switch-off means more.
         state.landing_by_switch = true;

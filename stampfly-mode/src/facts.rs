@@ -101,14 +101,15 @@ pub struct Facts {
 }
 
 impl Facts {
-    pub(crate) fn read(now: Instant, input: &ModeInput<'_>, pilot: Heard) -> Self {
+    pub(crate) fn read(now: Instant, input: &ModeInput<'_>, pilot: Heard, armed: bool) -> Self {
         let age = |last: Option<Instant>| last.map_or(Duration::MAX, |at| now.since(at));
         Self {
             now,
             alerts: input.alerts,
             valid: input.estimate.valid,
             height: input.estimate.height,
-            tilt: frame::tilt(&input.estimate.attitude),
+            // Only the checks before arming ask for it, and an arc cosine is a tenth of a step.
+            tilt: if armed { 0.0 } else { frame::tilt(&input.estimate.attitude) },
             calibrated: input.calibration.complete,
             calibration: input.calibration.progress,
             contact: input.land_detected.contact,

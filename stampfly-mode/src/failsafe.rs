@@ -8,11 +8,11 @@
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground; in ACRO above 120° for a second | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
-//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity ([`imu`]) | disarmed |
+//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
 //! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
 //! | `POWER_LOST` | no finite battery sample for 1 s; a voltage below 0.1 V is one: no meter is fitted | with the next one |
-//! | `POWER_IMPLAUSIBLE` | armed, and the voltage changes as no battery's does, or is none ([`power`]) | with a plausible one, or disarmed |
+//! | `POWER_IMPLAUSIBLE` | armed, and the voltage changes as no battery's does, or is none | with a plausible one, or disarmed |
 //! | `USB_POWER` | voltage below 3.3 V while disarmed | 0.1 V higher |
 //! | `TOF_LOST`, `FLOW_LOST` | no usable sample for 1 s in the air | with the next one |
 //! | `RANGE_IMPLAUSIBLE`, `FLOW_IMPLAUSIBLE` | the estimator finds that they contradict the other sensors | when it no longer does |

@@ -88,16 +88,25 @@ impl ModeMachine {
         // The button is on the vehicle: a gesture on an armed one means that it is held in a hand.
         let stop_button = self.stop_button.stops(now, self.config.button_release, input.button, armed);
         let button = self.stop_button.unused(input.button);
-        let facts = Facts { stop_button, button, ..Facts::read(now, input, pilot) };
+        let facts = Facts { stop_button, button, ..Facts::read(now, input, pilot, armed) };
 
         let state = decide(&self.config, &before, &facts);
         if state.pairing.is_some() != before.pairing.is_some() {
             // Another transmitter has to show its arm switch off, too.
             self.transmitter.forget();
         }
-        // The checks of this decision: before what it acknowledged and where it led.
-        let checked = State { phase: before.phase, unacknowledged: before.unacknowledged, ..state };
-        self.refusals.step(&self.config, &checked, &facts);
+        let blocks = if armed {
+            // There is nothing to arm, and the checks would be half of a step.
+            if before.phase == FlightPhase::Armed {
+                self.refusals.clear();
+            }
+            ArmBlocks::NOT_ON_GROUND
+        } else {
+            // The checks of this decision: before what it acknowledged and where it led.
+            let checked = State { phase: before.phase, unacknowledged: before.unacknowledged, ..state };
+            self.refusals.step(&self.config, &checked, &facts);
+            self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check)
+        };
         self.state = state;
         let asked = facts.asked.arm || pilot.switch.rises || button == Some(ButtonGesture::Click);
         ModeOutput {
@@ -107,7 +116,7 @@ impl ModeMachine {
                 armed: state.is_armed(),
                 commander: state.commander,
                 pairing: state.pairing.is_some(),
-                blocks: self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check),
+                blocks,
                 transitions: state.transitions,
                 control_resets: state.control_resets,
             },

@@ -106,20 +106,20 @@ const fn row(from: FlightPhase, event: Event, to: FlightPhase) -> Transition {
 use Event as E;
 use FlightPhase as S;
 
-/// Every transition there is. A phase ignores an event without a row.
+/// Every transition there is, those of a phase most urgent first. A phase ignores an event without a row.
 pub const TABLE: &[Transition] = &[
     row(S::Init, E::Ready, S::IdleGround),
+    row(S::IdleGround, E::Arm, S::Armed),
     row(S::IdleGround, E::Lifted, S::IdleHeld),
     row(S::IdleHeld, E::SetDown, S::IdleGround),
-    row(S::IdleGround, E::Arm, S::Armed),
-    row(S::Armed, E::TakeOff, S::TakeOff),
     row(S::Armed, E::Emergency, S::IdleGround),
     row(S::Armed, E::Stop, S::IdleGround),
     row(S::Armed, E::Land, S::IdleGround),
-    row(S::TakeOff, E::TakeOffComplete, S::Flying),
+    row(S::Armed, E::TakeOff, S::TakeOff),
     row(S::TakeOff, E::Emergency, S::IdleGround),
     row(S::TakeOff, E::Stop, S::IdleGround),
     row(S::TakeOff, E::Land, S::Landing),
+    row(S::TakeOff, E::TakeOffComplete, S::Flying),
     row(S::Flying, E::Emergency, S::IdleGround),
     row(S::Flying, E::Stop, S::IdleGround),
     row(S::Flying, E::Land, S::Landing),
@@ -151,4 +151,19 @@ pub const fn is_armed(phase: FlightPhase) -> bool {
 #[must_use]
 pub const fn is_airborne(phase: FlightPhase) -> bool {
     matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_urgent_event_of_a_phase_comes_first_and_each_comes_once() {
+        let place = |event| Event::ALL.iter().position(|known| *known == event);
+        for &phase in FlightPhase::ALL {
+            let events: std::vec::Vec<_> =
+                TABLE.iter().filter(|row| row.from == phase).map(|row| place(row.event)).collect();
+            assert!(events.is_sorted_by(|a, b| a < b), "{phase:?}: {events:?}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 //! With a share of its hover thrust missing, a vehicle sinks at the speed at which drag carries that share: 0.3 m/s for 5 %
 //! against the vertical drag of about 1.4 1/s that small rotors have. Hover thrust is known to a few per cent, so a share
 //! that is fixed might not sink at all; it falls slowly instead, by one per cent a second, until even a vehicle that knows
-//! its hover thrust badly comes down. Once a second [`WeightTest`](super::weight::WeightTest) asks whether it stands.
+//! its hover thrust badly comes down. Once a second `WeightTest` asks whether it stands.
 //!
 //! | time since it began | share | sinks at, hover thrust known exactly |
 //! |---|---|---|
