@@ -14,11 +14,11 @@ stampfly_bus::schedule! {
     pub struct Runnables on crate::topics from VehicleConfig;
 
     /// State estimation.
-    estimation = Estimation: on sensor_imu, flight, 320 us;
+    estimation = Estimation: on sensor_imu, flight, 350 us;
     /// Anomaly detection.
-    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 40 us;
+    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 50 us;
     /// Take-off and landing manager.
-    landing = Landing: after failsafe, flight, 20 us;
+    landing = Landing: after failsafe, flight, 25 us;
     /// State management: the only place where the vehicle changes state.
     mode = Mode: after landing, flight, 60 us;
     /// Navigator: every set-point there is.

@@ -21,12 +21,18 @@ fn force(attitude: &Quat) -> Vec3 {
     attitude.inverse() * Vec3::new(0.0, 0.0, -GRAVITY)
 }
 
-fn flow(delta_x: f32, delta_y: f32) -> FlowData {
-    FlowData { delta_x, delta_y, interval: 0.01, quality: 100, valid: true }
+/// A sensor that measures never repeats itself: ±1 by the instant.
+fn dither(at: Instant) -> f32 {
+    (at.as_micros() / 2_500 * 7_919 % 101) as f32 / 50.0 - 1.0
 }
 
-fn range(distance: f32) -> TofData {
-    TofData { distance, valid: true, ..TofData::default() }
+fn flow(at: Instant, delta_x: f32, delta_y: f32) -> FlowData {
+    let noise = 2e-5 * dither(at);
+    FlowData { delta_x: delta_x + noise, delta_y: delta_y - noise, interval: 0.01, quality: 100, valid: true }
+}
+
+fn range(at: Instant, distance: f32) -> TofData {
+    TofData { distance: distance + 0.5e-3 * dither(at), valid: true, ..TofData::default() }
 }
 
 #[test]
@@ -52,8 +58,8 @@ fn tilted_out_of_sight_the_velocity_fades() {
             eskf.predict(at, &ImuData { accel: force(&attitude), gyro: rate, temperature: 25.0 });
             if step % 4 == 0 {
                 let distance = 0.5 / math::cos(stampfly_types::frame::tilt(&attitude));
-                eskf.fuse_tof(at, &range(distance));
-                eskf.fuse_flow(at, &flow(0.01 * 0.3 / distance, -0.01 * rate.x));
+                eskf.fuse_tof(at, &range(at, distance));
+                eskf.fuse_flow(at, &flow(at, 0.01 * 0.3 / distance, -0.01 * rate.x));
             }
         }
     };
@@ -84,8 +90,8 @@ fn rotation_is_taken_out_of_late_flow_at_the_time_it_was_seen() {
             let gyro = Vec3::new(rate(time - 0.5 * DT), 0.0, 0.0);
             eskf.predict(at, &ImuData { accel: force(&attitude), gyro, temperature: 25.0 });
             if step % 4 == 0 {
-                eskf.fuse_tof(at, &range(0.5 / math::cos(roll(time))));
-                eskf.fuse_flow(at, &flow(0.0, -0.01 * rate(time - 0.015 - 0.005)));
+                eskf.fuse_tof(at, &range(at, 0.5 / math::cos(roll(time))));
+                eskf.fuse_flow(at, &flow(at, 0.0, -0.01 * rate(time - 0.015 - 0.005)));
             }
             worst = worst.max(eskf.estimate().velocity.y.abs());
         }
