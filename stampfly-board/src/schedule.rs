@@ -29,7 +29,7 @@ stampfly_bus::schedule! {
     actuation = Actuation: after control, flight, 40 us;
 
     /// Still-calibration.
-    calibration = Calibration: every 20 ms, background, 100 us;
+    calibration = Calibration: every 20 ms, background, 110 us;
     /// Command arbitration.
     command = Command: every 20 ms, background, 30 us;
     /// Button gestures.

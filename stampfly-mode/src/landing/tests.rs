@@ -157,6 +157,15 @@ fn a_height_that_lies_does_not_land_a_vehicle_in_the_air() {
     assert!(ended.is_none_or(|ended| ended.height < 0.01), "in the air");
 }
 
+/// D1: a range of half the distance. On the floor the vertical loop has taken its thrust away before any test does.
+#[test]
+fn a_height_of_half_lands() {
+    let half = |height: f32, climb: f32, time: f32| everything(0.5 * height - 0.015, 0.5 * climb, time);
+    for height in [0.5, 1.5] {
+        Landing { height, told: half, ..NOMINAL }.lands(20.0);
+    }
+}
+
 #[test]
 fn hovering_low_in_flight_is_never_landed() {
     let mut manager = TakeoffLanding::new(LandingConfig::default());

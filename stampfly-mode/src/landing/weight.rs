@@ -32,6 +32,8 @@ const LEAST_SHARE: f32 = 0.15;
 const STANDS: f32 = 0.4;
 /// By more than this: it falls. The air carries the rest, a fifth by its cushion near the ground, more by drag with speed.
 const FALLS: f32 = 0.5;
+/// So much more specific force for its thrust has a vehicle that drag brakes; one that stands with little thrust has more.
+const CARRIED: f32 = 1.3;
 /// A step that lasts longer is treated as this long, s.
 const LONGEST_STEP: f32 = 0.02;
 
@@ -110,7 +112,9 @@ impl WeightTest {
         let input = Pair { force, thrust: self.delivered };
         self.quick.filter(input, QUICK, dt);
         self.steady.filter(input, STEADY, dt);
-        if !testing {
+        // What carries itself keeps its ratio of specific force to thrust. What stands does not, and tells nothing of before.
+        let carried = self.steady.force * self.before.thrust <= CARRIED * self.before.force * self.steady.thrust;
+        if !testing && carried {
             self.before = self.steady;
             return UNKNOWN;
         }
