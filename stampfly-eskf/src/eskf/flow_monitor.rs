@@ -16,16 +16,16 @@ const SMOOTH: f32 = 0.06;
 /// Time constant with which flow's corrections are forgotten, s.
 const FORGOTTEN: f32 = 2.0;
 /// Largest difference, m/s, for each metre of distance, and as a share of the velocity.
-const DIFFERENCE: f32 = 0.55;
+const DIFFERENCE: f32 = 0.7;
 const PER_METRE: f32 = 0.15;
 const SHARE: f32 = 0.25;
 /// For how long, s.
 const LASTS: f32 = 0.1;
 /// Readings running that are equal and not zero: frozen. At 100 Hz 0.4 s.
 const REPEATED: u32 = 40;
-/// The picture cannot stand still while the body turns by this much, rad: three counts of a PMW3901. Nearer to the floor
+/// The picture cannot stand still while the body turns by this much, rad: ten counts of a PMW3901. Nearer to the floor
 /// than [`SHARP`], m, it may be blurred.
-const TURNED: f32 = 0.007;
+const TURNED: f32 = 0.025;
 const SHARP: f32 = 0.15;
 /// For so many readings running, at least.
 const ZEROS: u32 = 20;
