@@ -1,0 +1,159 @@
+//! What may never happen, whatever is wrong: checked at every step of every flight.
+//!
+//! | invariant | what is checked at every step |
+//! |---|---|
+//! | `I1` | every duty is a number from 0 to 1 |
+//! | `I2` | not armed: every duty is 0 |
+//! | `I3` | the vehicle is armed while nothing blocks arming |
+//! | `I4` | the estimate's numbers are finite, and its quaternion is a rotation within 1e-4 |
+//! | `I5` | phases change as [`transitions`] say |
+//! | `I6` | armed, and no command of the commander for 520 ms: the alert `COMM_LOST` |
+//! | `I7` | no inertial sample for 32.5 ms (25 ms, and three periods): the motors are off |
+//! | `I9` | the instants of a topic never go back |
+//! | `I10` | 3 s, and 1 s for each 0.3 m of height, after an alert that demands landing: the motors are off |
+//!
+//! `I12` is the judge's, who knows the faults.
+
+use crate::topics::{COUNT, Id};
+use stampfly_flight::newest::message;
+use stampfly_mode::transitions;
+use stampfly_types::messages::{Alerts, CommandSource, FlightStatus, MotorOutput, StateEstimate, SystemAlert};
+use stampfly_types::{Duration, FieldKind, Instant, Message};
+use std::collections::BTreeSet;
+
+/// 500 ms, and 20 ms to notice.
+const COMM_SILENCE: Duration = Duration::from_millis(520);
+/// 25 ms, and three periods.
+const IMU_SILENCE: Duration = Duration::from_micros(32_500);
+/// Of I10.
+const LAND_WITHIN: Duration = Duration::from_secs(3);
+/// Of I10, m/s.
+const LAND_RATE: f32 = 0.3;
+
+/// The invariants of one flight.
+pub(super) struct Invariants {
+    /// Names of those that did not hold.
+    violations: BTreeSet<&'static str>,
+    hover_without_link: Duration,
+    last_at: [Option<Instant>; COUNT],
+    status: FlightStatus,
+    motors_on: bool,
+    /// Above the floor below, m.
+    clearance: f32,
+    comm_lost_since: Option<Instant>,
+    /// Until when the motors must be off, since an alert that demands landing.
+    must_be_off: Option<Instant>,
+}
+
+impl Invariants {
+    pub fn new(hover_without_link: Duration) -> Self {
+        Self {
+            violations: BTreeSet::new(),
+            hover_without_link,
+            last_at: [None; COUNT],
+            status: FlightStatus::default(),
+            motors_on: false,
+            clearance: 0.0,
+            comm_lost_since: None,
+            must_be_off: None,
+        }
+    }
+
+    pub fn require(&mut self, name: &'static str, holds: bool) {
+        if !holds {
+            self.violations.insert(name);
+        }
+    }
+
+    /// Names of the invariants that did not hold.
+    pub fn violations(&self) -> impl Iterator<Item = &'static str> {
+        self.violations.iter().copied()
+    }
+
+    /// A sample was published.
+    pub fn published(&mut self, id: Id, at: Instant, words: &[u32]) {
+        let last = self.last_at.get_mut(id as usize).and_then(|last| last.replace(at));
+        self.require("I9", last.is_none_or(|last| last <= at));
+        match id {
+            Id::actuator_motor => {
+                if let Some(output) = message::<MotorOutput>(words) {
+                    self.require("I1", output.duty.iter().all(|duty| (0.0..=1.0).contains(duty)));
+                    self.require("I2", self.status.armed || output.duty.iter().all(|duty| *duty == 0.0));
+                } else {
+                    self.require("I1", false);
+                }
+            }
+            Id::estimate_state => {
+                let estimate = message::<StateEstimate>(words);
+                self.require("I4", estimate.is_some_and(|estimate| is_sound(&estimate, words)));
+            }
+            Id::flight_status => {
+                if let Some(status) = message::<FlightStatus>(words) {
+                    self.status_changes(&status);
+                }
+            }
+            Id::system_alert => {
+                if let Some(alert) = message::<SystemAlert>(words) {
+                    self.alerts(at, alert.active);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn status_changes(&mut self, status: &FlightStatus) {
+        let (from, to) = (self.status.phase, status.phase);
+        let exists = transitions::TABLE.iter().any(|row| row.from == from && row.to == to);
+        self.require("I5", from == to || exists);
+        self.require("I3", self.status.armed || !status.armed || status.blocks.is_empty());
+        self.status = *status;
+    }
+
+    fn alerts(&mut self, at: Instant, active: Alerts) {
+        let last = |id: Id| self.last_at.get(id as usize).copied().flatten();
+        let (pilot, guided) = (last(Id::command_pilot), last(Id::command_guided));
+        let heard = match self.status.commander {
+            CommandSource::Pilot => pilot,
+            CommandSource::Guided => guided,
+            CommandSource::None | CommandSource::Failsafe => pilot.max(guided),
+        };
+        let silent = heard.is_some_and(|heard| at.since(heard) > COMM_SILENCE);
+        self.require("I6", !(self.status.armed && silent) || active.contains(Alerts::COMM_LOST));
+        self.comm_lost_since =
+            active.contains(Alerts::COMM_LOST).then(|| self.comm_lost_since.unwrap_or(at)).filter(|_| self.motors_on);
+        let abandoned = self.comm_lost_since.is_some_and(|since| at.since(since) >= self.hover_without_link);
+        let lands = abandoned || active.intersects(Alerts::CRITICAL_BATTERY | Alerts::ESTIMATE_DIVERGED);
+        self.must_be_off = (lands && self.motors_on).then(|| {
+            self.must_be_off.unwrap_or(at + LAND_WITHIN + Duration::from_seconds(self.clearance.max(0.0) / LAND_RATE))
+        });
+    }
+
+    /// What the motors are given, whatever decides it.
+    pub fn motors(&mut self, on: bool) {
+        self.motors_on = on;
+    }
+
+    /// Time goes on, at this height above the floor, m.
+    pub fn see(&mut self, now: Instant, clearance: f32) {
+        self.clearance = clearance;
+        let imu = self.last_at.get(Id::sensor_imu as usize).copied().flatten();
+        self.require("I7", !self.motors_on || imu.is_none_or(|imu| now.since(imu) <= IMU_SILENCE));
+        self.require("I10", !self.motors_on || self.must_be_off.is_none_or(|until| now <= until));
+    }
+}
+
+/// Finite numbers, and a rotation.
+fn is_sound(estimate: &StateEstimate, words: &[u32]) -> bool {
+    let fields = StateEstimate::FIELDS.iter().scan(0, |next, field| {
+        let start = *next;
+        *next += field.words;
+        Some((start, field))
+    });
+    let mut numbers = fields
+        .filter(|(_, field)| field.kind == FieldKind::F32)
+        .flat_map(|(start, field)| words.get(start..start + field.words).unwrap_or_default());
+    numbers.all(|word| f32::from_bits(*word).is_finite()) && (estimate.attitude.into_inner().norm() - 1.0).abs() <= 1e-4
+}
+
+#[cfg(test)]
+mod tests;

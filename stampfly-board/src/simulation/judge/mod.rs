@@ -1,0 +1,367 @@
+//! What came of a flight: how it ended, and whether anything happened that never may.
+//!
+//! The first line that fits is the end of the flight. *After the fault* is after the first fault began, and the whole of a
+//! flight without one; lengths and speeds are the truth's.
+//!
+//! | end | rule |
+//! |---|---|
+//! | `refused` | the motors never turned |
+//! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
+//! | `kept-on` | the motors were on at the end |
+//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of the first blow of a wall or a ceiling |
+//! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end |
+//! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
+//! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
+//! | `transparent` | anything else |
+//!
+//! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
+//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide.
+//!
+//! What never may happen is in [`invariants`], and `I12`: every fault began, and changed something.
+
+mod course;
+mod invariants;
+mod moments;
+mod sight;
+
+use super::mission::Mission;
+use crate::topics::Id;
+use course::Course;
+use invariants::Invariants;
+use moments::Moments;
+use serde::Serialize;
+pub(super) use sight::Sight;
+use stampfly_flight::newest::message;
+use stampfly_sim::Truth;
+use stampfly_sim::fault::{Class, Injector};
+use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, SystemAlert};
+use stampfly_types::{Duration, FieldKind, Instant, Message, frame};
+use std::string::{String, ToString};
+use std::vec::Vec;
+
+/// Above the place where it stood: it has left the ground, m.
+const OFF_GROUND: f32 = 0.05;
+/// Bounds of `flown-away`: above the highest commanded height and beside the path, m.
+const AWAY: [f32; 2] = [1.0, 5.0];
+/// Bounds of `transparent`, in the same order, m.
+const EXACT: [f32; 2] = [0.15, 0.5];
+/// A pilot's bounds are this many times as wide.
+const PILOT: f32 = 2.0;
+/// Motors that stop within this time of a fault were cut.
+const CUT: Duration = Duration::from_millis(300);
+/// Hardest touch-down that is none of a crash, m/s.
+const HARD: f32 = 1.0;
+/// Largest tilt of a vehicle that has landed, degrees.
+const TILTED: f32 = 20.0;
+/// Motors that were off for so long after a fault stay off; the second is for a vehicle that has not been armed yet, the third
+/// for one that still falls.
+const OVER: [Duration; 3] = [Duration::from_secs(3), Duration::from_secs(10), Duration::from_secs(30)];
+
+/// An alert's time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AlertSpan {
+    /// Its name.
+    pub name: &'static str,
+    /// When it began, s since power-on.
+    pub since: f64,
+    /// When it was over; `None` when it was not at the end.
+    pub until: Option<f64>,
+}
+
+/// A fault of the flight.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaultSpan {
+    /// As it was given.
+    pub fault: String,
+    /// When it began, s since power-on; `None` when its moment never came.
+    pub since: Option<f64>,
+    /// How often it has changed something.
+    pub changes: u64,
+}
+
+/// What came of a flight. Serialised into the JSON object that describes it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Judgement {
+    /// How it ended; see the [module](self) documentation.
+    pub outcome: &'static str,
+    /// The worst end that is acceptable.
+    pub expected: &'static str,
+    /// Is the end no worse than that?
+    pub as_expected: bool,
+    /// Names of the invariants that did not hold, see the [module](self) documentation.
+    pub violations: Vec<&'static str>,
+    /// Highest above the place where it stood, m.
+    pub max_height_m: f64,
+    /// Highest above the highest height commanded until then, after the fault, m; negative below it.
+    pub max_above_m: f64,
+    /// Farthest beside the commanded path, m.
+    pub max_distance_m: f64,
+    /// Sink rate at the first touch after the fault, or of the landing, m/s.
+    pub touch_speed_mps: Option<f64>,
+    /// From the fault until the motors stayed off, s.
+    pub cut_after_s: Option<f64>,
+    /// Height above the ground there, m.
+    pub cut_height_m: Option<f64>,
+    /// Alerts, in the order in which they began.
+    pub alerts: Vec<AlertSpan>,
+    /// Faults, as they were given.
+    pub faults: Vec<FaultSpan>,
+}
+
+#[derive(Clone, Copy)]
+struct Touch {
+    at: Instant,
+    speed: f32,
+    tilt: f32,
+}
+
+pub(super) struct Judge {
+    injector: Injector,
+    invariants: Invariants,
+    moments: Moments,
+    course: Course,
+    piloted: bool,
+    alerts: Alerts,
+    spans: Vec<AlertSpan>,
+    motors_on: bool,
+    turned: bool,
+    /// The last instant at which the motors stopped, and the height there.
+    stopped: Option<(Instant, f32)>,
+    start: Option<Instant>,
+    last: Option<Truth>,
+    /// Above the floor below, m.
+    clearance: f32,
+    struck: Option<Instant>,
+    now: Instant,
+    in_air: bool,
+    highest: f32,
+    beside: f32,
+    /// After the fault.
+    away: [f32; 2],
+    touches: Vec<Touch>,
+    was_landing: bool,
+    /// Landing began before the mission asked for it.
+    early: bool,
+    /// The motors stopped for good before the mission asked for landing.
+    stopped_early: bool,
+    mode: Option<FlightMode>,
+    other_mode: bool,
+    new_alert: bool,
+    /// Steps of the mission that are done.
+    done: usize,
+}
+
+impl Judge {
+    pub fn new(injector: &Injector, mission: &Mission, piloted: bool, hover_without_link: Duration) -> Self {
+        Self {
+            injector: injector.clone(),
+            invariants: Invariants::new(hover_without_link),
+            moments: Moments::default(),
+            course: Course::new(mission),
+            piloted,
+            alerts: Alerts::NONE,
+            spans: Vec::new(),
+            motors_on: false,
+            turned: false,
+            stopped: None,
+            start: None,
+            last: None,
+            clearance: 0.0,
+            struck: None,
+            now: Instant::ZERO,
+            in_air: false,
+            highest: 0.0,
+            beside: 0.0,
+            away: [f32::NEG_INFINITY; 2],
+            touches: Vec::new(),
+            was_landing: false,
+            early: false,
+            stopped_early: false,
+            mode: None,
+            other_mode: false,
+            new_alert: false,
+            done: 0,
+        }
+    }
+
+    /// A sample was published.
+    pub fn published(&mut self, id: Id, at: Instant, words: &[u32]) {
+        self.invariants.published(id, at, words);
+        if id == Id::system_alert
+            && let Some(alert) = message::<SystemAlert>(words)
+        {
+            self.alerts_change(at, alert.active);
+        }
+    }
+
+    fn alerts_change(&mut self, at: Instant, active: Alerts) {
+        let seconds = at.seconds_f64();
+        let after_fault = self.has_begun(at);
+        for (name, bit) in names() {
+            let (was, is) = (self.alerts.bits() & bit != 0, active.bits() & bit != 0);
+            if is && !was {
+                self.spans.push(AlertSpan { name, since: seconds, until: None });
+                // Before the first command nobody has been heard, and sensors start.
+                self.new_alert |= after_fault && (self.turned || self.injector.faults().next().is_some());
+            } else if was
+                && !is
+                && let Some(span) = self.spans.iter_mut().rev().find(|span| span.name == name)
+            {
+                span.until = Some(seconds);
+            }
+        }
+        self.alerts = active;
+    }
+
+    /// What the motors are given, whatever decides it.
+    pub fn motors(&mut self, now: Instant, on: bool) {
+        self.invariants.motors(on);
+        if self.motors_on && !on {
+            self.stopped = Some((now, self.clearance));
+            self.stopped_early = !self.course.asks_to_land(self.done);
+        }
+        if on {
+            (self.stopped, self.stopped_early) = (None, false);
+        }
+        self.turned |= on;
+        self.motors_on = on;
+    }
+
+    fn has_begun(&self, now: Instant) -> bool {
+        self.injector.faults().next().is_none() || self.injector.first_begun(now).is_some()
+    }
+
+    /// Looks at the truth, at the control rate.
+    pub fn see(&mut self, sight: &Sight<'_>) {
+        let Sight { now, truth, clearance, struck, status, done } = *sight;
+        self.struck = self.struck.or(struck.then_some(now));
+        self.clearance = clearance;
+        (self.now, self.done) = (now, done);
+        self.start = self.start.or(Some(now));
+        let (up, sink) = (height(truth), self.last.map_or(0.0, |last| last.velocity.z));
+        let landing = status.phase == FlightPhase::Landing || (self.course.asks_to_land(done) && status.armed);
+        if landing && !self.was_landing {
+            self.early |= !self.course.asks_to_land(done);
+        }
+        self.was_landing = landing;
+        let touches = self.in_air && truth.contact;
+        self.in_air = (self.in_air || clearance > OFF_GROUND) && !truth.contact;
+        self.moments.tell(&self.injector, sight, self.motors_on, landing && self.in_air, landing && touches);
+
+        let after_fault = self.has_begun(now);
+        if touches && (after_fault && self.injector.faults().next().is_some() || landing) {
+            let tilt = frame::tilt(&truth.attitude).to_degrees();
+            self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt });
+        }
+        self.course.visit(&truth.position);
+        let (top, beside) = self.course.commanded(done, &truth.position);
+        self.highest = self.highest.max(up);
+        self.beside = self.beside.max(beside);
+        if after_fault {
+            self.away = [self.away[0].max(up - top), self.away[1].max(beside)];
+        }
+        if status.phase == FlightPhase::Flying {
+            let mode = *self.mode.get_or_insert(status.mode);
+            self.other_mode |= after_fault && mode != status.mode;
+        }
+        self.invariants.see(now, clearance);
+        self.last = Some(*truth);
+    }
+
+    /// Is there nothing more to come of a fault? The motors are off, and whoever commands waits for something else.
+    pub fn is_over(&self, now: Instant) -> bool {
+        let Some(begun) = self.injector.first_begun(now) else { return false };
+        let since = self.stopped.map_or(begun, |(at, _)| at.max(begun));
+        let [off, idle, fallen] = OVER;
+        let in_air = self.last.is_some_and(|truth| !truth.contact);
+        let enough = if !self.turned {
+            idle
+        } else if in_air {
+            fallen
+        } else {
+            off
+        };
+        !self.motors_on && now.since(since) >= enough
+    }
+
+    pub fn finish(mut self) -> Judgement {
+        let begun = self.injector.first_begun(self.now);
+        let count = self.injector.faults().count();
+        let faults: Vec<_> = self
+            .injector
+            .faults()
+            .enumerate()
+            .map(|(place, fault)| FaultSpan {
+                fault: fault.to_string(),
+                since: self.injector.begins(place).filter(|since| *since <= self.now).map(Instant::seconds_f64),
+                changes: self.injector.changes(place),
+            })
+            .collect();
+        self.invariants.require("I12", faults.iter().all(|span| span.since.is_some() && span.changes > 0));
+        let expected = self.injector.faults().map(|fault| fault.expected()).max().unwrap_or(Class::Transparent);
+        let outcome = self.class(begun);
+        // Motors that were off already stayed off from the beginning of the fault.
+        let stopped = if self.turned { self.stopped } else { Some((self.now, 0.0)) };
+        let stopped = begun.zip(stopped).map(|(begun, (at, height))| {
+            let at = if self.turned { at } else { begun };
+            (at.since(begun).seconds_f64(), f64::from(height.max(0.0)))
+        });
+        let touch = self.touches.iter().find(|touch| begun.is_none_or(|begun| touch.at >= begun));
+        let [above, _] = self.away;
+        Judgement {
+            outcome: outcome.name(),
+            expected: expected.name(),
+            as_expected: outcome.is_within(expected) && (count > 0 || outcome != Class::Refused),
+            violations: self.invariants.violations().collect(),
+            max_height_m: self.highest.into(),
+            max_above_m: if above.is_finite() { above.into() } else { 0.0 },
+            max_distance_m: self.beside.into(),
+            touch_speed_mps: touch.map(|touch| touch.speed.into()),
+            cut_after_s: stopped.map(|(after, _)| after),
+            cut_height_m: stopped.map(|(_, height)| height),
+            alerts: self.spans,
+            faults,
+        }
+    }
+
+    /// By the table of the [module](self) documentation.
+    fn class(&self, begun: Option<Instant>) -> Class {
+        let [above, beside] = self.away;
+        let wide = if self.piloted { PILOT } else { 1.0 };
+        let from = begun.or(self.start).unwrap_or(self.now);
+        let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
+        let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
+        let at_once = |from: Option<Instant>, at: Instant| from.is_some_and(|from| at >= from && at.since(from) <= CUT);
+        if !self.turned {
+            Class::Refused
+        } else if above > AWAY[0] || beside > AWAY[1] {
+            Class::FlownAway
+        } else if self.motors_on {
+            Class::KeptOn
+        } else if self.stopped.is_some_and(|(at, _)| at_once(begun, at) || at_once(self.struck, at)) {
+            Class::Cut
+        } else if lies || self.touches.iter().any(hard) {
+            Class::Crashed
+        } else if self.early || self.stopped_early || !self.course.is_visited() {
+            Class::Landed
+        } else if self.new_alert || self.other_mode || above > wide * EXACT[0] || beside > wide * EXACT[1] {
+            Class::Degraded
+        } else {
+            Class::Transparent
+        }
+    }
+}
+
+fn height(truth: &Truth) -> f32 {
+    -truth.position.z
+}
+
+/// Every alert with its bit.
+fn names() -> impl Iterator<Item = (&'static str, u32)> {
+    let names = SystemAlert::FIELDS.first().map(|field| field.kind);
+    let names = if let Some(FieldKind::Flags(names)) = names { names } else { &[] };
+    names.iter().copied()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,63 @@
+//! Flights that are made up, and what the judge says of them.
+
+use super::*;
+use crate::simulation::faults::FAULTS;
+use stampfly_mode::transitions;
+use stampfly_sim::fault::Fault;
+use stampfly_types::Vec3;
+use stampfly_types::messages::FlightStatus;
+
+fn judge(faults: &[&str]) -> Judge {
+    let faults: Vec<_> = faults.iter().filter_map(|text| Fault::parse(text, FAULTS).ok()).collect();
+    let injector = Injector::new(Instant::ZERO, &faults);
+    let mission = Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.8\nland\n").expect("a mission");
+    Judge::new(&injector, &mission, false, Duration::from_secs(3))
+}
+
+fn status(phase: FlightPhase) -> FlightStatus {
+    FlightStatus { phase, armed: transitions::is_armed(phase), mode: FlightMode::PosHold, ..Default::default() }
+}
+
+/// Shows the judge a vehicle at this height, with this sink rate.
+fn show(judge: &mut Judge, now: Instant, phase: FlightPhase, (up, sink): (f32, f32), done: usize) {
+    let truth = Truth {
+        position: Vec3::new(0.0, 0.0, -up),
+        velocity: Vec3::new(0.0, 0.0, sink),
+        contact: up <= 0.0,
+        ..Default::default()
+    };
+    judge.see(&Sight { now, truth: &truth, clearance: up, struck: false, status: &status(phase), done });
+}
+
+/// Flies up to 0.5 m, suffers the fault at 2 s, and stops the motors at `stop` seconds at this height.
+fn flown(fault: &str, highest: f32, stop: Option<(f64, f32)>, touch: f32) -> Judgement {
+    let mut judge = judge(&[fault]);
+    let at = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
+    show(&mut judge, at(0.5), FlightPhase::Armed, (0.0, 0.0), 1);
+    judge.motors(at(1.0), true);
+    show(&mut judge, at(1.5), FlightPhase::Flying, (0.5, 0.0), 1);
+    show(&mut judge, at(2.1), FlightPhase::Flying, (highest, 0.0), 1);
+    if let Some((seconds, height)) = stop {
+        show(&mut judge, at(seconds), FlightPhase::Flying, (height, touch), 2);
+        judge.motors(at(seconds), false);
+        show(&mut judge, at(seconds + 0.5), FlightPhase::IdleGround, (0.0, 0.0), 2);
+    }
+    judge.finish()
+}
+
+#[test]
+fn ends_are_told_apart() {
+    let fault = "baro-step@2";
+    let outcome = |highest, stop, touch| flown(fault, highest, stop, touch).outcome;
+    assert_eq!(outcome(1.6, Some((4.0, 0.1)), 0.3), "flown-away");
+    assert_eq!(outcome(0.5, None, 0.0), "kept-on");
+    assert_eq!(outcome(0.5, Some((2.25, 0.5)), 3.0), "cut");
+    assert_eq!(outcome(0.5, Some((2.35, 0.5)), 3.0), "crashed");
+    assert_eq!(outcome(0.5, Some((4.0, 0.0)), 0.3), "landed");
+    let cut = flown(fault, 0.5, Some((2.25, 0.4)), 3.0);
+    assert!((cut.cut_after_s.unwrap_or_default() - 0.25).abs() < 1e-6, "{cut:?}");
+    assert!((cut.cut_height_m.unwrap_or_default() - 0.4).abs() < 1e-6, "{cut:?}");
+    assert_eq!(cut.touch_speed_mps, Some(3.0));
+    assert!(cut.violations.contains(&"I12"), "nothing was changed: {cut:?}");
+    assert_eq!(judge(&[fault]).finish().outcome, "refused");
+}
