@@ -4,7 +4,7 @@
 //! silent is replaced by the failsafe: level, no climb. After a silence, the pilot's sticks count again when they have been
 //! heard for [`AuthorityConfig::back`]: a link that lets single frames through would throw the vehicle about.
 
-use stampfly_types::messages::{CommandSetpoint, CommandSource, PilotInput, stick};
+use stampfly_types::messages::{CommandSetpoint, CommandSource, PilotInput};
 use stampfly_types::{Duration, Instant};
 
 /// Limits of the arbitration.
@@ -55,13 +55,7 @@ impl Authority {
 
     /// A frame from the pilot. Sticks that are not finite count as centred; others are clamped to ±1.
     pub fn pilot(&mut self, at: Instant, input: &PilotInput) {
-        let input = PilotInput {
-            roll: stick(input.roll),
-            pitch: stick(input.pitch),
-            yaw: stick(input.yaw),
-            throttle: stick(input.throttle),
-            ..*input
-        };
+        let input = input.cleaned();
         if self.pilot.is_some_and(|(last, _)| at.since(last) >= self.config.stale) {
             self.pilot_back = Some(at);
         }

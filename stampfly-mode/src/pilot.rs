@@ -6,7 +6,7 @@
 //! off by the pilot for certain, so it asks for a landing and never stops the motors.
 
 use crate::config::ModeConfig;
-use stampfly_types::messages::{FlightMode, PilotInput, stick};
+use stampfly_types::messages::{FlightMode, PilotInput};
 use stampfly_types::{Duration, Instant};
 
 /// A switch whose new position counts after some time.
@@ -113,13 +113,7 @@ impl Transmitter {
             (self.newest, self.moved_since) = (None, None);
             return Heard::default();
         };
-        let input = PilotInput {
-            roll: stick(raw.roll),
-            pitch: stick(raw.pitch),
-            yaw: stick(raw.yaw),
-            throttle: stick(raw.throttle),
-            ..*raw
-        };
+        let input = raw.cleaned();
         let sticks = [input.roll, input.pitch, input.yaw, input.throttle];
         if self.newest != Some(at) && ![raw.roll, raw.pitch, raw.yaw, raw.throttle].iter().all(|s| s.is_finite()) {
             self.unreadable = self.unreadable.wrapping_add(1);

@@ -38,6 +38,26 @@ pub fn stick(deflection: f32) -> f32 {
     if deflection.is_finite() { deflection.clamp(-1.0, 1.0) } else { 0.0 }
 }
 
+impl PilotInput {
+    /// The same frame with sticks that may be used, see [`stick`].
+    ///
+    /// ```
+    /// use stampfly_types::messages::PilotInput;
+    /// let frame = PilotInput { roll: f32::NAN, throttle: 1.5, arm: true, ..Default::default() };
+    /// assert_eq!(frame.cleaned(), PilotInput { throttle: 1.0, arm: true, ..Default::default() });
+    /// ```
+    #[must_use]
+    pub fn cleaned(&self) -> Self {
+        Self {
+            roll: stick(self.roll),
+            pitch: stick(self.pitch),
+            yaw: stick(self.yaw),
+            throttle: stick(self.throttle),
+            ..*self
+        }
+    }
+}
+
 message_enum! {
     /// What a guided command asks for.
     pub enum GuidedKind {
