@@ -1,6 +1,6 @@
 //! A flight through the state table, told by its transitions.
 
-use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
+use stampfly_mode::{ModeInput, ModeMachine};
 use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
@@ -55,7 +55,6 @@ fn main() {
             estimate,
             calibration,
             land_detected,
-            sensors: SensorTimes::all(now),
             pilot: None,
             sticks: CommandSource::Guided,
             commands,

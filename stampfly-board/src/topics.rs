@@ -14,15 +14,15 @@ stampfly_bus::topics! {
     /// Inertial sample, body FRD, specific force; every sample.
     sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe, calibration];
     /// Range to the ground.
-    sensor_tof: TofData = ring(8) @ 30 Hz from tof => [estimation, failsafe, mode];
+    sensor_tof: TofData = ring(8) @ 30 Hz from tof => [estimation, failsafe];
     /// Range ahead. Reserved: nothing reads it yet.
     sensor_tof_front: TofData = ring(8) @ 30 Hz from tof_front => [];
     /// Optical flow since the previous sample.
-    sensor_flow: FlowData = ring(16) @ 100 Hz from flow => [estimation, failsafe, mode];
+    sensor_flow: FlowData = ring(16) @ 100 Hz from flow => [estimation, failsafe];
     /// Magnetic field.
     sensor_mag: MagData = ring(8) @ 25 Hz from mag => [estimation, calibration];
     /// Air pressure.
-    sensor_baro: BaroData = ring(8) @ 25 Hz from baro => [estimation, calibration, mode];
+    sensor_baro: BaroData = ring(8) @ 25 Hz from baro => [estimation, failsafe, calibration];
     /// Where cameras see the vehicle.
     external_pose: ExternalPose = ring(8) @ 100 Hz from cameras => [estimation];
     /// Battery.

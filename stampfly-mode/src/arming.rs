@@ -3,8 +3,8 @@
 use crate::config::ModeConfig;
 use crate::facts::Facts;
 use crate::state::{CUT, State};
+use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, Validity};
-use stampfly_types::{Duration, Instant};
 
 /// A reason against arming.
 #[derive(Clone, Copy, Debug)]
@@ -42,14 +42,6 @@ const fn when(refuses: bool) -> Option<(f32, f32)> {
 fn above(value: f32, limit: f32) -> Option<(f32, f32)> {
     let allowed = value <= limit;
     if allowed { None } else { Some((value, limit)) }
-}
-
-/// A sensor that a mode needs must not be silent.
-fn silent(needed: bool, age: Duration, config: &ModeConfig) -> Option<(f32, f32)> {
-    // A sensor that never spoke has no age.
-    let age = if age == Duration::MAX { f32::INFINITY } else { age.seconds() };
-    let limit = config.sensor_silence.seconds();
-    if needed && age >= limit { Some((age, limit)) } else { None }
 }
 
 /// Alerts of sensors without which no vehicle takes off.
@@ -94,12 +86,12 @@ checks! {
     TILTED ["rad"] "tilted too far" => |config, state, facts| above(facts.tilt, config.arming_tilt);
     ESTIMATE [""] "the estimate is lost, or has no vertical velocity in a mode that holds height" => |config, state, facts|
         when(facts.alerts.contains(Alerts::ESTIMATE_DIVERGED) || (holds_height(state) && !facts.valid.contains(Validity::VELOCITY_Z)));
-    NO_RANGE ["s"] "no usable range, in a mode that holds height" => |config, state, facts|
-        silent(holds_height(state), facts.ages.range, config);
-    NO_BARO ["s"] "no air pressure, in a mode that holds height" => |config, state, facts|
-        silent(holds_height(state), facts.ages.baro, config);
-    NO_FLOW ["s"] "no usable optical flow, in POS_HOLD" => |config, state, facts|
-        silent(state.wanted == FlightMode::PosHold, facts.ages.flow, config);
+    NO_RANGE [""] "no usable range, in a mode that holds height" => |config, state, facts|
+        when(holds_height(state) && facts.alerts.contains(Alerts::TOF_LOST));
+    NO_BARO [""] "no air pressure, in a mode that holds height" => |config, state, facts|
+        when(holds_height(state) && facts.alerts.contains(Alerts::BARO_LOST));
+    NO_FLOW [""] "no optical flow, in POS_HOLD" => |config, state, facts|
+        when(state.wanted == FlightMode::PosHold && facts.alerts.contains(Alerts::FLOW_LOST));
     NO_BATTERY [""] "powered from USB" => |config, state, facts| when(facts.alerts.contains(Alerts::USB_POWER));
     LOW_BATTERY [""] "the battery is low" => |config, state, facts|
         when(facts.alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY));
@@ -161,7 +153,7 @@ impl Refusals {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facts::{Ages, Asked};
+    use crate::facts::Asked;
     use crate::pilot::Heard;
     use stampfly_types::messages::PilotInput;
 
@@ -216,7 +208,6 @@ mod tests {
 
     #[test]
     fn d9_arming_asks_for_the_sensors_of_the_mode_and_names_them() {
-        let (old, fresh) = (Duration::from_secs(1), Duration::from_millis(999));
         let (range, flow, baro) = (ArmBlocks::NO_RANGE, ArmBlocks::NO_FLOW, ArmBlocks::NO_BARO);
         for (mode, needed) in [
             (FlightMode::PosHold, range | flow | baro),
@@ -225,14 +216,14 @@ mod tests {
             (FlightMode::Acro, ArmBlocks::NONE),
         ] {
             let (state, facts) = ready(mode);
-            for (ages, missing) in [
-                (Ages { range: fresh, flow: fresh, baro: fresh }, ArmBlocks::NONE),
-                (Ages { range: old, ..Ages::default() }, range),
-                (Ages { flow: old, ..Ages::default() }, flow),
-                (Ages { baro: Duration::MAX, ..Ages::default() }, baro),
+            for (alerts, missing) in [
+                (Alerts::NONE, ArmBlocks::NONE),
+                (Alerts::TOF_LOST, range),
+                (Alerts::FLOW_LOST, flow),
+                (Alerts::BARO_LOST, baro),
             ] {
                 let expected = if needed.contains(missing) { missing } else { ArmBlocks::NONE };
-                assert_eq!(found(&state, &Facts { ages, ..facts }), expected, "{mode:?}");
+                assert_eq!(found(&state, &Facts { alerts, ..facts }), expected, "{mode:?}");
             }
         }
     }

@@ -48,8 +48,6 @@ pub struct ModeConfig {
     pub take_over: f32,
     /// For how long the sticks have to be deflected so far.
     pub take_over_time: Duration,
-    /// Arming refuses a sensor whose newest usable sample is older.
-    pub sensor_silence: Duration,
     /// A vehicle that hears no new transmitter for this long stops looking.
     pub pairing_timeout: Duration,
     /// After this time in pairing, every frame is a new transmitter's.
@@ -99,8 +97,6 @@ impl Default for ModeConfig {
             take_over: 0.15,
             // Longer than a bump against the transmitter, shorter than a person's reaction to what the vehicle does.
             take_over_time: Duration::from_millis(100),
-            // Thirty periods of the slowest of them.
-            sensor_silence: Duration::from_secs(1),
             // Time to switch on a transmitter and to put it into pairing.
             pairing_timeout: Duration::from_secs(60),
             // The radio follows within 20 ms.

@@ -3,7 +3,7 @@
 use crate::input::ModeInput;
 use crate::pilot::Heard;
 use stampfly_types::messages::{Alerts, ButtonGesture, CommandSource, GroundContact, GuidedKind, Validity};
-use stampfly_types::{Duration, Instant, frame};
+use stampfly_types::{Instant, frame};
 
 /// What programs ask for in one step, as a set: the order of the commands does not matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,18 +48,6 @@ impl Asked {
     }
 }
 
-/// How old the newest usable sample of a sensor is; the longest duration for none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Ages {
-    /// Range to the ground.
-    pub range: Duration,
-    /// Optical flow.
-    pub flow: Duration,
-    /// Air pressure.
-    pub baro: Duration,
-}
-
 /// What is true in one step. The default is a vehicle that has just been switched on: nothing is known, and nothing was asked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -84,8 +72,6 @@ pub struct Facts {
     pub takeoff_complete: bool,
     /// Touchdown is sure.
     pub landed: bool,
-    /// Sensors that arming asks for.
-    pub ages: Ages,
     /// What programs ask for.
     pub asked: Asked,
     /// What the pilot's transmitter says.
@@ -102,7 +88,6 @@ pub struct Facts {
 
 impl Facts {
     pub(crate) fn read(now: Instant, input: &ModeInput<'_>, pilot: Heard, armed: bool) -> Self {
-        let age = |last: Option<Instant>| last.map_or(Duration::MAX, |at| now.since(at));
         Self {
             now,
             alerts: input.alerts,
@@ -115,11 +100,6 @@ impl Facts {
             contact: input.land_detected.contact,
             takeoff_complete: input.land_detected.takeoff_complete,
             landed: input.land_detected.landed,
-            ages: Ages {
-                range: age(input.sensors.range),
-                flow: age(input.sensors.flow),
-                baro: age(input.sensors.baro),
-            },
             asked: Asked::read(input.commands),
             pilot,
             sticks: input.sticks,

@@ -14,7 +14,7 @@
 //! | `POWER_LOST` | no finite battery sample for 1 s; a voltage below 0.1 V is one: no meter is fitted | with the next one |
 //! | `POWER_IMPLAUSIBLE` | armed, and the voltage changes as no battery's does, or is none | with a plausible one, or disarmed |
 //! | `USB_POWER` | voltage below 3.3 V while disarmed | 0.1 V higher |
-//! | `TOF_LOST`, `FLOW_LOST` | no usable sample for 1 s in the air | with the next one |
+//! | `TOF_LOST`, `FLOW_LOST`, `BARO_LOST` | no usable sample for 1 s | with the next one |
 //! | `RANGE_IMPLAUSIBLE`, `FLOW_IMPLAUSIBLE` | the estimator finds that they contradict the other sensors | when it no longer does |
 //! | `TILT_MISMATCH` | gravity and estimated tilt 10° apart for 0.5 s on the ground | with agreement |
 //! | `ESTIMATE_DIVERGED` | the estimator says so | disarmed |
@@ -65,7 +65,7 @@ use stampfly_types::{Instant, Stamped};
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -124,14 +124,16 @@ impl Failsafe {
         let forgotten = !status.armed && now.since(self.latched_at) >= config.shown;
         let kept = if forgotten { self.active.without(LATCHED) } else { self.active };
         let active = self.power.step(config, kept | found, now, input.power, status.armed);
-        let airborne = matches!(status.phase, FlightPhase::Flying | FlightPhase::Landing);
         let silent = |last: Option<Instant>, limit| last.is_none_or(|at| now.since(at) >= limit);
+        // At power-on a sensor gets as long for its first sample.
+        let lost = |last: Option<Instant>| now.since(last.unwrap_or(Instant::ZERO)) >= config.aiding_silence;
         let active = active
             .set(Alerts::IMU_DEGRADED, silence >= config.imu_degraded)
             .set(Alerts::TILT_MISMATCH, mismatch)
             .set(Alerts::COMM_LOST, silent(input.command, config.link_silence))
-            .set(Alerts::TOF_LOST, airborne && silent(input.tof, config.aiding_silence))
-            .set(Alerts::FLOW_LOST, airborne && silent(input.flow, config.aiding_silence))
+            .set(Alerts::TOF_LOST, lost(input.tof))
+            .set(Alerts::FLOW_LOST, lost(input.flow))
+            .set(Alerts::BARO_LOST, lost(input.baro))
             .set(Alerts::RANGE_IMPLAUSIBLE, input.status.range_implausible)
             .set(Alerts::FLOW_IMPLAUSIBLE, input.status.flow_implausible)
             .set(Alerts::SELF_TEST_FAILED, input.self_test == SelfTestVerdict::Failed)

@@ -7,7 +7,7 @@ use crate::arming::{Refusal, Refusals};
 use crate::config::ModeConfig;
 use crate::decision::{State, decide};
 use crate::facts::Facts;
-pub use crate::input::{Command, ModeInput, SensorTimes};
+pub use crate::input::{Command, ModeInput};
 use crate::pilot::Transmitter;
 use crate::stop_button::StopButton;
 use stampfly_types::Instant;
@@ -28,7 +28,7 @@ pub struct ModeOutput {
 /// The mode machine.
 ///
 /// ```
-/// use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
+/// use stampfly_mode::{ModeInput, ModeMachine};
 /// use stampfly_types::{Instant, messages::*};
 /// let mut machine = ModeMachine::default();
 /// let estimate = StateEstimate { height: 0.03, valid: Validity::ALL, ..Default::default() };
@@ -36,7 +36,7 @@ pub struct ModeOutput {
 /// let land_detected = LandDetected::default();
 /// let mut input = ModeInput {
 ///     alerts: Alerts::NONE, estimate: &estimate, calibration: &calibration, land_detected: &land_detected,
-///     sensors: SensorTimes::all(Instant::ZERO), pilot: None, sticks: CommandSource::None, commands: &[], button: None,
+///     pilot: None, sticks: CommandSource::None, commands: &[], button: None,
 ///     cut_off: false,
 /// };
 /// assert_eq!(machine.step(Instant::ZERO, &input).flight_status.phase, FlightPhase::IdleGround);

@@ -1,6 +1,6 @@
 //! A stranger's program: a vehicle that becomes ready.
 
-use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
+use stampfly_mode::{ModeInput, ModeMachine};
 use stampfly_types::Instant;
 use stampfly_types::messages::*;
 
@@ -12,7 +12,6 @@ fn main() {
         estimate: &estimate,
         calibration: &calibration,
         land_detected: &LandDetected::default(),
-        sensors: SensorTimes::all(Instant::ZERO),
         pilot: None,
         sticks: CommandSource::None,
         commands: &[],

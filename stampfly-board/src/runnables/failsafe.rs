@@ -4,6 +4,7 @@ use crate::config::VehicleConfig;
 use crate::topics::FailsafeEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::FailsafeInput;
+use stampfly_mode::transitions::is_airborne;
 use stampfly_types::Instant;
 use stampfly_types::messages::CommandSource;
 
@@ -16,6 +17,7 @@ pub struct Failsafe {
     last_guided: Option<Instant>,
     last_tof: Option<Instant>,
     last_flow: Option<Instant>,
+    last_baro: Option<Instant>,
 }
 
 impl Failsafe {
@@ -28,6 +30,7 @@ impl Failsafe {
             last_guided: None,
             last_tof: None,
             last_flow: None,
+            last_baro: None,
         }
     }
 }
@@ -41,8 +44,13 @@ impl Runnable for Failsafe {
         let newest = |last: Option<Instant>, at: Option<Instant>| last.max(at.map(|at| at.min(now)));
         let range = ends.sensor_tof.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
         self.last_tof = newest(self.last_tof, range);
-        let flow = ends.sensor_flow.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
+        // A standing vehicle is nearer to the floor than the camera sees sharply.
+        let stands = !is_airborne(ends.flight_status.get().phase);
+        let flow = ends.sensor_flow.iter().filter(|sample| sample.data.valid || stands).map(|sample| sample.at).max();
         self.last_flow = newest(self.last_flow, flow);
+        let baro =
+            ends.sensor_baro.iter().filter(|sample| sample.data.altitude.is_finite()).map(|sample| sample.at).max();
+        self.last_baro = newest(self.last_baro, baro);
         let pilot = ends.command_pilot.last().map(|sample| sample.at);
         let guided = ends.command_guided.last().map(|sample| sample.at);
         (self.last_pilot, self.last_guided) = (newest(self.last_pilot, pilot), newest(self.last_guided, guided));
@@ -65,6 +73,7 @@ impl Runnable for Failsafe {
                 command,
                 tof: self.last_tof,
                 flow: self.last_flow,
+                baro: self.last_baro,
                 self_test: ends.self_test.get().verdict,
                 flight_status: ends.flight_status.get(),
             },

@@ -6,7 +6,7 @@ use crate::messages::RestartRequest;
 use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
-use stampfly_mode::{ModeInput, ModeMachine, SensorTimes};
+use stampfly_mode::{ModeInput, ModeMachine};
 use stampfly_types::messages::{ArmRefusals, ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
@@ -18,7 +18,6 @@ pub struct Mode {
     /// A pilot's frame as old as this counts as none.
     stale_pilot: Duration,
     pilot: Option<Stamped<PilotInput>>,
-    sensors: SensorTimes,
     published: Option<EstimatorCommand>,
     /// Refusals to arm since power-on.
     refused: u32,
@@ -37,7 +36,6 @@ impl Mode {
             // The frames that count for the sticks count here, too.
             stale_pilot: config.authority.stale,
             pilot: None,
-            sensors: SensorTimes::default(),
             published: None,
             refused: 0,
             last: FlightStatus::default(),
@@ -52,15 +50,6 @@ impl Runnable for Mode {
     fn run(&mut self, activation: &mut Activation, ends: &mut ModeEnds<'_>) {
         let now = activation.now();
         self.pilot = ends.command_pilot.last().copied().or(self.pilot);
-        let range = ends.sensor_tof.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
-        let flow = ends.sensor_flow.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
-        let baro =
-            ends.sensor_baro.iter().filter(|sample| sample.data.altitude.is_finite()).map(|sample| sample.at).max();
-        self.sensors = SensorTimes {
-            range: self.sensors.range.max(range),
-            flow: self.sensors.flow.max(flow),
-            baro: self.sensors.baro.max(baro),
-        };
         // As many as the queue holds.
         let mut commands = Vec::<GuidedKind, 16>::new();
         for command in ends.command_guided.iter() {
@@ -79,7 +68,6 @@ impl Runnable for Mode {
             estimate: ends.estimate_state.get(),
             calibration: ends.calibration.get(),
             land_detected: ends.land_detected.get(),
-            sensors: self.sensors,
             pilot: self
                 .pilot
                 .as_ref()

@@ -1,7 +1,7 @@
 //! Every state with every relevant alert and every set of up to three events: what must hold whatever happens.
 
 use super::*;
-use crate::facts::{Ages, Asked};
+use crate::facts::Asked;
 use crate::pilot::{Heard, Switched};
 use crate::transitions::TABLE;
 use stampfly_types::messages::PilotInput;
@@ -101,7 +101,6 @@ fn quiet(state: &State) -> Facts {
         height: if airborne || state.phase == FlightPhase::IdleHeld { 1.5 } else { 0.03 },
         contact: if airborne { GroundContact::Air } else { GroundContact::Ground },
         calibrated: true,
-        ages: Ages::default(),
         sticks: state.commander,
         ..Facts::default()
     }

@@ -20,6 +20,8 @@ pub struct FailsafeInput<'a> {
     pub tof: Option<Instant>,
     /// Newest usable flow.
     pub flow: Option<Instant>,
+    /// Newest air pressure.
+    pub baro: Option<Instant>,
     /// How the self test at power-on ended.
     pub self_test: SelfTestVerdict,
     /// State and mode one step ago.

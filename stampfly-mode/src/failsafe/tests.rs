@@ -79,6 +79,7 @@ impl Rig {
             command: Some(now),
             tof: Some(now),
             flow: Some(now),
+            baro: Some(now),
             self_test: SelfTestVerdict::NotRun,
             flight_status: &self.mode,
         };
@@ -154,8 +155,9 @@ fn the_battery_warns_before_it_lands() {
             status: &EstimatorStatus::default(),
             power: Some((at, &power)),
             command: Some(at),
-            tof: None,
-            flow: None,
+            tof: Some(at),
+            flow: Some(at),
+            baro: Some(at),
             self_test: SelfTestVerdict::NotRun,
             flight_status: &mode,
         };
@@ -180,8 +182,9 @@ fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Opti
         status: &EstimatorStatus::default(),
         power: power.map(|(at, _)| (Instant::from_millis(at), &battery)),
         command: command.map(Instant::from_millis),
-        tof: None,
-        flow: None,
+        tof: Some(now),
+        flow: Some(now),
+        baro: Some(now),
         self_test: SelfTestVerdict::NotRun,
         flight_status: &FlightStatus::default(),
     };
@@ -233,6 +236,7 @@ fn a_failed_self_test_is_an_alert_for_good() {
             command: Some(Instant::ZERO),
             tof: None,
             flow: None,
+            baro: None,
             self_test,
             flight_status: mode,
         };
@@ -241,4 +245,36 @@ fn a_failed_self_test_is_an_alert_for_good() {
     assert_eq!(step(SelfTestVerdict::Identical), Alerts::NONE);
     assert_eq!(step(SelfTestVerdict::WithinTolerance), Alerts::SELF_TEST_DIFFERS);
     assert_eq!(step(SelfTestVerdict::Failed), Alerts::SELF_TEST_FAILED);
+}
+
+#[test]
+fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
+    let bits = [Alerts::TOF_LOST, Alerts::FLOW_LOST, Alerts::BARO_LOST];
+    for phase in [FlightPhase::IdleGround, FlightPhase::Flying] {
+        for (place, bit) in bits.into_iter().enumerate() {
+            let mode = FlightStatus { phase, ..Default::default() };
+            let seen = |millis: u64, heard: u64| {
+                let now = Instant::from_millis(millis);
+                let power = PowerData { voltage: 4.0, ..Default::default() };
+                let times =
+                    [0, 1, 2].map(|sensor| Some(if sensor == place { Instant::from_millis(heard) } else { now }));
+                let [tof, flow, baro] = times;
+                let input = FailsafeInput {
+                    imu: &inertial::still(millis),
+                    estimate: &StateEstimate::default(),
+                    status: &EstimatorStatus::default(),
+                    power: Some((now, &power)),
+                    command: Some(now),
+                    tof,
+                    flow,
+                    baro,
+                    self_test: SelfTestVerdict::NotRun,
+                    flight_status: &mode,
+                };
+                Failsafe::default().step(now, &input).active
+            };
+            assert_eq!(seen(2_990, 2_000), Alerts::NONE, "{phase:?}");
+            assert_eq!(seen(3_000, 2_000), bit, "{phase:?}");
+        }
+    }
 }

@@ -6,6 +6,8 @@ use stampfly_types::messages::{
     Alerts, CalibrationResult, FlightMode, GroundContact, GuidedKind, LandDetected, PilotInput, StateEstimate, Validity,
 };
 
+/// Range, flow and barometer.
+const SENSORS_LOST: Alerts = Alerts::TOF_LOST.with(Alerts::FLOW_LOST).with(Alerts::BARO_LOST);
 const STEP: Duration = Duration::from_micros(2_500);
 
 /// A situation the machine can be put into.
@@ -19,7 +21,6 @@ pub(crate) struct World {
     pub pilot: Option<PilotInput>,
     /// What the controllers follow; `None` for the commander's sticks, at once.
     pub sticks: Option<CommandSource>,
-    pub sensors: Option<SensorTimes>,
     /// Happens in the next step, and not again.
     pub button: Option<ButtonGesture>,
     pub cut_off: bool,
@@ -35,7 +36,6 @@ impl World {
             alerts: Alerts::NONE,
             pilot: None,
             sticks: None,
-            sensors: None,
             button: None,
             cut_off: false,
             now: Instant::ZERO,
@@ -50,7 +50,6 @@ impl World {
             estimate: &self.estimate,
             calibration: &self.calibration,
             land_detected: &self.land_detected,
-            sensors: self.sensors.unwrap_or(SensorTimes::all(self.now)),
             pilot: self.pilot.as_ref().map(|pilot| (frame_at, pilot)),
             sticks: self.sticks.unwrap_or(machine.state.commander),
             commands,
@@ -414,7 +413,7 @@ fn d5_mode_arbitration_table() {
     for (phase, set) in [(S::IdleGround, true), (S::Armed, true), (S::Flying, false)] {
         let (mut machine, mut world) = in_phase(phase);
         machine.state.wanted = FlightMode::AltHold;
-        world.sensors = Some(SensorTimes::default());
+        world.alerts = SENSORS_LOST;
         world.step(&mut machine, &[Command::Hold]);
         assert_eq!(machine.state.wanted == FlightMode::PosHold, set, "a program in {phase:?}");
     }
@@ -423,7 +422,7 @@ fn d5_mode_arbitration_table() {
 #[test]
 fn d9_a_vehicle_without_its_sensors_does_not_arm() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
-    world.sensors = Some(SensorTimes::default());
+    world.alerts = SENSORS_LOST;
     let output = world.step(&mut machine, &[Command::Arm]);
     let missing = ArmBlocks::NO_RANGE | ArmBlocks::NO_FLOW | ArmBlocks::NO_BARO;
     assert_eq!((output.flight_status.armed, output.flight_status.blocks, output.refused), (false, missing, true));

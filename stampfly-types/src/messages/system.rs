@@ -199,6 +199,8 @@ message_flags! {
         FLOW_IMPLAUSIBLE = 18,
         /// The battery voltage changes as no battery's does.
         POWER_IMPLAUSIBLE = 19,
+        /// No air pressure.
+        BARO_LOST = 20,
     }
 }
 

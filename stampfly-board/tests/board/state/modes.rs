@@ -2,8 +2,8 @@
 
 use super::{Numbers, at, goes_on};
 use stampfly_mode::{
-    Authority, ButtonDecoder, Failsafe, FailsafeInput, LandingConfig, LandingInput, ModeInput, ModeMachine,
-    SensorTimes, Signaller, TakeoffLanding,
+    Authority, ButtonDecoder, Failsafe, FailsafeInput, LandingConfig, LandingInput, ModeInput, ModeMachine, Signaller,
+    TakeoffLanding,
 };
 use stampfly_types::messages::*;
 use stampfly_types::{Stamped, Vec3};
@@ -48,7 +48,6 @@ fn mode_machine_goes_on() {
             estimate: &estimate,
             calibration: &calibration,
             land_detected: &land_detected,
-            sensors: SensorTimes::all(at(k)),
             pilot: Some((at(k - k % 8), &pilot)).filter(|_| k % 400 < 330),
             sticks: CommandSource::Pilot,
             commands,
@@ -81,6 +80,7 @@ fn failsafe_goes_on() {
             command: Some(at(k - k % 250)),
             tof: Some(at(k - k % 350)),
             flow: None,
+            baro: None,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &FlightStatus { phase, armed, ..Default::default() },
         };
