@@ -8,7 +8,8 @@
 //! | [`pilot`], [`radio`] | a person with a transmitter instead; what carries commands and telemetry |
 //! | [`faults`], [`judge`] | what can go wrong, and what came of it |
 //! | [`metrics`] | how good a flight was |
-//! | [`flight`] | one flight: what is started, what is watched, what came of it |
+//! | [`flight`] | one flight: what is started, what is watched |
+//! | [`Setup`], [`Outcome`] | what decides a flight, and how it went |
 //!
 //! For programs on a PC (feature `simulation`); nothing of it is in the firmware.
 
@@ -19,15 +20,19 @@ mod home;
 pub mod judge;
 pub mod metrics;
 pub mod mission;
+mod outcome;
 mod page;
 pub mod pilot;
 pub mod plant;
 pub mod radio;
 pub mod sensing;
+mod setup;
+mod watch;
 
-pub use flight::{Outcome, PhaseChange, Setup};
+pub use outcome::{Outcome, PhaseChange};
 pub use page::PAGE;
 pub use plant::PLANT;
+pub use setup::Setup;
 
 use crate::config::VehicleConfig;
 use crate::golden;

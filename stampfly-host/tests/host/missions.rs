@@ -108,7 +108,8 @@ fn complaints(mission: &Mission, flight: &Flight<StampFly, ()>) -> Vec<String> {
     check(outcome.finished, "the mission was not flown to its end".into());
     check(outcome.metrics.landed, "did not land".into());
     check(outcome.metrics.disarmed, "did not disarm".into());
-    check(outcome.motors_sane, "a motor was sent nonsense".into());
+    let violations = &outcome.judgement.violations;
+    check(violations.is_empty(), format!("violated {violations:?}"));
     check(flight.flown.log_lost == 0, format!("the log missed {} samples", flight.flown.log_lost));
     let bounds = [
         ("estimate to truth", outcome.metrics.est_pos_rms_m, 0.2),

@@ -1,0 +1,133 @@
+//! How a flight of the StampFly went, for people and for scripts.
+
+use super::judge::Judgement;
+use super::metrics::{FIGURES, Metrics};
+use serde::Serialize;
+use stampfly_sim::vehicle::{Figure, Verdict};
+use stampfly_types::Instant;
+use stampfly_types::messages::{FlightMode, FlightPhase};
+use std::string::String;
+use std::vec::Vec;
+use std::{format, vec};
+
+/// A change of state or mode, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseChange {
+    /// When it began.
+    pub since: Instant,
+    /// State.
+    pub phase: FlightPhase,
+    /// Mode.
+    pub mode: FlightMode,
+}
+
+/// How a flight went.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The figures.
+    pub metrics: Metrics,
+    /// States and modes, in order.
+    pub phases: Vec<PhaseChange>,
+    /// Was the mission flown to its end?
+    pub finished: bool,
+    /// Largest true tilt, degrees.
+    pub worst_tilt_deg: f64,
+    /// Battery voltage at the start and at the end, V.
+    pub battery: [f32; 2],
+    /// What came of faults, and what never may happen.
+    pub judgement: Judgement,
+}
+
+impl Verdict for Outcome {
+    /// Without faults the mission has to be flown; with faults the end has to be acceptable. Either way every invariant has
+    /// to hold.
+    fn succeeded(&self) -> bool {
+        let flown = self.facts().iter().all(|(_, holds)| *holds);
+        let Judgement { faults, as_expected, violations, .. } = &self.judgement;
+        violations.is_empty() && if faults.is_empty() { flown } else { *as_expected }
+    }
+
+    fn findings(&self) -> impl Serialize {
+        &self.judgement
+    }
+
+    fn facts(&self) -> Vec<(&'static str, bool)> {
+        vec![
+            ("landed", self.metrics.landed),
+            ("disarmed", self.metrics.disarmed),
+            ("finished", self.finished),
+            ("motors_sane", !self.judgement.violations.iter().any(|name| ["I1", "I2"].contains(name))),
+        ]
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        let figures = FIGURES.iter().map(|(name, unit, value)| Figure { name, unit, value: value(&self.metrics) });
+        figures.collect()
+    }
+
+    fn story(&self) -> Vec<String> {
+        let mut told = self.events();
+        told.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let mut told: Vec<_> = told.into_iter().map(|(at, what)| format!("{at:>9.3} s  {what}")).collect();
+        told.extend(
+            self.judgement
+                .faults
+                .iter()
+                .filter(|span| span.since.is_none())
+                .map(|span| format!("{:>11}  fault {} never began", "", span.fault)),
+        );
+        let [first, last] = self.battery;
+        told.push(format!("largest tilt {:.3} deg", self.worst_tilt_deg));
+        told.push(format!("battery {first:.2} V at the start, {last:.2} V at the end"));
+        let Judgement { outcome, expected, violations, faults, .. } = &self.judgement;
+        if !faults.is_empty() {
+            told.push(format!("outcome {outcome}, acceptable up to {expected}"));
+        }
+        if !violations.is_empty() {
+            told.push(format!("VIOLATED {}", violations.join(", ")));
+        }
+        told
+    }
+
+    fn sentence(&self) -> String {
+        if !self.judgement.faults.is_empty() {
+            let word = if self.succeeded() { "as expected" } else { "NOT ACCEPTABLE" };
+            return format!("{}, {word}", self.judgement.outcome);
+        }
+        let sentence = match (self.metrics.landed, self.metrics.disarmed) {
+            (true, true) => "landed and disarmed",
+            (true, false) => "landed, still armed",
+            (false, _) => "DID NOT LAND",
+        };
+        sentence.into()
+    }
+}
+
+impl Outcome {
+    /// What happened when, s: phases, faults, and alerts of a vehicle that had been armed.
+    fn events(&self) -> Vec<(f64, String)> {
+        let mut phases: Vec<_> = self
+            .phases
+            .iter()
+            .map(|change| {
+                let mode =
+                    if change.phase == FlightPhase::Flying { format!(" {:?}", change.mode) } else { String::new() };
+                (change.since.seconds_f64(), format!("{}{mode}", change.phase.name()))
+            })
+            .collect();
+        // On the ground the mode is no news.
+        phases.dedup_by(|(_, next), (_, last)| next == last);
+        let armed = self.phases.iter().find(|change| change.phase == FlightPhase::Armed);
+        let armed = armed.map_or(f64::INFINITY, |change| change.since.seconds_f64());
+        let Judgement { faults, alerts, .. } = &self.judgement;
+        let faults = faults
+            .iter()
+            .filter_map(|span| Some((span.since?, format!("fault {}, {} changes", span.fault, span.changes))));
+        let alerts = alerts.iter().filter(|span| span.until.is_none_or(|until| until >= armed)).map(|span| {
+            let until = span.until.map(|until| format!(" until {until:.3} s")).unwrap_or_default();
+            (span.since, format!("alert {}{until}", span.name))
+        });
+        phases.extend(faults.chain(alerts));
+        phases
+    }
+}

@@ -1,0 +1,53 @@
+//! All that decides a flight of the StampFly.
+
+use super::mission::{self, Mission};
+use super::plant::PLANT;
+use super::sensing::Sensing;
+use crate::config::VehicleConfig;
+use stampfly_sim::SimulationConfig;
+use stampfly_sim::fault::Fault;
+use stampfly_types::Duration;
+use stampfly_types::messages::FlightMode;
+use std::vec::Vec;
+
+/// All that decides a flight.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The vehicle in its surroundings.
+    pub simulation: SimulationConfig,
+    /// The flight stack.
+    pub vehicle: VehicleConfig,
+    /// What to fly.
+    pub mission: Mission,
+    /// What the sensor tasks read.
+    pub sensing: Sensing,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
+    /// The mission is flown by a pilot in this mode; `None` for a ground station.
+    pub pilot: Option<FlightMode>,
+    /// Is the vehicle watched by a motion capture system?
+    pub cameras: bool,
+    /// Seed of the executor's delays; `None` for an executor that is never late.
+    pub jitter: Option<u64>,
+    /// The flight is broken off after this long.
+    pub limit: Duration,
+}
+
+impl Setup {
+    /// The reference mission with this seed.
+    #[must_use]
+    pub fn reference(seed: u64) -> Self {
+        let simulation = SimulationConfig { seed, ..SimulationConfig::new(PLANT) };
+        Self {
+            vehicle: VehicleConfig::default(),
+            mission: Mission::parse(mission::REFERENCE).unwrap_or_else(|_| Mission { steps: Vec::new() }),
+            sensing: Sensing::Models,
+            faults: Vec::new(),
+            pilot: None,
+            cameras: false,
+            jitter: None,
+            limit: Duration::from_secs(180),
+            simulation,
+        }
+    }
+}
