@@ -3,8 +3,8 @@
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, run as run_program};
 
-/// A package that people build by itself, and what of it.
-const ALONE: (&str, &str) = ("stampfly-benches", "--benches");
+/// Packages that people build by themselves, and what of them.
+const ALONE: [(&str, &str); 2] = [("stampfly-benches", "--benches"), ("examples", "--examples")];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args([
@@ -16,7 +16,9 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         "-D",
         "warnings",
     ]))?;
-    // As people run a benchmark: by itself, a package has only the features it asks for.
-    let (package, targets) = ALONE;
-    run_program(repository.cargo().args(["check", "--quiet", "-p", package, targets]))
+    // As people run a benchmark or an example: by themselves, a package has only the features it asks for.
+    for (package, targets) in ALONE {
+        run_program(repository.cargo().args(["check", "--quiet", "-p", package, targets]))?;
+    }
+    Ok(())
 }

@@ -105,7 +105,9 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     let mut cargo = firmware(repository, "build");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
-    cargo.args(["--bins", "--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
+    // One example is enough to see that they link.
+    cargo.args(["--bins", "--example", "bmi270"]);
+    cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
     run_program(&mut cargo)?;
     Ok(repository.target("esp32").join(C6).join("release/stampfly-esp32s3"))
 }

@@ -38,8 +38,6 @@ const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyT
 const ROM: u64 = 512;
 /// Part of its stack that a task may take. The rest is for interrupts and for errors of this bound.
 const SHARE: f64 = 0.5;
-/// The same for what runs once at the start, when neither the radio nor the other core interrupts.
-const SHARE_AT_START: f64 = 0.6;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
@@ -150,16 +148,16 @@ fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failu
         for (name, frame) in depth.way.iter().filter(|(_, frame)| *frame >= 256) {
             println!("    {frame:>6}  {:.100}", name);
         }
-        let (available, most) = match core {
-            Core::Flight => (esp32::sizes::FLIGHT_STACK as u64, SHARE),
-            Core::Ground => (ground, SHARE_AT_START),
+        let available = match core {
+            Core::Flight => esp32::sizes::FLIGHT_STACK as u64,
+            Core::Ground => ground,
             Core::OnTopOfAssembly => continue,
         };
         let share = depth.bytes as f64 / available as f64;
         let said = format!("{task} may take {:.0} % of {available} bytes of stack", share * 100.0);
         println!("{said}");
-        if share > most {
-            held.failures.push(format!("{said}; {:.0} % is the most", most * 100.0));
+        if share > SHARE {
+            held.failures.push(format!("{said}; {:.0} % is the most", SHARE * 100.0));
         }
     }
     println!("{ROM} bytes each are allowed for what is in ROM: {elsewhere:?}");
