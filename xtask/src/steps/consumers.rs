@@ -54,6 +54,7 @@ fn consume(repository: &Repository, library: &Library, place: &Path) -> Result<(
         repository
             .cargo()
             .current_dir(&folder)
+            .env("CARGO_PROFILE_DEV_DEBUG", "false")
             .args(["run", "--quiet", "--target-dir"])
             .arg(repository.target("consumers")),
     )

@@ -14,20 +14,22 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let clone = repository.target("package-clone");
     let _ = fs::remove_dir_all(&clone);
     run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
-    // One folder per commit: cargo does not unpack a version twice, and ours does not change with every commit.
-    let (commit, _) = capture(repository.command("git").args(["rev-parse", "--short", "HEAD"]))?;
-    let packages = repository.target("packages");
-    let _ = fs::remove_dir_all(&packages);
-    let mut package = repository.cargo();
-    package
-        .current_dir(&clone)
+    // Into the folder of `consumers`, whose programs have the same dependencies with the same features.
+    let folder = repository.target("consumers");
+    let libraries = repository.libraries()?;
+    let inside = |arguments: &[&str]| {
+        let mut cargo = repository.cargo();
+        cargo.current_dir(&clone).args(arguments).arg("--target-dir").arg(&folder);
         // Whether it builds is all that is asked here.
-        .env("CARGO_PROFILE_DEV_DEBUG", "false")
-        .args(["package", "--locked", "--quiet", "--target-dir"])
-        .arg(packages.join(commit.trim()));
-    // Together, because they depend on each other and none is published yet.
-    for library in repository.libraries()? {
-        package.args(["-p", &library.name]);
-    }
-    run_program(&mut package)
+        cargo.env("CARGO_PROFILE_DEV_DEBUG", "false");
+        // Together, because they depend on each other and none is published yet.
+        for library in &libraries {
+            cargo.args(["-p", &library.name]);
+        }
+        cargo
+    };
+    // Cargo neither unpacks nor builds a version twice, and ours does not change with every commit.
+    let _ = fs::remove_dir_all(folder.join("package"));
+    run_program(&mut inside(&["clean", "--quiet"]))?;
+    run_program(&mut inside(&["package", "--locked", "--quiet"]))
 }
