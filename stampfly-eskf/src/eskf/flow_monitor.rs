@@ -15,7 +15,7 @@
 //! | standard deviation that was added to the tilt | the filter found its own tilt to be wrong, so the acceleration that is restored is wrong, too |
 //!
 //! A picture that stands still while the body turns says that the vehicle moves by turn times distance the opposite
-//! way. Millimetres do so in any hand; centimetres do not.
+//! way. A vehicle that is carried does so by millimetres.
 //!
 //! Not for an error of scale of some tens of per cent, nor for a constant offset that was there from the beginning: no
 //! other sensor on board measures a constant velocity.
@@ -235,13 +235,13 @@ mod tests {
 
     #[test]
     fn a_gyro_bias_that_flow_moved_explains_the_tilt_that_flow_goes_on_correcting() {
-        // A bias of (0.1, -0.05) rad/s tips the acceleration by gravity times as much each second.
+        // A bias of (0.2, -0.1) rad/s tips the acceleration by gravity times as much each second.
         let moved = |sign: f32| {
             let mut monitor = FlowMonitor::airborne();
-            monitor.corrected(&Vec3::zeros(), &(Vec3::new(0.1, -0.05, 0.0) * sign));
+            monitor.corrected(&Vec3::zeros(), &(Vec3::new(0.2, -0.1, 0.0) * sign));
             monitor
         };
-        let correction = Vec3::new(0.05, 0.1, 0.0) * GRAVITY * DT;
+        let correction = Vec3::new(0.1, 0.2, 0.0) * GRAVITY * DT;
         assert!(found(moved(1.0), correction).is_none());
         let unmoved = found(moved(0.0), correction).unwrap();
         assert!(found(moved(-1.0), correction).unwrap() < unmoved);
