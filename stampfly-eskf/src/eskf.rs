@@ -322,6 +322,7 @@ impl Eskf {
 
     /// Inflates the tilt and the gyro bias that may have tilted it.
     fn inflate_tilt(&mut self) {
+        self.flow_monitor.inflated(TILT_INFLATION);
         for axis in 0..2 {
             self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
             self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);

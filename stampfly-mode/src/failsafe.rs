@@ -31,7 +31,7 @@
 //! | full scale, garbage for good | 10 ms, 25 ms |
 //! | force below a fifth of g, or above 2.5 g, for good | 1.1 s |
 //! | range stuck at 3 cm, outliers, aliased, ramp | 0.3 s, 0.35 s, 2 s, 4.5 s |
-//! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.9 s, 0.4 s, 0.2 s, 1 to 2 s |
+//! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 1 to 2 s |
 //! | battery reading of nothing, or 0.35 V off | the first such reading |
 //!
 //! Numbers: `safety.*` parameters of the StampFly's reference firmware. Its recorded flights show 2–3 m/s² of

@@ -1,32 +1,56 @@
 //! Does optical flow agree with what the accelerometer felt?
 //!
-//! Flow that lies is not rejected: it moves tilt and accelerometer bias until acceleration and flow agree again. So the
-//! comparison undoes what flow did to the predicted acceleration over the last seconds. What remains of flow's velocity
-//! less the integral of that acceleration, over half a second, is what no motion explains: zeros or a frozen reading
-//! while the vehicle accelerates, axes swapped or reversed, an offset that begins.
+//! Flow that lies is not rejected: it moves tilt, accelerometer bias and gyro bias until acceleration and flow agree
+//! again. So the comparison undoes what flow did to the predicted acceleration over the last seconds: at once through
+//! tilt and accelerometer bias, and second after second through the gyro bias, which goes on turning the tilt. What
+//! remains of flow's velocity less the integral of that acceleration, over half a second, is what no motion explains: a
+//! frozen reading while the vehicle accelerates, axes swapped or reversed, an offset that begins.
+//!
+//! The limit is the root of a sum of squares, one for each reason why honest readings differ:
+//!
+//! | term | reason |
+//! |---|---|
+//! | constant, and for each metre of distance | accelerometer and tilt; resolution of the picture |
+//! | share of the picture's motion, and of the motion that the body's turning gives it | a reading holds one frame, two or none |
+//! | standard deviation that was added to the tilt | the filter found its own tilt to be wrong, so the acceleration that is restored is wrong, too |
+//!
+//! A picture that stands still while the body turns says that the vehicle moves by turn times distance the opposite
+//! way. A vehicle that is carried does so by millimetres.
 //!
 //! Not for an error of scale of some tens of per cent, nor for a constant offset that was there from the beginning: no
 //! other sensor on board measures a constant velocity.
 
-use stampfly_types::Vec3;
+use stampfly_types::{GRAVITY, Vec3};
 
 /// Time constant over which velocities are compared, s, and of the low-pass on their difference.
 const OVER: f32 = 0.5;
 const SMOOTH: f32 = 0.06;
-/// Time constant with which flow's corrections are forgotten, s.
+/// Time constants with which flow's corrections of tilt and accelerometer bias are forgotten, s, and those of the gyro
+/// bias. The latter act through the former, so they have to outlast them.
 const FORGOTTEN: f32 = 2.0;
-/// Largest difference, m/s, for each metre of distance, and as a share of the velocity.
-const DIFFERENCE: f32 = 0.7;
+const BIAS_FORGOTTEN: f32 = 4.0;
+/// Largest difference, m/s, and for each metre of distance. Over [`OVER`] 0.55 m/s are 1.1 m/s², as much as a tilt that
+/// is wrong by 6.4°.
+const DIFFERENCE: f32 = 0.55;
 const PER_METRE: f32 = 0.15;
+/// Share of the picture's motion. A PMW3901 takes 121 frames a second: of 100 readings every fifth holds two frames, and
+/// one that is read early none. Such a single reading is wrong by all of the motion, of which [`SMOOTH`] lets a seventh
+/// through, and a quarter of two that follow each other.
 const SHARE: f32 = 0.25;
+/// Largest difference for each radian that is added to the tilt's standard deviation, m/s: two deviations of the
+/// velocity that gravity brings about over [`OVER`].
+const PER_RADIAN: f32 = 2.0 * GRAVITY * OVER;
 /// For how long, s.
 const LASTS: f32 = 0.1;
 /// Readings running that are equal and not zero: frozen. At 100 Hz 0.4 s.
 const REPEATED: u32 = 40;
-/// The picture cannot stand still while the body turns by this much, rad: ten counts of a PMW3901. Nearer to the floor
+/// The picture cannot stand still while the body turns by this much, rad: three counts of a PMW3901. Nearer to the floor
 /// than [`SHARP`], m, it may be blurred.
-const TURNED: f32 = 0.025;
+const TURNED: f32 = 0.007;
 const SHARP: f32 = 0.15;
+/// Nor if the vehicle would have to move by this much, m, to keep it still. Over a quarter of a second 5 mm are
+/// 0.16 m/s², as much as a tilt that is wrong by 1°: the accelerometer contradicts no less.
+const COMPENSATED: f32 = 0.005;
 /// For so many readings running, at least.
 const ZEROS: u32 = 20;
 /// After a start in the air the filter first has to find tilt and biases, s.
@@ -41,10 +65,14 @@ const STANDING_RATE: f32 = 0.6;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct FlowMonitor {
-    /// Integral of the acceleration since the last reading.
+    /// Integral of the acceleration since the last reading, and over which time.
     change: [f32; 2],
-    /// What flow added to the acceleration lately.
+    elapsed: f32,
+    /// What flow added to the acceleration lately, and to the gyro bias.
     added: [f32; 2],
+    gyro_bias: [f32; 2],
+    /// Standard deviation that was added to the tilt lately.
+    tilt: f32,
     /// Flow's and the accelerometer's velocity above their mean of the last half second.
     flow: [f32; 2],
     inertial: [f32; 2],
@@ -81,17 +109,25 @@ impl FlowMonitor {
         self.implausible
     }
 
-    /// Integrates the change of the velocity, world.
+    /// Integrates the change of the velocity, world, in `dt`.
     #[inline]
-    pub(super) fn predict(&mut self, change: &Vec3) {
+    pub(super) fn predict(&mut self, change: &Vec3, dt: f32) {
+        self.elapsed += dt;
         self.change[0] += change.x;
         self.change[1] += change.y;
     }
 
-    /// Flow changed the predicted acceleration by this much, world.
-    pub(super) fn corrected(&mut self, change: &Vec3) {
-        self.added[0] += change.x;
-        self.added[1] += change.y;
+    /// Flow changed the predicted acceleration and the gyro bias by this much, world.
+    pub(super) fn corrected(&mut self, acceleration: &Vec3, gyro_bias: &Vec3) {
+        self.added[0] += acceleration.x;
+        self.added[1] += acceleration.y;
+        self.gyro_bias[0] += gyro_bias.x;
+        self.gyro_bias[1] += gyro_bias.y;
+    }
+
+    /// The filter found its tilt to be wrong, and added this standard deviation, rad.
+    pub(super) fn inflated(&mut self, tilt: f32) {
+        self.tilt = tilt;
     }
 
     /// Takes a reading of a standing vehicle: rate of the picture less the gyro's, rad/s.
@@ -102,29 +138,38 @@ impl FlowMonitor {
         *self = Self { standing, implausible: x * x + y * y > STANDING_RATE * STANDING_RATE, ..Self::default() };
     }
 
-    /// Takes a reading: counts as they came, what the body's own turning makes of
-    /// the picture, rad/s, velocity, world, and the distance to the floor. `known` says that the distance is
-    /// certain. True when it has just become implausible.
+    /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
+    /// rad/s, velocity, world, and the distance to the floor. `known` says that the distance is certain. True when it
+    /// has just become implausible.
     pub(super) fn flow(
         &mut self,
         counts: [f32; 2],
         turning: [f32; 2],
         velocity: &Vec3,
         distance: f32,
-        dt: f32,
+        interval: f32,
         known: bool,
     ) -> bool {
         let velocity = [velocity.x, velocity.y];
         let change = core::mem::take(&mut self.change);
-        let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0) else {
+        let dt = core::mem::take(&mut self.elapsed);
+        let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0 && interval > 0.0) else {
             // Where the distance jumps, the velocity does.
             (self.flow, self.inertial, self.difference) = Default::default();
             (self.differs, self.agrees) = (0.0, 0.0);
             return false;
         };
-        let (fade, forget) = (1.0 - dt / (OVER + dt), 1.0 - dt / FORGOTTEN);
+        let fade = OVER / (OVER + dt);
+        let forget = FORGOTTEN / (FORGOTTEN + dt);
         let smooth = dt / (SMOOTH + dt);
-        let [mut difference, mut motion, mut speed] = [0.0; 3];
+        let [x, y] = self.gyro_bias;
+        // A tilt that is turned by w changes the acceleration by gravity times w, a quarter turn about the vertical on.
+        // The bias is subtracted from the rate, so it turns the opposite way.
+        self.added[0] += GRAVITY * y * dt;
+        self.added[1] -= GRAVITY * x * dt;
+        self.gyro_bias = self.gyro_bias.map(|bias| bias * (BIAS_FORGOTTEN / (BIAS_FORGOTTEN + dt)));
+        self.tilt *= forget;
+        let [mut difference, mut motion, mut picture] = [0.0; 3];
         for axis in 0..2 {
             self.flow[axis] = (self.flow[axis] + velocity[axis] - last[axis]) * fade;
             self.inertial[axis] = (self.inertial[axis] + change[axis] - self.added[axis] * dt) * fade;
@@ -133,7 +178,8 @@ impl FlowMonitor {
             self.difference[axis] += (apart - self.difference[axis]) * smooth;
             difference += self.difference[axis] * self.difference[axis];
             motion += self.inertial[axis] * self.inertial[axis];
-            speed += velocity[axis] * velocity[axis];
+            let rate = counts[axis] / interval;
+            picture += rate * rate + turning[axis] * turning[axis];
         }
         let repeated = counts == self.reading && counts != [0.0; 2];
         self.repeats = if repeated { self.repeats.saturating_add(1) } else { 0 };
@@ -141,28 +187,90 @@ impl FlowMonitor {
         if counts == [0.0; 2] && distance > SHARP {
             self.zeros = self.zeros.saturating_add(1);
             for (turn, rate) in self.turn.iter_mut().zip(turning) {
-                *turn += rate * dt;
+                *turn += rate * interval;
                 self.turned = self.turned.max(turn.abs());
             }
         } else {
             (self.zeros, self.turn, self.turned) = Default::default();
         }
-        let blind = self.zeros >= ZEROS && self.turned > TURNED;
-        let limit = DIFFERENCE + PER_METRE * distance;
-        // The share is of squares: a sum of both would do as well, and costs a root.
-        let limit = limit * limit + SHARE * SHARE * speed;
-        self.differs = if difference > limit { self.differs + dt } else { 0.0 };
+        let blind = self.zeros >= ZEROS && self.turned > TURNED && self.turned * distance > COMPENSATED;
+        let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
+        // Of squares: a sum would do as well, and costs a root.
+        let limit = base * base + share * share * picture + tilt * tilt;
+        self.differs = if difference > limit { self.differs + interval } else { 0.0 };
         if self.implausible {
             if motion > MOTION * MOTION {
                 let agrees = difference < 0.2 * motion && self.repeats < REPEATED && self.zeros < ZEROS;
-                self.agrees = if agrees { self.agrees + dt } else { 0.0 };
+                self.agrees = if agrees { self.agrees + interval } else { 0.0 };
             }
             self.implausible = self.agrees < AGREES_FOR;
             return false;
         }
-        self.waits = (self.waits - dt).max(0.0);
+        self.waits = (self.waits - interval).max(0.0);
         self.implausible = (self.differs > LASTS && self.waits == 0.0) || self.repeats >= REPEATED || blind;
         self.agrees = 0.0;
         self.implausible
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f32 = 0.01;
+
+    /// A vehicle that stands still in the air, as flow tells; after each reading flow corrects the acceleration by this
+    /// much. After how many of 200 readings is flow not believed?
+    fn found(mut monitor: FlowMonitor, correction: Vec3) -> Option<u32> {
+        monitor.ready();
+        (0..200).find(|n| {
+            monitor.predict(&Vec3::zeros(), DT);
+            // Not frozen.
+            let counts = [if n % 2 == 0 { 0.002 } else { -0.002 }, 0.0];
+            let implausible = monitor.flow(counts, [0.0; 2], &Vec3::zeros(), 0.3, DT, true);
+            monitor.corrected(&correction, &Vec3::zeros());
+            implausible
+        })
+    }
+
+    #[test]
+    fn a_gyro_bias_that_flow_moved_explains_the_tilt_that_flow_goes_on_correcting() {
+        // A bias of (0.2, -0.1) rad/s tips the acceleration by gravity times as much each second.
+        let moved = |sign: f32| {
+            let mut monitor = FlowMonitor::airborne();
+            monitor.corrected(&Vec3::zeros(), &(Vec3::new(0.2, -0.1, 0.0) * sign));
+            monitor
+        };
+        let correction = Vec3::new(0.1, 0.2, 0.0) * GRAVITY * DT;
+        assert!(found(moved(1.0), correction).is_none());
+        let unmoved = found(moved(0.0), correction).unwrap();
+        assert!(found(moved(-1.0), correction).unwrap() < unmoved);
+    }
+
+    #[test]
+    fn a_tilt_that_was_found_to_be_wrong_may_be_corrected() {
+        let inflated = |tilt: f32| {
+            let mut monitor = FlowMonitor::airborne();
+            monitor.inflated(tilt);
+            monitor
+        };
+        // One and a half m/s² within two seconds.
+        let correction = Vec3::new(0.015, 0.0, 0.0);
+        let sure = found(inflated(0.0), correction).unwrap();
+        assert!(found(inflated(0.1), correction).is_none_or(|found| found > sure));
+        assert!(found(inflated(0.0), 0.25 * correction).is_none());
+    }
+
+    #[test]
+    fn a_picture_stands_still_for_millimetres_not_for_centimetres() {
+        let found = |distance: f32| {
+            let mut monitor = FlowMonitor::airborne();
+            (0..30).any(|_| {
+                monitor.predict(&Vec3::zeros(), DT);
+                // 0.012 rad in all.
+                monitor.flow([0.0; 2], [0.04, 0.0], &Vec3::new(0.0, -0.04 * distance, 0.0), distance, DT, true)
+            })
+        };
+        assert!(!found(0.3) && found(1.0));
     }
 }

@@ -212,7 +212,7 @@ impl Eskf {
         } else {
             let height = self.height();
             self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias, height);
-            self.flow_monitor.predict(change);
+            self.flow_monitor.predict(change, dt);
         }
     }
 }

@@ -117,7 +117,9 @@ impl Eskf {
         } else {
             let shaken = self.vibration[0].mean_square() > SHAKEN;
             let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && !shaken;
-            if self.flow_monitor.flow(counts, [raw.y, -raw.x], &world, distance, flow.interval, known) {
+            // Less the bias of the ground, which flow cannot have moved.
+            let turn = raw - self.calibration.gyro_bias;
+            if self.flow_monitor.flow(counts, [turn.y, -turn.x], &world, distance, flow.interval, known) {
                 // It has moved tilt and biases, too.
                 self.inflate_tilt();
                 for axis in 0..2 {
@@ -130,7 +132,7 @@ impl Eskf {
             return Err(Refusal::Implausible);
         }
         self.acceleration.update(middle, world);
-        let raw = self.force + self.state.accel_bias;
+        let (raw, bias) = (self.force + self.state.accel_bias, self.state.gyro_bias);
         let before = rotate(&self.state.rotation(), &self.force);
         let fusion = match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => {
@@ -154,8 +156,9 @@ impl Eskf {
                 self.finish_reset(Sensor::Flow)
             }
         };
-        let after = rotate(&self.state.rotation(), &(raw - self.state.accel_bias));
-        self.flow_monitor.corrected(&(after - before));
+        let rotation = self.state.rotation();
+        let after = rotate(&rotation, &(raw - self.state.accel_bias));
+        self.flow_monitor.corrected(&(after - before), &rotate(&rotation, &(self.state.gyro_bias - bias)));
         Ok(fusion)
     }
 

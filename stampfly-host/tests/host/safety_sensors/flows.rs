@@ -8,7 +8,7 @@ type Lie = Box<dyn FnMut(f32, &mut FlowData)>;
 fn lies() -> Vec<(&'static str, Lie, f32)> {
     let mut held = None;
     vec![
-        ("zero", Box::new(|_, flow: &mut FlowData| (flow.delta_x, flow.delta_y) = (0.0, 0.0)), 4.0),
+        ("zero", Box::new(|_, flow: &mut FlowData| (flow.delta_x, flow.delta_y) = (0.0, 0.0)), 2.0),
         (
             "frozen",
             Box::new(move |_, flow: &mut FlowData| {
@@ -22,14 +22,14 @@ fn lies() -> Vec<(&'static str, Lie, f32)> {
         (
             "reversed",
             Box::new(|_, flow: &mut FlowData| (flow.delta_x, flow.delta_y) = (-flow.delta_x, -flow.delta_y)),
-            5.0,
+            3.0,
         ),
         (
             "swapped",
             Box::new(|_, flow: &mut FlowData| (flow.delta_x, flow.delta_y) = (flow.delta_y, flow.delta_x)),
             4.0,
         ),
-        ("4 rad/s too much", Box::new(|_, flow: &mut FlowData| flow.delta_x += 0.04), 0.5),
+        ("2 rad/s too much", Box::new(|_, flow: &mut FlowData| flow.delta_x += 0.02), 0.5),
         ("huge", Box::new(|_, flow: &mut FlowData| flow.delta_x += 1.0), 0.5),
     ]
 }
