@@ -146,8 +146,6 @@ pub struct Eskf {
     flow_innovation_bias: InnovationBiasMonitor,
     flow_monitor: FlowMonitor,
     vertical: VerticalMonitor,
-    /// Last specific force used as the vertical, and what it should have been.
-    gravity: [Vec3; 2],
     status: EstimatorStatus,
 }
 
@@ -203,7 +201,6 @@ impl Eskf {
             flow_innovation_bias: InnovationBiasMonitor::default(),
             flow_monitor: FlowMonitor::airborne(),
             vertical: VerticalMonitor::airborne(),
-            gravity: [Vec3::zeros(); 2],
             status: EstimatorStatus::default(),
         }
     }
@@ -227,7 +224,15 @@ impl Eskf {
 
     /// The state at the time of a measurement. Refuses measurements before initialisation, and those that are not
     /// finite, not new, too old or from the future.
+    #[inline]
     fn time_align(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<DelayedState, Refusal> {
+        let age = self.accept_age(sensor, at, values)?;
+        // Right after the start the history is empty.
+        self.state_at(age).ok_or(Refusal::Stale)
+    }
+
+    /// How old a measurement is, s, if [`time_align`](Self::time_align) does not refuse it.
+    fn accept_age(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<f32, Refusal> {
         if !self.initialized {
             return Err(Refusal::NotInitialized);
         }
@@ -241,16 +246,17 @@ impl Eskf {
         if age < -MAX_AHEAD {
             return Err(Refusal::Future);
         }
-        if !self.gates.is_new(sensor, at) {
-            return Err(Refusal::Repeated);
-        }
+        if self.gates.is_new(sensor, at) { Ok(age) } else { Err(Refusal::Repeated) }
+    }
+
+    /// The state so many seconds ago. `None` when the history does not go back so far.
+    fn state_at(&self, age: f32) -> Option<DelayedState> {
         if age.abs() < SIMULTANEOUS {
-            return Ok(self.current_state());
+            return Some(self.current_state());
         }
-        // Right after the start the history is empty.
-        let step = self.history.since(age).ok_or(Refusal::Stale)?;
+        let step = self.history.since(age)?;
         let state = step.state_at_start(&self.state);
-        Ok(DelayedState { state, rotation: state.rotation(), step, age })
+        Some(DelayedState { state, rotation: state.rotation(), step, age })
     }
 
     /// Innovation of a measurement against the state of its time.

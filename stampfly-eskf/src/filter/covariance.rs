@@ -242,7 +242,7 @@ impl Covariance {
             let dot = |row: &Row| {
                 let mut sum = 0.0;
                 for ([a, b, c], [x, y, z]) in blocks.iter().zip(row.as_chunks::<3>().0) {
-                    if [*a, *b, *c] != [0.0; 3] {
+                    if *a != 0.0 || *b != 0.0 || *c != 0.0 {
                         sum += a * x + b * y + c * z;
                     }
                 }
@@ -250,7 +250,7 @@ impl Covariance {
             };
             let mut column = [0.0; WIDTH];
             for ([a, b, c], [x, y, z]) in blocks.iter().zip(self.rows.as_chunks::<3>().0) {
-                if [*a, *b, *c] != [0.0; 3] {
+                if *a != 0.0 || *b != 0.0 || *c != 0.0 {
                     add_multiples::<0, 3, WHOLE_ROWS>(&mut column, [(*a, x), (*b, y), (*c, z)]);
                 }
             }

@@ -64,7 +64,7 @@ impl ImuMonitor {
         let mean = self.mean.get_or_insert(imu.accel);
         *mean += (imu.accel - *mean) * config.force_weight;
         let [low, high] = config.force_range;
-        let off = holds_height && !(low..=high).contains(&mean.norm());
+        let off = holds_height && !(low * low..=high * high).contains(&mean.norm_squared());
         let off = lasts(&mut self.off, at, off, config.force_time);
         worst >= config.stuck_samples || self.suspects >= SUSPECTS || off
     }
