@@ -13,7 +13,8 @@ const SHAKEN: f32 = 100.0;
 
 impl Eskf {
     pub(super) fn update_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
-        let delayed = self.time_align(Sensor::Tof, at, &[tof.distance])?;
+        let age = self.admit(Sensor::Tof, at, &[tof.distance])?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         if !tof.valid {
             return Err(Refusal::Quality);
         }
@@ -77,7 +78,8 @@ impl Eskf {
         // The reading is the mean velocity over the interval: compare it with the state in the middle of it.
         let late = self.config.flow_delay + 0.5 * flow.interval;
         let middle = at - Duration::from_micros((late * 1e6) as u64);
-        let delayed = self.time_align(Sensor::Flow, middle, &[flow.delta_x, flow.delta_y])?;
+        let age = self.admit(Sensor::Flow, middle, &[flow.delta_x, flow.delta_y])?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         if delayed.rotation[2][2] < self.config.min_cos_tilt {
             return Err(Refusal::Tilt);
         }
@@ -160,7 +162,8 @@ impl Eskf {
         if !self.config.baro_enable {
             return Err(Refusal::NotUsed);
         }
-        let delayed = self.time_align(Sensor::Baro, at, &[baro.altitude])?;
+        let age = self.admit(Sensor::Baro, at, &[baro.altitude])?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         self.vertical.baro(self.now, baro.altitude, self.anchor.is_some());
         let noise = self.config.baro_sigma * self.config.baro_sigma;
         let here = baro.altitude + delayed.state.position.z;
@@ -208,7 +211,8 @@ impl Eskf {
         if !self.config.mag_enable {
             return Err(Refusal::NotUsed);
         }
-        let delayed = self.time_align(Sensor::Mag, at, mag.field.as_slice())?;
+        let age = self.admit(Sensor::Mag, at, mag.field.as_slice())?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         let strength = mag.field.norm();
         if !(10.0..=100.0).contains(&strength) {
             return Err(Refusal::Range);
@@ -254,7 +258,8 @@ impl Eskf {
     }
 
     pub(super) fn update_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
-        let delayed = self.time_align(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
+        let age = self.admit(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-6);
         let rows = aid::velocity::world(&delayed.state);
         let innovation = self.innovation(&delayed, rows, (*velocity).into(), [variance; 3]);
@@ -275,7 +280,8 @@ impl Eskf {
     }
 
     pub(super) fn update_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
-        let delayed = self.time_align(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
+        let age = self.admit(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-8);
         let rows = aid::position::world(&delayed.state);
         let innovation = self.innovation(&delayed, rows, (*position).into(), [variance; 3]);
@@ -300,7 +306,8 @@ impl Eskf {
 
     pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
         let [x, y, z, w]: [f32; 4] = attitude.coords.into();
-        let delayed = self.time_align(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
+        let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
+        let Some(delayed) = self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-8);
         let error = aid::attitude::error(delayed.state.attitude, [w, x, y, z]);
         let innovation = self.innovation(&delayed, aid::attitude::rows(), error.into(), [variance; 3]);
