@@ -303,6 +303,13 @@ mod tests {
             let back = Duration::from_seconds(Duration::from_micros(micros).seconds());
             prop_assert!(back.as_micros().abs_diff(micros) <= 1);
         }
+
+        #[test]
+        fn seconds_of_any_length_are_as_exact(bits in 0u32..64, micros in any::<u64>()) {
+            let duration = Duration::from_micros(micros >> bits);
+            let exact = duration.seconds_f64();
+            prop_assert!((f64::from(duration.seconds()) - exact).abs() <= 2e-7 * exact, "{duration}");
+        }
     }
 
     #[test]
