@@ -14,9 +14,9 @@ stampfly_bus::schedule! {
     pub struct Runnables on crate::topics from VehicleConfig;
 
     /// State estimation.
-    estimation = Estimation: on sensor_imu, flight, 350 us;
+    estimation = Estimation: on sensor_imu, flight, 320 us;
     /// Anomaly detection.
-    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 50 us;
+    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 40 us;
     /// Take-off and landing manager.
     landing = Landing: after failsafe, flight, 25 us;
     /// State management: the only place where the vehicle changes state.
@@ -29,7 +29,7 @@ stampfly_bus::schedule! {
     actuation = Actuation: after control, flight, 40 us;
 
     /// Still-calibration.
-    calibration = Calibration: every 20 ms, background, 110 us;
+    calibration = Calibration: every 20 ms, background, 100 us;
     /// Command arbitration.
     command = Command: every 20 ms, background, 30 us;
     /// Button gestures.

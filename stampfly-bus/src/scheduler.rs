@@ -66,8 +66,9 @@ impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
     #[must_use]
     pub fn due(&self, band: Band, first: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<(usize, Instant)> {
         let states = self.states.as_ref();
-        let lines = self.table.iter().zip(states).enumerate().skip(first);
-        lines
+        let lines = self.table.get(first..)?.iter().zip(states.get(first..)?);
+        (first..)
+            .zip(lines)
             .filter(|(_, (info, _))| info.band == band)
             .find_map(|(index, (info, state))| triggered(states, info, state, clock, heads).map(|now| (index, now)))
     }

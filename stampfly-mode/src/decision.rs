@@ -26,7 +26,7 @@ use crate::arming;
 use crate::config::ModeConfig;
 use crate::facts::Facts;
 pub use crate::state::{CUT, LAND, Silence, State};
-use crate::transitions::{Event, TABLE, is_airborne, is_armed};
+use crate::transitions::{Event, is_airborne, is_armed, rows};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, GroundContact, Validity,
 };
@@ -60,26 +60,30 @@ impl State {
 /// ```
 #[must_use]
 pub fn decide(config: &ModeConfig, state: &State, facts: &Facts) -> State {
-    let before = state;
-    let mut state = *before;
-    watch_link(config, &mut state, facts);
-    choose_commander(before, &mut state, facts);
-    choose_mode(config, &mut state, facts);
-    watch_pairing(config, &mut state, facts);
-    watch_height(&mut state, facts);
-    let crashed = state.unacknowledged;
+    let mut next = *state;
+    advance(config, &mut next, facts);
+    next
+}
+
+/// [`decide`] in place: a copy of the state is 130 instructions.
+pub(crate) fn advance(config: &ModeConfig, state: &mut State, facts: &Facts) {
+    let (was_armed, was_manual) = (state.is_armed(), state.mode.is_manual());
+    watch_link(config, state, facts);
+    choose_commander(state, facts);
+    choose_mode(config, state, facts);
+    watch_pairing(config, state, facts);
+    watch_height(state, facts);
     // A person has come to look at the vehicle. A press alone is no sign of it: what it becomes may be a click, which must not
     // find the crash acknowledged and arm.
     let gesture = facts.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
-    if !before.is_armed() && (facts.pilot.switch.falls || gesture || facts.asked.disarm) {
+    let acknowledges = !was_armed && (facts.pilot.switch.falls || gesture || facts.asked.disarm);
+    let next = rows(state.phase).iter().find(|row| happens(row.event, config, was_manual, state, facts));
+    // What is acknowledged in this step does not arm in it.
+    if acknowledges {
         state.unacknowledged = ArmBlocks::NONE;
     }
-    // What is acknowledged in this step does not arm in it.
-    let present = State { unacknowledged: crashed, ..state };
-    // Rows of a phase stand in the order of their urgency.
-    let mut rows = TABLE.iter().filter(|row| row.from == state.phase);
-    if let Some(row) = rows.find(|row| happens(row.event, config, before, &present, facts)) {
-        leave_and_enter(config, &mut state, facts, row.event, row.to);
+    if let Some(row) = next {
+        leave_and_enter(config, state, facts, row.event, row.to);
     } else if state.phase == FlightPhase::Landing && facts.pilot.switch.falls {
         // The pilot wants this landing, whatever began it. The next switch-off means more.
         state.landing_by_switch = true;
@@ -89,7 +93,6 @@ pub fn decide(config: &ModeConfig, state: &State, facts: &Facts) -> State {
         state.full_resets = state.full_resets.wrapping_add(1);
     }
     state.diverged = diverged;
-    state
 }
 
 /// A silence ends when the commander has been heard for a while: a link that flaps is none.
@@ -109,14 +112,14 @@ fn watch_link(config: &ModeConfig, state: &mut State, facts: &Facts) {
     };
 }
 
-fn choose_commander(before: &State, state: &mut State, facts: &Facts) {
+fn choose_commander(state: &mut State, facts: &Facts) {
     if !state.is_armed() {
         state.commander = CommandSource::None;
         return;
     }
     let pilot = &facts.pilot;
     let acts = pilot.deflected || pilot.mode_turned || pilot.switch.rises || pilot.switch.falls;
-    let retakes = facts.asked.flies() && !before.wanted.is_manual();
+    let retakes = facts.asked.flies() && !state.wanted.is_manual();
     // On the ground no flight is interrupted.
     let starts = facts.asked.flies() && state.phase == FlightPhase::Armed;
     if acts {
@@ -172,7 +175,7 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let adrift = state.wanted == FlightMode::PosHold && state.mode != FlightMode::PosHold;
     let adrift = adrift && state.commander != CommandSource::Pilot && is_airborne(state.phase);
     state.adrift = adrift.then(|| state.adrift.unwrap_or(facts.now));
-    let rests = facts.pilot.frame.is_none_or(|(_, input)| input.throttle <= config.throttle_rest);
+    let rests = facts.pilot.frame.as_ref().is_none_or(|(_, input)| input.throttle <= config.throttle_rest);
     state.throttle_rested |= rests;
 }
 
@@ -183,7 +186,7 @@ fn watch_pairing(config: &ModeConfig, state: &mut State, facts: &Facts) {
         state.pairing = if state.pairing.is_some() { None } else { Some(facts.now) };
     }
     state.pairing = state.pairing.filter(|since| {
-        let paired = facts.pilot.frame.is_some_and(|(at, _)| at > *since + config.pairing_settle);
+        let paired = facts.pilot.frame.as_ref().is_some_and(|(at, _)| *at > *since + config.pairing_settle);
         !paired && facts.now.since(*since) < config.pairing_timeout
     });
 }
@@ -193,30 +196,31 @@ fn watch_height(state: &mut State, facts: &Facts) {
     state.unmeasured = unmeasured.then(|| state.unmeasured.unwrap_or(facts.now));
 }
 
-/// Has this event happened? The words are in [`Event::guard`].
-fn happens(event: Event, config: &ModeConfig, before: &State, state: &State, facts: &Facts) -> bool {
+/// Has this event happened? The words are in [`Event::guard`]. `was_manual`: the mode in force in the step before was.
+// Inlined, the conditions of every event would be computed before the loop over the rows: some 300 instructions.
+#[inline(never)]
+fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, facts: &Facts) -> bool {
     let (asked, pilot, phase) = (&facts.asked, &facts.pilot, state.phase);
-    let waited = facts.now.since(state.entered);
+    let waited = |time: Duration| facts.now.since(state.entered) >= time;
     let lasts = |since: Option<Instant>, time: Duration| since.is_some_and(|since| facts.now.since(since) >= time);
-    let kill = asked.kill
-        || facts.stop_button
-        || facts.cut_off
-        || pilot.frame.is_some_and(|(_, input)| input.kill)
-        || facts.alerts.intersects(CUT);
-    let throttle = pilot.frame.map_or(0.0, |(_, input)| input.throttle);
+    let kill = || {
+        asked.kill
+            || facts.stop_button
+            || facts.cut_off
+            || pilot.frame.as_ref().is_some_and(|(_, input)| input.kill)
+            || facts.alerts.intersects(CUT)
+    };
     match event {
-        Event::Emergency => kill,
+        Event::Emergency => kill(),
         Event::Stop => match phase {
             FlightPhase::Armed => {
-                asked.disarm || pilot.switch.falls || pilot.switch.found_off || waited >= config.armed_timeout
+                asked.disarm || pilot.switch.falls || pilot.switch.found_off || waited(config.armed_timeout)
             }
             // A transmitter that restarts turns both switches at once; that is no wish to fall.
-            FlightPhase::TakeOff | FlightPhase::Flying => {
-                pilot.switch.falls && before.mode.is_manual() && state.mode.is_manual()
-            }
+            FlightPhase::TakeOff | FlightPhase::Flying => pilot.switch.falls && was_manual && state.mode.is_manual(),
             FlightPhase::Landing => {
                 let low = state.is_low(config, facts) && (asked.disarm || pilot.switch.falls);
-                low || (pilot.switch.falls && state.landing_by_switch) || waited >= state.landing_limit
+                low || (pilot.switch.falls && state.landing_by_switch) || waited(state.landing_limit)
             }
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld => false,
         },
@@ -226,7 +230,7 @@ fn happens(event: Event, config: &ModeConfig, before: &State, state: &State, fac
             let unheard = silent && (lasts(state.silence.map(|s| s.since), config.hover_without_link));
             let unled = silent || facts.sticks == CommandSource::Failsafe;
             let blind = lasts(state.blind, config.blind) || (state.blind.is_some() && unled);
-            let overdue = phase == FlightPhase::TakeOff && waited >= config.take_off_timeout;
+            let overdue = phase == FlightPhase::TakeOff && waited(config.take_off_timeout);
             asked.land
                 || asked.disarm
                 || pilot.switch.falls
@@ -242,13 +246,14 @@ fn happens(event: Event, config: &ModeConfig, before: &State, state: &State, fac
         }
         Event::TakeOff => {
             let piloted = state.commander == CommandSource::Pilot && facts.sticks == CommandSource::Pilot;
+            let throttle = pilot.frame.as_ref().map_or(0.0, |(_, input)| input.throttle);
             let raised = piloted && state.throttle_rested && throttle > config.throttle_take_off;
-            let by_itself = !state.mode.is_manual() && state.takes_off && waited >= config.spool;
+            let by_itself = !state.mode.is_manual() && state.takes_off && waited(config.spool);
             asked.take_off || by_itself || raised
         }
         Event::Arm => {
             let wanted = asked.arm || pilot.switch.rises || facts.button == Some(ButtonGesture::Click);
-            let refused = kill || asked.disarm || asked.land || pilot.switch.falls || facts.pressed();
+            let refused = kill() || asked.disarm || asked.land || pilot.switch.falls || facts.pressed();
             wanted && !refused && arming::blocks(config, state, facts).is_empty()
         }
         Event::SetDown => {

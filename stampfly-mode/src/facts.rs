@@ -87,7 +87,14 @@ pub struct Facts {
 }
 
 impl Facts {
-    pub(crate) fn read(now: Instant, input: &ModeInput<'_>, pilot: Heard, armed: bool) -> Self {
+    pub(crate) fn read(
+        now: Instant,
+        input: &ModeInput<'_>,
+        pilot: Heard,
+        armed: bool,
+        stop_button: bool,
+        button: Option<ButtonGesture>,
+    ) -> Self {
         Self {
             now,
             alerts: input.alerts,
@@ -103,8 +110,8 @@ impl Facts {
             asked: Asked::read(input.commands),
             pilot,
             sticks: input.sticks,
-            stop_button: false,
-            button: None,
+            stop_button,
+            button,
             cut_off: input.cut_off,
         }
     }

@@ -72,7 +72,7 @@ use stampfly_types::{Instant, Stamped};
 /// let quiet = FailsafeInput { imu: &[], ..quiet };
 /// assert!(failsafe.step(Instant::from_micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Failsafe {
     config: FailsafeConfig,
@@ -97,11 +97,28 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::IMU_FAULTY)
     .with(Alerts::ESTIMATE_DIVERGED);
 
+impl Default for Failsafe {
+    fn default() -> Self {
+        Self::new(FailsafeConfig::default())
+    }
+}
+
 impl Failsafe {
     /// Nothing wrong yet.
     #[must_use]
     pub fn new(config: FailsafeConfig) -> Self {
-        Self { config, ..Self::default() }
+        Self {
+            config,
+            active: Alerts::NONE,
+            seen: Alerts::NONE,
+            last_imu: None,
+            heard_imu: Instant::ZERO,
+            latched_at: Instant::ZERO,
+            imu: ImuMonitor::default(),
+            motion: MotionMonitor::default(),
+            attitude: AttitudeMonitor::new(&config),
+            power: PowerMonitor::default(),
+        }
     }
 
     /// One step; runs on a deadline when there are no samples.

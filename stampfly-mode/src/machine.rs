@@ -1,11 +1,11 @@
 //! The mode machine: the only place where the vehicle changes phase, mode and commander.
 //!
 //! [`ModeMachine::step`] turns its inputs into [`Facts`] (switches debounced, sticks cleaned, gestures told apart) and lets
-//! [`decide`] say what follows. The failsafe is an event, never a phase.
+//! [`decide`](crate::decision::decide) say what follows. The failsafe is an event, never a phase.
 
 use crate::arming::{Refusal, Refusals};
 use crate::config::ModeConfig;
-use crate::decision::{State, decide};
+use crate::decision::{State, advance};
 use crate::facts::Facts;
 pub use crate::input::{Command, ModeInput};
 use crate::pilot::Transmitter;
@@ -81,34 +81,34 @@ impl ModeMachine {
 
     /// One step, at the control rate.
     pub fn step(&mut self, now: Instant, input: &ModeInput<'_>) -> ModeOutput {
-        let before = self.state;
-        let armed = before.is_armed();
-        let flies = before.commander == CommandSource::Pilot;
+        let armed = self.state.is_armed();
+        let flies = self.state.commander == CommandSource::Pilot;
         let pilot = self.transmitter.step(&self.config, input.pilot, armed, flies);
         // The button is on the vehicle: a gesture on an armed one means that it is held in a hand.
         let stop_button = self.stop_button.stops(now, self.config.button_release, input.button, armed);
         let button = self.stop_button.unused(input.button);
-        let facts = Facts { stop_button, button, ..Facts::read(now, input, pilot, armed) };
+        let facts = Facts::read(now, input, pilot, armed, stop_button, button);
 
-        let state = decide(&self.config, &before, &facts);
-        if state.pairing.is_some() != before.pairing.is_some() {
+        let State { phase, unacknowledged, pairing, .. } = self.state;
+        advance(&self.config, &mut self.state, &facts);
+        let state = &self.state;
+        if state.pairing.is_some() != pairing.is_some() {
             // Another transmitter has to show its arm switch off, too.
             self.transmitter.forget();
         }
         let blocks = if armed {
             // There is nothing to arm, and the checks would be half of a step.
-            if before.phase == FlightPhase::Armed {
+            if phase == FlightPhase::Armed {
                 self.refusals.clear();
             }
             ArmBlocks::NOT_ON_GROUND
         } else {
             // The checks of this decision: before what it acknowledged and where it led.
-            let checked = State { phase: before.phase, unacknowledged: before.unacknowledged, ..state };
+            let checked = State { phase, unacknowledged, ..*state };
             self.refusals.step(&self.config, &checked, &facts);
             self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check)
         };
-        self.state = state;
-        let asked = facts.asked.arm || pilot.switch.rises || button == Some(ButtonGesture::Click);
+        let asked = facts.asked.arm || facts.pilot.switch.rises || button == Some(ButtonGesture::Click);
         ModeOutput {
             flight_status: FlightStatus {
                 phase: state.phase,

@@ -128,6 +128,29 @@ pub const TABLE: &[Transition] = &[
     row(S::Landing, E::Touchdown, S::IdleGround),
 ];
 
+/// First row of each phase, and the one after its last. The whole table in every step would be 150 instructions.
+const PLACES: [(usize, usize); FlightPhase::ALL.len()] = {
+    let mut places = [(0, 0); FlightPhase::ALL.len()];
+    let mut index = 0;
+    while index < TABLE.len() {
+        let (first, end) = &mut places[TABLE[index].from as usize];
+        if *end == 0 {
+            *first = index;
+        }
+        assert!(*end == 0 || *end == index, "the rows of a phase stand together");
+        *end = index + 1;
+        index += 1;
+    }
+    places
+};
+
+/// The rows of a phase, most urgent first.
+#[must_use]
+pub fn rows(phase: FlightPhase) -> &'static [Transition] {
+    let place = PLACES.get(phase as usize);
+    place.and_then(|(first, end)| TABLE.get(*first..*end)).unwrap_or_default()
+}
+
 /// Where an event leads; `None` when the phase ignores it.
 ///
 /// ```
@@ -138,7 +161,7 @@ pub const TABLE: &[Transition] = &[
 /// ```
 #[must_use]
 pub fn next(phase: FlightPhase, event: Event) -> Option<FlightPhase> {
-    TABLE.iter().find(|row| row.from == phase && row.event == event).map(|row| row.to)
+    rows(phase).iter().find(|row| row.event == event).map(|row| row.to)
 }
 
 /// May the motors turn in this phase?

@@ -54,6 +54,19 @@ pub fn tilt(attitude: &Quat) -> f32 {
     2.0 * math::atan2(math::sqrt(q.i * q.i + q.j * q.j), math::sqrt(q.w * q.w + q.k * q.k))
 }
 
+/// Cosine of [`tilt`]: what to compare with a limit, because it takes no root and no arc tangent. Not for a tilt near zero,
+/// whose cosine hardly changes.
+///
+/// ```
+/// use stampfly_types::{Quat, frame::cos_tilt};
+/// assert!((cos_tilt(&Quat::from_euler_angles(0.3, 0.0, 2.0)) - 0.3f32.cos()).abs() < 1e-6);
+/// ```
+#[must_use]
+pub fn cos_tilt(attitude: &Quat) -> f32 {
+    let q = attitude.quaternion();
+    1.0 - 2.0 * (q.i * q.i + q.j * q.j)
+}
+
 /// The attitude with this heading and no tilt.
 #[must_use]
 pub fn from_yaw(yaw: f32) -> Quat {

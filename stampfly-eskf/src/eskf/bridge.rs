@@ -6,15 +6,17 @@
 //! 0.2 m/s and the tilt of 2000 °/s is 5°.
 
 use crate::config::EskfConfig;
-use stampfly_types::Instant;
 use stampfly_types::messages::ImuData;
+use stampfly_types::{Duration, Instant};
 
 /// Samples running that are bridged.
 const LONGEST: u32 = 3;
 /// Share of full scale that counts as full scale.
 const FULL: f32 = 0.9;
-/// After a gap this long nothing is known about what the rate was, s.
-const GAP: f32 = 0.05;
+/// After a gap this long nothing is known about what the rate was.
+const GAP: Duration = Duration::from_millis(50);
+/// Two samples that came together are a period apart, this long at least.
+const PERIOD: Duration = Duration::from_millis(2);
 
 /// The last sample that was believed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,9 +30,9 @@ impl Bridge {
     /// What to use in place of a finite sample; `None` for the sample itself.
     pub(super) fn step(&mut self, config: &EskfConfig, at: Instant, imu: &ImuData) -> Option<ImuData> {
         let stand_in = self.last.filter(|(last, before)| {
-            // Two samples that came together are a period apart.
-            let elapsed = at.since(*last).seconds().max(2e-3);
-            let jumps = (imu.gyro - before.gyro).amax() > config.angular_acceleration * elapsed;
+            let elapsed = at.since(*last).max(PERIOD);
+            let limit = config.angular_acceleration * elapsed.seconds();
+            let jumps = (imu.gyro - before.gyro).iter().any(|change| change.abs() > limit);
             let full = imu.accel.iter().all(|axis| axis.abs() > FULL * config.accel_full_scale);
             elapsed < GAP && (jumps || full) && self.bridged < LONGEST
         });

@@ -63,8 +63,11 @@ impl Estimator for Eskf {
         }
     }
 
+    // Inlined into the loop over the samples, it would compute seventy addresses before the loop: 140 instructions.
+    #[inline(never)]
     fn predict(&mut self, at: Instant, imu: &ImuData) {
-        let usable = imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.is_finite());
+        let finite = |v: &Vec3| v.x.is_finite() && v.y.is_finite() && v.z.is_finite();
+        let usable = finite(&imu.accel) && finite(&imu.gyro);
         let dt = at.since(self.now).seconds();
         if !usable {
             self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
@@ -195,9 +198,7 @@ impl Estimator for Eskf {
     }
 
     fn status(&self) -> EstimatorStatus {
-        let [measured, predicted] = &self.gravity;
-        let apart = measured.cross(predicted).norm();
-        EstimatorStatus { accel_innovation: math::atan2(apart, measured.dot(predicted)), ..self.status }
+        self.status
     }
 }
 

@@ -16,7 +16,8 @@ const SHAKEN: f32 = 100.0;
 
 impl Eskf {
     pub(super) fn update_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
-        let delayed = self.time_align(Sensor::Tof, at, &[tof.distance])?;
+        let age = self.admit(Sensor::Tof, at, &[tof.distance])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         if !tof.valid {
             return Err(Refusal::Quality);
         }
@@ -46,7 +47,7 @@ impl Eskf {
         let cone = tof.distance * (1.0 - cos_tilt);
         let sigma = self.config.tof_sigma.max(tof.sigma) + cone;
         let variance = sigma * sigma;
-        let innovation = self.innovation(&delayed, [row], [tof.distance], [variance]);
+        let innovation = self.innovation(delayed, [row], [tof.distance], [variance]);
         let ratio = self.test_ratio(&innovation);
         self.status.tof_innovation = tof.distance - row.predicted;
         self.status.tof_ratio = ratio;
@@ -80,7 +81,8 @@ impl Eskf {
         // The reading is the mean velocity over the interval: compare it with the state in the middle of it.
         let late = self.config.flow_delay + 0.5 * flow.interval;
         let middle = at - Duration::from_micros((late * 1e6) as u64);
-        let delayed = self.time_align(Sensor::Flow, middle, &[flow.delta_x, flow.delta_y])?;
+        let age = self.admit(Sensor::Flow, middle, &[flow.delta_x, flow.delta_y])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         if delayed.rotation[2][2] < self.config.min_cos_tilt {
             return Err(Refusal::Tilt);
         }
@@ -104,7 +106,7 @@ impl Eskf {
         };
         let variances = [variance(&rows[0], raw.y), variance(&rows[1], -raw.x)];
         // One gate for both axes: a single axis locked out drifts unnoticed.
-        let innovation = self.innovation(&delayed, rows, measured, variances);
+        let innovation = self.innovation(delayed, rows, measured, variances);
         let ratio = self.test_ratio(&innovation);
         self.status.flow_innovation = [measured[0] - rows[0].predicted, measured[1] - rows[1].predicted];
         self.status.flow_ratio = ratio;
@@ -166,7 +168,8 @@ impl Eskf {
         if !self.config.baro_enable {
             return Err(Refusal::NotUsed);
         }
-        let delayed = self.time_align(Sensor::Baro, at, &[baro.altitude])?;
+        let age = self.admit(Sensor::Baro, at, &[baro.altitude])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         self.vertical.baro(self.now, baro.altitude, self.anchor.is_some());
         let noise = self.config.baro_sigma * self.config.baro_sigma;
         let here = baro.altitude + delayed.state.position.z;
@@ -176,7 +179,7 @@ impl Eskf {
         let offset = *offset;
         let row = aid::baro::altitude(&delayed.state, offset.value());
         let residual = baro.altitude - row.predicted;
-        let innovation = self.innovation(&delayed, [row], [baro.altitude], [noise + offset.variance()]);
+        let innovation = self.innovation(delayed, [row], [baro.altitude], [noise + offset.variance()]);
         let ratio = self.test_ratio(&innovation);
         self.status.baro_innovation = residual;
         self.status.baro_ratio = ratio;
@@ -214,7 +217,8 @@ impl Eskf {
         if !self.config.mag_enable {
             return Err(Refusal::NotUsed);
         }
-        let delayed = self.time_align(Sensor::Mag, at, mag.field.as_slice())?;
+        let age = self.admit(Sensor::Mag, at, mag.field.as_slice())?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let strength = mag.field.norm();
         if !(10.0..=100.0).contains(&strength) {
             return Err(Refusal::Range);
@@ -226,7 +230,7 @@ impl Eskf {
         self.status.mag_innovation = -row.predicted;
         match self.config.mag_model {
             MagModel::Heading => {
-                let innovation = self.innovation(&delayed, [row], [0.0], [variance]);
+                let innovation = self.innovation(delayed, [row], [0.0], [variance]);
                 let ratio = self.test_ratio(&innovation);
                 Ok(self.gate_mag(&innovation, ratio))
             }
@@ -234,7 +238,7 @@ impl Eskf {
                 let rows = aid::field::direction(&delayed.rotation, &reference);
                 let direction = mag.field / strength;
                 let measured = [direction.x, direction.y, direction.z];
-                let innovation = self.innovation(&delayed, rows, measured, [variance; 3]);
+                let innovation = self.innovation(delayed, rows, measured, [variance; 3]);
                 let ratio = self.test_ratio(&innovation);
                 Ok(self.gate_mag(&innovation, ratio))
             }
@@ -260,10 +264,11 @@ impl Eskf {
     }
 
     pub(super) fn update_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
-        let delayed = self.time_align(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
+        let age = self.admit(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-6);
         let rows = aid::velocity::world(&delayed.state);
-        let innovation = self.innovation(&delayed, rows, (*velocity).into(), [variance; 3]);
+        let innovation = self.innovation(delayed, rows, (*velocity).into(), [variance; 3]);
         let ratio = self.test_ratio(&innovation);
         self.acceleration.update(at, *velocity);
         match self.gates.test(Sensor::Velocity, self.now, ratio, self.config.lockout) {
@@ -281,10 +286,11 @@ impl Eskf {
     }
 
     pub(super) fn update_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
-        let delayed = self.time_align(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
+        let age = self.admit(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-8);
         let rows = aid::position::world(&delayed.state);
-        let innovation = self.innovation(&delayed, rows, (*position).into(), [variance; 3]);
+        let innovation = self.innovation(delayed, rows, (*position).into(), [variance; 3]);
         let ratio = self.test_ratio(&innovation);
         match self.gates.test(Sensor::Position, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
@@ -306,10 +312,11 @@ impl Eskf {
 
     pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
         let [x, y, z, w]: [f32; 4] = attitude.coords.into();
-        let delayed = self.time_align(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
+        let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-8);
         let error = aid::attitude::error(delayed.state.attitude, [w, x, y, z]);
-        let innovation = self.innovation(&delayed, aid::attitude::rows(), error.into(), [variance; 3]);
+        let innovation = self.innovation(delayed, aid::attitude::rows(), error.into(), [variance; 3]);
         let ratio = self.test_ratio(&innovation);
         match self.gates.test(Sensor::Attitude, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),

@@ -35,7 +35,8 @@ impl Eskf {
         let rows = aid::gravity::specific_force(&delayed.state, &delayed.rotation, acceleration);
         let innovation = self.innovation(&delayed, rows, accel.into(), [variance; 3]);
         let ratio = self.test_ratio(&innovation);
-        self.gravity = [accel, Vec3::new(rows[0].predicted, rows[1].predicted, rows[2].predicted)];
+        let predicted = Vec3::new(rows[0].predicted, rows[1].predicted, rows[2].predicted);
+        self.status.accel_innovation = math::atan2(accel.cross(&predicted).norm(), accel.dot(&predicted));
         self.status.accel_ratio = ratio;
         let fusion = match self.gates.test(Sensor::Gravity, self.now, ratio, 4.0 * self.config.lockout) {
             GateResult::Fuse => self.update(&innovation, ratio),

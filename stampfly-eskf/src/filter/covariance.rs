@@ -176,40 +176,38 @@ impl Covariance {
 
         let driving = [0.0, noise.velocity, noise.attitude, noise.gyro_bias, noise.accel_bias];
 
-        // Rows: T = F·P for the nine rows that change, from the diagonal block on.
-        let p = &self.rows;
-        let mut t = [[0.0; WIDTH]; 9];
-        for i in 0..3 {
-            let (a, b, c) = (by_attitude[i], by_bias[i], turn[i]);
-            let [x, y, z] = [0, 1, 2].map(|axis| &p[ATTITUDE + axis]);
-            let bias = [0, 1, 2].map(|axis| &p[ACCEL_BIAS + axis]);
-            let mut row = p[POSITION + i];
-            add_multiples::<POSITION, 1, WHOLE>(&mut row, [(dt, &p[VELOCITY + i])]);
-            t[i] = row;
-            let mut row = p[VELOCITY + i];
-            add_multiples::<VELOCITY, 3, WHOLE>(&mut row, [(a[0], x), (a[1], y), (a[2], z)]);
-            add_multiples::<VELOCITY, 3, WHOLE>(&mut row, [(b[0], bias[0]), (b[1], bias[1]), (b[2], bias[2])]);
-            t[3 + i] = row;
-            let mut row = [0.0; WIDTH];
-            add_multiples::<ATTITUDE, 3, WHOLE>(&mut row, [(c[0], x), (c[1], y), (c[2], z)]);
-            add_multiples::<ATTITUDE, 1, WHOLE>(&mut row, [(-dt, &p[GYRO_BIAS + i])]);
-            t[6 + i] = row;
+        // Rows: T = F·P for the nine that change, from the diagonal block on. Each block needs only those after it as they
+        // were, so it takes their place.
+        let [position, velocity, attitude, gyro_bias, accel_bias] = self.rows.as_chunks_mut::<3>().0 else { return };
+        for (row, velocity) in position.iter_mut().zip(&*velocity) {
+            add_multiples::<POSITION, 1, WHOLE>(row, [(dt, velocity)]);
+        }
+        let before = *attitude;
+        let [x, y, z] = &before;
+        let [bias_x, bias_y, bias_z] = &*accel_bias;
+        for ((row, a), b) in velocity.iter_mut().zip(&by_attitude).zip(&by_bias) {
+            add_multiples::<VELOCITY, 3, WHOLE>(row, [(a[0], x), (a[1], y), (a[2], z)]);
+            add_multiples::<VELOCITY, 3, WHOLE>(row, [(b[0], bias_x), (b[1], bias_y), (b[2], bias_z)]);
+        }
+        for ((row, c), gyro_bias) in attitude.iter_mut().zip(&turn).zip(&*gyro_bias) {
+            *row = [0.0; WIDTH];
+            add_multiples::<ATTITUDE, 3, WHOLE>(row, [(c[0], x), (c[1], y), (c[2], z)]);
+            add_multiples::<ATTITUDE, 1, WHOLE>(row, [(-dt, gyro_bias)]);
         }
 
         // Columns: the first nine of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
-        for (r, t) in t.iter().enumerate() {
-            let row = &mut self.rows[r];
-            *row = *t;
+        for (r, row) in self.rows.iter_mut().enumerate().take(9) {
+            let [x, y, z] = [row[6], row[7], row[8]];
             for i in 0..3 {
                 let (a, b, c) = (by_attitude[i], by_bias[i], turn[i]);
                 if r < VELOCITY {
-                    row[i] = t[i] + dt * t[3 + i];
+                    row[i] += dt * row[3 + i];
                 }
                 if r < ATTITUDE {
                     row[3 + i] =
-                        t[3 + i] + a[0] * t[6] + a[1] * t[7] + a[2] * t[8] + b[0] * t[12] + b[1] * t[13] + b[2] * t[14];
+                        row[3 + i] + a[0] * x + a[1] * y + a[2] * z + b[0] * row[12] + b[1] * row[13] + b[2] * row[14];
                 }
-                row[6 + i] = c[0] * t[6] + c[1] * t[7] + c[2] * t[8] - dt * t[9 + i];
+                row[6 + i] = c[0] * x + c[1] * y + c[2] * z - dt * row[9 + i];
             }
         }
         // Mirror: the upper triangle is the one computed.
@@ -242,7 +240,7 @@ impl Covariance {
             let dot = |row: &Row| {
                 let mut sum = 0.0;
                 for ([a, b, c], [x, y, z]) in blocks.iter().zip(row.as_chunks::<3>().0) {
-                    if [*a, *b, *c] != [0.0; 3] {
+                    if *a != 0.0 || *b != 0.0 || *c != 0.0 {
                         sum += a * x + b * y + c * z;
                     }
                 }
@@ -250,7 +248,7 @@ impl Covariance {
             };
             let mut column = [0.0; WIDTH];
             for ([a, b, c], [x, y, z]) in blocks.iter().zip(self.rows.as_chunks::<3>().0) {
-                if [*a, *b, *c] != [0.0; 3] {
+                if *a != 0.0 || *b != 0.0 || *c != 0.0 {
                     add_multiples::<0, 3, WHOLE_ROWS>(&mut column, [(*a, x), (*b, y), (*c, z)]);
                 }
             }

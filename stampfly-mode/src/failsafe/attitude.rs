@@ -7,9 +7,14 @@ use stampfly_types::messages::{FlightMode, FlightPhase, ImuData, Validity};
 use stampfly_types::{Instant, Vec3, frame, math};
 
 /// What is remembered of the attitude.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct AttitudeMonitor {
+    /// Cosines of the configuration's tilts: with them no step takes an arc cosine, 250 instructions.
+    cos_armed: f32,
+    cos_acro: f32,
+    cos_tumble: f32,
+    cos_mismatch: f32,
     /// Specific force for the tilt on the ground.
     gravity: Option<Vec3>,
     tumbled: Option<Instant>,
@@ -17,6 +22,19 @@ pub(super) struct AttitudeMonitor {
 }
 
 impl AttitudeMonitor {
+    /// Nothing seen yet.
+    pub(super) fn new(config: &FailsafeConfig) -> Self {
+        Self {
+            cos_armed: math::cos(config.armed_tilt),
+            cos_acro: math::cos(config.acro_tilt),
+            cos_tumble: math::cos(config.tumble_tilt),
+            cos_mismatch: math::cos(config.tilt_mismatch),
+            gravity: None,
+            tumbled: None,
+            mismatch: None,
+        }
+    }
+
     /// Takes a finite inertial sample.
     pub(super) fn add(&mut self, config: &FailsafeConfig, imu: &ImuData) {
         let gravity = self.gravity.get_or_insert(imu.accel);
@@ -28,23 +46,23 @@ impl AttitudeMonitor {
         let known = input.estimate.valid.contains(Validity::TILT);
         let status = input.flight_status;
         let limit = match (status.phase, status.mode) {
-            (FlightPhase::Armed, _) => Some((config.armed_tilt, config.tumble_time)),
+            (FlightPhase::Armed, _) => Some((self.cos_armed, config.tumble_time)),
             (FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing, FlightMode::Acro) => {
-                Some((config.acro_tilt, config.acro_time))
+                Some((self.cos_acro, config.acro_time))
             }
             (FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing, _) => {
-                Some((config.tumble_tilt, config.tumble_time))
+                Some((self.cos_tumble, config.tumble_time))
             }
             (FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld, _) => None,
         };
-        let over = limit.filter(|(tilt, _)| known && frame::tilt(&input.estimate.attitude) > *tilt);
+        let over = limit.filter(|(cos_tilt, _)| known && frame::cos_tilt(&input.estimate.attitude) < *cos_tilt);
         let time = over.map_or(config.tumble_time, |(_, time)| time);
         let tumbled = lasts(&mut self.tumbled, now, over.is_some(), time);
         let standing = status.phase == FlightPhase::IdleGround && known;
         let apart = standing
             && self.gravity.is_some_and(|force| {
                 let up = input.estimate.attitude.inverse_transform_vector(&-Vec3::z());
-                math::acos(force.dot(&up) / force.norm().max(1e-3)) > config.tilt_mismatch
+                force.dot(&up) < self.cos_mismatch * force.norm().max(1e-3)
             });
         [tumbled, lasts(&mut self.mismatch, now, apart, config.tilt_mismatch_time)]
     }

@@ -22,14 +22,33 @@ const SUSPECTS: u32 = 24 * SUSPECT;
 /// Share of full scale that counts as full scale: calibration and the decimation filter move it.
 const FULL: f32 = 0.98;
 
+/// What is remembered of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Axis {
+    last: f32,
+    /// Samples running in which it repeated itself, and in which it was at full scale.
+    equal: u32,
+    full: u32,
+}
+
+impl Axis {
+    /// Takes a value; gives the longer of the two runs.
+    fn step(&mut self, value: f32, full: f32) -> u32 {
+        let count = |run: u32, holds: bool| if holds { run.saturating_add(1) } else { 0 };
+        self.equal = count(self.equal, value.to_bits() == self.last.to_bits());
+        self.full = count(self.full, value.abs() >= full);
+        self.last = value;
+        self.equal.max(self.full)
+    }
+}
+
 /// What is remembered of the samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ImuMonitor {
-    last: [f32; 6],
-    /// Samples running in which each axis repeated itself, and in which it was at full scale.
-    equal: [u32; 6],
-    full: [u32; 6],
+    accel: [Axis; 3],
+    gyro: [Axis; 3],
     suspects: u32,
     mean: Option<Vec3>,
     off: Option<Instant>,
@@ -46,26 +65,23 @@ impl ImuMonitor {
         suspect: bool,
         holds_height: bool,
     ) -> bool {
-        let [accel, gyro] = [config.accel_full_scale * FULL, config.gyro_full_scale * FULL];
-        let [ax, ay, az] = imu.accel.into();
-        let [gx, gy, gz] = imu.gyro.into();
-        let values = [(ax, accel), (ay, accel), (az, accel), (gx, gyro), (gy, gyro), (gz, gyro)];
-        let mut worst = 0;
-        let counts = self.equal.iter_mut().zip(&mut self.full);
-        for (((value, limit), last), (equal, full)) in values.into_iter().zip(&mut self.last).zip(counts) {
-            let count = |run: &mut u32, holds: bool| *run = if holds { run.saturating_add(1) } else { 0 };
-            count(equal, value.to_bits() == last.to_bits());
-            count(full, value.abs() >= limit);
-            *last = value;
-            worst = worst.max(*equal).max(*full);
+        let mut longest = 0;
+        let sensors = [
+            (&mut self.accel, &imu.accel, config.accel_full_scale),
+            (&mut self.gyro, &imu.gyro, config.gyro_full_scale),
+        ];
+        for (axes, values, full_scale) in sensors {
+            for (axis, value) in axes.iter_mut().zip(values) {
+                longest = longest.max(axis.step(*value, full_scale * FULL));
+            }
         }
         self.suspects =
             if suspect { (self.suspects + SUSPECT).min(2 * SUSPECTS) } else { self.suspects.saturating_sub(1) };
         let mean = self.mean.get_or_insert(imu.accel);
         *mean += (imu.accel - *mean) * config.force_weight;
         let [low, high] = config.force_range;
-        let off = holds_height && !(low..=high).contains(&mean.norm());
+        let off = holds_height && !(low * low..=high * high).contains(&mean.norm_squared());
         let off = lasts(&mut self.off, at, off, config.force_time);
-        worst >= config.stuck_samples || self.suspects >= SUSPECTS || off
+        longest >= config.stuck_samples || self.suspects >= SUSPECTS || off
     }
 }

@@ -15,12 +15,14 @@
 
 use super::config::FailsafeConfig;
 use stampfly_types::messages::{Alerts, ImuData};
-use stampfly_types::{Instant, Vec3, math};
+use stampfly_types::{Duration, Instant, Vec3, math};
 
 /// Share of full scale at which the accelerometer's axes count as full.
 const FULL: f32 = 0.9;
 /// After a gap this long nothing is known about what the rate was.
-const GAP: f32 = 0.05;
+const GAP: Duration = Duration::from_millis(50);
+/// Two samples that came together are a period apart, this long at least.
+const PERIOD: Duration = Duration::from_millis(2);
 
 /// Samples above the limits, and the specific force over the length of a blow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,7 +49,7 @@ impl Evidence {
             };
         };
         count(&mut self.impacts, force >= limit);
-        count(&mut self.overspeeds, imu.gyro.norm() >= config.rate);
+        count(&mut self.overspeeds, imu.gyro.norm_squared() >= config.rate * config.rate);
         force
     }
 
@@ -82,8 +84,7 @@ impl MotionMonitor {
         landing: bool,
     ) -> (Alerts, bool) {
         let impact = if landing { config.landing_impact } else { config.impact };
-        let [mean, variance] = self.force;
-        let limit = impact.max(mean + config.impact_sigmas * math::sqrt(variance));
+        let limit = self.impact_limit(config, impact);
         let suspect = self.is_suspect(config, at, imu);
         if suspect {
             if self.suspects == 0 {
@@ -98,7 +99,8 @@ impl MotionMonitor {
         } else {
             let force = self.believed.add(config, imu, limit, true);
             // An impact must not raise its own threshold: outliers enter clipped.
-            let off = force.min(limit) - mean;
+            let [mean, variance] = self.force;
+            let off = if force < limit { force } else { limit } - mean;
             let weight = config.vibration_weight;
             self.force = [mean + weight * off, variance + weight * (off * off - variance)];
         }
@@ -107,12 +109,23 @@ impl MotionMonitor {
         (self.believed.alerts(config), suspect)
     }
 
+    /// Force of an impact: `impact`, or more where it vibrates so much.
+    fn impact_limit(&self, config: &FailsafeConfig, impact: f32) -> f32 {
+        let [mean, variance] = self.force;
+        let spare = impact - mean;
+        // Squares tell that the vibration does not matter, as it hardly ever does; the root is 50 instructions.
+        if spare > 0.0 && config.impact_sigmas * config.impact_sigmas * variance <= spare * spare {
+            return impact;
+        }
+        impact.max(mean + config.impact_sigmas * math::sqrt(variance))
+    }
+
     fn is_suspect(&self, config: &FailsafeConfig, at: Instant, imu: &ImuData) -> bool {
         let full = imu.accel.iter().all(|axis| axis.abs() >= FULL * config.accel_full_scale);
         let jumps = self.rate.is_some_and(|(last, rate)| {
-            // Two samples that came together are a period apart.
-            let elapsed = at.since(last).seconds().max(2e-3);
-            elapsed < GAP && (imu.gyro - rate).amax() > config.angular_acceleration * elapsed
+            let elapsed = at.since(last).max(PERIOD);
+            let limit = config.angular_acceleration * elapsed.seconds();
+            elapsed < GAP && (imu.gyro - rate).iter().any(|change| change.abs() > limit)
         });
         full || jumps
     }
