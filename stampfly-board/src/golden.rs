@@ -6,7 +6,7 @@
 
 use crate::VehicleConfig;
 use crate::schedule::Runnables;
-use crate::topics::Id;
+use crate::topics::{self, Id};
 use core::fmt;
 use stampfly_flight::golden::{self, GoldenError, PlayObserver, Report, Verdict};
 use stampfly_types::messages::{SelfTest, SelfTestVerdict};
@@ -35,18 +35,19 @@ pub fn play(observer: &mut impl PlayObserver) -> Result<Report, GoldenError> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome(pub Result<Report, GoldenError>);
 
-/// Plays the golden flight, before anything can turn. Not inlined: it needs a whole vehicle of stack, and returns it.
+/// Plays the golden flight on a fresh bus, before anything can turn. Not inlined: it needs a whole vehicle of stack, and
+/// returns it.
 ///
 /// ```
-/// use stampfly_board::golden::self_test;
-/// let outcome = self_test();
+/// use stampfly_board::{golden::self_test, topics::Bus};
+/// let outcome = self_test(&mut Bus::new());
 /// assert!(outcome.may_fly());
 /// assert_eq!(outcome.to_string(), "self test: every bit as recorded");
 /// ```
 #[inline(never)]
 #[must_use]
-pub fn self_test() -> Outcome {
-    Outcome(play(&mut ()))
+pub fn self_test(bus: &mut topics::Bus) -> Outcome {
+    Outcome(golden::play_on::<Runnables>(bus, FLIGHT, &VehicleConfig::default(), TOLERANCE, &mut ()))
 }
 
 impl Outcome {

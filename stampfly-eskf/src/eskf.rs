@@ -180,7 +180,7 @@ impl Eskf {
             state: NominalState::default(),
             pending_step: PropagationStep::default(),
             pending_rotation: NominalState::default().rotation(),
-            history: History::default(),
+            history: History::EMPTY,
             vibration: [Vibration::default(); 2],
             now: Instant::ZERO,
             initialized: false,

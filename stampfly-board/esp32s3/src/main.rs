@@ -33,6 +33,7 @@ mod sizes;
 mod spi;
 mod storage;
 
+use alloc::boxed::Box;
 use clock::Clock;
 use core::cell::RefCell;
 use embassy_executor::Spawner;
@@ -65,12 +66,19 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
     #[cfg(feature = "esp32c6")]
     esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
-    let tested = self_test();
+    let tested = self_test(&mut fresh_bus());
     esp_println::println!("{tested}");
     if !tested.may_fly() {
         cutoff::lock_out();
     }
     start(chip, tested)
+}
+
+/// A bus for the self test, on the heap that the radio does not need yet: the stack has to hold a vehicle then. Not inlined,
+/// because it is made on the stack.
+#[inline(never)]
+fn fresh_bus() -> Box<topics::Bus> {
+    Box::new(topics::Bus::new())
 }
 
 /// Assembles the vehicle and runs it. Apart from [`main`], so that the self test and this have the stack one after the

@@ -44,7 +44,7 @@ extern "C" fn flight() {
     }
     vehicle();
     chips();
-    let _ = black_box(golden::self_test());
+    let _ = black_box(golden::self_test(&mut topics::Bus::new()));
 }
 
 /// Everything between the sensors' topics and the motors', and the radio's end of the bus.

@@ -1,13 +1,13 @@
 //! The golden flight: this machine computes what the committed record says, and a changed record is not taken for it.
 
 use stampfly_board::golden::{FLIGHT, Outcome, TOLERANCE, self_test};
-use stampfly_board::{VehicleConfig, schedule::Runnables};
+use stampfly_board::{VehicleConfig, schedule::Runnables, topics::Bus};
 use stampfly_flight::golden::{GoldenError, Report, Verdict, play};
 use stampfly_types::messages::SelfTestVerdict;
 
 #[test]
 fn this_machine_publishes_the_recorded_bits() {
-    let outcome = self_test();
+    let outcome = self_test(&mut Bus::new());
     let report = outcome.0.expect("plays");
     assert_eq!((report.verdict, report.hash), (Verdict::Identical, 0x177e_4a61_0b59_a7c2));
     assert!(outcome.may_fly());

@@ -63,11 +63,14 @@ pub struct History {
 
 impl Default for History {
     fn default() -> Self {
-        Self { intervals: [EMPTY; DEPTH], newest: 0 }
+        Self::EMPTY
     }
 }
 
 impl History {
+    /// No sample. A constant, because a filter that is made on a small stack has no room for two of them.
+    pub(crate) const EMPTY: Self = Self { intervals: [EMPTY; DEPTH], newest: 0 };
+
     /// Appends the motion of one inertial sample.
     #[inline]
     pub fn add(&mut self, motion: &Motion) {

@@ -116,10 +116,23 @@ pub fn play<R: Schedule>(
     tolerance: f32,
     observer: &mut impl PlayObserver,
 ) -> Result<Report, GoldenError> {
+    play_on::<R>(&mut R::Topics::new(), record, config, tolerance, observer)
+}
+
+/// [`play`] on a bus that lies elsewhere than on the stack. Nothing may have been published on it.
+///
+/// # Errors
+/// As in [`play`].
+pub fn play_on<R: Schedule>(
+    bus: &mut R::Topics,
+    record: &[u8],
+    config: &R::Config,
+    tolerance: f32,
+    observer: &mut impl PlayObserver,
+) -> Result<Report, GoldenError> {
     let (header, entries) = format::open::<R>(record)?;
-    let mut bus = R::Topics::new();
     // Not taken apart by value: a second copy of a vehicle is more than some stacks have room for.
-    let mut assembled = Assembled::<R>::new(&mut bus, None, config, header.start);
+    let mut assembled = Assembled::<R>::new(bus, None, config, header.start);
     let Assembled { flight_loop, outside, taps } = &mut assembled;
     let (mut hash, mut output) = (FlightHash::new(), Vec::<u32, MAX_MESSAGE>::new());
     let mut drain = |observer: &mut _, hash: &mut FlightHash, output: &mut Vec<u32, MAX_MESSAGE>| {
