@@ -53,8 +53,8 @@ const SHARP: f32 = 0.15;
 const COMPENSATED: f32 = 0.005;
 /// For so many readings running, at least.
 const ZEROS: u32 = 20;
-/// After a start in the air the filter first has to find tilt and biases, s.
-const UNKNOWN: f32 = 10.0;
+/// After a start in the air the filter first has to find tilt and biases, s. A gyro bias of 3°/s takes as long.
+const UNKNOWN: f32 = 20.0;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
 const MOTION: f32 = 0.2;
 const AGREES_FOR: f32 = 0.5;

@@ -233,7 +233,9 @@ impl VerticalMonitor {
         let stuck = self.repeats >= repeated && (self.height - self.repeats_from).abs() > MOVED
             || self.repeats >= REPEATED_JUMPED && self.jumped;
         let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
-        let moved = (settled && self.moves > MOVES) || (self.moves > 1 && self.moved < -MOVED_DOWN);
+        // A filter that started in the air has to move its height to the range.
+        let wandered = self.age > 0.0 && self.moves > 1 && self.moved < -MOVED_DOWN;
+        let moved = (settled && self.moves > MOVES) || wandered;
         if stuck || apart || moved || self.jumps > JUMPS {
             // Right after the take-off the observer knows how far it came.
             let young = self.age < SETTLED && !self.restarted;

@@ -210,12 +210,7 @@ impl Covariance {
                 row[6 + i] = c[0] * x + c[1] * y + c[2] * z - dt * row[9 + i];
             }
         }
-        // Mirror: the upper triangle is the one computed.
-        for i in 1..N {
-            for j in 0..i.min(9) {
-                self.rows[i][j] = self.rows[j][i];
-            }
-        }
+        self.mirror(|_| 9);
         for (i, row) in self.rows.iter_mut().enumerate() {
             let grown = row[i] + driving[i / 3] * dt;
             row[i] = if grown > FLOOR[i] { grown } else { FLOOR[i] };
@@ -304,11 +299,7 @@ impl Covariance {
             self.subtract_outer_products::<ATTITUDE, M>(gain);
             self.subtract_outer_products::<GYRO_BIAS, M>(gain);
             self.subtract_outer_products::<ACCEL_BIAS, M>(gain);
-            for i in 3..N {
-                for j in 0..i / 3 * 3 {
-                    self.rows[i][j] = self.rows[j][i];
-                }
-            }
+            self.mirror(|i| i / 3 * 3);
         }
         let mut correction = [0.0; N];
         for (column, innovation) in gain.iter().zip(whitened) {
@@ -321,6 +312,18 @@ impl Covariance {
 }
 
 impl Covariance {
+    /// Copies the upper triangle, which was computed, to the lower one: of each row so many columns.
+    #[inline]
+    fn mirror(&mut self, columns: impl Fn(usize) -> usize) {
+        for i in 1..N {
+            let (above, rest) = self.rows.split_at_mut(i);
+            let Some(row) = rest.first_mut() else { return };
+            for (cell, above) in row.iter_mut().zip(above).take(columns(i)) {
+                *cell = above[i];
+            }
+        }
+    }
+
     /// Subtracts w·wᵀ of each column w of the gain from the three rows from `FIRST` on, on the diagonal block and to
     /// its right.
     #[inline]
