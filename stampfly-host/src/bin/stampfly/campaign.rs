@@ -7,7 +7,8 @@ use crate::fly::add_findings;
 use crate::terminal;
 use serde_json::{Map, Value, json};
 use stampfly_board::simulation::StampFly;
-use stampfly_host::campaign::{self, Flight, spreads, workers};
+use stampfly_host::campaign::parallel::workers;
+use stampfly_host::campaign::{self, Flight, spreads};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
 use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
@@ -116,7 +117,7 @@ fn print<V: Vehicle, W>(
             None => outln!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
         }
     }
-    let cores = workers(all);
+    let cores = workers(all, None);
     let plural = if cores == 1 { "" } else { "s" };
     outln!("\n{succeeded} of {all} flights succeeded; {factor:.0} × real time on {cores} core{plural}");
     if !failed.is_empty() {
