@@ -115,6 +115,8 @@ impl Cases {
     pub fn case(&self, index: u64) -> Case {
         let seed = self.plan.seed.wrapping_add(index);
         let mut options = self.plan.settings.options();
+        // Every flight has its own delays, too.
+        options.jitter = options.jitter.map(|seed| seed.wrapping_add(index));
         match usize::try_from(index).ok().and_then(|index| self.cells.get(index)) {
             Some((kind, moment, mode)) => {
                 options.fault = vec![format!("{}@{}", kind.name, moment.name())];
@@ -221,12 +223,25 @@ impl Case {
     /// The line that repeats it.
     #[must_use]
     pub fn line(&self) -> String {
-        let words = self.arguments().into_iter().map(|word| {
-            let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_=@+.,/:".contains(letter);
-            if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
-        });
-        format!("stampfly {}", words.collect::<Vec<_>>().join(" "))
+        format!("stampfly {}", shell_line(&self.arguments()))
     }
+}
+
+/// Words as a shell reads them.
+///
+/// ```
+/// use stampfly_host::campaign::case::shell_line;
+/// let words = ["--mission", "arm; land"].map(String::from);
+/// assert_eq!(shell_line(&words), "--mission 'arm; land'");
+/// ```
+#[must_use]
+pub fn shell_line(words: &[String]) -> String {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_=@+.,/:".contains(letter);
+    let quoted = words.iter().map(|word| {
+        let plain = !word.is_empty() && word.chars().all(is_plain);
+        if plain { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    });
+    quoted.collect::<Vec<_>>().join(" ")
 }
 
 /// Options that a campaign does not vary.

@@ -117,7 +117,8 @@ pub fn read(path: &Path) -> Result<Contents, FileError> {
     let with_path = |cause| FileError { path: path.into(), cause };
     let file = File::open(path).map_err(|error| with_path(Cause::Io("read", error)))?;
     let reader = SerializedFileReader::new(file).map_err(|error| with_path(error.into()))?;
-    let identity = identity(&reader).ok_or_else(|| with_path(Cause::Contents(format!("no {IDENTITY} in its footer"))))?;
+    let identity =
+        identity(&reader).ok_or_else(|| with_path(Cause::Contents(format!("no {IDENTITY} in its footer"))))?;
     let rows = reader.get_row_iter(None).map_err(|error| with_path(error.into()))?.map(|row| {
         let fields = row?.into_columns().into_iter().map(|(name, field)| (name, value(field)));
         Row::from_values(fields).map_err(Cause::Contents)

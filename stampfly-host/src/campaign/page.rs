@@ -3,6 +3,7 @@
 //! A single file without scripts and without any reference to the outside.
 
 use super::summary::{Cell, Failure, Summary, Table, phases};
+use crate::report::escape;
 use stampfly_sim::fault::{FaultKind, Moment};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -87,9 +88,10 @@ fn shown(cell: &Cell) -> String {
 }
 
 fn failures(failures: &[Failure]) -> String {
-    let mut text = "<div class=\"scroll\"><table class=\"list\">\n<thead><tr><th>fault</th><th>moment</th><th>verdict</th>\
+    let mut text =
+        "<div class=\"scroll\"><table class=\"list\">\n<thead><tr><th>fault</th><th>moment</th><th>verdict</th>\
                     <th>flights</th><th>repeat it</th></tr></thead>\n<tbody>\n"
-        .to_owned();
+            .to_owned();
     for Failure { fault, phase, verdict, flights, line, .. } in failures {
         let [fault, phase, verdict, line] = [fault, phase, verdict, line].map(|part| escape(part));
         let _ = writeln!(
@@ -98,9 +100,4 @@ fn failures(failures: &[Failure]) -> String {
         );
     }
     text + "</tbody>\n</table></div>\n"
-}
-
-/// Text as it may stand in HTML.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

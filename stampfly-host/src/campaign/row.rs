@@ -191,13 +191,23 @@ impl Row {
         ![PASSED, IDLE].contains(&self.verdict.as_str())
     }
 
+    /// Did it fail as this one did: with the same end if that was wrong, with one of its violations if it had any?
+    #[must_use]
+    pub fn failed_like(&self, other: &Self) -> bool {
+        let broken = |row: &Self| -> Vec<String> {
+            row.violations.split_whitespace().filter(|name| *name != FAULT_ACTED).map(Into::into).collect()
+        };
+        let (broken, of_other) = (broken(self), broken(other));
+        let same_end = other.as_expected || (!self.as_expected && self.outcome == other.outcome);
+        self.failed() && same_end && (of_other.is_empty() || of_other.iter().any(|name| broken.contains(name)))
+    }
+
     /// The columns that say what was flown.
     #[must_use]
     pub fn of(case: &Case) -> Self {
         let Case { index, seed, options } = case;
-        let joined = |part: &dyn Fn(&str) -> String| {
-            options.fault.iter().map(|text| part(text)).collect::<Vec<_>>().join("+")
-        };
+        let joined =
+            |part: &dyn Fn(&str) -> String| options.fault.iter().map(|text| part(text)).collect::<Vec<_>>().join("+");
         Self {
             index: *index,
             seed: *seed,

@@ -39,7 +39,11 @@ impl Cell {
 
 /// Ends from best to worst; a panic is worse than any.
 fn severity(outcome: &str) -> usize {
-    if outcome == PANICKED { Class::ALL.len() } else { Class::ALL.iter().position(|c| c.name() == outcome).unwrap_or(0) }
+    if outcome == PANICKED {
+        Class::ALL.len()
+    } else {
+        Class::ALL.iter().position(|c| c.name() == outcome).unwrap_or(0)
+    }
 }
 
 /// Flights that failed in the same way.

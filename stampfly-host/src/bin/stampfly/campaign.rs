@@ -3,6 +3,7 @@
 
 use crate::arguments::CampaignOptions;
 use crate::failure::Failure;
+use crate::fault_campaign;
 use crate::fly::add_findings;
 use crate::terminal;
 use serde_json::{Map, Value, json};
@@ -17,6 +18,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
+    if options.faults {
+        return fault_campaign::run(options);
+    }
     if options.consistency {
         return consistency(options);
     }
