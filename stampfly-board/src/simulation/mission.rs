@@ -83,6 +83,9 @@ pub const REFERENCE: &str = include_str!("../../missions/square.mission");
 /// Take-off, a minute of hovering, landing.
 pub const HOVER: &str = include_str!("../../missions/hover.mission");
 
+/// The shortest flight that has every moment at which a fault can begin: for campaigns.
+pub const SHORT: &str = "arm; takeoff 0.5; hover 2; goto 1 0 0.7; land";
+
 /// Random number stream of random missions; the vehicle's own are below a thousand.
 const STREAM: u64 = 1_000;
 
@@ -221,7 +224,7 @@ mod tests {
 
     #[test]
     fn the_built_in_missions_are_missions() {
-        for text in [REFERENCE, HOVER] {
+        for text in [REFERENCE, HOVER, SHORT] {
             let mission = Mission::parse(text).expect("a mission");
             assert_eq!((mission.steps[0], mission.steps.last()), (Step::Arm, Some(&Step::Land)));
         }

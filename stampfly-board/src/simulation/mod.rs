@@ -59,7 +59,7 @@ impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety = Variety { modes: pilot::MODES, missions: &["square", "random"] };
+    const VARIETY: Variety = Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"] };
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;

@@ -3,7 +3,7 @@
 //! So a campaign is flown in parts, on any machines and in any order, without anybody who hands out work.
 //!
 //! The first flights walk through every *cell*: every fault of the vehicle's table, with its usual value, at every moment
-//! of a flight, under a program's commands and then in every mode of a pilot. The others draw fault, value, moment,
+//! of a short flight, under a program's commands and then in every mode of a pilot. The others draw fault, value, moment,
 //! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults.
 
 use serde::{Deserialize, Serialize};
@@ -20,8 +20,9 @@ const STREAM: u64 = 1_100;
 const VALUES: [f64; 2] = [0.25, 1.0];
 /// Shortest and longest duration, s.
 const LASTS: [f64; 2] = [0.05, 10.0];
-/// Faults that begin at a time begin within these, s since power-on: the reference mission is over after 33 s.
-const TIMES: [f64; 2] = [3.0, 30.0];
+/// Faults that begin at a time begin within these, s since power-on: before the vehicle is armed, and when the shortest mission
+/// is about to land.
+const TIMES: [f64; 2] = [3.0, 12.0];
 /// Strongest gusts, m/s: half more than in the reference mission.
 const GUST: f64 = 0.8;
 
@@ -121,6 +122,7 @@ impl Cases {
             Some((kind, moment, mode)) => {
                 options.fault = vec![format!("{}@{}", kind.name, moment.name())];
                 options.pilot = mode.map(Into::into);
+                options.mission = options.mission.or_else(|| self.missions.first().map(|mission| (*mission).into()));
             }
             None => self.draw(&mut options, seed),
         }

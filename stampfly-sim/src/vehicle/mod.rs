@@ -208,7 +208,7 @@ pub struct Setting {
 pub struct Variety {
     /// Flight modes of a pilot, as [`Options::pilot`] takes them.
     pub modes: &'static [&'static str],
-    /// Missions, as [`Options::mission`] takes them, the usual one first.
+    /// Missions, as [`Options::mission`] takes them; the first is short and has every moment at which a fault can begin.
     pub missions: &'static [&'static str],
 }
 

@@ -22,8 +22,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as WallInstant;
 
-/// Of so many kinds of failures the smallest form is looked for: each costs some tens of flights.
-const MOST_SHRUNK: usize = 20;
+/// Of so many kinds of failures the smallest form is looked for.
+const MOST_SHRUNK: usize = 12;
+/// For each of them so much is flown, s: two or three seconds of a core.
+const MOST_FLOWN: f64 = 600.0;
 /// So many kinds of failures are printed; all are in the page.
 const MOST_PRINTED: usize = 40;
 
@@ -212,7 +214,12 @@ impl<'o> Campaign<'o> {
         let lines = parallel::each(count, parallel::workers(count, self.options.of_faults.threads), &|place| {
             let row = rows.get(failures.get(place)?.first)?;
             let case = row.case().ok()?;
-            let mut fails = |case: &Case| fly_case::<V>(case).is_ok_and(|smaller| smaller.failed_like(row));
+            let mut flown = 0.0;
+            let mut fails = |case: &Case| {
+                let smaller = if flown < MOST_FLOWN { fly_case::<V>(case).ok() } else { None };
+                flown += smaller.as_ref().map_or(0.0, |smaller| smaller.duration_s);
+                smaller.is_some_and(|smaller| smaller.failed_like(row))
+            };
             let line = shrink::<V>(&case, &mut fails).line();
             bar.inc(1);
             Some(line)
