@@ -23,7 +23,9 @@ pub fn html(summary: &Summary, faults: &[FaultKind], title: &str, subtitle: &str
     let metrics: String = metrics.iter().map(|(name, count, good)| metric(name, *count, *good)).collect();
     let names: Vec<&str> = faults.iter().map(|kind| kind.name).collect();
     let columns: Vec<&str> = phases().filter(|phase| *phase != "time" || has_column(&summary.cells, phase)).collect();
-    let mut body = section("Faults by the moment at which they begin", &table(&summary.cells, &names, &columns));
+    let legend = "<p>The worst end of each cell, and its flights; red: how many of them failed; grey: the fault changed nothing.</p>\n";
+    let cells = table(&summary.cells, &names, &columns);
+    let mut body = section("Faults by the moment at which they begin", &format!("{legend}{cells}"));
     if !summary.pairs.is_empty() {
         let others: BTreeSet<&str> = summary.pairs.keys().map(|(_, other)| other.as_str()).collect();
         let others: Vec<&str> = names.iter().copied().filter(|name| others.contains(name)).collect();

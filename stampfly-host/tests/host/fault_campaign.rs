@@ -321,6 +321,49 @@ fn a_slurm_script_flies_a_shard() {
     assert_eq!((summary["kept"].as_u64(), summary["flights"].as_u64()), (Some(4), Some(4)));
 }
 
+/// Stands in for HyperQueue's program: notes how it is called, and runs the tasks of the array one after the other.
+const STAND_IN: &str = r#"#!/bin/bash
+echo "$@" > called
+while [ "$1" != --array ]; do shift; done
+array=$2
+while [ "$1" != -- ]; do shift; done
+shift
+for part in ${array//,/ }; do
+    for HQ_TASK_ID in $(seq ${part%-*} ${part#*-}); do
+        export HQ_TASK_ID
+        "$@" >/dev/null
+    done
+done
+"#;
+
+#[test]
+fn hyperqueue_flies_the_shards_that_are_missing() {
+    use std::os::unix::fs::PermissionsExt;
+    let here = folder("hyperqueue");
+    let line = ["campaign", "--faults", "--flights", "5", "--mission", HOP, "--json", "--out", "out"];
+    stampfly(&here, &[&line[..], &["--shard", "2/5"]].concat());
+    let program = here.join("hq");
+    fs::write(&program, STAND_IN).expect("written");
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("may be run");
+    let path = format!("{}:{}", here.display(), std::env::var("PATH").unwrap_or_default());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stampfly"));
+    command.current_dir(&here).env("PATH", path).args(line).args(["--shards", "5", "--engine", "hq"]);
+    let output = command.output().expect("the program starts");
+    let summary: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((summary["kept"].as_u64(), summary["flights"].as_u64()), (Some(1), Some(5)));
+    let called = fs::read_to_string(here.join("called")).expect("called");
+    assert!(called.contains("--array 0-1,3-4 ") && called.contains("--shard auto/5"), "{called}");
+
+    // One that flies nothing is not believed.
+    fs::write(&program, "#!/bin/bash\necho no server >&2\n").expect("written");
+    let output = command.args(["--again"]).output().expect("the program starts");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(1) && said.contains("5 of 5 shards missing") && said.contains("no server"),
+        "{said}"
+    );
+}
+
 #[test]
 fn mistakes_are_named() {
     let here = folder("mistakes");

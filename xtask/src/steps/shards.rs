@@ -23,7 +23,7 @@ const DOCUMENT: &str = "docs/campaigns.md";
 const QUERIES: usize = 5;
 
 /// What is flown: a short mission, because it is not the flights that are tested here.
-const FLIGHTS: &str = "160";
+const FLIGHTS: &str = "128";
 const SHARDS: &str = "16";
 const MISSION: &str = "arm; takeoff 0.4; goto 0.6 0 0.4; land";
 /// So many shards are there when a worker is killed.
@@ -31,7 +31,7 @@ const KILL_AFTER: usize = 4;
 /// The whole campaign takes some seconds; a cluster that hangs does not end.
 const PATIENCE: Duration = Duration::from_secs(300);
 /// Rows that are flown again.
-const AGAIN: [&str; 3] = ["0", "4", "9"];
+const AGAIN: [&str; 3] = ["0", "4", "7"];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
@@ -40,7 +40,8 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
 
     let [one, many] = ["one", "many"].map(|name| folder.join(name));
-    finish(&mut campaign(repository, &one, "1"))?;
+    // A shard of one is all of it, without a search for the smallest failures.
+    finish(campaign(repository, &one).args(["--shard", "0/1"]))?;
     let killed_after = on_cluster(repository, &folder, &many)?;
     println!("a worker was killed when {killed_after} of {SHARDS} shards were there");
 
@@ -77,10 +78,10 @@ fn stampfly(repository: &Repository) -> Command {
     repository.command(&repository.target("release/stampfly").display().to_string())
 }
 
-fn campaign(repository: &Repository, out: &Path, shards: &str) -> Command {
+fn campaign(repository: &Repository, out: &Path) -> Command {
     let mut command = stampfly(repository);
     command.args(["campaign", "--faults", "--json", "--flights", FLIGHTS, "--mission", MISSION]);
-    command.args(["--shards", shards, "--out"]).arg(out);
+    command.arg("--out").arg(out);
     command
 }
 
@@ -120,8 +121,8 @@ fn on_cluster(repository: &Repository, folder: &Path, out: &Path) -> Result<usiz
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders = python.parent().map(Path::to_owned).into_iter().chain(std::env::split_paths(&path));
     let path = std::env::join_paths(folders).map_err(|e| e.to_string())?;
-    let mut hq = campaign(repository, out, SHARDS);
-    hq.args(["--engine", "hq"]).env("PATH", path).env("HQ_SERVER_DIR", &server_folder);
+    let mut hq = campaign(repository, out);
+    hq.args(["--engine", "hq", "--shards", SHARDS]).env("PATH", path).env("HQ_SERVER_DIR", &server_folder);
     let shown = announced(&hq);
     let report = folder.join("report.json");
     let to = fs::File::create(&report).map_err(|e| format!("{}: {e}", report.display()))?;
@@ -185,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_campaign_is_complete_or_not() {
-        assert_eq!(complete(b"{\"flights\":160,\"failed\":3}"), Ok(()));
+        assert_eq!(complete(b"{\"flights\":128,\"failed\":3}"), Ok(()));
         for report in [&b"{\"flights\":150}"[..], b"{}", b""] {
             assert!(complete(report).is_err());
         }

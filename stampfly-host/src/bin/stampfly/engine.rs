@@ -81,14 +81,24 @@ pub fn hq(job: &Job, shards: &[Shard], done: &dyn Fn(&[Shard])) -> Result<(), Fa
 /// `hq submit`, one array job.
 fn by_program(hq: &Path, job: &Job, shards: &[Shard]) -> Result<Child, Failure> {
     let count = shards.first().map_or(1, |shard| shard.count());
-    let numbers: Vec<String> = shards.iter().map(|shard| shard.index().to_string()).collect();
     let mut submit = Command::new(hq);
-    submit.args(["submit", "--wait", "--name", "stampfly", "--cpus", "1", "--array", &numbers.join(",")]);
+    submit.args(["submit", "--wait", "--name", "stampfly", "--cpus", "1", "--array", &ranges(shards)]);
     submit
         .arg("--stdout=none")
         .arg(format!("--stderr={}:rm-if-finished", job.out.join("task-%{TASK_ID}.stderr").display()));
     submit.arg("--").args(job.with(&["--threads", "1", "--shard", &format!("auto/{count}")])?);
     start(submit.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()), hq)
+}
+
+/// Numbers of shards as `hq submit --array` takes them: a list of all of them may be too long for a command line.
+fn ranges(shards: &[Shard]) -> String {
+    let runs = shards.chunk_by(|one, next| one.index() + 1 == next.index());
+    let texts = runs.filter_map(|run| match run {
+        [one] => Some(one.index().to_string()),
+        [first, .., last] => Some(format!("{}-{}", first.index(), last.index())),
+        [] => None,
+    });
+    texts.collect::<Vec<_>>().join(",")
 }
 
 /// The Python package, one task a shard.
