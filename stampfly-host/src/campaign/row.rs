@@ -191,15 +191,18 @@ impl Row {
         ![PASSED, IDLE].contains(&self.verdict.as_str())
     }
 
+    /// Invariants that the vehicle did not hold.
+    pub fn broken(&self) -> impl Iterator<Item = &str> {
+        self.violations.split_whitespace().filter(|name| *name != FAULT_ACTED)
+    }
+
     /// Did it fail as this one did: with the same end if that was wrong, with one of its violations if it had any?
     #[must_use]
     pub fn failed_like(&self, other: &Self) -> bool {
-        let broken = |row: &Self| -> Vec<String> {
-            row.violations.split_whitespace().filter(|name| *name != FAULT_ACTED).map(Into::into).collect()
-        };
-        let (broken, of_other) = (broken(self), broken(other));
         let same_end = other.as_expected || (!self.as_expected && self.outcome == other.outcome);
-        self.failed() && same_end && (of_other.is_empty() || of_other.iter().any(|name| broken.contains(name)))
+        let same_violation =
+            other.broken().next().is_none() || other.broken().any(|name| self.broken().any(|broken| broken == name));
+        self.failed() && same_end && same_violation
     }
 
     /// The columns that say what was flown.

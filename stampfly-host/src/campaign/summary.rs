@@ -29,7 +29,7 @@ impl Cell {
         self.flights += 1;
         self.idle += usize::from(row.verdict == IDLE);
         self.wrong += usize::from(row.failed() && !row.as_expected);
-        self.violated += usize::from(row.failed() && !row.violations.is_empty());
+        self.violated += usize::from(row.broken().next().is_some());
         self.failed += usize::from(row.failed());
         if self.flights == 1 || severity(&row.outcome) > severity(&self.worst) {
             self.worst.clone_from(&row.outcome);
@@ -77,7 +77,7 @@ pub struct Summary {
     pub pairs: Table,
     /// How many flights ended how.
     pub outcomes: BTreeMap<String, usize>,
-    /// How often each invariant did not hold in flights that failed.
+    /// In how many flights each invariant did not hold.
     pub violations: BTreeMap<String, usize>,
     /// Every kind of failure, the most frequent first.
     pub failures: Vec<Failure>,
@@ -100,10 +100,10 @@ impl Summary {
             key.add(row);
             *summary.outcomes.entry(row.outcome.clone()).or_default() += 1;
             summary.duration_s += row.duration_s;
+            for name in row.broken() {
+                *summary.violations.entry(name.into()).or_default() += 1;
+            }
             if row.failed() {
-                for name in row.violations.split_whitespace() {
-                    *summary.violations.entry(name.into()).or_default() += 1;
-                }
                 failures.entry([&row.fault, &row.phase, &row.verdict]).or_insert((0, place)).0 += 1;
             }
         }

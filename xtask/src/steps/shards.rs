@@ -50,7 +50,8 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         capture(command.arg(repository.root.join(script)).args(arguments).current_dir(&folder)).map(|(said, _)| said)
     };
     print!("{}", duckdb(Path::new("xtask/campaign/compare.py"), &[&one, &many])?);
-    let queries = queries(&fs::read_to_string(repository.root.join(DOCUMENT)).map_err(|e| format!("{DOCUMENT}: {e}"))?);
+    let document = fs::read_to_string(repository.root.join(DOCUMENT)).map_err(|e| format!("{DOCUMENT}: {e}"))?;
+    let queries = queries(&document);
     if queries.len() < QUERIES {
         return Err(format!("{DOCUMENT} has {} queries, not {QUERIES}", queries.len()));
     }
