@@ -95,7 +95,7 @@ fn simpler(fault: &Fault) -> Vec<String> {
         let whole = Duration::from_secs(time.as_micros() / 1_000_000);
         all.extend((whole != time).then_some(Fault { when: When::After(whole), ..*fault }));
     }
-    all.iter().map(|fault| short(fault)).collect()
+    all.iter().map(short).collect()
 }
 
 /// A fault's text without a value that is the usual one.

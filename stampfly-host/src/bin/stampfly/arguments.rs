@@ -85,8 +85,8 @@ pub struct ModesOptions {
 pub struct SceneOptions {
     #[command(flatten)]
     pub vehicle: VehicleOption,
-    /// Mission to fly: a file, or one that the vehicle knows by name (StampFly: `square`, `hover`,
-    /// `random`; rover: `course`, and its CSV logs).
+    /// Mission to fly: a file, its text with `;` between steps (StampFly: `arm; takeoff 0.5; land`), or one that the vehicle
+    /// knows by name (StampFly: `square`, `hover`, `random`; rover: `course`, and its CSV logs).
     #[arg(long, value_name = "FILE")]
     pub mission: Option<String>,
     /// Change a number of the simulated vehicle or its surroundings (see `--list`).
