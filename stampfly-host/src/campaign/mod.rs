@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`case`] | which flight is number N |
 //! | [`flight`], [`row`] | flies one; a flight as a row of a table |
-//! | [`shard`], [`file`] | the part of a campaign that one task flies, and its Parquet file |
+//! | [`shard`], [`mod@file`] | the part of a campaign that one task flies, and its Parquet file |
 //! | [`summary`], [`page`] | faults × moments, failures; as CSV and HTML |
 //! | [`shrink`] | the smallest flight in which the same goes wrong |
 //! | [`parallel`] | work on every core |
