@@ -57,12 +57,14 @@ const STEPS: &[Step] = &[
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
     Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).alone(),
+    Step::new("shards", "Fly a campaign on a HyperQueue server that loses a worker", steps::shards::run),
     Step::new("golden", "Compare the golden flight with a new recording", steps::golden::run).accepting(&[Fix]),
     Step::new("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
         .beside()
         .accepting(&[Fix]),
     Step::new("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
         .accepting(&[Fix]),
+    Step::new("campaign", "Fly two thousand flights with faults: none may end wrong", steps::campaign::run).manual(),
     Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
     Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
     Step::new("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)

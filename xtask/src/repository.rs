@@ -112,7 +112,7 @@ fn split<'t>(text: &'t str, begin: &str, end: &str) -> Option<[&'t str; 3]> {
 
 /// Says what is run, runs it, and turns a failure into a sentence.
 pub fn run(command: &mut Command) -> Result<(), Failure> {
-    let shown = announce(command);
+    let shown = announced(command);
     let status = command.status().map_err(|e| format!("`{shown}` could not be started: {e}"))?;
     if status.success() { Ok(()) } else { Err(format!("`{shown}` ended with {status}")) }
 }
@@ -124,7 +124,7 @@ pub fn json(report: &str) -> Result<Value, Failure> {
 
 /// Like [`run`], and returns what the program wrote to stdout and to stderr.
 pub fn capture(command: &mut Command) -> Result<(String, String), Failure> {
-    let shown = announce(command);
+    let shown = announced(command);
     let output = command.stdin(Stdio::null()).output().map_err(|e| format!("`{shown}` could not be started: {e}"))?;
     let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     if output.status.success() {
@@ -155,7 +155,8 @@ pub fn add_targets(repository: &Repository, targets: &[&str]) -> Result<(), Fail
     Ok(())
 }
 
-fn announce(command: &Command) -> String {
+/// Says what is run.
+pub fn announced(command: &Command) -> String {
     let mut shown: Vec<String> = command
         .get_envs()
         .filter_map(|(key, value)| Some(format!("{}={}", key.to_string_lossy(), value?.to_string_lossy())))

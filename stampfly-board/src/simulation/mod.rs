@@ -44,10 +44,11 @@ use stampfly_flight::parameters::{self, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::FaultKind;
-use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Page, Setting, SetupError, Vehicle};
+use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Page, Setting, SetupError, Variety, Vehicle};
 use stampfly_types::Message;
 use std::fmt::Display;
 use std::format;
+use std::string::{String, ToString};
 use std::vec::Vec;
 
 /// The StampFly, for programs that fly vehicles.
@@ -58,6 +59,7 @@ impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
+    const VARIETY: Variety = Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"] };
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
@@ -69,16 +71,7 @@ impl Vehicle for StampFly {
             return Err("the StampFly is not flown by other programs".into());
         }
         let mut setup = Setup::reference(seed);
-        setup.mission = match options.mission.as_deref().unwrap_or("square") {
-            "square" => Mission::parse(mission::REFERENCE),
-            "hover" => Mission::parse(mission::HOVER),
-            "random" => Ok(Mission::random(seed)),
-            path => {
-                let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
-                Mission::parse(&text)
-            }
-        }
-        .map_err(|error| format!("mission {}: {error}", options.mission.as_deref().unwrap_or_default()))?;
+        setup.mission = mission_of(options, seed)?;
         if let Some(vibration) = options.vibration {
             setup.simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
         }
@@ -100,7 +93,7 @@ impl Vehicle for StampFly {
         setup.faults = options.faults(faults::FAULTS)?;
         if let Some(name) = &options.pilot {
             let mode = pilot::mode_named(name);
-            let unknown = || format!("--mode '{name}' is none of stabilize, acro, althold, poshold");
+            let unknown = || format!("--mode '{name}' is none of {}", pilot::MODES.join(", "));
             setup.pilot = Some(mode.ok_or_else(unknown)?);
         }
         setup.sensing = if options.chips { Sensing::Chips } else { Sensing::Models };
@@ -156,12 +149,38 @@ impl Vehicle for StampFly {
         })
     }
 
+    fn shorter_missions(options: &Options, seed: u64) -> Vec<String> {
+        let Ok(Mission { steps }) = mission_of(options, seed) else { return Vec::new() };
+        let [arm, takeoff, middle @ .., land] = steps.as_slice() else { return Vec::new() };
+        let shorter = |count| {
+            let middle = middle.iter().take(count);
+            Mission { steps: [arm, takeoff].into_iter().chain(middle).chain([land]).copied().collect() }.to_string()
+        };
+        (0..middle.len()).map(shorter).collect()
+    }
+
     fn plant(setup: &Setup) -> Vec<Setting> {
         let rows = setup.simulation.plant.iter();
         let settings =
             rows.map(|row| Setting { name: row.name, value: row.value, unit: row.unit, meaning: row.description });
         settings.collect()
     }
+}
+
+/// The mission that options name: one that is built in, the text of one, or a file.
+fn mission_of(options: &Options, seed: u64) -> Result<Mission, SetupError> {
+    let name = options.mission.as_deref().unwrap_or("square");
+    match name {
+        "square" => Mission::parse(mission::REFERENCE),
+        "hover" => Mission::parse(mission::HOVER),
+        "random" => Ok(Mission::random(seed)),
+        text if text.contains(';') => Mission::parse(text),
+        path => {
+            let text = std::fs::read_to_string(path).map_err(|error| format!("mission {path}: {error}"))?;
+            Mission::parse(&text)
+        }
+    }
+    .map_err(|error| format!("mission {name}: {error}"))
 }
 
 /// The mission of the golden flight.

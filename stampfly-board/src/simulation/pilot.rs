@@ -271,6 +271,9 @@ impl<'b> Pilot<'b> {
     }
 }
 
+/// Names of the flight modes, as options give them.
+pub(super) const MODES: &[&str] = &["stabilize", "acro", "althold", "poshold"];
+
 /// The flight mode of this name, as options give it; POS_HOLD when it is empty.
 pub(super) fn mode_named(name: &str) -> Option<FlightMode> {
     match name {

@@ -10,6 +10,8 @@ mod grid;
 mod page;
 mod panels;
 
+pub(crate) use page::escape;
+
 use stampfly_lab::Flight;
 use stampfly_sim::vehicle::Page;
 

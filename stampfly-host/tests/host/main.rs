@@ -7,6 +7,7 @@ mod chips;
 mod command_line;
 mod determinism;
 mod estimate;
+mod fault_campaign;
 mod faults;
 mod figures;
 mod flight_task;

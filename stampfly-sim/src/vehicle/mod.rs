@@ -203,6 +203,20 @@ pub struct Setting {
     pub meaning: &'static str,
 }
 
+/// What the flights of a campaign vary.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Variety {
+    /// Flight modes of a pilot, as [`Options::pilot`] takes them.
+    pub modes: &'static [&'static str],
+    /// Missions, as [`Options::mission`] takes them; the first is short and has every moment at which a fault can begin.
+    pub missions: &'static [&'static str],
+}
+
+impl Variety {
+    /// Nothing is varied.
+    pub const NONE: Self = Self { modes: &[], missions: &[] };
+}
+
 /// A vehicle's golden flight: how it is flown, and how its record is judged.
 pub struct Golden<V: Vehicle + ?Sized> {
     /// The flight, as short as can be.
@@ -229,6 +243,8 @@ pub trait Vehicle: 'static {
     const BESIDE: &'static [Topic] = &[];
     /// What can go wrong in its flights. None by default.
     const FAULTS: &'static [FaultKind] = &[];
+    /// What the flights of a campaign vary. Nothing by default.
+    const VARIETY: Variety = Variety::NONE;
     /// What a page about a flight shows of it. By default a plot per topic and unit.
     const PAGE: Page = Page::EMPTY;
     /// Its runnables. Serialisable, so that a log can hold key frames.
@@ -274,6 +290,12 @@ pub trait Vehicle: 'static {
     /// Its golden flight, if it has one.
     fn golden() -> Option<Golden<Self>> {
         None
+    }
+
+    /// Missions that are over earlier than the one of these options, as [`Options::mission`] takes them, shortest first: for
+    /// looking for the smallest flight in which something happens. None by default.
+    fn shorter_missions(_options: &Options, _seed: u64) -> Vec<String> {
+        Vec::new()
     }
 
     /// Every number of the simulated vehicle and its surroundings that options can change. None by default.

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod budget;
+pub mod campaign;
 pub mod clippy;
 pub mod constants;
 pub mod consumers;
@@ -26,6 +27,7 @@ pub mod panic_proof;
 pub mod peers;
 pub mod python;
 pub mod qemu;
+pub mod shards;
 pub mod test;
 pub mod ulog;
 pub mod vectors;

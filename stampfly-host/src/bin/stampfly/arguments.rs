@@ -4,11 +4,14 @@ use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};
+use stampfly_host::campaign::case::Settings;
+use stampfly_host::campaign::shard::Shard;
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
 use stampfly_lab::estimate::{Method, Suite, suite};
 use stampfly_sim::vehicle::{Live, Options, Vehicle};
 use std::net::SocketAddr;
+use std::num::NonZero;
 use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.
@@ -82,8 +85,8 @@ pub struct ModesOptions {
 pub struct SceneOptions {
     #[command(flatten)]
     pub vehicle: VehicleOption,
-    /// Mission to fly: a file, or one that the vehicle knows by name (StampFly: `square`, `hover`,
-    /// `random`; rover: `course`, and its CSV logs).
+    /// Mission to fly: a file, its text with `;` between steps (StampFly: `arm; takeoff 0.5; land`), or one that the vehicle
+    /// knows by name (StampFly: `square`, `hover`, `random`; rover: `course`, and its CSV logs).
     #[arg(long, value_name = "FILE")]
     pub mission: Option<String>,
     /// Change a number of the simulated vehicle or its surroundings (see `--list`).
@@ -139,11 +142,17 @@ pub struct FlyOptions {
     /// Folder for `flight.ulg` and `flight.html`.
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
+    /// Fly a flight of a campaign again, and compare its hash: exit code 1 when it is another.
+    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "jitter", "seed"])]
+    pub from: Option<PathBuf>,
+    /// Which one: its row in the file, from 0.
+    #[arg(long, value_name = "N", requires = "from")]
+    pub row: Option<usize>,
 }
 
 impl Default for FlyOptions {
     fn default() -> Self {
-        Self { scene: SceneOptions::default(), seed: 1, out: ".".into() }
+        Self { scene: SceneOptions::default(), seed: 1, out: ".".into(), from: None, row: None }
     }
 }
 
@@ -182,12 +191,59 @@ pub struct CampaignOptions {
     /// `--mission random --flights 500`.
     #[arg(long)]
     pub consistency: bool,
-    /// How many flights.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    /// How many flights; 2000 with `--faults`.
+    #[arg(long, value_name = "N", default_value_t = 100, default_value_if("faults", "true", "2000"), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub flights: u64,
     /// Seed of the first flight; the others count up from there.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Fly through what can go wrong: every fault at every moment in every mode, then faults, values, moments, missions and
+    /// surroundings at random. Every flight must end as its fault allows (`stampfly faults`).
+    #[arg(long, conflicts_with_all = ["consistency", "fault", "pilot"])]
+    pub faults: bool,
+    #[command(flatten)]
+    pub of_faults: FaultCampaignOptions,
+}
+
+/// Options of `campaign --faults`.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Campaign of faults")]
+pub struct FaultCampaignOptions {
+    /// Let half of the random flights have two faults.
+    #[arg(long, requires = "faults")]
+    pub pairs: bool,
+    /// Folder for the flights (Parquet) and the tables (HTML, CSV). Flights that are already there are not flown again.
+    #[arg(long, value_name = "DIR", default_value = "campaign", requires = "faults")]
+    pub out: PathBuf,
+    /// Fly every flight again, whatever is in the folder.
+    #[arg(long, requires = "faults")]
+    pub again: bool,
+    /// Divide the campaign into so many files.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "faults", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub shards: u64,
+    /// Fly only shard I of N, with I from 0 to N - 1, and write its file. `auto/N` takes I from HQ_TASK_ID (HyperQueue),
+    /// SLURM_ARRAY_TASK_ID (Slurm) or JOB_COMPLETION_INDEX (Kubernetes). Exit code 0 when the file is written, whatever
+    /// became of the flights; the same command with `--shards N` sums up.
+    #[arg(long, value_name = "I/N", requires = "faults", conflicts_with = "shards")]
+    pub shard: Option<Shard>,
+    /// What flies: this program; HyperQueue's server, one task a shard; or Slurm, by a script that is written into DIR.
+    #[arg(long, value_enum, default_value_t = Engine::Local, requires = "faults", conflicts_with = "shard")]
+    pub engine: Engine,
+    /// Fly on so many cores instead of all.
+    #[arg(long, value_name = "N", requires = "faults")]
+    pub threads: Option<NonZero<usize>>,
+}
+
+/// What flies a campaign of faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Engine {
+    /// This program.
+    #[default]
+    Local,
+    /// HyperQueue.
+    Hq,
+    /// Slurm.
+    Slurm,
 }
 
 /// Options of `replay`.
@@ -294,12 +350,22 @@ fn north_and_east(text: &str) -> Result<[f32; 2], String> {
 impl SceneOptions {
     /// The flight these options describe.
     pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>, live: Option<Live>) -> Result<V::Setup, Failure> {
+        let options = Options { live, ..self.options(jitter) };
+        Ok(V::setup(&options, seed)?)
+    }
+
+    /// The same as a vehicle takes them.
+    pub fn options(&self, jitter: Option<u64>) -> Options {
         let Self { mission, plant, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } =
             self.clone();
         let pilot = pilot.then(|| mode.unwrap_or_default());
-        let options =
-            Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live };
-        Ok(V::setup(&options, seed)?)
+        Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live: None }
+    }
+
+    /// What all flights of a campaign of faults have in common.
+    pub fn settings(&self) -> Settings {
+        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, .. } = self.clone();
+        Settings { mission, plant, param, vibration, gust, wind, chips, cameras, jitter }
     }
 
     /// Prints what can be changed.

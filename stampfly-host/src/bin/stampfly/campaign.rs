@@ -3,11 +3,13 @@
 
 use crate::arguments::CampaignOptions;
 use crate::failure::Failure;
+use crate::fault_campaign;
 use crate::fly::add_findings;
 use crate::terminal;
 use serde_json::{Map, Value, json};
 use stampfly_board::simulation::StampFly;
-use stampfly_host::campaign::{self, Flight, spreads, workers};
+use stampfly_host::campaign::parallel::workers;
+use stampfly_host::campaign::{self, Flight, spreads};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
 use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
@@ -16,6 +18,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
+    if options.faults {
+        return fault_campaign::run(options);
+    }
     if options.consistency {
         return consistency(options);
     }
@@ -116,7 +121,7 @@ fn print<V: Vehicle, W>(
             None => outln!("{name:<22} {:>9} {:>9} {:>9} {unit}", "–", "–", "–"),
         }
     }
-    let cores = workers(all);
+    let cores = workers(all, None);
     let plural = if cores == 1 { "" } else { "s" };
     outln!("\n{succeeded} of {all} flights succeeded; {factor:.0} × real time on {cores} core{plural}");
     if !failed.is_empty() {

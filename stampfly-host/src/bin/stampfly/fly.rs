@@ -6,18 +6,27 @@ use crate::failure::Failure;
 use crate::terminal;
 use serde_json::{Map, Value, json};
 use stampfly_bus::Schedule;
+use stampfly_host::campaign;
+use stampfly_host::campaign::row::Row;
 use stampfly_host::flown::{Flown, fly};
 use stampfly_host::recorder::{Recorder, Timing};
 use stampfly_host::report::{Metric, Report};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::flight_log;
-use stampfly_sim::vehicle::{Live, Vehicle, Verdict};
+use stampfly_sim::vehicle::{Live, Options, Vehicle, Verdict};
 use stampfly_types::Duration;
 use std::net::UdpSocket;
 use std::path::Path;
 use std::process::ExitCode;
 
+/// What is written.
+const LOG: &str = "flight.ulg";
+const PAGE: &str = "flight.html";
+
 pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
+    if let Some((file, row)) = options.from.as_ref().zip(options.row) {
+        return again(options, file, row);
+    }
     vehicles::with(&options.scene.vehicle.name, Fly(options, None))?
 }
 
@@ -26,6 +35,58 @@ pub fn serve(options: &ServeOptions) -> Result<ExitCode, Failure> {
     outln!("listening on {}", socket.local_addr()?);
     let limit = Duration::from_seconds(options.seconds);
     vehicles::with(&options.fly.scene.vehicle.name, Fly(&options.fly, Some(Live { socket: socket.into(), limit })))?
+}
+
+/// A flight of a campaign, from its row.
+fn again(options: &FlyOptions, file: &Path, row: usize) -> Result<ExitCode, Failure> {
+    let contents = campaign::file::read(file)?;
+    let rows = contents.rows.len();
+    let row = contents.rows.into_iter().nth(row);
+    let row = row.ok_or_else(|| format!("{} has rows 0 to {}", file.display(), rows.saturating_sub(1)))?;
+    vehicles::with(&options.scene.vehicle.name, Again(options, row))?
+}
+
+struct Again<'o>(&'o FlyOptions, Row);
+
+impl ForVehicle for Again<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let Self(options, row) = self;
+        let case = row.case()?;
+        let setup = V::setup(&case.options, case.seed)?;
+        let (flown, recorder) = fly_and_write::<V>(options, &case.options, case.seed, &setup)?;
+        let again = campaign::flight::finished(Row::of(&case), &flown, recorder.hash());
+        let digest = campaign::flight::digest::<V>(&setup);
+        let same = again.log_hash == row.log_hash;
+        if options.scene.json {
+            let mut object = figures(&flown, recorder.hash());
+            object.insert("verdict".into(), json!(again.verdict));
+            object.insert("recorded_hash".into(), json!(row.log_hash));
+            object.insert("same".into(), json!(same));
+            object.insert("line".into(), json!(case.line()));
+            outln!("{}", Value::Object(object));
+        } else {
+            outln!("{}\n", case.line());
+            flown.outcome.story().iter().for_each(|line| outln!("  {line}"));
+            outln!("\nverdict  {}, recorded {}", again.verdict, row.verdict);
+            outln!("hash     {}, recorded {}", again.log_hash, row.log_hash);
+            if !same {
+                let version = env!("CARGO_PKG_VERSION");
+                let why = if row.version != version {
+                    format!("it was flown by version {}, this is {version}", row.version)
+                } else if row.parameter_digest != digest {
+                    "its parameters were others".into()
+                } else {
+                    "the flight stack or the simulator is another".into()
+                };
+                outln!("\nNOT the same flight: {why}");
+            }
+            let [log, page] = [LOG, PAGE].map(|name| options.out.join(name));
+            outln!("log      {}\nreport   {}", log.display(), page.display());
+        }
+        Ok(if same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
 }
 
 struct Fly<'o>(&'o FlyOptions, Option<Live>);
@@ -40,43 +101,55 @@ impl ForVehicle for Fly<'_> {
             return Ok(ExitCode::SUCCESS);
         }
         let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, live)?;
-        std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
-        let facts = [
-            ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-            ("seed".to_owned(), options.seed.to_string()),
-            ("mission".to_owned(), options.scene.mission.clone().unwrap_or_else(|| "default".into())),
-        ];
-        let mut recorder = Recorder::<V>::with_log(&setup, &facts).with_timing();
-        let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
-        let flown = fly::<V>(&setup, &mut recorder, &mut |done, word| {
-            bar.set_message(word);
-            bar.set_position((done * 1000.0) as u64);
-        });
-        bar.finish_and_clear();
-
-        let log = options.out.join("flight.ulg");
-        std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
-        let page = options.out.join("flight.html");
-        write_report::<V>(&flown, &recorder, options, &page)?;
-        for (name, contents) in flown.outcome.files() {
-            let path = options.out.join(name);
-            std::fs::write(&path, contents).map_err(|error| format!("{}: {error}", path.display()))?;
-        }
-
+        let typed = options.scene.options(options.scene.jitter);
+        let (flown, recorder) = fly_and_write::<V>(options, &typed, options.seed, &setup)?;
         if options.scene.json {
-            print_json(&flown, recorder.hash());
+            outln!("{}", Value::Object(figures(&flown, recorder.hash())));
         } else {
+            let [log, page] = [LOG, PAGE].map(|name| options.out.join(name));
             print_screen::<V>(&flown, &recorder, &log, &page);
         }
         Ok(if flown.outcome.succeeded() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 }
 
+/// Flies it, and writes log, report and whatever else belongs to the flight.
+fn fly_and_write<V: Vehicle>(
+    options: &FlyOptions,
+    flight: &Options,
+    seed: u64,
+    setup: &V::Setup,
+) -> Result<(Flown<V::Outcome>, Recorder<V>), Failure> {
+    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
+    let facts = [
+        ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("seed".to_owned(), seed.to_string()),
+        ("mission".to_owned(), flight.mission.clone().unwrap_or_else(|| "default".into())),
+    ];
+    let mut recorder = Recorder::<V>::with_log(setup, &facts).with_timing();
+    let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
+    let flown = fly::<V>(setup, &mut recorder, &mut |done, word| {
+        bar.set_message(word);
+        bar.set_position((done * 1000.0) as u64);
+    });
+    bar.finish_and_clear();
+
+    let log = options.out.join(LOG);
+    std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
+    write_report::<V>(&flown, &recorder, flight.mission.as_deref(), seed, &options.out.join(PAGE))?;
+    for (name, contents) in flown.outcome.files() {
+        let path = options.out.join(name);
+        std::fs::write(&path, contents).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    Ok((flown, recorder))
+}
+
 /// The report is made from the log, so it shows what the log holds and nothing else.
 fn write_report<V: Vehicle>(
     flown: &Flown<V::Outcome>,
     recorder: &Recorder<V>,
-    options: &FlyOptions,
+    mission: Option<&str>,
+    seed: u64,
     page: &Path,
 ) -> Result<(), Failure> {
     let parsed = flight_log::parse(recorder.log())?;
@@ -86,10 +159,10 @@ fn write_report<V: Vehicle>(
     let figures = figures.iter().filter_map(|figure| Some((figure, figure.value?)));
     metrics.extend(figures.map(|(figure, value)| Metric::new(figure.name, format!("{value:.3}"), figure.unit)));
     metrics.push(Metric::new("log hash", format!("{:016x}", recorder.hash()), ""));
-    let mission = options.scene.mission.as_deref().map(|mission| format!("mission {mission}, ")).unwrap_or_default();
+    let mission = mission.map(|mission| format!("mission {mission}, ")).unwrap_or_default();
     let report = Report {
         title: format!("Flight of {}", V::NAME),
-        subtitle: format!("simulated, {mission}seed {}, {:.1} s", options.seed, flown.duration.seconds_f64()),
+        subtitle: format!("simulated, {mission}seed {seed}, {:.1} s", flown.duration.seconds_f64()),
         metrics,
         page: &V::PAGE,
         flight: &parsed.flight,
@@ -97,7 +170,8 @@ fn write_report<V: Vehicle>(
     report.write(page).map_err(|error| format!("{}: {error}", page.display()).into())
 }
 
-fn print_json(flown: &Flown<impl Verdict>, hash: u64) {
+/// The flight as a JSON object.
+fn figures(flown: &Flown<impl Verdict>, hash: u64) -> Map<String, Value> {
     let mut object = Map::new();
     for (name, value) in flown.outcome.facts() {
         object.insert(name.into(), json!(value));
@@ -109,7 +183,7 @@ fn print_json(flown: &Flown<impl Verdict>, hash: u64) {
     object.insert("duration_s".into(), json!(flown.duration.seconds_f64()));
     object.insert("realtime_factor".into(), json!(flown.realtime_factor));
     object.insert("log_hash".into(), json!(format!("{hash:016x}")));
-    outln!("{}", Value::Object(object));
+    object
 }
 
 /// Adds what came of faults.

@@ -7,8 +7,10 @@ macro_rules! outln {
 
 mod arguments;
 mod campaign;
+mod engine;
 mod estimate;
 mod failure;
+mod fault_campaign;
 mod faults;
 mod fly;
 mod golden;

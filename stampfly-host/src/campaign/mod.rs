@@ -1,11 +1,29 @@
 //! A campaign: many missions in parallel, each with its own seed, and what they say together.
+//!
+//! [`run`] flies the same mission many times. A *fault campaign* flies through what can go wrong:
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`case`] | which flight is number N |
+//! | [`flight`], [`row`] | flies one; a flight as a row of a table |
+//! | [`shard`], [`mod@file`] | the part of a campaign that one task flies, and its Parquet file |
+//! | [`summary`], [`page`] | faults × moments, failures; as CSV and HTML |
+//! | [`shrink`] | the smallest flight in which the same goes wrong |
+//! | [`parallel`] | work on every core |
+
+pub mod case;
+pub mod file;
+pub mod flight;
+pub mod page;
+pub mod parallel;
+pub mod row;
+pub mod shard;
+pub mod shrink;
+pub mod summary;
 
 use crate::flown::{Flown, fly};
 use serde::Serialize;
 use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Median, 95th percentile and worst of a figure over the flights that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -55,12 +73,6 @@ impl<V: Vehicle, W> Flight<V, W> {
     }
 }
 
-/// On how many cores that many flights are flown at once: all there are.
-#[must_use]
-pub fn workers(flights: usize) -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from).min(flights.max(1))
-}
-
 /// Flies these setups, each with its seed, on as many threads as there are cores. Flights come back in the order of the
 /// setups. Each has a witness of its own; `done` is called after each.
 pub fn run<V: Vehicle, W: Witness<V::Runnables> + Send>(
@@ -68,27 +80,17 @@ pub fn run<V: Vehicle, W: Witness<V::Runnables> + Send>(
     witness: &(dyn Fn(u64, &V::Setup) -> W + Sync),
     done: &(dyn Fn(&Flight<V, W>) + Sync),
 ) -> Vec<Flight<V, W>> {
-    let next = AtomicUsize::new(0);
-    let flights = Mutex::new(BTreeMap::new());
-    std::thread::scope(|scope| {
-        for _ in 0..workers(setups.len()) {
-            scope.spawn(|| {
-                while let Some((index, (seed, setup))) = {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    setups.get(index).map(|setup| (index, setup))
-                } {
-                    let mut witness = witness(*seed, setup);
-                    let flown = fly::<V>(setup, &mut witness, &mut |_, _| {});
-                    let flight = Flight { seed: *seed, flown, witness };
-                    done(&flight);
-                    if let Ok(mut flights) = flights.lock() {
-                        flights.insert(index, flight);
-                    }
-                }
-            });
-        }
-    });
-    flights.into_inner().unwrap_or_default().into_values().collect()
+    parallel::each(setups.len(), parallel::workers(setups.len(), None), &|place| {
+        let (seed, setup) = setups.get(place)?;
+        let mut witness = witness(*seed, setup);
+        let flown = fly::<V>(setup, &mut witness, &mut |_, _| {});
+        let flight = Flight { seed: *seed, flown, witness };
+        done(&flight);
+        Some(flight)
+    })
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// Figures over all flights: name, unit, spread.

@@ -1,0 +1,262 @@
+//! Which flight is number N of a campaign: a function of the campaign and of N, and of nothing else.
+//!
+//! So a campaign is flown in parts, on any machines and in any order, without anybody who hands out work.
+//!
+//! The first flights walk through every *cell*: every fault of the vehicle's table, with its usual value, at every moment
+//! of a short flight, under a program's commands and then in every mode of a pilot. The others draw fault, value, moment,
+//! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults.
+
+use serde::{Deserialize, Serialize};
+use stampfly_sim::Noise;
+use stampfly_sim::fault::{Fault, FaultKind, FaultValue, Moment, When};
+use stampfly_sim::vehicle::{Options, Vehicle};
+use stampfly_types::Duration;
+
+/// Random number stream of campaigns; those of vehicles, missions and faults are others.
+const STREAM: u64 = 1_100;
+
+/// Values are drawn from this part of the table's usual value to that: the table says how a flight may end with the usual
+/// one, and milder ones may not end worse.
+const VALUES: [f64; 2] = [0.25, 1.0];
+/// Shortest and longest duration, s.
+const LASTS: [f64; 2] = [0.05, 10.0];
+/// Faults that begin at a time begin within these, s since power-on: before the vehicle is armed, and when the shortest mission
+/// is about to land.
+const TIMES: [f64; 2] = [3.0, 12.0];
+/// Strongest gusts, m/s: half more than in the reference mission.
+const GUST: f64 = 0.8;
+
+/// A campaign: everything that decides which flights it has.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Seed of the first flight; the others count up.
+    pub seed: u64,
+    /// How many flights.
+    pub flights: u64,
+    /// Are there flights with two faults?
+    pub pairs: bool,
+    /// What all flights have in common, as on the command line.
+    pub settings: Settings,
+}
+
+/// What a flight can be told beside its faults: see [`Options`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(missing_docs, reason = "as in Options")]
+pub struct Settings {
+    pub mission: Option<String>,
+    pub plant: Vec<String>,
+    pub param: Vec<String>,
+    pub vibration: Option<f64>,
+    pub gust: Option<f32>,
+    pub wind: Option<[f32; 2]>,
+    pub chips: bool,
+    pub cameras: bool,
+    pub jitter: Option<u64>,
+}
+
+impl Settings {
+    /// The same as options of a flight.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, jitter } = self.clone();
+        Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, ..Options::default() }
+    }
+}
+
+/// One flight of a campaign.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Its number in the campaign, from zero.
+    pub index: u64,
+    /// Its seed.
+    pub seed: u64,
+    /// Everything else that decides it.
+    pub options: Options,
+}
+
+/// A cell of a campaign's first flights: fault, moment, mode of a pilot.
+type Cell = (&'static FaultKind, Moment, Option<&'static str>);
+
+/// The flights of a campaign.
+#[derive(Clone, Debug)]
+pub struct Cases {
+    plan: Plan,
+    faults: &'static [FaultKind],
+    modes: &'static [&'static str],
+    missions: &'static [&'static str],
+    cells: Vec<Cell>,
+}
+
+impl Cases {
+    /// The flights of this campaign of this vehicle.
+    #[must_use]
+    pub fn new<V: Vehicle>(plan: &Plan) -> Self {
+        let (faults, modes) = (V::FAULTS, V::VARIETY.modes);
+        let rounds = Moment::ALL.len();
+        let modes_and_none = std::iter::once(None).chain(modes.iter().copied().map(Some));
+        // Each round has every fault once, and the moments in turn: a campaign that is cut short has seen some of all.
+        let cells = modes_and_none.flat_map(|mode| {
+            (0..rounds).flat_map(move |round| {
+                let moment = move |place: usize| Moment::ALL[(round + place) % rounds];
+                faults.iter().enumerate().map(move |(place, kind)| (kind, moment(place), mode))
+            })
+        });
+        Self { cells: cells.collect(), plan: plan.clone(), faults, modes, missions: V::VARIETY.missions }
+    }
+
+    /// How many flights walk through the cells: every cell is flown in a campaign that has as many.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Flight number `index`.
+    #[must_use]
+    pub fn case(&self, index: u64) -> Case {
+        let seed = self.plan.seed.wrapping_add(index);
+        let mut options = self.plan.settings.options();
+        // Every flight has its own delays, too.
+        options.jitter = options.jitter.map(|seed| seed.wrapping_add(index));
+        match usize::try_from(index).ok().and_then(|index| self.cells.get(index)) {
+            Some((kind, moment, mode)) => {
+                options.fault = vec![format!("{}@{}", kind.name, moment.name())];
+                options.pilot = mode.map(Into::into);
+                options.mission = options.mission.or_else(|| self.missions.first().map(|mission| (*mission).into()));
+            }
+            None => self.draw(&mut options, seed),
+        }
+        Case { index, seed, options }
+    }
+
+    /// Anything at all.
+    fn draw(&self, options: &mut Options, seed: u64) {
+        let mut dice = Dice(Noise::new(seed, STREAM));
+        let Some(first) = dice.one(self.faults) else { return };
+        options.fault = vec![dice.fault(first).to_string()];
+        if self.plan.pairs && dice.0.chance(0.5) {
+            // Two of a kind would be one.
+            let others: Vec<_> = self.faults.iter().filter(|kind| kind.name != first.name).collect();
+            options.fault.extend(dice.one(&others).map(|kind| dice.fault(kind).to_string()));
+        }
+        // As often under a program's commands as in any one mode.
+        let mode = dice.below(self.modes.len() + 1);
+        options.pilot = self.modes.get(mode).map(|mode| (*mode).into());
+        if options.mission.is_none() {
+            options.mission = dice.one(self.missions).map(|mission| (*mission).into());
+        }
+        options.gust = options.gust.or(Some(dice.round(0.0, GUST) as f32));
+        options.chips |= dice.0.chance(0.1);
+        options.jitter = options.jitter.or(dice.0.chance(0.25).then_some(seed));
+    }
+}
+
+/// Draws from a flight's seed.
+struct Dice(Noise);
+
+impl Dice {
+    fn below(&mut self, count: usize) -> usize {
+        ((self.0.unit() * count as f64) as usize).min(count.saturating_sub(1))
+    }
+
+    fn one<'t, T>(&mut self, of: &'t [T]) -> Option<&'t T> {
+        let place = self.below(of.len());
+        of.get(place)
+    }
+
+    /// A number between two, with three digits.
+    fn round(&mut self, low: f64, high: f64) -> f64 {
+        let value = low + (high - low) * self.0.unit();
+        // Reading what is written gives the nearest number, as it will be read from the command line.
+        format!("{value:.2e}").parse().unwrap_or(value)
+    }
+
+    /// This fault, some time.
+    fn fault(&mut self, kind: &'static FaultKind) -> Fault {
+        let value = match kind.value {
+            FaultValue::None => None,
+            FaultValue::Number { default, range: [low, high], .. } => {
+                Some(self.round(VALUES[0] * default, VALUES[1] * default).clamp(low, high))
+            }
+            FaultValue::OrLast { range: [low, high], .. } => {
+                self.0.chance(0.5).then(|| self.round(low, high).clamp(low, high))
+            }
+        };
+        let when = if self.0.chance(0.8) {
+            When::Moment(Moment::ALL[self.below(Moment::ALL.len())])
+        } else {
+            When::After(seconds(self.round(TIMES[0], TIMES[1])))
+        };
+        // Evenly over orders of magnitude.
+        let lasts = self.0.chance(0.5).then(|| seconds(LASTS[0] * (LASTS[1] / LASTS[0]).powf(self.0.unit())));
+        Fault { kind, value, when, lasts }
+    }
+}
+
+/// With whole milliseconds.
+fn seconds(seconds: f64) -> Duration {
+    Duration::from_millis((1e3 * seconds).round() as u64)
+}
+
+impl Case {
+    /// The arguments of `stampfly` that fly it.
+    #[must_use]
+    pub fn arguments(&self) -> Vec<String> {
+        let Self { seed, options, .. } = self;
+        let Options { mission, pilot, fault, gust, chips, jitter, vibration, .. } = options;
+        let mut arguments: Vec<String> = vec!["fly".into(), "--seed".into(), seed.to_string()];
+        let mut add = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                arguments.extend([format!("--{name}"), value]);
+            }
+        };
+        add("mission", mission.clone());
+        fault.iter().for_each(|fault| add("fault", Some(fault.clone())));
+        add("gust", gust.map(|gust| gust.to_string()));
+        add("vibration", vibration.map(|vibration| vibration.to_string()));
+        add("jitter", jitter.map(|jitter| jitter.to_string()));
+        add("mode", pilot.clone().filter(|mode| !mode.is_empty()));
+        arguments.extend(pilot.as_ref().map(|_| "--pilot".into()));
+        arguments.extend(chips.then(|| "--chips".into()));
+        arguments.extend(rest(options));
+        arguments
+    }
+
+    /// The line that repeats it.
+    #[must_use]
+    pub fn line(&self) -> String {
+        format!("stampfly {}", shell_line(&self.arguments()))
+    }
+}
+
+/// Words as a shell reads them.
+///
+/// ```
+/// use stampfly_host::campaign::case::shell_line;
+/// let words = ["--mission", "arm; land"].map(String::from);
+/// assert_eq!(shell_line(&words), "--mission 'arm; land'");
+/// ```
+#[must_use]
+pub fn shell_line(words: &[String]) -> String {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_=@+.,/:".contains(letter);
+    let quoted = words.iter().map(|word| {
+        let plain = !word.is_empty() && word.chars().all(is_plain);
+        if plain { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    });
+    quoted.collect::<Vec<_>>().join(" ")
+}
+
+/// Options that a campaign does not vary.
+#[must_use]
+pub fn rest(options: &Options) -> Vec<String> {
+    let Options { plant, param, wind, cameras, .. } = options;
+    let named = |name: &str, values: &[String]| -> Vec<String> {
+        // Without the spaces that may stand around `=`: they part the words of a row.
+        values.iter().flat_map(|value| [format!("--{name}"), value.split_whitespace().collect()]).collect()
+    };
+    let mut words = named("plant", plant);
+    words.extend(named("param", param));
+    words.extend(wind.iter().flat_map(|[north, east]| ["--wind".into(), format!("{north},{east}")]));
+    words.extend(cameras.then(|| "--cameras".into()));
+    words
+}

@@ -1,0 +1,105 @@
+//! A fault campaign as one HTML page: fault × moment, pairs of faults, failures with the line that repeats each.
+//!
+//! A single file without scripts and without any reference to the outside.
+
+use super::summary::{Cell, Failure, Summary, Table, phases};
+use crate::report::escape;
+use stampfly_sim::fault::{FaultKind, Moment};
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// The page of a campaign. `title` is its heading, `subtitle` says what was flown.
+#[must_use]
+pub fn html(summary: &Summary, faults: &[FaultKind], title: &str, subtitle: &str) -> String {
+    let all = &summary.all;
+    let passed = all.flights - all.failed - all.idle;
+    let metrics = [
+        ("flights", all.flights, None),
+        ("passed", passed, Some(all.failed == 0)),
+        ("wrong end", all.wrong, Some(all.wrong == 0)),
+        ("invariant violated", all.violated, Some(all.violated == 0)),
+        ("fault changed nothing", all.idle, None),
+    ];
+    let metrics: String = metrics.iter().map(|(name, count, good)| metric(name, *count, *good)).collect();
+    let names: Vec<&str> = faults.iter().map(|kind| kind.name).collect();
+    let columns: Vec<&str> = phases().filter(|phase| *phase != "time" || has_column(&summary.cells, phase)).collect();
+    let legend = "<p>The worst end of each cell, and its flights; red: how many of them failed; grey: the fault changed nothing.</p>\n";
+    let cells = table(&summary.cells, &names, &columns);
+    let mut body = section("Faults by the moment at which they begin", &format!("{legend}{cells}"));
+    if !summary.pairs.is_empty() {
+        let others: BTreeSet<&str> = summary.pairs.keys().map(|(_, other)| other.as_str()).collect();
+        let others: Vec<&str> = names.iter().copied().filter(|name| others.contains(name)).collect();
+        body += &section("Two faults", &table(&summary.pairs, &names, &others));
+    }
+    if !summary.failures.is_empty() {
+        body += &section("Failures", &failures(&summary.failures));
+    }
+    format!(
+        include_str!("page.html"),
+        style = concat!(include_str!("../report/page.css"), include_str!("page.css")),
+        title = escape(title),
+        subtitle = escape(subtitle),
+        metrics = metrics,
+        body = body,
+    )
+}
+
+fn has_column(table: &Table, column: &str) -> bool {
+    table.keys().any(|(_, name)| name == column)
+}
+
+fn metric(name: &str, count: usize, good: Option<bool>) -> String {
+    let class = good.map_or("", |good| if good { " class=\"passed\"" } else { " class=\"failed\"" });
+    format!("<tr{class}><th scope=\"row\">{name}</th><td><b>{count}</b></td></tr>\n")
+}
+
+fn section(title: &str, inside: &str) -> String {
+    format!("<section class=\"card\">\n<h2>{title}</h2>\n{inside}</section>\n")
+}
+
+/// Cells as a table: rows without a flight are left out.
+fn table(cells: &Table, rows: &[&str], columns: &[&str]) -> String {
+    let wide = if columns.len() > Moment::ALL.len() + 1 { " class=\"wide\"" } else { "" };
+    let mut text = format!("<div class=\"scroll\"><table{wide}>\n<thead><tr><th></th>");
+    columns.iter().for_each(|column| {
+        let _ = write!(text, "<th scope=\"col\"><span>{}</span></th>", escape(column));
+    });
+    text += "</tr></thead>\n<tbody>\n";
+    for row in rows {
+        let of_row: Vec<_> =
+            columns.iter().map(|column| cells.get(&((*row).to_owned(), (*column).to_owned()))).collect();
+        if of_row.iter().any(Option::is_some) {
+            let _ = write!(text, "<tr><th scope=\"row\">{}</th>", escape(row));
+            text.extend(of_row.iter().map(|cell| cell.map_or("<td></td>".into(), shown)));
+            text += "</tr>\n";
+        }
+    }
+    text + "</tbody>\n</table></div>\n"
+}
+
+fn shown(cell: &Cell) -> String {
+    let Cell { flights, idle, wrong, violated, failed, worst } = cell;
+    let class = match (failed, idle == flights) {
+        (0, true) => "idle",
+        (0, false) => "good",
+        _ => "bad",
+    };
+    let count = if *failed > 0 { format!("{failed}/{flights}") } else { flights.to_string() };
+    let says = format!("{flights} flights: {wrong} wrong end, {violated} invariant violated, {idle} changed nothing");
+    format!("<td class=\"{class}\" title=\"{says}\"><b>{}</b> <i>{count}</i></td>", escape(worst))
+}
+
+fn failures(failures: &[Failure]) -> String {
+    let mut text =
+        "<div class=\"scroll\"><table class=\"list\">\n<thead><tr><th>fault</th><th>moment</th><th>verdict</th>\
+                    <th>flights</th><th>repeat it</th></tr></thead>\n<tbody>\n"
+            .to_owned();
+    for Failure { fault, phase, verdict, flights, line, .. } in failures {
+        let [fault, phase, verdict, line] = [fault, phase, verdict, line].map(|part| escape(part));
+        let _ = writeln!(
+            text,
+            "<tr><th scope=\"row\">{fault}</th><td>{phase}</td><td>{verdict}</td><td>{flights}</td><td><code>{line}</code></td></tr>"
+        );
+    }
+    text + "</tbody>\n</table></div>\n"
+}
