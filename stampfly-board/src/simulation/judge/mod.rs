@@ -17,7 +17,7 @@
 //! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
 //! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide.
 //!
-//! What never may happen is in [`invariants`], and `I12`: every fault began, and changed something.
+//! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
 mod course;
 mod invariants;
