@@ -1,0 +1,94 @@
+//! What refuses arming.
+
+use super::*;
+
+#[test]
+fn d9_a_vehicle_without_its_sensors_does_not_arm() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.alerts = SENSORS_LOST;
+    let output = world.step(&mut machine, &[Command::Arm]);
+    let missing = ArmBlocks::NO_RANGE | ArmBlocks::NO_FLOW | ArmBlocks::NO_BARO;
+    assert_eq!((output.flight_status.armed, output.flight_status.blocks, output.refused), (false, missing, true));
+    assert_eq!(machine.refusals().count(), 3);
+}
+
+#[test]
+fn the_arm_switch_of_a_new_transmitter_must_be_seen_off() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.sends(&mut machine, frame(FlightMode::PosHold, false, 0.0));
+    world.button = Some(ButtonGesture::HoldPair);
+    world.step(&mut machine, &[]);
+    world.pilot = None;
+    world.pass(&mut machine, 1_000);
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    assert!(!world.sends(&mut machine, on).pairing);
+    assert!(!world.sends(&mut machine, on).armed, "switched on before it was seen off");
+    world.sends(&mut machine, off);
+    assert!(world.sends(&mut machine, on).armed);
+}
+
+#[test]
+fn turning_the_mode_switch_of_an_armed_vehicle_does_not_take_off() {
+    for (from, to, throttle) in
+        [(FlightMode::Stabilize, FlightMode::AltHold, 0.0), (FlightMode::AltHold, FlightMode::Stabilize, 0.6)]
+    {
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+        world.sends(&mut machine, frame(from, false, throttle));
+        assert!(world.sends(&mut machine, frame(from, true, throttle)).armed);
+        machine.state.takes_off = false;
+        let status = world.sends(&mut machine, frame(to, true, throttle));
+        assert_eq!(status.mode, to);
+        assert_eq!(world.pass(&mut machine, 2_000).phase, FlightPhase::Armed, "{from:?} to {to:?}");
+        world.sends(&mut machine, frame(to, true, 0.0));
+        assert_eq!(world.sends(&mut machine, frame(to, true, 0.3)).phase, FlightPhase::TakeOff);
+    }
+}
+
+#[test]
+fn a_switch_that_was_on_at_boot_does_not_arm() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    assert!(!world.sends(&mut machine, on).armed);
+    assert!(machine.refusals().any(|refusal| refusal.check == ArmBlocks::ARM_SWITCH));
+    world.sends(&mut machine, off);
+    assert!(world.sends(&mut machine, on).armed, "off, then on");
+}
+
+#[test]
+fn a_vehicle_that_hears_neither_pilot_nor_program_does_not_arm() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.alerts = Alerts::COMM_LOST;
+    for gesture in [ButtonGesture::Press, ButtonGesture::Click] {
+        world.button = Some(gesture);
+        let mode = world.step(&mut machine, &[]).flight_status;
+        assert_eq!((mode.armed, mode.blocks), (false, ArmBlocks::NO_LINK), "{gesture:?}");
+    }
+    assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed, "a command is a sign of life itself");
+}
+
+#[test]
+fn a_mode_that_holds_height_does_not_arm_without_one() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.estimate.valid = Validity::TILT;
+    for arm in [false, true] {
+        let mode = world.sends(&mut machine, frame(FlightMode::AltHold, arm, 0.6));
+        assert_eq!((mode.armed, mode.mode, mode.blocks), (false, FlightMode::AltHold, ArmBlocks::ESTIMATE));
+    }
+    world.estimate.valid = Validity::ALL;
+    for arm in [false, true] {
+        world.sends(&mut machine, frame(FlightMode::AltHold, arm, 0.6));
+    }
+    assert!(machine.state.is_armed(), "a raised stick is a climb rate, and no reason");
+}
+
+#[test]
+fn the_machine_blocks_arming_at_the_tilt_of_its_configuration() {
+    let tilted = stampfly_types::Quat::from_euler_angles(0.2, 0.0, 0.0);
+    for (arming_tilt, blocks) in [(0.15, ArmBlocks::TILTED), (0.25, ArmBlocks::NONE)] {
+        let mut machine = ModeMachine::new(ModeConfig { arming_tilt, ..ModeConfig::default() });
+        let mut world = World::ready();
+        world.estimate.attitude = tilted;
+        world.step(&mut machine, &[]);
+        assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, blocks);
+    }
+}
