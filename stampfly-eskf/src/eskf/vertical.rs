@@ -49,8 +49,9 @@ const JUMPS: f32 = 5.0;
 const JUMP_FADING: f32 = 0.4;
 /// Rejections count for this long.
 const REMEMBERED: Duration = Duration::from_secs(3);
-/// How near a range has to be to what is expected, m, and for how long, to be believed again, s.
-const AGREES: f32 = 0.15;
+/// How near a range has to be to what is expected, m, and for how long, to be believed again, s. What is expected follows the
+/// barometer, which is as wrong as that after some seconds.
+const AGREES: f32 = 0.3;
 const AGREES_FOR: f32 = 1.0;
 /// Time constants with which the observer follows the barometer, s: slower at first, because starting propellers change
 /// the pressure by more than half a metre.

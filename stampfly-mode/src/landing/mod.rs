@@ -11,7 +11,7 @@
 //! | what is known | descent | test for touchdown |
 //! |---|---|---|
 //! | height above the ground, by range or cameras | [`LandingConfig::descent`], slower near the ground | the ramp, near the ground |
-//! | climb rate, by the barometer | the same, from a metre on at [`LandingConfig::touchdown`] | a moment without thrust, once a second |
+//! | climb rate, by the barometer | [`LandingConfig::descent`] | a moment without thrust, once a second |
 //! | neither | on thrust | the same |
 
 mod blind;
@@ -95,9 +95,6 @@ const UNLIMITED: f32 = 2.0;
 /// What measures the height above the ground. A barometer does not: after some minutes it is wrong by half a metre.
 const HEIGHT_SENSORS: SensorMask = SensorMask::TOF.with(SensorMask::EXTERNAL);
 
-/// Below this height, m, a barometer may mean the ground.
-const UNSURE_HEIGHT: f32 = 1.0;
-
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
 const FREE_FALL: Duration = Duration::from_millis(250);
@@ -154,7 +151,7 @@ impl TakeoffLanding {
                 let landed = if ground_known && self.blind.is_none() {
                     self.land(now, estimate, weight, &mut land_detected)
                 } else {
-                    self.land_blind(now, estimate, weight, climb_known, &mut land_detected)
+                    self.land_blind(now, weight, climb_known, &mut land_detected)
                 };
                 land_detected.landed = landed;
                 if landed {
@@ -214,20 +211,12 @@ impl TakeoffLanding {
     }
 
     /// One step of a landing whose height above the ground is not known. Has the vehicle landed?
-    fn land_blind(
-        &mut self,
-        now: Instant,
-        estimate: &StateEstimate,
-        weight: Answers,
-        climb_known: bool,
-        asked: &mut LandDetected,
-    ) -> bool {
+    fn land_blind(&mut self, now: Instant, weight: Answers, climb_known: bool, asked: &mut LandDetected) -> bool {
         let config = &self.config;
         let blind = self.blind.get_or_insert_default();
         let (ceiling, landed) = blind.step(now, weight, config.touchdown_time);
         self.is_testing = blind.is_testing();
-        let high = estimate.valid.contains(Validity::HEIGHT) && estimate.height > UNSURE_HEIGHT;
-        asked.descent_rate = if climb_known && high { config.descent } else { config.touchdown };
+        asked.descent_rate = if climb_known { config.descent } else { config.touchdown };
         // Where the climb rate is controlled, thrust is taken away for the test alone.
         if self.is_testing || !climb_known {
             asked.thrust_ceiling = ceiling;
