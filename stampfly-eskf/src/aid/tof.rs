@@ -11,7 +11,7 @@
 //! | start | a valid range within `tof_min` to `tof_max`, tilt within `min_cos_tilt`; the first one in flight defines the surface |
 //! | continue | the same, and a test ratio of at most one; on the ground it measures the surface instead of the height |
 //! | stop | invalid, out of range or tilted: refused at once, inactive one second after the last accepted range |
-//! | reset | rejected for longer than twice `lockout`: height to the range; variance of height and climb rate reset, vertical accelerometer bias inflated |
+//! | reset | rejected for longer than `lockout`: height to the range; variance of height and climb rate reset, vertical accelerometer bias inflated |
 
 use super::Row;
 use crate::filter::state::Rotation;

@@ -8,9 +8,6 @@ use crate::config::MagModel;
 /// Where nothing but the barometer holds the height, the height is reset to one that is this near, m. Farther away one of
 /// them is wrong, and it is not known which: height and climb rate become invalid.
 const BARO_REACH: f32 = 2.0;
-/// The lock-out of a range is longer by this factor: the monitor needs nine readings after a jump, 0.3 s at 30 Hz, to know one
-/// that is stuck.
-const RANGE_LOCKOUT: f32 = 2.0;
 /// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
 const SHAKEN: f32 = 100.0;
 
@@ -51,7 +48,7 @@ impl Eskf {
         let ratio = self.test_ratio(&innovation);
         self.status.tof_innovation = tof.distance - row.predicted;
         self.status.tof_ratio = ratio;
-        match self.gates.test(Sensor::Tof, self.now, ratio, RANGE_LOCKOUT * self.config.lockout) {
+        match self.gates.test(Sensor::Tof, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => {
                 self.vertical.rejected(self.now);

@@ -9,7 +9,7 @@
 //! |---|---|
 //! | it repeats itself while the observer moves by [`MOVED`], or right after a jump | stuck |
 //! | the filter's path and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
-//! | the height was moved to it more than [`MOVES`] times, or more than once and down by [`MOVED_DOWN`], within three seconds | aliased, an edge below |
+//! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
 //! | it jumps more than five times within about two seconds | outliers, an edge below |
 //!
 //! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust changes. A range that is off by a
@@ -36,8 +36,6 @@ const NEAR: f32 = 0.35;
 const CLEARANCE: f32 = 0.03;
 /// Times that the height was moved to the range.
 const MOVES: u32 = 3;
-/// Sum of the moves, m. The vehicle climbs by what its height is moved down; once is a desk.
-const MOVED_DOWN: f32 = 0.6;
 /// Paths are compared this long after the take-off, s, because starting propellers change the pressure.
 const SETTLED: f32 = 4.0;
 /// As much later after a start in the air, s: first the filter has to find tilt and biases.
@@ -49,9 +47,8 @@ const JUMPS: f32 = 5.0;
 const JUMP_FADING: f32 = 0.4;
 /// Rejections count for this long.
 const REMEMBERED: Duration = Duration::from_secs(3);
-/// How near a range has to be to what is expected, m, and for how long, to be believed again, s. What is expected follows the
-/// barometer, which is as wrong as that after some seconds.
-const AGREES: f32 = 0.3;
+/// How near a range has to be to what is expected, m, and for how long, to be believed again, s.
+const AGREES: f32 = 0.15;
 const AGREES_FOR: f32 = 1.0;
 /// Time constants with which the observer follows the barometer, s: slower at first, because starting propellers change
 /// the pressure by more than half a metre.
@@ -234,10 +231,7 @@ impl VerticalMonitor {
         let stuck = self.repeats >= repeated && (self.height - self.repeats_from).abs() > MOVED
             || self.repeats >= REPEATED_JUMPED && self.jumped;
         let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
-        // A filter that started in the air has to move its height to the range.
-        let wandered = self.age > 0.0 && self.moves > 1 && self.moved < -MOVED_DOWN;
-        let moved = (settled && self.moves > MOVES) || wandered;
-        if stuck || apart || moved || self.jumps > JUMPS {
+        if stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES) {
             // Right after the take-off the observer knows how far it came.
             let young = self.age < SETTLED && !self.restarted;
             let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };

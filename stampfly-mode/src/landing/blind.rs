@@ -11,7 +11,7 @@
 //! | 4 s | 0.91 | 0.6 m/s |
 //! | 7 s and later | 0.88 | 0.85 m/s |
 //!
-//! A vehicle whose climb rate is known sinks at the speed it is asked for, and has use for the test alone.
+//! Not for a vehicle whose climb rate is known: that one sinks at the speed it is asked for.
 
 use super::weight::{Answers, Support};
 use crate::lasting::lasting;

@@ -7,12 +7,6 @@
 //! The ramp is also the test for touchdown: a vehicle whose specific force does not follow its thrust
 //! stands. Neither height nor climb rate can make a vehicle in the air count as landed. One that falls although its
 //! height says that it stands gets its thrust back, and comes down blind, as one without height and climb rate does.
-//!
-//! | what is known | descent | test for touchdown |
-//! |---|---|---|
-//! | height above the ground, by range or cameras | [`LandingConfig::descent`], slower near the ground | the ramp, near the ground |
-//! | climb rate, by the barometer | [`LandingConfig::descent`] | a moment without thrust, once a second |
-//! | neither | on thrust | the same |
 
 mod blind;
 mod config;
@@ -22,7 +16,7 @@ use crate::lasting::lasting;
 use blind::BlindDescent;
 pub use config::LandingConfig;
 use stampfly_types::messages::{
-    ControlOutput, FlightPhase, GroundContact, LandDetected, SensorMask, Setpoint, StateEstimate, Validity,
+    ControlOutput, FlightPhase, GroundContact, LandDetected, Setpoint, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant};
 use weight::{Answers, Support, WeightTest};
@@ -49,9 +43,7 @@ pub struct LandingInput<'a> {
 /// let mut manager = TakeoffLanding::new(LandingConfig::default());
 /// // A vehicle of half a kilogram that stands on the floor in LANDING: its thrust falls, its specific force does not.
 /// let specific_force = Vec3::new(0.0, 0.0, -9.8);
-/// let estimate = StateEstimate {
-///     height: 0.03, specific_force, valid: Validity::ALL, sensors: SensorMask::TOF, ..Default::default()
-/// };
+/// let estimate = StateEstimate { height: 0.03, specific_force, valid: Validity::ALL, ..Default::default() };
 /// let (mut landed_at, mut ceiling) = (None, 1.0f32);
 /// for k in 0..1000u64 {
 ///     let land_detected = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
@@ -81,19 +73,14 @@ pub struct TakeoffLanding {
     /// Since when it has been falling under a falling ceiling.
     falling: Option<Instant>,
     weight: WeightTest,
-    /// The descent without a height above the ground, once it has begun.
+    /// The descent without height and climb rate, once it has begun.
     blind: Option<BlindDescent>,
-    /// It fell although height and climb rate said otherwise.
-    is_deceived: bool,
     /// Was thrust being taken away in the step before?
     is_testing: bool,
 }
 
 /// Thrust ceiling that is none, share of hover thrust.
 const UNLIMITED: f32 = 2.0;
-
-/// What measures the height above the ground. A barometer does not: after some minutes it is wrong by half a metre.
-const HEIGHT_SENSORS: SensorMask = SensorMask::TOF.with(SensorMask::EXTERNAL);
 
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
@@ -116,7 +103,6 @@ impl TakeoffLanding {
             falling: None,
             weight: WeightTest::default(),
             blind: None,
-            is_deceived: false,
             is_testing: false,
         }
     }
@@ -126,7 +112,7 @@ impl TakeoffLanding {
         self.entered = now;
         self.entry_height = input.estimate.height;
         (self.in_band, self.stalled, self.ceiling, self.still) = (None, None, None, None);
-        (self.falling, self.blind, self.is_deceived, self.is_testing) = (None, None, false, false);
+        (self.falling, self.blind, self.is_testing) = (None, None, false);
     }
 
     /// One step, at the control rate.
@@ -146,12 +132,15 @@ impl TakeoffLanding {
             FlightPhase::TakeOff => land_detected.takeoff_complete = self.take_off(now, input),
             FlightPhase::Flying => self.contact = GroundContact::Air,
             FlightPhase::Landing => {
-                let climb_known = estimate.valid.contains(Validity::VELOCITY_Z) && !self.is_deceived;
-                let ground_known = climb_known && estimate.sensors.intersects(HEIGHT_SENSORS);
-                let landed = if ground_known && self.blind.is_none() {
+                let climb_known = estimate.valid.contains(Validity::VELOCITY_Z);
+                let landed = if climb_known && self.blind.is_none() {
                     self.land(now, estimate, weight, &mut land_detected)
                 } else {
-                    self.land_blind(now, weight, climb_known, &mut land_detected)
+                    let blind = self.blind.get_or_insert_default();
+                    let (ceiling, landed) = blind.step(now, weight, config.touchdown_time);
+                    (land_detected.thrust_ceiling, self.is_testing) = (ceiling, blind.is_testing());
+                    land_detected.descent_rate = config.touchdown;
+                    landed
                 };
                 land_detected.landed = landed;
                 if landed {
@@ -204,24 +193,10 @@ impl TakeoffLanding {
         }
         if lasting(&mut self.falling, now, weight.quick == Support::Falls) >= FREE_FALL {
             // Low, or not sinking, it says, and it falls: neither height nor climb rate is to be believed.
-            (self.blind, self.is_deceived, self.is_testing) = (Some(BlindDescent::default()), true, false);
+            (self.blind, self.is_testing) = (Some(BlindDescent::default()), false);
             return false;
         }
         lasting(&mut self.still, now, weight.steady == Support::Stands) >= config.touchdown_time
-    }
-
-    /// One step of a landing whose height above the ground is not known. Has the vehicle landed?
-    fn land_blind(&mut self, now: Instant, weight: Answers, climb_known: bool, asked: &mut LandDetected) -> bool {
-        let config = &self.config;
-        let blind = self.blind.get_or_insert_default();
-        let (ceiling, landed) = blind.step(now, weight, config.touchdown_time);
-        self.is_testing = blind.is_testing();
-        asked.descent_rate = if climb_known { config.descent } else { config.touchdown };
-        // Where the climb rate is controlled, thrust is taken away for the test alone.
-        if self.is_testing || !climb_known {
-            asked.thrust_ceiling = ceiling;
-        }
-        landed
     }
 }
 

@@ -7,7 +7,7 @@
 //!
 //! The test costs height: with 40 % of the thrust missing, a vehicle in the air has gained 0.2 m/s after 60 ms.
 
-use stampfly_types::{Duration, Instant};
+use stampfly_types::Instant;
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +34,8 @@ const STANDS: f32 = 0.4;
 const FALLS: f32 = 0.5;
 /// So much more specific force for its thrust has a vehicle that drag brakes; one that stands with little thrust has more.
 const CARRIED: f32 = 1.3;
-/// A step that lasts longer is treated as this long.
-const LONGEST_STEP: Duration = Duration::from_millis(20);
+/// A step that lasts longer is treated as this long, s.
+const LONGEST_STEP: f32 = 0.02;
 
 /// Specific force upwards along the body's z axis, m/s², and thrust, N, through the same filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -107,7 +107,7 @@ impl WeightTest {
             (self.delivered, self.quick, self.steady, self.before) = (thrust, first, first, first);
             return UNKNOWN;
         };
-        let dt = now.since(last).min(LONGEST_STEP).seconds();
+        let dt = now.since(last).seconds().min(LONGEST_STEP);
         self.delivered += dt / (LAG + dt) * (thrust - self.delivered);
         let input = Pair { force, thrust: self.delivered };
         self.quick.filter(input, QUICK, dt);
