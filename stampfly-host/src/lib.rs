@@ -16,6 +16,7 @@ pub mod campaign;
 pub mod flown;
 pub mod golden;
 mod inputs;
+mod page;
 pub mod recorder;
 pub mod report;
 pub mod vehicles;

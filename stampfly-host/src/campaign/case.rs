@@ -27,7 +27,7 @@ const TIMES: [f64; 2] = [3.0, 12.0];
 const GUST: f64 = 0.8;
 
 /// A campaign: everything that decides which flights it has.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plan {
     /// Seed of the first flight; the others count up.
     pub seed: u64,
@@ -35,33 +35,8 @@ pub struct Plan {
     pub flights: u64,
     /// Are there flights with two faults?
     pub pairs: bool,
-    /// What all flights have in common, as on the command line.
-    pub settings: Settings,
-}
-
-/// What a flight can be told beside its faults: see [`Options`].
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-#[expect(missing_docs, reason = "as in Options")]
-pub struct Settings {
-    pub mission: Option<String>,
-    pub plant: Vec<String>,
-    pub param: Vec<String>,
-    pub vibration: Option<f64>,
-    pub gust: Option<f32>,
-    pub wind: Option<[f32; 2]>,
-    pub chips: bool,
-    pub cameras: bool,
-    pub jitter: Option<u64>,
-}
-
-impl Settings {
-    /// The same as options of a flight.
-    #[must_use]
-    pub fn options(&self) -> Options {
-        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, jitter } = self.clone();
-        Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, ..Options::default() }
-    }
+    /// What all flights have in common. Each has its own fault and pilot, so these two are empty.
+    pub options: Options,
 }
 
 /// One flight of a campaign.
@@ -115,7 +90,7 @@ impl Cases {
     #[must_use]
     pub fn case(&self, index: u64) -> Case {
         let seed = self.plan.seed.wrapping_add(index);
-        let mut options = self.plan.settings.options();
+        let mut options = self.plan.options.clone();
         // Every flight has its own delays, too.
         options.jitter = options.jitter.map(|seed| seed.wrapping_add(index));
         match usize::try_from(index).ok().and_then(|index| self.cells.get(index)) {

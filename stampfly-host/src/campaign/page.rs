@@ -3,7 +3,7 @@
 //! A single file without scripts and without any reference to the outside.
 
 use super::summary::{Cell, Failure, Summary, Table, phases};
-use crate::report::escape;
+use crate::page::{self, Metric, escape};
 use stampfly_sim::fault::{FaultKind, Moment};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -13,14 +13,14 @@ use std::fmt::Write;
 pub fn html(summary: &Summary, faults: &[FaultKind], title: &str, subtitle: &str) -> String {
     let all = &summary.all;
     let passed = all.flights - all.failed - all.idle;
+    let judged = |name: &str, count: usize, good: bool| Metric::new(name, count, "").judged(good);
     let metrics = [
-        ("flights", all.flights, None),
-        ("passed", passed, Some(all.failed == 0)),
-        ("wrong end", all.wrong, Some(all.wrong == 0)),
-        ("invariant violated", all.violated, Some(all.violated == 0)),
-        ("fault changed nothing", all.idle, None),
+        Metric::new("flights", all.flights, ""),
+        judged("passed", passed, all.failed == 0),
+        judged("wrong end", all.wrong, all.wrong == 0),
+        judged("invariant violated", all.violated, all.violated == 0),
+        Metric::new("fault changed nothing", all.idle, ""),
     ];
-    let metrics: String = metrics.iter().map(|(name, count, good)| metric(name, *count, *good)).collect();
     let names: Vec<&str> = faults.iter().map(|kind| kind.name).collect();
     let columns: Vec<&str> = phases().filter(|phase| *phase != "time" || has_column(&summary.cells, phase)).collect();
     let legend = "<p>The worst end of each cell, and its flights; red: how many of them failed; grey: the fault changed nothing.</p>\n";
@@ -34,23 +34,11 @@ pub fn html(summary: &Summary, faults: &[FaultKind], title: &str, subtitle: &str
     if !summary.failures.is_empty() {
         body += &section("Failures", &failures(&summary.failures));
     }
-    format!(
-        include_str!("page.html"),
-        style = concat!(include_str!("../report/page.css"), include_str!("page.css")),
-        title = escape(title),
-        subtitle = escape(subtitle),
-        metrics = metrics,
-        body = body,
-    )
+    page::html(title, subtitle, &metrics, include_str!("page.css"), &body)
 }
 
 fn has_column(table: &Table, column: &str) -> bool {
     table.keys().any(|(_, name)| name == column)
-}
-
-fn metric(name: &str, count: usize, good: Option<bool>) -> String {
-    let class = good.map_or("", |good| if good { " class=\"passed\"" } else { " class=\"failed\"" });
-    format!("<tr{class}><th scope=\"row\">{name}</th><td><b>{count}</b></td></tr>\n")
 }
 
 fn section(title: &str, inside: &str) -> String {

@@ -1,8 +1,9 @@
-//! The page itself: template, style, script and data become one file.
+//! The page itself: elements, style, script and data become one file.
 
+use super::Report;
 use super::grid::{Channel, Grid};
 use super::panels::{Actor, Band, Builder, Panel};
-use super::{Metric, Report};
+use crate::page;
 use serde::Serialize;
 use stampfly_sim::vehicle::Body;
 use std::io;
@@ -54,7 +55,7 @@ impl Report<'_> {
         builder.all_panels();
         let scene = builder.scene();
         let Body { rings, radius, outline, down, nose, reach } = self.page.body;
-        let page = Page {
+        let data = Page {
             start: grid.start.seconds_f64(),
             step: grid.step as f64 * 1e-6,
             points: grid.points,
@@ -66,16 +67,9 @@ impl Report<'_> {
             panels: builder.panels,
         };
         // Numbers, strings and lists always have a JSON form; `<` could end the script element they stand in.
-        let data = serde_json::to_string(&page).unwrap_or_default().replace('<', "\\u003c");
-        format!(
-            include_str!("page.html"),
-            style = include_str!("page.css"),
-            script = SCRIPT,
-            title = escape(&self.title),
-            subtitle = escape(&self.subtitle),
-            metrics = self.metrics.iter().map(metric).collect::<String>(),
-            data = data,
-        )
+        let data = serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c");
+        let body = format!(include_str!("page.html"), script = SCRIPT, data = data);
+        page::html(&self.title, &self.subtitle, &self.metrics, include_str!("page.css"), &body)
     }
 
     /// Writes the page to a file.
@@ -85,19 +79,4 @@ impl Report<'_> {
     pub fn write(&self, path: impl AsRef<Path>) -> io::Result<()> {
         std::fs::write(path, self.html())
     }
-}
-
-fn metric(metric: &Metric) -> String {
-    let verdict = match metric.passed {
-        None => "",
-        Some(true) => " class=\"passed\"",
-        Some(false) => " class=\"failed\"",
-    };
-    let [name, value, unit] = [&metric.name, &metric.value, &metric.unit].map(|text| escape(text));
-    format!("<tr{verdict}><th scope=\"row\">{name}</th><td><b>{value}</b> <span>{unit}</span></td></tr>\n")
-}
-
-/// Text as it may stand in HTML.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use serde_json::Value;
 use stampfly_board::simulation::StampFly;
-use stampfly_host::campaign::case::{Case, Cases, Plan, Settings};
+use stampfly_host::campaign::case::{Case, Cases, Plan};
 use stampfly_host::campaign::flight::fly_case;
 use stampfly_host::campaign::row::{Column, IDLE, Kind, PASSED, Row};
 use stampfly_host::campaign::shard::Shard;
@@ -23,7 +23,7 @@ use std::process::Command;
 const HOP: &str = "arm; takeoff 0.3; land";
 
 fn plan(flights: u64, pairs: bool) -> Plan {
-    Plan { seed: 7, flights, pairs, settings: Settings::default() }
+    Plan { seed: 7, flights, pairs, options: Options::default() }
 }
 
 /// An empty folder of this test's own.
@@ -103,13 +103,13 @@ proptest! {
 
     #[test]
     fn a_case_survives_its_row(index in 0u64..100_000, cameras: bool, wind in prop::option::of((-5f32..5.0, -5f32..5.0))) {
-        let settings = Settings {
+        let options = Options {
             cameras,
             wind: wind.map(|(north, east)| [north, east]),
             plant: vec!["mass=0.04".into()],
-            ..Settings::default()
+            ..Options::default()
         };
-        let cases = Cases::new::<StampFly>(&Plan { settings, ..plan(0, true) });
+        let cases = Cases::new::<StampFly>(&Plan { options, ..plan(0, true) });
         let case = cases.case(index);
         let again = Row::of(&case).case().expect("a case");
         prop_assert_eq!(again.arguments(), case.arguments());
@@ -294,7 +294,7 @@ fn shards_and_one_run_give_the_same_rows() {
 #[test]
 fn rows_do_not_depend_on_threads() {
     let cases = Cases::new::<StampFly>(&Plan {
-        settings: Settings { mission: Some(HOP.into()), ..Settings::default() },
+        options: Options { mission: Some(HOP.into()), ..Options::default() },
         ..plan(6, false)
     });
     let rows = |threads| parallel::each(6, threads, &|index| fly_case::<StampFly>(&cases.case(index as u64)).ok());

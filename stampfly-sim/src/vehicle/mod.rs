@@ -30,7 +30,7 @@ pub use witness::Witness;
 
 use crate::fault::{Fault, FaultKind};
 use crate::time::{Clock, Tasks};
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_types::Instant;
@@ -139,7 +139,8 @@ pub struct NoFindings {}
 pub type SetupError = String;
 
 /// Options of a flight as they are typed. A vehicle refuses what it has no use for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Options {
     /// A mission: a built-in name or a file.
     pub mission: Option<String>,
@@ -163,7 +164,8 @@ pub struct Options {
     pub fault: Vec<String>,
     /// Fly with a pilot's sticks, in this flight mode; empty is the vehicle's own choice.
     pub pilot: Option<String>,
-    /// Fly what other programs ask for.
+    /// Fly what other programs ask for; not written down, because it is not repeatable.
+    #[serde(skip)]
     pub live: Option<Live>,
 }
 

@@ -4,7 +4,6 @@ use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};
-use stampfly_host::campaign::case::Settings;
 use stampfly_host::campaign::shard::Shard;
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
@@ -360,12 +359,6 @@ impl SceneOptions {
             self.clone();
         let pilot = pilot.then(|| mode.unwrap_or_default());
         Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live: None }
-    }
-
-    /// What all flights of a campaign of faults have in common.
-    pub fn settings(&self) -> Settings {
-        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, .. } = self.clone();
-        Settings { mission, plant, param, vibration, gust, wind, chips, cameras, jitter }
     }
 
     /// Prints what can be changed.

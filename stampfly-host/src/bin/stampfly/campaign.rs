@@ -18,9 +18,6 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
-    if options.faults {
-        return fault_campaign::run(options);
-    }
     if options.consistency {
         return consistency(options);
     }
@@ -37,6 +34,9 @@ impl ForVehicle for Campaign<'_> {
         if options.scene.list {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
+        }
+        if options.faults {
+            return fault_campaign::run::<V>(options);
         }
         let (flights, factor) = fly_all::<V, ()>(options, &|_, _| ())?;
         print::<V, ()>(options, &flights, factor, None);

@@ -13,7 +13,7 @@ use stampfly_host::campaign::shard::Shard;
 use stampfly_host::campaign::shrink::shrink;
 use stampfly_host::campaign::summary::Summary;
 use stampfly_host::campaign::{file, page, parallel};
-use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_host::vehicles;
 use stampfly_log::FlightHash;
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;
@@ -29,30 +29,16 @@ const MOST_FLOWN: f64 = 600.0;
 /// So many kinds of failures are printed; all are in the page.
 const MOST_PRINTED: usize = 40;
 
-pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
-    vehicles::with(&options.scene.vehicle.name, FaultCampaign(options))?
-}
-
-struct FaultCampaign<'o>(&'o CampaignOptions);
-
-impl ForVehicle for FaultCampaign<'_> {
-    type Output = Result<ExitCode, Failure>;
-
-    fn run<V: Vehicle>(self) -> Self::Output {
-        let options = self.0;
-        if options.scene.list {
-            options.scene.print_list::<V>(options.seed)?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        if V::FAULTS.is_empty() {
-            return Err(format!("--faults: nothing can go wrong in a flight of {}", V::NAME).into());
-        }
-        let campaign = Campaign::new::<V>(options)?;
-        match (options.of_faults.shard, options.of_faults.engine) {
-            (Some(shard), _) => campaign.fly_one::<V>(shard),
-            (None, Engine::Slurm) => campaign.write_slurm::<V>(),
-            (None, engine) => campaign.fly_all::<V>(engine),
-        }
+/// The campaign of one vehicle.
+pub fn run<V: Vehicle>(options: &CampaignOptions) -> Result<ExitCode, Failure> {
+    if V::FAULTS.is_empty() {
+        return Err(format!("--faults: nothing can go wrong in a flight of {}", V::NAME).into());
+    }
+    let campaign = Campaign::new::<V>(options)?;
+    match (options.of_faults.shard, options.of_faults.engine) {
+        (Some(shard), _) => campaign.fly_one::<V>(shard),
+        (None, Engine::Slurm) => campaign.write_slurm::<V>(),
+        (None, engine) => campaign.fly_all::<V>(engine),
     }
 }
 
@@ -67,7 +53,8 @@ struct Campaign<'o> {
 impl<'o> Campaign<'o> {
     fn new<V: Vehicle>(options: &'o CampaignOptions) -> Result<Self, Failure> {
         let CampaignOptions { scene, flights, seed, of_faults, .. } = options;
-        let plan = Plan { seed: *seed, flights: *flights, pairs: of_faults.pairs, settings: scene.settings() };
+        let plan =
+            Plan { seed: *seed, flights: *flights, pairs: of_faults.pairs, options: scene.options(scene.jitter) };
         let cases = Cases::new::<V>(&plan);
         // What is wrong with the options is wrong with the first flight.
         let first = cases.case(0);
@@ -293,8 +280,8 @@ impl<'o> Campaign<'o> {
 
     /// What an engine's tasks run, but for the shard.
     fn job<V: Vehicle>(&self) -> Job {
-        let Plan { seed, flights, pairs, settings } = &self.plan;
-        let common = Case { index: 0, seed: *seed, options: settings.options() };
+        let Plan { seed, flights, pairs, options } = &self.plan;
+        let common = Case { index: 0, seed: *seed, options: options.clone() };
         let mut arguments = vec!["campaign".to_owned(), "--faults".into()];
         // After the name of the command.
         arguments.extend(common.arguments().into_iter().skip(1));
