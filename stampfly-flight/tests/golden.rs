@@ -58,7 +58,7 @@ fn recorded() -> (Vec<u8>, FlightHash) {
 }
 
 fn played(record: &[u8], gain: f32) -> Result<Report, GoldenError> {
-    play::<Rover>(record, &gain, TOLERANCE, &mut ())
+    play::<Rover>(&mut Bus::new(), record, &gain, TOLERANCE, &mut ())
 }
 
 #[test]
@@ -141,7 +141,7 @@ impl PlayObserver for Counts {
 #[test]
 fn an_observer_is_told_everything() {
     let mut counts = Counts::default();
-    let report = play::<Rover>(&recorded().0, &GAIN, TOLERANCE, &mut counts).expect("plays");
+    let report = play::<Rover>(&mut Bus::new(), &recorded().0, &GAIN, TOLERANCE, &mut counts).expect("plays");
     assert_eq!(counts.bands, 100);
     assert_eq!(counts.published.iter().sum::<usize>() as u64, report.messages);
     // Fifteen times ranges, four more in the burst, and the deadline in the gap; the monitor once in 100 ms.

@@ -9,13 +9,16 @@
 use crate::flown::fly;
 pub use crate::inputs::{Event, Inputs};
 use crate::recorder::Recorder;
-use stampfly_bus::Band;
+use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_flight::Observer;
 use stampfly_flight::golden::{GoldenError, PlayObserver, Report, Writer, play, tables};
 use stampfly_sim::vehicle::{Golden, Vehicle, Verdict};
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 use std::fmt;
+
+/// A vehicle's bus.
+type Topics<V> = <<V as Vehicle>::Runnables as Schedule>::Topics;
 
 /// The record goes on for this long after the last change of state.
 const TAIL: Duration = Duration::from_millis(100);
@@ -77,7 +80,8 @@ fn shorten(inputs: &mut Vec<Event>, end: Instant) {
 /// Now and then, when the samples of all other sensors are youngest, holds them back until the leading sensor's next
 /// sample comes.
 fn gather<V: Vehicle>(inputs: &mut Vec<Event>, start: Instant, golden: &Golden<V>) {
-    let mut newest: Vec<Option<(Instant, usize)>> = vec![None; golden.gathered.len()];
+    let others = other_sensors::<V>(inputs, golden.leading);
+    let mut newest: Vec<Option<(Instant, usize)>> = vec![None; others.len()];
     // Of each stretch of time, the leading sample that the others are closest to: age of the oldest, and places.
     let mut closest: BTreeMap<u64, (Duration, usize, Vec<usize>)> = BTreeMap::new();
     for (place, input) in inputs.iter().enumerate() {
@@ -91,7 +95,7 @@ fn gather<V: Vehicle>(inputs: &mut Vec<Event>, start: Instant, golden: &Golden<V
             if closest.get(&stretch).is_none_or(|(best, ..)| *best > oldest) {
                 closest.insert(stretch, (oldest, place, seen.into_iter().map(|(_, place)| place).collect()));
             }
-        } else if let Some(sensor) = golden.gathered.iter().position(|id| id == topic) {
+        } else if let Some(sensor) = others.iter().position(|id| id == topic) {
             newest[sensor] = Some((*at, place));
         }
     }
@@ -104,14 +108,31 @@ fn gather<V: Vehicle>(inputs: &mut Vec<Event>, start: Instant, golden: &Golden<V
     }
 }
 
+/// The topics of the other sensors in a record, the slowest last.
+fn other_sensors<V: Vehicle>(inputs: &[Event], leading: usize) -> Vec<usize> {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for input in inputs {
+        let Event::Sample { topic, .. } = input else { continue };
+        let is_sensor =
+            <Topics<V> as TopicTable>::TOPICS.get(*topic).is_some_and(|info| info.name.starts_with("sensor_"));
+        if is_sensor && *topic != leading {
+            *counts.entry(*topic).or_default() += 1;
+        }
+    }
+    let mut topics: Vec<_> = counts.into_iter().collect();
+    topics.sort_by_key(|(_, samples)| std::cmp::Reverse(*samples));
+    topics.into_iter().map(|(topic, _)| topic).collect()
+}
+
 /// Writes a record of these inputs, with what comes of them here.
 fn write<V: Vehicle>(golden: &Golden<V>, inputs: &[Event], start: Instant) -> Result<(Vec<u8>, Report), GoldenError> {
     // Played once without expecting anything, to find out what to expect.
     let (config, tolerance) = (V::config(&golden.setup), golden.tolerance);
     let mut outputs = Outputs { topic: golden.output, ..Outputs::default() };
-    let first = play::<V::Runnables>(&encode(golden, inputs, start, &[], 0), config, tolerance, &mut outputs)?;
+    let blank = encode(golden, inputs, start, &[], 0);
+    let first = play::<V::Runnables>(&mut TopicTable::new(), &blank, config, tolerance, &mut outputs)?;
     let record = encode(golden, inputs, start, &outputs.of_turns, first.hash);
-    let report = play::<V::Runnables>(&record, config, tolerance, &mut ())?;
+    let report = play::<V::Runnables>(&mut TopicTable::new(), &record, config, tolerance, &mut ())?;
     Ok((record, report))
 }
 
@@ -189,7 +210,7 @@ mod tests {
     }
 
     fn played(record: &[u8], observer: &mut impl PlayObserver) -> Result<Report, GoldenError> {
-        play::<Runnables>(record, &VehicleConfig::default(), TOLERANCE, observer)
+        play::<Runnables>(&mut TopicTable::new(), record, &VehicleConfig::default(), TOLERANCE, observer)
     }
 
     /// The golden flight as it was flown, with its hash.

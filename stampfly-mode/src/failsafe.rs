@@ -81,6 +81,9 @@ pub struct Failsafe {
     /// Stamp of the newest inertial sample, and when the sensor was last heard: no later than now.
     last_imu: Option<Instant>,
     heard_imu: Instant,
+    heard_tof: Instant,
+    heard_flow: Instant,
+    heard_baro: Instant,
     /// When one of the latched conditions was last present.
     latched_at: Instant,
     imu: ImuMonitor,
@@ -112,7 +115,11 @@ impl Failsafe {
             active: Alerts::NONE,
             seen: Alerts::NONE,
             last_imu: None,
+            // At power-on a sensor gets as long for its first sample.
             heard_imu: Instant::ZERO,
+            heard_tof: Instant::ZERO,
+            heard_flow: Instant::ZERO,
+            heard_baro: Instant::ZERO,
             latched_at: Instant::ZERO,
             imu: ImuMonitor::default(),
             motion: MotionMonitor::default(),
@@ -142,15 +149,18 @@ impl Failsafe {
         let kept = if forgotten { self.active.without(LATCHED) } else { self.active };
         let active = self.power.step(config, kept | found, now, input.power, status.armed);
         let silent = |last: Option<Instant>, limit| last.is_none_or(|at| now.since(at) >= limit);
-        // At power-on a sensor gets as long for its first sample.
-        let lost = |last: Option<Instant>| now.since(last.unwrap_or(Instant::ZERO)) >= config.aiding_silence;
+        // A stamp in the future must not stand for samples that never come.
+        let lost = |heard: &mut Instant, at: Option<Instant>| {
+            *heard = at.map_or(*heard, |at| (*heard).max(at.min(now)));
+            now.since(*heard) >= config.aiding_silence
+        };
         let active = active
             .set(Alerts::IMU_DEGRADED, silence >= config.imu_degraded)
             .set(Alerts::TILT_MISMATCH, mismatch)
             .set(Alerts::COMM_LOST, silent(input.command, config.link_silence))
-            .set(Alerts::TOF_LOST, lost(input.tof))
-            .set(Alerts::FLOW_LOST, lost(input.flow))
-            .set(Alerts::BARO_LOST, lost(input.baro))
+            .set(Alerts::TOF_LOST, lost(&mut self.heard_tof, input.tof))
+            .set(Alerts::FLOW_LOST, lost(&mut self.heard_flow, input.flow))
+            .set(Alerts::BARO_LOST, lost(&mut self.heard_baro, input.baro))
             .set(Alerts::RANGE_IMPLAUSIBLE, input.status.range_implausible)
             .set(Alerts::FLOW_IMPLAUSIBLE, input.status.flow_implausible)
             .set(Alerts::SELF_TEST_FAILED, input.self_test == SelfTestVerdict::Failed)

@@ -69,6 +69,13 @@ impl Resonator {
     }
 }
 
+/// Weights of a tone's cosine and sine on each axis. Apart, so that the axes can be added up side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tone {
+    cos: [f64; AXES],
+    sin: [f64; AXES],
+}
+
 /// Vibration of one inertial sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Vibration {
@@ -79,8 +86,8 @@ pub(crate) struct Vibration {
     per_hover: f64,
     /// Phase of each rotor as a point on the unit circle.
     phase: [(f64, f64); ROTORS],
-    /// Cosine and sine weight of each tone of each rotor on each axis.
-    weights: [[[(f64, f64); AXES]; 2]; ROTORS],
+    /// Of each tone of each rotor.
+    weights: [[Tone; 2]; ROTORS],
     resonators: [Resonator; AXES],
 }
 
@@ -92,12 +99,14 @@ impl Vibration {
             // No two propellers are balanced alike.
             let balance = 1.0 + noise.within(0.5);
             core::array::from_fn(|harmonic| {
-                core::array::from_fn(|axis| {
+                let mut tone = Tone { cos: [0.0; AXES], sin: [0.0; AXES] };
+                for (axis, profile) in PROFILES.iter().enumerate() {
                     let (sin, cos) = libm::sincos(noise.within(core::f64::consts::PI));
                     // Four rotors add in power; a tone's amplitude is √2 of its root mean square.
-                    let amplitude = balance * PROFILES[axis].tones[harmonic] * (2.0 / ROTORS as f64).sqrt();
-                    (amplitude * cos, amplitude * sin)
-                })
+                    let amplitude = balance * profile.tones[harmonic] * (2.0 / ROTORS as f64).sqrt();
+                    (tone.cos[axis], tone.sin[axis]) = (amplitude * cos, amplitude * sin);
+                }
+                tone
             })
         });
         let resonators = PROFILES.map(|profile| Resonator::new(profile.resonance.0, profile.resonance.1, dt));
@@ -117,8 +126,8 @@ impl Vibration {
             let share = (speed * self.per_hover) * (speed * self.per_hover);
             power += share / ROTORS as f64;
             let harmonics = [(cos, sin), (cos * cos - sin * sin, 2.0 * sin * cos)];
-            for ((cos, sin), weights) in harmonics.iter().zip(&self.weights[rotor]) {
-                for (sum, (a, b)) in total.iter_mut().zip(weights) {
+            for ((cos, sin), tone) in harmonics.iter().zip(&self.weights[rotor]) {
+                for ((sum, a), b) in total.iter_mut().zip(&tone.cos).zip(&tone.sin) {
                     *sum += share * (a * cos + b * sin);
                 }
             }

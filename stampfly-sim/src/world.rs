@@ -6,6 +6,7 @@
 
 use crate::plant::{DT, Motion, Plant, ROTORS, RotorFault, STEP, Scene};
 use core::cell::RefCell;
+use nalgebra::Vector3;
 use stampfly_types::{Instant, Quat, Vec3, message};
 use std::rc::Rc;
 
@@ -58,14 +59,28 @@ impl State {
         }
     }
 
-    fn motion_at(&mut self, instant: Instant) -> Motion {
+    /// The motion after the last step before `instant`, and the time since, s.
+    fn before(&mut self, instant: Instant) -> (&Motion, f64) {
         self.advance_to(instant);
         let since_start = instant.since(self.start).as_micros();
         let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
         let step = (since_start / STEP.as_micros()).max(oldest);
         let rest = since_start.saturating_sub(step * STEP.as_micros()) as f64 * 1e-6;
-        self.history[step as usize % HISTORY].after(rest.min(DT), self.plant.parameters().gravity)
+        (&self.history[step as usize % HISTORY], rest.min(DT))
     }
+
+    fn motion_at(&mut self, instant: Instant) -> Motion {
+        let gravity = self.plant.parameters().gravity;
+        let (motion, rest) = self.before(instant);
+        motion.after(rest, gravity)
+    }
+}
+
+/// What an inertial sensor is exposed to, in the units and frames of [`Motion`].
+pub(crate) struct Inertial {
+    pub specific_force: Vector3<f64>,
+    pub rate: Vector3<f64>,
+    pub rotor_speed: [f64; ROTORS],
 }
 
 /// A shared handle to one vehicle in its surroundings.
@@ -131,8 +146,22 @@ impl World {
     /// Height above the floor below the vehicle at `instant`, m.
     #[must_use]
     pub fn height_at(&self, instant: Instant) -> f64 {
-        let motion = self.motion_at(instant);
-        self.inspect(|plant| plant.scene().floor(&motion.position)) - motion.position.z
+        let mut state = self.0.borrow_mut();
+        let gravity = state.plant.parameters().gravity;
+        let (motion, rest) = state.before(instant);
+        let position = motion.position_after(rest, gravity);
+        state.plant.scene().floor(&position) - position.z
+    }
+
+    /// What shakes and turns an inertial sensor at `instant`, as in [`motion_at`](Self::motion_at) without the rest.
+    pub(crate) fn inertial_at(&self, instant: Instant) -> Inertial {
+        let mut state = self.0.borrow_mut();
+        let (motion, rest) = state.before(instant);
+        Inertial {
+            specific_force: motion.specific_force,
+            rate: motion.rate_after(rest),
+            rotor_speed: motion.rotor_speed,
+        }
     }
 
     /// Looks at the plant as it is after the last step.

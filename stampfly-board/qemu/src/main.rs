@@ -26,6 +26,7 @@ mod record;
 
 use profile::Profile;
 use stampfly_board::golden;
+use stampfly_board::topics::Bus;
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_flight::golden::{Verdict, stack_size};
 
@@ -52,7 +53,7 @@ fn run() -> bool {
         return false;
     };
     let mut profile = Profile::new(record);
-    let report = match golden::play(&mut profile) {
+    let report = match golden::play(&mut Bus::new(), &mut profile) {
         Ok(report) => report,
         Err(error) => {
             outln!("{error}");

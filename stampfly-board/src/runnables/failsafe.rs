@@ -5,8 +5,8 @@ use crate::topics::FailsafeEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::FailsafeInput;
 use stampfly_mode::transitions::is_airborne;
-use stampfly_types::Instant;
 use stampfly_types::messages::CommandSource;
+use stampfly_types::{Instant, Stamped};
 
 /// Failsafe: everything that can go wrong in, alerts out.
 #[derive(Clone, Debug)]
@@ -15,23 +15,13 @@ pub struct Failsafe {
     failsafe: stampfly_mode::Failsafe,
     last_pilot: Option<Instant>,
     last_guided: Option<Instant>,
-    last_tof: Option<Instant>,
-    last_flow: Option<Instant>,
-    last_baro: Option<Instant>,
 }
 
 impl Failsafe {
     /// Nothing wrong yet.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        Self {
-            failsafe: stampfly_mode::Failsafe::new(config.failsafe),
-            last_pilot: None,
-            last_guided: None,
-            last_tof: None,
-            last_flow: None,
-            last_baro: None,
-        }
+        Self { failsafe: stampfly_mode::Failsafe::new(config.failsafe), last_pilot: None, last_guided: None }
     }
 }
 
@@ -42,15 +32,8 @@ impl Runnable for Failsafe {
         let now = activation.now();
         // A stamp in the future must not stand for samples that never come.
         let newest = |last: Option<Instant>, at: Option<Instant>| last.max(at.map(|at| at.min(now)));
-        let range = ends.sensor_tof.iter().filter(|sample| sample.data.valid).map(|sample| sample.at).max();
-        self.last_tof = newest(self.last_tof, range);
         // A standing vehicle is nearer to the floor than the camera sees sharply.
         let stands = !is_airborne(ends.flight_status.get().phase);
-        let flow = ends.sensor_flow.iter().filter(|sample| sample.data.valid || stands).map(|sample| sample.at).max();
-        self.last_flow = newest(self.last_flow, flow);
-        let baro =
-            ends.sensor_baro.iter().filter(|sample| sample.data.altitude.is_finite()).map(|sample| sample.at).max();
-        self.last_baro = newest(self.last_baro, baro);
         let pilot = ends.command_pilot.last().map(|sample| sample.at);
         let guided = ends.command_guided.last().map(|sample| sample.at);
         (self.last_pilot, self.last_guided) = (newest(self.last_pilot, pilot), newest(self.last_guided, guided));
@@ -71,13 +54,18 @@ impl Runnable for Failsafe {
                 status: ends.estimate_status.get(),
                 power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
                 command,
-                tof: self.last_tof,
-                flow: self.last_flow,
-                baro: self.last_baro,
+                tof: usable(&ends.sensor_tof, |range| range.valid),
+                flow: usable(&ends.sensor_flow, |flow| flow.valid || stands),
+                baro: usable(&ends.sensor_baro, |pressure| pressure.altitude.is_finite()),
                 self_test: ends.self_test.get().verdict,
                 flight_status: ends.flight_status.get(),
             },
         );
         ends.system_alert.publish(now, &alert);
     }
+}
+
+/// When the newest usable sample of a topic arrived.
+fn usable<M>(samples: &[Stamped<M>], is_usable: impl Fn(&M) -> bool) -> Option<Instant> {
+    samples.iter().filter(|sample| is_usable(&sample.data)).map(|sample| sample.at).max()
 }

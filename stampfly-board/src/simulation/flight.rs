@@ -76,18 +76,17 @@ impl vehicle::Surroundings for Surroundings {
         let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog } = self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
         let wrong = wrong.take().expect("surroundings are started once");
-        let lines = wrong.sensor_lines();
         let cameras = setup.cameras;
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
         let Others { motors, indicator, button, link, cutoff } = match setup.sensing {
-            Sensing::Models => sensing::start_models(tasks, clock, (sensors, lines), outside, cameras, health),
+            Sensing::Models => sensing::start_models(tasks, clock, (sensors, &wrong), outside, cameras, health),
             Sensing::Chips => {
-                sensing::start_drivers(tasks, clock, (board, shared), (sensors, lines), outside, cameras, health)
+                sensing::start_drivers(tasks, clock, (board, shared), (sensors, &wrong), outside, cameras, health)
             }
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
         let home = Home::new(&world.truth_at(setup.simulation.start));
-        let radio = Radio::new(clock, link, wrong.radio_lines());
+        let radio = Radio::new(clock, link, &wrong);
         let waits = wrong.injector.wants(Moment::Ground);
         match setup.pilot {
             None => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),

@@ -138,13 +138,6 @@ impl Vehicle for StampFly {
             output: golden::OUTPUT as usize,
             tolerance: golden::TOLERANCE,
             leading: Id::sensor_imu as usize,
-            gathered: &[
-                Id::sensor_tof as usize,
-                Id::sensor_flow as usize,
-                Id::sensor_mag as usize,
-                Id::sensor_baro as usize,
-                Id::sensor_power as usize,
-            ],
             settled: |outcome| outcome.phases.last().map(|phase| phase.since),
         })
     }

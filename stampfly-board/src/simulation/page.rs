@@ -84,7 +84,6 @@ pub const PAGE: Page = Page {
         )
         .times(1e3)
         .picking(Pick::Mean),
-        PanelSpec::new("Sensors", "Barometric altitude", "m", "sensor_baro", &[("altitude", "altitude")]),
         PanelSpec::new("Battery", "Voltage", "V", "sensor_power", &[("voltage", "voltage")]),
         PanelSpec::new("Battery", "Current", "A", "sensor_power", &[("current", "current")]),
     ],

@@ -1,8 +1,8 @@
 //! The radio between the vehicle and whoever flies it, with what can go wrong on it.
 
-use super::faults::RadioLines;
+use super::faults::Wrong;
 use crate::messages::TelemetryFrame;
-use crate::topics;
+use crate::topics::{self, Id};
 use stampfly_sim::fault::Line;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
@@ -11,7 +11,9 @@ use stampfly_types::messages::{GuidedCommand, PilotInput};
 pub struct Radio<'b> {
     clock: Clock,
     ends: topics::LinkEnds<'b>,
-    lines: RadioLines,
+    pilot: Line<PilotInput>,
+    guided: Line<GuidedCommand>,
+    telemetry: Line<TelemetryFrame>,
     frame: TelemetryFrame,
 }
 
@@ -19,12 +21,18 @@ impl<'b> Radio<'b> {
     /// One on which nothing goes wrong.
     #[must_use]
     pub fn undisturbed(clock: &Clock, ends: topics::LinkEnds<'b>) -> Self {
-        let lines = RadioLines { pilot: Line::clear(), guided: Line::clear(), telemetry: Line::clear() };
-        Self::new(clock, ends, lines)
+        Self::new(clock, ends, &Wrong::new(&[], clock.now(), 0))
     }
 
-    pub(super) fn new(clock: &Clock, ends: topics::LinkEnds<'b>, lines: RadioLines) -> Self {
-        Self { clock: clock.clone(), ends, lines, frame: TelemetryFrame::default() }
+    pub(super) fn new(clock: &Clock, ends: topics::LinkEnds<'b>, wrong: &Wrong) -> Self {
+        Self {
+            clock: clock.clone(),
+            ends,
+            pilot: wrong.line(Id::command_pilot),
+            guided: wrong.line(Id::command_guided),
+            telemetry: wrong.line(Id::telemetry),
+            frame: TelemetryFrame::default(),
+        }
     }
 
     /// Virtual time.
@@ -36,14 +44,14 @@ impl<'b> Radio<'b> {
     /// Sends a program's command. `false` when the vehicle's queue is full; one that is lost on the way is not noticed.
     pub fn command(&mut self, command: GuidedCommand) -> bool {
         let now = self.clock.now();
-        let arrived = self.lines.guided.pass(now, &command);
+        let arrived = self.guided.pass(now, &command);
         arrived.is_none_or(|command| self.ends.command_guided.publish(now, command).is_ok())
     }
 
     /// Sends a frame of the transmitter.
     pub fn sticks(&mut self, input: &PilotInput) {
         let now = self.clock.now();
-        if let Some(input) = self.lines.pilot.pass(now, input) {
+        if let Some(input) = self.pilot.pass(now, input) {
             self.ends.command_pilot.publish(now, &input);
         }
     }
@@ -51,7 +59,7 @@ impl<'b> Radio<'b> {
     /// The newest telemetry that has arrived.
     pub fn telemetry(&mut self) -> TelemetryFrame {
         let newest = self.ends.telemetry.latest();
-        if let Some(frame) = newest.and_then(|frame| self.lines.telemetry.pass(self.clock.now(), &frame.data)) {
+        if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(self.clock.now(), &frame.data)) {
             self.frame = frame;
         }
         self.frame

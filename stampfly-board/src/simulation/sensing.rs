@@ -1,14 +1,14 @@
 //! The tasks that feed the bus: models of the sensors, or the real drivers over emulated chips.
 
-use super::faults::SensorLines;
-use crate::{devices, topics};
+use super::faults::Wrong;
+use crate::devices;
+use crate::topics::{self, Id};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
 use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_sim::chips::{self, I2cBus, stand_in_image};
-use stampfly_sim::fault::Line;
 use stampfly_sim::sensors::{ButtonModel, IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use std::sync::LazyLock;
@@ -32,8 +32,8 @@ pub type Healths = [SensorHealth; 8];
 
 /// A task that publishes a sensor's samples, as far as they come through its line, for as long as the vehicle is on.
 macro_rules! spawn {
-    ($tasks:ident, $clock:ident, $health:ident, $backoff:ident, $sensor:expr => $line:expr => $publisher:expr) => {{
-        let (mut sensor, mut line, mut publisher) = ($sensor, $line, $publisher);
+    ($tasks:ident, $clock:ident, $health:ident, $wrong:ident, $backoff:ident, $sensor:expr => $ends:ident.$owner:ident.$topic:ident) => {{
+        let (mut sensor, mut line, mut publisher) = ($sensor, $wrong.line(Id::$topic), $ends.$owner.$topic);
         let (clock, health): (_, &SensorHealth) = ($clock.clone(), $health.next().expect("one for each sensor"));
         $tasks.spawn(async move {
             let publish = |at, data: &_| {
@@ -78,20 +78,20 @@ impl Shared {
 pub(super) fn start_models<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
-    (models, lines): (Sensors, SensorLines),
+    (models, wrong): (Sensors, &Wrong),
     ends: topics::Outside<'a>,
     cameras: bool,
     health: &'a Healths,
 ) -> Others<'a> {
     let mut health = health.iter();
-    spawn!(tasks, clock, health, CRITICAL, models.imu => lines.imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, SHARED, models.tof => lines.tof => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, SHARED, models.flow => lines.flow => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, SHARED, models.mag => lines.mag => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, SHARED, models.baro => lines.baro => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, SHARED, models.power => lines.power => ends.power.sensor_power);
+    spawn!(tasks, clock, health, wrong, CRITICAL, models.imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, wrong, SHARED, models.tof => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, wrong, SHARED, models.flow => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, wrong, SHARED, models.mag => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, wrong, SHARED, models.baro => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, wrong, SHARED, models.power => ends.power.sensor_power);
     if cameras {
-        spawn!(tasks, clock, health, SHARED, models.cameras => Line::clear() => ends.cameras.external_pose);
+        spawn!(tasks, clock, health, wrong, SHARED, models.cameras => ends.cameras.external_pose);
     }
     Others {
         motors: (models.motors, ends.motors),
@@ -107,7 +107,7 @@ pub(super) fn start_drivers<'a>(
     tasks: &mut Tasks<'a>,
     clock: &Clock,
     (board, shared): (chips::Board, &'a mut Shared),
-    (models, lines): (Sensors, SensorLines),
+    (models, wrong): (Sensors, &Wrong),
     ends: topics::Outside<'a>,
     cameras: bool,
     health: &'a Healths,
@@ -121,15 +121,15 @@ pub(super) fn start_drivers<'a>(
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
     let imu = devices::imu(imu, time(), &IMAGE).with_interrupt(ready);
-    spawn!(tasks, clock, health, CRITICAL, imu => lines.imu => ends.imu.sensor_imu);
-    spawn!(tasks, clock, health, SHARED, down => lines.tof => ends.tof.sensor_tof);
-    spawn!(tasks, clock, health, SHARED, ahead => Line::clear() => ends.tof_front.sensor_tof_front);
-    spawn!(tasks, clock, health, SHARED, devices::flow(flow, time()) => lines.flow => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, SHARED, devices::magnetometer(to_mag, time()) => lines.mag => ends.mag.sensor_mag);
-    spawn!(tasks, clock, health, SHARED, devices::barometer(to_baro, time()) => lines.baro => ends.baro.sensor_baro);
-    spawn!(tasks, clock, health, SHARED, devices::power(to_power, time()) => lines.power => ends.power.sensor_power);
+    spawn!(tasks, clock, health, wrong, CRITICAL, imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, wrong, SHARED, down => ends.tof.sensor_tof);
+    spawn!(tasks, clock, health, wrong, SHARED, ahead => ends.tof_front.sensor_tof_front);
+    spawn!(tasks, clock, health, wrong, SHARED, devices::flow(flow, time()) => ends.flow.sensor_flow);
+    spawn!(tasks, clock, health, wrong, SHARED, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, wrong, SHARED, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
+    spawn!(tasks, clock, health, wrong, SHARED, devices::power(to_power, time()) => ends.power.sensor_power);
     if cameras {
-        spawn!(tasks, clock, health, SHARED, models.cameras => Line::clear() => ends.cameras.external_pose);
+        spawn!(tasks, clock, health, wrong, SHARED, models.cameras => ends.cameras.external_pose);
     }
     Others {
         motors: (models.motors, ends.motors),

@@ -18,7 +18,7 @@ fn this_machine_publishes_the_recorded_bits() {
 fn other_gains_are_beyond_and_do_not_fly() {
     let mut config = VehicleConfig::default();
     config.cascade.rate.roll.kp *= 2.0;
-    let report = play::<Runnables>(FLIGHT, &config, TOLERANCE, &mut ()).expect("plays");
+    let report = play::<Runnables>(&mut Bus::new(), FLIGHT, &config, TOLERANCE, &mut ()).expect("plays");
     assert!(matches!(report.verdict, Verdict::Beyond { worst, .. } if worst > TOLERANCE), "{report:?}");
     for failed in [Outcome(Ok(report)), Outcome(Err(GoldenError::Damaged))] {
         assert!(!failed.may_fly() && failed.to_string().contains("FAILED"), "{failed}");

@@ -76,12 +76,13 @@ pub const fn stack_size<R: Schedule>() -> usize {
     size_of::<R::Topics>() + size_of::<Assembled<'static, R>>()
 }
 
-/// Plays a golden flight on a vehicle of its own and compares. `tolerance` is the largest deviation of a number in the
-/// output that may still be rounding.
+/// Plays a golden flight on a vehicle of its own and compares. Nothing may have been published on `bus`; it is an argument
+/// so that it may lie elsewhere than on the stack. `tolerance` is the largest deviation of a number in the output that may
+/// still be rounding.
 ///
 /// ```
 /// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::{Rover, topics::Id}; // the rover of `tests/common`, configured by a gain
+/// use rover::{Rover, topics::{Bus, Id}}; // the rover of `tests/common`, configured by a gain
 /// use stampfly_flight::golden::{Verdict, Writer, play, tables};
 /// use stampfly_types::{Instant, Message, messages::{MotorOutput, TofData}};
 ///
@@ -100,10 +101,10 @@ pub const fn stack_size<R: Schedule>() -> usize {
 /// record.append(&mut entries);
 ///
 /// // The hash is unknown before the first play.
-/// let report = play::<Rover>(&record, &0.5, 0.01, &mut ())?;
+/// let report = play::<Rover>(&mut Bus::new(), &record, &0.5, 0.01, &mut ())?;
 /// assert_eq!(report.verdict, Verdict::WithinTolerance { worst: 0.0 });
 /// record[24..32].copy_from_slice(&report.hash.to_le_bytes());
-/// assert_eq!(play::<Rover>(&record, &0.5, 0.01, &mut ())?.verdict, Verdict::Identical);
+/// assert_eq!(play::<Rover>(&mut Bus::new(), &record, &0.5, 0.01, &mut ())?.verdict, Verdict::Identical);
 /// # Ok(())
 /// # }
 /// ```
@@ -111,19 +112,6 @@ pub const fn stack_size<R: Schedule>() -> usize {
 /// # Errors
 /// When the record is none, is damaged, or was recorded with other tables.
 pub fn play<R: Schedule>(
-    record: &[u8],
-    config: &R::Config,
-    tolerance: f32,
-    observer: &mut impl PlayObserver,
-) -> Result<Report, GoldenError> {
-    play_on::<R>(&mut R::Topics::new(), record, config, tolerance, observer)
-}
-
-/// [`play`] on a bus that lies elsewhere than on the stack. Nothing may have been published on it.
-///
-/// # Errors
-/// As in [`play`].
-pub fn play_on<R: Schedule>(
     bus: &mut R::Topics,
     record: &[u8],
     config: &R::Config,

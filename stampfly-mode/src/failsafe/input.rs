@@ -1,9 +1,9 @@
-//! What the failsafe looks at in one step. Everything is borrowed: whoever steps it keeps the newest of each.
+//! What the failsafe looks at in one step. Everything is borrowed.
 
 use stampfly_types::messages::{EstimatorStatus, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate};
 use stampfly_types::{Instant, Stamped};
 
-/// What the failsafe looks at. Times are those of the newest sample, usable or authentic.
+/// What the failsafe looks at.
 #[derive(Clone, Copy, Debug)]
 pub struct FailsafeInput<'a> {
     /// The inertial samples since the step before, oldest first: every one counts for the detection of impacts.
@@ -16,11 +16,11 @@ pub struct FailsafeInput<'a> {
     pub power: Option<(Instant, &'a PowerData)>,
     /// Newest command of any kind.
     pub command: Option<Instant>,
-    /// Newest usable range.
+    /// Newest usable range since the step before.
     pub tof: Option<Instant>,
-    /// Newest usable flow.
+    /// Newest usable flow since the step before.
     pub flow: Option<Instant>,
-    /// Newest air pressure.
+    /// Newest air pressure since the step before.
     pub baro: Option<Instant>,
     /// How the self test at power-on ended.
     pub self_test: SelfTestVerdict,

@@ -55,15 +55,28 @@ impl Motion {
     /// The motion `dt` seconds later, for times shorter than a step: rotors and forces as they are.
     #[must_use]
     pub(crate) fn after(&self, dt: f64, gravity: f64) -> Self {
-        let acceleration = self.attitude * self.specific_force + Vector3::new(0.0, 0.0, gravity);
         let mean_rate = self.rate + self.angular_acceleration * (0.5 * dt);
         Self {
-            position: self.position + self.velocity * dt + acceleration * (0.5 * dt * dt),
-            velocity: self.velocity + acceleration * dt,
+            position: self.position_after(dt, gravity),
+            velocity: self.velocity + self.acceleration(gravity) * dt,
             attitude: turn(&self.attitude, &(mean_rate * dt)),
-            rate: self.rate + self.angular_acceleration * dt,
+            rate: self.rate_after(dt),
             ..*self
         }
+    }
+
+    /// The position alone, as in [`after`](Self::after).
+    pub(crate) fn position_after(&self, dt: f64, gravity: f64) -> Vector3<f64> {
+        self.position + self.velocity * dt + self.acceleration(gravity) * (0.5 * dt * dt)
+    }
+
+    /// The rate alone, as in [`after`](Self::after).
+    pub(crate) fn rate_after(&self, dt: f64) -> Vector3<f64> {
+        self.rate + self.angular_acceleration * dt
+    }
+
+    fn acceleration(&self, gravity: f64) -> Vector3<f64> {
+        self.attitude * self.specific_force + Vector3::new(0.0, 0.0, gravity)
     }
 }
 

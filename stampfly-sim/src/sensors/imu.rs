@@ -82,7 +82,7 @@ impl ImuPhysics {
 
     /// The next sample, taken at `at`: accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s, body.
     pub(crate) fn sample(&mut self, at: Instant) -> [f64; 6] {
-        let motion = self.world.motion_at(at);
+        let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
         let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
         let gyro = self.gyro_matrix * motion.rate + self.gyro_bias;

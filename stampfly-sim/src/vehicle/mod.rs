@@ -229,10 +229,9 @@ pub struct Golden<V: Vehicle + ?Sized> {
     pub output: usize,
     /// Largest deviation of a number that may still be rounding.
     pub tolerance: f32,
-    /// The sensor that activates the flight band.
+    /// The sensor that activates the flight band. Now and then all other topics `sensor_…` are new at once, which is what a
+    /// step costs most.
     pub leading: usize,
-    /// The others: now and then all of them are new at once, which is what a step costs most. The slowest comes last.
-    pub gathered: &'static [usize],
     /// When the vehicle last changed its state.
     pub settled: fn(&V::Outcome) -> Option<Instant>,
 }

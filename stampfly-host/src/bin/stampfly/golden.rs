@@ -3,6 +3,7 @@
 use crate::arguments::GoldenOptions;
 use crate::failure::Failure;
 use serde_json::json;
+use stampfly_bus::TopicTable;
 use stampfly_flight::golden::{Verdict, play};
 use stampfly_host::golden::record;
 use stampfly_host::vehicles::{self, ForVehicle};
@@ -23,7 +24,8 @@ impl ForVehicle for Golden<'_> {
         let golden = V::golden().ok_or_else(|| format!("{} has no golden flight", V::NAME))?;
         let recorded = options.record.as_ref().map(|_| record::<V>(&golden)).transpose()?;
         let flight = recorded.as_deref().unwrap_or(golden.record);
-        let report = play::<V::Runnables>(flight, &V::default_config(), golden.tolerance, &mut ())?;
+        let report =
+            play::<V::Runnables>(&mut TopicTable::new(), flight, &V::default_config(), golden.tolerance, &mut ())?;
         if let (Some(path), Some(bytes)) = (&options.record, &recorded) {
             std::fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))?;
         }
