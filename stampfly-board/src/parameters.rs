@@ -133,6 +133,8 @@ parameters! {
 
     "failsafe.impact.flying" [20.0, 150.0] "m/s^2" failsafe.impact => "specific force of an impact";
     "failsafe.impact.landing" [20.0, 150.0] "m/s^2" failsafe.landing_impact => "specific force of an impact while landing";
+    "failsafe.touch.height" [0.0, 1.0] "m" failsafe.touch_height => "a push from below this near to the ground is a touchdown";
+    "failsafe.touch.speed" [0.3, 3.0] "m/s" failsafe.touch_speed => "sink rate of a fall, whose end is an impact";
     "failsafe.impact.sigmas" [3.0, 20.0] "1" failsafe.impact_sigmas => "impact, standard deviations of the vibration";
     "failsafe.rate.max" [5.0, 34.0] "rad/s" failsafe.rate => "rate at which the motors stop";
     "failsafe.tumble.tilt" [0.8, 3.0] "rad" failsafe.tumble_tilt => "tilt of a vehicle that tumbles";

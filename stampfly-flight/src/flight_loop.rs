@@ -41,7 +41,7 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 }
 
-impl<O: Observer> Observer for &mut O {
+impl<O: Observer + ?Sized> Observer for &mut O {
     fn starts(&mut self, index: usize) {
         (**self).starts(index);
     }
@@ -117,7 +117,7 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     }
 
     /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
-    pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut impl Observer) -> bool {
+    pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
         let mut next = 0;
         while let Some((index, now)) = self.scheduler.due(band, next, clock, self.heads.as_ref()) {
             let mut activation = Activation::live(index as u8, now);
@@ -129,7 +129,13 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     }
 
     #[inline]
-    fn start(&mut self, index: usize, activation: &mut Activation, clock: Instant, observer: &mut impl Observer) {
+    fn start(
+        &mut self,
+        index: usize,
+        activation: &mut Activation,
+        clock: Instant,
+        observer: &mut (impl Observer + ?Sized),
+    ) {
         observer.starts(index);
         self.scheduler.started(index, activation.now(), clock, self.heads.as_ref());
         R::read(&mut self.ends, index, activation);
@@ -137,7 +143,7 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     }
 
     #[inline]
-    fn complete(&mut self, index: usize, activation: &mut Activation, observer: &mut impl Observer) {
+    fn complete(&mut self, index: usize, activation: &mut Activation, observer: &mut (impl Observer + ?Sized)) {
         self.runnables.run(&mut self.ends, index, activation);
         self.scheduler.finished(index);
         observer.finished(activation);
@@ -145,7 +151,12 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
 
     /// Lets the next due activation of this band read its inputs. What is published before [`finish`](Self::finish)
     /// belongs to its next activation, as if it had been interrupted.
-    pub fn start_next(&mut self, band: Band, clock: Instant, observer: &mut impl Observer) -> Option<Pending> {
+    pub fn start_next(
+        &mut self,
+        band: Band,
+        clock: Instant,
+        observer: &mut (impl Observer + ?Sized),
+    ) -> Option<Pending> {
         let (index, now) = self.scheduler.due(band, 0, clock, self.heads.as_ref())?;
         let mut activation = Activation::live(index as u8, now);
         self.start(index, &mut activation, clock, observer);
@@ -153,7 +164,7 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     }
 
     /// Runs what has read its inputs.
-    pub fn finish(&mut self, Pending(mut activation): Pending, observer: &mut impl Observer) {
+    pub fn finish(&mut self, Pending(mut activation): Pending, observer: &mut (impl Observer + ?Sized)) {
         self.complete(usize::from(activation.record().index), &mut activation, observer);
     }
 

@@ -23,13 +23,11 @@ pub struct Flown<O> {
 /// Never by design; a panic here is a defect of the flight stack.
 pub fn fly<V: Vehicle>(
     setup: &V::Setup,
-    witness: &mut impl Witness<V::Runnables>,
+    witness: &mut dyn Witness<V::Runnables>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Flown<V::Outcome> {
     let begun = WallInstant::now();
-    let mut surroundings = V::surroundings(setup);
-    let ended = stampfly_sim::vehicle::fly(V::config(setup), &V::options(setup), &mut surroundings, witness, report);
-    let Ended { outcome, duration, log_lost } = ended;
+    let Ended { outcome, duration, log_lost } = V::fly(setup, witness, report);
     let realtime_factor = duration.seconds_f64() / begun.elapsed().as_secs_f64();
     Flown { outcome, duration, realtime_factor, log_lost }
 }

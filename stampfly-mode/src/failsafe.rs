@@ -4,7 +4,7 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
+//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground; in ACRO above 120° for a second | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
@@ -49,9 +49,9 @@ pub use input::FailsafeInput;
 
 use attitude::AttitudeMonitor;
 use imu::ImuMonitor;
-use motion::MotionMonitor;
+use motion::{Contact, MotionMonitor};
 use power::PowerMonitor;
-use stampfly_types::messages::{Alerts, FlightPhase, FlightStatus, ImuData, SelfTestVerdict, SystemAlert};
+use stampfly_types::messages::{Alerts, FlightPhase, ImuData, SelfTestVerdict, SystemAlert};
 use stampfly_types::{Instant, Stamped};
 
 /// The failsafe.
@@ -133,7 +133,7 @@ impl Failsafe {
         let status = input.flight_status;
         let mut found = Alerts::NONE;
         for sample in input.imu {
-            found |= self.inspect(now, sample, status);
+            found |= self.inspect(now, sample, input);
         }
         let config = &self.config;
         let silence = now.since(self.heard_imu);
@@ -171,7 +171,8 @@ impl Failsafe {
     }
 
     /// Looks at one inertial sample.
-    fn inspect(&mut self, now: Instant, sample: &Stamped<ImuData>, status: &FlightStatus) -> Alerts {
+    fn inspect(&mut self, now: Instant, sample: &Stamped<ImuData>, input: &FailsafeInput<'_>) -> Alerts {
+        let status = input.flight_status;
         let Stamped { at, data: imu, .. } = sample;
         // A sum of squares that overflows is no measurement either.
         let finite = (imu.accel.norm_squared() + imu.gyro.norm_squared()).is_finite();
@@ -181,8 +182,7 @@ impl Failsafe {
         // A stamp in the future must not stand for samples that never come.
         self.heard_imu = self.heard_imu.max((*at).min(now));
         let flies = matches!(status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
-        let landing = status.phase == FlightPhase::Landing;
-        let (found, suspect) = self.motion.step(&self.config, *at, imu, landing);
+        let (found, suspect) = self.motion.step(&self.config, *at, imu, Contact::expected(&self.config, input));
         let holds_height = flies && !status.mode.is_manual();
         let faulty = self.imu.step(&self.config, *at, imu, suspect, holds_height);
         if !suspect {

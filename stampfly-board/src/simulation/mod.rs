@@ -44,7 +44,9 @@ use stampfly_flight::parameters::{self, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::FaultKind;
-use stampfly_sim::vehicle::{FlightOptions, Golden, Options, Page, Setting, SetupError, Variety, Vehicle};
+use stampfly_sim::vehicle::{
+    self, Ended, FlightOptions, Golden, Options, Page, Setting, SetupError, Variety, Vehicle, Witness,
+};
 use stampfly_types::Message;
 use std::fmt::Display;
 use std::format;
@@ -63,7 +65,6 @@ impl Vehicle for StampFly {
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
-    type Surroundings = flight::Surroundings;
     type Outcome = Outcome;
 
     fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
@@ -110,8 +111,13 @@ impl Vehicle for StampFly {
         &setup.vehicle
     }
 
-    fn surroundings(setup: &Setup) -> flight::Surroundings {
-        flight::Surroundings::new(setup)
+    fn fly(
+        setup: &Setup,
+        witness: &mut dyn Witness<Runnables>,
+        report: &mut dyn FnMut(f32, &'static str),
+    ) -> Ended<Outcome> {
+        let mut surroundings = flight::Surroundings::new(setup);
+        vehicle::fly(&setup.vehicle, &Self::options(setup), &mut surroundings, witness, report)
     }
 
     fn default_config() -> VehicleConfig {

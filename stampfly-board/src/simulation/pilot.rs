@@ -34,10 +34,15 @@ const DEAD_BAND: f32 = 0.05;
 const REACHED: [f32; 2] = [0.25, 0.15];
 /// And stays so for this long.
 const SETTLED: Duration = Duration::from_millis(500);
+/// Above this nothing touches the ground any more, m.
+const CLEAR: f32 = 0.1;
 /// How fast the pilot climbs and sinks, m/s.
 const CLIMB: f32 = 0.3;
 /// Highest speed to a place, m/s.
 const SPEED: f32 = 0.4;
+
+/// How fast the lean that stays over a place is learned, g per metre and second: a tenth of what the loop would bear.
+const LEARNS: f32 = 0.006;
 
 /// What the pilot wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,12 +100,23 @@ pub(super) struct Pilot<'b> {
     input: PilotInput,
     /// What the pilot has learned of the throttle that hovers, share.
     trim: f32,
+    /// What the pilot has learned of the lean that stays over a place, forward and right, in units of gravity.
+    lean_trim: [f32; 2],
 }
 
 impl<'b> Pilot<'b> {
     pub fn new(radio: Radio<'b>, world: &World, home: Home, meaning: Meaning, mode: FlightMode) -> Self {
         let input = PilotInput { mode, ..PilotInput::default() };
-        Self { radio, world: world.clone(), home, meaning, past: VecDeque::new(), input, trim: 0.0 }
+        Self {
+            radio,
+            world: world.clone(),
+            home,
+            meaning,
+            past: VecDeque::new(),
+            input,
+            trim: 0.0,
+            lean_trim: [0.0; 2],
+        }
     }
 
     /// Flies the mission. Never gives up: whoever runs it bounds the time. With `waits`, two seconds pass between the
@@ -231,25 +247,33 @@ impl<'b> Pilot<'b> {
         let velocity = frame::from_yaw(-seen.yaw) * seen.velocity;
         let limit = |speed: f32, most: f32| speed.clamp(-most, most);
 
-        let [pitch, roll] = [(error.x, velocity.x, seen.lean[0]), (error.y, velocity.y, seen.lean[1])].map(
-            |(error, velocity, lean)| match mode {
-                // Within reach the stick is let go: the vehicle holds its place.
-                FlightMode::PosHold if error.abs() < 0.1 => 0.0,
-                FlightMode::PosHold => limit(0.8 * error, SPEED) / self.meaning.navigator.stick_speed,
-                FlightMode::AltHold | FlightMode::Stabilize => {
-                    // 1.2 1/s of damping: a quarter of what the reaction time would bear.
-                    let wanted = 1.2 * (limit(0.5 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
-                    wanted / self.meaning.lean
-                }
-                FlightMode::Acro => {
-                    let wanted = 0.7 * (limit(0.3 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
-                    2.0 * (limit(wanted, 0.2) - lean) / self.meaning.tilt_rate
-                }
-            },
-        );
+        for (trim, error) in self.lean_trim.iter_mut().zip([error.x, error.y]) {
+            *trim = limit(*trim + LEARNS * PERIOD.seconds() * limit(error, 0.5), 0.1);
+        }
+        let axes = [
+            (error.x, velocity.x, seen.lean[0], self.lean_trim[0]),
+            (error.y, velocity.y, seen.lean[1], self.lean_trim[1]),
+        ];
+        let [pitch, roll] = axes.map(|(error, velocity, lean, trim)| match mode {
+            // Within reach the stick is let go: the vehicle holds its place.
+            FlightMode::PosHold if error.abs() < 0.1 => 0.0,
+            FlightMode::PosHold => limit(0.8 * error, SPEED) / self.meaning.navigator.stick_speed,
+            FlightMode::AltHold | FlightMode::Stabilize => {
+                // 1.2 1/s of damping: a quarter of what the reaction time would bear.
+                let wanted = 1.2 * (limit(0.5 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
+                (wanted + trim) / self.meaning.lean
+            }
+            FlightMode::Acro => {
+                let wanted = 1.0 * (limit(0.4 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
+                2.5 * (limit(wanted + trim, 0.3) - lean) / self.meaning.tilt_rate
+            }
+        });
         let turn = if mode == FlightMode::PosHold { self.meaning.navigator.turn_rate } else { self.meaning.yaw_rate };
         let climb = if sinks { -CLIMB } else { limit(-0.8 * error.z, CLIMB) };
-        let throttle = if mode.is_manual() {
+        let throttle = if mode.is_manual() && !sinks && -seen.position.z < CLEAR {
+            // Off the ground quickly: what still touches it tips the vehicle over.
+            self.meaning.hover + self.trim + 0.08
+        } else if mode.is_manual() {
             // 2 1/s of damping, and what is left over is learned in some seconds.
             let wrong = climb + velocity.z;
             self.trim = limit(self.trim + 0.001 * wrong, 0.2);

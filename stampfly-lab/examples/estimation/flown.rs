@@ -7,7 +7,7 @@ use stampfly_bus::Activation;
 use stampfly_eskf::Estimator;
 use stampfly_flight::{Observer, newest::message};
 use stampfly_sim::Truth;
-use stampfly_sim::vehicle::{Vehicle, Witness, fly};
+use stampfly_sim::vehicle::{Vehicle, Witness};
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, StateEstimate, TofData,
 };
@@ -72,8 +72,7 @@ impl Flown {
     /// Flies, and takes down what the estimation read.
     pub fn new(setup: &Setup) -> Result<Self, Box<dyn Error>> {
         let mut notes = Notes::default();
-        let (options, mut surroundings) = (StampFly::options(setup), StampFly::surroundings(setup));
-        let ended = fly(&setup.vehicle, &options, &mut surroundings, &mut notes, &mut |_, _| {});
+        let ended = StampFly::fly(setup, &mut notes, &mut |_, _| {});
         if ended.outcome.finished { Ok(notes.flown) } else { Err("the mission was not flown to its end".into()) }
     }
 }

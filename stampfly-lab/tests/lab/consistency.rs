@@ -3,7 +3,7 @@
 use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_lab::consistency::{Observation, Summary};
-use stampfly_sim::vehicle::{Vehicle, Verdict, fly};
+use stampfly_sim::vehicle::{Vehicle, Verdict};
 
 fn campaign(flights: u64, change: impl Fn(&mut Setup)) -> Summary {
     let seen: Vec<_> = (1..=flights)
@@ -11,8 +11,7 @@ fn campaign(flights: u64, change: impl Fn(&mut Setup)) -> Summary {
             let mut setup = Setup { mission: Mission::random(seed), ..Setup::reference(seed) };
             change(&mut setup);
             let mut observation = Observation::new(setup.vehicle.eskf, seed);
-            let (options, mut surroundings) = (StampFly::options(&setup), StampFly::surroundings(&setup));
-            let ended = fly(&setup.vehicle, &options, &mut surroundings, &mut observation, &mut |_, _| {});
+            let ended = StampFly::fly(&setup, &mut observation, &mut |_, _| {});
             assert!(ended.outcome.succeeded(), "seed {seed}");
             observation.finish()
         })

@@ -10,6 +10,10 @@ pub struct FailsafeConfig {
     pub impact: f32,
     /// Impact while landing, m/s²: a firm touchdown reaches 4 g.
     pub landing_impact: f32,
+    /// Nearer to the ground than this, m, and at less than `touch_speed`, a push from below is a touchdown.
+    pub touch_height: f32,
+    /// Sink rate of a fall, m/s: the hardest touchdown, 1 m/s, and what the estimate may be wrong by.
+    pub touch_speed: f32,
     /// Impact, in standard deviations of the vibration.
     pub impact_sigmas: f32,
     /// Angular rate, rad/s.
@@ -94,6 +98,8 @@ impl Default for FailsafeConfig {
         Self {
             impact: 3.0 * GRAVITY,
             landing_impact: 6.0 * GRAVITY,
+            touch_height: 0.2,
+            touch_speed: 1.2,
             impact_sigmas: 6.0,
             rate: 13.96,
             tumble_tilt: 1.05,

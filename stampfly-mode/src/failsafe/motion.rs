@@ -14,7 +14,8 @@
 //! | up to three suspect samples, then the motion of before | never |
 
 use super::config::FailsafeConfig;
-use stampfly_types::messages::{Alerts, ImuData};
+use super::input::FailsafeInput;
+use stampfly_types::messages::{Alerts, FlightPhase, ImuData, Validity};
 use stampfly_types::{Duration, Instant, Vec3, math};
 
 /// Share of full scale at which the accelerometer's axes count as full.
@@ -23,6 +24,31 @@ const FULL: f32 = 0.9;
 const GAP: Duration = Duration::from_millis(50);
 /// Two samples that came together are a period apart, this long at least.
 const PERIOD: Duration = Duration::from_millis(2);
+
+/// What kind of contact would be no accident.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Contact {
+    /// None.
+    None,
+    /// With the ground, which may be anywhere.
+    Landing,
+    /// With the ground, from above: it is near, and the vehicle does not fall.
+    TouchDown,
+}
+
+impl Contact {
+    pub(super) fn expected(config: &FailsafeConfig, input: &FailsafeInput<'_>) -> Self {
+        let estimate = input.estimate;
+        let known = estimate.valid.contains(Validity::HEIGHT.with(Validity::VELOCITY_Z));
+        if known && estimate.height < config.touch_height && estimate.velocity.z < config.touch_speed {
+            Self::TouchDown
+        } else if input.flight_status.phase == FlightPhase::Landing {
+            Self::Landing
+        } else {
+            Self::None
+        }
+    }
+}
 
 /// Samples above the limits, and the specific force over the length of a blow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,10 +61,11 @@ struct Evidence {
 
 impl Evidence {
     /// Adds a sample; gives the force over the length of a blow.
-    fn add(&mut self, config: &FailsafeConfig, imu: &ImuData, limit: f32, runs: bool) -> f32 {
+    fn add(&mut self, config: &FailsafeConfig, imu: &ImuData, contact: Contact, limit: f32, runs: bool) -> f32 {
         let blow = self.blow.get_or_insert(imu.accel);
         *blow += (imu.accel - *blow) * config.blow_weight;
-        let force = blow.norm();
+        let force =
+            if contact == Contact::TouchDown { Vec3::new(blow.x, blow.y, blow.z.max(0.0)).norm() } else { blow.norm() };
         let count = |count: &mut u32, above: bool| {
             *count = if above {
                 count.saturating_add(1)
@@ -81,9 +108,9 @@ impl MotionMonitor {
         config: &FailsafeConfig,
         at: Instant,
         imu: &ImuData,
-        landing: bool,
+        contact: Contact,
     ) -> (Alerts, bool) {
-        let impact = if landing { config.landing_impact } else { config.impact };
+        let impact = if contact == Contact::Landing { config.landing_impact } else { config.impact };
         let limit = self.impact_limit(config, impact);
         let suspect = self.is_suspect(config, at, imu);
         if suspect {
@@ -91,13 +118,13 @@ impl MotionMonitor {
                 self.suspected = self.believed;
             }
             self.suspects = self.suspects.saturating_add(1);
-            self.suspected.add(config, imu, limit, false);
+            self.suspected.add(config, imu, contact, limit, false);
             if self.suspects <= config.garbled_samples {
                 return (Alerts::NONE, true);
             }
             self.believed = self.suspected;
         } else {
-            let force = self.believed.add(config, imu, limit, true);
+            let force = self.believed.add(config, imu, contact, limit, true);
             // An impact must not raise its own threshold: outliers enter clipped.
             let [mean, variance] = self.force;
             let off = if force < limit { force } else { limit } - mean;

@@ -32,7 +32,7 @@ impl Rig {
             failsafe: Failsafe::default(),
             mode,
             now: Instant::ZERO,
-            estimate: StateEstimate { valid: Validity::ALL, ..Default::default() },
+            estimate: StateEstimate { height: 1.0, valid: Validity::ALL, ..Default::default() },
             status: EstimatorStatus::default(),
             battery: PowerData { voltage: 4.1, ..Default::default() },
             noise: 1,
@@ -104,6 +104,26 @@ fn a_crash_is_seen_within_some_samples_and_stays() {
     let shown = (0..2_000).take_while(|_| rig.sample(REST, Vec3::zeros()) == Alerts::IMPACT).count();
     assert!((780..=800).contains(&shown), "until disarmed, for two seconds: {shown} samples");
     assert!(rig.sample(REST, Vec3::zeros()).is_empty());
+}
+
+/// In STABILIZE and ACRO nobody announces a landing.
+#[test]
+fn a_touchdown_by_hand_is_no_crash_and_a_fall_or_a_wall_is() {
+    let struck = |height: f32, sink: f32, blow: Vec3| {
+        let mut rig = Rig::flying();
+        rig.mode.mode = FlightMode::Stabilize;
+        rig.estimate = StateEstimate { valid: Validity::ALL, ..rig.estimate };
+        (rig.estimate.height, rig.estimate.velocity.z) = (height, sink);
+        for _ in 0..400 {
+            rig.sample(REST, Vec3::zeros());
+        }
+        (0..8).any(|_| rig.sample(REST + blow, Vec3::zeros()).contains(Alerts::IMPACT))
+    };
+    let (below, ahead) = (Vec3::new(5.0, 0.0, -65.0), Vec3::new(-50.0, 0.0, 0.0));
+    assert!(!struck(0.03, 1.0, below));
+    assert!(struck(0.03, 1.5, below), "a fall");
+    assert!(struck(0.5, 0.3, below), "not the ground");
+    assert!(struck(0.03, 0.0, ahead), "a wall");
 }
 
 proptest! {

@@ -45,7 +45,7 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
     config: &R::Config,
     options: &FlightOptions,
     surroundings: &mut S,
-    witness: &mut impl Witness<R>,
+    witness: &mut dyn Witness<R>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Ended<S::Outcome> {
     let (start, end) = (options.start, options.start + options.limit);
@@ -126,7 +126,7 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
 }
 
 /// Passes on what was published.
-fn drain<R: Schedule>(taps: &mut impl Taps, around: &mut impl Around, witness: &mut impl Witness<R>) {
+fn drain<R: Schedule>(taps: &mut impl Taps, around: &mut impl Around, witness: &mut dyn Witness<R>) {
     taps.drain(&mut |topic, at, generation, words| {
         witness.published(topic, at, generation, words);
         around.published(topic, at, words);

@@ -252,8 +252,6 @@ pub trait Vehicle: 'static {
     type Runnables: Schedule + Serialize + DeserializeOwned;
     /// All that decides a flight.
     type Setup: Clone + Send + Sync;
-    /// What is around it.
-    type Surroundings: Surroundings<Runnables = Self::Runnables, Outcome = Self::Outcome>;
     /// How a flight went.
     type Outcome: Verdict + Send;
 
@@ -269,8 +267,13 @@ pub trait Vehicle: 'static {
     /// The configuration of its flight stack.
     fn config(setup: &Self::Setup) -> &<Self::Runnables as Schedule>::Config;
 
-    /// A world for one flight.
-    fn surroundings(setup: &Self::Setup) -> Self::Surroundings;
+    /// Flies it in its surroundings, with [`fly`](super::vehicle::fly). Written out for each vehicle, so that its whole flight is
+    /// compiled once, in its own crate, and not again in every program and test.
+    fn fly(
+        setup: &Self::Setup,
+        witness: &mut dyn Witness<Self::Runnables>,
+        report: &mut dyn FnMut(f32, &'static str),
+    ) -> Ended<Self::Outcome>;
 
     /// The flight stack's configuration when nothing is changed.
     fn default_config() -> <Self::Runnables as Schedule>::Config;

@@ -13,7 +13,9 @@ use crate::{Parameters, Runnables, schedule::TICK};
 use stampfly_log::ulog::ParameterValue;
 use stampfly_param::ParameterTable;
 use stampfly_sim::Noise;
-use stampfly_sim::vehicle::{FlightOptions, Options, Page, Script, Scripted, Setting, SetupError, Vehicle};
+use stampfly_sim::vehicle::{
+    self, Ended, FlightOptions, Options, Page, Script, Scripted, Setting, SetupError, Vehicle, Witness,
+};
 use stampfly_types::{Duration, Instant};
 use std::prelude::v1::*;
 
@@ -32,7 +34,6 @@ impl Vehicle for Rover {
     const PAGE: Page = page::PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
-    type Surroundings = Scripted<Setup>;
     type Outcome = Drive;
 
     fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
@@ -72,8 +73,12 @@ impl Vehicle for Rover {
         &setup.parameters
     }
 
-    fn surroundings(setup: &Setup) -> Scripted<Setup> {
-        Scripted::new(setup)
+    fn fly(
+        setup: &Setup,
+        witness: &mut dyn Witness<Runnables>,
+        report: &mut dyn FnMut(f32, &'static str),
+    ) -> Ended<Drive> {
+        vehicle::fly(&setup.parameters, &Self::options(setup), &mut Scripted::new(setup), witness, report)
     }
 
     fn default_config() -> Parameters {
