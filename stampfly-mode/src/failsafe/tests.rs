@@ -7,7 +7,7 @@ use super::*;
 use proptest::prelude::*;
 use stampfly_types::Duration;
 use stampfly_types::messages::{EstimatorStatus, PowerData, StateEstimate};
-use stampfly_types::messages::{FlightMode, Validity};
+use stampfly_types::messages::{FlightMode, FlightStatus, Validity};
 use stampfly_types::{GRAVITY, Vec3};
 use std::vec::Vec;
 

@@ -42,13 +42,21 @@ enum Thing {
 }
 
 impl Thing {
-    /// Puts it there, relative to the vehicle, or takes it away.
-    fn put(self, scene: &mut Scene, motion: &Motion, there: bool) {
+    /// The share of it that is there so long after it began, s.
+    fn share(self, seconds: f64) -> f64 {
+        if matches!(self, Self::Slope(_)) { (seconds / TILTS).min(1.0) } else { 1.0 }
+    }
+
+    /// Puts this share of it there, relative to the vehicle, or takes it away.
+    fn put(self, scene: &mut Scene, motion: &Motion, share: f64) {
+        let there = share > 0.0;
         match self {
             Self::Edge(drop) => scene.edge = there.then(|| (Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
             Self::Slope(rise) => {
-                scene.slope = if there { [rise, 0.0] } else { [0.0; 2] };
-                scene.pivot = [motion.position.x, motion.position.y];
+                if scene.slope == [0.0; 2] {
+                    scene.pivot = [motion.position.x, motion.position.y];
+                }
+                scene.slope = [rise * share, 0.0];
             }
             Self::FloorVelocity(north) => scene.floor_velocity = if there { [north, 0.0] } else { [0.0; 2] },
             Self::Ceiling(above) => scene.ceiling = there.then(|| above - motion.position.z),
@@ -60,6 +68,8 @@ impl Thing {
     }
 }
 
+/// A floor tilts in this time, s: at once it would throw off what stands on it.
+const TILTS: f64 = 1.0;
 /// How far ahead an edge is, m: no vehicle of this size stands on it.
 const EDGE_AHEAD: f64 = 0.3;
 
@@ -68,8 +78,8 @@ pub(super) struct Wrong {
     pub injector: Injector,
     acts: Vec<(usize, Act)>,
     seed: u64,
-    /// Which acts beside the bus were in force at the last look.
-    in_force: Vec<bool>,
+    /// The share of each act beside the bus that was in force at the last look.
+    in_force: Vec<f64>,
     /// Steps in which an obstacle pushed, at the last look.
     strikes: u64,
 }
@@ -82,7 +92,7 @@ impl Wrong {
             .enumerate()
             .flat_map(|(place, fault)| acts(fault).into_iter().map(move |act| (place, act)))
             .collect();
-        Self { injector: Injector::new(start, faults), in_force: vec![false; acts.len()], strikes: 0, acts, seed }
+        Self { injector: Injector::new(start, faults), in_force: vec![0.0; acts.len()], strikes: 0, acts, seed }
     }
 
     /// The way to a topic, or from the telemetry's to the radio.
@@ -106,15 +116,21 @@ impl Wrong {
             if struck && is_obstacle {
                 self.injector.note_change(*place);
             }
-            if active == *in_force {
+            let since = self.injector.begins(*place).map_or(0.0, |begun| now.since(begun).seconds_f64());
+            let share = match act {
+                _ if !active => 0.0,
+                Act::Scene(thing) => thing.share(since),
+                _ => 1.0,
+            };
+            if share == *in_force {
                 continue;
             }
-            *in_force = active;
+            *in_force = share;
             match act {
                 Act::Rotor(rotor, fault) => {
                     world.set_rotor_fault(now, *rotor, if active { *fault } else { RotorFault::NONE });
                 }
-                Act::Scene(thing) => world.change_scene(now, |scene, motion| thing.put(scene, motion, active)),
+                Act::Scene(thing) => world.change_scene(now, |scene, motion| thing.put(scene, motion, share)),
                 Act::Bus(attached) => {
                     let Some(chips) = chips else { continue };
                     let faults = Faults { dead: active, ..Faults::default() };

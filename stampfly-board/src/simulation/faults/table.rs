@@ -76,7 +76,7 @@ pub const FAULTS: &[FaultKind] = &[
     number("ceiling", ("m", 0.2, 0.02, 10.0), Cut, "There is a ceiling this far above the vehicle."),
     number("wall", ("m", 0.4, 0.05, 10.0), Cut, "There is a wall this far ahead of the vehicle."),
     plain("hand", Landed, "A hand holds the vehicle where it is."),
-    plain("baro-silent", Transparent, "No pressure arrives."),
+    plain("baro-silent", Degraded, "No pressure arrives."),
     plain("baro-stuck", Transparent, "Pressure repeats the last sample."),
     number("baro-step", ("m", 3.0, -1000.0, 1000.0), Transparent, "The barometric altitude jumps up by this."),
     number("mag-bent", ("uT", 100.0, -2000.0, 2000.0), Transparent, "A magnet adds this field, to the right."),

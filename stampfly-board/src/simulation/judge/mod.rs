@@ -8,14 +8,15 @@
 //! | `refused` | the motors never turned |
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
-//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of the first blow of a wall or a ceiling |
+//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of the first blow of a wall or a ceiling, and not on the ground at the end of the mission |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
 //! | `transparent` | anything else |
 //!
 //! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
-//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide.
+//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide, in ACRO four
+//! times.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -45,8 +46,8 @@ const OFF_GROUND: f32 = 0.05;
 const AWAY: [f32; 2] = [1.0, 5.0];
 /// Bounds of `transparent`, in the same order, m.
 const EXACT: [f32; 2] = [0.15, 0.5];
-/// A pilot's bounds are this many times as wide.
-const PILOT: f32 = 2.0;
+/// A pilot's bounds are this many times as wide: where the vehicle levels itself, and where it does not.
+const PILOT: [f32; 2] = [2.0, 4.0];
 /// Motors that stop within this time of a fault were cut.
 const CUT: Duration = Duration::from_millis(300);
 /// Hardest touch-down that is none of a crash, m/s.
@@ -120,7 +121,8 @@ pub(super) struct Judge {
     invariants: Invariants,
     moments: Moments,
     course: Course,
-    piloted: bool,
+    /// Bounds of `transparent` are this many times as wide.
+    wide: f32,
     alerts: Alerts,
     spans: Vec<AlertSpan>,
     motors_on: bool,
@@ -152,13 +154,18 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub fn new(injector: &Injector, mission: &Mission, piloted: bool, hover_without_link: Duration) -> Self {
+    pub fn new(
+        injector: &Injector,
+        mission: &Mission,
+        pilot: Option<FlightMode>,
+        hover_without_link: Duration,
+    ) -> Self {
         Self {
             injector: injector.clone(),
             invariants: Invariants::new(hover_without_link),
             moments: Moments::default(),
             course: Course::new(mission),
-            piloted,
+            wide: pilot.map_or(1.0, |mode| PILOT[usize::from(mode == FlightMode::Acro)]),
             alerts: Alerts::NONE,
             spans: Vec::new(),
             motors_on: false,
@@ -327,7 +334,7 @@ impl Judge {
     /// By the table of the [module](self) documentation.
     fn class(&self, begun: Option<Instant>) -> Class {
         let [above, beside] = self.away;
-        let wide = if self.piloted { PILOT } else { 1.0 };
+        let wide = self.wide;
         let from = begun.or(self.start).unwrap_or(self.now);
         let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
         let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
@@ -338,7 +345,9 @@ impl Judge {
             Class::FlownAway
         } else if self.motors_on {
             Class::KeptOn
-        } else if self.stopped.is_some_and(|(at, _)| at_once(begun, at) || at_once(self.struck, at)) {
+        } else if self.stopped.is_some_and(|(at, height)| {
+            (self.stopped_early || height > OFF_GROUND) && (at_once(begun, at) || at_once(self.struck, at))
+        }) {
             Class::Cut
         } else if lies || self.touches.iter().any(hard) {
             Class::Crashed
