@@ -53,8 +53,11 @@ impl Authority {
         Self { config, ..Self::default() }
     }
 
-    /// A frame from the pilot. Sticks that are not finite count as centred; others are clamped to ±1.
+    /// A frame from the pilot. Sticks are clamped to ±1; a frame with one that is no number is not heard.
     pub fn pilot(&mut self, at: Instant, input: &PilotInput) {
+        if !input.is_readable() {
+            return;
+        }
         let input = input.cleaned();
         if self.pilot.is_some_and(|(last, _)| at.since(last) >= self.config.stale) {
             self.pilot_back = Some(at);
@@ -121,6 +124,20 @@ mod tests {
         }
     }
 
+    /// Half throttle, which a centred stick is in STABILIZE, would let it fall.
+    #[test]
+    fn sticks_that_are_no_numbers_are_silence() {
+        let mut authority = Authority::default();
+        authority.pilot(Instant::ZERO, &HALF);
+        for ms in (20..1_000u64).step_by(20) {
+            let now = Instant::from_millis(ms);
+            authority.pilot(now, &PilotInput { throttle: f32::NAN, ..HALF });
+            let sticks = authority.step(now, CommandSource::Pilot, true);
+            assert_eq!(sticks.source == CommandSource::Pilot, ms < 500, "{ms}");
+            assert!(sticks.throttle == 0.0 && sticks.roll.is_finite());
+        }
+    }
+
     #[test]
     fn d13_one_source_does_not_speak_for_another() {
         let mut authority = Authority::default();
@@ -147,9 +164,9 @@ mod tests {
     }
 
     #[test]
-    fn nan_is_centre() {
+    fn sticks_beyond_their_ends_are_at_their_ends() {
         let mut authority = Authority::default();
-        authority.pilot(Instant::ZERO, &PilotInput { roll: f32::NAN, pitch: 9.0, ..Default::default() });
+        authority.pilot(Instant::ZERO, &PilotInput { pitch: 9.0, ..Default::default() });
         let setpoint = authority.step(Instant::from_micros(1), CommandSource::Pilot, true);
         assert_eq!((setpoint.roll, setpoint.pitch), (0.0, 1.0));
     }

@@ -115,7 +115,7 @@ impl Transmitter {
         };
         let input = raw.cleaned();
         let sticks = [input.roll, input.pitch, input.yaw, input.throttle];
-        if self.newest != Some(at) && ![raw.roll, raw.pitch, raw.yaw, raw.throttle].iter().all(|s| s.is_finite()) {
+        if self.newest != Some(at) && !raw.is_readable() {
             self.unreadable = self.unreadable.wrapping_add(1);
         }
         if self.newest.is_none() || !armed || flies {

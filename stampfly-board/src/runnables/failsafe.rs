@@ -5,7 +5,7 @@ use crate::topics::FailsafeEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::FailsafeInput;
 use stampfly_mode::transitions::is_airborne;
-use stampfly_types::messages::CommandSource;
+use stampfly_types::messages::{CommandSource, PilotInput};
 use stampfly_types::{Instant, Stamped};
 
 /// Failsafe: everything that can go wrong in, alerts out.
@@ -34,7 +34,7 @@ impl Runnable for Failsafe {
         let newest = |last: Option<Instant>, at: Option<Instant>| last.max(at.map(|at| at.min(now)));
         // A standing vehicle is nearer to the floor than the camera sees sharply.
         let stands = !is_airborne(ends.flight_status.get().phase);
-        let pilot = ends.command_pilot.last().map(|sample| sample.at);
+        let pilot = usable(&ends.command_pilot, PilotInput::is_readable);
         let guided = ends.command_guided.last().map(|sample| sample.at);
         (self.last_pilot, self.last_guided) = (newest(self.last_pilot, pilot), newest(self.last_guided, guided));
         // A source that does not fly the vehicle does not keep its flight going.

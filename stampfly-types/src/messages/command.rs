@@ -56,6 +56,13 @@ impl PilotInput {
             ..*self
         }
     }
+
+    /// Are all sticks numbers? Where one is none, a frame says nothing about what the pilot wants but for its switches: no value
+    /// that it could be taken for is safe in every flight mode.
+    #[must_use]
+    pub fn is_readable(&self) -> bool {
+        [self.roll, self.pitch, self.yaw, self.throttle].iter().all(|stick| stick.is_finite())
+    }
 }
 
 message_enum! {

@@ -38,13 +38,18 @@ enum Thing {
     FloorVelocity(f64),
     Ceiling(f64),
     Wall(f64),
-    Hand,
+    /// For so long, s.
+    Hand(f64),
 }
 
 impl Thing {
     /// The share of it that is there so long after it began, s.
     fn share(self, seconds: f64) -> f64 {
-        if matches!(self, Self::Slope(_)) { (seconds / TILTS).min(1.0) } else { 1.0 }
+        match self {
+            Self::Slope(_) => (seconds / TILTS).min(1.0),
+            Self::Hand(holds) if seconds >= holds => 0.0,
+            _ => 1.0,
+        }
     }
 
     /// Puts this share of it there, relative to the vehicle, or takes it away.
@@ -61,7 +66,7 @@ impl Thing {
             Self::FloorVelocity(north) => scene.floor_velocity = if there { [north, 0.0] } else { [0.0; 2] },
             Self::Ceiling(above) => scene.ceiling = there.then(|| above - motion.position.z),
             Self::Wall(ahead) => scene.wall = there.then(|| Beyond::ahead_of(motion, ahead)),
-            Self::Hand => {
+            Self::Hand(_) => {
                 scene.hand = there.then_some(Hand { position: motion.position, attitude: motion.attitude });
             }
         }

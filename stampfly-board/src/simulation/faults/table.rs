@@ -75,7 +75,7 @@ pub const FAULTS: &[FaultKind] = &[
     number("edge", ("m", 0.7, -0.5, 3.0), Degraded, "From 0.3 m ahead on, the floor is lower by this."),
     number("ceiling", ("m", 0.2, 0.02, 10.0), Cut, "There is a ceiling this far above the vehicle."),
     number("wall", ("m", 0.4, 0.05, 10.0), Cut, "There is a wall this far ahead of the vehicle."),
-    plain("hand", Landed, "A hand holds the vehicle where it is."),
+    number("hand", ("s", 3.0, 0.1, 600.0), Landed, "A hand holds the vehicle where it is for this long."),
     plain("baro-silent", Degraded, "No pressure arrives."),
     plain("baro-stuck", Transparent, "Pressure repeats the last sample."),
     number("baro-step", ("m", 3.0, -1000.0, 1000.0), Transparent, "The barometric altitude jumps up by this."),
@@ -158,7 +158,7 @@ pub(super) fn acts(fault: &Fault) -> Vec<Act> {
         ("edge", ..) => vec![Act::Scene(Thing::Edge(value))],
         ("ceiling", ..) => vec![Act::Scene(Thing::Ceiling(value))],
         ("wall", ..) => vec![Act::Scene(Thing::Wall(value))],
-        ("hand", ..) => vec![Act::Scene(Thing::Hand)],
+        ("hand", ..) => vec![Act::Scene(Thing::Hand(value))],
         // 12 Pa a metre at sea level.
         (_, Some(topic), "step") => {
             vec![on(topic, &["altitude"], Effect::Add(number)), on(topic, &["pressure"], Effect::Add(-12.0 * number))]

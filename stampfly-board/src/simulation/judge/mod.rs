@@ -338,6 +338,7 @@ impl Judge {
         let from = begun.or(self.start).unwrap_or(self.now);
         let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
         let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
+        let crashed = lies || self.touches.iter().any(hard);
         let at_once = |from: Option<Instant>, at: Instant| from.is_some_and(|from| at >= from && at.since(from) <= CUT);
         if !self.turned {
             Class::Refused
@@ -346,10 +347,11 @@ impl Judge {
         } else if self.motors_on {
             Class::KeptOn
         } else if self.stopped.is_some_and(|(at, height)| {
-            (self.stopped_early || height > OFF_GROUND) && (at_once(begun, at) || at_once(self.struck, at))
+            let at_the_end = !self.stopped_early && height <= OFF_GROUND && !crashed;
+            !at_the_end && (at_once(begun, at) || at_once(self.struck, at))
         }) {
             Class::Cut
-        } else if lies || self.touches.iter().any(hard) {
+        } else if crashed {
             Class::Crashed
         } else if self.early || self.stopped_early || !self.course.is_visited() {
             Class::Landed
