@@ -245,8 +245,8 @@ impl Around<'_> {
         self.seen_at = now;
         let done = self.progress.done.get();
         let clearance = self.world.height_at(now) as f32 - self.standing;
-        let struck = self.world.inspect(|plant| plant.ground().strikes() > 0);
-        self.judge.see(&Sight { now, truth, clearance, struck, status: &self.watch.mode, done });
+        let strikes = self.world.inspect(|plant| plant.ground().strikes());
+        self.judge.see(&Sight { now, truth, clearance, strikes, status: &self.watch.mode, done });
     }
 }
 

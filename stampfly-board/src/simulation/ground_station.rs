@@ -18,6 +18,10 @@ const LIFE_DIVIDER: u32 = 5;
 /// Looks after which telemetry surely knows of a command.
 const ROUND_TRIP: u32 = 4;
 
+/// A place that is not reached in this time is given up, and the mission goes on to the next step. Ten metres at 0.3 m/s, the
+/// slowest of the random missions, take 35 s.
+pub(super) const LONGEST_LEG: Duration = Duration::from_secs(50);
+
 /// What the ground station reports about itself.
 #[derive(Debug, Default)]
 pub struct Progress {
@@ -62,9 +66,15 @@ impl Station<'_> {
     async fn wait_for(&mut self, condition: impl Fn(&TelemetryFrame) -> bool) {
         while !condition(&self.look().await) {}
     }
+
+    /// The same, but gives up after [`LONGEST_LEG`].
+    async fn wait_awhile_for(&mut self, condition: impl Fn(&TelemetryFrame) -> bool) {
+        let until = self.radio.clock().now() + LONGEST_LEG;
+        while !condition(&self.look().await) && self.radio.clock().now() < until {}
+    }
 }
 
-/// Flies the mission. Never gives up: whoever runs it bounds the time. With `waits`, two seconds pass between the vehicle's
+/// Flies the mission. A place that cannot be reached is given up. With `waits`, two seconds pass between the vehicle's
 /// permission to arm and arming.
 pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Progress) {
     let mut link = Station { radio, looks: 0 };
@@ -84,7 +94,7 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
             Step::TakeOff { height } => {
                 let position = Vec3::new(0.0, 0.0, -height);
                 link.send(GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() }).await;
-                link.wait_for(|frame| frame.phase == FlightPhase::Flying).await;
+                link.wait_awhile_for(|frame| frame.phase == FlightPhase::Flying || !frame.armed).await;
             }
             Step::GoTo { place: [north, east, up], yaw: heading, speed, dwell } => {
                 yaw = heading.unwrap_or(yaw);
@@ -100,7 +110,7 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
                 for _ in 0..ROUND_TRIP {
                     link.look().await;
                 }
-                link.wait_for(|frame| frame.remaining == 0 || frame.phase != FlightPhase::Flying).await;
+                link.wait_awhile_for(|frame| frame.remaining == 0 || frame.phase != FlightPhase::Flying).await;
             }
             Step::Hover { seconds } => link.wait(Duration::from_seconds(seconds)).await,
             Step::Land => {

@@ -13,7 +13,7 @@
 //! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
 //! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
 
-use super::ground_station::Progress;
+use super::ground_station::{LONGEST_LEG, Progress};
 use super::home::Home;
 use super::mission::{Mission, Step};
 use super::radio::Radio;
@@ -41,8 +41,8 @@ const CLIMB: f32 = 0.3;
 /// Highest speed to a place, m/s.
 const SPEED: f32 = 0.4;
 
-/// How fast the lean that stays over a place is learned, g per metre and second: a tenth of what the loop would bear.
-const LEARNS: f32 = 0.006;
+/// How fast the lean that stays over a place is learned, g per metre and second: a quarter of what the loop would bear.
+const LEARNS: f32 = 0.02;
 
 /// What the pilot wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,7 +119,7 @@ impl<'b> Pilot<'b> {
         }
     }
 
-    /// Flies the mission. Never gives up: whoever runs it bounds the time. With `waits`, two seconds pass between the
+    /// Flies the mission. A place that cannot be reached is given up. With `waits`, two seconds pass between the
     /// display's permission and arming.
     pub async fn fly(mut self, mission: &Mission, waits: bool, progress: &Progress) {
         let mut place = Vec3::zeros();
@@ -143,7 +143,7 @@ impl<'b> Pilot<'b> {
                 Step::TakeOff { height } => {
                     place.z = -height;
                     // It takes off by itself where the mode holds height.
-                    while !self.input.mode.is_manual() && self.radio.telemetry().phase != FlightPhase::Flying {
+                    while !self.flown().is_manual() && self.radio.telemetry().phase != FlightPhase::Flying {
                         self.frame(Aim::LetGo).await;
                     }
                     self.fly_to(place).await;
@@ -164,6 +164,12 @@ impl<'b> Pilot<'b> {
         }
     }
 
+    /// The mode that the display shows, which a vehicle that has lost a sensor chooses itself.
+    fn flown(&mut self) -> FlightMode {
+        let frame = self.radio.telemetry();
+        if frame.armed { frame.mode } else { self.input.mode }
+    }
+
     fn may_arm(&mut self) -> bool {
         let frame = self.radio.telemetry();
         frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty()
@@ -178,6 +184,7 @@ impl<'b> Pilot<'b> {
 
     async fn fly_to(&mut self, place: Vec3) {
         let mut since = self.radio.clock().now();
+        let until = since + LONGEST_LEG;
         loop {
             let seen = self.frame(Aim::Be(place)).await;
             let away = seen.position - place;
@@ -186,20 +193,20 @@ impl<'b> Pilot<'b> {
                 since = now;
             }
             // A vehicle that is not flying any more goes nowhere.
-            if now.since(since) >= SETTLED || !self.radio.telemetry().armed {
+            if now.since(since) >= SETTLED || now >= until || !self.radio.telemetry().armed {
                 return;
             }
         }
     }
 
     async fn land(&mut self, place: Vec3) {
-        if self.input.mode.is_manual() {
+        if self.flown().is_manual() {
             while !self.frame(Aim::Sink(place)).await.contact && self.radio.telemetry().armed {}
             self.keep(Aim::Stand, Duration::from_millis(300)).await;
         }
         self.input.arm = false;
         while self.radio.telemetry().armed {
-            let aim = if self.input.mode == FlightMode::AltHold { Aim::Be(place) } else { Aim::LetGo };
+            let aim = if self.flown() == FlightMode::AltHold { Aim::Be(place) } else { Aim::LetGo };
             self.frame(aim).await;
         }
     }
@@ -233,7 +240,7 @@ impl<'b> Pilot<'b> {
     }
 
     fn steer(&mut self, aim: Aim, seen: &Seen) {
-        let mode = self.input.mode;
+        let mode = self.flown();
         let rest = if mode.is_manual() { -1.0 } else { 0.0 };
         let (place, sinks) = match aim {
             Aim::Stand | Aim::LetGo => {
@@ -248,7 +255,7 @@ impl<'b> Pilot<'b> {
         let limit = |speed: f32, most: f32| speed.clamp(-most, most);
 
         for (trim, error) in self.lean_trim.iter_mut().zip([error.x, error.y]) {
-            *trim = limit(*trim + LEARNS * PERIOD.seconds() * limit(error, 0.5), 0.1);
+            *trim = limit(*trim + LEARNS * PERIOD.seconds() * limit(error, 0.5), 0.2);
         }
         let axes = [
             (error.x, velocity.x, seen.lean[0], self.lean_trim[0]),

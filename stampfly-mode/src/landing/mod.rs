@@ -152,7 +152,7 @@ impl TakeoffLanding {
         land_detected
     }
 
-    /// Is take-off complete? A vehicle that something holds on the ground never completes it.
+    /// Is take-off complete? A vehicle that something holds never completes it.
     fn take_off(&mut self, now: Instant, input: &LandingInput<'_>) -> bool {
         let (config, estimate, path) = (&self.config, input.estimate, input.setpoint);
         let height_known = estimate.valid.contains(Validity::HEIGHT);
@@ -163,12 +163,14 @@ impl TakeoffLanding {
             self.contact = GroundContact::Air;
         }
         let airborne = self.contact == GroundContact::Air;
+        let away = (path.position.z - estimate.position.z).abs();
         let arrived = airborne
             && path.velocity.z.abs() < config.takeoff_path_speed
-            && (path.position.z - estimate.position.z).abs() < config.takeoff_band
+            && away < config.takeoff_band
             && estimate.velocity.z.abs() < config.takeoff_speed;
         let in_band = lasting(&mut self.in_band, now, arrived);
-        let overdue = now.since(self.entered) > config.takeoff_limit;
+        // One that something holds down, such as a ceiling, never completes it: its time is limited by the mode machine.
+        let overdue = now.since(self.entered) > config.takeoff_limit && away < 2.0 * config.takeoff_band;
         in_band >= config.takeoff_settle || (airborne && overdue)
     }
 

@@ -67,13 +67,20 @@ pub struct Scene {
     pub hand: Option<Hand>,
 }
 
+/// A place this far below the upper one of two floors is on the lower one, m: deeper than anything presses into a floor.
+const OVERHANG: f64 = 0.05;
+
 impl Scene {
     /// The floor's z at a place, world NED, m.
     #[must_use]
     pub fn floor(&self, place: &Vector3<f64>) -> f64 {
         let level = match &self.edge {
-            Some((beyond, drop)) if beyond.depth(place) > 0.0 => *drop,
-            _ => 0.0,
+            Some((beyond, drop)) => {
+                let (here, there) = if beyond.depth(place) > 0.0 { (*drop, 0.0) } else { (0.0, *drop) };
+                // What is under the upper floor already is not thrown up through it.
+                if place.z > here + OVERHANG { here.max(there) } else { here }
+            }
+            None => 0.0,
         };
         level - self.slope[0] * (place.x - self.pivot[0]) - self.slope[1] * (place.y - self.pivot[1])
     }

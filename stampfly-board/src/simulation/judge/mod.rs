@@ -8,7 +8,7 @@
 //! | `refused` | the motors never turned |
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
-//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of the first blow of a wall or a ceiling, and not on the ground at the end of the mission |
+//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
@@ -133,7 +133,11 @@ pub(super) struct Judge {
     last: Option<Truth>,
     /// Above the floor below, m.
     clearance: f32,
+    strikes: u64,
+    /// The last push of a wall or a ceiling.
     struck: Option<Instant>,
+    /// Did the motors stop at once after one?
+    stopped_by_blow: bool,
     now: Instant,
     in_air: bool,
     highest: f32,
@@ -174,7 +178,9 @@ impl Judge {
             start: None,
             last: None,
             clearance: 0.0,
+            strikes: 0,
             struck: None,
+            stopped_by_blow: false,
             now: Instant::ZERO,
             in_air: false,
             highest: 0.0,
@@ -226,6 +232,7 @@ impl Judge {
         if self.motors_on && !on {
             self.stopped = Some((now, self.clearance));
             self.stopped_early = !self.course.asks_to_land(self.done);
+            self.stopped_by_blow = self.struck.is_some_and(|struck| now.since(struck) <= CUT);
         }
         if on {
             (self.stopped, self.stopped_early) = (None, false);
@@ -240,8 +247,10 @@ impl Judge {
 
     /// Looks at the truth, at the control rate.
     pub fn see(&mut self, sight: &Sight<'_>) {
-        let Sight { now, truth, clearance, struck, status, done } = *sight;
-        self.struck = self.struck.or(struck.then_some(now));
+        let Sight { now, truth, clearance, strikes, status, done } = *sight;
+        if strikes > self.strikes {
+            (self.strikes, self.struck) = (strikes, Some(now));
+        }
         self.clearance = clearance;
         (self.now, self.done) = (now, done);
         self.start = self.start.or(Some(now));
@@ -339,7 +348,7 @@ impl Judge {
         let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
         let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
         let crashed = lies || self.touches.iter().any(hard);
-        let at_once = |from: Option<Instant>, at: Instant| from.is_some_and(|from| at >= from && at.since(from) <= CUT);
+        let at_once = |at: Instant| begun.is_some_and(|begun| at >= begun && at.since(begun) <= CUT);
         if !self.turned {
             Class::Refused
         } else if above > AWAY[0] || beside > AWAY[1] {
@@ -348,7 +357,7 @@ impl Judge {
             Class::KeptOn
         } else if self.stopped.is_some_and(|(at, height)| {
             let at_the_end = !self.stopped_early && height <= OFF_GROUND && !crashed;
-            !at_the_end && (at_once(begun, at) || at_once(self.struck, at))
+            !at_the_end && (at_once(at) || self.stopped_by_blow)
         }) {
             Class::Cut
         } else if crashed {

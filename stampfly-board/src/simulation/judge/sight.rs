@@ -11,8 +11,8 @@ pub struct Sight<'a> {
     pub truth: &'a Truth,
     /// Height above the floor below, 0 when it stands, m.
     pub clearance: f32,
-    /// Has it struck a wall or a ceiling?
-    pub struck: bool,
+    /// In so many physics steps a wall or a ceiling has pushed it.
+    pub strikes: u64,
     pub status: &'a FlightStatus,
     /// Steps of the mission that are done.
     pub done: usize,

@@ -26,7 +26,7 @@ fn show(judge: &mut Judge, now: Instant, phase: FlightPhase, (up, sink): (f32, f
         contact: up <= 0.0,
         ..Default::default()
     };
-    judge.see(&Sight { now, truth: &truth, clearance: up, struck: false, status: &status(phase), done });
+    judge.see(&Sight { now, truth: &truth, clearance: up, strikes: 0, status: &status(phase), done });
 }
 
 /// Flies up to 0.5 m, suffers the fault at 2 s, and stops the motors at `stop` seconds at this height.
