@@ -78,7 +78,7 @@ impl Default for VehicleConfig {
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
             mode: ModeConfig::default(),
-            failsafe: FailsafeConfig::default(),
+            failsafe: FailsafeConfig { weak_motor: AIRFRAME.rotor_torque() * 0.3, ..FailsafeConfig::default() },
             landing: LandingConfig::default(),
             authority: AuthorityConfig::default(),
             button: ButtonConfig::default(),

@@ -67,7 +67,7 @@ stampfly_bus::topics! {
     /// The point on the path where the vehicle should be now.
     setpoint: Setpoint = latest @ 400 Hz from navigation => [landing, control, telemetry];
     /// Thrust and torque.
-    control_output: ControlOutput = latest @ 400 Hz from control => [landing, actuation];
+    control_output: ControlOutput = latest @ 400 Hz from control => [failsafe, landing, actuation];
     /// Duty of every motor.
     actuator_motor: MotorOutput = latest @ 400 Hz from actuation => [control, motors];
 

@@ -157,6 +157,15 @@ impl Airframe {
         self.rotors.len() as f32 * self.motor_thrust_max
     }
 
+    /// Torque about each body axis that one rotor's share of the weight makes, N·m, the mean over the rotors.
+    #[must_use]
+    pub fn rotor_torque(&self) -> Vec3 {
+        let rotors = self.rotors.len().max(1) as f32;
+        let arms =
+            self.rotors.iter().fold(Vec3::zeros(), |sum, rotor| sum + Vec3::new(rotor.y, rotor.x, rotor.kappa).abs());
+        arms * (self.hover_thrust() / (rotors * rotors))
+    }
+
     /// Largest collective thrust for a controller, N: [`THRUST_SHARE`] of [`Self::full_thrust`].
     #[must_use]
     pub const fn thrust_limit(&self) -> f32 {
@@ -185,6 +194,8 @@ mod tests {
         assert!((airframe.hover_thrust() - 4.903).abs() < 1e-3);
         assert!((airframe.thrust_limit() - 0.92 * 9.2).abs() < 1e-5);
         let limit = airframe.torque_limit();
+        // A quarter of 4.903 N on a lever of 0.09 m.
+        assert!((airframe.rotor_torque() - Vec3::new(0.1103, 0.1103, 0.0245)).norm() < 1e-4);
         // Two motors at 2.3 N on levers of 0.09 m, the others still: 0.414 N·m.
         assert!((limit - Vec3::new(0.4 * 0.414, 0.4 * 0.414, 0.75 * 0.092)).norm() < 1e-6, "{limit}");
     }

@@ -6,7 +6,8 @@
 //! |---|---|---|
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
-//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground; in ACRO above 120° for a second | disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40° for 50 ms while taking off; in ACRO above 120° for a second | disarmed |
+//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch of 0.3 of what one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
@@ -42,14 +43,17 @@ mod config;
 mod imu;
 mod input;
 mod motion;
+mod motors;
 mod power;
 
 pub use config::FailsafeConfig;
 pub use input::FailsafeInput;
 
+use crate::transitions::is_airborne;
 use attitude::AttitudeMonitor;
 use imu::ImuMonitor;
 use motion::{Contact, MotionMonitor};
+use motors::MotorMonitor;
 use power::PowerMonitor;
 use stampfly_types::messages::{Alerts, FlightPhase, ImuData, SelfTestVerdict, SystemAlert};
 use stampfly_types::{Instant, Stamped};
@@ -65,7 +69,7 @@ use stampfly_types::{Instant, Stamped};
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, torque: &Vec3::zeros(), self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -90,6 +94,7 @@ pub struct Failsafe {
     motion: MotionMonitor,
     attitude: AttitudeMonitor,
     power: PowerMonitor,
+    motors: MotorMonitor,
 }
 
 /// Alerts that stay until the vehicle is disarmed, and long enough to be seen.
@@ -98,7 +103,8 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::TUMBLED)
     .with(Alerts::IMU_LOST)
     .with(Alerts::IMU_FAULTY)
-    .with(Alerts::ESTIMATE_DIVERGED);
+    .with(Alerts::ESTIMATE_DIVERGED)
+    .with(Alerts::MOTOR_WEAK);
 
 impl Default for Failsafe {
     fn default() -> Self {
@@ -125,6 +131,7 @@ impl Failsafe {
             motion: MotionMonitor::default(),
             attitude: AttitudeMonitor::new(&config),
             power: PowerMonitor::default(),
+            motors: MotorMonitor::default(),
         }
     }
 
@@ -141,6 +148,7 @@ impl Failsafe {
         found = found
             .set(Alerts::IMU_LOST, silence >= config.imu_lost)
             .set(Alerts::TUMBLED, tumbled)
+            .set(Alerts::MOTOR_WEAK, self.motors.step(config, now, input, is_airborne(status.phase)))
             .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
         if !found.is_empty() {
             self.latched_at = now;

@@ -55,7 +55,8 @@ const FAULT: Alerts = Alerts::IMU_LOST
     .with(Alerts::IMU_FAULTY)
     .with(Alerts::ESTIMATE_DIVERGED)
     .with(Alerts::TILT_MISMATCH)
-    .with(Alerts::POWER_LOST);
+    .with(Alerts::POWER_LOST)
+    .with(Alerts::MOTOR_WEAK);
 /// What a person has to look at before the vehicle flies again.
 const ERROR: ArmBlocks = ArmBlocks::CRASHED.with(ArmBlocks::CUT_OFF).with(ArmBlocks::SELF_TEST);
 /// A low battery is called out again after this long.

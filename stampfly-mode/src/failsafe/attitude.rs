@@ -14,6 +14,7 @@ pub(super) struct AttitudeMonitor {
     cos_armed: f32,
     cos_acro: f32,
     cos_tumble: f32,
+    cos_tip: f32,
     cos_mismatch: f32,
     /// Specific force for the tilt on the ground.
     gravity: Option<Vec3>,
@@ -28,6 +29,7 @@ impl AttitudeMonitor {
             cos_armed: math::cos(config.armed_tilt),
             cos_acro: math::cos(config.acro_tilt),
             cos_tumble: math::cos(config.tumble_tilt),
+            cos_tip: math::cos(config.tip_tilt),
             cos_mismatch: math::cos(config.tilt_mismatch),
             gravity: None,
             tumbled: None,
@@ -47,12 +49,9 @@ impl AttitudeMonitor {
         let status = input.flight_status;
         let limit = match (status.phase, status.mode) {
             (FlightPhase::Armed, _) => Some((self.cos_armed, config.tumble_time)),
-            (FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing, FlightMode::Acro) => {
-                Some((self.cos_acro, config.acro_time))
-            }
-            (FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing, _) => {
-                Some((self.cos_tumble, config.tumble_time))
-            }
+            (FlightPhase::TakeOff, _) => Some((self.cos_tip, config.tip_time)),
+            (FlightPhase::Flying | FlightPhase::Landing, FlightMode::Acro) => Some((self.cos_acro, config.acro_time)),
+            (FlightPhase::Flying | FlightPhase::Landing, _) => Some((self.cos_tumble, config.tumble_time)),
             (FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld, _) => None,
         };
         let over = limit.filter(|(cos_tilt, _)| known && frame::cos_tilt(&input.estimate.attitude) < *cos_tilt);

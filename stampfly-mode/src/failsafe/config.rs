@@ -1,6 +1,6 @@
 //! Thresholds, times and filter weights of the [failsafe](super).
 
-use stampfly_types::{Duration, GRAVITY};
+use stampfly_types::{Duration, GRAVITY, Vec3};
 
 /// Thresholds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,15 @@ pub struct FailsafeConfig {
     pub tumble_tilt: f32,
     /// For how long it is tilted so far.
     pub tumble_time: Duration,
+    /// Tilt of a vehicle that tips over while it takes off, rad, and for how long.
+    pub tip_tilt: f32,
+    /// For how long it is tilted so far.
+    pub tip_time: Duration,
+    /// Torque about roll and pitch, N·m, that together betray a weak motor: 0.3 of the torque that one rotor's share of the
+    /// weight makes. Infinite where nothing is known of the airframe: then no motor is found weak.
+    pub weak_motor: Vec3,
+    /// For how long they are asked for.
+    pub weak_motor_time: Duration,
     /// Silence of the inertial sensor after which it is degraded.
     pub imu_degraded: Duration,
     /// Silence of the inertial sensor after which it is lost.
@@ -104,6 +113,10 @@ impl Default for FailsafeConfig {
             rate: 13.96,
             tumble_tilt: 1.05,
             tumble_time: Duration::from_millis(300),
+            tip_tilt: 0.7,
+            tip_time: Duration::from_millis(50),
+            weak_motor: Vec3::new(f32::INFINITY, f32::INFINITY, f32::INFINITY),
+            weak_motor_time: Duration::from_millis(100),
             imu_degraded: Duration::from_millis(10),
             imu_lost: Duration::from_millis(25),
             link_silence: Duration::from_millis(500),

@@ -80,6 +80,7 @@ impl Rig {
             tof: Some(now),
             flow: Some(now),
             baro: Some(now),
+            torque: &Vec3::zeros(),
             self_test: SelfTestVerdict::NotRun,
             flight_status: &self.mode,
         };
@@ -178,6 +179,7 @@ fn the_battery_warns_before_it_lands() {
             tof: Some(at),
             flow: Some(at),
             baro: Some(at),
+            torque: &Vec3::zeros(),
             self_test: SelfTestVerdict::NotRun,
             flight_status: &mode,
         };
@@ -205,6 +207,7 @@ fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Opti
         tof: Some(now),
         flow: Some(now),
         baro: Some(now),
+        torque: &Vec3::zeros(),
         self_test: SelfTestVerdict::NotRun,
         flight_status: &FlightStatus::default(),
     };
@@ -257,6 +260,7 @@ fn a_failed_self_test_is_an_alert_for_good() {
             tof: None,
             flow: None,
             baro: None,
+            torque: &Vec3::zeros(),
             self_test,
             flight_status: mode,
         };
@@ -288,6 +292,7 @@ fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
                     tof,
                     flow,
                     baro,
+                    torque: &Vec3::zeros(),
                     self_test: SelfTestVerdict::NotRun,
                     flight_status: &mode,
                 };

@@ -201,6 +201,8 @@ message_flags! {
         POWER_IMPLAUSIBLE = 19,
         /// No air pressure.
         BARO_LOST = 20,
+        /// One motor pushes much less than the others.
+        MOTOR_WEAK = 21,
     }
 }
 
