@@ -48,11 +48,11 @@ const GENERATED: &[(&str, &str, &str)] = &[
         "docs/faults.md",
         "faults",
         "# Faults\n\nWhat can go wrong in a simulated flight of the StampFly: `stampfly fly --fault NAME[=VALUE]@WHEN[+SECONDS]`. \
-         Printed from the table in `stampfly-board/src/simulation/faults.rs` by `cargo xtask docs --fix`.\n\nWHEN is `ground`, \
+         Printed from the table in `stampfly-board/src/simulation/faults/table.rs` by `cargo xtask docs --fix`.\n\nWHEN is `ground`, \
          `spool`, `takeoff`, `hover`, `move`, `landing`, `touch`, or a number of seconds after power-on; a fault lasts for \
          SECONDS, or to the end of the flight. How a flight may end, from best to worst: refused, transparent, degraded, \
          landed, cut; crashed, flown-away and kept-on are never acceptable. The rules are in \
-         `stampfly-board/src/simulation/judge.rs`.",
+         `stampfly-board/src/simulation/judge/mod.rs`.",
     ),
     (
         "docs/modes.md",
