@@ -125,3 +125,53 @@ fn a_pilot_flies_a_mission_in_every_mode() {
         assert!(outcome.phases.iter().any(flown_in), "{mode:?}: {:?}", outcome.phases);
     }
 }
+
+const MODES: [FlightMode; 4] = [FlightMode::Stabilize, FlightMode::Acro, FlightMode::AltHold, FlightMode::PosHold];
+
+/// A short flight with a pilot.
+fn piloted(mode: FlightMode, seed: u64, faults: &[&str]) -> Outcome {
+    let common = setup("arm\ntakeoff 0.5\nhover 2\ngoto 1 0 0.5\nland\n", faults);
+    let reference = Setup::reference(seed);
+    flown(&Setup { mission: common.mission, faults: common.faults, pilot: Some(mode), ..reference }).0
+}
+
+/// Nobody announces a landing in STABILIZE and ACRO, and no manoeuvre or gust is a weak motor.
+#[test]
+fn nothing_is_found_in_a_flight_by_hand() {
+    for mode in MODES {
+        for seed in 1..=4 {
+            let outcome = piloted(mode, seed, &[]);
+            let alerts: Vec<_> = outcome.judgement.alerts.iter().map(|span| span.name).collect();
+            assert_eq!(alerts, ["COMM_LOST"], "{mode:?}, seed {seed}: before the first frame, and no other");
+            assert!(outcome.finished, "{mode:?}, seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn half_a_propeller_in_the_air_ends_in_a_landing() {
+    for mode in MODES {
+        for motor in 1..=4 {
+            let outcome = piloted(mode, 1, &[&format!("motor-{motor}-thrust@hover")]);
+            let judgement = &outcome.judgement;
+            assert!(judgement.alerts.iter().any(|span| span.name == "MOTOR_WEAK"), "{mode:?} {motor}");
+            assert_eq!(judgement.outcome, "landed", "{mode:?} {motor}: {judgement:?}");
+        }
+    }
+}
+
+/// They counted as centred, which in STABILIZE and ACRO is half throttle.
+#[test]
+fn sticks_that_are_no_numbers_end_in_a_landing() {
+    for mode in MODES {
+        let judgement = piloted(mode, 1, &["pilot-nan@hover"]).judgement;
+        assert_eq!(judgement.outcome, "landed", "{mode:?}: {judgement:?}");
+        assert!(judgement.touch_speed_mps.is_some_and(|speed| speed < 0.5), "{mode:?}: {judgement:?}");
+    }
+}
+
+#[test]
+fn a_ceiling_over_the_take_off_ends_it() {
+    let outcome = flown(&setup("arm\ntakeoff 0.5\nhover 2\nland\n", &["ceiling@spool"])).0;
+    assert_eq!(outcome.judgement.outcome, "landed", "{:?}", outcome.judgement);
+}
