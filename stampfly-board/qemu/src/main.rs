@@ -26,8 +26,8 @@ mod record;
 
 use profile::Profile;
 use stampfly_board::golden;
-use stampfly_board::topics::Bus;
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
+use stampfly_board::topics::Bus;
 use stampfly_flight::golden::{Verdict, stack_size};
 
 #[cfg(not(target_arch = "xtensa"))]
