@@ -3,80 +3,22 @@
 //! `stampfly faults` and `docs/faults.md` print the table. Sensor faults act on samples on their way to the bus, behind
 //! models and behind drivers alike; a dead bus also silences emulated chips; motor faults act on the plant.
 
+mod act;
 mod table;
 
 pub use table::FAULTS;
 
 use crate::topics::Id;
+use act::{Act, Thing};
 use stampfly_bus::Band;
 use stampfly_sim::World;
 use stampfly_sim::chips::{AttachedChips, Faults};
-use stampfly_sim::fault::{Distortion, Fault, Injector, Line};
-use stampfly_sim::plant::{Beyond, Hand, Motion, RotorFault, Scene};
+use stampfly_sim::fault::{Fault, Injector, Line};
+use stampfly_sim::plant::RotorFault;
 use stampfly_types::{Instant, Message};
 use std::vec;
 use std::vec::Vec;
 use table::acts;
-
-/// Where a fault acts, and how.
-#[derive(Clone, Copy, Debug)]
-enum Act {
-    /// Samples from outside, on their way to a topic.
-    Sample(Id, Distortion),
-    /// The chips on a bus do not answer: only where there are chips.
-    Bus(fn(&AttachedChips) -> Vec<&stampfly_sim::chips::Attached>),
-    Rotor(usize, RotorFault),
-    Scene(Thing),
-    HoldUp(Band, Option<f64>),
-}
-
-/// What stands in the way.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Thing {
-    Edge(f64),
-    Slope(f64),
-    FloorVelocity(f64),
-    Ceiling(f64),
-    Wall(f64),
-    /// For so long, s.
-    Hand(f64),
-}
-
-impl Thing {
-    /// The share of it that is there so long after it began, s.
-    fn share(self, seconds: f64) -> f64 {
-        match self {
-            Self::Slope(_) => (seconds / TILTS).min(1.0),
-            Self::Hand(holds) if seconds >= holds => 0.0,
-            _ => 1.0,
-        }
-    }
-
-    /// Puts this share of it there, relative to the vehicle, or takes it away.
-    fn put(self, scene: &mut Scene, motion: &Motion, share: f64) {
-        let there = share > 0.0;
-        match self {
-            Self::Edge(drop) => scene.edge = there.then(|| (Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
-            Self::Slope(rise) => {
-                if scene.slope == [0.0; 2] {
-                    scene.pivot = [motion.position.x, motion.position.y];
-                }
-                scene.slope = [rise * share, 0.0];
-            }
-            Self::FloorVelocity(north) => scene.floor_velocity = if there { [north, 0.0] } else { [0.0; 2] },
-            Self::Ceiling(above) => scene.ceiling = there.then(|| above - motion.position.z),
-            Self::Wall(ahead) => scene.wall = there.then(|| Beyond::ahead_of(motion, ahead)),
-            Self::Hand(_) => {
-                scene.hand = there.then_some(Hand { position: motion.position, attitude: motion.attitude });
-            }
-        }
-    }
-}
-
-/// A floor tilts in this time, s: at once it would throw off what stands on it.
-const TILTS: f64 = 1.0;
-/// How far ahead an edge is, m: no vehicle of this size stands on it.
-const EDGE_AHEAD: f64 = 0.3;
 
 /// What is wrong in one flight, and where it acts.
 pub(super) struct Wrong {

@@ -1,6 +1,6 @@
 //! The table of what can go wrong in a flight of the StampFly, and what each row does.
 
-use super::{Act, Thing};
+use super::act::{Act, Thing};
 use crate::topics::{Id, TOPICS};
 use stampfly_bus::{Band, TopicInfo};
 use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind};
