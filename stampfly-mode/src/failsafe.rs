@@ -7,7 +7,7 @@
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40° for 50 ms while taking off; in ACRO above 120° for a second | disarmed |
-//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch of 0.3 of what one rotor's share of the weight makes, for 0.1 s | disarmed |
+//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |

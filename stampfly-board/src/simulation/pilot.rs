@@ -1,7 +1,8 @@
 //! A simulated pilot: flies a mission with the sticks and switches of a transmitter.
 //!
 //! The pilot sees where the vehicle really is, 0.2 s late, and reads the transmitter's display. What is not seen in time
-//! is not corrected, and nothing is done in an emergency: what the vehicle does by itself is what is to be known.
+//! is not corrected, and nothing is done in an emergency: what the vehicle does by itself is what is to be known. But a vehicle that
+//! drifts away in POS_HOLD is flown in ALT_HOLD, as anybody would.
 //!
 //! | mode | sticks |
 //! |---|---|
@@ -21,7 +22,7 @@ use stampfly_control::CascadeConfig;
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_sim::World;
 use stampfly_types::messages::{FlightMode, FlightPhase, PilotInput};
-use stampfly_types::{Duration, Vec3, frame};
+use stampfly_types::{Duration, Instant, Vec3, frame};
 use std::collections::VecDeque;
 
 /// Of the transmitter's frames.
@@ -34,6 +35,9 @@ const DEAD_BAND: f32 = 0.05;
 const REACHED: [f32; 2] = [0.25, 0.15];
 /// And stays so for this long.
 const SETTLED: Duration = Duration::from_millis(500);
+/// So far from its place, m, and farther away for so long: POS_HOLD does not hold a position.
+const LOST: f32 = 1.5;
+const LOST_FOR: Duration = Duration::from_secs(2);
 /// Above this nothing touches the ground any more, m.
 const CLEAR: f32 = 0.1;
 /// How fast the pilot climbs and sinks, m/s.
@@ -102,6 +106,8 @@ pub(super) struct Pilot<'b> {
     trim: f32,
     /// What the pilot has learned of the lean that stays over a place, forward and right, in units of gravity.
     lean_trim: [f32; 2],
+    /// Since when it has been far from its place.
+    lost: Option<Instant>,
 }
 
 impl<'b> Pilot<'b> {
@@ -116,6 +122,7 @@ impl<'b> Pilot<'b> {
             input,
             trim: 0.0,
             lean_trim: [0.0; 2],
+            lost: None,
         }
     }
 
@@ -161,6 +168,18 @@ impl<'b> Pilot<'b> {
         progress.finished.set(true);
         loop {
             self.frame(Aim::Stand).await;
+        }
+    }
+
+    /// A vehicle that moves away from where it should be does not hold its place, whatever it believes: a pilot then takes the
+    /// mode in which it only holds its height.
+    fn mistrust(&mut self, place: Vec3, seen: &Seen, now: Instant) {
+        let error = (place - seen.position).xy();
+        let lost = self.flown() == FlightMode::PosHold && error.norm() > LOST && error.dot(&seen.velocity.xy()) < 0.0;
+        let since = if lost { *self.lost.get_or_insert(now) } else { now };
+        self.lost = self.lost.filter(|_| lost);
+        if now.since(since) >= LOST_FOR {
+            self.input.mode = FlightMode::AltHold;
         }
     }
 
@@ -217,12 +236,15 @@ impl<'b> Pilot<'b> {
         let seen = self.look(now);
         self.steer(aim, &seen);
         self.radio.sticks(&self.input);
+        if let Aim::Be(place) | Aim::Sink(place) = aim {
+            self.mistrust(place, &seen, now);
+        }
         let clock = self.radio.clock().clone();
         clock.sleep_until(now + PERIOD).await;
         seen
     }
 
-    fn look(&mut self, now: stampfly_types::Instant) -> Seen {
+    fn look(&mut self, now: Instant) -> Seen {
         let mut truth = self.world.truth_at(now);
         self.home.bring(&mut truth);
         let yaw = frame::yaw(&truth.attitude);

@@ -1,8 +1,9 @@
 //! A motor or a propeller that has become weak.
 //!
 //! Its thrust is missed on one corner, so the controller asks for torque about roll and pitch at once, and keeps asking. A gust or
-//! a manoeuvre asks for as much for a moment, a shifted load about one axis. A vehicle on the ground says nothing: what holds it
-//! looks the same.
+//! a manoeuvre asks for as much for a moment, a shifted load about one axis. A battery that lies askew asks for it from the
+//! take-off on: so what has become so counts from 0.3 of a rotor's share of the weight on, what has been so from 0.45 on. A vehicle on
+//! the ground says nothing, because what holds it looks the same.
 
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
@@ -12,6 +13,10 @@ use stampfly_types::{Instant, Vec3};
 
 /// Weight of a step in the mean torque: a time constant of 50 ms at 400 Hz, two of a motor.
 const WEIGHT: f32 = 0.05;
+/// The same for what is usual: 3 s, which a weakness of a tenth of a second does not move.
+const USUAL: f32 = 0.0008;
+/// What is usual may be this many times as large as what becomes so.
+const STANDING: f32 = 1.5;
 /// Below this a leg may still touch the ground, m.
 const CLEAR: f32 = 0.08;
 
@@ -20,6 +25,7 @@ const CLEAR: f32 = 0.08;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MotorMonitor {
     mean: Vec3,
+    usual: Vec3,
     uneven: Option<Instant>,
 }
 
@@ -35,11 +41,16 @@ impl MotorMonitor {
         let estimate = input.estimate;
         let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < CLEAR;
         if !flies || near {
-            *self = Self::default();
+            // What the ground has asked for is no weakness, and is gone soon.
+            let mean = self.mean + (*input.torque - self.mean) * WEIGHT;
+            *self = Self { mean, usual: mean, uneven: None };
             return false;
         }
         self.mean += (*input.torque - self.mean) * WEIGHT;
-        let uneven = self.mean.x.abs() > config.weak_motor.x && self.mean.y.abs() > config.weak_motor.y;
+        self.usual += (self.mean - self.usual) * USUAL;
+        let weak = &config.weak_motor;
+        let beyond = |torque: Vec3, times: f32| torque.x.abs() > times * weak.x && torque.y.abs() > times * weak.y;
+        let uneven = beyond(self.mean - self.usual, 1.0) || beyond(self.mean, STANDING);
         lasts(&mut self.uneven, now, uneven, config.weak_motor_time)
     }
 }

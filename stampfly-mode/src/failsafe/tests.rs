@@ -21,6 +21,7 @@ struct Rig {
     estimate: StateEstimate,
     status: EstimatorStatus,
     battery: PowerData,
+    torque: Vec3,
     noise: u32,
 }
 
@@ -35,6 +36,7 @@ impl Rig {
             estimate: StateEstimate { height: 1.0, valid: Validity::ALL, ..Default::default() },
             status: EstimatorStatus::default(),
             battery: PowerData { voltage: 4.1, ..Default::default() },
+            torque: Vec3::zeros(),
             noise: 1,
         }
     }
@@ -80,7 +82,7 @@ impl Rig {
             tof: Some(now),
             flow: Some(now),
             baro: Some(now),
-            torque: &Vec3::zeros(),
+            torque: &self.torque,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &self.mode,
         };
@@ -302,4 +304,28 @@ fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
             assert_eq!(seen(3_000, 2_000), bit, "{phase:?}");
         }
     }
+}
+
+/// A step of the torque about roll and pitch, in units of the configured limits, after a second of another.
+fn is_weak(before: [f32; 2], after: [f32; 2], lasts: usize) -> bool {
+    let config = FailsafeConfig { weak_motor: Vec3::new(1.0, 1.0, 1.0), ..FailsafeConfig::default() };
+    let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+    let mut found = false;
+    for (torque, samples) in [(before, 400), (after, lasts), (before, 200)] {
+        rig.torque = Vec3::new(torque[0], torque[1], 0.0);
+        for _ in 0..samples {
+            found |= rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_WEAK);
+        }
+    }
+    found
+}
+
+#[test]
+fn a_motor_that_becomes_weak_is_found_and_a_load_that_lies_askew_is_not() {
+    assert!(is_weak([0.0, 0.0], [1.5, -1.5], 80), "0.2 s");
+    assert!(!is_weak([0.0, 0.0], [1.5, -1.5], 30), "a gust of 75 ms");
+    assert!(!is_weak([0.0, 0.0], [4.0, 0.5], 400), "about one axis");
+    assert!(!is_weak([0.9, 0.9], [1.2, 1.2], 400), "askew all the time");
+    assert!(is_weak([0.4, 0.4], [-1.4, 1.6], 80), "beyond what is usual");
+    assert!(is_weak([1.7, 1.7], [1.7, 1.7], 10), "weak from the take-off on");
 }

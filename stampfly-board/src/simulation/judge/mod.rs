@@ -15,8 +15,8 @@
 //! | `transparent` | anything else |
 //!
 //! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
-//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide, in ACRO four
-//! times.
+//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide in POS_HOLD,
+//! three times where the vehicle levels itself, and four times in ACRO.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -46,8 +46,15 @@ const OFF_GROUND: f32 = 0.05;
 const AWAY: [f32; 2] = [1.0, 5.0];
 /// Bounds of `transparent`, in the same order, m.
 const EXACT: [f32; 2] = [0.15, 0.5];
-/// A pilot's bounds are this many times as wide: where the vehicle levels itself, and where it does not.
-const PILOT: [f32; 2] = [2.0, 4.0];
+/// A pilot's bounds are so many times as wide.
+const fn pilot_bounds(mode: FlightMode) -> f32 {
+    match mode {
+        FlightMode::PosHold => 2.0,
+        FlightMode::AltHold | FlightMode::Stabilize => 3.0,
+        FlightMode::Acro => 4.0,
+    }
+}
+
 /// Motors that stop within this time of a fault were cut.
 const CUT: Duration = Duration::from_millis(300);
 /// Hardest touch-down that is none of a crash, m/s.
@@ -169,7 +176,7 @@ impl Judge {
             invariants: Invariants::new(hover_without_link),
             moments: Moments::default(),
             course: Course::new(mission),
-            wide: pilot.map_or(1.0, |mode| PILOT[usize::from(mode == FlightMode::Acro)]),
+            wide: pilot.map_or(1.0, pilot_bounds),
             alerts: Alerts::NONE,
             spans: Vec::new(),
             motors_on: false,
