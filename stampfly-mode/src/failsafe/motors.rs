@@ -8,8 +8,8 @@
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use crate::lasting::lasts;
+use stampfly_types::Instant;
 use stampfly_types::messages::Validity;
-use stampfly_types::{Instant, Vec3};
 
 /// Weight of a step in the mean torque: a time constant of 50 ms at 400 Hz, two of a motor.
 const WEIGHT: f32 = 0.05;
@@ -24,8 +24,9 @@ const CLEAR: f32 = 0.08;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MotorMonitor {
-    mean: Vec3,
-    usual: Vec3,
+    /// About roll and pitch, N·m.
+    mean: [f32; 2],
+    usual: [f32; 2],
     uneven: Option<Instant>,
 }
 
@@ -40,17 +41,21 @@ impl MotorMonitor {
     ) -> bool {
         let estimate = input.estimate;
         let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < CLEAR;
+        let asked = [input.torque.x, input.torque.y];
+        let limits = [config.weak_motor.x, config.weak_motor.y];
+        let (mut became, mut stands) = (true, true);
+        for axis in 0..2 {
+            self.mean[axis] += (asked[axis] - self.mean[axis]) * WEIGHT;
+            let risen = self.mean[axis] - self.usual[axis];
+            self.usual[axis] += risen * USUAL;
+            became &= risen.abs() > limits[axis];
+            stands &= self.mean[axis].abs() > STANDING * limits[axis];
+        }
         if !flies || near {
             // What the ground has asked for is no weakness, and is gone soon.
-            let mean = self.mean + (*input.torque - self.mean) * WEIGHT;
-            *self = Self { mean, usual: mean, uneven: None };
+            (self.usual, self.uneven) = (self.mean, None);
             return false;
         }
-        self.mean += (*input.torque - self.mean) * WEIGHT;
-        self.usual += (self.mean - self.usual) * USUAL;
-        let weak = &config.weak_motor;
-        let beyond = |torque: Vec3, times: f32| torque.x.abs() > times * weak.x && torque.y.abs() > times * weak.y;
-        let uneven = beyond(self.mean - self.usual, 1.0) || beyond(self.mean, STANDING);
-        lasts(&mut self.uneven, now, uneven, config.weak_motor_time)
+        lasts(&mut self.uneven, now, became || stands, config.weak_motor_time)
     }
 }
