@@ -267,7 +267,7 @@ pub trait Vehicle: 'static {
     /// The configuration of its flight stack.
     fn config(setup: &Self::Setup) -> &<Self::Runnables as Schedule>::Config;
 
-    /// Flies it in its surroundings, with [`fly`](super::vehicle::fly). Written out for each vehicle, so that its whole flight is
+    /// Flies it in its surroundings, with [`fly`]. Written out for each vehicle, so that its whole flight is
     /// compiled once, in its own crate, and not again in every program and test.
     fn fly(
         setup: &Self::Setup,
