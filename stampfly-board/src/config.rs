@@ -7,6 +7,7 @@ use crate::airframe::{AIRFRAME, GROUND_HEIGHT};
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
+use stampfly_mode::failsafe::WEAK_SHARE;
 use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
 use stampfly_types::message_enum;
 
@@ -68,6 +69,7 @@ impl Default for VehicleConfig {
     /// The StampFly as it is built.
     fn default() -> Self {
         let ground_clearance = GROUND_HEIGHT as f32;
+        let weak = AIRFRAME.rotor_torque() * WEAK_SHARE;
         Self {
             estimator: EstimatorKind::default(),
             controller: ControllerKind::default(),
@@ -78,7 +80,7 @@ impl Default for VehicleConfig {
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
             mode: ModeConfig::default(),
-            failsafe: FailsafeConfig { weak_motor: AIRFRAME.rotor_torque() * 0.3, ..FailsafeConfig::default() },
+            failsafe: FailsafeConfig { weak_roll: weak.x, weak_pitch: weak.y, ..FailsafeConfig::default() },
             landing: LandingConfig::default(),
             authority: AuthorityConfig::default(),
             button: ButtonConfig::default(),

@@ -141,8 +141,8 @@ parameters! {
     "failsafe.tumble.time" [0.05, 2.0] "s" failsafe.tumble_time => "tilted for this long it tumbles";
     "failsafe.tip.tilt" [0.3, 1.3] "rad" failsafe.tip_tilt => "tilt of a vehicle that tips over while it takes off";
     "failsafe.tip.time" [0.02, 1.0] "s" failsafe.tip_time => "tilted for this long it tips over";
-    "failsafe.weak.roll" [0.0001, 0.1] "N*m" failsafe.weak_motor.x => "torque about roll that betrays a weak motor";
-    "failsafe.weak.pitch" [0.0001, 0.1] "N*m" failsafe.weak_motor.y => "torque about pitch that betrays a weak motor";
+    "failsafe.weak.roll" [0.0001, 0.1] "N*m" failsafe.weak_roll => "torque about roll that betrays a weak motor";
+    "failsafe.weak.pitch" [0.0001, 0.1] "N*m" failsafe.weak_pitch => "torque about pitch that betrays a weak motor";
     "failsafe.weak.time" [0.02, 2.0] "s" failsafe.weak_motor_time => "for this long it is a weak motor";
     "failsafe.imu.degraded" [0.005, 0.02] "s" failsafe.imu_degraded => "silence of a degraded inertial sensor";
     "failsafe.imu.lost" [0.02, 0.1] "s" failsafe.imu_lost => "silence of a lost inertial sensor, stops the motors";

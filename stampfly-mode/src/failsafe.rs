@@ -46,10 +46,9 @@ mod motion;
 mod motors;
 mod power;
 
-pub use config::FailsafeConfig;
+pub use config::{FailsafeConfig, WEAK_SHARE};
 pub use input::FailsafeInput;
 
-use crate::transitions::is_airborne;
 use attitude::AttitudeMonitor;
 use imu::ImuMonitor;
 use motion::{Contact, MotionMonitor};
@@ -148,7 +147,7 @@ impl Failsafe {
         found = found
             .set(Alerts::IMU_LOST, silence >= config.imu_lost)
             .set(Alerts::TUMBLED, tumbled)
-            .set(Alerts::MOTOR_WEAK, self.motors.step(config, now, input, is_airborne(status.phase)))
+            .set(Alerts::MOTOR_WEAK, self.motors.step(config, now, input))
             .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
         if !found.is_empty() {
             self.latched_at = now;

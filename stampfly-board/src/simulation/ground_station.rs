@@ -3,7 +3,7 @@
 //! It knows nothing but what the vehicle tells it, and sends a sign of life ten times a second so that the vehicle
 //! knows the link is there.
 
-use super::mission::{Mission, Step};
+use super::mission::{LONGEST_LEG, Mission, Step};
 use super::radio::Radio;
 use crate::messages::TelemetryFrame;
 use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
@@ -17,10 +17,6 @@ const LIFE_DIVIDER: u32 = 5;
 
 /// Looks after which telemetry surely knows of a command.
 const ROUND_TRIP: u32 = 4;
-
-/// A place that is not reached in this time is given up, and the mission goes on to the next step. Ten metres at 0.3 m/s, the
-/// slowest of the random missions, take 35 s.
-pub(super) const LONGEST_LEG: Duration = Duration::from_secs(50);
 
 /// What the ground station reports about itself.
 #[derive(Debug, Default)]

@@ -13,13 +13,18 @@
 //!
 //! Positions are metres from the take-off spot, heights above it. A step begins when the one before is done: `arm` when
 //! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `land` when it stands
-//! and is disarmed.
+//! and is disarmed. A place that cannot be reached is given up after [`LONGEST_LEG`].
 
 use stampfly_sim::Noise;
+use stampfly_types::Duration;
 use std::fmt;
 use std::string::String;
 use std::vec::Vec;
 use std::{format, vec};
+
+/// A place that is not reached in this time is given up, and the mission goes on to the next step. Ten metres at 0.3 m/s, the
+/// slowest of the random missions, take 35 s.
+pub const LONGEST_LEG: Duration = Duration::from_secs(50);
 
 /// One step.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,9 +14,9 @@
 //! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
 //! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
 
-use super::ground_station::{LONGEST_LEG, Progress};
+use super::ground_station::Progress;
 use super::home::Home;
-use super::mission::{Mission, Step};
+use super::mission::{LONGEST_LEG, Mission, Step};
 use super::radio::Radio;
 use stampfly_control::CascadeConfig;
 use stampfly_control::guidance::NavigatorConfig;
@@ -276,7 +276,7 @@ impl<'b> Pilot<'b> {
         let velocity = frame::from_yaw(-seen.yaw) * seen.velocity;
         let limit = |speed: f32, most: f32| speed.clamp(-most, most);
 
-        for (trim, error) in self.lean_trim.iter_mut().zip([error.x, error.y]) {
+        for (trim, error) in self.lean_trim.iter_mut().zip([error.x, error.y]).filter(|_| mode != FlightMode::PosHold) {
             *trim = limit(*trim + LEARNS * PERIOD.seconds() * limit(error, 0.5), 0.2);
         }
         let axes = [
@@ -288,12 +288,12 @@ impl<'b> Pilot<'b> {
             FlightMode::PosHold if error.abs() < 0.1 => 0.0,
             FlightMode::PosHold => limit(0.8 * error, SPEED) / self.meaning.navigator.stick_speed,
             FlightMode::AltHold | FlightMode::Stabilize => {
-                // 1.2 1/s of damping: a quarter of what the reaction time would bear.
-                let wanted = 1.2 * (limit(0.5 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
+                // 2 1/s of damping: two fifths of what the reaction time would bear.
+                let wanted = 2.0 * (limit(0.7 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
                 (wanted + trim) / self.meaning.lean
             }
             FlightMode::Acro => {
-                let wanted = 1.0 * (limit(0.4 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
+                let wanted = 1.5 * (limit(0.6 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
                 2.5 * (limit(wanted + trim, 0.3) - lean) / self.meaning.tilt_rate
             }
         });
@@ -301,7 +301,7 @@ impl<'b> Pilot<'b> {
         let climb = if sinks { -CLIMB } else { limit(-0.8 * error.z, CLIMB) };
         let throttle = if mode.is_manual() && !sinks && -seen.position.z < CLEAR {
             // Off the ground quickly: what still touches it tips the vehicle over.
-            self.meaning.hover + self.trim + 0.08
+            self.meaning.hover + self.trim + 0.14
         } else if mode.is_manual() {
             // 2 1/s of damping, and what is left over is learned in some seconds.
             let wrong = climb + velocity.z;

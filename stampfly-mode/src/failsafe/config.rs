@@ -1,6 +1,10 @@
 //! Thresholds, times and filter weights of the [failsafe](super).
 
-use stampfly_types::{Duration, GRAVITY, Vec3};
+use stampfly_types::{Duration, GRAVITY};
+
+/// A motor is weak when this share of its thrust is missing. Of half a propeller 0.5 is, and a step of the demand has to exceed
+/// the limit for a while.
+pub const WEAK_SHARE: f32 = 0.3;
 
 /// Thresholds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,9 +30,11 @@ pub struct FailsafeConfig {
     pub tip_tilt: f32,
     /// For how long it is tilted so far.
     pub tip_time: Duration,
-    /// Torque about roll and pitch, N·m, that together betray a weak motor: 0.3 of the torque that one rotor's share of the
+    /// Torques about roll and pitch, N·m, that together betray a weak motor: [`WEAK_SHARE`] of what one rotor's share of the
     /// weight makes. Infinite where nothing is known of the airframe: then no motor is found weak.
-    pub weak_motor: Vec3,
+    pub weak_roll: f32,
+    /// The same about pitch.
+    pub weak_pitch: f32,
     /// For how long they are asked for.
     pub weak_motor_time: Duration,
     /// Silence of the inertial sensor after which it is degraded.
@@ -115,7 +121,8 @@ impl Default for FailsafeConfig {
             tumble_time: Duration::from_millis(300),
             tip_tilt: 0.7,
             tip_time: Duration::from_millis(50),
-            weak_motor: Vec3::new(f32::INFINITY, f32::INFINITY, f32::INFINITY),
+            weak_roll: f32::INFINITY,
+            weak_pitch: f32::INFINITY,
             weak_motor_time: Duration::from_millis(100),
             imu_degraded: Duration::from_millis(10),
             imu_lost: Duration::from_millis(25),

@@ -2,14 +2,14 @@
 //!
 //! Its thrust is missed on one corner, so the controller asks for torque about roll and pitch at once, and keeps asking. A gust or
 //! a manoeuvre asks for as much for a moment, a shifted load about one axis. A battery that lies askew asks for it from the
-//! take-off on: so what has become so counts from 0.3 of a rotor's share of the weight on, what has been so from 0.45 on. A vehicle on
-//! the ground says nothing, because what holds it looks the same.
+//! take-off on: so what has become so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a rotor's share of the weight on, what has
+//! been so from [`STANDING`] times that on. A vehicle on the ground says nothing, because what holds it looks the same.
 
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use crate::lasting::lasts;
 use stampfly_types::Instant;
-use stampfly_types::messages::Validity;
+use stampfly_types::messages::{FlightPhase, Validity};
 
 /// Weight of a step in the mean torque: a time constant of 50 ms at 400 Hz, two of a motor.
 const WEIGHT: f32 = 0.05;
@@ -32,17 +32,13 @@ pub(super) struct MotorMonitor {
 
 impl MotorMonitor {
     /// Is a motor weak?
-    pub(super) fn step(
-        &mut self,
-        config: &FailsafeConfig,
-        now: Instant,
-        input: &FailsafeInput<'_>,
-        flies: bool,
-    ) -> bool {
+    pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> bool {
         let estimate = input.estimate;
+        // One that lands already has nothing more to find out, and may stand without knowing it.
+        let flies = matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying);
         let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < CLEAR;
         let asked = [input.torque.x, input.torque.y];
-        let limits = [config.weak_motor.x, config.weak_motor.y];
+        let limits = [config.weak_roll, config.weak_pitch];
         let (mut became, mut stands) = (true, true);
         for axis in 0..2 {
             self.mean[axis] += (asked[axis] - self.mean[axis]) * WEIGHT;

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use stampfly_types::Duration;
 use stampfly_types::messages::{EstimatorStatus, PowerData, StateEstimate};
 use stampfly_types::messages::{FlightMode, FlightStatus, Validity};
-use stampfly_types::{GRAVITY, Vec3};
+use stampfly_types::{GRAVITY, Quat, Vec3};
 use std::vec::Vec;
 
 /// A control period at 400 Hz.
@@ -308,7 +308,7 @@ fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
 
 /// A step of the torque about roll and pitch, in units of the configured limits, after a second of another.
 fn is_weak(before: [f32; 2], after: [f32; 2], lasts: usize) -> bool {
-    let config = FailsafeConfig { weak_motor: Vec3::new(1.0, 1.0, 1.0), ..FailsafeConfig::default() };
+    let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
     let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
     let mut found = false;
     for (torque, samples) in [(before, 400), (after, lasts), (before, 200)] {
@@ -328,4 +328,33 @@ fn a_motor_that_becomes_weak_is_found_and_a_load_that_lies_askew_is_not() {
     assert!(!is_weak([0.9, 0.9], [1.2, 1.2], 400), "askew all the time");
     assert!(is_weak([0.4, 0.4], [-1.4, 1.6], 80), "beyond what is usual");
     assert!(is_weak([1.7, 1.7], [1.7, 1.7], 10), "weak from the take-off on");
+}
+
+/// What stands leans on the ground, and a landing is what would follow.
+#[test]
+fn a_weak_motor_is_looked_for_in_flight_only() {
+    let found = |phase: FlightPhase, height: f32| {
+        let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
+        let mut rig = Rig { failsafe: Failsafe::new(config), torque: Vec3::new(2.0, 2.0, 0.0), ..Rig::flying() };
+        (rig.mode.phase, rig.estimate.height) = (phase, height);
+        (0..400).any(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_WEAK))
+    };
+    assert!(found(FlightPhase::Flying, 1.0) && found(FlightPhase::TakeOff, 0.2));
+    assert!(
+        !found(FlightPhase::TakeOff, 0.03) && !found(FlightPhase::Landing, 1.0) && !found(FlightPhase::Armed, 0.03)
+    );
+}
+
+/// From 45 degrees a vehicle still falls back onto its feet, from 75 not.
+#[test]
+fn a_vehicle_that_tips_over_while_taking_off_stops() {
+    let after = |phase: FlightPhase, tilt: f32| {
+        let mut rig = Rig::flying();
+        rig.mode.phase = phase;
+        rig.estimate.attitude = Quat::from_axis_angle(&Vec3::x_axis(), tilt);
+        (1..=200).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
+    };
+    assert_eq!(after(FlightPhase::TakeOff, 0.65), None);
+    assert!(after(FlightPhase::TakeOff, 0.75).is_some_and(|samples| (20..=22).contains(&samples)));
+    assert_eq!(after(FlightPhase::Flying, 0.75), None, "a lean in flight");
 }

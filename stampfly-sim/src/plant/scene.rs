@@ -140,6 +140,18 @@ mod tests {
         Plant::new(&parameters, &WindConfig::CALM, Some(&pose), 1)
     }
 
+    /// It used to be thrown up by a floor that it was half a metre under.
+    #[test]
+    fn what_drifts_back_under_an_edge_stays_below() {
+        for (drop, upper) in [(0.7, Vector3::new(-0.01, 0.0, 0.0)), (-0.7, Vector3::new(0.01, 0.0, -0.7))] {
+            let ahead = Beyond { point: [0.0, 0.0], ahead: [1.0, 0.0] };
+            let scene = Scene { edge: Some((ahead, drop)), ..Scene::default() };
+            assert_eq!(scene.floor(&upper), upper.z, "on the upper floor");
+            let under = upper + Vector3::new(0.0, 0.0, 0.5);
+            assert_eq!(scene.floor(&under), upper.z + 0.7, "under it");
+        }
+    }
+
     #[test]
     fn beyond_an_edge_it_falls_deeper() {
         let mut plant = plant(0.3);

@@ -15,8 +15,7 @@
 //! | `transparent` | anything else |
 //!
 //! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
-//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide in POS_HOLD,
-//! three times where the vehicle levels itself, and four times in ACRO.
+//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -46,15 +45,8 @@ const OFF_GROUND: f32 = 0.05;
 const AWAY: [f32; 2] = [1.0, 5.0];
 /// Bounds of `transparent`, in the same order, m.
 const EXACT: [f32; 2] = [0.15, 0.5];
-/// A pilot's bounds are so many times as wide.
-const fn pilot_bounds(mode: FlightMode) -> f32 {
-    match mode {
-        FlightMode::PosHold => 2.0,
-        FlightMode::AltHold | FlightMode::Stabilize => 3.0,
-        FlightMode::Acro => 4.0,
-    }
-}
-
+/// A pilot's bounds are this many times as wide.
+const PILOT: f32 = 2.0;
 /// Motors that stop within this time of a fault were cut.
 const CUT: Duration = Duration::from_millis(300);
 /// Hardest touch-down that is none of a crash, m/s.
@@ -128,8 +120,7 @@ pub(super) struct Judge {
     invariants: Invariants,
     moments: Moments,
     course: Course,
-    /// Bounds of `transparent` are this many times as wide.
-    wide: f32,
+    piloted: bool,
     alerts: Alerts,
     spans: Vec<AlertSpan>,
     motors_on: bool,
@@ -165,18 +156,13 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub fn new(
-        injector: &Injector,
-        mission: &Mission,
-        pilot: Option<FlightMode>,
-        hover_without_link: Duration,
-    ) -> Self {
+    pub fn new(injector: &Injector, mission: &Mission, piloted: bool, hover_without_link: Duration) -> Self {
         Self {
             injector: injector.clone(),
             invariants: Invariants::new(hover_without_link),
             moments: Moments::default(),
             course: Course::new(mission),
-            wide: pilot.map_or(1.0, pilot_bounds),
+            piloted,
             alerts: Alerts::NONE,
             spans: Vec::new(),
             motors_on: false,
@@ -350,7 +336,7 @@ impl Judge {
     /// By the table of the [module](self) documentation.
     fn class(&self, begun: Option<Instant>) -> Class {
         let [above, beside] = self.away;
-        let wide = self.wide;
+        let wide = if self.piloted { PILOT } else { 1.0 };
         let from = begun.or(self.start).unwrap_or(self.now);
         let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
         let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
