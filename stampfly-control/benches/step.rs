@@ -46,7 +46,11 @@ fn situation() -> Situation {
             armed: true,
             ..FlightStatus::default()
         },
-        land_detected: LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..LandDetected::default() },
+        land_detected: LandDetected {
+            contact: GroundContact::Air,
+            thrust_ceiling: f32::MAX,
+            ..LandDetected::default()
+        },
         command: CommandSetpoint { source: CommandSource::Guided, ..CommandSetpoint::default() },
     }
 }

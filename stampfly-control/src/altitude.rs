@@ -8,7 +8,7 @@
 use stampfly_types::GRAVITY;
 
 use crate::airframe::Airframe;
-use crate::bound::{symmetric, within};
+use crate::bound::{possible_thrust, symmetric, within};
 use crate::pid::{Pid, PidGains};
 use crate::rate::integration;
 
@@ -76,7 +76,7 @@ pub struct Climb {
 /// Circumstances of one step that limit thrust or learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThrustLimits {
-    /// Upper limit as a share of hover thrust; above one means none.
+    /// Upper limit as a share of hover thrust; `f32::MAX` while unlimited.
     pub ceiling: f32,
     /// Share of the last thrust that the mixer could not deliver.
     pub unmet: f32,
@@ -94,7 +94,7 @@ pub struct ThrustLimits {
 /// let config = AltitudeConfig::for_airframe(&Airframe::EXAMPLE);
 /// let mut altitude = AltitudeController::new(&config);
 /// let still = Climb { cos_tilt: 1.0, ..Climb::default() };
-/// let limits = ThrustLimits { ceiling: 2.0, unmet: 0.0, learn: true, hold: false };
+/// let limits = ThrustLimits { ceiling: f32::MAX, unmet: 0.0, learn: true, hold: false };
 /// assert_eq!(altitude.step(&still, &limits, 0.0025), config.hover_thrust);
 /// let too_low = Climb { error: -0.3, ..still };
 /// assert!(altitude.step(&too_low, &limits, 0.0025) > config.hover_thrust);
@@ -181,9 +181,7 @@ impl AltitudeController {
     }
 
     fn limit(&self, thrust: f32, limits: &ThrustLimits) -> f32 {
-        // A ceiling that is no number limits nothing: NaN compares false.
-        let ceiling = if limits.ceiling <= 1.0 { limits.ceiling.max(0.0) * self.hover_thrust } else { f32::MAX };
-        if thrust.is_finite() { within(thrust, 0.0, self.config.thrust_max.min(ceiling)) } else { 0.0 }
+        possible_thrust(thrust, self.config.thrust_max, limits.ceiling, self.hover_thrust)
     }
 }
 
@@ -192,7 +190,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const FREE: ThrustLimits = ThrustLimits { ceiling: 2.0, unmet: 0.0, learn: true, hold: false };
+    const FREE: ThrustLimits = ThrustLimits { ceiling: f32::MAX, unmet: 0.0, learn: true, hold: false };
     const DT: f32 = 0.0025;
 
     fn config() -> AltitudeConfig {
@@ -240,10 +238,12 @@ mod tests {
     }
 
     #[test]
-    fn the_ceiling_is_a_share_of_hover_thrust_and_off_above_one() {
+    fn the_ceiling_limits_thrust() {
         let altitude = AltitudeController::new(&config());
-        let limited = altitude.limit(2.0 * config().thrust_max, &ThrustLimits { ceiling: 0.7, ..FREE });
-        assert!((limited / altitude.hover_thrust() - 0.7).abs() < 1e-6);
+        for ceiling in [0.7, 1.2] {
+            let limited = altitude.limit(2.0 * config().thrust_max, &ThrustLimits { ceiling, ..FREE });
+            assert!((limited / altitude.hover_thrust() - ceiling).abs() < 1e-6);
+        }
         assert_eq!(altitude.limit(2.0 * config().thrust_max, &FREE), config().thrust_max);
     }
 

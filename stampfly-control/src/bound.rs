@@ -22,9 +22,27 @@ pub(crate) fn symmetric(value: f32, limit: f32) -> f32 {
     within(value, -limit, limit)
 }
 
+/// Collective thrust, N, from zero to `max` and to `ceiling`, a share of `hover`. No number is no thrust; a ceiling that is no
+/// number limits nothing, because `min` takes the other one.
+#[inline]
+pub(crate) fn possible_thrust(thrust: f32, max: f32, ceiling: f32, hover: f32) -> f32 {
+    let limit = max.min(ceiling * hover).max(0.0);
+    if thrust.is_finite() { within(thrust, 0.0, limit) } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_ceiling_is_a_share_of_hover_thrust() {
+        assert_eq!(possible_thrust(0.5, 0.6, 1.25, 0.3), 0.375);
+        assert_eq!(possible_thrust(0.5, 0.6, -1.0, 0.3), 0.0);
+        for unlimited in [f32::MAX, f32::INFINITY, f32::NAN] {
+            assert_eq!(possible_thrust(0.9, 0.6, unlimited, 0.3), 0.6);
+        }
+        assert_eq!(possible_thrust(f32::NAN, 0.6, f32::MAX, 0.3), 0.0);
+    }
 
     #[test]
     fn wrong_bounds_do_not_panic() {

@@ -83,7 +83,7 @@ const THROTTLE_OFF: f32 = 0.03;
 /// let mut controller = CascadeController::new(&CascadeConfig::for_airframe(&Airframe::EXAMPLE));
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
 /// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::PosHold, armed: true, ..Default::default() };
-/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
+/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: f32::MAX, ..Default::default() };
 /// let setpoint = Setpoint {
 ///     position: Vec3::new(1.0, 0.0, 0.0),
 ///     axes: SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW,

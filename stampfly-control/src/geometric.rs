@@ -14,7 +14,7 @@ use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
 use crate::airframe::Airframe;
 use crate::attitude;
-use crate::bound::{symmetric, within};
+use crate::bound::{possible_thrust, symmetric, within};
 use crate::cascade::StickConfig;
 use crate::controller::{ControlInput, Controller};
 use crate::intent::{Heading, Horizontal, Intent, Vertical};
@@ -84,7 +84,7 @@ impl GeometricConfig {
 /// let mut controller: Box<dyn Controller> = Box::new(GeometricController::new(&config));
 /// let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
 /// let mode = FlightStatus { phase: FlightPhase::Flying, mode: FlightMode::AltHold, armed: true, ..Default::default() };
-/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: 2.0, ..Default::default() };
+/// let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling: f32::MAX, ..Default::default() };
 /// let setpoint = Setpoint { axes: SetpointAxes::POSITION_Z | SetpointAxes::YAW, ..Default::default() };
 /// let output = controller.step(Instant::from_micros(2_500), &ControlInput {
 ///     estimate: &estimate, command: &CommandSetpoint { roll: 0.5, ..Default::default() }, setpoint: &setpoint,
@@ -198,13 +198,7 @@ impl Controller for GeometricController {
             Vertical::Throttle(throttle) => throttle * config.thrust_max,
             Vertical::Descend => 0.96 * hover,
         };
-        let ceiling = if input.land_detected.thrust_ceiling <= 1.0 {
-            input.land_detected.thrust_ceiling * hover
-        } else {
-            f32::MAX
-        };
-        let thrust =
-            if thrust.is_finite() { within(thrust, 0.0, config.thrust_max.min(ceiling.max(0.0))) } else { 0.0 };
+        let thrust = possible_thrust(thrust, config.thrust_max, input.land_detected.thrust_ceiling, hover);
 
         let (heading, yaw_rate) = match intent.heading {
             Heading::Hold { yaw, rate } => {

@@ -45,8 +45,11 @@ fn above(value: f32, limit: f32) -> Option<(f32, f32)> {
 }
 
 /// Alerts of sensors without which no vehicle takes off.
-const SILENT_SENSOR: Alerts =
-    Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY).with(Alerts::POWER_LOST);
+const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED
+    .with(Alerts::IMU_LOST)
+    .with(Alerts::IMU_FAULTY)
+    .with(Alerts::IMU_NOISY)
+    .with(Alerts::POWER_LOST);
 
 macro_rules! checks {
     ($($block:ident [$unit:literal] $refuses:literal => |$config:ident, $state:ident, $facts:ident| $test:expr;)+) => {
@@ -199,7 +202,7 @@ mod tests {
         assert_eq!(found(&state, &silent), ArmBlocks::NO_LINK);
         let spoken = Facts { asked: Asked { any: true, ..Asked::default() }, ..silent };
         assert_eq!(found(&state, &spoken), ArmBlocks::NONE, "a command is a sign of life itself");
-        for sensor in [Alerts::IMU_DEGRADED, Alerts::IMU_LOST, Alerts::POWER_LOST] {
+        for sensor in [Alerts::IMU_DEGRADED, Alerts::IMU_LOST, Alerts::IMU_NOISY, Alerts::POWER_LOST] {
             assert_eq!(found(&state, &Facts { alerts: sensor, ..facts }), ArmBlocks::SENSOR, "{sensor:?}");
         }
         let pairing = State { pairing: Some(Instant::ZERO), ..state };

@@ -6,10 +6,11 @@
 //! |---|---|---|
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
-//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40° for 50 ms while taking off; in ACRO above 120° for a second | disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, or 14° from how it stood below 0.08 m, for 20 ms while taking off; in ACRO above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity | disarmed |
+//! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
 //! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
 //! | `POWER_LOST` | no finite battery sample for 1 s; a voltage below 0.1 V is one: no meter is fitted | with the next one |
@@ -30,6 +31,7 @@
 //! | inertial sensor stuck, zero, one axis stuck | 50 ms; motors off within 60 ms |
 //! | samples that are not finite, silence | 25 ms; motors off within 33 ms |
 //! | full scale, garbage for good | 10 ms, 25 ms |
+//! | spikes in one sample of five | 0.1 s; it lands |
 //! | force below a fifth of g, or above 2.5 g, for good | 1.1 s |
 //! | range stuck at 3 cm, outliers, aliased, ramp | 0.3 s, 0.35 s, 2 s, 4.5 s |
 //! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 1 to 2 s |
@@ -103,7 +105,8 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::IMU_LOST)
     .with(Alerts::IMU_FAULTY)
     .with(Alerts::ESTIMATE_DIVERGED)
-    .with(Alerts::MOTOR_WEAK);
+    .with(Alerts::MOTOR_WEAK)
+    .with(Alerts::IMU_NOISY);
 
 impl Default for Failsafe {
     fn default() -> Self {
@@ -191,11 +194,11 @@ impl Failsafe {
         let flies = matches!(status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
         let (found, suspect) = self.motion.step(&self.config, *at, imu, Contact::expected(&self.config, input));
         let holds_height = flies && !status.mode.is_manual();
-        let faulty = self.imu.step(&self.config, *at, imu, suspect, holds_height);
+        let [faulty, noisy] = self.imu.step(&self.config, *at, imu, suspect, holds_height);
         if !suspect {
             self.attitude.add(&self.config, imu);
         }
-        found.set(Alerts::IMU_FAULTY, faulty)
+        found.set(Alerts::IMU_FAULTY, faulty).set(Alerts::IMU_NOISY, noisy)
     }
 }
 

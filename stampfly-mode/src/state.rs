@@ -8,7 +8,8 @@ use stampfly_types::{Duration, Instant};
 pub const CUT: Alerts =
     Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY);
 /// Alerts that demand a landing at once.
-pub const LAND: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::MOTOR_WEAK);
+pub const LAND: Alerts =
+    Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::MOTOR_WEAK).with(Alerts::IMU_NOISY);
 
 /// A silence of the commander.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

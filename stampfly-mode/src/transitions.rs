@@ -70,7 +70,7 @@ impl Event {
                 "`Land` or `Disarm` from any program, arm switch off in a mode that holds height, link lost for too long (at \
                  once without height), height lost for too long, horizontal velocity lost for too long without a pilot, a \
                  take-off that takes too long, or `CRITICAL_BATTERY`, \
-                 `ESTIMATE_DIVERGED`, `MOTOR_WEAK`"
+                 `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `IMU_NOISY`"
             }
             Self::TakeOffComplete => "the land detector says so, or in a manual mode the vehicle has left the ground",
             Self::TakeOff => {

@@ -112,7 +112,7 @@ impl<C: Controller> Flight<C> {
                 armed: true,
                 ..FlightStatus::default()
             },
-            land_detected: LandDetected { thrust_ceiling: 2.0, ..LandDetected::default() },
+            land_detected: LandDetected { thrust_ceiling: f32::MAX, ..LandDetected::default() },
             command: CommandSetpoint::default(),
             setpoint: Setpoint { axes: Axes::POSITION_XY | Axes::POSITION_Z | Axes::YAW, ..Setpoint::default() },
             valid: Validity::ALL,

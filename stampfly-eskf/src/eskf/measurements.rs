@@ -2,12 +2,15 @@
 //! models, and the conditions of each sensor, are in [`aid`](crate::aid).
 
 use super::gate::{GateResult, Sensor};
+use super::vertical::Use;
 use super::*;
 use crate::config::MagModel;
 
 /// Where nothing but the barometer holds the height, the height is reset to one that is this near, m. Farther away one of
 /// them is wrong, and it is not known which: height and climb rate become invalid.
 const BARO_REACH: f32 = 2.0;
+/// Test ratio of a range that is rejected whatever its gate says.
+const REJECTED: f32 = 2.0;
 /// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
 const SHAKEN: f32 = 100.0;
 
@@ -34,7 +37,8 @@ impl Eskf {
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
         let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
-        if !self.vertical.range(self.now, tof.distance, expected) {
+        let use_as = self.vertical.range(self.now, tof.distance, expected);
+        if use_as == Use::Ignore {
             return Err(Refusal::Implausible);
         }
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
@@ -48,13 +52,24 @@ impl Eskf {
         let ratio = self.test_ratio(&innovation);
         self.status.tof_innovation = tof.distance - row.predicted;
         self.status.tof_ratio = ratio;
-        match self.gates.test(Sensor::Tof, self.now, ratio, self.config.lockout) {
-            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
+        let gated = if use_as == Use::Reject { ratio.max(REJECTED) } else { ratio };
+        match self.gates.test(Sensor::Tof, self.now, gated, self.config.lockout) {
+            GateResult::Fuse => {
+                self.vertical.used();
+                Ok(self.update(&innovation, ratio))
+            }
             GateResult::Reject => {
                 self.vertical.rejected(self.now);
                 Ok(Fusion::Gated { ratio })
             }
             GateResult::Reset => {
+                let velocity = self.state.velocity;
+                let known = self.gates.is_recent(Sensor::Flow, self.now);
+                if self.vertical.convicts(known.then(|| math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y)))
+                {
+                    return Err(Refusal::Implausible);
+                }
+                self.vertical.used();
                 let down = surface - below - delayed.state.position.z;
                 self.vertical.rejected(self.now);
                 self.vertical.moved(-down);

@@ -7,13 +7,17 @@
 //!
 //! | the range is implausible when | |
 //! |---|---|
-//! | it repeats itself while the observer moves by [`MOVED`], or right after a jump | stuck |
+//! | it repeats itself while the observer moves by [`MOVED`], right after a jump, or for 1.5 s | stuck |
 //! | the filter's path and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
 //! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
 //! | it jumps more than five times within about two seconds | outliers, an edge below |
+//! | it jumps and stays there, and the vehicle does not move sideways | aliased, an offset, something below that was not there |
 //!
 //! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust changes. A range that is off by a
 //! constant is a table, and one that is off by a factor is found only where the path is long.
+//! Until then two kinds of readings do no harm: one that repeats itself [`UNUSED`] times is not used, and one that leaps is
+//! rejected until another one confirms it.
+//!
 //! The range is believed again after a second of readings that change, do not jump and lie within [`AGREES`] of where
 //! the filter expects them.
 
@@ -26,8 +30,12 @@ const FADING: f32 = 4.0;
 const MOVED: f32 = 0.2;
 /// Readings running that are equal are repeated: 0.5 s. Noise of a millimetre repeats one with a probability below 0.4.
 const REPEATED: u32 = 15;
+/// So many are stuck whether anything moves or not: 1.5 s.
+const REPEATED_ALWAYS: u32 = 45;
 /// As many while the observer moves: a range that lives changes with it.
 const REPEATED_MOVING: u32 = 6;
+/// A reading that repeats itself so often is not used any more: 0.13 s, in which a take-off rises by 4 cm.
+const UNUSED: u32 = 4;
 /// As many after a jump.
 const REPEATED_JUMPED: u32 = 8;
 /// Below this height the pressure under the propellers changes with it, m.
@@ -40,6 +48,10 @@ const MOVES: u32 = 3;
 const SETTLED: f32 = 4.0;
 /// As much later after a start in the air, s: first the filter has to find tilt and biases.
 const UNKNOWN: f32 = 6.0;
+/// A range so far from its predecessor and from what the filter expects leaps, m: an outlier at first.
+const LEAP: f32 = 0.05;
+/// At this speed a vehicle may cross an edge or a table within a rejection, m/s.
+const CROSSES: f32 = 0.15;
 /// A range so far from its predecessor jumps, m.
 const JUMP: f32 = 0.15;
 /// Jumps, less one for every [`JUMP_FADING`] seconds.
@@ -62,14 +74,25 @@ const CLIMB_FOLLOWS: f32 = 1.0;
 /// The height of a pressure step that no climb makes between two readings, m.
 const PRESSURE_STEP: f32 = 1.5;
 
-/// Who contradicts whom.
+/// What the filter has to put right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// Nobody.
-    Agreement,
-    /// The range is wrong: climb rate up, m/s, accelerometer bias along the vertical, m/s², and how much higher the
+    /// Nothing: the range agrees, or what was wrong about it was not used.
+    Nothing,
+    /// A wrong range has misled it: climb rate up, m/s, accelerometer bias along the vertical, m/s², and how much higher the
     /// vehicle is than the filter believes, m.
     Range { climb: f32, bias: f32, higher: f32 },
+}
+
+/// What may be done with a range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Use {
+    /// What its gate says.
+    Gate,
+    /// It counts as one that its gate rejects.
+    Reject,
+    /// Nothing.
+    Ignore,
 }
 
 /// The observer and what is remembered of the range.
@@ -103,6 +126,9 @@ pub(super) struct VerticalMonitor {
     /// Height of the observer when the range began to repeat itself.
     repeats_from: f32,
     jumps: f32,
+    /// Readings running that were rejected because they leap or because their gate says so, and whether the first one jumped.
+    rejects: u32,
+    jumped_away: bool,
     agrees: f32,
     implausible: bool,
 }
@@ -177,10 +203,15 @@ impl VerticalMonitor {
         }
     }
 
-    /// Takes a range before the filter does. True when it may be used.
-    pub(super) fn range(&mut self, at: Instant, distance: f32, expected: f32) -> bool {
+    /// Takes a range before the filter does.
+    pub(super) fn range(&mut self, at: Instant, distance: f32, expected: f32) -> Use {
         let dt = at.since(self.range_at).seconds().min(0.2);
-        let jumps = (distance - self.range).abs() > JUMP && self.range > 0.0;
+        let change = (distance - self.range).abs();
+        let jumps = change > JUMP && self.range > 0.0;
+        let leaps = change > LEAP && self.range > 0.0 && (distance - expected).abs() > LEAP;
+        if self.rejects == 0 {
+            self.jumped_away = jumps;
+        }
         if distance.to_bits() == self.range.to_bits() {
             self.repeats = self.repeats.saturating_add(1);
         } else {
@@ -197,12 +228,35 @@ impl VerticalMonitor {
                 self.restart(self.bias);
             }
         }
-        !self.implausible
+        if self.implausible || self.repeats >= UNUSED {
+            Use::Ignore
+        } else if leaps {
+            Use::Reject
+        } else {
+            Use::Gate
+        }
+    }
+
+    /// The filter used a range.
+    pub(super) fn used(&mut self) {
+        self.rejects = 0;
     }
 
     /// The filter rejected a range.
     pub(super) fn rejected(&mut self, at: Instant) {
         self.rejected = Some(at);
+        self.rejects = self.rejects.saturating_add(1);
+    }
+
+    /// The filter has rejected ranges for so long that its height would be reset to them, at this horizontal speed, m/s, if that
+    /// is known. Is it the range that is wrong? A height and a climb rate that the range has no part in stay as they are.
+    pub(super) fn convicts(&mut self, speed: Option<f32>) -> bool {
+        // A filter that started in the air has to find its height first.
+        let wrong = self.age > 0.0 && self.jumped_away && speed.is_some_and(|speed| speed < CROSSES);
+        if wrong {
+            (self.implausible, self.path, self.moved, self.moves, self.rejects) = (true, 0.0, 0.0, 0, 0);
+        }
+        wrong
     }
 
     /// The filter moved its height up by this much, to the range.
@@ -223,21 +277,25 @@ impl VerticalMonitor {
             (self.rejected, self.moved, self.moves) = (None, 0.0, 0);
         }
         if self.implausible || self.zero.is_none() {
-            return Verdict::Agreement;
+            return Verdict::Nothing;
         }
         // Until it has settled the observer may drift while the vehicle still stands, where ranges repeat themselves.
         let settled = self.age > SETTLED;
         let repeated = if settled { REPEATED_MOVING } else { REPEATED };
         let stuck = self.repeats >= repeated && (self.height - self.repeats_from).abs() > MOVED
-            || self.repeats >= REPEATED_JUMPED && self.jumped;
+            || self.repeats >= REPEATED_JUMPED && self.jumped
+            || self.repeats >= REPEATED_ALWAYS;
         let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
         if stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES) {
             // Right after the take-off the observer knows how far it came.
             let young = self.age < SETTLED && !self.restarted;
             let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };
+            let misled = apart || self.moves > 0;
             (self.implausible, self.path, self.moved, self.moves) = (true, 0.0, 0.0, 0);
-            return Verdict::Range { climb: self.climb, bias: self.bias, higher };
+            if misled {
+                return Verdict::Range { climb: self.climb, bias: self.bias, higher };
+            }
         }
-        Verdict::Agreement
+        Verdict::Nothing
     }
 }

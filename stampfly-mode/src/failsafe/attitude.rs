@@ -15,7 +15,10 @@ pub(super) struct AttitudeMonitor {
     cos_acro: f32,
     cos_tumble: f32,
     cos_tip: f32,
+    cos_lift: f32,
     cos_mismatch: f32,
+    /// The body's down axis, world, of the vehicle before it took off: floors slope.
+    rest: Vec3,
     /// Specific force for the tilt on the ground.
     gravity: Option<Vec3>,
     tumbled: Option<Instant>,
@@ -30,6 +33,8 @@ impl AttitudeMonitor {
             cos_acro: math::cos(config.acro_tilt),
             cos_tumble: math::cos(config.tumble_tilt),
             cos_tip: math::cos(config.tip_tilt),
+            cos_lift: math::cos(config.lift_tilt),
+            rest: Vec3::z(),
             cos_mismatch: math::cos(config.tilt_mismatch),
             gravity: None,
             tumbled: None,
@@ -45,8 +50,10 @@ impl AttitudeMonitor {
 
     /// Does it tumble, and does gravity contradict its tilt on the ground?
     pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> [bool; 2] {
-        let known = input.estimate.valid.contains(Validity::TILT);
+        let estimate = input.estimate;
+        let known = estimate.valid.contains(Validity::TILT);
         let status = input.flight_status;
+        let tips = known && self.tips(config, input);
         let limit = match (status.phase, status.mode) {
             (FlightPhase::Armed, _) => Some((self.cos_armed, config.tumble_time)),
             (FlightPhase::TakeOff, _) => Some((self.cos_tip, config.tip_time)),
@@ -54,15 +61,35 @@ impl AttitudeMonitor {
             (FlightPhase::Flying | FlightPhase::Landing, _) => Some((self.cos_tumble, config.tumble_time)),
             (FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld, _) => None,
         };
-        let over = limit.filter(|(cos_tilt, _)| known && frame::cos_tilt(&input.estimate.attitude) < *cos_tilt);
+        let over = limit.filter(|(cos_tilt, _)| known && (frame::cos_tilt(&estimate.attitude) < *cos_tilt || tips));
         let time = over.map_or(config.tumble_time, |(_, time)| time);
         let tumbled = lasts(&mut self.tumbled, now, over.is_some(), time);
         let standing = status.phase == FlightPhase::IdleGround && known;
         let apart = standing
             && self.gravity.is_some_and(|force| {
-                let up = input.estimate.attitude.inverse_transform_vector(&-Vec3::z());
+                let up = estimate.attitude.inverse_transform_vector(&-Vec3::z());
                 force.dot(&up) < self.cos_mismatch * force.norm().max(1e-3)
             });
         [tumbled, lasts(&mut self.mismatch, now, apart, config.tilt_mismatch_time)]
+    }
+
+    /// Does it tip on a leg, because a propeller is weak or something holds it? If its motors stop in time, it falls back.
+    fn tips(&mut self, config: &FailsafeConfig, input: &FailsafeInput<'_>) -> bool {
+        let (estimate, torque) = (input.estimate, input.torque);
+        match input.flight_status.phase {
+            FlightPhase::Armed => {
+                self.rest = estimate.attitude.transform_vector(&Vec3::z());
+                false
+            }
+            FlightPhase::TakeOff => {
+                let low = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
+                let lean = estimate.attitude.inverse_transform_vector(&self.rest);
+                // A pilot may want to tilt. Then the controller does not push back.
+                let pushes_back =
+                    torque.x * lean.y.signum() < -config.weak_roll || torque.y * lean.x.signum() > config.weak_pitch;
+                low && lean.z < self.cos_lift && (pushes_back || !input.flight_status.mode.is_manual())
+            }
+            _ => false,
+        }
     }
 }

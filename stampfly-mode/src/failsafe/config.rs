@@ -26,10 +26,15 @@ pub struct FailsafeConfig {
     pub tumble_tilt: f32,
     /// For how long it is tilted so far.
     pub tumble_time: Duration,
-    /// Tilt of a vehicle that tips over while it takes off, rad, and for how long.
+    /// Tilt of a vehicle that tips over while it takes off, rad.
     pub tip_tilt: f32,
     /// For how long it is tilted so far.
     pub tip_time: Duration,
+    /// Tilt of one that tips on a leg, rad: from how it stood, below `lift_height`, in a mode that holds its height or against
+    /// a torque as of `weak_roll` and `weak_pitch`.
+    pub lift_tilt: f32,
+    /// Below this height a leg may still touch the ground, m.
+    pub lift_height: f32,
     /// Torques about roll and pitch, N·m, that together betray a weak motor: [`WEAK_SHARE`] of what one rotor's share of the
     /// weight makes. Infinite where nothing is known of the airframe: then no motor is found weak.
     pub weak_roll: f32,
@@ -120,7 +125,10 @@ impl Default for FailsafeConfig {
             tumble_tilt: 1.05,
             tumble_time: Duration::from_millis(300),
             tip_tilt: 0.7,
-            tip_time: Duration::from_millis(50),
+            tip_time: Duration::from_millis(20),
+            // Half the tilt that a stick may ask for; from there a vehicle still falls back on its legs.
+            lift_tilt: 0.25,
+            lift_height: 0.08,
             weak_roll: f32::INFINITY,
             weak_pitch: f32::INFINITY,
             weak_motor_time: Duration::from_millis(100),

@@ -4,10 +4,11 @@
 //! |---|---|
 //! | one axis repeats the same number | `stuck_samples`: noise of a MEMS sensor forbids it |
 //! | one axis stays at full scale | `stuck_samples` |
-//! | most samples ask for an angular acceleration that no body has ([`motion`](super::motion)) | 24 of them in a row, or as many of 27 |
+//! | many samples ask for an angular acceleration that no body has ([`motion`](super::motion)) | 24 of them in a row, or 48 of 96 |
 //! | the mean specific force is far from gravity, in a mode that holds its height | `force_time` |
 //!
-//! Samples that are not finite never get here: they count as silence. Not for small errors of scale and bias, which
+//! With fewer such samples, but six close together, or more than one in 25, it is *noisy*: what stands in for them lets the vehicle fly on, and it
+//! lands. Samples that are not finite never get here: they count as silence. Not for small errors of scale and bias, which
 //! the estimator finds.
 
 use super::config::FailsafeConfig;
@@ -15,10 +16,14 @@ use crate::lasting::lasts;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3};
 
-/// Suspect samples count this much against one that is not.
-const SUSPECT: u32 = 8;
+/// Suspect samples count this much against one that is not: a third of them adds up.
+const SUSPECT: u32 = 2;
 /// Where they are a fault: 24 running, which is 60 ms at 400 Hz.
 const SUSPECTS: u32 = 24 * SUSPECT;
+/// The same for noise: one sample in 25 adds up.
+const NOISE: u32 = 24;
+/// Where they are noise: three more than a garbled burst has.
+const NOISY: u32 = 6 * NOISE;
 /// Share of full scale that counts as full scale: calibration and the decimation filter move it.
 const FULL: f32 = 0.98;
 
@@ -50,13 +55,14 @@ pub(super) struct ImuMonitor {
     accel: [Axis; 3],
     gyro: [Axis; 3],
     suspects: u32,
+    noise: u32,
     mean: Option<Vec3>,
     off: Option<Instant>,
 }
 
 impl ImuMonitor {
     /// Takes a sample. `suspect` says that it asks for the impossible, `holds_height` that the vehicle flies in a mode
-    /// whose climb rate is limited. True while the sensor does not measure.
+    /// whose climb rate is limited. Does the sensor measure nothing, and is it noisy?
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
@@ -64,7 +70,7 @@ impl ImuMonitor {
         imu: &ImuData,
         suspect: bool,
         holds_height: bool,
-    ) -> bool {
+    ) -> [bool; 2] {
         let mut longest = 0;
         let sensors = [
             (&mut self.accel, &imu.accel, config.accel_full_scale),
@@ -75,13 +81,16 @@ impl ImuMonitor {
                 longest = longest.max(axis.step(*value, full_scale * FULL));
             }
         }
-        self.suspects =
-            if suspect { (self.suspects + SUSPECT).min(2 * SUSPECTS) } else { self.suspects.saturating_sub(1) };
+        let count = |count: u32, weight: u32, limit: u32| {
+            if suspect { (count + weight).min(limit) } else { count.saturating_sub(1) }
+        };
+        self.suspects = count(self.suspects, SUSPECT, 2 * SUSPECTS);
+        self.noise = count(self.noise, NOISE, 2 * NOISY);
         let mean = self.mean.get_or_insert(imu.accel);
         *mean += (imu.accel - *mean) * config.force_weight;
         let [low, high] = config.force_range;
         let off = holds_height && !(low * low..=high * high).contains(&mean.norm_squared());
         let off = lasts(&mut self.off, at, off, config.force_time);
-        longest >= config.stuck_samples || self.suspects >= SUSPECTS || off
+        [longest >= config.stuck_samples || self.suspects >= SUSPECTS || off, self.noise >= NOISY]
     }
 }

@@ -17,8 +17,6 @@ const WEIGHT: f32 = 0.05;
 const USUAL: f32 = 0.0008;
 /// What is usual may be this many times as large as what becomes so.
 const STANDING: f32 = 1.5;
-/// Below this a leg may still touch the ground, m.
-const CLEAR: f32 = 0.08;
 
 /// What is remembered of the torque that the controller asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,7 +34,7 @@ impl MotorMonitor {
         let estimate = input.estimate;
         // One that lands already has nothing more to find out, and may stand without knowing it.
         let flies = matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying);
-        let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < CLEAR;
+        let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
         let asked = [input.torque.x, input.torque.y];
         let limits = [config.weak_roll, config.weak_pitch];
         let (mut became, mut stands) = (true, true);

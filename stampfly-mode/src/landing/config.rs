@@ -29,6 +29,11 @@ pub struct LandingConfig {
     pub stall_time: Duration,
     /// Standing for this long with the ceiling down is touchdown.
     pub touchdown_time: Duration,
+    /// Where the thrust ceiling of a take-off begins, share of hover thrust. A vehicle whose height does not seem to change,
+    /// because something holds it or a range finder is stuck, is not thrown up.
+    pub takeoff_ceiling: f32,
+    /// How fast it rises, 1/s: one that is heavier than it knows takes off later.
+    pub takeoff_ceiling_rise: f32,
     /// Within this band of its goal take-off has arrived, m.
     pub takeoff_band: f32,
     /// Vertical speed with which take-off has arrived, m/s.
@@ -58,6 +63,9 @@ impl Default for LandingConfig {
             still_speed: 0.08,
             stall_time: Duration::from_secs(1),
             touchdown_time: Duration::from_millis(300),
+            // 2 m/s², which the path of a take-off asks for.
+            takeoff_ceiling: 1.2,
+            takeoff_ceiling_rise: 0.2,
             takeoff_band: 0.06,
             takeoff_speed: 0.16,
             takeoff_path_speed: 0.02,

@@ -79,9 +79,6 @@ pub struct TakeoffLanding {
     is_testing: bool,
 }
 
-/// Thrust ceiling that is none, share of hover thrust.
-const UNLIMITED: f32 = 2.0;
-
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
 const FREE_FALL: Duration = Duration::from_millis(250);
@@ -124,12 +121,16 @@ impl TakeoffLanding {
         let estimate = input.estimate;
         let weight = self.weight.step(now, -estimate.specific_force.z, input.demand.thrust, self.is_testing);
         let mut land_detected =
-            LandDetected { thrust_ceiling: UNLIMITED, descent_rate: config.descent, ..LandDetected::default() };
+            LandDetected { thrust_ceiling: f32::MAX, descent_rate: config.descent, ..LandDetected::default() };
         match self.phase {
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => {
                 self.contact = GroundContact::Ground;
             }
-            FlightPhase::TakeOff => land_detected.takeoff_complete = self.take_off(now, input),
+            FlightPhase::TakeOff => {
+                let time = now.since(self.entered).seconds();
+                land_detected.thrust_ceiling = config.takeoff_ceiling + config.takeoff_ceiling_rise * time;
+                land_detected.takeoff_complete = self.take_off(now, input);
+            }
             FlightPhase::Flying => self.contact = GroundContact::Air,
             FlightPhase::Landing => {
                 let climb_known = estimate.valid.contains(Validity::VELOCITY_Z);

@@ -89,7 +89,7 @@ impl Landing {
             } else {
                 0.96
             };
-            let ceiling = if land_detected.thrust_ceiling <= 1.0 { land_detected.thrust_ceiling } else { 1.6 };
+            let ceiling = land_detected.thrust_ceiling.min(1.6);
             demand = wanted.clamp(0.2, ceiling.max(0.2));
         }
         None

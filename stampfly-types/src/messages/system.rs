@@ -203,6 +203,8 @@ message_flags! {
         BARO_LOST = 20,
         /// One motor pushes much less than the others.
         MOTOR_WEAK = 21,
+        /// Many inertial samples are garbage, too few for [`IMU_FAULTY`](Self::IMU_FAULTY).
+        IMU_NOISY = 22,
     }
 }
 
@@ -261,7 +263,7 @@ message! {
         takeoff_complete: bool,
         /// Touchdown is confirmed.
         landed: bool,
-        /// Upper limit on collective thrust as a share of hover thrust; above one while unlimited.
+        /// Upper limit on collective thrust as a share of hover thrust; `f32::MAX` while unlimited.
         thrust_ceiling: f32,
         /// Descent speed asked for while landing.
         descent_rate: f32 ["m/s"],

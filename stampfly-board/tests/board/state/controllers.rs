@@ -58,7 +58,7 @@ fn fly<C: Controller>(controller: &mut C, k: u64, n: &mut Numbers) -> ControlOut
         axes: SetpointAxes::ALL,
         ..Default::default()
     };
-    let land_detected = LandDetected { thrust_ceiling: 2.0, ..Default::default() };
+    let land_detected = LandDetected { thrust_ceiling: f32::MAX, ..Default::default() };
     let input = ControlInput {
         estimate: &estimate(n),
         command: &sticks(n),

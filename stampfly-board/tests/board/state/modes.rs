@@ -38,7 +38,7 @@ fn mode_machine_goes_on() {
             contact,
             takeoff_complete: flies && k % 400 > 260,
             landed: k % 400 > 390,
-            thrust_ceiling: 2.0,
+            thrust_ceiling: f32::MAX,
             descent_rate: 0.3,
         };
         let commands = if k.is_multiple_of(230) { &[GuidedKind::Arm, GuidedKind::TakeOff][..] } else { &[] };
