@@ -192,7 +192,9 @@ impl Failsafe {
         // A stamp in the future must not stand for samples that never come.
         self.heard_imu = self.heard_imu.max((*at).min(now));
         let flies = matches!(status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
-        let (found, suspect) = self.motion.step(&self.config, *at, imu, Contact::expected(&self.config, input));
+        let contact = Contact::expected(&self.config, input);
+        let noisy = self.active.contains(Alerts::IMU_NOISY);
+        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy);
         let holds_height = flies && !status.mode.is_manual();
         let [faulty, noisy] = self.imu.step(&self.config, *at, imu, suspect, holds_height);
         if !suspect {

@@ -17,6 +17,8 @@ const FULL: f32 = 0.9;
 const GAP: Duration = Duration::from_millis(50);
 /// Two samples that came together are a period apart, this long at least.
 const PERIOD: Duration = Duration::from_millis(2);
+/// A body whose samples are missing for longer goes on as it did: only a blow changes its rate by more.
+const STEADY: Duration = Duration::from_millis(5);
 
 /// The last sample that was believed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,8 +32,8 @@ impl Bridge {
     /// What to use in place of a finite sample; `None` for the sample itself.
     pub(super) fn step(&mut self, config: &EskfConfig, at: Instant, imu: &ImuData) -> Option<ImuData> {
         let stand_in = self.last.filter(|(last, before)| {
-            let elapsed = at.since(*last).max(PERIOD);
-            let limit = config.angular_acceleration * elapsed.seconds();
+            let elapsed = at.since(*last);
+            let limit = config.angular_acceleration * elapsed.clamp(PERIOD, STEADY).seconds();
             let jumps = (imu.gyro - before.gyro).iter().any(|change| change.abs() > limit);
             let full = imu.accel.iter().all(|axis| axis.abs() > FULL * config.accel_full_scale);
             elapsed < GAP && (jumps || full) && self.bridged < LONGEST

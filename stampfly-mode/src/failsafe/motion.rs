@@ -24,6 +24,11 @@ const FULL: f32 = 0.9;
 const GAP: Duration = Duration::from_millis(50);
 /// Two samples that came together are a period apart, this long at least.
 const PERIOD: Duration = Duration::from_millis(2);
+/// A body whose samples are missing for longer goes on as it did: only a blow changes its rate by more.
+const STEADY: Duration = Duration::from_millis(5);
+
+/// So many times as long is a burst of a sensor that is noisy: of one sample in five, four come together every two seconds.
+const NOISY: u32 = 3;
 
 /// What kind of contact would be no accident.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,13 +107,14 @@ pub(super) struct MotionMonitor {
 }
 
 impl MotionMonitor {
-    /// Takes a finite sample: what it shows, and whether it is suspect.
+    /// Takes a finite sample: what it shows, and whether it is suspect. `noisy`: suspect samples are frequent.
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
         at: Instant,
         imu: &ImuData,
         contact: Contact,
+        noisy: bool,
     ) -> (Alerts, bool) {
         let impact = if contact == Contact::Landing { config.landing_impact } else { config.impact };
         let limit = self.impact_limit(config, impact);
@@ -119,7 +125,8 @@ impl MotionMonitor {
             }
             self.suspects = self.suspects.saturating_add(1);
             self.suspected.add(config, imu, contact, limit, false);
-            if self.suspects <= config.garbled_samples {
+            let burst = if noisy { NOISY * config.garbled_samples } else { config.garbled_samples };
+            if self.suspects <= burst {
                 return (Alerts::NONE, true);
             }
             self.believed = self.suspected;
@@ -150,8 +157,8 @@ impl MotionMonitor {
     fn is_suspect(&self, config: &FailsafeConfig, at: Instant, imu: &ImuData) -> bool {
         let full = imu.accel.iter().all(|axis| axis.abs() >= FULL * config.accel_full_scale);
         let jumps = self.rate.is_some_and(|(last, rate)| {
-            let elapsed = at.since(last).max(PERIOD);
-            let limit = config.angular_acceleration * elapsed.seconds();
+            let elapsed = at.since(last);
+            let limit = config.angular_acceleration * elapsed.clamp(PERIOD, STEADY).seconds();
             elapsed < GAP && (imu.gyro - rate).iter().any(|change| change.abs() > limit)
         });
         full || jumps

@@ -345,16 +345,54 @@ fn a_weak_motor_is_looked_for_in_flight_only() {
     );
 }
 
+/// Samples until a vehicle that stood at one roll angle and has another one now counts as tumbled.
+fn tumbled(phase: FlightPhase, mode: FlightMode, height: f32, [stood, tilt]: [f32; 2], torque: f32) -> Option<u32> {
+    let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
+    let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+    let roll = |angle: f32| Quat::from_axis_angle(&Vec3::x_axis(), angle);
+    (rig.mode.phase, rig.mode.mode, rig.estimate.attitude) = (FlightPhase::Armed, mode, roll(stood));
+    for _ in 0..10 {
+        rig.sample(REST, Vec3::zeros());
+    }
+    (rig.mode.phase, rig.estimate.height, rig.estimate.attitude) = (phase, height, roll(tilt));
+    rig.torque = Vec3::new(torque, 0.0, 0.0);
+    (1..=200).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
+}
+
 /// From 45 degrees a vehicle still falls back onto its feet, from 75 not.
 #[test]
 fn a_vehicle_that_tips_over_while_taking_off_stops() {
-    let after = |phase: FlightPhase, tilt: f32| {
-        let mut rig = Rig::flying();
-        rig.mode.phase = phase;
-        rig.estimate.attitude = Quat::from_axis_angle(&Vec3::x_axis(), tilt);
-        (1..=200).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
-    };
-    assert_eq!(after(FlightPhase::TakeOff, 0.65), None);
-    assert!(after(FlightPhase::TakeOff, 0.75).is_some_and(|samples| (20..=22).contains(&samples)));
-    assert_eq!(after(FlightPhase::Flying, 0.75), None, "a lean in flight");
+    let at = |phase, tilt| tumbled(phase, FlightMode::PosHold, 1.0, [0.0, tilt], 0.0);
+    assert_eq!(at(FlightPhase::TakeOff, 0.65), None);
+    assert!(at(FlightPhase::TakeOff, 0.75).is_some_and(|samples| (8..=10).contains(&samples)));
+    assert_eq!(at(FlightPhase::Flying, 0.75), None, "a lean in flight");
+}
+
+#[test]
+fn a_vehicle_that_tips_on_a_leg_stops() {
+    let at = |mode, height, tilts, torque| tumbled(FlightPhase::TakeOff, mode, height, tilts, torque).is_some();
+    assert!(at(FlightMode::AltHold, 0.03, [0.0, 0.3], 0.0));
+    assert!(!at(FlightMode::AltHold, 0.03, [0.2, 0.3], 0.0), "a slope");
+    assert!(!at(FlightMode::AltHold, 0.2, [0.0, 0.3], 0.0), "in the air");
+    assert!(at(FlightMode::Stabilize, 0.03, [0.0, 0.3], -1.5), "against the controller");
+    assert!(!at(FlightMode::Stabilize, 0.03, [0.0, 0.3], 1.5), "as the pilot wants");
+}
+
+/// One rate in `every` is off by 20 rad/s: are the motors cut, and does the vehicle land?
+fn spikes(every: usize, samples: usize) -> [bool; 2] {
+    let mut rig = Rig::flying();
+    let mut seen = Alerts::NONE;
+    for sample in 1..=samples {
+        let off = if sample % every == 0 { 20.0 } else { 0.0 };
+        seen |= rig.sample(REST, Vec3::new(off, 0.0, 0.0));
+    }
+    [seen.intersects(crate::decision::CUT), seen.contains(Alerts::IMU_NOISY)]
+}
+
+#[test]
+fn a_noisy_gyro_ends_the_flight_by_a_landing() {
+    assert_eq!(spikes(5, 4_000), [false, true]);
+    assert_eq!(spikes(20, 4_000), [false, true]);
+    assert_eq!(spikes(40, 4_000), [false, false], "a spike now and then");
+    assert_eq!(spikes(2, 4_000), [true, true], "every second sample");
 }

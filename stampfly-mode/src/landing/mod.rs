@@ -81,7 +81,7 @@ pub struct TakeoffLanding {
 
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
-const FREE_FALL: Duration = Duration::from_millis(250);
+const FREE_FALL: Duration = Duration::from_millis(200);
 
 impl TakeoffLanding {
     /// A manager of a vehicle that stands.
