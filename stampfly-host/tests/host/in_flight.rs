@@ -175,3 +175,34 @@ fn a_ceiling_over_the_take_off_ends_it() {
     let outcome = flown(&setup("arm\ntakeoff 0.5\nhover 2\nland\n", &["ceiling@spool"])).0;
     assert_eq!(outcome.judgement.outcome, "landed", "{:?}", outcome.judgement);
 }
+
+/// It pushed the vehicle up to 1.7 m, or by a quarter of a metre with every turn of the phase.
+#[test]
+fn a_range_that_lies_from_the_take_off_on_does_not_carry_the_vehicle_away() {
+    for fault in ["tof-stuck@ground", "tof-stuck@takeoff", "tof-alias@ground", "tof-alias@hover", "tof-outliers@spool"]
+    {
+        let judgement = flown(&setup("arm\ntakeoff 0.5\nhover 2\ngoto 1 0 0.7\nland\n", &[fault])).0.judgement;
+        assert!(judgement.alerts.iter().any(|span| span.name == "RANGE_IMPLAUSIBLE"), "{fault}");
+        assert!(judgement.as_expected && judgement.max_above_m < 0.8, "{fault}: {judgement:?}");
+    }
+}
+
+/// The motors stopped in the air, 1.8 s after the first spike.
+#[test]
+fn spikes_of_the_gyro_end_in_a_landing() {
+    for mode in [FlightMode::AltHold, FlightMode::PosHold] {
+        let judgement = piloted(mode, 2, &["gyro-spikes@hover"]).judgement;
+        assert!(judgement.alerts.iter().any(|span| span.name == "IMU_NOISY"), "{mode:?}");
+        assert_eq!(judgement.outcome, "landed", "{mode:?}: {judgement:?}");
+    }
+}
+
+/// It tipped over, and lay on its back.
+#[test]
+fn half_a_propeller_on_the_ground_ends_upright() {
+    for motor in 1..=4 {
+        let fault = format!("motor-{motor}-thrust@spool");
+        let judgement = flown(&setup("arm\ntakeoff 0.5\nhover 2\nland\n", &[&fault])).0.judgement;
+        assert_eq!(judgement.outcome, "landed", "{fault}: {judgement:?}");
+    }
+}
