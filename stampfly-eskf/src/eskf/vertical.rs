@@ -15,6 +15,7 @@
 //!
 //! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust changes. A range that is off by a
 //! constant is a table, and one that is off by a factor is found only where the path is long.
+//!
 //! Until then two kinds of readings do no harm: one that repeats itself [`UNUSED`] times is not used, and one that leaps is
 //! rejected until another one confirms it.
 //!
@@ -30,14 +31,14 @@ const FADING: f32 = 4.0;
 const MOVED: f32 = 0.2;
 /// Readings running that are equal are repeated: 0.5 s. Noise of a millimetre repeats one with a probability below 0.4.
 const REPEATED: u32 = 15;
-/// So many are stuck whether anything moves or not: 1.5 s.
-const REPEATED_ALWAYS: u32 = 45;
 /// As many while the observer moves: a range that lives changes with it.
 const REPEATED_MOVING: u32 = 6;
-/// A reading that repeats itself so often is not used any more: 0.13 s, in which a take-off rises by 4 cm.
-const UNUSED: u32 = 4;
 /// As many after a jump.
 const REPEATED_JUMPED: u32 = 8;
+/// As many whether anything moves or not: 1.5 s.
+const REPEATED_ALWAYS: u32 = 45;
+/// A reading that repeats itself so often is not used any more: 0.13 s, in which a take-off rises by 4 cm.
+const UNUSED: u32 = 4;
 /// Below this height the pressure under the propellers changes with it, m.
 const NEAR: f32 = 0.35;
 /// Height of the sensor on a vehicle that stands, m.
