@@ -3,8 +3,9 @@
 //! Works on a fresh clone, so that a file that exists but was never committed is noticed.
 
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, capture, run as run_program};
-use std::fs;
+use crate::repository::{Failure, Library, Repository, capture, run as run_program};
+use std::path::PathBuf;
+use std::{env, fs};
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let (uncommitted, _) = capture(repository.command("git").args(["status", "--porcelain"]))?;
@@ -30,6 +31,24 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     };
     // Cargo neither unpacks nor builds a version twice, and ours does not change with every commit.
     let _ = fs::remove_dir_all(folder.join("package"));
+    forget_unpacked(&libraries);
     run_program(&mut inside(&["clean", "--quiet"]))?;
     run_program(&mut inside(&["package", "--locked", "--quiet"]))
+}
+
+/// Removes what cargo's home keeps unpacked of these libraries: it is of an older commit and has the same version.
+fn forget_unpacked(libraries: &[Library]) {
+    let default = || env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo"));
+    let Some(home) = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(default) else { return };
+    let entries = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten();
+    for unpacked in entries(home.join("registry/src")).flat_map(|registry| entries(registry.path())) {
+        let name = unpacked.file_name();
+        let is_ours = |library: &Library| {
+            let version = name.to_str().and_then(|name| name.strip_prefix(&library.name)?.strip_prefix('-'));
+            version.is_some_and(|version| version.starts_with(|first: char| first.is_ascii_digit()))
+        };
+        if libraries.iter().any(is_ours) {
+            let _ = fs::remove_dir_all(unpacked.path());
+        }
+    }
 }
