@@ -141,6 +141,8 @@ parameters! {
     "failsafe.tumble.time" [0.05, 2.0] "s" failsafe.tumble_time => "tilted for this long it tumbles";
     "failsafe.tip.tilt" [0.3, 1.3] "rad" failsafe.tip_tilt => "tilt of a vehicle that tips over while it takes off";
     "failsafe.tip.time" [0.02, 1.0] "s" failsafe.tip_time => "tilted for this long it tips over";
+    "failsafe.lift.tilt" [0.1, 1.3] "rad" failsafe.lift_tilt => "tilt of a vehicle that tips on a leg while it takes off";
+    "failsafe.lift.height" [0.0, 0.5] "m" failsafe.lift_height => "below this a leg may still touch the ground";
     "failsafe.weak.roll" [0.0001, 0.1] "N*m" failsafe.weak_roll => "torque about roll that betrays a weak motor";
     "failsafe.weak.pitch" [0.0001, 0.1] "N*m" failsafe.weak_pitch => "torque about pitch that betrays a weak motor";
     "failsafe.weak.time" [0.02, 2.0] "s" failsafe.weak_motor_time => "for this long it is a weak motor";
@@ -168,6 +170,8 @@ parameters! {
     "landing.touchdown.time" [0.1, 2.0] "s" landing.touchdown_time => "not sinking this long under the ceiling is touchdown";
     "takeoff.airborne.rise" [0.02, 0.3] "m" landing.airborne_rise => "a rise that is airborne";
     "takeoff.airborne.speed" [0.1, 0.5] "m/s" landing.airborne_speed => "a climb rate that is airborne";
+    "takeoff.ceiling" [1.05, 10.0] "1" landing.takeoff_ceiling => "largest thrust of a take-off at first, share of hover thrust";
+    "takeoff.ceiling.rise" [0.0, 10.0] "1/s" landing.takeoff_ceiling_rise => "it rises so fast";
     "takeoff.arrived.band" [0.02, 0.3] "m" landing.takeoff_band => "take-off has arrived this close to its goal";
     "takeoff.arrived.speed" [0.05, 0.5] "m/s" landing.takeoff_speed => "take-off has arrived slower than this";
     "takeoff.arrived.time" [0.1, 5.0] "s" landing.takeoff_settle => "arrived for this long, take-off is complete";

@@ -198,7 +198,10 @@ impl Controller for GeometricController {
             Vertical::Throttle(throttle) => throttle * config.thrust_max,
             Vertical::Descend => 0.96 * hover,
         };
-        let thrust = possible_thrust(thrust, config.thrust_max, input.land_detected.thrust_ceiling, hover);
+        // A pilot's thrust is the pilot's.
+        let limited = !matches!(intent.vertical, Vertical::Throttle(_));
+        let ceiling = if limited { input.land_detected.thrust_ceiling } else { f32::MAX };
+        let thrust = possible_thrust(thrust, config.thrust_max, ceiling, hover);
 
         let (heading, yaw_rate) = match intent.heading {
             Heading::Hold { yaw, rate } => {

@@ -47,7 +47,7 @@ use stampfly_types::messages::{
     StateEstimate, TofData, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
-use vertical::{Verdict, VerticalMonitor};
+use vertical::{Correction, VerticalMonitor};
 
 /// Measurements from farther ahead than this are refused, s.
 const MAX_AHEAD: f32 = 0.02;
@@ -428,7 +428,7 @@ impl Eskf {
 
     /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
     fn judge_range(&mut self) {
-        if let Verdict::Range { climb, bias, higher } = self.vertical.judge(self.now, self.height()) {
+        if let Some(Correction { climb, bias, higher }) = self.vertical.judge(self.now, self.height()) {
             self.state.velocity.z = -climb;
             self.state.position.z -= higher;
             self.state.accel_bias.z = -bias;

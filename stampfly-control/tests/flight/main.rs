@@ -455,3 +455,26 @@ fn ten_minutes_on_the_ground_wind_nothing_up() {
         );
     }
 }
+
+/// Loops may be wrong about the height while the vehicle takes off. A pilot looks at it.
+#[test]
+fn the_ceiling_of_thrust_is_not_for_a_pilots_throttle() {
+    fn share_of_hover<C: Controller>(controller: C, mode: FlightMode) -> f32 {
+        let mut flight = Flight::standing(controller, Vehicle::default());
+        flight.flight_status.mode = mode;
+        flight.land_detected.thrust_ceiling = 0.5;
+        (flight.command.source, flight.command.throttle) = (CommandSource::Pilot, 1.0);
+        flight.setpoint.position.z = -1.0;
+        if mode.is_manual() {
+            flight.setpoint.axes = SetpointAxes::YAW;
+        }
+        flight.step();
+        flight.output.thrust / AIRFRAME.hover_thrust()
+    }
+    for mode in [FlightMode::AltHold, FlightMode::Stabilize] {
+        for share in [share_of_hover(cascade(), mode), share_of_hover(geometric(), mode)] {
+            assert_eq!(share > 1.2, mode.is_manual(), "{mode:?}: {share}");
+            assert!(mode.is_manual() || (share - 0.5).abs() < 1e-3, "{mode:?}: {share}");
+        }
+    }
+}

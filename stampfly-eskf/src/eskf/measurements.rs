@@ -37,7 +37,7 @@ impl Eskf {
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
         let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
-        let use_as = self.vertical.range(self.now, tof.distance, expected);
+        let use_as = self.vertical.range(self.now, tof.distance, expected, self.gates.is_rejected(Sensor::Tof));
         if use_as == Use::Ignore {
             return Err(Refusal::Implausible);
         }
@@ -54,10 +54,7 @@ impl Eskf {
         self.status.tof_ratio = ratio;
         let gated = if use_as == Use::Reject { ratio.max(REJECTED) } else { ratio };
         match self.gates.test(Sensor::Tof, self.now, gated, self.config.lockout) {
-            GateResult::Fuse => {
-                self.vertical.used();
-                Ok(self.update(&innovation, ratio))
-            }
+            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => {
                 self.vertical.rejected(self.now);
                 Ok(Fusion::Gated { ratio })
@@ -65,11 +62,12 @@ impl Eskf {
             GateResult::Reset => {
                 let velocity = self.state.velocity;
                 let known = self.gates.is_recent(Sensor::Flow, self.now);
-                if self.vertical.convicts(known.then(|| math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y)))
+                if self
+                    .vertical
+                    .refuses_jump(known.then(|| math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y)))
                 {
                     return Err(Refusal::Implausible);
                 }
-                self.vertical.used();
                 let down = surface - below - delayed.state.position.z;
                 self.vertical.rejected(self.now);
                 self.vertical.moved(-down);

@@ -75,14 +75,15 @@ const CLIMB_FOLLOWS: f32 = 1.0;
 /// The height of a pressure step that no climb makes between two readings, m.
 const PRESSURE_STEP: f32 = 1.5;
 
-/// What the filter has to put right.
+/// What a filter has to put right that a wrong range has misled.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
-    /// Nothing: the range agrees, or what was wrong about it was not used.
-    Nothing,
-    /// A wrong range has misled it: climb rate up, m/s, accelerometer bias along the vertical, m/s², and how much higher the
-    /// vehicle is than the filter believes, m.
-    Range { climb: f32, bias: f32, higher: f32 },
+pub(super) struct Correction {
+    /// Climb rate up, m/s.
+    pub climb: f32,
+    /// Bias of the upward acceleration, m/s².
+    pub bias: f32,
+    /// How much higher the vehicle is than the filter believes, m.
+    pub higher: f32,
 }
 
 /// What may be done with a range.
@@ -127,9 +128,8 @@ pub(super) struct VerticalMonitor {
     /// Height of the observer when the range began to repeat itself.
     repeats_from: f32,
     jumps: f32,
-    /// Readings running that were rejected because they leap or because their gate says so, and whether the first one jumped.
-    rejects: u32,
-    jumped_away: bool,
+    /// The first of the readings that are being rejected had jumped.
+    rejected_since_jump: bool,
     agrees: f32,
     implausible: bool,
 }
@@ -204,14 +204,14 @@ impl VerticalMonitor {
         }
     }
 
-    /// Takes a range before the filter does.
-    pub(super) fn range(&mut self, at: Instant, distance: f32, expected: f32) -> Use {
+    /// Takes a range before the filter does. `rejecting`: the filter rejected the one before.
+    pub(super) fn range(&mut self, at: Instant, distance: f32, expected: f32, rejecting: bool) -> Use {
         let dt = at.since(self.range_at).seconds().min(0.2);
         let change = (distance - self.range).abs();
         let jumps = change > JUMP && self.range > 0.0;
         let leaps = change > LEAP && self.range > 0.0 && (distance - expected).abs() > LEAP;
-        if self.rejects == 0 {
-            self.jumped_away = jumps;
+        if !rejecting {
+            self.rejected_since_jump = jumps;
         }
         if distance.to_bits() == self.range.to_bits() {
             self.repeats = self.repeats.saturating_add(1);
@@ -238,26 +238,25 @@ impl VerticalMonitor {
         }
     }
 
-    /// The filter used a range.
-    pub(super) fn used(&mut self) {
-        self.rejects = 0;
-    }
-
     /// The filter rejected a range.
     pub(super) fn rejected(&mut self, at: Instant) {
         self.rejected = Some(at);
-        self.rejects = self.rejects.saturating_add(1);
     }
 
     /// The filter has rejected ranges for so long that its height would be reset to them, at this horizontal speed, m/s, if that
     /// is known. Is it the range that is wrong? A height and a climb rate that the range has no part in stay as they are.
-    pub(super) fn convicts(&mut self, speed: Option<f32>) -> bool {
+    pub(super) fn refuses_jump(&mut self, speed: Option<f32>) -> bool {
         // A filter that started in the air has to find its height first.
-        let wrong = self.age > 0.0 && self.jumped_away && speed.is_some_and(|speed| speed < CROSSES);
+        let wrong = self.age > 0.0 && self.rejected_since_jump && speed.is_some_and(|speed| speed < CROSSES);
         if wrong {
-            (self.implausible, self.path, self.moved, self.moves, self.rejects) = (true, 0.0, 0.0, 0, 0);
+            self.leave_out();
         }
         wrong
+    }
+
+    /// From here on the range is implausible, and what it did before does not count again.
+    fn leave_out(&mut self) {
+        (self.implausible, self.path, self.moved, self.moves) = (true, 0.0, 0.0, 0);
     }
 
     /// The filter moved its height up by this much, to the range.
@@ -272,13 +271,14 @@ impl VerticalMonitor {
         *self = Self { bias, range, range_at, implausible, ..Self::airborne() };
     }
 
-    /// Who is wrong, for a filter that believes in this height. After a verdict the observer goes on from there.
-    pub(super) fn judge(&mut self, now: Instant, height: f32) -> Verdict {
+    /// Is the range wrong, and what has a filter to put right that believes in this height? Nothing where it did not use what was
+    /// wrong. The observer goes on from there.
+    pub(super) fn judge(&mut self, now: Instant, height: f32) -> Option<Correction> {
         if self.rejected.is_some_and(|at| now.since(at) > REMEMBERED) {
             (self.rejected, self.moved, self.moves) = (None, 0.0, 0);
         }
         if self.implausible || self.zero.is_none() {
-            return Verdict::Nothing;
+            return None;
         }
         // Until it has settled the observer may drift while the vehicle still stands, where ranges repeat themselves.
         let settled = self.age > SETTLED;
@@ -287,16 +287,15 @@ impl VerticalMonitor {
             || self.repeats >= REPEATED_JUMPED && self.jumped
             || self.repeats >= REPEATED_ALWAYS;
         let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
-        if stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES) {
-            // Right after the take-off the observer knows how far it came.
-            let young = self.age < SETTLED && !self.restarted;
-            let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };
-            let misled = apart || self.moves > 0;
-            (self.implausible, self.path, self.moved, self.moves) = (true, 0.0, 0.0, 0);
-            if misled {
-                return Verdict::Range { climb: self.climb, bias: self.bias, higher };
-            }
+        let wrong = stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES);
+        if !wrong {
+            return None;
         }
-        Verdict::Nothing
+        // Right after the take-off the observer knows how far it came.
+        let young = self.age < SETTLED && !self.restarted;
+        let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };
+        let misled = apart || self.moves > 0;
+        self.leave_out();
+        misled.then_some(Correction { climb: self.climb, bias: self.bias, higher })
     }
 }

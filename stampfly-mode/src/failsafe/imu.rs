@@ -7,8 +7,9 @@
 //! | many samples ask for an angular acceleration that no body has ([`motion`](super::motion)) | 24 of them in a row, or 48 of 96 |
 //! | the mean specific force is far from gravity, in a mode that holds its height | `force_time` |
 //!
-//! With fewer such samples, but six close together, or more than one in 25, it is *noisy*: what stands in for them lets the vehicle fly on, and it
-//! lands. Samples that are not finite never get here: they count as silence. Not for small errors of scale and bias, which
+//! With fewer such samples, but six close together or more than one in 25, it is *noisy*: the vehicle can still fly, and lands.
+//!
+//! Samples that are not finite never get here: they count as silence. Not for small errors of scale and bias, which
 //! the estimator finds.
 
 use super::config::FailsafeConfig;

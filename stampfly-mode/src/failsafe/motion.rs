@@ -1,11 +1,9 @@
 //! Impact and excess rate, and which samples to believe about them.
 //!
 //! A blow shows in two samples running, and two samples of garbage (a shifted frame, a register of `0x8000`) look like
-//! a blow. What tells them apart is the gyro: a body with a moment of inertia does not change its rate by more than its
-//! torque allows, and a burst ends where it began. A sample is *suspect* when its rate asks for more than
-//! `angular_acceleration` since the last one believed, or all axes of the accelerometer are at full scale. Up to
-//! `garbled_samples` suspect samples running are set aside. One more, and it was no burst: all of them count. A blow
-//! so hard that it looks like garbage is therefore seen two samples later than any other.
+//! a blow. What tells them apart is that a burst ends where it began. A sample is *suspect* when [`ImuData::is_garbled`] says so.
+//! Up to `garbled_samples` suspect samples running are set aside, three times as many of a noisy sensor. One more, and it was
+//! no burst: all of them count. A blow so hard that it looks like garbage is therefore seen two samples later than any other.
 //!
 //! | evidence | motors off after |
 //! |---|---|
@@ -16,19 +14,10 @@
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use stampfly_types::messages::{Alerts, FlightPhase, ImuData, Validity};
-use stampfly_types::{Duration, Instant, Vec3, math};
+use stampfly_types::{Instant, Vec3, math};
 
-/// Share of full scale at which the accelerometer's axes count as full.
-const FULL: f32 = 0.9;
-/// After a gap this long nothing is known about what the rate was.
-const GAP: Duration = Duration::from_millis(50);
-/// Two samples that came together are a period apart, this long at least.
-const PERIOD: Duration = Duration::from_millis(2);
-/// A body whose samples are missing for longer goes on as it did: only a blow changes its rate by more.
-const STEADY: Duration = Duration::from_millis(5);
-
-/// So many times as long is a burst of a sensor that is noisy: of one sample in five, four come together every two seconds.
-const NOISY: u32 = 3;
+/// A burst of a noisy sensor is this many times as long: of one sample in five, four come together every two seconds.
+const NOISY_BURST: u32 = 3;
 
 /// What kind of contact would be no accident.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,14 +107,15 @@ impl MotionMonitor {
     ) -> (Alerts, bool) {
         let impact = if contact == Contact::Landing { config.landing_impact } else { config.impact };
         let limit = self.impact_limit(config, impact);
-        let suspect = self.is_suspect(config, at, imu);
+        let before = self.rate.map(|(last, rate)| (at.since(last), rate));
+        let suspect = imu.is_garbled(before, config.angular_acceleration, config.accel_full_scale);
         if suspect {
             if self.suspects == 0 {
                 self.suspected = self.believed;
             }
             self.suspects = self.suspects.saturating_add(1);
             self.suspected.add(config, imu, contact, limit, false);
-            let burst = if noisy { NOISY * config.garbled_samples } else { config.garbled_samples };
+            let burst = if noisy { NOISY_BURST * config.garbled_samples } else { config.garbled_samples };
             if self.suspects <= burst {
                 return (Alerts::NONE, true);
             }
@@ -152,15 +142,5 @@ impl MotionMonitor {
             return impact;
         }
         impact.max(mean + config.impact_sigmas * math::sqrt(variance))
-    }
-
-    fn is_suspect(&self, config: &FailsafeConfig, at: Instant, imu: &ImuData) -> bool {
-        let full = imu.accel.iter().all(|axis| axis.abs() >= FULL * config.accel_full_scale);
-        let jumps = self.rate.is_some_and(|(last, rate)| {
-            let elapsed = at.since(last);
-            let limit = config.angular_acceleration * elapsed.clamp(PERIOD, STEADY).seconds();
-            elapsed < GAP && (imu.gyro - rate).iter().any(|change| change.abs() > limit)
-        });
-        full || jumps
     }
 }

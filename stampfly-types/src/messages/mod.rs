@@ -13,6 +13,7 @@
 pub mod command;
 pub mod control;
 pub mod estimate;
+mod garbled;
 pub mod sensor;
 pub mod system;
 
