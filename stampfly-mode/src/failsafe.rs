@@ -33,8 +33,8 @@
 //! | full scale, garbage for good | 10 ms, 25 ms |
 //! | spikes in one sample of five | 0.1 s; it lands |
 //! | force below a fifth of g, or above 2.5 g, for good | 1.1 s |
-//! | range stuck at 3 cm, outliers, aliased, ramp | 0.3 s, 0.35 s, 2 s, 4.5 s |
-//! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 1 to 2 s |
+//! | range stuck at 3 cm, outliers, aliased or off by a step, frozen, ramp | 0.3 s, 0.35 s, 0.25 s, 1.5 s, 3.4 to 4.4 s |
+//! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 0.7 to 3.1 s |
 //! | battery reading of nothing, or 0.35 V off | the first such reading |
 //!
 //! Numbers: `safety.*` parameters of the StampFly's reference firmware. Its recorded flights show 2–3 m/s² of

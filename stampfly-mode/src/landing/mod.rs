@@ -5,7 +5,7 @@
 //!
 //! Near the ground the thrust ceiling is ramped down, so the vehicle settles instead of floating on its own ground effect.
 //! The ramp is also the test for touchdown: a vehicle whose specific force does not follow its thrust
-//! stands. Neither height nor climb rate can make a vehicle in the air count as landed. One that falls although its
+//! stands. So does one that has lost half of its thrust, in whatever way, and none of its specific force. Neither height nor climb rate can make a vehicle in the air count as landed. One that falls although its
 //! height says that it stands gets its thrust back, and comes down blind, as one without height and climb rate does.
 
 mod blind;
@@ -72,6 +72,8 @@ pub struct TakeoffLanding {
     still: Option<Instant>,
     /// Since when it has been falling under a falling ceiling.
     falling: Option<Instant>,
+    /// Since when something else than its thrust has carried it.
+    carried: Option<Instant>,
     weight: WeightTest,
     /// The descent without height and climb rate, once it has begun.
     blind: Option<BlindDescent>,
@@ -81,7 +83,10 @@ pub struct TakeoffLanding {
 
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
-const FREE_FALL: Duration = Duration::from_millis(200);
+const FREE_FALL: Duration = Duration::from_millis(250);
+
+/// The ground carries a vehicle that keeps its specific force without its thrust for this long.
+const CARRIED: Duration = Duration::from_secs(1);
 
 impl TakeoffLanding {
     /// A manager of a vehicle that stands.
@@ -98,6 +103,7 @@ impl TakeoffLanding {
             ceiling: None,
             still: None,
             falling: None,
+            carried: None,
             weight: WeightTest::default(),
             blind: None,
             is_testing: false,
@@ -109,7 +115,10 @@ impl TakeoffLanding {
         self.entered = now;
         self.entry_height = input.estimate.height;
         (self.in_band, self.stalled, self.ceiling, self.still) = (None, None, None, None);
-        (self.falling, self.blind, self.is_testing) = (None, None, false);
+        (self.falling, self.carried, self.blind, self.is_testing) = (None, None, None, false);
+        if input.phase == FlightPhase::Landing {
+            self.weight.begin_landing();
+        }
     }
 
     /// One step, at the control rate.
@@ -143,8 +152,9 @@ impl TakeoffLanding {
                     land_detected.descent_rate = config.touchdown;
                     landed
                 };
-                land_detected.landed = landed;
-                if landed {
+                let carried = lasting(&mut self.carried, now, weight.is_carried) >= CARRIED;
+                land_detected.landed = landed || carried;
+                if land_detected.landed {
                     self.contact = GroundContact::Ground;
                 }
             }

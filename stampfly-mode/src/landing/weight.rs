@@ -34,6 +34,9 @@ const STANDS: f32 = 0.4;
 const FALLS: f32 = 0.5;
 /// So much more specific force for its thrust has a vehicle that drag brakes; one that stands with little thrust has more.
 const CARRIED: f32 = 1.3;
+/// Shares of the thrust and of the specific force of the flight.
+const LITTLE_THRUST: f32 = 0.55;
+const ALL_FORCE: f32 = 0.9;
 /// A step that lasts longer is treated as this long, s.
 const LONGEST_STEP: f32 = 0.02;
 
@@ -79,9 +82,10 @@ pub struct Answers {
     pub quick: Support,
     /// Within half a second, through strong vibration.
     pub steady: Support,
+    /// Half of the thrust of the flight is gone, and the specific force is still that of the flight: nothing that flies does
+    /// this, at less than 2.5 m/s downwards, however slowly the thrust went.
+    pub is_carried: bool,
 }
-
-const UNKNOWN: Answers = Answers { quick: Support::Unknown, steady: Support::Unknown };
 
 /// Filtered thrust and specific force, and what both were before thrust was taken away.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -93,19 +97,27 @@ pub struct WeightTest {
     quick: Pair,
     steady: Pair,
     before: Pair,
+    /// Both when the landing began.
+    flight: Pair,
 }
 
 impl WeightTest {
+    /// A landing begins.
+    pub fn begin_landing(&mut self) {
+        self.flight = self.steady;
+    }
+
     /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
     /// reference stays.
     pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Answers {
+        let unknown = Answers { quick: Support::Unknown, steady: Support::Unknown, is_carried: false };
         if !(force.is_finite() && thrust.is_finite()) {
-            return UNKNOWN;
+            return unknown;
         }
         let Some(last) = self.last.replace(now) else {
             let first = Pair { force, thrust };
             (self.delivered, self.quick, self.steady, self.before) = (thrust, first, first, first);
-            return UNKNOWN;
+            return unknown;
         };
         let dt = now.since(last).seconds().min(LONGEST_STEP);
         self.delivered += dt / (LAG + dt) * (thrust - self.delivered);
@@ -113,11 +125,61 @@ impl WeightTest {
         self.quick.filter(input, QUICK, dt);
         self.steady.filter(input, STEADY, dt);
         // What carries itself keeps its ratio of specific force to thrust. What stands does not, and tells nothing of before.
-        let carried = self.steady.force * self.before.thrust <= CARRIED * self.before.force * self.steady.thrust;
-        if !testing && carried {
+        let is_carried = self.steady.thrust < LITTLE_THRUST * self.flight.thrust
+            && self.steady.force > ALL_FORCE * self.flight.force;
+        let keeps_ratio = self.steady.force * self.before.thrust <= CARRIED * self.before.force * self.steady.thrust;
+        // More thrust than before a test that begins while motors spool up is none that was taken away.
+        let taken = self.steady.thrust < self.before.thrust;
+        if keeps_ratio && !(testing && taken) {
             self.before = self.steady;
-            return UNKNOWN;
+            return Answers { is_carried, ..unknown };
         }
-        Answers { quick: self.quick.support(self.before), steady: self.steady.support(self.before) }
+        Answers { quick: self.quick.support(self.before), steady: self.steady.support(self.before), is_carried }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::GRAVITY;
+
+    /// A take-off is given up a tenth of a second after its motors started: thrust went on rising when the test began.
+    #[test]
+    fn a_vehicle_that_never_left_the_ground_stands() {
+        let mut test = WeightTest::default();
+        let mut stands = false;
+        for step in 0u64..800 {
+            let thrust = match step {
+                0..40 => 0.0,
+                40..80 => 0.43,
+                _ => (0.36 - 0.0006 * (step - 80) as f32).max(0.18),
+            };
+            let answers = test.step(Instant::from_micros(2_500 * step), GRAVITY, thrust, step > 80);
+            stands = answers.steady == Support::Stands;
+        }
+        assert!(stands);
+    }
+
+    /// Flies, and lands with this thrust at the end of a second and this share of the specific force that thrust makes.
+    fn is_carried(thrust: f32, force: f32) -> bool {
+        let mut test = WeightTest::default();
+        let mut answers = None;
+        for step in 0u64..1_600 {
+            let gone = step.saturating_sub(400).min(400) as f32 / 400.0;
+            let [thrust, force] = [(0.36, thrust), (GRAVITY, force)].map(|(from, to)| from + (to - from) * gone);
+            if step == 400 {
+                test.begin_landing();
+            }
+            answers = Some(test.step(Instant::from_micros(2_500 * step), force, thrust, false));
+        }
+        answers.is_some_and(|answers| answers.is_carried)
+    }
+
+    #[test]
+    fn what_the_ground_carries_is_noticed_however_slowly_its_thrust_went() {
+        assert!(is_carried(0.18, GRAVITY));
+        assert!(!is_carried(0.34, GRAVITY), "at its rate of descent");
+        assert!(!is_carried(0.18, 0.5 * GRAVITY + 1.4), "it falls, with 1 m/s of drag");
+        assert!(!is_carried(0.18, 0.5 * GRAVITY + 1.4 * 2.0), "with 2 m/s");
     }
 }
