@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration as WallDuration;
 
 use stampfly_link::Datagram;
@@ -89,10 +89,10 @@ impl Rover {
         command
     }
 
-    fn session(&self, arguments: &[&str]) -> Output {
+    /// Runs the Python package to its end. What it printed is the error when its exit code is another.
+    fn session(&self, arguments: &[&str], code: i32) -> Result<(), String> {
         let output = self.python(arguments).output().expect("python3 runs");
-        assert!(output.status.success(), "{arguments:?}: {output:?}");
-        output
+        if output.status.code() == Some(code) { Ok(()) } else { Err(format!("{arguments:?}: {output:?}")) }
     }
 
     /// Waits for its end, and repeats the session from its log.
@@ -109,17 +109,28 @@ impl Drop for Rover {
     }
 }
 
+/// Drives, changes of parameters and a refusal, the last drive in the other encoding.
+fn python_session(rover: &Rover) -> Result<(), String> {
+    rover.session(&["drive", "scenarios/emergency_stop.txt", "--plot", "terminal"], 0)?;
+    rover.session(&["set", "engine.max_accel=1.5", "steering.time_constant=0.3"], 0)?;
+    rover.session(&["set"], 0)?;
+    rover.session(&["set", "engine.max_accel=99"], 2)?;
+    rover.session(&["--json", "drive", "scenarios/slalom.txt", "--plot", "page"], 0)
+}
+
 #[test]
 fn a_session_from_python_drives_changes_parameters_and_is_replayed() {
-    let rover = Rover::start("session", 14);
-    rover.session(&["drive", "scenarios/emergency_stop.txt", "--plot", "terminal"]);
-    rover.session(&["set", "engine.max_accel=1.5", "steering.time_constant=0.3"]);
-    rover.session(&["set"]);
-    let refused = rover.python(&["set", "engine.max_accel=99"]).output().expect("python3 runs");
-    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
-    // In the other encoding.
-    rover.session(&["--json", "drive", "scenarios/slalom.txt", "--plot", "page"]);
-    rover.end();
+    // It runs in real time, so a machine with more to do makes the operator late, or the session longer than the vehicle
+    // is served. Then it is repeated with more time.
+    let mut failures = Vec::new();
+    for seconds in [14, 20, 30, 40] {
+        let rover = Rover::start(&format!("session_{seconds}"), seconds);
+        match python_session(&rover) {
+            Ok(()) => return rover.end(),
+            Err(failure) => failures.push(failure),
+        }
+    }
+    panic!("{failures:#?}");
 }
 
 /// The button, the log, and time in between: an operator in this process.
