@@ -80,7 +80,12 @@ impl Default for VehicleConfig {
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
             mode: ModeConfig::default(),
-            failsafe: FailsafeConfig { weak_roll: weak.x, weak_pitch: weak.y, ..FailsafeConfig::default() },
+            failsafe: FailsafeConfig {
+                weak_roll: weak.x,
+                weak_pitch: weak.y,
+                hover_thrust: AIRFRAME.hover_thrust(),
+                ..FailsafeConfig::default()
+            },
             landing: LandingConfig::default(),
             authority: AuthorityConfig::default(),
             button: ButtonConfig::default(),

@@ -16,7 +16,7 @@ stampfly_bus::schedule! {
     /// State estimation.
     estimation = Estimation: on sensor_imu, flight, 320 us;
     /// Anomaly detection.
-    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 40 us;
+    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 45 us;
     /// Take-off and landing manager.
     landing = Landing: after failsafe, flight, 25 us;
     /// State management: the only place where the vehicle changes state.

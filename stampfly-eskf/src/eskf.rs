@@ -7,23 +7,27 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `eskf.rs` | the filter's state, time alignment, update, inflation and resets |
+//! | `eskf.rs` | the filter's state, time alignment and update |
 //! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
 //! | `eskf/bridge.rs` | inertial samples that are garbage |
 //! | `eskf/measurements.rs` | one update a sensor |
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, initial heading, unobserved velocity |
+//! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
 //! | `eskf/vertical.rs` | range against inertia and barometer |
 //! | `eskf/flow_monitor.rs` | flow against inertia |
+//! | `eskf/gyro_monitor.rs` | a jump of the gyro's against flow |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
 mod bridge;
 mod flow_monitor;
 mod gate;
+mod gyro_monitor;
 mod innovation_bias;
 mod interface;
 mod measurements;
 mod pseudo_measurements;
+mod resets;
 mod vertical;
 
 use crate::aid::baro::Offset;
@@ -35,12 +39,13 @@ use crate::filter::covariance::{Covariance, Innovation, ProcessNoise};
 use crate::filter::history::MAX_AGE;
 use crate::filter::state::{Rotation, multiply, rotate, rotate_back};
 use crate::filter::{
-    ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, NominalState, POSITION, PropagationStep, VELOCITY, Vibration,
+    ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, N, NominalState, POSITION, PropagationStep, VELOCITY, Vibration,
 };
 use crate::level::attitude_from_specific_force;
 use bridge::Bridge;
 use flow_monitor::FlowMonitor;
 use gate::{Gates, Sensor};
+use gyro_monitor::{GyroJump, GyroMonitor, Near};
 use innovation_bias::InnovationBiasMonitor;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
@@ -59,14 +64,6 @@ const MAX_STEP: f32 = 0.5;
 /// 400 Hz with every second one. A hundredth of the time in which the covariance changes, and half the work. (PX4's
 /// EKF2 takes 10 ms.)
 const COVARIANCE_STEP: f32 = 4e-3;
-/// Standard deviations added to tilt and gyro bias when flow's innovations are biased, and after a reset to flow: rad
-/// and rad/s.
-const TILT_INFLATION: f32 = 0.1;
-const GYRO_BIAS_INFLATION: f32 = 0.03;
-/// Standard deviation of the velocity after a restart in flight, m/s.
-const RESTART_VELOCITY: f32 = 3.0;
-/// A position beyond this does not survive a restart in flight, m.
-const KEPT_POSITION: f32 = 50.0;
 /// Pseudo-measurements are made on every n-th inertial sample.
 const PSEUDO_MEASUREMENT_DIVIDER: u32 = 4;
 
@@ -145,6 +142,7 @@ pub struct Eskf {
     gates: Gates,
     flow_innovation_bias: InnovationBiasMonitor,
     flow_monitor: FlowMonitor,
+    gyro_monitor: GyroMonitor,
     vertical: VerticalMonitor,
     status: EstimatorStatus,
 }
@@ -200,6 +198,7 @@ impl Eskf {
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
             flow_monitor: FlowMonitor::airborne(),
+            gyro_monitor: GyroMonitor::default(),
             vertical: VerticalMonitor::airborne(),
             status: EstimatorStatus::default(),
         }
@@ -298,39 +297,6 @@ impl Eskf {
         self.update(&innovation, ratio);
     }
 
-    /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time
-    /// is wrong. Late measurements are refused until it has filled again.
-    fn reset_history(&mut self) {
-        self.history = History::default();
-        self.pending_step = PropagationStep::default();
-        self.pending_rotation = self.state.rotation();
-    }
-
-    /// Counts a reset of the state to a sensor that had been locked out.
-    fn finish_reset(&mut self, sensor: Sensor) -> Fusion {
-        self.status.resets = self.status.resets.wrapping_add(1);
-        self.status.diverged |= self.gates.record_reset(sensor, self.now);
-        Fusion::Reset
-    }
-
-    /// Inflates tilt and gyro bias because flow's innovations are biased. Counts as a reset: many in a row mean that
-    /// the estimate has diverged.
-    fn inflate_on_innovation_bias(&mut self) {
-        self.inflate_tilt();
-        self.status.diverged |= self.gates.count_reset(self.now);
-    }
-
-    /// Inflates the tilt and the gyro bias that may have tilted it.
-    fn inflate_tilt(&mut self) {
-        self.flow_monitor.inflated(TILT_INFLATION);
-        for axis in 0..2 {
-            self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
-            self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
-            // Tilt and accelerometer bias look alike to flow: the bias is estimated anew.
-            self.reset_accel_bias(axis);
-        }
-    }
-
     /// Counts a measurement in the status.
     fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {
         if let Some(offered) = self.status.offered.get_mut(counter as usize) {
@@ -342,71 +308,6 @@ impl Eskf {
             *refused = refused.wrapping_add(1);
         }
         fusion
-    }
-
-    /// Starts position and velocity again, in flight. Attitude, heading and biases are better than those of the
-    /// calibration at power-on, so they stay; their variance grows by what drove the estimate away.
-    fn restart_motion(&mut self) {
-        let mut variances = initial_covariance(&self.config);
-        for axis in 0..3 {
-            for (block, limit) in [(ATTITUDE, 1.0), (GYRO_BIAS, 0.1), (ACCEL_BIAS, 2.0)] {
-                // A covariance that is not sound says nothing.
-                let before = self.covariance.get(block + axis, block + axis);
-                let before = if before.is_finite() { before.max(0.0).min(limit) } else { limit };
-                variances.reset(block + axis, before);
-            }
-            variances.reset(VELOCITY + axis, RESTART_VELOCITY * RESTART_VELOCITY);
-        }
-        self.covariance = variances;
-        for axis in 0..2 {
-            self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
-        }
-        for axis in 0..3 {
-            self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
-            self.covariance.inflate(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
-        }
-        // Where that is, is a matter of definition; a jump would be flown back.
-        self.state.position = self.state.position.map(|axis| if axis.abs() < KEPT_POSITION { axis } else { 0.0 });
-        self.state.velocity = Vec3::zeros();
-        self.surface = None;
-        self.baro_offset = None;
-        self.baro_updated = self.now;
-        self.acceleration = Acceleration::default();
-        self.accels = Mean::default();
-        self.gates = Gates::default();
-        self.flow_innovation_bias = InnovationBiasMonitor::default();
-        self.flow_monitor = FlowMonitor::airborne();
-        self.vertical.restart(-self.state.accel_bias.z);
-        self.reset_history();
-        self.status.diverged = false;
-    }
-
-    /// Starts again: on the ground, or where the attitude is no number, from the last calibration; in flight position and
-    /// velocity only.
-    fn restart(&mut self) {
-        let (at, calibration, status) = (self.now, self.calibration, self.status);
-        if self.anchor.is_some() || !self.state.is_finite() {
-            self.initialize(at, &calibration);
-            self.status = status;
-        } else {
-            self.restart_motion();
-        }
-        self.status.resets = status.resets.wrapping_add(1);
-        self.status.diverged = true;
-    }
-
-    /// Restarts a filter that is not finite or whose covariance is not sound; a position or velocity beyond any flight
-    /// means divergence, whatever holds it. Where nothing measures the horizontal position it is nobody's claim.
-    fn check_health(&mut self) {
-        let NominalState { position, velocity, .. } = &self.state;
-        if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
-            self.restart();
-        } else if velocity.amax() > 50.0
-            || position.z.abs() > 100.0
-            || (position.xy().amax() > 100.0 && self.is_velocity_aided())
-        {
-            self.status.diverged = true;
-        }
     }
 
     /// Is the velocity measured, or held by the zero-velocity update?
@@ -424,22 +325,6 @@ impl Eskf {
     /// Does a range hold the height?
     fn is_range_aided(&self) -> bool {
         self.gates.is_recent(Sensor::Tof, self.now) && !self.vertical.is_implausible()
-    }
-
-    /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
-    fn judge_range(&mut self) {
-        if let Some(Correction { climb, bias, higher }) = self.vertical.judge(self.now, self.height()) {
-            self.state.velocity.z = -climb;
-            self.state.position.z -= higher;
-            self.state.accel_bias.z = -bias;
-            self.covariance.reset(VELOCITY + 2, 0.5);
-            self.covariance.inflate(POSITION + 2, 0.1);
-            self.covariance.reset(ACCEL_BIAS + 2, 0.1);
-            // The barometer holds the height from here.
-            self.baro_offset = None;
-            self.status.resets = self.status.resets.wrapping_add(1);
-        }
-        self.status.range_implausible = self.vertical.is_implausible();
     }
 
     /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.

@@ -9,7 +9,7 @@
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, or 14° from how it stood below 0.08 m, for 20 ms while taking off; in ACRO above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
-//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, far from gravity | disarmed |
+//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, a force that neither gravity nor the thrust explains | disarmed |
 //! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
 //! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
@@ -32,7 +32,7 @@
 //! | samples that are not finite, silence | 25 ms; motors off within 33 ms |
 //! | full scale, garbage for good | 10 ms, 25 ms |
 //! | spikes in one sample of five | 0.1 s; it lands |
-//! | force below a fifth of g, or above 2.5 g, for good | 1.1 s |
+//! | scale of a half or less | 0.2 to 0.35 s; motors off |
 //! | range stuck at 3 cm, outliers, aliased or off by a step, frozen, ramp | 0.3 s, 0.35 s, 0.25 s, 1.5 s, 3.4 to 4.4 s |
 //! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 0.7 to 3.1 s |
 //! | battery reading of nothing, or 0.35 V off | the first such reading |
@@ -42,6 +42,7 @@
 
 mod attitude;
 mod config;
+mod force;
 mod imu;
 mod input;
 mod motion;
@@ -52,11 +53,12 @@ pub use config::{FailsafeConfig, WEAK_SHARE};
 pub use input::FailsafeInput;
 
 use attitude::AttitudeMonitor;
+use force::ForceMonitor;
 use imu::ImuMonitor;
 use motion::{Contact, MotionMonitor};
 use motors::MotorMonitor;
 use power::PowerMonitor;
-use stampfly_types::messages::{Alerts, FlightPhase, ImuData, SelfTestVerdict, SystemAlert};
+use stampfly_types::messages::{Alerts, ImuData, SelfTestVerdict, SystemAlert};
 use stampfly_types::{Instant, Stamped};
 
 /// The failsafe.
@@ -70,7 +72,7 @@ use stampfly_types::{Instant, Stamped};
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, torque: &Vec3::zeros(), self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, output: &ControlOutput::default(), self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -92,6 +94,7 @@ pub struct Failsafe {
     /// When one of the latched conditions was last present.
     latched_at: Instant,
     imu: ImuMonitor,
+    force: ForceMonitor,
     motion: MotionMonitor,
     attitude: AttitudeMonitor,
     power: PowerMonitor,
@@ -130,6 +133,7 @@ impl Failsafe {
             heard_baro: Instant::ZERO,
             latched_at: Instant::ZERO,
             imu: ImuMonitor::default(),
+            force: ForceMonitor::default(),
             motion: MotionMonitor::default(),
             attitude: AttitudeMonitor::new(&config),
             power: PowerMonitor::default(),
@@ -182,7 +186,6 @@ impl Failsafe {
 
     /// Looks at one inertial sample.
     fn inspect(&mut self, now: Instant, sample: &Stamped<ImuData>, input: &FailsafeInput<'_>) -> Alerts {
-        let status = input.flight_status;
         let Stamped { at, data: imu, .. } = sample;
         // A sum of squares that overflows is no measurement either.
         let finite = (imu.accel.norm_squared() + imu.gyro.norm_squared()).is_finite();
@@ -191,14 +194,13 @@ impl Failsafe {
         }
         // A stamp in the future must not stand for samples that never come.
         self.heard_imu = self.heard_imu.max((*at).min(now));
-        let flies = matches!(status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
         let contact = Contact::expected(&self.config, input);
         let noisy = self.active.contains(Alerts::IMU_NOISY);
         let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy);
-        let holds_height = flies && !status.mode.is_manual();
-        let [faulty, noisy] = self.imu.step(&self.config, *at, imu, suspect, holds_height);
+        let [mut faulty, noisy] = self.imu.step(&self.config, imu, suspect);
         if !suspect {
             self.attitude.add(&self.config, imu);
+            faulty |= self.force.step(&self.config, *at, imu, input);
         }
         found.set(Alerts::IMU_FAULTY, faulty).set(Alerts::IMU_NOISY, noisy)
     }

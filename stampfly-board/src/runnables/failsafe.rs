@@ -57,7 +57,7 @@ impl Runnable for Failsafe {
                 tof: usable(&ends.sensor_tof, |range| range.valid),
                 flow: usable(&ends.sensor_flow, |flow| flow.valid || stands),
                 baro: usable(&ends.sensor_baro, |pressure| pressure.altitude.is_finite()),
-                torque: &ends.control_output.get().torque,
+                output: ends.control_output.get(),
                 self_test: ends.self_test.get().verdict,
                 flight_status: ends.flight_status.get(),
             },

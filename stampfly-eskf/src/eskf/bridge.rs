@@ -10,6 +10,7 @@ use stampfly_types::messages::ImuData;
 
 /// Samples running that are bridged.
 const LONGEST: u32 = 3;
+
 /// The last sample that was believed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

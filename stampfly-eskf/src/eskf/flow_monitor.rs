@@ -130,7 +130,13 @@ impl FlowMonitor {
         self.tilt = tilt;
     }
 
-    /// Takes a reading of a standing vehicle: rate of the picture less the gyro's, rad/s.
+    /// What was compared until now says nothing.
+    pub(super) fn forget(&mut self) {
+        (self.flow, self.inertial, self.difference) = Default::default();
+        (self.differs, self.agrees) = (0.0, 0.0);
+    }
+
+    /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
     pub(super) fn stand(&mut self, rate: [f32; 2], dt: f32) {
         let share = dt / (OVER + dt);
         let standing = core::array::from_fn(|axis| self.standing[axis] + (rate[axis] - self.standing[axis]) * share);
@@ -155,8 +161,7 @@ impl FlowMonitor {
         let dt = core::mem::take(&mut self.elapsed);
         let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0 && interval > 0.0) else {
             // Where the distance jumps, the velocity does.
-            (self.flow, self.inertial, self.difference) = Default::default();
-            (self.differs, self.agrees) = (0.0, 0.0);
+            self.forget();
             return false;
         };
         let fade = OVER / (OVER + dt);

@@ -18,6 +18,7 @@ impl Estimator for Eskf {
         self.calibration = *calibration;
         self.command = command;
         self.state.gyro_bias = calibration.gyro_bias;
+        self.gyro_monitor = GyroMonitor::new(at, calibration);
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
         self.pending_rotation = self.state.rotation();
         self.baro_updated = at;
@@ -87,10 +88,15 @@ impl Estimator for Eskf {
         let before = self.state.velocity;
         let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
         self.history.add(&motion);
-        self.watch(&(self.state.velocity - before), motion.dt);
+        let change = self.state.velocity - before;
+        self.watch(&change, motion.dt);
         let [force, rate] = &mut self.vibration;
         force.add(&imu.accel, motion.dt);
         rate.add(&imu.gyro, motion.dt);
+        let noise = rate.mean_square();
+        if let Some(jump) = self.gyro_monitor.predict(at, motion.dt, imu, noise, &before, &change) {
+            self.correct_gyro(&jump);
+        }
         self.pending_step.extend(&motion);
         if self.pending_step.duration > COVARIANCE_STEP {
             let [force, rate] = self.vibration.map(|vibration| vibration.mean_square() * motion.dt);

@@ -11,6 +11,11 @@ use crate::config::MagModel;
 const BARO_REACH: f32 = 2.0;
 /// Test ratio of a range that is rejected whatever its gate says.
 const REJECTED: f32 = 2.0;
+/// Largest climb rate that a wrong acceleration is taken to have made within the lock-out, m/s: 7.5 m/s², more than the zero of
+/// a shaken accelerometer moves.
+const WRONG_CLIMB: f32 = 1.5;
+/// At this distance an error of the velocity of 0.05 m/s is a rate of 0.33 rad/s.
+const GYRO_DISTANCE: f32 = 0.15;
 /// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
 const SHAKEN: f32 = 100.0;
 
@@ -73,9 +78,16 @@ impl Eskf {
                 self.vertical.moved(-down);
                 self.state.position.z += down;
                 self.covariance.reset(POSITION + 2, 4.0 * variance);
-                // A wrong height comes from a wrong climb rate: the next ranges estimate it anew.
-                self.covariance.reset(VELOCITY + 2, 1.0);
-                self.covariance.inflate(ACCEL_BIAS + 2, 0.04);
+                // A wrong height comes from a wrong climb rate: the next ranges estimate it anew. Where the range did not
+                // jump, that came from a wrong acceleration in the time of the lock-out.
+                let time = self.config.lockout;
+                let climb = if self.vertical.rejects_since_jump() {
+                    0.0
+                } else {
+                    (2.0 * down / time).clamp(-WRONG_CLIMB, WRONG_CLIMB)
+                };
+                self.covariance.reset(VELOCITY + 2, 1.0 + climb * climb);
+                self.covariance.inflate(ACCEL_BIAS + 2, 0.04 + climb * climb / (time * time));
                 Ok(self.finish_reset(Sensor::Tof))
             }
         }
@@ -105,6 +117,10 @@ impl Eskf {
         let raw = self.history.mean_rate(end, flow.interval).unwrap_or(self.rate) + self.state.gyro_bias;
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
+        if let Some(jump) = self.examine_gyro(at, flow.interval, delayed, measured, distance) {
+            self.correct_gyro(&jump);
+            return Ok(Fusion::Reset);
+        }
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
         let rows = rows.map(|row| without_heading(row, &delayed.rotation[2]));
         // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
@@ -125,7 +141,7 @@ impl Eskf {
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
         let counts = [flow.delta_x, flow.delta_y];
         if self.anchor.is_some() {
-            self.flow_monitor.stand(measured.map(|velocity| velocity / distance), flow.interval);
+            self.flow_monitor.stand(self.status.flow_innovation.map(|velocity| velocity / distance), flow.interval);
         } else {
             let shaken = self.vibration[0].mean_square() > SHAKEN;
             let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && !shaken;
@@ -172,6 +188,28 @@ impl Eskf {
         let after = rotate(&rotation, &(raw - self.state.accel_bias));
         self.flow_monitor.corrected(&(after - before), &rotate(&rotation, &(self.state.gyro_bias - bias)));
         Ok(fusion)
+    }
+
+    /// Shows flow's velocity along body x and y to who watches the gyro.
+    fn examine_gyro(
+        &mut self,
+        at: Instant,
+        interval: f32,
+        delayed: &DelayedState,
+        measured: [f32; 2],
+        distance: f32,
+    ) -> Option<GyroJump> {
+        let near = match self.anchor {
+            Some(_) => Near::Standing,
+            None if distance < GYRO_DISTANCE => Near::Above,
+            None => Near::Far,
+        };
+        let velocity = rotate_back(&delayed.rotation, &self.gyro_monitor.velocity(delayed.state.velocity));
+        let excess = [(measured[1] - velocity.y) / distance, (velocity.x - measured[0]) / distance];
+        let from = at - Duration::from_micros(((self.config.flow_delay + interval) * 1e6) as u64);
+        // Flow that lies says nothing.
+        let near = (!self.flow_monitor.is_implausible()).then_some(near);
+        self.gyro_monitor.flow(self.now, from, interval, excess, near)
     }
 
     pub(super) fn update_baro(&mut self, at: Instant, baro: &BaroData) -> Result<Fusion, Refusal> {

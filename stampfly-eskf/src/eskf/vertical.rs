@@ -8,7 +8,7 @@
 //! | the range is implausible when | |
 //! |---|---|
 //! | it repeats itself while the observer moves by [`MOVED`], right after a jump, or for 1.5 s | stuck |
-//! | the filter's path and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
+//! | the filter's path while it fuses ranges and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
 //! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
 //! | it jumps more than five times within about two seconds | outliers, an edge below |
 //! | it jumps and stays there, and the vehicle does not move sideways | aliased, an offset, something below that was not there |
@@ -128,6 +128,8 @@ pub(super) struct VerticalMonitor {
     /// Height of the observer when the range began to repeat itself.
     repeats_from: f32,
     jumps: f32,
+    /// The filter rejected the last range.
+    rejecting: bool,
     /// The first of the readings that are being rejected had jumped.
     rejected_since_jump: bool,
     agrees: f32,
@@ -165,7 +167,10 @@ impl VerticalMonitor {
         self.height += (self.climb + 0.5 * change) * dt;
         self.climb += change;
         self.age += dt;
-        self.path += (climb - self.path * (1.0 / FADING)) * dt;
+        // What the filter does while it rejects ranges is not what they say.
+        if !self.rejecting {
+            self.path += (climb - self.path * (1.0 / FADING)) * dt;
+        }
         if self.rejected.is_none() && !self.implausible {
             if height < NEAR {
                 self.path = 0.0;
@@ -185,7 +190,7 @@ impl VerticalMonitor {
         self.baro_at = at;
         let last = self.altitude.replace(altitude).unwrap_or(altitude);
         self.baro_repeats = if altitude.to_bits() == last.to_bits() { self.baro_repeats.saturating_add(1) } else { 0 };
-        if (altitude - last).abs() < PRESSURE_STEP {
+        if (altitude - last).abs() < PRESSURE_STEP && !self.rejecting {
             self.path -= altitude - last;
         }
         let zero = self.zero.get_or_insert(altitude - self.height);
@@ -210,6 +215,7 @@ impl VerticalMonitor {
         let change = (distance - self.range).abs();
         let jumps = change > JUMP && self.range > 0.0;
         let leaps = change > LEAP && self.range > 0.0 && (distance - expected).abs() > LEAP;
+        self.rejecting = rejecting;
         if !rejecting {
             self.rejected_since_jump = jumps;
         }
@@ -252,6 +258,11 @@ impl VerticalMonitor {
             self.leave_out();
         }
         wrong
+    }
+
+    /// Did the first of the ranges that are being rejected jump?
+    pub(super) fn rejects_since_jump(&self) -> bool {
+        self.rejected_since_jump
     }
 
     /// From here on the range is implausible, and what it did before does not count again.

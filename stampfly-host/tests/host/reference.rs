@@ -16,7 +16,12 @@ type Flight = campaign::Flight<StampFly, ()>;
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
 
 fn campaign(change: impl Fn(&mut Setup)) -> Vec<Flight> {
-    let setups: Vec<(u64, Setup)> = SEEDS
+    campaign_of(SEEDS, change)
+}
+
+fn campaign_of(seeds: impl IntoIterator<Item = u64>, change: impl Fn(&mut Setup)) -> Vec<Flight> {
+    let setups: Vec<(u64, Setup)> = seeds
+        .into_iter()
         .map(|seed| {
             let mut setup = Setup::reference(seed);
             change(&mut setup);
@@ -70,8 +75,9 @@ fn a_minute_of_hovering_stays_in_place() {
 /// A badly bent propeller: nobody asks for grace, but the vehicle must come down and know that it has.
 #[test]
 fn four_times_the_vibration_still_lands() {
-    let flights = campaign(|setup| setup.simulation.vibration = 4.0);
-    expect(&flights, &[("touchdown_speed_mps", 1.0), ("land_error_m", 1.0)]);
+    // In the last three the filter loses the range for a moment, which is no fault of the range's.
+    let flights = campaign_of(SEEDS.chain([30, 67, 141]), |setup| setup.simulation.vibration = 4.0);
+    expect(&flights, &[("touchdown_speed_mps", 1.0), ("land_error_m", 1.0), ("alt_rms_m", 0.15)]);
     for flight in &flights {
         assert!(
             flight.flown.outcome.worst_tilt_deg < 35.0,

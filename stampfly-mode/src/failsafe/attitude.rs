@@ -75,7 +75,7 @@ impl AttitudeMonitor {
 
     /// Does it tip on a leg, because a propeller is weak or something holds it? If its motors stop in time, it falls back.
     fn tips(&mut self, config: &FailsafeConfig, input: &FailsafeInput<'_>) -> bool {
-        let (estimate, torque) = (input.estimate, input.torque);
+        let (estimate, torque) = (input.estimate, &input.output.torque);
         match input.flight_status.phase {
             FlightPhase::Armed => {
                 self.rest = estimate.attitude.transform_vector(&Vec3::z());

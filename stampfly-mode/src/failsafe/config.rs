@@ -87,11 +87,12 @@ pub struct FailsafeConfig {
     pub accel_full_scale: f32,
     /// So many equal samples running of one axis, or so many at full scale, are a sensor that does not measure.
     pub stuck_samples: u32,
-    /// Between these lies the mean specific force of a vehicle that flies by itself, m/s².
-    pub force_range: [f32; 2],
-    /// Weight of an inertial sample in that mean.
+    /// Thrust that carries the weight, N. Infinite where nothing is known of the airframe: then the specific force has to
+    /// be between 0.2 and 2.5 of gravity, in modes that hold their height.
+    pub hover_thrust: f32,
+    /// Weight of an inertial sample in the mean specific force.
     pub force_weight: f32,
-    /// Time for which the mean lies outside.
+    /// For how long the mean is implausible.
     pub force_time: Duration,
     /// Tilt of a vehicle that tumbles while armed on the ground, rad.
     pub armed_tilt: f32,
@@ -160,9 +161,9 @@ impl Default for FailsafeConfig {
             stuck_samples: 20,
             // Half a second beyond either end would be a climb rate that no mode which holds its height asks for, and four times
             // the recorded vibration moves the mean by less.
-            force_range: [0.2 * GRAVITY, 2.5 * GRAVITY],
-            force_weight: 0.01,
-            force_time: Duration::from_millis(500),
+            hover_thrust: f32::INFINITY,
+            force_weight: 0.08,
+            force_time: Duration::from_millis(150),
             armed_tilt: 1.31,
             acro_tilt: 2.1,
             acro_time: Duration::from_secs(1),

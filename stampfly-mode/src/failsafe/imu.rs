@@ -5,7 +5,6 @@
 //! | one axis repeats the same number | `stuck_samples`: noise of a MEMS sensor forbids it |
 //! | one axis stays at full scale | `stuck_samples` |
 //! | many samples ask for an angular acceleration that no body has ([`motion`](super::motion)) | 24 of them in a row, or 48 of 96 |
-//! | the mean specific force is far from gravity, in a mode that holds its height | `force_time` |
 //!
 //! With fewer such samples, but six close together or more than one in 25, it is *noisy*: the vehicle can still fly, and lands.
 //!
@@ -13,9 +12,7 @@
 //! the estimator finds.
 
 use super::config::FailsafeConfig;
-use crate::lasting::lasts;
 use stampfly_types::messages::ImuData;
-use stampfly_types::{Instant, Vec3};
 
 /// Suspect samples count this much against one that is not: a third of them adds up.
 const SUSPECT: u32 = 2;
@@ -57,21 +54,11 @@ pub(super) struct ImuMonitor {
     gyro: [Axis; 3],
     suspects: u32,
     noise: u32,
-    mean: Option<Vec3>,
-    off: Option<Instant>,
 }
 
 impl ImuMonitor {
-    /// Takes a sample. `suspect` says that it asks for the impossible, `holds_height` that the vehicle flies in a mode
-    /// whose climb rate is limited. Does the sensor measure nothing, and is it noisy?
-    pub(super) fn step(
-        &mut self,
-        config: &FailsafeConfig,
-        at: Instant,
-        imu: &ImuData,
-        suspect: bool,
-        holds_height: bool,
-    ) -> [bool; 2] {
+    /// Takes a sample. `suspect` says that it asks for the impossible. Does the sensor measure nothing, and is it noisy?
+    pub(super) fn step(&mut self, config: &FailsafeConfig, imu: &ImuData, suspect: bool) -> [bool; 2] {
         let mut longest = 0;
         let sensors = [
             (&mut self.accel, &imu.accel, config.accel_full_scale),
@@ -87,11 +74,6 @@ impl ImuMonitor {
         };
         self.suspects = count(self.suspects, SUSPECT, 2 * SUSPECTS);
         self.noise = count(self.noise, NOISE, 2 * NOISY);
-        let mean = self.mean.get_or_insert(imu.accel);
-        *mean += (imu.accel - *mean) * config.force_weight;
-        let [low, high] = config.force_range;
-        let off = holds_height && !(low * low..=high * high).contains(&mean.norm_squared());
-        let off = lasts(&mut self.off, at, off, config.force_time);
-        [longest >= config.stuck_samples || self.suspects >= SUSPECTS || off, self.noise >= NOISY]
+        [longest >= config.stuck_samples || self.suspects >= SUSPECTS, self.noise >= NOISY]
     }
 }

@@ -1,7 +1,9 @@
 //! What the failsafe looks at in one step. Everything is borrowed.
 
-use stampfly_types::messages::{EstimatorStatus, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate};
-use stampfly_types::{Instant, Stamped, Vec3};
+use stampfly_types::messages::{
+    ControlOutput, EstimatorStatus, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate,
+};
+use stampfly_types::{Instant, Stamped};
 
 /// What the failsafe looks at.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +24,8 @@ pub struct FailsafeInput<'a> {
     pub flow: Option<Instant>,
     /// Newest air pressure since the step before.
     pub baro: Option<Instant>,
-    /// Torque that the controller asked for one step ago, body, N·m.
-    pub torque: &'a Vec3,
+    /// What the controller asked for one step ago.
+    pub output: &'a ControlOutput,
     /// How the self test at power-on ended.
     pub self_test: SelfTestVerdict,
     /// State and mode one step ago.

@@ -35,7 +35,7 @@ impl MotorMonitor {
         // One that lands already has nothing more to find out, and may stand without knowing it.
         let flies = matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying);
         let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
-        let asked = [input.torque.x, input.torque.y];
+        let asked = [input.output.torque.x, input.output.torque.y];
         let limits = [config.weak_roll, config.weak_pitch];
         let (mut became, mut stands) = (true, true);
         for axis in 0..2 {

@@ -1,12 +1,13 @@
 //! What the failsafe finds and what it does not.
 
 mod battery;
+mod force;
 mod inertial;
 
 use super::*;
 use proptest::prelude::*;
 use stampfly_types::Duration;
-use stampfly_types::messages::{EstimatorStatus, PowerData, StateEstimate};
+use stampfly_types::messages::{ControlOutput, EstimatorStatus, FlightPhase, PowerData, StateEstimate};
 use stampfly_types::messages::{FlightMode, FlightStatus, Validity};
 use stampfly_types::{GRAVITY, Quat, Vec3};
 use std::vec::Vec;
@@ -21,7 +22,7 @@ struct Rig {
     estimate: StateEstimate,
     status: EstimatorStatus,
     battery: PowerData,
-    torque: Vec3,
+    output: ControlOutput,
     noise: u32,
 }
 
@@ -36,7 +37,7 @@ impl Rig {
             estimate: StateEstimate { height: 1.0, valid: Validity::ALL, ..Default::default() },
             status: EstimatorStatus::default(),
             battery: PowerData { voltage: 4.1, ..Default::default() },
-            torque: Vec3::zeros(),
+            output: ControlOutput::default(),
             noise: 1,
         }
     }
@@ -82,7 +83,7 @@ impl Rig {
             tof: Some(now),
             flow: Some(now),
             baro: Some(now),
-            torque: &self.torque,
+            output: &self.output,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &self.mode,
         };
@@ -181,7 +182,7 @@ fn the_battery_warns_before_it_lands() {
             tof: Some(at),
             flow: Some(at),
             baro: Some(at),
-            torque: &Vec3::zeros(),
+            output: &ControlOutput::default(),
             self_test: SelfTestVerdict::NotRun,
             flight_status: &mode,
         };
@@ -209,7 +210,7 @@ fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Opti
         tof: Some(now),
         flow: Some(now),
         baro: Some(now),
-        torque: &Vec3::zeros(),
+        output: &ControlOutput::default(),
         self_test: SelfTestVerdict::NotRun,
         flight_status: &FlightStatus::default(),
     };
@@ -262,7 +263,7 @@ fn a_failed_self_test_is_an_alert_for_good() {
             tof: None,
             flow: None,
             baro: None,
-            torque: &Vec3::zeros(),
+            output: &ControlOutput::default(),
             self_test,
             flight_status: mode,
         };
@@ -294,7 +295,7 @@ fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
                     tof,
                     flow,
                     baro,
-                    torque: &Vec3::zeros(),
+                    output: &ControlOutput::default(),
                     self_test: SelfTestVerdict::NotRun,
                     flight_status: &mode,
                 };
@@ -312,7 +313,7 @@ fn is_weak(before: [f32; 2], after: [f32; 2], lasts: usize) -> bool {
     let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
     let mut found = false;
     for (torque, samples) in [(before, 400), (after, lasts), (before, 200)] {
-        rig.torque = Vec3::new(torque[0], torque[1], 0.0);
+        rig.output.torque = Vec3::new(torque[0], torque[1], 0.0);
         for _ in 0..samples {
             found |= rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_WEAK);
         }
@@ -335,7 +336,11 @@ fn a_motor_that_becomes_weak_is_found_and_a_load_that_lies_askew_is_not() {
 fn a_weak_motor_is_looked_for_in_flight_only() {
     let found = |phase: FlightPhase, height: f32| {
         let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
-        let mut rig = Rig { failsafe: Failsafe::new(config), torque: Vec3::new(2.0, 2.0, 0.0), ..Rig::flying() };
+        let mut rig = Rig {
+            failsafe: Failsafe::new(config),
+            output: ControlOutput { thrust: 0.0, torque: Vec3::new(2.0, 2.0, 0.0) },
+            ..Rig::flying()
+        };
         (rig.mode.phase, rig.estimate.height) = (phase, height);
         (0..400).any(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_WEAK))
     };
@@ -355,7 +360,7 @@ fn tumbled(phase: FlightPhase, mode: FlightMode, height: f32, [stood, tilt]: [f3
         rig.sample(REST, Vec3::zeros());
     }
     (rig.mode.phase, rig.estimate.height, rig.estimate.attitude) = (phase, height, roll(tilt));
-    rig.torque = Vec3::new(torque, 0.0, 0.0);
+    rig.output.torque = Vec3::new(torque, 0.0, 0.0);
     (1..=200).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
 }
 

@@ -4,9 +4,10 @@
 //! must not stop a landing.
 //!
 //! Near the ground the thrust ceiling is ramped down, so the vehicle settles instead of floating on its own ground effect.
-//! The ramp is also the test for touchdown: a vehicle whose specific force does not follow its thrust
-//! stands. So does one that has lost half of its thrust, in whatever way, and none of its specific force. Neither height nor climb rate can make a vehicle in the air count as landed. One that falls although its
-//! height says that it stands gets its thrust back, and comes down blind, as one without height and climb rate does.
+//! The ramp is also the test for touchdown: a vehicle whose specific force does not follow its thrust stands. So does one
+//! that has lost half of its thrust, in whatever way, and none of its specific force. Neither height nor climb rate can
+//! make a vehicle in the air count as landed. One that falls although its height says that it stands gets its thrust back,
+//! and comes down blind, as one without height and climb rate does.
 
 mod blind;
 mod config;

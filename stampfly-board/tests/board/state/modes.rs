@@ -81,7 +81,7 @@ fn failsafe_goes_on() {
             tof: Some(at(k - k % 350)),
             flow: None,
             baro: None,
-            torque: &Vec3::zeros(),
+            output: &ControlOutput::default(),
             self_test: SelfTestVerdict::NotRun,
             flight_status: &FlightStatus { phase, armed, ..Default::default() },
         };

@@ -69,3 +69,39 @@ fn d21_two_garbled_samples_are_flown_through() {
         }
     }
 }
+
+#[test]
+fn a_gyro_whose_zero_jumps_is_flown_on_with() {
+    use FlightPhase::{Flying, Landing, TakeOff};
+    for seed in SEEDS {
+        for (phase, after) in [(Flying, 2.0), (TakeOff, 0.0), (Landing, 0.1)] {
+            for jump in [1.0, -2.0] {
+                let lie: Box<dyn FnMut(f32, &mut ImuData)> = Box::new(move |_, imu| imu.gyro.x += jump);
+                let lies = Lies { imu: Some(lie), ..Lies::default() };
+                let (seen, since) = fly(seed, 40.0, Onset::After(phase, after), lies);
+                let what = format!("{jump} rad/s in {phase:?}, seed {seed}");
+                let (drift, highest) = (seen.drift(since, Instant::MAX), seen.highest(since));
+                println!("{what}: {drift:.2} m, {highest:.2} m");
+                assert!(drift < 0.6 && highest < 0.8, "{what}: {drift} m, {highest} m");
+                assert!(!seen.end().0.armed && seen.end().1.contact, "{what}: it has landed");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_inertial_sensor_of_half_the_scale_stops_the_motors() {
+    for seed in SEEDS {
+        for scale in [0.3, 0.4, 0.5] {
+            let lie: Box<dyn FnMut(f32, &mut ImuData)> = Box::new(move |_, imu| {
+                imu.accel *= scale;
+                imu.gyro *= scale;
+            });
+            let lies = Lies { imu: Some(lie), ..Lies::default() };
+            let (seen, since) = fly(seed, 14.0, Onset::After(FlightPhase::Flying, 1.0), lies);
+            let took = seen.motors_off_after(since);
+            println!("{scale}, seed {seed}: {took}");
+            assert!(took <= Duration::from_millis(350), "{scale}, seed {seed}: {took}");
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! What is put right when the estimate is found to be wrong.
+//!
+//! | found by | put right | counts towards divergence |
+//! |---|---|---|
+//! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
+//! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
+//! | the second opinion about the range ([`vertical`](super::vertical)) | climb rate, height, vertical accelerometer bias | no |
+//! | the picture of the floor ([`gyro_monitor`](super::gyro_monitor)) | gyro bias, tilt, horizontal velocity | no |
+//! | [`check_health`](Eskf::check_health): a state that is no number or beyond any flight | position and velocity, on the ground everything | it is divergence |
+
+use super::*;
+
+/// Standard deviations added to tilt and gyro bias when flow's innovations are biased, and after a reset to flow: rad
+/// and rad/s.
+const TILT_INFLATION: f32 = 0.1;
+const GYRO_BIAS_INFLATION: f32 = 0.03;
+/// Uncertain share of a jump of the gyro's, and uncertain velocity after it, m/s.
+const JUMP_UNCERTAIN: f32 = 0.2;
+const JUMP_VELOCITY: f32 = 0.1;
+/// Standard deviation of the velocity after a restart in flight, m/s.
+const RESTART_VELOCITY: f32 = 3.0;
+/// A position beyond this does not survive a restart in flight, m.
+const KEPT_POSITION: f32 = 50.0;
+
+impl Eskf {
+    /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time
+    /// is wrong. Late measurements are refused until it has filled again.
+    pub(super) fn reset_history(&mut self) {
+        self.history = History::default();
+        self.pending_step = PropagationStep::default();
+        self.pending_rotation = self.state.rotation();
+    }
+
+    /// Counts a reset of the state to a sensor that had been locked out.
+    pub(super) fn finish_reset(&mut self, sensor: Sensor) -> Fusion {
+        self.status.resets = self.status.resets.wrapping_add(1);
+        self.status.diverged |= self.gates.record_reset(sensor, self.now);
+        Fusion::Reset
+    }
+
+    /// Inflates tilt and gyro bias because flow's innovations are biased. Counts as a reset: many in a row mean that
+    /// the estimate has diverged.
+    pub(super) fn inflate_on_innovation_bias(&mut self) {
+        self.inflate_tilt();
+        self.status.diverged |= self.gates.count_reset(self.now);
+    }
+
+    /// Inflates the tilt and the gyro bias that may have tilted it.
+    pub(super) fn inflate_tilt(&mut self) {
+        self.flow_monitor.inflated(TILT_INFLATION);
+        for axis in 0..2 {
+            self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
+            self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
+            // Tilt and accelerometer bias look alike to flow: the bias is estimated anew.
+            self.reset_accel_bias(axis);
+        }
+    }
+
+    /// Takes a jump that was the gyro's own out of bias, attitude and velocity.
+    pub(super) fn correct_gyro(&mut self, jump: &GyroJump) {
+        let turned = jump.rate.map(|rate| rate * jump.age);
+        let mut correction = [0.0; N];
+        for axis in 0..2 {
+            correction[GYRO_BIAS + axis] = jump.rate[axis];
+            correction[ATTITUDE + axis] = -turned[axis];
+            let [rate, turn] = [jump.rate[axis], turned[axis]].map(|value| JUMP_UNCERTAIN * value);
+            self.covariance.inflate(GYRO_BIAS + axis, rate * rate);
+            self.covariance.inflate(ATTITUDE + axis, turn * turn);
+            self.covariance.inflate(VELOCITY + axis, JUMP_VELOCITY * JUMP_VELOCITY);
+            // Here the filter starts again, and what turned on the ground is taken to be the gyro's.
+            self.calibration.gyro_bias[axis] += jump.rate[axis];
+        }
+        self.state.correct(&correction);
+        self.state.velocity.x = jump.velocity.x;
+        self.state.velocity.y = jump.velocity.y;
+        self.flow_monitor.forget();
+        self.reset_history();
+        self.status.resets = self.status.resets.wrapping_add(1);
+    }
+
+    /// Starts position and velocity again, in flight. Attitude, heading and biases are better than those of the
+    /// calibration at power-on, so they stay; their variance grows by what drove the estimate away.
+    pub(super) fn restart_motion(&mut self) {
+        let mut variances = initial_covariance(&self.config);
+        for axis in 0..3 {
+            for (block, limit) in [(ATTITUDE, 1.0), (GYRO_BIAS, 0.1), (ACCEL_BIAS, 2.0)] {
+                // A covariance that is not sound says nothing.
+                let before = self.covariance.get(block + axis, block + axis);
+                let before = if before.is_finite() { before.max(0.0).min(limit) } else { limit };
+                variances.reset(block + axis, before);
+            }
+            variances.reset(VELOCITY + axis, RESTART_VELOCITY * RESTART_VELOCITY);
+        }
+        self.covariance = variances;
+        for axis in 0..2 {
+            self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
+        }
+        for axis in 0..3 {
+            self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
+            self.covariance.inflate(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
+        }
+        // Where that is, is a matter of definition; a jump would be flown back.
+        self.state.position = self.state.position.map(|axis| if axis.abs() < KEPT_POSITION { axis } else { 0.0 });
+        self.state.velocity = Vec3::zeros();
+        self.surface = None;
+        self.baro_offset = None;
+        self.baro_updated = self.now;
+        self.acceleration = Acceleration::default();
+        self.accels = Mean::default();
+        self.gates = Gates::default();
+        self.flow_innovation_bias = InnovationBiasMonitor::default();
+        self.flow_monitor = FlowMonitor::airborne();
+        self.vertical.restart(-self.state.accel_bias.z);
+        self.reset_history();
+        self.status.diverged = false;
+    }
+
+    /// Starts again: on the ground, or where the attitude is no number, from the last calibration; in flight position and
+    /// velocity only.
+    pub(super) fn restart(&mut self) {
+        let (at, calibration, status) = (self.now, self.calibration, self.status);
+        if self.anchor.is_some() || !self.state.is_finite() {
+            self.initialize(at, &calibration);
+            self.status = status;
+        } else {
+            self.restart_motion();
+        }
+        self.status.resets = status.resets.wrapping_add(1);
+        self.status.diverged = true;
+    }
+
+    /// Restarts a filter that is not finite or whose covariance is not sound; a position or velocity beyond any flight
+    /// means divergence, whatever holds it. Where nothing measures the horizontal position it is nobody's claim.
+    pub(super) fn check_health(&mut self) {
+        let NominalState { position, velocity, .. } = &self.state;
+        if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
+            self.restart();
+        } else if velocity.amax() > 50.0
+            || position.z.abs() > 100.0
+            || (position.xy().amax() > 100.0 && self.is_velocity_aided())
+        {
+            self.status.diverged = true;
+        }
+    }
+
+    /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
+    pub(super) fn judge_range(&mut self) {
+        if let Some(Correction { climb, bias, higher }) = self.vertical.judge(self.now, self.height()) {
+            self.state.velocity.z = -climb;
+            self.state.position.z -= higher;
+            self.state.accel_bias.z = -bias;
+            self.covariance.reset(VELOCITY + 2, 0.5);
+            self.covariance.inflate(POSITION + 2, 0.1);
+            self.covariance.reset(ACCEL_BIAS + 2, 0.1);
+            // The barometer holds the height from here.
+            self.baro_offset = None;
+            self.status.resets = self.status.resets.wrapping_add(1);
+        }
+        self.status.range_implausible = self.vertical.is_implausible();
+    }
+}

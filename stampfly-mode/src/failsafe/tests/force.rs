@@ -1,0 +1,63 @@
+//! A specific force that fits neither gravity nor thrust.
+
+use super::*;
+
+/// After how many of 400 samples is a vehicle stopped that asks for this thrust and feels this force, both of gravity?
+fn found(phase: FlightPhase, thrust: f32, force: f32) -> Option<u32> {
+    let config = FailsafeConfig { hover_thrust: 0.36, ..FailsafeConfig::default() };
+    let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+    (rig.mode.phase, rig.mode.mode) = (phase, FlightMode::Acro);
+    rig.output.thrust = 0.36;
+    let mut rig = rig.settled();
+    rig.output.thrust = thrust * 0.36;
+    (0..400).find(|_| rig.sample(REST * force, Vec3::zeros()).contains(Alerts::IMU_FAULTY))
+}
+
+#[test]
+fn d7_a_force_of_half_the_thrust_stops_the_motors_within_300_ms() {
+    for (thrust, force) in [(1.0, 0.5), (1.4, 0.7), (1.0, 0.0), (1.0, 2.0), (1.5, 2.8)] {
+        let samples = found(FlightPhase::Flying, thrust, force);
+        assert!(samples.is_some_and(|samples| samples < 120), "{force} g at {thrust}: {samples:?}");
+    }
+}
+
+#[test]
+fn what_gravity_or_thrust_explains_does_not() {
+    // Hovering, a loop, a fall, an empty battery, a ceiling.
+    for (thrust, force) in [(1.0, 1.0), (2.0, 2.0), (0.0, 0.1), (1.0, 0.7), (2.0, 1.0)] {
+        assert_eq!(found(FlightPhase::Flying, thrust, force), None, "{force} g at {thrust}");
+    }
+    assert_eq!(found(FlightPhase::Armed, 0.0, 0.5), None, "it may be carried");
+}
+
+#[test]
+fn on_the_ground_only_gravity_does() {
+    for (force, faulty) in [(0.5, true), (1.4, true), (0.8, false), (1.2, false)] {
+        assert_eq!(found(FlightPhase::IdleGround, 0.0, force).is_some(), faulty, "{force} g");
+    }
+}
+
+#[test]
+fn d7_a_force_that_no_flight_has_is_a_fault_of_any_airframe_within_1_1_s() {
+    let found = |mode: FlightMode, factor: f32| {
+        let mut rig = Rig::flying();
+        rig.mode.mode = mode;
+        let mut rig = rig.settled();
+        (0..440).any(|_| rig.sample(REST * factor, Vec3::zeros()).contains(Alerts::IMU_FAULTY))
+    };
+    assert!([0.0, 0.1, 2.8].into_iter().all(|factor| found(FlightMode::PosHold, factor)));
+    assert!(!found(FlightMode::PosHold, 0.5));
+    assert!(!found(FlightMode::Acro, 0.0), "falling with the motors at rest, where the throttle is the pilot's");
+}
+
+#[test]
+fn a_zero_that_vibration_moves_is_no_fault() {
+    let config = FailsafeConfig { hover_thrust: 0.36, ..FailsafeConfig::default() };
+    let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+    rig.output.thrust = 1.1 * 0.36;
+    for n in 0..2_000 {
+        let shake = Vec3::new(6.0, -5.0, 9.0) * if n % 2 == 0 { 1.0 } else { -1.0 };
+        let alerts = rig.sample(REST * 0.7 + shake, Vec3::zeros());
+        assert!(!alerts.contains(Alerts::IMU_FAULTY), "sample {n}");
+    }
+}
