@@ -84,6 +84,8 @@ impl Default for VehicleConfig {
                 weak_roll: weak.x,
                 weak_pitch: weak.y,
                 hover_thrust: AIRFRAME.hover_thrust(),
+                // Chips, lights and radio take up to 0.4 A; a motor at a quarter of its duty takes as much again.
+                idle_current: 0.6,
                 ..FailsafeConfig::default()
             },
             landing: LandingConfig::default(),

@@ -143,6 +143,7 @@ parameters! {
     "failsafe.tip.time" [0.02, 1.0] "s" failsafe.tip_time => "tilted for this long it tips over";
     "failsafe.lift.tilt" [0.1, 1.3] "rad" failsafe.lift_tilt => "tilt of a vehicle that tips on a leg while it takes off";
     "failsafe.lift.height" [0.0, 0.5] "m" failsafe.lift_height => "below this a leg may still touch the ground";
+    "failsafe.lift.lead" [0.0, 0.5] "s" failsafe.lift_lead => "that tilt is the one in so many seconds, if it goes on turning";
     "failsafe.weak.roll" [0.0001, 0.1] "N*m" failsafe.weak_roll => "torque about roll that betrays a weak motor";
     "failsafe.weak.pitch" [0.0001, 0.1] "N*m" failsafe.weak_pitch => "torque about pitch that betrays a weak motor";
     "failsafe.weak.time" [0.02, 2.0] "s" failsafe.weak_motor_time => "for this long it is a weak motor";
@@ -151,6 +152,7 @@ parameters! {
     "failsafe.link.timeout" [0.1, 5.0] "s" failsafe.link_silence => "silence of a lost link";
     "failsafe.battery.low" [3.2, 4.0] "V" failsafe.battery_low => "low battery: warns, no arming";
     "failsafe.battery.critical" [2.5, 3.2] "V" failsafe.battery_critical => "critical battery: lands";
+    "failsafe.battery.idle" [0.05, 10.0] "A" failsafe.idle_current => "a disarmed vehicle that takes more has a motor that turns";
     "failsafe.battery.usb" [2.5, 3.6] "V" failsafe.usb => "disarmed below this it has no battery, no arming";
     "failsafe.battery.hysteresis" [0.0, 0.3] "V" failsafe.battery_hysteresis => "an alert of the battery clears this much higher";
     "failsafe.battery.time" [0.1, 20.0] "s" failsafe.battery_time => "time constant of the voltage's low-pass";

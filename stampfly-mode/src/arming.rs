@@ -95,6 +95,8 @@ checks! {
         when(holds_height(state) && facts.alerts.contains(Alerts::BARO_LOST));
     NO_FLOW [""] "no optical flow, in POS_HOLD" => |config, state, facts|
         when(state.wanted == FlightMode::PosHold && facts.alerts.contains(Alerts::FLOW_LOST));
+    MOTOR [""] "a motor turns, as the battery's current shows" => |config, state, facts|
+        when(facts.alerts.contains(Alerts::MOTOR_RUNS));
     NO_BATTERY [""] "powered from USB" => |config, state, facts| when(facts.alerts.contains(Alerts::USB_POWER));
     LOW_BATTERY [""] "the battery is low" => |config, state, facts|
         when(facts.alerts.intersects(Alerts::LOW_BATTERY | Alerts::CRITICAL_BATTERY));

@@ -6,8 +6,10 @@
 //! |---|---|---|
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
-//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, or 14° from how it stood below 0.08 m, for 20 ms while taking off; in ACRO above 120° for a second | disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 80 ms, while taking off or landing; in ACRO above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
+//! | `MOTOR_LOST` | in the air, a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
+//! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, a force that neither gravity nor the thrust explains | disarmed |
 //! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
@@ -109,6 +111,7 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::IMU_FAULTY)
     .with(Alerts::ESTIMATE_DIVERGED)
     .with(Alerts::MOTOR_WEAK)
+    .with(Alerts::MOTOR_LOST)
     .with(Alerts::IMU_NOISY);
 
 impl Default for Failsafe {
@@ -150,11 +153,13 @@ impl Failsafe {
         }
         let config = &self.config;
         let silence = now.since(self.heard_imu);
-        let [tumbled, mismatch] = self.attitude.step(config, now, input);
+        let [weak, lost] = self.motors.step(config, now, input);
+        let [tumbled, mismatch] = self.attitude.step(config, now, input, self.active.contains(Alerts::MOTOR_WEAK));
         found = found
             .set(Alerts::IMU_LOST, silence >= config.imu_lost)
             .set(Alerts::TUMBLED, tumbled)
-            .set(Alerts::MOTOR_WEAK, self.motors.step(config, now, input))
+            .set(Alerts::MOTOR_WEAK, weak)
+            .set(Alerts::MOTOR_LOST, lost)
             .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
         if !found.is_empty() {
             self.latched_at = now;

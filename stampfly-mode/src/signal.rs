@@ -57,6 +57,8 @@ const FAULT: Alerts = Alerts::IMU_LOST
     .with(Alerts::TILT_MISMATCH)
     .with(Alerts::POWER_LOST)
     .with(Alerts::MOTOR_WEAK)
+    .with(Alerts::MOTOR_LOST)
+    .with(Alerts::MOTOR_RUNS)
     .with(Alerts::IMU_NOISY);
 /// What a person has to look at before the vehicle flies again.
 const ERROR: ArmBlocks = ArmBlocks::CRASHED.with(ArmBlocks::CUT_OFF).with(ArmBlocks::SELF_TEST);

@@ -5,8 +5,12 @@ use stampfly_types::messages::{Alerts, ArmBlocks, CommandSource, FlightMode, Fli
 use stampfly_types::{Duration, Instant};
 
 /// Alerts that stop the motors in any phase.
-pub const CUT: Alerts =
-    Alerts::IMPACT.with(Alerts::GYRO_ANOMALY).with(Alerts::TUMBLED).with(Alerts::IMU_LOST).with(Alerts::IMU_FAULTY);
+pub const CUT: Alerts = Alerts::IMPACT
+    .with(Alerts::GYRO_ANOMALY)
+    .with(Alerts::TUMBLED)
+    .with(Alerts::IMU_LOST)
+    .with(Alerts::IMU_FAULTY)
+    .with(Alerts::MOTOR_LOST);
 /// Alerts that demand a landing at once.
 pub const LAND: Alerts =
     Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::MOTOR_WEAK).with(Alerts::IMU_NOISY);

@@ -58,7 +58,7 @@ impl Event {
         match self {
             Self::Emergency => {
                 "kill from any link, a press of the button, the cut-off, or `IMPACT`, `GYRO_ANOMALY`, `TUMBLED`, `IMU_LOST`, \
-                 `IMU_FAULTY`"
+                 `IMU_FAULTY`, `MOTOR_LOST`"
             }
             Self::Stop => {
                 "ARMED: arm switch off, `Disarm`, or armed for too long. TAKEOFF, FLYING: arm switch off in a manual mode. \

@@ -350,7 +350,9 @@ impl Navigator {
         if self.path.position().z > lowest {
             self.path.place_vertically(lowest, self.path.velocity().z);
         }
-        SetpointAxes::POSITION_Z | SetpointAxes::YAW | self.horizontal_axes(input, dt)
+        // In every mode: what lands at a speed that nobody asked for falls over its legs.
+        self.drift(input, dt);
+        SetpointAxes::POSITION_Z | SetpointAxes::YAW | known_horizontally(input)
     }
 
     fn follow_route(&mut self, now: Instant, input: &NavigatorInput<'_>, dt: f32) {

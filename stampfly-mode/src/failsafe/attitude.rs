@@ -3,7 +3,7 @@
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use crate::lasting::lasts;
-use stampfly_types::messages::{FlightMode, FlightPhase, ImuData, Validity};
+use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, ImuData, Validity};
 use stampfly_types::{Instant, Vec3, frame, math};
 
 /// What is remembered of the attitude.
@@ -48,12 +48,18 @@ impl AttitudeMonitor {
         *gravity += (imu.accel - *gravity) * config.gravity_weight;
     }
 
-    /// Does it tumble, and does gravity contradict its tilt on the ground?
-    pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> [bool; 2] {
+    /// Does it tumble, and does gravity contradict its tilt on the ground? `weak`: one of its motors is.
+    pub(super) fn step(
+        &mut self,
+        config: &FailsafeConfig,
+        now: Instant,
+        input: &FailsafeInput<'_>,
+        weak: bool,
+    ) -> [bool; 2] {
         let estimate = input.estimate;
         let known = estimate.valid.contains(Validity::TILT);
         let status = input.flight_status;
-        let tips = known && self.tips(config, input);
+        let tips = known && self.tips(config, input, weak);
         let limit = match (status.phase, status.mode) {
             (FlightPhase::Armed, _) => Some((self.cos_armed, config.tumble_time)),
             (FlightPhase::TakeOff, _) => Some((self.cos_tip, config.tip_time)),
@@ -62,7 +68,7 @@ impl AttitudeMonitor {
             (FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld, _) => None,
         };
         let over = limit.filter(|(cos_tilt, _)| known && (frame::cos_tilt(&estimate.attitude) < *cos_tilt || tips));
-        let time = over.map_or(config.tumble_time, |(_, time)| time);
+        let time = over.filter(|_| !tips).map_or(config.tip_time, |(_, time)| time);
         let tumbled = lasts(&mut self.tumbled, now, over.is_some(), time);
         let standing = status.phase == FlightPhase::IdleGround && known;
         let apart = standing
@@ -74,20 +80,25 @@ impl AttitudeMonitor {
     }
 
     /// Does it tip on a leg, because a propeller is weak or something holds it? If its motors stop in time, it falls back.
-    fn tips(&mut self, config: &FailsafeConfig, input: &FailsafeInput<'_>) -> bool {
+    fn tips(&mut self, config: &FailsafeConfig, input: &FailsafeInput<'_>, weak: bool) -> bool {
         let (estimate, torque) = (input.estimate, &input.output.torque);
-        match input.flight_status.phase {
+        let FlightStatus { phase, mode, .. } = input.flight_status;
+        match phase {
             FlightPhase::Armed => {
                 self.rest = estimate.attitude.transform_vector(&Vec3::z());
                 false
             }
-            FlightPhase::TakeOff => {
+            FlightPhase::TakeOff | FlightPhase::Landing => {
                 let low = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
                 let lean = estimate.attitude.inverse_transform_vector(&self.rest);
-                // A pilot may want to tilt. Then the controller does not push back.
+                // Motors take some time to stop, and what turns already turns on.
+                let lean = lean - estimate.angular_rate.cross(&lean) * config.lift_lead;
+                // A pilot may want to tilt, and a program may land in a gust. Then the controller does not push back. Against a
+                // weak motor it pushes all the time, and on the ground that is what tips the vehicle.
                 let pushes_back =
                     torque.x * lean.y.signum() < -config.weak_roll || torque.y * lean.x.signum() > config.weak_pitch;
-                low && lean.z < self.cos_lift && (pushes_back || !input.flight_status.mode.is_manual())
+                let takes_off_by_itself = *phase == FlightPhase::TakeOff && !mode.is_manual();
+                low && lean.z < self.cos_lift && (weak || pushes_back || takes_off_by_itself)
             }
             _ => false,
         }

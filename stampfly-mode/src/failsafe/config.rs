@@ -30,9 +30,11 @@ pub struct FailsafeConfig {
     pub tip_tilt: f32,
     /// For how long it is tilted so far.
     pub tip_time: Duration,
-    /// Tilt of one that tips on a leg, rad: from how it stood, below `lift_height`, in a mode that holds its height or against
-    /// a torque as of `weak_roll` and `weak_pitch`.
+    /// Tilt of one that tips on a leg, rad: from how it stood, below `lift_height`, while it takes off in a mode that holds its
+    /// height, or takes off or lands against a torque as of `weak_roll` and `weak_pitch`.
     pub lift_tilt: f32,
+    /// That tilt is the one in so many seconds, if it goes on turning as it does: four lags of its motors.
+    pub lift_lead: f32,
     /// Below this height a leg may still touch the ground, m.
     pub lift_height: f32,
     /// Torques about roll and pitch, N·m, that together betray a weak motor: [`WEAK_SHARE`] of what one rotor's share of the
@@ -56,6 +58,8 @@ pub struct FailsafeConfig {
     pub usb: f32,
     /// Below this no meter is fitted, V.
     pub no_meter: f32,
+    /// Largest current of a disarmed vehicle's electronics, A: more takes a motor. Infinite where it is not known.
+    pub idle_current: f32,
     /// Hysteresis of the battery thresholds, V.
     pub battery_hysteresis: f32,
     /// Time constant of the battery low-pass, s.
@@ -129,6 +133,7 @@ impl Default for FailsafeConfig {
             tip_time: Duration::from_millis(20),
             // Half the tilt that a stick may ask for; from there a vehicle still falls back on its legs.
             lift_tilt: 0.25,
+            lift_lead: 0.08,
             lift_height: 0.08,
             weak_roll: f32::INFINITY,
             weak_pitch: f32::INFINITY,
@@ -140,6 +145,7 @@ impl Default for FailsafeConfig {
             battery_critical: 3.0,
             usb: 3.3,
             no_meter: 0.1,
+            idle_current: f32::INFINITY,
             battery_hysteresis: 0.1,
             battery_time: 2.0,
             power_silence: Duration::from_secs(1),

@@ -4,12 +4,15 @@
 //! a manoeuvre asks for as much for a moment, a shifted load about one axis. A battery that lies askew asks for it from the
 //! take-off on: so what has become so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a rotor's share of the weight on, what has
 //! been so from [`STANDING`] times that on. A vehicle on the ground says nothing, because what holds it looks the same.
+//!
+//! With half of a rotor's thrust a vehicle lands. A controller that asks for more than one rotor's whole share about both axes
+//! does not get it: the other three have nothing left, and the vehicle turns over as it comes down. That motor is lost.
 
-use super::config::FailsafeConfig;
+use super::config::{FailsafeConfig, WEAK_SHARE};
 use super::input::FailsafeInput;
 use crate::lasting::lasts;
-use stampfly_types::Instant;
 use stampfly_types::messages::{FlightPhase, Validity};
+use stampfly_types::{Duration, Instant};
 
 /// Weight of a step in the mean torque: a time constant of 50 ms at 400 Hz, two of a motor.
 const WEIGHT: f32 = 0.05;
@@ -17,6 +20,11 @@ const WEIGHT: f32 = 0.05;
 const USUAL: f32 = 0.0008;
 /// What is usual may be this many times as large as what becomes so.
 const STANDING: f32 = 1.5;
+/// A motor is lost from this many times a weak one's torque on: a rotor's share of the weight.
+const LOST: f32 = 1.0 / WEAK_SHARE;
+
+/// A lost motor shows this soon after it was found weak. One that lands after all is not dropped.
+const SOON: Duration = Duration::from_millis(200);
 
 /// What is remembered of the torque that the controller asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,30 +34,38 @@ pub(super) struct MotorMonitor {
     mean: [f32; 2],
     usual: [f32; 2],
     uneven: Option<Instant>,
+    uncontrolled: Option<Instant>,
+    /// When a motor was found weak.
+    found: Option<Instant>,
 }
 
 impl MotorMonitor {
-    /// Is a motor weak?
-    pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> bool {
+    /// Is a motor weak, and is one lost?
+    pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> [bool; 2] {
         let estimate = input.estimate;
         // One that lands already has nothing more to find out, and may stand without knowing it.
         let flies = matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying);
         let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
         let asked = [input.output.torque.x, input.output.torque.y];
         let limits = [config.weak_roll, config.weak_pitch];
-        let (mut became, mut stands) = (true, true);
+        let (mut became, mut stands, mut exceeds) = (true, true, true);
         for axis in 0..2 {
             self.mean[axis] += (asked[axis] - self.mean[axis]) * WEIGHT;
             let risen = self.mean[axis] - self.usual[axis];
             self.usual[axis] += risen * USUAL;
             became &= risen.abs() > limits[axis];
             stands &= self.mean[axis].abs() > STANDING * limits[axis];
+            exceeds &= self.mean[axis].abs() > LOST * limits[axis];
         }
+        let soon = self.found.is_some_and(|found| now.since(found) < SOON);
+        let lost = lasts(&mut self.uncontrolled, now, exceeds && (flies || soon) && !near, config.weak_motor_time);
         if !flies || near {
             // What the ground has asked for is no weakness, and is gone soon.
             (self.usual, self.uneven) = (self.mean, None);
-            return false;
+            return [false, lost];
         }
-        lasts(&mut self.uneven, now, became || stands, config.weak_motor_time)
+        let weak = lasts(&mut self.uneven, now, became || stands, config.weak_motor_time);
+        self.found = if weak { self.found.or(Some(now)) } else { None };
+        [weak, lost]
     }
 }

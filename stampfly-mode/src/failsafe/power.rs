@@ -3,11 +3,14 @@
 //! While armed, a reading is implausible when it is not finite, outside `voltage_range`, or farther from the last
 //! plausible one than `voltage_step`, `voltage_rate` times the time since, and what the change of the current makes of
 //! `resistance` explain together. It then counts for nothing else. Disarmed everything is plausible: batteries are
-//! changed, and a board runs on USB.
+//! changed, and a board runs on USB. But what draws more than `idle_current` then is a motor.
 
 use super::config::FailsafeConfig;
 use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, PowerData};
+
+/// Time constant of the mean current, s: a radio draws its power in bursts of milliseconds.
+const IDLE_TIME: f32 = 0.3;
 
 /// What is remembered of the battery.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,6 +22,8 @@ pub(super) struct PowerMonitor {
     newest: Option<Instant>,
     finite: Option<Instant>,
     plausible: Option<(Instant, f32, f32)>,
+    /// Low-passed, A, while disarmed.
+    current: Option<(Instant, f32)>,
 }
 
 impl PowerMonitor {
@@ -61,7 +66,9 @@ impl PowerMonitor {
             return active;
         }
         let plausible = !armed || self.is_plausible(config, at, power);
-        let active = active.set(Alerts::POWER_IMPLAUSIBLE, !plausible);
+        let active = active
+            .set(Alerts::POWER_IMPLAUSIBLE, !plausible)
+            .set(Alerts::MOTOR_RUNS, self.draws(config, at, power, armed));
         if !plausible {
             return active;
         }
@@ -78,6 +85,19 @@ impl PowerMonitor {
             .set(Alerts::USB_POWER, below(Alerts::USB_POWER, config.usb) && !armed)
             .set(Alerts::LOW_BATTERY, below(Alerts::LOW_BATTERY, config.battery_low))
             .set(Alerts::CRITICAL_BATTERY, below(Alerts::CRITICAL_BATTERY, config.battery_critical))
+    }
+
+    /// Does it draw more than a disarmed vehicle's electronics?
+    fn draws(&mut self, config: &FailsafeConfig, at: Instant, power: &PowerData, armed: bool) -> bool {
+        if armed || !power.current.is_finite() {
+            self.current = None;
+            return false;
+        }
+        let (last, before) = self.current.unwrap_or((at, 0.0));
+        let dt = at.since(last).seconds();
+        let current = before + (power.current - before) * (dt / (IDLE_TIME + dt));
+        self.current = Some((at, current));
+        current > config.idle_current
     }
 
     fn is_plausible(&self, config: &FailsafeConfig, at: Instant, power: &PowerData) -> bool {

@@ -97,6 +97,8 @@ message_flags! {
         CUT_OFF = 17,
         /// The pilot's kill switch is on.
         KILL = 18,
+        /// A motor turns that should stand.
+        MOTOR = 19,
     }
 }
 
@@ -205,6 +207,10 @@ message_flags! {
         MOTOR_WEAK = 21,
         /// Many inertial samples are garbage, too few for [`IMU_FAULTY`](Self::IMU_FAULTY).
         IMU_NOISY = 22,
+        /// One motor does not do what it is told, and the others cannot make up for it: motors off.
+        MOTOR_LOST = 23,
+        /// A motor turns although the vehicle is disarmed.
+        MOTOR_RUNS = 24,
     }
 }
 

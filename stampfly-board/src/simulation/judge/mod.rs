@@ -9,7 +9,7 @@
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
 //! | `cut` | the motors stopped for good within 0.3 s of the fault, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
-//! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end |
+//! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
 //! | `transparent` | anything else |
@@ -49,6 +49,9 @@ const EXACT: [f32; 2] = [0.15, 0.5];
 const PILOT: f32 = 2.0;
 /// Motors that stop within this time of a fault were cut.
 const CUT: Duration = Duration::from_millis(300);
+/// A rotor that turns faster than this, rad/s, this long after the motors have stopped, is driven.
+const TURNS: f32 = 1_000.0;
+const COAST: Duration = Duration::from_millis(150);
 /// Hardest touch-down that is none of a crash, m/s.
 const HARD: f32 = 1.0;
 /// Largest tilt of a vehicle that has landed, degrees.
@@ -148,6 +151,8 @@ pub(super) struct Judge {
     early: bool,
     /// The motors stopped for good before the mission asked for landing.
     stopped_early: bool,
+    /// A rotor went on turning when the motors had stopped.
+    runs_on: bool,
     mode: Option<FlightMode>,
     other_mode: bool,
     new_alert: bool,
@@ -183,6 +188,7 @@ impl Judge {
             was_landing: false,
             early: false,
             stopped_early: false,
+            runs_on: false,
             mode: None,
             other_mode: false,
             new_alert: false,
@@ -228,7 +234,7 @@ impl Judge {
             self.stopped_by_blow = self.struck.is_some_and(|struck| now.since(struck) <= CUT);
         }
         if on {
-            (self.stopped, self.stopped_early) = (None, false);
+            (self.stopped, self.stopped_early, self.runs_on) = (None, false, false);
         }
         self.turned |= on;
         self.motors_on = on;
@@ -273,6 +279,8 @@ impl Judge {
             let mode = *self.mode.get_or_insert(status.mode);
             self.other_mode |= after_fault && mode != status.mode;
         }
+        let coasted = self.stopped.is_some_and(|(at, _)| now.since(at) > COAST);
+        self.runs_on |= coasted && truth.rotor_speed.iter().any(|speed| *speed > TURNS);
         self.invariants.see(now, clearance);
         self.last = Some(*truth);
     }
@@ -338,8 +346,11 @@ impl Judge {
         let [above, beside] = self.away;
         let wide = if self.piloted { PILOT } else { 1.0 };
         let from = begun.or(self.start).unwrap_or(self.now);
-        let hard = |touch: &Touch| touch.at >= from && (touch.speed > HARD || touch.tilt > TILTED);
-        let lies = self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
+        let until = self.stopped.filter(|_| self.runs_on).map_or(self.now, |(at, _)| at);
+        let counts = |touch: &Touch| (from..=until).contains(&touch.at);
+        let hard = |touch: &Touch| counts(touch) && (touch.speed > HARD || touch.tilt > TILTED);
+        let lies = !self.runs_on
+            && self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
         let crashed = lies || self.touches.iter().any(hard);
         let at_once = |at: Instant| begun.is_some_and(|begun| at >= begun && at.since(begun) <= CUT);
         if !self.turned {
