@@ -42,6 +42,9 @@ const SHARE: f32 = 0.25;
 const PER_RADIAN: f32 = 2.0 * GRAVITY * OVER;
 /// For how long, s.
 const LASTS: f32 = 0.1;
+/// Both velocities begin with the mean of so many readings: a single one may hold two frames, and what it is wrong by would
+/// stay in every difference for [`OVER`].
+const BEGINNING: u32 = 10;
 /// Readings running that are equal and not zero: frozen. At 100 Hz 0.4 s.
 const REPEATED: u32 = 40;
 /// The picture cannot stand still while the body turns by this much, rad: three counts of a PMW3901. Nearer to the floor
@@ -77,6 +80,9 @@ pub(super) struct FlowMonitor {
     flow: [f32; 2],
     inertial: [f32; 2],
     last: Option<[f32; 2]>,
+    /// Readings since the comparison began, and how far apart the velocities were in the first of them.
+    readings: u32,
+    apart: [f32; 2],
     difference: [f32; 2],
     differs: f32,
     agrees: f32,
@@ -134,6 +140,7 @@ impl FlowMonitor {
     pub(super) fn forget(&mut self) {
         (self.flow, self.inertial, self.difference) = Default::default();
         (self.differs, self.agrees) = (0.0, 0.0);
+        (self.readings, self.apart) = Default::default();
     }
 
     /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
@@ -175,12 +182,19 @@ impl FlowMonitor {
         self.gyro_bias = self.gyro_bias.map(|bias| bias * (BIAS_FORGOTTEN / (BIAS_FORGOTTEN + dt)));
         self.tilt *= forget;
         let [mut difference, mut motion, mut picture] = [0.0; 3];
+        let begins = self.readings < BEGINNING;
+        self.readings += u32::from(begins);
         for axis in 0..2 {
             self.flow[axis] = (self.flow[axis] + velocity[axis] - last[axis]) * fade;
             self.inertial[axis] = (self.inertial[axis] + change[axis] - self.added[axis] * dt) * fade;
             self.added[axis] *= forget;
             let apart = self.flow[axis] - self.inertial[axis];
-            self.difference[axis] += (apart - self.difference[axis]) * smooth;
+            if begins {
+                self.apart[axis] += apart / BEGINNING as f32;
+                self.flow[axis] -= if self.readings == BEGINNING { self.apart[axis] } else { 0.0 };
+            } else {
+                self.difference[axis] += (apart - self.difference[axis]) * smooth;
+            }
             difference += self.difference[axis] * self.difference[axis];
             motion += self.inertial[axis] * self.inertial[axis];
             let rate = counts[axis] / interval;
@@ -204,7 +218,7 @@ impl FlowMonitor {
         let limit = base * base + share * share * picture + tilt * tilt;
         self.differs = if difference > limit { self.differs + interval } else { 0.0 };
         if self.implausible {
-            if motion > MOTION * MOTION {
+            if motion > MOTION * MOTION && !begins {
                 let agrees = difference < 0.2 * motion && self.repeats < REPEATED && self.zeros < ZEROS;
                 self.agrees = if agrees { self.agrees + interval } else { 0.0 };
             }

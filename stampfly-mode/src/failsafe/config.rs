@@ -96,8 +96,8 @@ pub struct FailsafeConfig {
     pub hover_thrust: f32,
     /// Weight of an inertial sample in the mean specific force.
     pub force_weight: f32,
-    /// For how long the mean is implausible.
-    pub force_time: Duration,
+    /// The unexplained part of the mean specific force is a fault when it has made this speed, m/s.
+    pub force_speed: f32,
     /// Tilt of a vehicle that tumbles while armed on the ground, rad.
     pub armed_tilt: f32,
     /// Tilt of a vehicle that tumbles in ACRO, rad.
@@ -169,7 +169,7 @@ impl Default for FailsafeConfig {
             // the recorded vibration moves the mean by less.
             hover_thrust: f32::INFINITY,
             force_weight: 0.08,
-            force_time: Duration::from_millis(150),
+            force_speed: 0.15,
             armed_tilt: 1.31,
             acro_tilt: 2.1,
             acro_time: Duration::from_secs(1),

@@ -9,7 +9,6 @@
 
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
-use crate::lasting::lasts;
 use core::ops::Range;
 use stampfly_types::messages::{FlightPhase, ImuData};
 use stampfly_types::{GRAVITY, Instant, Vec3, math};
@@ -20,7 +19,7 @@ const STANDING: Range<f32> = 0.75..1.25;
 const FLYING: Range<f32> = 0.85..1.2;
 /// How far it may be from what the thrust makes, of the larger of that and gravity, and of the vibration's root mean square,
 /// which moves an accelerometer's zero.
-const CARRIED: f32 = 0.42;
+const CARRIED: f32 = 0.36;
 const RECTIFIED: f32 = 0.25;
 /// What it may be where that is all that is known: where it shakes by more than a mean square, (m/s²)², of three times the
 /// recorded vibration, which moves an accelerometer's zero by a third of it, or where the hover thrust is unknown.
@@ -29,6 +28,11 @@ const WIDE: Range<f32> = 0.2..2.5;
 /// Weight of a sample in the mean square.
 const SHAKEN_WEIGHT: f32 = 0.01;
 
+/// A step that is longer counts as this long, s.
+const LONGEST_STEP: f32 = 0.01;
+/// On the ground, so many times as much is a fault: it may be put down hard, or taken up.
+const HANDLED: f32 = 4.0;
+
 /// Means of the specific force, m/s², and of the thrust, N.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -36,11 +40,13 @@ pub(super) struct ForceMonitor {
     mean: Option<(Vec3, f32)>,
     /// Mean square of the force about its mean.
     shaken: f32,
-    off: Option<Instant>,
+    last: Option<Instant>,
+    /// Speed that the unexplained part of the force has made, m/s: a cumulative sum, which no single sample resets.
+    unexplained: f32,
 }
 
 impl ForceMonitor {
-    /// Takes a sample. Has the force been implausible for `force_time`?
+    /// Takes a sample. Has the unexplained part of the force made a speed of `force_speed`?
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
@@ -48,31 +54,34 @@ impl ForceMonitor {
         imu: &ImuData,
         input: &FailsafeInput<'_>,
     ) -> bool {
+        let dt = self.last.replace(at).map_or(0.0, |last| at.since(last).seconds().min(LONGEST_STEP));
         let (force, thrust) = self.mean.get_or_insert((imu.accel, input.output.thrust));
         let off = imu.accel - *force;
         self.shaken += (off.norm_squared() - self.shaken) * SHAKEN_WEIGHT;
         *force += off * config.force_weight;
         *thrust += (input.output.thrust - *thrust) * config.force_weight;
-        let square = force.norm_squared() * (1.0 / (GRAVITY * GRAVITY));
-        let within = |range: &Range<f32>| square > range.start * range.start && square < range.end * range.end;
-        let off = match input.flight_status.phase {
-            FlightPhase::IdleGround => !within(&STANDING),
+        let (size, thrust) = (force.norm(), *thrust);
+        let beyond = |range: &Range<f32>| (range.start * GRAVITY - size).max(size - range.end * GRAVITY);
+        let (excess, limit) = match input.flight_status.phase {
+            FlightPhase::IdleGround => (beyond(&STANDING), HANDLED * config.force_speed),
             FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => {
                 let known = config.hover_thrust.is_finite();
                 let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
-                let explained = || {
-                    if !known {
-                        // It may be falling with its motors at rest.
-                        return input.flight_status.mode.is_manual();
-                    }
-                    let carried = *thrust * (GRAVITY / config.hover_thrust);
+                let unlike_thrust = if known {
+                    let carried = thrust * (GRAVITY / config.hover_thrust);
                     let range = CARRIED * carried.max(GRAVITY) + RECTIFIED * math::sqrt(self.shaken);
-                    (force.norm() - carried).abs() < range
+                    (size - carried).abs() - range
+                } else if input.flight_status.mode.is_manual() {
+                    // It may be falling with its motors at rest.
+                    -GRAVITY
+                } else {
+                    GRAVITY
                 };
-                !within(range) && !explained()
+                (beyond(range).min(unlike_thrust), config.force_speed)
             }
-            FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => false,
+            FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => (-GRAVITY, config.force_speed),
         };
-        lasts(&mut self.off, at, off, config.force_time)
+        self.unexplained = (self.unexplained + excess * dt).max(0.0);
+        self.unexplained > limit
     }
 }
