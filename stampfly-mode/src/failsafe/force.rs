@@ -11,16 +11,16 @@ use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use core::ops::Range;
 use stampfly_types::messages::{FlightPhase, ImuData};
-use stampfly_types::{GRAVITY, Instant, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Vec3};
 
 /// What the force may be on the ground, of gravity.
 const STANDING: Range<f32> = 0.75..1.25;
 /// What it may be in the air, whatever the thrust.
 const FLYING: Range<f32> = 0.85..1.2;
-/// How far it may be from what the thrust makes, of the larger of that and gravity, and of the vibration's root mean square,
-/// which moves an accelerometer's zero.
+/// How far it may be from what the thrust makes, of the larger of that and gravity, and for the vibration's mean square, 1/(m/s²):
+/// an accelerometer that is shaken has its zero elsewhere, and four times as far when it is shaken twice as much.
 const CARRIED: f32 = 0.36;
-const RECTIFIED: f32 = 0.25;
+const RECTIFIED: f32 = 0.04;
 /// What it may be where that is all that is known: where it shakes by more than a mean square, (m/s²)², of three times the
 /// recorded vibration, which moves an accelerometer's zero by a third of it, or where the hover thrust is unknown.
 const SHAKEN: f32 = 120.0;
@@ -69,7 +69,7 @@ impl ForceMonitor {
                 let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
                 let unlike_thrust = if known {
                     let carried = thrust * (GRAVITY / config.hover_thrust);
-                    let range = CARRIED * carried.max(GRAVITY) + RECTIFIED * math::sqrt(self.shaken);
+                    let range = CARRIED * carried.max(GRAVITY) + RECTIFIED * self.shaken;
                     (size - carried).abs() - range
                 } else if input.flight_status.mode.is_manual() {
                     // It may be falling with its motors at rest.
