@@ -96,7 +96,7 @@ impl vehicle::Surroundings for Surroundings {
             }
         }
         let hover_without_link = setup.vehicle.mode.hover_without_link;
-        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot.is_some(), hover_without_link);
+        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, hover_without_link);
         Around {
             clock: clock.clone(),
             world: world.clone(),

@@ -10,12 +10,12 @@ use stampfly_types::{Instant, Vec3, frame, math};
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct AttitudeMonitor {
-    /// Cosines of the configuration's tilts: with them no step takes an arc cosine, 250 instructions.
+    /// Cosines of the configuration's tilts, and a sine: with them no step takes an arc cosine, 250 instructions.
     cos_armed: f32,
     cos_acro: f32,
     cos_tumble: f32,
     cos_tip: f32,
-    cos_lift: f32,
+    sin_lift: f32,
     cos_mismatch: f32,
     /// The body's down axis, world, of the vehicle before it took off: floors slope.
     rest: Vec3,
@@ -33,7 +33,7 @@ impl AttitudeMonitor {
             cos_acro: math::cos(config.acro_tilt),
             cos_tumble: math::cos(config.tumble_tilt),
             cos_tip: math::cos(config.tip_tilt),
-            cos_lift: math::cos(config.lift_tilt),
+            sin_lift: math::sin(config.lift_tilt),
             rest: Vec3::z(),
             cos_mismatch: math::cos(config.tilt_mismatch),
             gravity: None,
@@ -90,15 +90,20 @@ impl AttitudeMonitor {
             }
             FlightPhase::TakeOff | FlightPhase::Landing => {
                 let low = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
-                let lean = estimate.attitude.inverse_transform_vector(&self.rest);
                 // Motors take some time to stop, and what turns already turns on.
-                let lean = lean - estimate.angular_rate.cross(&lean) * config.lift_lead;
+                let soon = |world: &Vec3| {
+                    let body = estimate.attitude.inverse_transform_vector(world);
+                    let lean = body - estimate.angular_rate.cross(&body) * config.lift_lead;
+                    (lean, lean.x * lean.x + lean.y * lean.y > self.sin_lift * self.sin_lift)
+                };
+                // From a slope it turns to level, and stands as the slope does.
+                let ((lean, leans), (_, tilts)) = (soon(&self.rest), soon(&Vec3::z()));
                 // A pilot may want to tilt, and a program may land in a gust. Then the controller does not push back. Against a
                 // weak motor it pushes all the time, and on the ground that is what tips the vehicle.
                 let pushes_back =
                     torque.x * lean.y.signum() < -config.weak_roll || torque.y * lean.x.signum() > config.weak_pitch;
                 let takes_off_by_itself = *phase == FlightPhase::TakeOff && !mode.is_manual();
-                low && lean.z < self.cos_lift && (weak || pushes_back || takes_off_by_itself)
+                low && leans && tilts && (weak || pushes_back || takes_off_by_itself)
             }
             _ => false,
         }

@@ -33,7 +33,7 @@ pub struct FailsafeConfig {
     /// Tilt of one that tips on a leg, rad: from how it stood, below `lift_height`, while it takes off in a mode that holds its
     /// height, or takes off or lands against a torque as of `weak_roll` and `weak_pitch`.
     pub lift_tilt: f32,
-    /// That tilt is the one in so many seconds, if it goes on turning as it does: four lags of its motors.
+    /// That tilt is the one in so many seconds, if it goes on turning as it does: three lags of its motors.
     pub lift_lead: f32,
     /// Below this height a leg may still touch the ground, m.
     pub lift_height: f32,
@@ -133,7 +133,7 @@ impl Default for FailsafeConfig {
             tip_time: Duration::from_millis(20),
             // Half the tilt that a stick may ask for; from there a vehicle still falls back on its legs.
             lift_tilt: 0.25,
-            lift_lead: 0.08,
+            lift_lead: 0.05,
             lift_height: 0.08,
             weak_roll: f32::INFINITY,
             weak_pitch: f32::INFINITY,

@@ -15,7 +15,8 @@
 //! | `transparent` | anything else |
 //!
 //! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
-//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide.
+//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide, in ACRO three
+//! times.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -45,8 +46,9 @@ const OFF_GROUND: f32 = 0.05;
 const AWAY: [f32; 2] = [1.0, 5.0];
 /// Bounds of `transparent`, in the same order, m.
 const EXACT: [f32; 2] = [0.15, 0.5];
-/// A pilot's bounds are this many times as wide.
+/// A pilot's bounds are this many times as wide; in ACRO, where sticks are rates, a pilot without faults is up to 1.3 m beside.
 const PILOT: f32 = 2.0;
+const ACRO_PILOT: f32 = 3.0;
 /// Motors that stop within this time of a fault were cut.
 const CUT: Duration = Duration::from_millis(300);
 /// A rotor that turns faster than this, rad/s, this long after the motors have stopped, is driven.
@@ -123,7 +125,8 @@ pub(super) struct Judge {
     invariants: Invariants,
     moments: Moments,
     course: Course,
-    piloted: bool,
+    /// How many times as wide the bounds of `transparent` are.
+    wide: f32,
     alerts: Alerts,
     spans: Vec<AlertSpan>,
     motors_on: bool,
@@ -161,13 +164,22 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub fn new(injector: &Injector, mission: &Mission, piloted: bool, hover_without_link: Duration) -> Self {
+    pub fn new(
+        injector: &Injector,
+        mission: &Mission,
+        pilot: Option<FlightMode>,
+        hover_without_link: Duration,
+    ) -> Self {
         Self {
             injector: injector.clone(),
             invariants: Invariants::new(hover_without_link),
             moments: Moments::default(),
             course: Course::new(mission),
-            piloted,
+            wide: match pilot {
+                None => 1.0,
+                Some(FlightMode::Acro) => ACRO_PILOT,
+                Some(_) => PILOT,
+            },
             alerts: Alerts::NONE,
             spans: Vec::new(),
             motors_on: false,
@@ -344,7 +356,7 @@ impl Judge {
     /// By the table of the [module](self) documentation.
     fn class(&self, begun: Option<Instant>) -> Class {
         let [above, beside] = self.away;
-        let wide = if self.piloted { PILOT } else { 1.0 };
+        let wide = self.wide;
         let from = begun.or(self.start).unwrap_or(self.now);
         let until = self.stopped.filter(|_| self.runs_on).map_or(self.now, |(at, _)| at);
         let counts = |touch: &Touch| (from..=until).contains(&touch.at);
