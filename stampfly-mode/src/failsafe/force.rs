@@ -30,6 +30,8 @@ const SHAKEN_WEIGHT: f32 = 0.01;
 
 /// A step that is longer counts as this long, s.
 const LONGEST_STEP: f32 = 0.01;
+/// However large it is, it lasts this long, s: a hand that takes hold of the vehicle jerks it for 30 ms.
+const LEAST_TIME: f32 = 0.1;
 /// On the ground, so many times as much is a fault: it may be put down hard, or taken up.
 const HANDLED: f32 = 4.0;
 
@@ -81,7 +83,7 @@ impl ForceMonitor {
             }
             FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => (-GRAVITY, config.force_speed),
         };
-        self.unexplained = (self.unexplained + excess * dt).max(0.0);
+        self.unexplained = (self.unexplained + excess.min(limit / LEAST_TIME) * dt).max(0.0);
         self.unexplained > limit
     }
 }
