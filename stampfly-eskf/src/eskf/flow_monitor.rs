@@ -61,8 +61,15 @@ const UNKNOWN: f32 = 20.0;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
 const MOTION: f32 = 0.2;
 const AGREES_FOR: f32 = 0.5;
-/// Largest mean rate of the picture on a vehicle that stands, rad/s.
-const STANDING_RATE: f32 = 0.6;
+/// Largest mean rate of the picture on a vehicle that stands, rad/s, over [`OVER`] and over the second time, s. The second is
+/// for what begins while the motors spool up.
+const STANDING_RATE: [f32; 2] = [0.6, 1.0];
+const STANDING_SOON: f32 = 0.1;
+/// Means of so many readings are compared with those two before: one of five holds two frames.
+const BLOCK: u32 = 5;
+/// Largest jump of such a mean, m/s, and for each metre of distance: 1 m/s² over 0.15 s, and the picture's noise.
+const JUMP: f32 = 0.2;
+const JUMP_PER_METRE: f32 = 0.5;
 
 /// What is remembered of flow and acceleration, horizontal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -83,6 +90,9 @@ pub(super) struct FlowMonitor {
     /// Readings since the comparison began, and how far apart the velocities were in the first of them.
     readings: u32,
     apart: [f32; 2],
+    /// The last two means of [`BLOCK`] differences, and the sum of the next.
+    means: [[f32; 2]; 2],
+    sum: [f32; 2],
     difference: [f32; 2],
     differs: f32,
     agrees: f32,
@@ -92,7 +102,7 @@ pub(super) struct FlowMonitor {
     zeros: u32,
     turn: [f32; 2],
     turned: f32,
-    standing: [f32; 2],
+    standing: [[f32; 2]; 2],
     implausible: bool,
     /// How long it has to hold back, s.
     waits: f32,
@@ -140,15 +150,36 @@ impl FlowMonitor {
     pub(super) fn forget(&mut self) {
         (self.flow, self.inertial, self.difference) = Default::default();
         (self.differs, self.agrees) = (0.0, 0.0);
-        (self.readings, self.apart) = Default::default();
+        (self.readings, self.apart, self.sum, self.means) = Default::default();
     }
 
     /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
     pub(super) fn stand(&mut self, rate: [f32; 2], dt: f32) {
-        let share = dt / (OVER + dt);
-        let standing = core::array::from_fn(|axis| self.standing[axis] + (rate[axis] - self.standing[axis]) * share);
-        let [x, y] = standing;
-        *self = Self { standing, implausible: x * x + y * y > STANDING_RATE * STANDING_RATE, ..Self::default() };
+        let mut standing = self.standing;
+        let mut implausible = false;
+        for ((mean, over), limit) in standing.iter_mut().zip([OVER, STANDING_SOON]).zip(STANDING_RATE) {
+            let share = dt / (over + dt);
+            *mean = core::array::from_fn(|axis| mean[axis] + (rate[axis] - mean[axis]) * share);
+            let [x, y] = *mean;
+            implausible |= x * x + y * y > limit * limit;
+        }
+        *self = Self { standing, implausible, ..Self::default() };
+    }
+
+    /// Square of the jump that a mean of [`BLOCK`] differences has made since the one two before, m²/s²; zero between blocks.
+    fn jump(&mut self, begins: bool) -> f32 {
+        if begins || !self.readings.is_multiple_of(BLOCK) {
+            return 0.0;
+        }
+        let mean = core::mem::take(&mut self.sum);
+        let [before, last] = self.means;
+        self.means = [last, mean];
+        // Before the third block there is nothing to compare with.
+        if self.readings < BEGINNING + 3 * BLOCK {
+            0.0
+        } else {
+            (mean[0] - before[0]).powi(2) + (mean[1] - before[1]).powi(2)
+        }
     }
 
     /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
@@ -183,7 +214,7 @@ impl FlowMonitor {
         self.tilt *= forget;
         let [mut difference, mut motion, mut picture] = [0.0; 3];
         let begins = self.readings < BEGINNING;
-        self.readings += u32::from(begins);
+        self.readings = self.readings.wrapping_add(1);
         for axis in 0..2 {
             self.flow[axis] = (self.flow[axis] + velocity[axis] - last[axis]) * fade;
             self.inertial[axis] = (self.inertial[axis] + change[axis] - self.added[axis] * dt) * fade;
@@ -194,6 +225,7 @@ impl FlowMonitor {
                 self.flow[axis] -= if self.readings == BEGINNING { self.apart[axis] } else { 0.0 };
             } else {
                 self.difference[axis] += (apart - self.difference[axis]) * smooth;
+                self.sum[axis] += apart / BLOCK as f32;
             }
             difference += self.difference[axis] * self.difference[axis];
             motion += self.inertial[axis] * self.inertial[axis];
@@ -214,6 +246,8 @@ impl FlowMonitor {
         }
         let blind = self.zeros >= ZEROS && self.turned > TURNED && self.turned * distance > COMPENSATED;
         let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
+        let (jump, jumping) = (self.jump(begins), JUMP + JUMP_PER_METRE * distance);
+        let jumps = distance > SHARP && jump > jumping * jumping + share * share * picture;
         // Of squares: a sum would do as well, and costs a root.
         let limit = base * base + share * share * picture + tilt * tilt;
         self.differs = if difference > limit { self.differs + interval } else { 0.0 };
@@ -226,7 +260,10 @@ impl FlowMonitor {
             return false;
         }
         self.waits = (self.waits - interval).max(0.0);
-        self.implausible = (self.differs > LASTS && self.waits == 0.0) || self.repeats >= REPEATED || blind;
+        self.implausible = (self.differs > LASTS && self.waits == 0.0)
+            || (jumps && self.waits == 0.0)
+            || self.repeats >= REPEATED
+            || blind;
         self.agrees = 0.0;
         self.implausible
     }
