@@ -185,8 +185,9 @@ impl CascadeController {
         let per_weight = 1.0 / carried;
         let (mut x, mut y) = (demand.x * per_weight, demand.y * per_weight);
         let slope_squared = x * x + y * y;
-        if slope_squared > self.tan_tilt_max * self.tan_tilt_max {
-            let shorten = self.tan_tilt_max / math::sqrt(slope_squared);
+        let tan_max = self.tan_tilt_max.min(intent.tan_tilt_max);
+        if slope_squared > tan_max * tan_max {
+            let shorten = tan_max / math::sqrt(slope_squared);
             (x, y) = (x * shorten, y * shorten);
         }
         let scale = 1.0 / math::sqrt(1.0 + x * x + y * y);

@@ -165,7 +165,7 @@ impl GeometricController {
             | Horizontal::Velocity
             | Horizontal::Rates { .. }
             | Horizontal::Damp
-            | Horizontal::Nothing => (demand.x, demand.y, self.tan_tilt_max),
+            | Horizontal::Nothing => (demand.x, demand.y, self.tan_tilt_max.min(intent.tan_tilt_max)),
         };
         let length = math::sqrt(x * x + y * y);
         let scale = if length > tan_max * up { tan_max * up / length } else { 1.0 };

@@ -31,7 +31,13 @@ pub struct Intent {
     pub heading: Heading,
     /// The vehicle touches the ground: integrators would learn the ground's push, so they must not move.
     pub grounded: bool,
+    /// Tangent of the largest tilt for a place or a velocity: [`SETTLING`] while thrust is taken away to find the ground. A
+    /// vehicle that stands on one leg leans on, whatever is asked, and falls over it; steady wind needs less.
+    pub tan_tilt_max: f32,
 }
+
+/// Tangent of the largest tilt of a vehicle that settles on the ground: 6°.
+const SETTLING: f32 = 0.1;
 
 /// What roll and pitch are for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,7 +145,14 @@ impl Intent {
         } else {
             Heading::Stick(stick(input.command.yaw))
         };
-        Some(Self { horizontal, vertical, heading, grounded: input.land_detected.contact == GroundContact::Ground })
+        let settles = input.flight_status.phase == FlightPhase::Landing && input.land_detected.thrust_ceiling < 1.0;
+        Some(Self {
+            horizontal,
+            vertical,
+            heading,
+            grounded: input.land_detected.contact == GroundContact::Ground,
+            tan_tilt_max: if settles { SETTLING } else { f32::INFINITY },
+        })
     }
 }
 

@@ -70,6 +70,8 @@ const BLOCK: u32 = 5;
 /// Largest jump of such a mean, m/s, and for each metre of distance: 1 m/s² over 0.15 s, and the picture's noise.
 const JUMP: f32 = 0.2;
 const JUMP_PER_METRE: f32 = 0.5;
+/// A jump convicts flow after this time, s: one of the gyro's zero looks the same, and is found and undone until then.
+const JUMP_WAITS: f32 = 0.1;
 
 /// What is remembered of flow and acceleration, horizontal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,6 +95,8 @@ pub(super) struct FlowMonitor {
     /// The last two means of [`BLOCK`] differences, and the sum of the next.
     means: [[f32; 2]; 2],
     sum: [f32; 2],
+    /// Time since a jump, s, while it is none of the gyro's.
+    jumped: Option<f32>,
     difference: [f32; 2],
     differs: f32,
     agrees: f32,
@@ -150,7 +154,7 @@ impl FlowMonitor {
     pub(super) fn forget(&mut self) {
         (self.flow, self.inertial, self.difference) = Default::default();
         (self.differs, self.agrees) = (0.0, 0.0);
-        (self.readings, self.apart, self.sum, self.means) = Default::default();
+        (self.readings, self.apart, self.sum, self.means, self.jumped) = Default::default();
     }
 
     /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
@@ -247,7 +251,8 @@ impl FlowMonitor {
         let blind = self.zeros >= ZEROS && self.turned > TURNED && self.turned * distance > COMPENSATED;
         let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
         let (jump, jumping) = (self.jump(begins), JUMP + JUMP_PER_METRE * distance);
-        let jumps = distance > SHARP && jump > jumping * jumping + share * share * picture;
+        let jumps = distance > SHARP && self.waits == 0.0 && jump > jumping * jumping + share * share * picture;
+        self.jumped = self.jumped.map(|time| time + interval).or(jumps.then_some(0.0));
         // Of squares: a sum would do as well, and costs a root.
         let limit = base * base + share * share * picture + tilt * tilt;
         self.differs = if difference > limit { self.differs + interval } else { 0.0 };
@@ -261,7 +266,7 @@ impl FlowMonitor {
         }
         self.waits = (self.waits - interval).max(0.0);
         self.implausible = (self.differs > LASTS && self.waits == 0.0)
-            || (jumps && self.waits == 0.0)
+            || self.jumped > Some(JUMP_WAITS)
             || self.repeats >= REPEATED
             || blind;
         self.agrees = 0.0;
