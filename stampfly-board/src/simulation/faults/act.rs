@@ -45,7 +45,9 @@ impl Thing {
     pub(super) fn put(self, scene: &mut Scene, motion: &Motion, share: f64) {
         let there = share > 0.0;
         match self {
-            Self::Edge(drop) => scene.edge = there.then(|| (Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
+            // It stays: a floor that came back would strike what is below it.
+            Self::Edge(drop) if there => scene.edge = Some((Beyond::ahead_of(motion, EDGE_AHEAD), drop)),
+            Self::Edge(_) => {}
             Self::Slope(rise) => {
                 if scene.slope == [0.0; 2] {
                     scene.pivot = [motion.position.x, motion.position.y];

@@ -72,7 +72,7 @@ pub const FAULTS: &[FaultKind] = &[
     plain("floor-dark", Landed, "The flow sensor sees no features and says so."),
     number("floor-moves", ("m/s", 0.3, -3.0, 3.0), Landed, "The floor moves north at this speed."),
     number("slope", ("", 0.2, -2.0, 2.0), Degraded, "The floor rises by this for each metre to the north."),
-    number("edge", ("m", 0.7, -0.5, 3.0), Degraded, "From 0.3 m ahead on, the floor is lower by this."),
+    number("edge", ("m", 0.7, -0.5, 3.0), Degraded, "From 0.3 m ahead on, the floor is lower by this, for good."),
     number("ceiling", ("m", 0.2, 0.02, 10.0), Cut, "There is a ceiling this far above the vehicle."),
     number("wall", ("m", 0.4, 0.05, 10.0), Cut, "There is a wall this far ahead of the vehicle."),
     number("hand", ("s", 3.0, 0.1, 600.0), Landed, "A hand holds the vehicle where it is for this long."),
