@@ -1,6 +1,7 @@
 //! A body with a weight, a floor and rotors that lag, below a manager that is told the truth, or is not.
 
 use super::*;
+use stampfly_types::messages::Validity;
 use stampfly_types::{GRAVITY, Vec3, math};
 
 const DT: f32 = 0.0025;
