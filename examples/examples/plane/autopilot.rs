@@ -13,14 +13,18 @@ const LARGEST: f32 = 20.0 / 180.0 * core::f32::consts::PI;
 const PITCH_GAIN: f32 = core::f32::consts::PI / 180.0;
 /// Throttle for an error of the airspeed, s/m.
 const THROTTLE_GAIN: f32 = 0.8;
-/// How much it turns towards a line, 1/m.
+/// How much it turns towards a line, 1/m: in the air, and on its wheels.
 const LINE_GAIN: f32 = 0.01;
+const LINE_GAIN_WHEELS: f32 = 0.2;
 
 /// The controls that bring about the demand.
 pub fn steer(demand: &Demand, motion: &Motion) -> Controls {
     let here = motion.position;
     let (wanted, present) = match demand.course {
-        Course::Along(from, to) => (along(from, to, here), motion.track()),
+        Course::Along(from, to) => {
+            let gain = if motion.on_ground { LINE_GAIN_WHEELS } else { LINE_GAIN };
+            (along(from, to, here, gain), motion.track())
+        }
         Course::To(goal) => (here.direction(goal), motion.track()),
         Course::Track(track) => (track, motion.track()),
         Course::Heading(heading) => (heading, motion.heading),
@@ -44,8 +48,8 @@ pub fn steer(demand: &Demand, motion: &Motion) -> Controls {
 }
 
 /// The track that leads to the line and along it.
-fn along(from: Point, to: Point, here: Point) -> f32 {
+fn along(from: Point, to: Point, here: Point, gain: f32) -> f32 {
     let course = from.direction(to);
     let aside = from.distance(here) * math::sin(from.direction(here) - course);
-    course - math::atan2(LINE_GAIN * aside, 1.0)
+    course - math::atan2(gain * aside, 1.0)
 }

@@ -73,11 +73,6 @@ impl Motion {
         if self.airspeed < 0.1 { self.heading } else { math::atan2(east, north) }
     }
 
-    /// m/s.
-    pub fn sink_rate(&self) -> f32 {
-        -self.airspeed * math::sin(self.path)
-    }
-
     /// The next `dt` seconds.
     pub fn step(&mut self, controls: &Controls, dt: f32) {
         let pressure = 0.5 * AIR * self.airspeed * self.airspeed * WING;
@@ -89,7 +84,7 @@ impl Motion {
         let pull = THRUST * controls.throttle - drag;
         if self.on_ground {
             let load = (MASS * GRAVITY - lift).max(0.0);
-            let friction = if controls.brake { BRAKING } else { ROLLING } * MASS * GRAVITY.min(load / MASS + 1.0);
+            let friction = if controls.brake { BRAKING } else { ROLLING } * load;
             self.airspeed = (self.airspeed + (pull - friction) / MASS * dt).max(0.0);
             let turn = (2.0 * controls.steering).clamp(-WHEELS, WHEELS);
             self.heading += if self.airspeed > 0.2 { turn * dt } else { 0.0 };
@@ -109,7 +104,7 @@ impl Motion {
         self.position.altitude += self.airspeed * math::sin(self.path) * dt;
         if self.position.altitude <= self.field {
             self.position.altitude = self.field;
-            self.on_ground |= self.path <= 0.0;
+            self.on_ground |= self.path < 0.0;
         }
     }
 }

@@ -113,7 +113,7 @@ impl Stage<Taxiing> for Hold {
     }
 
     fn execute(&mut self, _: &mut Taxiing, _: Instant, seen: &Seen<'_>) -> Step<Taxiing> {
-        if seen.cleared {
+        if seen.cleared && seen.airspeed < 0.5 {
             return Step::End(TaxiingEnd::Cleared);
         }
         Step::Stay(stand(seen))
