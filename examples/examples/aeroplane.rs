@@ -175,22 +175,45 @@ mod tests {
         assert!(off_slope < 3.0, "{off_slope} m");
     }
 
-    #[test]
-    fn a_landing_that_floats_goes_round() {
-        let mut flight = Flight::new();
-        flight.reach("Landing/Flare");
-        let held = flight.motion;
-        let mut places = vec![flight.place()];
-        for _ in 0..1_100 {
-            // A wind from below holds it up, at its speed.
-            flight.motion.position.altitude = held.position.altitude;
-            flight.motion.airspeed = held.airspeed;
+    /// Where it goes in this time when something outside changes its motion before every step.
+    fn disturbed(flight: &mut Flight, seconds: u64, disturb: impl Fn(&mut Motion)) -> Vec<String> {
+        let (mut places, end) = (vec![flight.place()], flight.now + Duration::from_secs(seconds));
+        while flight.now < end {
+            disturb(&mut flight.motion);
             flight.step(true);
             if places.last() != Some(&flight.place()) {
                 places.push(flight.place());
             }
         }
+        places
+    }
+
+    #[test]
+    fn a_landing_that_floats_goes_round() {
+        let mut flight = Flight::new();
+        flight.reach("Landing/Flare");
+        let held = flight.motion;
+        // A wind from below holds it up, at its speed.
+        let places = disturbed(&mut flight, 22, |motion| {
+            (motion.position.altitude, motion.airspeed) = (held.position.altitude, held.airspeed);
+        });
         assert_eq!(places, ["Landing/Flare", "TakeOff/Climb"], "fast enough, it does not roll");
+    }
+
+    #[test]
+    fn a_take_off_that_does_not_climb_lands() {
+        let mut flight = Flight::new();
+        flight.reach("TakeOff/Climb");
+        let places = disturbed(&mut flight, 61, |motion| motion.position.altitude = FIELD + 20.0);
+        assert_eq!(places, ["TakeOff/Climb", "Landing/Transition"]);
+    }
+
+    #[test]
+    fn an_aeroplane_that_does_not_move_is_parked() {
+        let mut flight = Flight::new();
+        flight.step(true);
+        let places = disturbed(&mut flight, 700, |motion| motion.airspeed = 0.0);
+        assert_eq!(places, ["TakeOff/Roll", "Taxiing/Return", "Taxiing/Park"]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ const APPROACH: f32 = 1.3 * STALL;
 const FLARE: f32 = 10.0;
 const DECRAB: f32 = 5.0;
 const TOUCHDOWN: f32 = 2.0;
-/// The slope begins within this angle of the runway, rad: 30°.
+/// The slope begins within this angle of the runway, rad: 30°, as the original's comment says. Its code says 80°.
 const GATE: f32 = core::f32::consts::FRAC_PI_6;
 /// The transition turns in within this distance of the slope's beginning, m.
 const TURN_IN: f32 = 60.0;

@@ -1,7 +1,8 @@
 //! An aeroplane: what its modes are told, what they demand, and which mode follows which.
 //!
 //! This file is the whole table. Each mode is a file of its own, names no other one, and was added from outside of the crate
-//! that runs them.
+//! that runs them. Speeds, heights and angles are those of the public path manager of ZeroPilot, branch `pathManRestructure`, where
+//! no comment says otherwise; times are chosen, several times what a stage needs.
 
 pub mod autopilot;
 pub mod cruising;

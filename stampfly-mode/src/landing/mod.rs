@@ -104,10 +104,10 @@ impl TakeoffLanding {
                 self.weight.begin_landing();
             }
         }
-        let (config, estimate) = (self.config, input.estimate);
+        let estimate = input.estimate;
         let weight = self.weight.step(now, -estimate.specific_force.z, input.demand.thrust, self.is_testing);
         let seen = Seen {
-            config: &config,
+            config: &self.config,
             phase: input.phase,
             estimate,
             setpoint: input.setpoint,

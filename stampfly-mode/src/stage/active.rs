@@ -7,8 +7,8 @@ use super::traits::{Failure, HandOver, Input, Limit, Memory, Mode, Output, Stage
 use core::fmt;
 use stampfly_types::Instant;
 
-/// Hand-overs in one cycle; more are a circle. A chain of stages that have nothing to do is shorter.
-const HAND_OVERS: usize = 8;
+/// Hand-overs in one cycle on one level; more are a circle. A chain of stages that have nothing to do is shorter.
+const HAND_OVERS: u8 = 8;
 
 /// A mode that has been entered and not been left, in its current stage. Only a [`Selector`](super::Selector), or an active
 /// mode above it, can make one.
@@ -60,9 +60,12 @@ impl<M: Mode> Active<M> {
             Limit::End(time, end) if age >= time => Step::End(end),
             Limit::Stage(..) | Limit::End(..) | Limit::Unlimited(_) => self.execute(now, input),
         };
-        for _ in 0..HAND_OVERS {
+        let mut left = HAND_OVERS;
+        loop {
             match step {
+                Step::Stage(_) if left == 0 => return Ran::Failed(Failure::Circle),
                 Step::Stage(next) => {
+                    left -= 1;
                     self.change(next, now, input);
                     step = self.execute(now, input);
                 }
@@ -71,7 +74,6 @@ impl<M: Mode> Active<M> {
                 Step::Fail(failure) => return Ran::Failed(failure),
             }
         }
-        Ran::Failed(Failure::Circle)
     }
 
     fn execute(&mut self, now: Instant, input: &Input<'_, M>) -> Step<M> {

@@ -12,7 +12,7 @@
 //! * `enter` comes once before the first `execute`, `exit` once after the last: at a change of stage, a hand-over, a time-out,
 //!   a switch, an abort. A mode is entered before its stage and left after it.
 //! * A stage says in one cycle either what it demands or what comes next. Then its successor is entered and makes the demand
-//!   of the same cycle, so no demand is lost, late or mixed. After eight hand-overs the cycle fails.
+//!   of the same cycle, so no demand is lost, late or mixed. After more than eight hand-overs the cycle fails.
 //! * Every stage has a limit of time, or says why it has none. Limits are looked at before `execute`.
 //! * A stage can change to a stage of its own mode only; a mode does not name another. It says how it has ended, and the
 //!   vehicle's [`HandOver`]s say what follows. The compiler refuses a table with a hole.

@@ -278,6 +278,12 @@ fn a_stage_ends_by_itself_when_its_time_is_over() {
 #[test]
 fn a_circle_is_a_failure_and_not_the_end() {
     let journal = RefCell::default();
+    let chain = |changes| World {
+        acts: RefCell::new([Act::Stay].into_iter().chain([Act::To(1)].repeat(changes)).collect()),
+        journal: &journal,
+    };
+    assert_eq!(Selector::<Play>::new().execute(Instant::ZERO, &chain(8)), Ok((0, 1)));
+    assert_eq!(Selector::<Play>::new().execute(Instant::ZERO, &chain(9)), Err(Failure::Circle));
     let circle = World { acts: RefCell::new([Act::To(0), Act::To(1)].repeat(20)), journal: &journal };
     let mut selector = Selector::<Play>::new();
     assert_eq!(selector.execute(Instant::ZERO, &circle), Err(Failure::Circle));

@@ -72,7 +72,7 @@ pub enum Step<M: Mode> {
     Stage(M::Stage),
     /// Its mode has ended.
     End(M::End),
-    /// It cannot go on with this input. It stays the current stage until somebody switches or aborts.
+    /// It cannot go on with this input. It stays the current stage, and is executed again in the next cycle.
     Fail(Failure),
 }
 
