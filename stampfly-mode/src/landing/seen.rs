@@ -39,21 +39,20 @@ impl Seen<'_> {
 
     /// Nothing new, and no limit of thrust.
     pub fn asked(&self) -> Asked {
+        self.touching(self.contact)
+    }
+
+    /// The same, with this contact.
+    pub fn touching(&self, contact: GroundContact) -> Asked {
         Asked {
             land_detected: LandDetected {
-                contact: self.contact,
+                contact,
                 thrust_ceiling: f32::MAX,
                 descent_rate: self.config.descent,
                 ..LandDetected::default()
             },
             is_testing: false,
         }
-    }
-
-    /// The same, with this contact.
-    pub fn touching(&self, contact: GroundContact) -> Asked {
-        let asked = self.asked();
-        Asked { land_detected: LandDetected { contact, ..asked.land_detected }, ..asked }
     }
 }
 
