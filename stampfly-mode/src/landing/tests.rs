@@ -252,6 +252,25 @@ fn the_second_flight_goes_through_the_same_stages_as_the_first() {
 }
 
 #[test]
+fn a_take_off_counts_from_its_phase_and_not_from_arming() {
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    let mut step = |seconds, phase, height| {
+        let estimate = StateEstimate { height, valid: Validity::ALL, ..Default::default() };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput::default());
+        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+        manager.step(Instant::from_secs(seconds), &input)
+    };
+    assert_eq!(step(0, FlightPhase::Armed, 0.0).thrust_ceiling, f32::MAX);
+    let config = LandingConfig::default();
+    let lift_off = step(5, FlightPhase::TakeOff, 0.04);
+    assert_eq!(lift_off.thrust_ceiling, config.takeoff_ceiling);
+    let later = step(6, FlightPhase::TakeOff, 0.08);
+    assert_eq!(later.contact, GroundContact::Ground, "by 4 cm");
+    assert_eq!(later.thrust_ceiling, config.takeoff_ceiling + config.takeoff_ceiling_rise);
+    assert_eq!(step(6, FlightPhase::TakeOff, 0.1).contact, GroundContact::Air);
+}
+
+#[test]
 fn a_blind_landing_stays_blind_and_the_next_one_sees() {
     let mut manager = TakeoffLanding::new(LandingConfig::default());
     let landing = [(FlightPhase::Landing, 1.0, 0.3)];
