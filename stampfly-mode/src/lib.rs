@@ -8,6 +8,7 @@
 //! | [`arming`] | whether the motors may be armed, and if not, why | inside the machine |
 //! | [`failsafe`] | what is wrong: detects, never acts | 400 Hz |
 //! | [`landing`] | contact with the ground, take-off and landing | 400 Hz |
+//! | [`stage`] | what comes next: modes and their stages, for any vehicle | by its user |
 //! | [`authority`] | the sticks of the commander | 50 Hz |
 //! | [`button`] | what a press meant | 50 Hz |
 //! | [`signal`] | what people see and hear | 30 Hz |
@@ -32,6 +33,7 @@ mod lasting;
 pub mod machine;
 mod pilot;
 pub mod signal;
+pub mod stage;
 mod state;
 mod stop_button;
 pub mod transitions;

@@ -33,26 +33,29 @@ const SETTLE: Duration = Duration::from_millis(60);
 const TEST: Duration = Duration::from_millis(85);
 
 /// A descent without height and climb rate.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BlindDescent {
-    began: Option<Instant>,
+    began: Instant,
     /// When the last test began.
-    tested: Option<Instant>,
+    tested: Instant,
     is_testing: bool,
     stands: Option<Instant>,
 }
 
 impl BlindDescent {
+    /// One that begins.
+    pub const fn new(now: Instant) -> Self {
+        Self { began: now, tested: now, is_testing: false, stands: None }
+    }
+
     /// The ceiling of thrust as a share of hover thrust, and whether the vehicle has stood for `touchdown_time`.
     /// `weight` is what the weight test said in this step.
     pub fn step(&mut self, now: Instant, weight: Answers, touchdown_time: Duration) -> (f32, bool) {
-        let began = *self.began.get_or_insert(now);
-        let tested = *self.tested.get_or_insert(now);
-        if !self.is_testing && now.since(tested) >= PAUSE {
-            (self.is_testing, self.tested, self.stands) = (true, Some(now), None);
+        if !self.is_testing && now.since(self.tested) >= PAUSE {
+            (self.is_testing, self.tested, self.stands) = (true, now, None);
         }
-        let age = now.since(self.tested.unwrap_or(now));
+        let age = now.since(self.tested);
         if self.is_testing && age >= SETTLE {
             let standing = lasting(&mut self.stands, now, weight.quick == Support::Stands);
             if standing >= touchdown_time {
@@ -62,7 +65,7 @@ impl BlindDescent {
                 self.is_testing = false;
             }
         }
-        let share = (FIRST_SHARE - FALL * now.since(began).seconds()).max(LEAST_SHARE);
+        let share = (FIRST_SHARE - FALL * now.since(self.began).seconds()).max(LEAST_SHARE);
         (if self.is_testing { TEST_SHARE } else { share }, false)
     }
 

@@ -1,7 +1,11 @@
 //! A body with a weight, a floor and rotors that lag, below a manager that is told the truth, or is not.
 
 use super::*;
+use stampfly_types::messages::Validity;
 use stampfly_types::{GRAVITY, Vec3, math};
+use std::string::{String, ToString};
+use std::vec;
+use std::vec::Vec;
 
 const DT: f32 = 0.0025;
 /// Of the motors, s.
@@ -201,4 +205,78 @@ fn a_vehicle_that_is_held_never_completes_its_take_off() {
         let land_detected = manager.step(Instant::from_micros(2_500 * k), &input);
         assert!(!land_detected.takeoff_complete && land_detected.contact == GroundContact::Ground);
     }
+}
+
+/// The stages that a manager goes through, from step to step of this table: phase, height, m, and rate of descent, m/s.
+fn stages(manager: &mut TakeoffLanding, steps: &[(FlightPhase, f32, f32)], valid: Validity) -> Vec<String> {
+    let mut told = vec![];
+    for (k, &(phase, height, sink_rate)) in steps.iter().enumerate() {
+        let estimate = StateEstimate {
+            height,
+            velocity: Vec3::new(0.0, 0.0, sink_rate),
+            specific_force: Vec3::new(0.0, 0.0, -GRAVITY),
+            valid,
+            ..Default::default()
+        };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
+        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+        manager.step(Instant::from_micros(2_500 * k as u64), &input);
+        told.push(manager.stage().to_string());
+    }
+    told
+}
+
+#[test]
+fn the_second_flight_goes_through_the_same_stages_as_the_first() {
+    use FlightPhase::{Armed, Flying, IdleGround, Landing, TakeOff};
+    let flight = [
+        (IdleGround, 0.03, 0.0, "Stand"),
+        (Armed, 0.03, 0.0, "TakeOff/SpoolUp"),
+        (TakeOff, 0.03, 0.0, "TakeOff/LiftOff"),
+        (TakeOff, 0.1, -0.4, "TakeOff/Climb"),
+        (Flying, 1.0, 0.0, "Fly"),
+        (Landing, 1.0, 0.3, "Landing/Descend"),
+        (Landing, 0.2, 0.2, "Landing/Flare"),
+        (Landing, 0.04, 0.15, "Landing/Touchdown"),
+        // It bounces, and a gust takes it up.
+        (Landing, 0.1, -0.1, "Landing/Flare"),
+        (Landing, 0.4, -0.3, "Landing/Descend"),
+        (Landing, 0.04, 0.3, "Landing/Touchdown"),
+    ];
+    let (steps, names): (Vec<_>, Vec<_>) =
+        flight.map(|(phase, height, sink_rate, name)| ((phase, height, sink_rate), name)).into_iter().unzip();
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    for _ in 0..2 {
+        assert_eq!(stages(&mut manager, &steps, Validity::ALL), names);
+    }
+}
+
+#[test]
+fn a_take_off_counts_from_its_phase_and_not_from_arming() {
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    let mut step = |seconds, phase, height| {
+        let estimate = StateEstimate { height, valid: Validity::ALL, ..Default::default() };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput::default());
+        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+        manager.step(Instant::from_secs(seconds), &input)
+    };
+    assert_eq!(step(0, FlightPhase::Armed, 0.0).thrust_ceiling, f32::MAX);
+    let config = LandingConfig::default();
+    let lift_off = step(5, FlightPhase::TakeOff, 0.04);
+    assert_eq!(lift_off.thrust_ceiling, config.takeoff_ceiling);
+    let later = step(6, FlightPhase::TakeOff, 0.08);
+    assert_eq!(later.contact, GroundContact::Ground, "by 4 cm");
+    assert_eq!(later.thrust_ceiling, config.takeoff_ceiling + config.takeoff_ceiling_rise);
+    assert_eq!(step(6, FlightPhase::TakeOff, 0.1).contact, GroundContact::Air);
+}
+
+#[test]
+fn a_blind_landing_stays_blind_and_the_next_one_sees() {
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    let landing = [(FlightPhase::Landing, 1.0, 0.3)];
+    assert_eq!(stages(&mut manager, &landing, Validity::ALL), ["Landing/Descend"]);
+    assert_eq!(stages(&mut manager, &landing, Validity::TILT), ["Landing/Blind"]);
+    assert_eq!(stages(&mut manager, &landing, Validity::ALL), ["Landing/Blind"]);
+    assert_eq!(stages(&mut manager, &[(FlightPhase::IdleGround, 0.03, 0.0)], Validity::ALL), ["Stand"]);
+    assert_eq!(stages(&mut manager, &landing, Validity::ALL), ["Landing/Descend"]);
 }
