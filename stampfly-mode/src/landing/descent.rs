@@ -28,6 +28,9 @@ use stampfly_types::{Duration, Instant};
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
 const FREE_FALL: Duration = Duration::from_millis(250);
+/// So is one that falls for this long and sinks faster than it descends by this, m/s: the climb rate says the same.
+const FAST_FALL: Duration = Duration::from_millis(60);
+const FAST: f32 = 0.1;
 
 /// The ground carries a vehicle that keeps its specific force without its thrust for this long.
 const CARRIED: Duration = Duration::from_secs(1);
@@ -92,7 +95,9 @@ impl Landing {
 
     /// A cycle of a stage that knows its climb rate.
     fn step(&mut self, now: Instant, seen: &Seen<'_>, mut asked: Asked) -> Step<Self> {
-        self.falls = lasting(&mut self.falling, now, seen.weight.quick == Support::Falls) >= FREE_FALL;
+        let fast = seen.sink_rate().is_some_and(|rate| rate > seen.config.descent + FAST);
+        let enough = if fast { FAST_FALL } else { FREE_FALL };
+        self.falls = lasting(&mut self.falling, now, seen.weight.quick == Support::Falls) >= enough;
         asked.is_testing &= !self.falls;
         let still = lasting(&mut self.still, now, seen.weight.steady == Support::Stands);
         let landed = !self.falls && still >= seen.config.touchdown_time;
