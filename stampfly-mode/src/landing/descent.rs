@@ -28,9 +28,11 @@ use stampfly_types::{Duration, Instant};
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
 const FREE_FALL: Duration = Duration::from_millis(250);
-/// So is one that falls for this long and sinks faster than it descends by this, m/s: the climb rate says the same.
-const FAST_FALL: Duration = Duration::from_millis(60);
+/// So is one that sinks faster than it descends by this, m/s, for this long, at no more than this share of its thrust: from 8 cm
+/// it would be on the ground before so much of its thrust is gone. The weight test alone is late, because drag carries a part.
 const FAST: f32 = 0.1;
+const FAST_FALL: Duration = Duration::from_millis(60);
+const RAMPED: f32 = 0.9;
 
 /// The ground carries a vehicle that keeps its specific force without its thrust for this long.
 const CARRIED: Duration = Duration::from_secs(1);
@@ -48,6 +50,8 @@ pub struct Landing {
     still: Option<Instant>,
     /// It falls.
     falling: Option<Instant>,
+    /// It sinks fast under a ceiling.
+    fast: Option<Instant>,
     /// Something else than its thrust carries it.
     carried: Option<Instant>,
     /// It has fallen for so long that neither height nor climb rate is to be believed. The next cycle is blind.
@@ -61,7 +65,7 @@ impl Mode for Landing {
     const FIRST: LandingStage = LandingStage::Descend;
 
     fn enter(_: Instant, _: &Seen<'_>) -> Self {
-        Self { stalled: None, still: None, falling: None, carried: None, falls: false }
+        Self { stalled: None, still: None, falling: None, fast: None, carried: None, falls: false }
     }
 }
 
@@ -95,9 +99,10 @@ impl Landing {
 
     /// A cycle of a stage that knows its climb rate.
     fn step(&mut self, now: Instant, seen: &Seen<'_>, mut asked: Asked) -> Step<Self> {
-        let fast = seen.sink_rate().is_some_and(|rate| rate > seen.config.descent + FAST);
-        let enough = if fast { FAST_FALL } else { FREE_FALL };
-        self.falls = lasting(&mut self.falling, now, seen.weight.quick == Support::Falls) >= enough;
+        let sinks = seen.sink_rate().is_some_and(|rate| rate > seen.config.descent + FAST);
+        let fast = sinks && asked.land_detected.thrust_ceiling < RAMPED && seen.weight.steady != Support::Stands;
+        self.falls = lasting(&mut self.falling, now, seen.weight.quick == Support::Falls) >= FREE_FALL
+            || lasting(&mut self.fast, now, fast) >= FAST_FALL;
         asked.is_testing &= !self.falls;
         let still = lasting(&mut self.still, now, seen.weight.steady == Support::Stands);
         let landed = !self.falls && still >= seen.config.touchdown_time;

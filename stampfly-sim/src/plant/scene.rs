@@ -76,9 +76,11 @@ impl Scene {
     pub fn floor(&self, place: &Vector3<f64>) -> f64 {
         let level = match &self.edge {
             Some((beyond, drop)) => {
-                let (here, there) = if beyond.depth(place) > 0.0 { (*drop, 0.0) } else { (0.0, *drop) };
-                // What is under the upper floor already is not thrown up through it.
-                if place.z > here + OVERHANG { here.max(there) } else { here }
+                let inside = beyond.depth(place);
+                let (here, there) = if inside > 0.0 { (*drop, 0.0) } else { (0.0, *drop) };
+                // What is under the upper floor already is not thrown up through it, and what is deeper below it than behind
+                // its face is at the face, which pushes it out.
+                if place.z > here + OVERHANG.min(inside.abs()) { here.max(there) } else { here }
             }
             None => 0.0,
         };
@@ -107,7 +109,14 @@ impl Scene {
     pub(super) fn inside(&self, place: &Vector3<f64>) -> impl Iterator<Item = (f64, Vector3<f64>)> {
         let ceiling = self.ceiling.map(|height| (-place.z - height, Vector3::new(0.0, 0.0, 1.0)));
         let wall = self.wall.map(|wall| (wall.depth(place), Vector3::new(-wall.ahead[0], -wall.ahead[1], 0.0)));
-        [ceiling, wall].into_iter().flatten().filter(|(depth, _)| *depth > 0.0)
+        let face = self.edge.and_then(|(beyond, drop)| {
+            // The upper floor's face looks ahead where the floor is lower there.
+            let (inside, out) = if drop > 0.0 { (-beyond.depth(place), 1.0) } else { (beyond.depth(place), -1.0) };
+            let below = place.z - drop.min(0.0);
+            let strikes = below > inside && self.floor(place) > drop.min(0.0);
+            strikes.then_some((inside, Vector3::new(out * beyond.ahead[0], out * beyond.ahead[1], 0.0)))
+        });
+        [ceiling, wall, face].into_iter().flatten().filter(|(depth, _)| *depth > 0.0)
     }
 
     /// Is the floor where it is by default?
