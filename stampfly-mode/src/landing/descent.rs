@@ -83,6 +83,8 @@ crate::stages! {
 
 impl Landing {
     /// The stage that fits. The same answer, asked again in the same cycle.
+    // Three stages ask this; inlined, three copies of it lie in flash.
+    #[inline(never)]
     fn stage(&mut self, now: Instant, seen: &Seen<'_>) -> LandingStage {
         let config = seen.config;
         let Some(sink_rate) = seen.sink_rate().filter(|_| !self.falls) else {
@@ -98,6 +100,8 @@ impl Landing {
     }
 
     /// A cycle of a stage that knows its climb rate.
+    // As above.
+    #[inline(never)]
     fn step(&mut self, now: Instant, seen: &Seen<'_>, mut asked: Asked) -> Step<Self> {
         let sinks = seen.sink_rate().is_some_and(|rate| rate > seen.config.descent + FAST);
         let fast = sinks && asked.land_detected.thrust_ceiling < RAMPED && seen.weight.steady != Support::Stands;
