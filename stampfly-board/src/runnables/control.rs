@@ -4,7 +4,8 @@ use super::command::present;
 use crate::config::{ControllerKind, VehicleConfig};
 use crate::topics::ControlEnds;
 use stampfly_bus::{Activation, Runnable};
-use stampfly_control::{CascadeController, ControlInput, Controller, GeometricController};
+use stampfly_control::indi::IndiRate;
+use stampfly_control::{CascadeController, ControlInput, Controller, GeometricController, IndiController};
 
 /// The controllers this vehicle can be told to use (`controller.type`).
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,7 @@ use stampfly_control::{CascadeController, ControlInput, Controller, GeometricCon
 enum Choice {
     Cascade(CascadeController),
     Geometric(GeometricController),
+    Indi(IndiController),
 }
 
 /// Control: state and set-point in, thrust and torque out.
@@ -28,6 +30,9 @@ impl Control {
     pub fn new(config: &VehicleConfig) -> Self {
         let controller = match config.controller {
             ControllerKind::Geometric => Choice::Geometric(GeometricController::new(&config.geometric)),
+            ControllerKind::Indi => {
+                Choice::Indi(IndiController::with_rate_law(&config.cascade, IndiRate::new(&config.indi)))
+            }
             ControllerKind::Cascade => Choice::Cascade(CascadeController::new(&config.cascade)),
         };
         Self { controller }
@@ -51,6 +56,7 @@ impl Runnable for Control {
         let output = match &mut self.controller {
             Choice::Cascade(controller) => controller.step(activation.now(), &input),
             Choice::Geometric(controller) => controller.step(activation.now(), &input),
+            Choice::Indi(controller) => controller.step(activation.now(), &input),
         };
         ends.control_output.publish(activation.now(), &output);
     }
