@@ -5,6 +5,7 @@ mod black_box;
 mod cameras;
 mod chips;
 mod command_line;
+mod controllers;
 mod determinism;
 mod estimate;
 mod fault_campaign;
