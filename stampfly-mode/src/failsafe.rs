@@ -5,8 +5,8 @@
 //! | alert | condition | clears |
 //! |---|---|---|
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
-//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
-//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, or 14° from how it stood below 0.08 m, for 20 ms while taking off; in ACRO above 120° for a second | disarmed |
+//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, four when they may be garbage | disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, or 14° from how it stood below 0.08 m, for 20 ms while taking off; in ACRO and while it turns over above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, a force that neither gravity nor the thrust explains | disarmed |
@@ -58,7 +58,7 @@ use imu::ImuMonitor;
 use motion::{Contact, MotionMonitor};
 use motors::MotorMonitor;
 use power::PowerMonitor;
-use stampfly_types::messages::{Alerts, ImuData, SelfTestVerdict, SystemAlert};
+use stampfly_types::messages::{Alerts, FlightPhase, ImuData, SelfTestVerdict, SystemAlert};
 use stampfly_types::{Instant, Stamped};
 
 /// The failsafe.
@@ -196,7 +196,9 @@ impl Failsafe {
         self.heard_imu = self.heard_imu.max((*at).min(now));
         let contact = Contact::expected(&self.config, input);
         let noisy = self.active.contains(Alerts::IMU_NOISY);
-        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy);
+        let flips = input.flight_status.phase == FlightPhase::Flip;
+        let rate = if flips { self.config.flip_rate } else { self.config.rate };
+        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy, rate);
         let [mut faulty, noisy] = self.imu.step(&self.config, imu, suspect);
         if !suspect {
             self.attitude.add(&self.config, imu);

@@ -12,6 +12,7 @@ mod fault_campaign;
 mod faults;
 mod figures;
 mod flight_task;
+mod flips;
 mod in_flight;
 mod losses;
 mod made_up;

@@ -57,7 +57,7 @@ impl ForceMonitor {
         let within = |range: &Range<f32>| square > range.start * range.start && square < range.end * range.end;
         let off = match input.flight_status.phase {
             FlightPhase::IdleGround => !within(&STANDING),
-            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => {
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => {
                 let known = config.hover_thrust.is_finite();
                 let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
                 let explained = || {

@@ -141,7 +141,7 @@ impl TakeoffLanding {
                 land_detected.thrust_ceiling = config.takeoff_ceiling + config.takeoff_ceiling_rise * time;
                 land_detected.takeoff_complete = self.take_off(now, input);
             }
-            FlightPhase::Flying => self.contact = GroundContact::Air,
+            FlightPhase::Flying | FlightPhase::Flip => self.contact = GroundContact::Air,
             FlightPhase::Landing => {
                 let climb_known = estimate.valid.contains(Validity::VELOCITY_Z);
                 let landed = if climb_known && self.blind.is_none() {
