@@ -178,19 +178,21 @@ impl FlipSequencer {
         if !(is_known(estimate) && estimate.valid.contains(Validity::HEIGHT)) {
             return Err(FlipRefusal::Estimate);
         }
-        // Comparisons that are false for NaN refuse.
-        if !(estimate.height >= config.height_min) {
+        // Comparisons are false for NaN, and then refuse.
+        let high = estimate.height >= config.height_min;
+        if !high {
             return Err(FlipRefusal::Height);
         }
         let [tilt, rate, drift, climb] = config.steady;
         let down = attitude::down_in_body(&estimate.attitude);
-        let drifts = estimate.valid.contains(Validity::VELOCITY_XY) && !(estimate.velocity.xy().norm() <= drift);
+        let stays = !estimate.valid.contains(Validity::VELOCITY_XY) || estimate.velocity.xy().norm() <= drift;
         let still =
             down.z >= math::cos(tilt) && estimate.angular_rate.norm() <= rate && estimate.velocity.z.abs() <= climb;
-        if !still || drifts {
+        if !(still && stays) {
             return Err(FlipRefusal::Unsteady);
         }
-        if voltage.is_some_and(|voltage| !(voltage >= config.voltage_min)) {
+        let charged = voltage.is_none_or(|voltage| voltage >= config.voltage_min);
+        if !charged {
             return Err(FlipRefusal::Battery);
         }
         (self.pitch, self.sense) = match direction {

@@ -126,7 +126,8 @@ fn a_reset_forgets_what_was_measured() {
     flight.step();
     let remembered = flight.output.torque;
     (flight.state, flight.flight_status, fresh.flight_status) = (fresh.state, reset, reset);
-    (flight.step(), fresh.step());
+    flight.step();
+    fresh.step();
     assert_eq!(flight.output.torque, fresh.output.torque);
     assert!((remembered - fresh.output.torque).norm() > 0.05 * AIRFRAME.rotor_torque().norm());
 }
