@@ -5,7 +5,7 @@
 
 use crate::airframe::{AIRFRAME, GROUND_HEIGHT};
 use stampfly_control::guidance::NavigatorConfig;
-use stampfly_control::{CascadeConfig, GeometricConfig, MotorConfig};
+use stampfly_control::{CascadeConfig, FlipConfig, GeometricConfig, IndiConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 use stampfly_mode::failsafe::WEAK_SHARE;
 use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
@@ -30,6 +30,8 @@ message_enum! {
         Cascade = 0,
         /// Geometric controller.
         Geometric = 1,
+        /// Cascade whose innermost loop is incremental nonlinear dynamic inversion.
+        Indi = 2,
     }
 }
 
@@ -49,6 +51,10 @@ pub struct VehicleConfig {
     pub cascade: CascadeConfig,
     /// Geometric controller.
     pub geometric: GeometricConfig,
+    /// Innermost loop of the incremental controller; its outer loops are those of the cascade.
+    pub indi: IndiConfig,
+    /// Turning over.
+    pub flip: FlipConfig,
     /// Motors and battery.
     pub motor: MotorConfig,
     /// Take-off, route and sticks.
@@ -69,6 +75,7 @@ impl Default for VehicleConfig {
     /// The StampFly as it is built.
     fn default() -> Self {
         let ground_clearance = GROUND_HEIGHT as f32;
+        let flip = FlipConfig::for_airframe(&AIRFRAME);
         let weak = AIRFRAME.rotor_torque() * WEAK_SHARE;
         Self {
             estimator: EstimatorKind::default(),
@@ -77,9 +84,11 @@ impl Default for VehicleConfig {
             complementary: ComplementaryConfig { ground_clearance, ..ComplementaryConfig::default() },
             cascade: CascadeConfig::for_airframe(&AIRFRAME),
             geometric: GeometricConfig::for_airframe(&AIRFRAME),
+            indi: IndiConfig::for_airframe(&AIRFRAME),
+            flip,
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
-            mode: ModeConfig::default(),
+            mode: ModeConfig { flip_height: flip.height_min, ..ModeConfig::default() },
             failsafe: FailsafeConfig {
                 weak_roll: weak.x,
                 weak_pitch: weak.y,

@@ -78,7 +78,7 @@ macro_rules! parameters {
 
 parameters! {
     "estimator.type" [0.0, 1.0] "1" estimator => "0: error-state Kalman filter, 1: complementary filter";
-    "controller.type" [0.0, 1.0] "1" controller => "0: cascade, 1: geometric";
+    "controller.type" [0.0, 2.0] "1" controller => "0: cascade, 1: geometric, 2: cascade with incremental inner loop";
 
     "rate.roll.kp" [0.0, 0.01] "N*m/(rad/s)" cascade.rate.roll.kp => "roll rate gain";
     "rate.roll.ti" [0.01, 100.0] "s" cascade.rate.roll.ti => "roll rate integral time";
@@ -89,6 +89,12 @@ parameters! {
     "rate.yaw.kp" [0.0, 0.01] "N*m/(rad/s)" cascade.rate.yaw.kp => "yaw rate gain";
     "rate.yaw.ti" [0.01, 100.0] "s" cascade.rate.yaw.ti => "yaw rate integral time";
     "rate.yaw.td" [0.0, 1.0] "s" cascade.rate.yaw.td => "yaw rate derivative time";
+    "indi.roll.bandwidth" [5.0, 100.0] "1/s" indi.bandwidth.x => "incremental loop: roll acceleration per rate error";
+    "indi.pitch.bandwidth" [5.0, 100.0] "1/s" indi.bandwidth.y => "incremental loop: pitch acceleration per rate error";
+    "indi.yaw.bandwidth" [2.0, 50.0] "1/s" indi.bandwidth.z => "incremental loop: yaw acceleration per rate error";
+    "indi.roll.smoothing" [0.01, 10.0] "s" indi.smoothing.x => "incremental loop: roll, filter of the increment";
+    "indi.pitch.smoothing" [0.01, 10.0] "s" indi.smoothing.y => "incremental loop: pitch, filter of the increment";
+    "indi.yaw.smoothing" [0.01, 10.0] "s" indi.smoothing.z => "incremental loop: yaw, filter of the increment";
     "attitude.tilt.kp" [0.5, 20.0] "1/s" cascade.attitude.tilt_gain => "tilt gain";
     "attitude.heading.kp" [0.1, 20.0] "1/s" cascade.attitude.heading_gain => "heading gain";
     "position.pos.kp" [0.1, 5.0] "1/s" cascade.position.position_gain => "position gain";
@@ -260,11 +266,16 @@ mod tests {
     #[test]
     fn a_kind_has_no_number_between_its_own() {
         let mut config = VehicleConfig::default();
-        for refused in [0.5, 2.0, -1.0, f32::NAN] {
+        for refused in [0.5, 3.0, -1.0, f32::NAN] {
             assert!(config.set(0, refused).is_err() && config.set(1, refused).is_err(), "{refused}");
         }
         assert_eq!((config.set(0, 1.0), config.set(1, 1.0)), (Ok(()), Ok(())));
         assert_eq!((config.estimator, config.controller), (EstimatorKind::Complementary, ControllerKind::Geometric));
+        assert_eq!(
+            (config.set(0, 2.0), config.set(1, 2.0)),
+            (Err(ParameterError::OutOfRange { min: 0.0, max: 1.0 }), Ok(()))
+        );
+        assert_eq!(config.controller, ControllerKind::Indi);
         assert_eq!((config.set(0, 0.0), config.estimator), (Ok(()), EstimatorKind::Eskf));
     }
 

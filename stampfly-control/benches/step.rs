@@ -4,9 +4,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 
 use stampfly_control::guidance::{Axis, Bounds, Navigator, NavigatorInput};
+use stampfly_control::indi::IndiRate;
 use stampfly_control::{
-    Airframe, CascadeConfig, CascadeController, ControlInput, Controller, GeometricConfig, GeometricController, Mixer,
-    MotorConfig, MotorStage, MultirotorMixer,
+    Airframe, CascadeConfig, CascadeController, ControlInput, Controller, GeometricConfig, GeometricController,
+    IndiConfig, IndiController, Mixer, MotorConfig, MotorStage, MultirotorMixer,
 };
 use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, GuidedCommand, GuidedKind,
@@ -90,6 +91,17 @@ fn control(c: &mut Criterion) {
         b.iter(|| {
             now += Duration::from_micros(2_500);
             mixer.mix(&geometric.step(now, &black_box(input(now, [0.0; 4]))))
+        });
+    });
+    let rate = IndiRate::new(&IndiConfig::for_airframe(&airframe));
+    let mut incremental = IndiController::with_rate_law(&CascadeConfig::for_airframe(&airframe), rate);
+    c.bench_function("incremental and mixer", |b| {
+        let mut unmet = [0.0; 4];
+        b.iter(|| {
+            now += Duration::from_micros(2_500);
+            let mixed = mixer.mix(&incremental.step(now, &black_box(input(now, unmet))));
+            unmet = mixed.unmet;
+            mixed
         });
     });
     let output = cascade.step(now, &input(now, [0.0; 4]));

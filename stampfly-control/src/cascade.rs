@@ -8,6 +8,9 @@
 //!
 //! All loops run every step. The path's derivatives are fed forward at every level they reach (velocity, acceleration,
 //! and the rate at which the acceleration turns the vehicle), so that following a path needs no error to begin with.
+//!
+//! The innermost loop is exchangeable: anything that is a [`RateLaw`]. [`RateController`] is the default,
+//! [`IndiController`](crate::IndiController) the same cascade around another one.
 
 use stampfly_types::messages::{ControlOutput, FlightPhase};
 use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
@@ -19,7 +22,7 @@ use crate::bound::symmetric;
 use crate::controller::{ControlInput, Controller};
 use crate::intent::{Heading, Horizontal, Intent, Vertical};
 use crate::position::{PositionConfig, PositionController};
-use crate::rate::{RateConfig, RateController};
+use crate::rate::{RateConfig, RateController, RateLaw};
 use crate::timing::StepTimer;
 
 /// Gains and limits of all loops.
@@ -99,12 +102,12 @@ const THROTTLE_OFF: f32 = 0.03;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CascadeController {
+pub struct CascadeController<R = RateController> {
     attitude: AttitudeConfig,
     sticks: StickConfig,
     tan_tilt_max: f32,
     sin_lean_max: f32,
-    rate: RateController,
+    rate: R,
     position: PositionController,
     altitude: AltitudeController,
     timer: StepTimer,
@@ -117,12 +120,20 @@ impl CascadeController {
     /// A cascade at rest.
     #[must_use]
     pub fn new(config: &CascadeConfig) -> Self {
+        Self::with_rate_law(config, RateController::new(&config.rate))
+    }
+}
+
+impl<R> CascadeController<R> {
+    /// A cascade at rest around this innermost loop; the gains for the default one are not used.
+    #[must_use]
+    pub fn with_rate_law(config: &CascadeConfig, rate: R) -> Self {
         Self {
             attitude: config.attitude,
             sticks: config.sticks,
             tan_tilt_max: math::tan(config.position.tilt_max),
             sin_lean_max: math::sin(config.sticks.lean_max),
-            rate: RateController::new(&config.rate),
+            rate,
             position: PositionController::new(&config.position),
             altitude: AltitudeController::new(&config.altitude),
             timer: StepTimer::default(),
@@ -199,7 +210,7 @@ impl CascadeController {
     }
 }
 
-impl Controller for CascadeController {
+impl<R: RateLaw> Controller for CascadeController<R> {
     #[inline]
     fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);

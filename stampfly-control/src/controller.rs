@@ -3,6 +3,7 @@
 //! Everything that differs between control laws lives behind [`Controller`]; everything they agree on (which loops
 //! the flight phase, the flight mode and the valid outputs of the estimator call for) is decided once, in
 //! [`crate::intent`]. [`CascadeController`](crate::CascadeController) is the default,
+//! [`IndiController`](crate::IndiController) the same with an innermost loop that learns at once what else turns the vehicle,
 //! [`GeometricController`](crate::GeometricController) the proof that another law fits the same socket.
 
 use stampfly_types::Instant;

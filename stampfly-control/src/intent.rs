@@ -101,7 +101,8 @@ impl Intent {
     pub fn read(input: &ControlInput<'_>) -> Option<Self> {
         let in_motion = match input.flight_status.phase {
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => false,
-            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => true,
+            // Who turns the vehicle over does not ask a control law.
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => true,
         };
         if !(in_motion && input.flight_status.armed) {
             return None;
@@ -282,7 +283,8 @@ mod tests {
             for armed in [false, true] {
                 let mut case = everything();
                 (case.mode.phase, case.mode.armed) = (*phase, armed);
-                let in_motion = matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
+                let still = [FlightPhase::Init, FlightPhase::IdleGround, FlightPhase::IdleHeld, FlightPhase::Armed];
+                let in_motion = !still.contains(phase);
                 assert_eq!(read(&case).is_some(), armed && in_motion, "{phase:?} {armed}");
             }
         }

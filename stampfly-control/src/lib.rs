@@ -9,8 +9,9 @@
 //!
 //! * [`guidance`]: where the vehicle should be, moment by moment;
 //! * [`controller`]: the socket for control laws; [`cascade`] (the default, built from [`rate`], [`attitude`],
-//!   [`position`] and [`altitude`]) and [`geometric`] fit it; [`intent`] tells both what the flight mode and the
-//!   estimator's validity ask for;
+//!   [`position`] and [`altitude`]), the same around [`indi`], and [`geometric`] fit it; [`intent`] tells all of them what the
+//!   flight mode and the estimator's validity ask for;
+//! * [`flip`]: turning over once, for as long as it takes in place of the controller;
 //! * [`airframe`]: the vehicle as a value, from which mixer, controllers and motor stage are configured;
 //! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry;
 //! * [`motor`] and [`curve`]: thrust to duty;
@@ -34,8 +35,10 @@ pub mod cascade;
 pub mod controller;
 pub mod curve;
 pub mod filter;
+pub mod flip;
 pub mod geometric;
 pub mod guidance;
+pub mod indi;
 pub mod intent;
 pub mod mixer;
 pub mod motor;
@@ -50,7 +53,9 @@ pub use airframe::{Airframe, Rotor, Spin};
 pub use cascade::{CascadeConfig, CascadeController, StickConfig};
 pub use controller::{ControlInput, Controller};
 pub use curve::MotorCurve;
+pub use flip::{FlipConfig, FlipController, FlipSequencer};
 pub use geometric::{GeometricConfig, GeometricController};
+pub use indi::{IndiConfig, IndiController};
 pub use intent::Intent;
 pub use mixer::{GeometryError, Mixed, Mixer, MultirotorMixer};
 pub use motor::{MotorConfig, MotorStage};

@@ -64,6 +64,22 @@ impl RateConfig {
     }
 }
 
+/// The innermost loop of a [cascade](crate::cascade): body rate to torque.
+///
+/// # Contract
+/// * The torque is finite, whatever the target; the measured rate is finite, see [`Horizontal::Nothing`].
+/// * What a loop remembers of a vehicle that something holds stays within a bound, and does not grow while `grounded`.
+///
+/// [`Horizontal::Nothing`]: crate::intent::Horizontal::Nothing
+pub trait RateLaw {
+    /// Torque for a rate, body axes, rad/s in and N·m out, `dt` seconds after the last one. `unmet` is the mixer's report of the
+    /// last step; `grounded`: the vehicle touches the ground, which turns it as well.
+    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3;
+
+    /// Forgets all that was measured.
+    fn reset(&mut self);
+}
+
 /// The body-rate loops.
 ///
 /// ```
@@ -119,6 +135,17 @@ impl RateController {
     pub fn reset(&mut self) {
         self.axes.iter_mut().for_each(Pid::reset);
         self.torque = Vec3::zeros();
+    }
+}
+
+impl RateLaw for RateController {
+    #[inline]
+    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3 {
+        self.step(target, measured, dt, unmet, grounded)
+    }
+
+    fn reset(&mut self) {
+        self.reset();
     }
 }
 

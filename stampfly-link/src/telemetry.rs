@@ -52,7 +52,7 @@ impl From<FlightPhase> for LinkState {
             FlightPhase::Init => Self::Init,
             FlightPhase::IdleGround | FlightPhase::IdleHeld => Self::Idle,
             FlightPhase::Armed => Self::Armed,
-            FlightPhase::TakeOff | FlightPhase::Flying => Self::Flying,
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Flip => Self::Flying,
             FlightPhase::Landing => Self::Landing,
         }
     }

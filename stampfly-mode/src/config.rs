@@ -58,6 +58,12 @@ pub struct ModeConfig {
     pub held_height: f32,
     /// Height above the ground below which a vehicle that was lifted stands again, m.
     pub standing_height: f32,
+    /// Least height above the surface to turn over, m. Infinite where nothing is known of the airframe: then it never does.
+    pub flip_height: f32,
+    /// A vehicle that is not upside down after this long does not turn over.
+    pub flip_start: Duration,
+    /// A flip that takes longer counts as over.
+    pub flip_timeout: Duration,
     /// After a press has stopped the motors, gestures are ignored until the button has been released for this long.
     pub button_release: Duration,
 }
@@ -106,6 +112,11 @@ impl Default for ModeConfig {
             // The range finder of a standing vehicle reads some centimetres; a hand lifts it higher than that.
             held_height: 0.15,
             standing_height: 0.08,
+            flip_height: f32::INFINITY,
+            // Climb and half a turn take half a second.
+            flip_start: Duration::from_millis(1_200),
+            // Three times what a vehicle of a palm's size needs: the sequence has time-outs of its own, this is for one that is stuck.
+            flip_timeout: Duration::from_secs(5),
             // A person in a hurry presses more than once, with less than this between.
             button_release: Duration::from_secs(2),
         }

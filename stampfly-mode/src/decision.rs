@@ -15,7 +15,7 @@
 //! | IDLE_GROUND | applied | the switch is applied | POS_HOLD |
 //! | ARMED | applied | ignored | POS_HOLD |
 //! | FLYING | applied | ignored | ignored |
-//! | TAKEOFF, LANDING | kept for later | ignored | ignored |
+//! | TAKEOFF, LANDING, FLIP | kept for later | ignored | ignored |
 //!
 //! A height-holding mode that loses the height stays what it is: the controller comes down without it, and after
 //! [`ModeConfig::blind`] the vehicle lands. It never becomes a mode in which the stick is thrust. A manual mode whose sticks
@@ -25,12 +25,15 @@
 use crate::arming;
 use crate::config::ModeConfig;
 use crate::facts::Facts;
-pub use crate::state::{CUT, LAND, Silence, State};
+pub use crate::state::{CUT, LAND, NO_FLIP, Silence, State};
 use crate::transitions::{Event, is_airborne, is_armed, rows};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, GroundContact, Validity,
 };
 use stampfly_types::{Duration, Instant};
+
+/// Cosine of the largest tilt, 15°, before and after turning over.
+const LEVEL: f32 = 0.966;
 
 impl State {
     /// Is the vehicle so close to the ground that the motors may be stopped?
@@ -73,6 +76,7 @@ pub(crate) fn advance(config: &ModeConfig, state: &mut State, facts: &Facts) {
     choose_mode(config, state, facts);
     watch_pairing(config, state, facts);
     watch_height(state, facts);
+    state.inverted |= facts.upright < 0.0;
     // A person has come to look at the vehicle. A press alone is no sign of it: what it becomes may be a click, which must not
     // find the crash acknowledged and arm.
     let gesture = facts.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
@@ -154,7 +158,9 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
             let guided = on_ground && facts.asked.flies() && state.commander == CommandSource::Guided;
             if guided { Some(FlightMode::PosHold) } else { turned }
         }
-        FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::TakeOff | FlightPhase::Landing => None,
+        FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::TakeOff | FlightPhase::Landing | FlightPhase::Flip => {
+            None
+        }
     };
     if let Some(wanted) = wanted.filter(|wanted| *wanted != state.wanted) {
         state.wanted = wanted;
@@ -222,7 +228,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
                 let low = state.is_low(config, facts) && (asked.disarm || pilot.switch.falls);
                 low || (pilot.switch.falls && state.landing_by_switch) || waited(state.landing_limit)
             }
-            FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld => false,
+            FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Flip => false,
         },
         Event::Touchdown => facts.landed,
         Event::Land => {
@@ -250,6 +256,18 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             let raised = piloted && state.throttle_rested && throttle > config.throttle_take_off;
             let by_itself = !state.mode.is_manual() && state.takes_off && waited(config.spool);
             asked.take_off || by_itself || raised
+        }
+        Event::Flip => {
+            let led = state.commander == CommandSource::Guided && !state.mode.is_manual();
+            let known = Validity::TILT.with(Validity::VELOCITY_Z).with(Validity::HEIGHT);
+            let high = facts.known_height().is_some_and(|height| height >= config.flip_height);
+            let usable = high && facts.valid.contains(known) && !facts.alerts.intersects(NO_FLIP);
+            asked.flip && led && usable && facts.upright > LEVEL && facts.at_rest
+        }
+        Event::FlipOver => {
+            let level = facts.upright > LEVEL && facts.at_rest;
+            let given_up = !state.inverted && waited(config.flip_start);
+            (level && (state.inverted || given_up)) || waited(config.flip_timeout)
         }
         Event::Arm => {
             let wanted = asked.arm || pilot.switch.rises || facts.button == Some(ButtonGesture::Click);
@@ -305,6 +323,9 @@ fn leave_and_enter(config: &ModeConfig, state: &mut State, facts: &Facts, event:
             state.landing_limit = facts.known_height().map_or(config.landing_blind, |height| {
                 config.landing_spare + Duration::from_seconds(height.max(0.0) / config.landing_slowest)
             });
+        }
+        FlightPhase::Flip => {
+            state.inverted = false;
         }
         FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::TakeOff | FlightPhase::Flying => {}
     }

@@ -21,9 +21,15 @@ pub struct Asked {
     pub arm: bool,
     /// Go somewhere, or stay.
     pub route: bool,
+    /// Turn over.
+    pub flip: bool,
     /// Any command, a sign of life included.
     pub any: bool,
 }
+
+/// Less than this, rad/s and m/s, is rest after turning over.
+const TURNS: f32 = 2.0;
+const CLIMBS: f32 = 0.5;
 
 impl Asked {
     /// Reads the commands of a step.
@@ -37,6 +43,7 @@ impl Asked {
             take_off: has(GuidedKind::TakeOff),
             arm: has(GuidedKind::Arm),
             route: has(GuidedKind::WayPoint) || has(GuidedKind::Hold),
+            flip: commands.iter().any(|kind| kind.flip().is_some()),
             any: !commands.is_empty(),
         }
     }
@@ -44,7 +51,7 @@ impl Asked {
     /// Does a program want to fly? Commands that only end a flight need no authority.
     #[must_use]
     pub const fn flies(&self) -> bool {
-        self.arm || self.take_off || self.route
+        self.arm || self.take_off || self.route || self.flip
     }
 }
 
@@ -84,6 +91,10 @@ pub struct Facts {
     pub button: Option<ButtonGesture>,
     /// The cut-off has stopped the motors.
     pub cut_off: bool,
+    /// Cosine of the tilt; less than zero is upside down.
+    pub upright: f32,
+    /// It hardly turns, climbs and sinks.
+    pub at_rest: bool,
 }
 
 impl Facts {
@@ -113,6 +124,9 @@ impl Facts {
             stop_button,
             button,
             cut_off: input.cut_off,
+            upright: frame::cos_tilt(&input.estimate.attitude),
+            at_rest: input.estimate.angular_rate.norm_squared() < TURNS * TURNS
+                && input.estimate.velocity.z.abs() < CLIMBS,
         }
     }
 

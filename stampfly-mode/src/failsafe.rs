@@ -5,8 +5,8 @@
 //! | alert | condition | clears |
 //! |---|---|---|
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
-//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s in two samples running, four when they may be garbage | disarmed |
-//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO above 120° for a second | disarmed |
+//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, four when they may be garbage | disarmed |
+//! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
@@ -60,7 +60,7 @@ use imu::ImuMonitor;
 use motion::{Contact, MotionMonitor};
 use motors::MotorMonitor;
 use power::PowerMonitor;
-use stampfly_types::messages::{Alerts, ImuData, SelfTestVerdict, SystemAlert};
+use stampfly_types::messages::{Alerts, FlightPhase, ImuData, SelfTestVerdict, SystemAlert};
 use stampfly_types::{Instant, Stamped};
 
 /// The failsafe.
@@ -201,7 +201,9 @@ impl Failsafe {
         self.heard_imu = self.heard_imu.max((*at).min(now));
         let contact = Contact::expected(&self.config, input);
         let noisy = self.active.contains(Alerts::IMU_NOISY);
-        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy);
+        let flips = input.flight_status.phase == FlightPhase::Flip;
+        let rate = if flips { self.config.flip_rate } else { self.config.rate };
+        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy, rate);
         let [mut faulty, noisy] = self.imu.step(&self.config, imu, suspect);
         if !suspect {
             self.attitude.add(&self.config, imu);

@@ -4,6 +4,7 @@
 //! looked at from the top; the first one that applies wins. A vehicle that crashed or whose motors were cut off shows an error
 //! until this is acknowledged.
 
+use crate::transitions::is_airborne;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, FlightStatus, Signal, Tone};
 use stampfly_types::{Duration, Instant};
 
@@ -109,8 +110,9 @@ impl Signaller {
             (mode.phase == FlightPhase::TakeOff, WHITE, Blink::Fast),
             (mode.phase == FlightPhase::Flying, GREEN, Blink::Solid),
             (mode.phase == FlightPhase::Landing, ORANGE, Blink::Slow),
+            (mode.phase == FlightPhase::Flip, GREEN, Blink::Fast),
         ];
-        let in_the_air = matches!(mode.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
+        let in_the_air = is_airborne(mode.phase);
         let rhythm = if in_the_air { Blink::Slow } else { Blink::Solid };
         let body = [
             (low, CYAN, Blink::Fast),

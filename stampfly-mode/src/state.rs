@@ -15,6 +15,17 @@ pub const CUT: Alerts = Alerts::IMPACT
 pub const LAND: Alerts =
     Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::MOTOR_WEAK).with(Alerts::IMU_NOISY);
 
+/// Alerts with which a vehicle does not turn over: something is wrong with what it would need for it.
+pub const NO_FLIP: Alerts = LAND
+    .with(Alerts::LOW_BATTERY)
+    .with(Alerts::POWER_LOST)
+    .with(Alerts::POWER_IMPLAUSIBLE)
+    .with(Alerts::IMU_DEGRADED)
+    .with(Alerts::TOF_LOST)
+    .with(Alerts::RANGE_IMPLAUSIBLE)
+    .with(Alerts::FLOW_IMPLAUSIBLE)
+    .with(Alerts::COMM_LOST);
+
 /// A silence of the commander.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -69,6 +80,8 @@ pub struct State {
     pub origin_resets: u32,
     /// A change of this number starts the estimator anew.
     pub full_resets: u32,
+    /// In this flip it has been upside down.
+    pub inverted: bool,
     /// The estimate was lost in the step before.
     pub diverged: bool,
 }

@@ -29,6 +29,10 @@ pub enum Event {
     TakeOffComplete,
     /// Landing was asked for, or is demanded by a fault.
     Land,
+    /// To turn over was asked for.
+    Flip,
+    /// It has turned over, or given it up.
+    FlipOver,
     /// Touchdown is sure.
     Touchdown,
     /// Motors off, because a person or program asked for it or the phase took too long.
@@ -39,11 +43,13 @@ pub enum Event {
 
 impl Event {
     /// Every event, most urgent first: the order in which [`decide`](crate::decision::decide) looks at them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Emergency,
         Self::Stop,
         Self::Touchdown,
         Self::Land,
+        Self::FlipOver,
+        Self::Flip,
         Self::TakeOffComplete,
         Self::TakeOff,
         Self::Arm,
@@ -72,6 +78,10 @@ impl Event {
                  take-off that takes too long, or `CRITICAL_BATTERY`, \
                  `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `IMU_NOISY`"
             }
+            Self::Flip => {
+                "a `Flip` of any direction, while a program flies in a mode that holds height, the height is known, and nothing is wrong"
+            }
+            Self::FlipOver => "the sequence is over, whatever became of it, or it takes too long",
             Self::TakeOffComplete => "the land detector says so, or in a manual mode the vehicle has left the ground",
             Self::TakeOff => {
                 "`TakeOff`, the spool-up time after arming in a mode that holds height, or the pilot's throttle raised from \
@@ -123,9 +133,13 @@ pub const TABLE: &[Transition] = &[
     row(S::Flying, E::Emergency, S::IdleGround),
     row(S::Flying, E::Stop, S::IdleGround),
     row(S::Flying, E::Land, S::Landing),
+    row(S::Flying, E::Flip, S::Flip),
     row(S::Landing, E::Emergency, S::IdleGround),
     row(S::Landing, E::Stop, S::IdleGround),
     row(S::Landing, E::Touchdown, S::IdleGround),
+    row(S::Flip, E::Emergency, S::IdleGround),
+    row(S::Flip, E::Land, S::Landing),
+    row(S::Flip, E::FlipOver, S::Flying),
 ];
 
 /// First row of each phase, and the one after its last. The whole table in every step would be 150 instructions.
@@ -167,13 +181,13 @@ pub fn next(phase: FlightPhase, event: Event) -> Option<FlightPhase> {
 /// May the motors turn in this phase?
 #[must_use]
 pub const fn is_armed(phase: FlightPhase) -> bool {
-    matches!(phase, FlightPhase::Armed | FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing)
+    matches!(phase, FlightPhase::Armed) || is_airborne(phase)
 }
 
 /// Has the vehicle been sent into the air?
 #[must_use]
 pub const fn is_airborne(phase: FlightPhase) -> bool {
-    matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing)
+    matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 use super::mission::{LONGEST_LEG, Mission, Step};
 use super::radio::Radio;
 use crate::messages::TelemetryFrame;
-use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
+use stampfly_types::messages::{FlightPhase, FlipDirection, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Vec3};
 use std::cell::Cell;
 
@@ -109,6 +109,19 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
                 link.wait_awhile_for(|frame| frame.remaining == 0 || frame.phase != FlightPhase::Flying).await;
             }
             Step::Hover { seconds } => link.wait(Duration::from_seconds(seconds)).await,
+            Step::Flip { direction } => {
+                let kind = match direction {
+                    FlipDirection::Left => GuidedKind::FlipLeft,
+                    FlipDirection::Right => GuidedKind::FlipRight,
+                    FlipDirection::Forward => GuidedKind::FlipForward,
+                    FlipDirection::Back => GuidedKind::FlipBack,
+                };
+                link.send(GuidedCommand { kind, ..Default::default() }).await;
+                for _ in 0..ROUND_TRIP {
+                    link.look().await;
+                }
+                link.wait_awhile_for(|frame| frame.phase != FlightPhase::Flip).await;
+            }
             Step::Land => {
                 link.send(GuidedCommand { kind: GuidedKind::Land, ..Default::default() }).await;
                 link.wait_for(|frame| !frame.armed).await;

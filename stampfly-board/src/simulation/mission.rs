@@ -6,17 +6,20 @@
 //! takeoff HEIGHT
 //! goto NORTH EAST HEIGHT [yaw DEGREES] [speed M/S] [dwell SECONDS]
 //! hover SECONDS
+//! flip left|right|forward|back
 //! land
 //! ```
 //!
 //! Steps may stand in one line, too, with `;` between them: `arm; takeoff 0.5; land`.
 //!
 //! Positions are metres from the take-off spot, heights above it. A step begins when the one before is done: `arm` when
-//! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `land` when it stands
+//! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `flip` when it
+//! flies on, `land` when it stands
 //! and is disarmed. A place that cannot be reached is given up after [`LONGEST_LEG`].
 
 use stampfly_sim::Noise;
 use stampfly_types::Duration;
+use stampfly_types::messages::FlipDirection;
 use std::fmt;
 use std::string::String;
 use std::vec::Vec;
@@ -51,6 +54,11 @@ pub enum Step {
     Hover {
         /// How long, s.
         seconds: f32,
+    },
+    /// Turn over once, from a hover.
+    Flip {
+        /// Which way.
+        direction: FlipDirection,
     },
     /// Land and disarm.
     Land,
@@ -165,6 +173,10 @@ impl fmt::Display for Step {
                     .try_for_each(|(name, value)| write!(f, " {name} {value}"))
             }
             Self::Hover { seconds } => write!(f, "hover {seconds}"),
+            Self::Flip { direction } => {
+                let (name, _) = DIRECTIONS.iter().find(|(_, known)| *known == direction).unwrap_or(&DIRECTIONS[0]);
+                write!(f, "flip {name}")
+            }
             Self::Land => f.write_str("land"),
         }
     }
@@ -180,6 +192,20 @@ impl fmt::Display for Mission {
     }
 }
 
+/// Words for the ways to turn over.
+const DIRECTIONS: [(&str, FlipDirection); 4] = [
+    ("left", FlipDirection::Left),
+    ("right", FlipDirection::Right),
+    ("forward", FlipDirection::Forward),
+    ("back", FlipDirection::Back),
+];
+
+fn direction(word: Option<&&str>) -> Result<FlipDirection, String> {
+    let word = word.ok_or("direction is missing")?;
+    let known = DIRECTIONS.iter().find(|(name, _)| name == word);
+    known.map(|(_, direction)| *direction).ok_or_else(|| format!("'{word}' is none of left, right, forward, back"))
+}
+
 fn number(word: Option<&&str>, what: &str, range: std::ops::RangeInclusive<f32>) -> Result<f32, String> {
     let word = word.ok_or_else(|| format!("{what} is missing"))?;
     let value: f32 = word.parse().map_err(|_| format!("{what}: '{word}' is no number"))?;
@@ -193,8 +219,9 @@ fn parse_step(verb: &str, arguments: &[&str]) -> Result<Step, String> {
         "land" => (Step::Land, 0),
         "takeoff" => (Step::TakeOff { height: number(arguments.first(), "height", 0.1..=10.0)? }, 1),
         "hover" => (Step::Hover { seconds: number(arguments.first(), "seconds", 0.0..=3600.0)? }, 1),
+        "flip" => (Step::Flip { direction: direction(arguments.first())? }, 1),
         "goto" => return parse_goto(arguments),
-        other => return Err(format!("'{other}' is no step; steps are arm, takeoff, goto, hover, land")),
+        other => return Err(format!("'{other}' is no step; steps are arm, takeoff, goto, hover, flip, land")),
     };
     match arguments.get(used) {
         Some(extra) => Err(format!("'{extra}' is too much")),
@@ -241,17 +268,21 @@ mod tests {
             let mission = Mission::random(seed);
             assert_eq!(Mission::parse(&mission.to_string()), Ok(mission));
         }
-        let text = "arm; takeoff 0.5; goto 1 0 0.5 yaw 90 speed 0.5 dwell 1; hover 2; land";
+        let text = "arm; takeoff 0.5; goto 1 0 0.5 yaw 90 speed 0.5 dwell 1; hover 2; flip back; land";
         assert_eq!(Mission::parse(text).expect("a mission").to_string(), text);
     }
 
     #[test]
     fn mistakes_are_named() {
         let message = |text: &str| Mission::parse(text).expect_err("a mistake").to_string();
-        assert_eq!(message("arm\n\nfly 3"), "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, land");
+        assert_eq!(
+            message("arm\n\nfly 3"),
+            "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, flip, land"
+        );
         assert_eq!(message("takeoff"), "line 1: height is missing");
         assert_eq!(message("takeoff NaN"), "line 1: height: NaN is not from 0.1 to 10");
         assert_eq!(message("goto 1 2 0.5 yaw"), "line 1: yaw is missing");
+        assert_eq!(message("flip over"), "line 1: 'over' is none of left, right, forward, back");
         assert_eq!(message("land now"), "line 1: 'now' is too much");
         assert_eq!(message("# nothing"), "the mission has no steps");
     }

@@ -161,6 +161,8 @@ impl<'b> Pilot<'b> {
                     self.keep(Aim::Be(place), Duration::from_seconds(dwell)).await;
                 }
                 Step::Hover { seconds } => self.keep(Aim::Be(place), Duration::from_seconds(seconds)).await,
+                // No switch of a transmitter asks for it.
+                Step::Flip { .. } => {}
                 Step::Land => self.land(place).await,
             }
             progress.done.set(progress.done.get() + 1);

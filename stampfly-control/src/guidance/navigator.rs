@@ -9,14 +9,15 @@
 //! | flying, position hold | pilot: sticks are velocities, released it brakes and holds; guided: the route | throttle is climb rate; guided: the route |
 //! | flying, altitude hold | follows the estimate, the sticks lean; without a pilot it brakes and holds | throttle is climb rate |
 //! | flying, manual | follows the estimate | follows the estimate |
+//! | turning over | waits; altitude hold follows the estimate | waits |
 //! | landing | brakes and holds, the pilot may steer | sinks at the rate the landing manager asks for |
 //!
 //! A path that follows the estimate takes its velocity over as well, so switching to position hold at speed brakes
 //! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it.
 
 use stampfly_types::messages::{
-    CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, LandDetected,
-    Setpoint, SetpointAxes, StateEstimate, Validity, stick,
+    CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, FlipDirection, GuidedCommand, GuidedKind,
+    LandDetected, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 use stampfly_types::{Duration, Instant, Vec3, frame, math};
 
@@ -130,6 +131,8 @@ pub struct Navigator {
     reached_at: Option<Instant>,
     arrived: bool,
     take_off: GuidedCommand,
+    /// Which way to turn over, as it was asked for last.
+    flip: Option<FlipDirection>,
     /// Height reference: where the vehicle last stood.
     ground: f32,
     phase: FlightPhase,
@@ -159,6 +162,7 @@ impl Navigator {
             reached_at: None,
             arrived: false,
             take_off: GuidedCommand::default(),
+            flip: None,
             ground: 0.0,
             phase: FlightPhase::Init,
             mode: FlightMode::default(),
@@ -175,6 +179,10 @@ impl Navigator {
     pub fn accept(&mut self, command: &GuidedCommand) -> Result<(), Refused> {
         let taken = match command.kind {
             GuidedKind::None | GuidedKind::Arm | GuidedKind::Disarm | GuidedKind::Kill => Ok(()),
+            GuidedKind::FlipLeft | GuidedKind::FlipRight | GuidedKind::FlipForward | GuidedKind::FlipBack => {
+                self.flip = command.kind.flip();
+                Ok(())
+            }
             GuidedKind::TakeOff => self.accept_take_off(command),
             GuidedKind::WayPoint => self.accept_way_point(command),
             GuidedKind::Hold | GuidedKind::Land => {
@@ -224,6 +232,7 @@ impl Navigator {
             FlightPhase::TakeOff => self.take_off(entered, input, dt),
             FlightPhase::Flying => self.fly(now, input, dt),
             FlightPhase::Landing => self.land(entered, input, dt),
+            FlightPhase::Flip => self.hold(input, dt),
         };
         Setpoint { remaining: self.route.len() as u32, arrived: self.arrived, ..self.path.setpoint(axes) }
     }
@@ -353,6 +362,20 @@ impl Navigator {
         // In every mode: what lands at a speed that nobody asked for falls over its legs.
         self.drift(input, dt);
         SetpointAxes::POSITION_Z | SetpointAxes::YAW | known_horizontally(input)
+    }
+
+    /// While it turns over, the path waits where it was: the vehicle comes back to it. In altitude hold it has drifted, and may stay
+    /// where it comes out.
+    fn hold(&mut self, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
+        if input.flight_status.mode == FlightMode::PosHold {
+            self.path.drift(0.0, 0.0, dt);
+        } else {
+            self.follow_horizontally(input);
+        }
+        self.path.sink(0.0, dt);
+        self.path.turn_at(0.0, dt);
+        let axes = SetpointAxes::POSITION_Z | SetpointAxes::YAW | known_horizontally(input);
+        self.flip.map_or(axes, |direction| axes | SetpointAxes::turn_over(direction))
     }
 
     fn follow_route(&mut self, now: Instant, input: &NavigatorInput<'_>, dt: f32) {

@@ -2,6 +2,7 @@
 //!
 //! `cargo test -p stampfly-control --test flight -- --nocapture` prints the figures.
 
+mod indi;
 mod plant;
 
 use plant::{AIRFRAME, Flight, Spread, Vehicle, gust};
@@ -209,8 +210,7 @@ fn margins_of_the_rate_loop() {
 }
 
 /// Half a stick to the right: when nine tenths of the lean are reached, s, and how far it overshoots, as a share.
-fn step_of_lean(airframe: &Airframe, vehicle: Vehicle) -> (f32, f32) {
-    let controller = CascadeController::new(&CascadeConfig::for_airframe(airframe));
+fn step_of_lean<C: Controller>(controller: C, vehicle: Vehicle) -> (f32, f32) {
     let mut flight = Flight::hovering(controller, Vehicle { noise: [0.0; 3], ..vehicle });
     flight.flight_status.mode = FlightMode::AltHold;
     flight.setpoint.axes = SetpointAxes::POSITION_Z | SetpointAxes::YAW;
@@ -234,7 +234,7 @@ fn step_of_lean(airframe: &Airframe, vehicle: Vehicle) -> (f32, f32) {
 #[test]
 fn steps_of_lean_are_quick_and_damped() {
     for (name, vehicle) in variations() {
-        let (risen, overshoot) = step_of_lean(&AIRFRAME, vehicle);
+        let (risen, overshoot) = step_of_lean(cascade(), vehicle);
         println!("{name:30} lean: 90 % in {:.0} ms, overshoot {:.0} %", 1e3 * risen, 100.0 * overshoot);
         assert!(risen < 0.28, "{name}: {risen} s");
         assert!(overshoot < 0.15, "{name}: overshoot by {overshoot}");
@@ -247,7 +247,8 @@ fn slow_motors_get_slower_loops() {
         let airframe = Airframe { motor_lag, ..AIRFRAME };
         for inertia in [0.8, 1.0, 1.25] {
             let vehicle = Vehicle { motor_lag, inertia: inertia * AIRFRAME.inertia, ..Vehicle::default() };
-            let (risen, overshoot) = step_of_lean(&airframe, vehicle);
+            let (risen, overshoot) =
+                step_of_lean(CascadeController::new(&CascadeConfig::for_airframe(&airframe)), vehicle);
             println!("{motor_lag} s, inertia x{inertia}: 90 % in {:.0} ms, overshoot {overshoot:.2}", 1e3 * risen);
             assert!(risen < 0.4 && overshoot < 0.15, "{motor_lag} s, inertia x{inertia}: {risen} s, {overshoot}");
         }
@@ -359,56 +360,57 @@ fn losing_outputs_of_the_estimator_degrades_step_by_step() {
     flight.fly(0.5, |f| assert!(f.state.rate.norm() < 0.5, "stops turning"));
 }
 
+/// `Flight::step` asserts a finite output; this feeds every kind of number into every input.
+fn poison<C: Controller>(controller: C) {
+    let mut flight = Flight::hovering(controller, Vehicle::default());
+    for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-40] {
+        for place in 0..12 {
+            flight.fly(0.01, |f| {
+                let mut estimate = StateEstimate { valid: Validity::ALL, ..StateEstimate::default() };
+                let mut setpoint = f.setpoint;
+                let mut stick = f.command;
+                match place {
+                    0 => estimate.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(value, value, 0.0, 0.0)),
+                    1 => estimate.angular_rate.x = value,
+                    2 => estimate.velocity.x = value,
+                    3 => estimate.velocity.z = value,
+                    4 => estimate.position.y = value,
+                    5 => estimate.position.z = value,
+                    6 => setpoint.position = Vec3::repeat(value),
+                    7 => setpoint.velocity = Vec3::repeat(value),
+                    8 => setpoint.acceleration = Vec3::repeat(value),
+                    9 => setpoint.yaw = value,
+                    10 => setpoint.yaw_rate = value,
+                    _ => (stick.roll, stick.throttle) = (value, value),
+                }
+                for mode in FlightMode::ALL {
+                    let mode = FlightStatus { mode: *mode, ..f.flight_status };
+                    let out = f.controller.step(
+                        f.now,
+                        &ControlInput {
+                            estimate: &estimate,
+                            command: &stick,
+                            setpoint: &setpoint,
+                            flight_status: &mode,
+                            land_detected: &f.land_detected,
+                            unmet: [0.0; 4],
+                        },
+                    );
+                    assert!(out.thrust.is_finite() && out.torque.iter().all(|t| t.is_finite()), "{place} {value}");
+                }
+            });
+        }
+    }
+    flight.state.attitude = Quat::identity();
+    flight.state.rate = Vec3::zeros();
+    flight.state.velocity = Vec3::zeros();
+    flight.state.position = Vec3::new(0.0, 0.0, -1.0);
+    flight.fly(5.0, |_| ());
+    assert!((flight.state.position - Vec3::new(0.0, 0.0, -1.0)).norm() < 0.05, "and it still flies");
+}
+
 #[test]
 fn poison_never_reaches_the_output() {
-    // `Flight::step` asserts a finite output; this feeds every kind of number into every input.
-    fn poison<C: Controller>(controller: C) {
-        let mut flight = Flight::hovering(controller, Vehicle::default());
-        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-40] {
-            for place in 0..12 {
-                flight.fly(0.01, |f| {
-                    let mut estimate = StateEstimate { valid: Validity::ALL, ..StateEstimate::default() };
-                    let mut setpoint = f.setpoint;
-                    let mut stick = f.command;
-                    match place {
-                        0 => estimate.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(value, value, 0.0, 0.0)),
-                        1 => estimate.angular_rate.x = value,
-                        2 => estimate.velocity.x = value,
-                        3 => estimate.velocity.z = value,
-                        4 => estimate.position.y = value,
-                        5 => estimate.position.z = value,
-                        6 => setpoint.position = Vec3::repeat(value),
-                        7 => setpoint.velocity = Vec3::repeat(value),
-                        8 => setpoint.acceleration = Vec3::repeat(value),
-                        9 => setpoint.yaw = value,
-                        10 => setpoint.yaw_rate = value,
-                        _ => (stick.roll, stick.throttle) = (value, value),
-                    }
-                    for mode in FlightMode::ALL {
-                        let mode = FlightStatus { mode: *mode, ..f.flight_status };
-                        let out = f.controller.step(
-                            f.now,
-                            &ControlInput {
-                                estimate: &estimate,
-                                command: &stick,
-                                setpoint: &setpoint,
-                                flight_status: &mode,
-                                land_detected: &f.land_detected,
-                                unmet: [0.0; 4],
-                            },
-                        );
-                        assert!(out.thrust.is_finite() && out.torque.iter().all(|t| t.is_finite()), "{place} {value}");
-                    }
-                });
-            }
-        }
-        flight.state.attitude = Quat::identity();
-        flight.state.rate = Vec3::zeros();
-        flight.state.velocity = Vec3::zeros();
-        flight.state.position = Vec3::new(0.0, 0.0, -1.0);
-        flight.fly(5.0, |_| ());
-        assert!((flight.state.position - Vec3::new(0.0, 0.0, -1.0)).norm() < 0.05, "and it still flies");
-    }
     poison(cascade());
     poison(geometric());
 }

@@ -58,6 +58,11 @@ const COMPENSATED: f32 = 0.005;
 const ZEROS: u32 = 20;
 /// After a start in the air the filter first has to find tilt and biases, s. A gyro bias of 3°/s takes as long.
 const UNKNOWN: f32 = 20.0;
+/// A vehicle that turns over moves the picture faster than a PMW3901 follows, 7.4 rad/s. Its readings are wrong by metres a second
+/// until it hardly turns any more, rad/s, for so long, s.
+const FAST: f32 = 7.0;
+const CALM: f32 = 1.0;
+const SETTLES: f32 = 0.1;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
 const MOTION: f32 = 0.2;
 const AGREES_FOR: f32 = 0.5;
@@ -110,6 +115,8 @@ pub(super) struct FlowMonitor {
     implausible: bool,
     /// How long it has to hold back, s.
     waits: f32,
+    /// The same after a fast turn.
+    settles: f32,
 }
 
 impl FlowMonitor {
@@ -148,6 +155,23 @@ impl FlowMonitor {
     /// The filter found its tilt to be wrong, and added this standard deviation, rad.
     pub(super) fn inflated(&mut self, tilt: f32) {
         self.tilt = tilt;
+    }
+
+    /// Takes the turning of the picture that the body makes, rad/s. Is it, or was it a moment ago, faster than the sensor follows? Then
+    /// the reading says nothing.
+    #[inline]
+    pub(super) fn turns_fast(&mut self, turning: [f32; 2], interval: f32) -> bool {
+        let [x, y] = turning;
+        // Nothing but a fast turn begins it.
+        let limit = if self.settles > 0.0 { CALM } else { FAST };
+        let fast = x * x + y * y > limit * limit;
+        self.settles = if fast { SETTLES } else { (self.settles - interval).max(0.0) };
+        let unusable = self.settles > 0.0;
+        if unusable {
+            self.last = None;
+            self.forget();
+        }
+        unusable
     }
 
     /// What was compared until now says nothing.

@@ -121,6 +121,9 @@ impl Eskf {
             self.correct_gyro(&jump);
             return Ok(Fusion::Reset);
         }
+        if self.anchor.is_none() && self.flow_monitor.turns_fast([raw.y, -raw.x], flow.interval) {
+            return Err(Refusal::Range);
+        }
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
         let rows = rows.map(|row| without_heading(row, &delayed.rotation[2]));
         // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading

@@ -11,28 +11,33 @@ fn fly(setups: &[(u64, Setup)]) -> Vec<Flight<StampFly, Recorder<StampFly>>> {
 }
 
 /// Flies the reference mission on some seeds with one parameter changed.
-fn fly_with(parameter: &str) {
+fn fly_with(parameter: &str, value: f32) {
     let setups: Vec<(u64, Setup)> = (1..=6)
         .map(|seed| {
             let mut setup = Setup::reference(seed);
-            parameters::set(&mut setup.vehicle, parameter, 1.0).expect("a parameter");
+            parameters::set(&mut setup.vehicle, parameter, value).expect("a parameter");
             (seed, setup)
         })
         .collect();
     let usual = fly(&[(1, Setup::reference(1))]);
     let flights = fly(&setups);
     for flight in &flights {
-        assert!(flight.succeeded(), "{parameter}=1, seed {}: {:?}", flight.seed, flight.flown.outcome.metrics);
+        assert!(flight.succeeded(), "{parameter}={value}, seed {}: {:?}", flight.seed, flight.flown.outcome.metrics);
     }
     assert_ne!(flights[0].witness.hash(), usual[0].witness.hash(), "{parameter} changes the flight");
 }
 
 #[test]
 fn the_complementary_filter_flies() {
-    fly_with("estimator.type");
+    fly_with("estimator.type", 1.0);
 }
 
 #[test]
 fn the_geometric_controller_flies() {
-    fly_with("controller.type");
+    fly_with("controller.type", 1.0);
+}
+
+#[test]
+fn the_incremental_controller_flies() {
+    fly_with("controller.type", 2.0);
 }

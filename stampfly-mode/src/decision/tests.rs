@@ -23,6 +23,7 @@ const HAPPENINGS: &[Happening] = &[
     ("TakeOff", |f| f.asked.take_off = true),
     ("Arm", |f| f.asked.arm = true),
     ("WayPoint", |f| f.asked.route = true),
+    ("Flip", |f| f.asked.flip = true),
     ("pilot's kill", |f| frame(f).kill = true),
     ("switch on", |f| f.pilot.switch.rises = true),
     ("switch off", |f| f.pilot.switch.falls = true),
@@ -100,6 +101,8 @@ fn quiet(state: &State) -> Facts {
         valid: Validity::ALL,
         height: if airborne || state.phase == FlightPhase::IdleHeld { 1.5 } else { 0.03 },
         contact: if airborne { GroundContact::Air } else { GroundContact::Ground },
+        upright: 1.0,
+        at_rest: true,
         calibrated: true,
         sticks: state.commander,
         ..Facts::default()
@@ -108,7 +111,7 @@ fn quiet(state: &State) -> Facts {
 
 #[test]
 fn exhaustive_single_step() {
-    let config = ModeConfig::default();
+    let config = ModeConfig { flip_height: 1.0, ..ModeConfig::default() };
     let (mut seen, mut decisions) = (BTreeSet::new(), 0u32);
     for state in states() {
         for alerts in ALERTS {
@@ -172,6 +175,11 @@ fn check(config: &ModeConfig, state: &State, facts: &Facts, next_state: &State, 
             assert_eq!(next_state.phase, FlightPhase::Landing, "{}", why());
         }
     }
+    if next_state.phase == FlightPhase::Flip && state.phase != FlightPhase::Flip {
+        assert!(facts.asked.flip && state.phase == FlightPhase::Flying, "turned over unasked: {}", why());
+        assert!(!next_state.mode.is_manual() && !facts.alerts.intersects(NO_FLIP), "turned over: {}", why());
+        assert_eq!(next_state.commander, CommandSource::Guided, "{}", why());
+    }
     let acts = facts.pilot.deflected || facts.pilot.mode_turned || facts.pilot.switch.rises || facts.pilot.switch.falls;
     if armed_before && armed && next_state.commander == CommandSource::Pilot && state.commander != CommandSource::Pilot
     {
@@ -199,6 +207,52 @@ fn every_state_ends_disarmed() {
             assert!(ended.is_some(), "{start:?} with {alerts:?}");
         }
     }
+}
+
+/// Turning over, from the command to the flight that goes on.
+#[test]
+fn a_flip_is_begun_and_ended_by_what_is_seen_of_it() {
+    let config = ModeConfig { flip_height: 1.0, ..ModeConfig::default() };
+    let flying = State {
+        phase: FlightPhase::Flying,
+        wanted: FlightMode::PosHold,
+        mode: FlightMode::PosHold,
+        commander: CommandSource::Guided,
+        ..State::default()
+    };
+    let asked = Facts { asked: Asked { flip: true, any: true, ..Asked::default() }, ..quiet(&flying) };
+    let turning = decide(&config, &flying, &asked);
+    assert_eq!((turning.phase, turning.inverted), (FlightPhase::Flip, false));
+    for refused in [
+        Facts { height: 0.9, ..asked },
+        Facts { valid: Validity::ALL.without(Validity::HEIGHT), ..asked },
+        Facts { alerts: Alerts::LOW_BATTERY, ..asked },
+        Facts { upright: 0.9, ..asked },
+        Facts { at_rest: false, ..asked },
+    ] {
+        assert_eq!(decide(&config, &flying, &refused).phase, FlightPhase::Flying, "{refused:?}");
+    }
+    let sticks = Facts { pilot: Heard { deflected: true, ..Heard::default() }, ..asked };
+    assert_eq!(decide(&config, &flying, &sticks).phase, FlightPhase::Flying, "the pilot flies");
+    assert_eq!(
+        decide(&ModeConfig::default(), &flying, &asked).phase,
+        FlightPhase::Flying,
+        "a vehicle nothing is known of"
+    );
+
+    let later = |millis| Instant::from_secs(100) + Duration::from_millis(millis);
+    let level = quiet(&turning);
+    // Level before it has been upside down is the climb; then it has given up.
+    assert_eq!(decide(&config, &turning, &Facts { now: later(300), ..level }).phase, FlightPhase::Flip);
+    assert_eq!(decide(&config, &turning, &Facts { now: later(1_300), ..level }).phase, FlightPhase::Flying);
+    let inverted = decide(&config, &turning, &Facts { now: later(500), upright: -0.5, at_rest: false, ..level });
+    assert!(inverted.phase == FlightPhase::Flip && inverted.inverted);
+    let falls = Facts { now: later(800), at_rest: false, ..level };
+    assert_eq!(decide(&config, &inverted, &falls).phase, FlightPhase::Flip);
+    assert_eq!(decide(&config, &inverted, &Facts { at_rest: true, ..falls }).phase, FlightPhase::Flying);
+    assert_eq!(decide(&config, &inverted, &Facts { now: later(5_000), ..falls }).phase, FlightPhase::Flying, "stuck");
+    let land = Facts { asked: Asked { land: true, any: true, ..Asked::default() }, ..falls };
+    assert_eq!(decide(&config, &inverted, &land).phase, FlightPhase::Landing);
 }
 
 /// A flight that goes on is the one state without a time-out, and INIT waits for its sensors: a vehicle without them must not

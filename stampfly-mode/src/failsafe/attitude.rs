@@ -64,6 +64,8 @@ impl AttitudeMonitor {
             (FlightPhase::Armed, _) => Some((self.cos_armed, config.tumble_time)),
             (FlightPhase::TakeOff, _) => Some((self.cos_tip, config.tip_time)),
             (FlightPhase::Flying | FlightPhase::Landing, FlightMode::Acro) => Some((self.cos_acro, config.acro_time)),
+            // It is upside down for a third of a second, and has to come back as a pilot's loop has.
+            (FlightPhase::Flip, _) => Some((self.cos_acro, config.acro_time)),
             (FlightPhase::Flying | FlightPhase::Landing, _) => Some((self.cos_tumble, config.tumble_time)),
             (FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld, _) => None,
         };

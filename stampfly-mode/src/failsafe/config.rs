@@ -22,6 +22,8 @@ pub struct FailsafeConfig {
     pub impact_sigmas: f32,
     /// Angular rate, rad/s.
     pub rate: f32,
+    /// The same of a vehicle that turns over on purpose, rad/s.
+    pub flip_rate: f32,
     /// Tilt of a vehicle that tumbles, rad.
     pub tumble_tilt: f32,
     /// For how long it is tilted so far.
@@ -127,6 +129,7 @@ impl Default for FailsafeConfig {
             touch_speed: 1.2,
             impact_sigmas: 6.0,
             rate: 13.96,
+            flip_rate: 31.4,
             tumble_tilt: 1.05,
             tumble_time: Duration::from_millis(300),
             tip_tilt: 0.7,

@@ -66,7 +66,7 @@ impl ForceMonitor {
         let beyond = |range: &Range<f32>| (range.start * GRAVITY - size).max(size - range.end * GRAVITY);
         let (excess, limit) = match input.flight_status.phase {
             FlightPhase::IdleGround => (beyond(&STANDING), HANDLED * config.force_speed),
-            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => {
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => {
                 let known = config.hover_thrust.is_finite();
                 let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
                 let unlike_thrust = if known {

@@ -55,7 +55,15 @@ struct Evidence {
 
 impl Evidence {
     /// Adds a sample; gives the force over the length of a blow.
-    fn add(&mut self, config: &FailsafeConfig, imu: &ImuData, contact: Contact, limit: f32, runs: bool) -> f32 {
+    fn add(
+        &mut self,
+        config: &FailsafeConfig,
+        imu: &ImuData,
+        contact: Contact,
+        limit: f32,
+        rate: f32,
+        runs: bool,
+    ) -> f32 {
         let blow = self.blow.get_or_insert(imu.accel);
         *blow += (imu.accel - *blow) * config.blow_weight;
         let force =
@@ -70,7 +78,7 @@ impl Evidence {
             };
         };
         count(&mut self.impacts, force >= limit);
-        count(&mut self.overspeeds, imu.gyro.norm_squared() >= config.rate * config.rate);
+        count(&mut self.overspeeds, imu.gyro.norm_squared() >= rate * rate);
         force
     }
 
@@ -96,7 +104,8 @@ pub(super) struct MotionMonitor {
 }
 
 impl MotionMonitor {
-    /// Takes a finite sample: what it shows, and whether it is suspect. `noisy`: suspect samples are frequent.
+    /// Takes a finite sample: what it shows, and whether it is suspect. `noisy`: suspect samples are frequent; `rate`: no vehicle
+    /// that is under control turns faster, rad/s.
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
@@ -104,6 +113,7 @@ impl MotionMonitor {
         imu: &ImuData,
         contact: Contact,
         noisy: bool,
+        rate: f32,
     ) -> (Alerts, bool) {
         let impact = if contact == Contact::Landing { config.landing_impact } else { config.impact };
         let limit = self.impact_limit(config, impact);
@@ -114,14 +124,14 @@ impl MotionMonitor {
                 self.suspected = self.believed;
             }
             self.suspects = self.suspects.saturating_add(1);
-            self.suspected.add(config, imu, contact, limit, false);
+            self.suspected.add(config, imu, contact, limit, rate, false);
             let burst = if noisy { NOISY_BURST * config.garbled_samples } else { config.garbled_samples };
             if self.suspects <= burst {
                 return (Alerts::NONE, true);
             }
             self.believed = self.suspected;
         } else {
-            let force = self.believed.add(config, imu, contact, limit, true);
+            let force = self.believed.add(config, imu, contact, limit, rate, true);
             // An impact must not raise its own threshold: outliers enter clipped.
             let [mean, variance] = self.force;
             let off = if force < limit { force } else { limit } - mean;

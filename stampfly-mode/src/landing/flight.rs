@@ -42,7 +42,7 @@ impl FlightStage {
         match phase {
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld => Self::Stand,
             FlightPhase::Armed | FlightPhase::TakeOff => Self::TakeOff,
-            FlightPhase::Flying => Self::Fly,
+            FlightPhase::Flying | FlightPhase::Flip => Self::Fly,
             FlightPhase::Landing => Self::Landing,
         }
     }

@@ -85,6 +85,56 @@ message_enum! {
         Land = 6,
         /// Motors off now.
         Kill = 7,
+        /// Turn over once to the left.
+        FlipLeft = 8,
+        /// Turn over once to the right.
+        FlipRight = 9,
+        /// Turn over once forward, nose down.
+        FlipForward = 10,
+        /// Turn over once backward, nose up.
+        FlipBack = 11,
+    }
+}
+
+message_enum! {
+    /// Which way a vehicle turns over.
+    pub enum FlipDirection {
+        /// Left wing down: negative roll.
+        #[default]
+        Left = 0,
+        /// Right wing down: positive roll.
+        Right = 1,
+        /// Nose down: negative pitch.
+        Forward = 2,
+        /// Nose up: positive pitch.
+        Back = 3,
+    }
+}
+
+impl GuidedKind {
+    /// The flip that is asked for, if one is.
+    ///
+    /// ```
+    /// use stampfly_types::messages::{FlipDirection, GuidedKind};
+    /// assert_eq!(GuidedKind::FlipBack.flip(), Some(FlipDirection::Back));
+    /// assert_eq!(GuidedKind::Hold.flip(), None);
+    /// ```
+    #[must_use]
+    pub const fn flip(self) -> Option<FlipDirection> {
+        match self {
+            Self::FlipLeft => Some(FlipDirection::Left),
+            Self::FlipRight => Some(FlipDirection::Right),
+            Self::FlipForward => Some(FlipDirection::Forward),
+            Self::FlipBack => Some(FlipDirection::Back),
+            Self::None
+            | Self::Arm
+            | Self::Disarm
+            | Self::TakeOff
+            | Self::WayPoint
+            | Self::Hold
+            | Self::Land
+            | Self::Kill => None,
+        }
     }
 }
 
@@ -164,6 +214,46 @@ message_flags! {
         YAW = 4,
         /// Heading rate only.
         YAW_RATE = 5,
+        /// Turn over once to the left, while in [`FlightPhase::Flip`](super::FlightPhase::Flip).
+        FLIP_LEFT = 6,
+        /// Turn over once to the right.
+        FLIP_RIGHT = 7,
+        /// Turn over once forward.
+        FLIP_FORWARD = 8,
+        /// Turn over once backward.
+        FLIP_BACK = 9,
+    }
+}
+
+impl SetpointAxes {
+    const FLIPS: [(Self, FlipDirection); 4] = [
+        (Self::FLIP_LEFT, FlipDirection::Left),
+        (Self::FLIP_RIGHT, FlipDirection::Right),
+        (Self::FLIP_FORWARD, FlipDirection::Forward),
+        (Self::FLIP_BACK, FlipDirection::Back),
+    ];
+
+    /// Turn over once this way.
+    ///
+    /// ```
+    /// use stampfly_types::messages::{FlipDirection, SetpointAxes};
+    /// assert_eq!(SetpointAxes::turn_over(FlipDirection::Back).flip(), Some(FlipDirection::Back));
+    /// assert_eq!(SetpointAxes::YAW.flip(), None);
+    /// ```
+    #[must_use]
+    pub const fn turn_over(direction: FlipDirection) -> Self {
+        match direction {
+            FlipDirection::Left => Self::FLIP_LEFT,
+            FlipDirection::Right => Self::FLIP_RIGHT,
+            FlipDirection::Forward => Self::FLIP_FORWARD,
+            FlipDirection::Back => Self::FLIP_BACK,
+        }
+    }
+
+    /// Which way to turn over, if that is asked for.
+    #[must_use]
+    pub fn flip(self) -> Option<FlipDirection> {
+        Self::FLIPS.iter().find(|(flag, _)| self.contains(*flag)).map(|(_, direction)| *direction)
     }
 }
 

@@ -18,7 +18,8 @@ pub mod sensor;
 pub mod system;
 
 pub use command::{
-    ButtonEvent, ButtonGesture, CommandSetpoint, GuidedCommand, GuidedKind, PilotInput, Setpoint, SetpointAxes, stick,
+    ButtonEvent, ButtonGesture, CommandSetpoint, FlipDirection, GuidedCommand, GuidedKind, PilotInput, Setpoint,
+    SetpointAxes, stick,
 };
 pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
 pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};

@@ -20,6 +20,8 @@ message_enum! {
         Flying = 5,
         /// Descending to the ground.
         Landing = 6,
+        /// Turning over once, out of a hover and back into it.
+        Flip = 7,
     }
 }
 

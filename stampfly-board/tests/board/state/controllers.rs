@@ -5,9 +5,10 @@ use serde::{Serialize, de::DeserializeOwned};
 use stampfly_board::airframe::{AIRFRAME, MIXER};
 use stampfly_control::filter::{Biquad, BiquadChain, BiquadCoefficients, DynamicNotch, LowPass};
 use stampfly_control::guidance::{Navigator, NavigatorInput};
+use stampfly_control::indi::IndiRate;
 use stampfly_control::{
-    CascadeConfig, CascadeController, ControlInput, Controller, GeometricConfig, GeometricController, Mixer,
-    MotorConfig, MotorStage, MultirotorMixer,
+    CascadeConfig, CascadeController, ControlInput, Controller, GeometricConfig, GeometricController, IndiConfig,
+    IndiController, Mixer, MotorConfig, MotorStage, MultirotorMixer,
 };
 use stampfly_types::Quat;
 use stampfly_types::messages::*;
@@ -74,6 +75,8 @@ fn fly<C: Controller>(controller: &mut C, k: u64, n: &mut Numbers) -> ControlOut
 fn controllers_go_on() {
     goes_on(CascadeController::new(&CascadeConfig::for_airframe(&AIRFRAME)), 600, fly);
     goes_on(GeometricController::new(&GeometricConfig::for_airframe(&AIRFRAME)), 600, fly);
+    let rate = IndiRate::new(&IndiConfig::for_airframe(&AIRFRAME));
+    goes_on(IndiController::with_rate_law(&CascadeConfig::for_airframe(&AIRFRAME), rate), 600, fly);
 }
 
 #[test]

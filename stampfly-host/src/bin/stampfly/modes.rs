@@ -6,7 +6,7 @@
 use crate::failure::Failure;
 use stampfly_mode::arming::CHECKS;
 use stampfly_mode::decision::{State, decide};
-use stampfly_mode::transitions::{Event, TABLE};
+use stampfly_mode::transitions::{Event, TABLE, is_airborne};
 use stampfly_mode::{Asked, Facts, Heard, ModeConfig};
 use stampfly_types::messages::{CommandSource, FlightMode, FlightPhase, GroundContact, PilotInput, Validity};
 use stampfly_types::{Duration, Instant};
@@ -27,7 +27,7 @@ fn diagram() {
         outln!("    {:?} --> {:?}: {:?}", row.from, row.to, row.event);
     }
     outln!(
-        "```\n\nThe motors may turn in Armed, TakeOff, Flying and Landing. INIT has no time-out: a vehicle whose sensors do"
+        "```\n\nThe motors may turn in Armed, TakeOff, Flying, Flip and Landing. INIT has no time-out: a vehicle whose sensors do"
     );
     outln!("not become ready must not go anywhere. IDLE_GROUND and FLYING last as long as they are wanted.");
 }
@@ -56,7 +56,7 @@ fn guards() {
 /// What becomes of the mode in a phase, in which the vehicle was told POS_HOLD.
 fn becomes(phase: FlightPhase, turned: bool, program: bool) -> &'static str {
     let now = Instant::from_secs(10);
-    let airborne = matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing);
+    let airborne = is_airborne(phase);
     let other = FlightMode::AltHold;
     let wanted = if program { other } else { FlightMode::PosHold };
     let state = State {

@@ -1,0 +1,104 @@
+//! A flip as a controller: thrust and torque from the sequence's set-points.
+//!
+//! The innermost loop is the [incremental](crate::indi) one, because the turn is over before an integral has found anything, and
+//! with the sequence's angular acceleration ahead of it the rate follows its ramps without an error to begin with.
+
+use stampfly_types::messages::{ControlOutput, FlipDirection, StateEstimate};
+use stampfly_types::{Instant, Vec3};
+
+use super::{FlipConfig, FlipRefusal, FlipSequencer, FlipStage};
+use crate::airframe::Airframe;
+use crate::bound::possible_thrust;
+use crate::indi::{IndiConfig, IndiRate};
+use crate::rate::RateLaw;
+use crate::timing::StepTimer;
+
+/// A [`FlipSequencer`] with its rate loop.
+///
+/// ```
+/// use stampfly_control::flip::FlipRefusal;
+/// use stampfly_control::{Airframe, FlipController};
+/// use stampfly_types::messages::{FlipDirection, StateEstimate, Validity};
+/// use stampfly_types::{Instant, Vec3};
+///
+/// let mut flip = FlipController::for_airframe(&Airframe::EXAMPLE);
+/// let estimate = StateEstimate { height: 2.0, valid: Validity::ALL, ..Default::default() };
+/// flip.start(Instant::ZERO, FlipDirection::Back, &estimate, None)?;
+/// // In place of the controller, while it gives something.
+/// let output = flip.step(Instant::from_micros(2_500), &estimate, [0.0; 4]).expect("it has only begun");
+/// assert!(output.thrust > Airframe::EXAMPLE.hover_thrust());
+/// # Ok::<(), FlipRefusal>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FlipController {
+    sequence: FlipSequencer,
+    rate: IndiRate,
+    timer: StepTimer,
+    /// Rate asked for per angular acceleration, s, so that the loop's torque has that acceleration.
+    ahead: Vec3,
+    thrust_max: f32,
+}
+
+impl FlipController {
+    /// Configured by the rules for an airframe.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
+        Self::new(&FlipConfig::for_airframe(airframe), &IndiConfig::for_airframe(airframe))
+    }
+
+    /// Nothing to do.
+    #[must_use]
+    pub fn new(config: &FlipConfig, rate: &IndiConfig) -> Self {
+        Self {
+            sequence: FlipSequencer::new(config),
+            rate: IndiRate::new(rate),
+            timer: StepTimer::default(),
+            // The damping takes λ of it off again.
+            ahead: rate.damping.zip_map(&rate.bandwidth, |damping, bandwidth| (1.0 + damping) / bandwidth),
+            thrust_max: config.thrust_max,
+        }
+    }
+
+    /// The sequence.
+    #[must_use]
+    pub fn sequence(&self) -> &FlipSequencer {
+        &self.sequence
+    }
+
+    /// Begins; see [`FlipSequencer::start`].
+    ///
+    /// # Errors
+    /// Says why the vehicle must not turn over.
+    pub fn start(
+        &mut self,
+        now: Instant,
+        direction: FlipDirection,
+        estimate: &StateEstimate,
+        voltage: Option<f32>,
+    ) -> Result<(), FlipRefusal> {
+        self.sequence.start(now, direction, estimate, voltage)?;
+        self.rate.reset();
+        Ok(())
+    }
+
+    /// One control period; `None` when it is over and the vehicle's controller flies on. `unmet` is the mixer's report.
+    pub fn step(&mut self, now: Instant, estimate: &StateEstimate, unmet: [f32; 4]) -> Option<ControlOutput> {
+        let dt = self.timer.step(now);
+        if self.sequence.stage() == FlipStage::Over {
+            return None;
+        }
+        let demand = self.sequence.step(now, estimate);
+        if self.sequence.stage() == FlipStage::Over {
+            return None;
+        }
+        let target = demand.rate + demand.acceleration.component_mul(&self.ahead);
+        let torque = self.rate.step(&target, &estimate.angular_rate, dt, unmet, false);
+        Some(ControlOutput { thrust: possible_thrust(demand.thrust, self.thrust_max, f32::MAX, 1.0), torque })
+    }
+
+    /// Ends it; see [`FlipSequencer::cancel`].
+    pub fn cancel(&mut self, now: Instant) {
+        self.sequence.cancel(now);
+    }
+}
