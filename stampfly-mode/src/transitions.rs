@@ -5,6 +5,9 @@
 //!                 │ arm                 ▲ stop, emergency
 //!                 ▼                     │ (from every phase below)
 //!               ARMED ─take off─► TAKEOFF ─complete─► FLYING ─land─► LANDING ─touchdown─► IDLE_GROUND
+//!                                                      │  ▲
+//!                                                 flip ▼  │ over
+//!                                                      FLIP ─land─► LANDING
 //! ```
 //!
 //! [`decide`](crate::decision::decide) finds out which events have happened. `docs/modes.md` is printed from [`TABLE`] and
@@ -79,9 +82,13 @@ impl Event {
                  `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `IMU_NOISY`"
             }
             Self::Flip => {
-                "a `Flip` of any direction, while a program flies in a mode that holds height, the height is known, and nothing is wrong"
+                "a `Flip` of any direction, while a program flies in a mode that holds height: level, at rest, above `flip_height`, the \
+                 battery not low, nothing wrong with range, flow and link"
             }
-            Self::FlipOver => "the sequence is over, whatever became of it, or it takes too long",
+            Self::FlipOver => {
+                "level and at rest again after it was upside down, or without that `flip_start` after it began; after `flip_timeout` \
+                 in any case"
+            }
             Self::TakeOffComplete => "the land detector says so, or in a manual mode the vehicle has left the ground",
             Self::TakeOff => {
                 "`TakeOff`, the spool-up time after arming in a mode that holds height, or the pilot's throttle raised from \
