@@ -202,12 +202,9 @@ impl FlowMonitor {
         let mean = core::mem::take(&mut self.sum);
         let [before, last] = self.means;
         self.means = [last, mean];
+        let [x, y] = [mean[0] - before[0], mean[1] - before[1]];
         // Before the third block there is nothing to compare with.
-        if self.readings < BEGINNING + 3 * BLOCK {
-            0.0
-        } else {
-            (mean[0] - before[0]).powi(2) + (mean[1] - before[1]).powi(2)
-        }
+        if self.readings < BEGINNING + 3 * BLOCK { 0.0 } else { x * x + y * y }
     }
 
     /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
