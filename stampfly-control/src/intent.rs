@@ -350,4 +350,29 @@ mod tests {
         (down.command.throttle, down.command.roll) = (-1.0, f32::NAN);
         assert_eq!(axes(&down), (Horizontal::Lean { forward: -0.25, right: 0.0 }, Vertical::Throttle(0.0)));
     }
+
+    #[test]
+    fn only_a_vehicle_that_settles_leans_little() {
+        let tan_tilt_max = |phase, thrust_ceiling| {
+            let mut case = everything();
+            case.mode.phase = phase;
+            let land_detected = LandDetected { contact: GroundContact::Air, thrust_ceiling, ..LandDetected::default() };
+            let input = ControlInput {
+                estimate: &case.estimate,
+                command: &case.command,
+                setpoint: &case.setpoint,
+                flight_status: &case.mode,
+                land_detected: &land_detected,
+                unmet: [0.0; 4],
+            };
+            Intent::read(&input).expect("in flight").tan_tilt_max
+        };
+        // Six degrees.
+        assert!((tan_tilt_max(FlightPhase::Landing, 0.9) - 0.105).abs() < 0.01);
+        for (phase, ceiling) in
+            [(FlightPhase::Landing, f32::MAX), (FlightPhase::TakeOff, 0.9), (FlightPhase::Flying, 0.9)]
+        {
+            assert_eq!(tan_tilt_max(phase, ceiling), f32::INFINITY, "{phase:?} {ceiling}");
+        }
+    }
 }

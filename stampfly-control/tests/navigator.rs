@@ -333,3 +333,25 @@ proptest! {
         }
     }
 }
+
+/// It drifted on with the pilot's sticks at rest, and fell over its legs.
+#[test]
+fn a_landing_brakes_in_every_mode_with_a_pilot_too() {
+    for mode in [FlightMode::AltHold, FlightMode::Stabilize, FlightMode::PosHold] {
+        for (lost, place, speed) in [
+            (Validity::NONE, true, true),
+            (Validity::POSITION_XY, false, true),
+            (Validity::POSITION_XY | Validity::VELOCITY_XY, false, false),
+        ] {
+            let mut bench = Bench::aloft();
+            (bench.mode.mode, bench.command.source) = (mode, CommandSource::Pilot);
+            bench.estimate.velocity = Vec3::new(0.4, 0.0, 0.0);
+            bench.step();
+            bench.estimate.valid = Validity::ALL.without(lost);
+            bench.enter(FlightPhase::Landing);
+            let axes = bench.step().axes;
+            assert_eq!(axes.contains(SetpointAxes::POSITION_XY), place, "{mode:?} {lost:?}");
+            assert!(!speed || axes.intersects(SetpointAxes::POSITION_XY | SetpointAxes::VELOCITY_XY), "{mode:?}");
+        }
+    }
+}

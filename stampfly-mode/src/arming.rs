@@ -207,6 +207,8 @@ mod tests {
         for sensor in [Alerts::IMU_DEGRADED, Alerts::IMU_LOST, Alerts::IMU_NOISY, Alerts::POWER_LOST] {
             assert_eq!(found(&state, &Facts { alerts: sensor, ..facts }), ArmBlocks::SENSOR, "{sensor:?}");
         }
+        let runs = Facts { alerts: Alerts::MOTOR_RUNS, ..facts };
+        assert_eq!(found(&state, &runs), ArmBlocks::MOTOR, "a motor that turns by itself");
         let pairing = State { pairing: Some(Instant::ZERO), ..state };
         assert_eq!(found(&pairing, &silent), ArmBlocks::PAIRING, "d16: no other transmitter is to be heard");
     }

@@ -355,4 +355,76 @@ mod tests {
         };
         assert!(!found(0.3) && found(1.0));
     }
+
+    /// After how many of 300 readings is flow not believed on a vehicle whose accelerometer feels no motion? `reading` makes
+    /// flow's velocity and the picture's rate, and may change the monitor before it takes them.
+    fn convicted(distance: f32, reading: impl Fn(u32, &mut FlowMonitor) -> (f32, f32)) -> Option<u32> {
+        let mut monitor = FlowMonitor::default();
+        (0..300).find(|n| {
+            monitor.predict(&Vec3::zeros(), DT);
+            let (velocity, rate) = reading(*n, &mut monitor);
+            // Not frozen.
+            let counts = [rate * DT, if n % 2 == 0 { 0.002 } else { -0.002 }];
+            monitor.flow(counts, [0.0; 2], &Vec3::new(velocity, 0.0, 0.0), distance, DT, true)
+        })
+    }
+
+    #[test]
+    fn a_first_reading_that_holds_two_frames_convicts_nobody() {
+        // The last one before flow's past is forgotten, and the first one after it.
+        for double in [99, 100] {
+            let found = convicted(0.3, |n, monitor| {
+                if n == 100 {
+                    monitor.forget();
+                }
+                (if n == double { 1.2 } else { 0.0 }, 0.0)
+            });
+            assert_eq!(found, None, "reading {double}");
+        }
+    }
+
+    #[test]
+    fn a_jump_convicts_flow_unless_it_was_the_gyros() {
+        // The smaller one is less than the difference may be for long.
+        for jump in [1.0, 0.6] {
+            for at in 100..105 {
+                let steps = |n: u32| (if n < at { 0.0 } else { jump }, 0.0);
+                let found = convicted(0.5, |n, _| steps(n));
+                assert!(
+                    found.is_some_and(|found| (at + 10..at + 30).contains(&found)),
+                    "{jump} m/s at {at}: {found:?}"
+                );
+                let undone = convicted(0.5, |n, monitor| {
+                    if n == at + 10 {
+                        monitor.forget();
+                    }
+                    steps(n)
+                });
+                assert_eq!(undone, None, "{jump} m/s at {at}");
+            }
+        }
+        assert_eq!(convicted(0.5, |n, _| (if n < 100 { 0.0 } else { 0.3 }, 0.0)), None, "none at all");
+    }
+
+    #[test]
+    fn nothing_jumps_where_every_fifth_reading_holds_two_frames() {
+        for distance in [0.3, 0.5, 1.0, 2.0] {
+            let found = convicted(distance, |n, _| {
+                let rate = if n % 5 == 0 { 2.0 } else { 1.0 };
+                (rate * distance, rate)
+            });
+            assert_eq!(found, None, "{distance} m");
+        }
+    }
+
+    #[test]
+    fn the_picture_of_a_vehicle_that_stands_may_creep_and_not_run() {
+        let found = |rate: f32, readings: u32| {
+            let mut monitor = FlowMonitor::default();
+            (0..readings).for_each(|_| monitor.stand([0.0, -rate], DT));
+            monitor.is_implausible()
+        };
+        assert!(found(2.0, 10), "while motors spool up");
+        assert!(found(0.7, 150) && !found(0.3, 100) && !found(0.7, 50));
+    }
 }

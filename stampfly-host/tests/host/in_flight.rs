@@ -8,7 +8,7 @@ use stampfly_host::recorder::Recorder;
 use stampfly_sim::fault::{Fault, FaultKind, Moment};
 use stampfly_sim::vehicle::{Vehicle, Verdict};
 use stampfly_types::Duration;
-use stampfly_types::messages::FlightMode;
+use stampfly_types::messages::{FlightMode, FlightPhase};
 
 const FAULTS: &[FaultKind] = StampFly::FAULTS;
 
@@ -207,4 +207,31 @@ fn half_a_propeller_on_the_ground_ends_upright() {
         let turned = |name: &str| judgement.alerts.iter().any(|span| span.name == name);
         assert!(!["GYRO_ANOMALY", "IMPACT", "TILT_MISMATCH"].into_iter().any(turned), "{fault}: {judgement:?}");
     }
+}
+
+/// It turned over as it came down.
+#[test]
+fn a_motor_that_no_longer_listens_is_lost_and_the_others_stop() {
+    let judgement = piloted(FlightMode::Acro, 1, &["motor-3-stuck=0.41@hover"]).judgement;
+    assert_eq!(judgement.outcome, "cut", "{judgement:?}");
+    assert!(judgement.cut_after_s.is_some_and(|after| after < 0.3), "{judgement:?}");
+}
+
+#[test]
+fn a_motor_that_runs_by_itself_keeps_the_vehicle_from_arming() {
+    let outcome = flown(&setup("arm\ntakeoff 0.5\nland\n", &["motor-1-stuck@ground"])).0;
+    let alerts: Vec<_> = outcome.judgement.alerts.iter().map(|span| span.name).collect();
+    assert!(alerts.contains(&"MOTOR_RUNS"), "{alerts:?}");
+    let armed = |change: &stampfly_board::simulation::PhaseChange| change.phase == FlightPhase::Armed;
+    assert!(!outcome.phases.iter().any(armed), "{:?}", outcome.phases);
+}
+
+/// It leaned on, over the leg that touched first.
+#[test]
+fn half_a_propeller_settles_upright() {
+    let flight = setup("arm\ntakeoff 0.5\nhover 2\ngoto 1 0 0.7\nland\n", &["motor-2-thrust@hover"]);
+    let reference = Setup::reference(1686);
+    let pilot = Some(FlightMode::PosHold);
+    let judgement = flown(&Setup { mission: flight.mission, faults: flight.faults, pilot, ..reference }).0.judgement;
+    assert_eq!(judgement.outcome, "landed", "{judgement:?}");
 }

@@ -3,6 +3,8 @@
 mod battery;
 mod force;
 mod inertial;
+mod motors;
+mod tipping;
 
 use super::*;
 use proptest::prelude::*;

@@ -280,3 +280,44 @@ fn a_blind_landing_stays_blind_and_the_next_one_sees() {
     assert_eq!(stages(&mut manager, &[(FlightPhase::IdleGround, 0.03, 0.0)], Validity::ALL), ["Stand"]);
     assert_eq!(stages(&mut manager, &landing, Validity::ALL), ["Landing/Descend"]);
 }
+
+/// It stands on a table's edge, says the range, and falls beside it.
+#[test]
+fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
+    let config = LandingConfig::default();
+    // Of the thrust that is missing so much of the specific force is: drag carries the rest. And how fast it becomes fast.
+    let blind_after = |follows: f32, gains: f32| {
+        let mut manager = TakeoffLanding::new(config);
+        let (mut sink_rate, mut thrust, mut ceiling, mut fast) = (0.1f32, 1.0f32, f32::MAX, None);
+        for k in 0..800u64 {
+            let now = Instant::from_micros(2_500 * k);
+            let demand = ControlOutput { thrust: ceiling.min(1.0), ..Default::default() };
+            thrust += DT / (LAG + DT) * (demand.thrust - thrust);
+            if ceiling < 0.9 {
+                sink_rate += gains * DT;
+            }
+            let estimate = StateEstimate {
+                height: 0.03,
+                velocity: Vec3::new(0.0, 0.0, sink_rate),
+                specific_force: Vec3::new(0.0, 0.0, -GRAVITY * (1.0 - follows * (1.0 - thrust))),
+                valid: Validity::ALL,
+                ..Default::default()
+            };
+            let setpoint = Setpoint::default();
+            let phase = if k < 200 { FlightPhase::Flying } else { FlightPhase::Landing };
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            ceiling = manager.step(now, &input).thrust_ceiling;
+            if sink_rate > config.descent + 0.1 {
+                fast.get_or_insert(now);
+            }
+            if manager.stage().to_string() == "Landing/Blind" {
+                return fast.map(|fast| now.since(fast).seconds());
+            }
+        }
+        None
+    };
+    let after = blind_after(0.45, 1.5);
+    assert!(after.is_some_and(|seconds| seconds < 0.15), "{after:?}");
+    assert_eq!(blind_after(0.0, 1.5), None, "it stands, whatever its climb rate says");
+    assert_eq!(blind_after(0.45, 0.0), None, "it is not fast");
+}

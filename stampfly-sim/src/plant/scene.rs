@@ -162,6 +162,21 @@ mod tests {
     }
 
     #[test]
+    fn the_face_of_an_edge_pushes_out_and_its_top_carries() {
+        let ahead = Beyond { point: [0.0, 0.0], ahead: [1.0, 0.0] };
+        // The lower floor lies ahead, and behind.
+        for (drop, upper, out) in [(0.7, 0.0, 1.0), (-0.7, -0.7, -1.0)] {
+            let scene = Scene { edge: Some((ahead, drop)), ..Scene::default() };
+            let struck = Vector3::new(-0.01 * out, 0.0, upper + 0.03);
+            assert_eq!(scene.floor(&struck), upper + 0.7, "no floor throws it up");
+            let pushes: Vec<_> = scene.inside(&struck).collect();
+            assert_eq!(pushes, [(0.01, Vector3::new(out, 0.0, 0.0))], "{drop} m");
+            let foot = Vector3::new(-0.02 * out, 0.0, upper + 0.002);
+            assert_eq!((scene.floor(&foot), scene.inside(&foot).count()), (upper, 0), "{drop} m: a foot");
+        }
+    }
+
+    #[test]
     fn beyond_an_edge_it_falls_deeper() {
         let mut plant = plant(0.3);
         let beyond = Beyond { point: [-1.0, 0.0], ahead: [1.0, 0.0] };

@@ -61,3 +61,25 @@ fn a_zero_that_vibration_moves_is_no_fault() {
         assert!(!alerts.contains(Alerts::IMU_FAULTY), "sample {n}");
     }
 }
+
+/// For so many samples each, in turn, it feels these forces: is it stopped within two seconds?
+fn stopped(forces: [(u32, f32); 2], repeats: bool) -> bool {
+    let config = FailsafeConfig { hover_thrust: 0.36, ..FailsafeConfig::default() };
+    let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+    rig.output.thrust = 0.36;
+    let mut rig = rig.settled();
+    let [(first, force), (second, other)] = forces;
+    (0..800u32).any(|n| {
+        let is_first = if repeats { n % (first + second) < first } else { n < first };
+        rig.sample(REST * if is_first { force } else { other }, Vec3::zeros()).contains(Alerts::IMU_FAULTY)
+    })
+}
+
+#[test]
+fn what_is_unexplained_adds_up_and_a_jerk_does_not() {
+    assert!(stopped([(30, 0.3), (15, 0.9)], true), "what fits in between is no excuse");
+    assert!(!stopped([(15, 0.3), (60, 0.9)], true), "it is less than what fits");
+    for force in [2.2, 2.9, -0.2] {
+        assert!(!stopped([(12, force), (1, 1.0)], false), "30 ms of {force} g");
+    }
+}

@@ -1,0 +1,80 @@
+//! A motor that is lost, and one that runs by itself.
+
+use super::*;
+
+/// A vehicle whose limits of torque are 1 N·m: one rotor's share is 3.3.
+fn rig(phase: FlightPhase, height: f32) -> Rig {
+    let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, idle_current: 0.6, ..FailsafeConfig::default() };
+    let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+    (rig.mode.phase, rig.estimate.height) = (phase, height);
+    rig
+}
+
+/// After how many of so many samples with this torque is the alert there?
+fn found(rig: &mut Rig, torque: [f32; 2], samples: u32, alert: Alerts) -> Option<u32> {
+    rig.output.torque = Vec3::new(torque[0], torque[1], 0.0);
+    (1..=samples).find(|_| rig.sample(REST, Vec3::zeros()).contains(alert))
+}
+
+#[test]
+fn a_torque_that_no_three_rotors_make_is_a_lost_motor() {
+    let lost = |phase, height, torque, samples| {
+        let mut rig = rig(phase, height);
+        found(&mut rig, torque, samples, Alerts::MOTOR_LOST)
+    };
+    let after = lost(FlightPhase::Flying, 1.0, [4.0, -4.0], 400);
+    assert!(after.is_some_and(|samples| (40..100).contains(&samples)), "a low-pass and 0.1 s: {after:?}");
+    for (phase, height, torque, samples, why) in [
+        (FlightPhase::Flying, 1.0, [4.0, 2.5], 400, "about one axis"),
+        (FlightPhase::Flying, 1.0, [3.0, 3.0], 400, "less than a share"),
+        (FlightPhase::Flying, 1.0, [4.0, 4.0], 60, "a gust"),
+        (FlightPhase::Flying, 0.03, [4.0, 4.0], 400, "near the ground"),
+        (FlightPhase::Armed, 1.0, [4.0, 4.0], 400, "it stands"),
+        (FlightPhase::Landing, 1.0, [4.0, 4.0], 400, "it lands after all"),
+    ] {
+        assert_eq!(lost(phase, height, torque, samples), None, "{why}");
+    }
+}
+
+#[test]
+fn a_weak_motor_that_lands_is_lost_soon_or_not_at_all() {
+    let lost = |waits: u32| {
+        let mut rig = rig(FlightPhase::Flying, 1.0);
+        found(&mut rig, [1.5, 1.5], 400, Alerts::MOTOR_WEAK).expect("a weak motor");
+        rig.mode.phase = FlightPhase::Landing;
+        found(&mut rig, [1.5, 1.5], waits, Alerts::MOTOR_LOST)
+            .or_else(|| found(&mut rig, [8.0, 8.0], 400, Alerts::MOTOR_LOST))
+    };
+    assert!(lost(0).is_some_and(|samples| samples < 80), "{:?}", lost(0));
+    assert_eq!(lost(60), None, "it took 150 ms of the 200");
+}
+
+/// Samples until a motor counts as running, of so many; bursts of a sample ten times a second add to the current, A.
+fn runs(armed: bool, current: f32, burst: f32) -> Option<u32> {
+    let mut rig = rig(FlightPhase::IdleGround, 0.03);
+    rig.mode.armed = armed;
+    if armed {
+        rig.mode.phase = FlightPhase::Armed;
+    }
+    (0..800).find(|n| {
+        rig.battery.current = current + if n % 40 == 0 { burst } else { 0.0 };
+        rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_RUNS)
+    })
+}
+
+#[test]
+fn only_a_motor_draws_amperes_while_disarmed() {
+    assert!(runs(false, 2.6, 0.0).is_some_and(|samples| samples < 200), "{:?}", runs(false, 2.6, 0.0));
+    assert_eq!(runs(false, 0.4, 2.0), None, "a radio's bursts");
+    assert_eq!(runs(true, 2.6, 0.0), None, "its motors may turn");
+}
+
+#[test]
+fn it_is_over_when_the_current_is() {
+    let mut rig = rig(FlightPhase::IdleGround, 0.03);
+    rig.mode.armed = false;
+    rig.battery.current = 2.6;
+    assert!((0..200).any(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_RUNS)));
+    rig.battery.current = 0.2;
+    assert!((0..400).any(|_| !rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_RUNS)));
+}
