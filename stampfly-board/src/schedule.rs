@@ -18,7 +18,7 @@ stampfly_bus::schedule! {
     /// Anomaly detection.
     failsafe = Failsafe: after estimation or at latest 5 ms, flight, 45 us;
     /// Take-off and landing manager.
-    landing = Landing: after failsafe, flight, 25 us;
+    landing = Landing: after failsafe, flight, 30 us;
     /// State management: the only place where the vehicle changes state.
     mode = Mode: after landing, flight, 60 us;
     /// Navigator: every set-point there is.

@@ -21,3 +21,20 @@ fn sensors_that_measure_raise_no_alert() {
     }
     assert!(found.is_empty(), "{} of {flights} flights: {found:?}", found.len());
 }
+
+/// Flow was convicted in three of these, because the comparison began with a reading of two frames (D-073).
+#[test]
+fn random_missions_at_twice_the_vibration_raise_no_alert() {
+    let mut campaign = std::process::Command::new(env!("CARGO_BIN_EXE_stampfly"));
+    campaign.args(["campaign", "--mission", "random", "--gust", "0", "--vibration", "2", "--json"]);
+    let output = campaign.args(["--seed", "18", "--flights", "10"]).output().expect("it runs");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let flights = report["each"].as_array().expect("flights");
+    assert_eq!(flights.len(), 10);
+    for flight in flights {
+        let names = flight["alerts"].as_array().expect("alerts").iter().map(|alert| &alert["name"]);
+        let found: Vec<_> =
+            names.filter(|name| !["COMM_LOST", "LOW_BATTERY"].map(Into::into).contains(*name)).collect();
+        assert!(found.is_empty() && flight["outcome"] == "transparent", "seed {}: {found:?}", flight["seed"]);
+    }
+}
