@@ -14,7 +14,7 @@ use stampfly_log::ulog::{Definitions, Level, ParameterValue, Sink, WriteError, W
 use stampfly_types::{Instant, messages::FlightStatus};
 
 /// Memory that the firmware has for it, words: 39 kB.
-pub const WORDS: usize = 8 * 1024 + 512;
+pub const WORDS: usize = 10 * 1024 - 512;
 
 /// A black box for this vehicle.
 pub type BlackBox<const WORDS: usize> = stampfly_flight::BlackBox<WORDS, COUNT>;

@@ -3,7 +3,7 @@
 //! The innermost loop is the [incremental](crate::indi) one, because the turn is over before an integral has found anything, and
 //! with the sequence's angular acceleration ahead of it the rate follows its ramps without an error to begin with.
 
-use stampfly_types::messages::{ControlOutput, FlipDirection, StateEstimate};
+use stampfly_types::messages::{ControlOutput, FlightPhase, FlipDirection, Setpoint, StateEstimate};
 use stampfly_types::{Instant, Vec3};
 
 use super::{FlipConfig, FlipRefusal, FlipSequencer, FlipStage};
@@ -35,6 +35,8 @@ pub struct FlipController {
     sequence: FlipSequencer,
     rate: IndiRate,
     timer: StepTimer,
+    /// The phase of the period before.
+    phase: FlightPhase,
     /// Rate asked for per angular acceleration, s, so that the loop's torque has that acceleration.
     ahead: Vec3,
     thrust_max: f32,
@@ -54,6 +56,7 @@ impl FlipController {
             sequence: FlipSequencer::new(config),
             rate: IndiRate::new(rate),
             timer: StepTimer::default(),
+            phase: FlightPhase::Init,
             // The damping takes λ of it off again.
             ahead: rate.damping.zip_map(&rate.bandwidth, |damping, bandwidth| (1.0 + damping) / bandwidth),
             thrust_max: config.thrust_max,
@@ -95,6 +98,28 @@ impl FlipController {
         let target = demand.rate + demand.acceleration.component_mul(&self.ahead);
         let torque = self.rate.step(&target, &estimate.angular_rate, dt, unmet, false);
         Some(ControlOutput { thrust: possible_thrust(demand.thrust, self.thrust_max, f32::MAX, 1.0), torque })
+    }
+
+    /// One control period of a vehicle whose mode machine knows [`FlightPhase::Flip`]: a flip begins with the phase, in the
+    /// direction that the set-point has, and ends with it. `None` while the vehicle's controller flies; so it does, hovering, in
+    /// the phase of a flip that is refused. The mode machine has looked at the battery.
+    pub fn follow(
+        &mut self,
+        now: Instant,
+        phase: FlightPhase,
+        setpoint: &Setpoint,
+        estimate: &StateEstimate,
+        unmet: [f32; 4],
+    ) -> Option<ControlOutput> {
+        let before = core::mem::replace(&mut self.phase, phase);
+        if phase != FlightPhase::Flip {
+            self.cancel(now);
+        } else if before != FlightPhase::Flip
+            && let Some(direction) = setpoint.axes.flip()
+        {
+            let _ = self.start(now, direction, estimate, None);
+        }
+        self.step(now, estimate, unmet)
     }
 
     /// Ends it; see [`FlipSequencer::cancel`].
