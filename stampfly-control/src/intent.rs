@@ -31,7 +31,7 @@ pub struct Intent {
     pub heading: Heading,
     /// The vehicle touches the ground: integrators would learn the ground's push, so they must not move.
     pub grounded: bool,
-    /// Tangent of the largest tilt for a place or a velocity: [`SETTLING`] while thrust is taken away to find the ground. A
+    /// Tangent of the largest tilt for a place or a velocity: 0.1 while thrust is taken away to find the ground. A
     /// vehicle that stands on one leg leans on, whatever is asked, and falls over it; steady wind needs less.
     pub tan_tilt_max: f32,
 }
