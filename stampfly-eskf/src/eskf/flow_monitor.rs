@@ -178,7 +178,9 @@ impl FlowMonitor {
     pub(super) fn forget(&mut self) {
         (self.flow, self.inertial, self.difference) = Default::default();
         (self.differs, self.agrees) = (0.0, 0.0);
-        (self.readings, self.apart, self.sum, self.means, self.jumped) = Default::default();
+        (self.readings, self.apart, self.sum, self.means) = Default::default();
+        // What has convicted stays: an offset agrees with every motion that follows, until the vehicle stands.
+        self.jumped = self.jumped.filter(|time| *time > JUMP_WAITS);
     }
 
     /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
@@ -282,7 +284,7 @@ impl FlowMonitor {
                 let agrees = difference < 0.2 * motion && self.repeats < REPEATED && self.zeros < ZEROS;
                 self.agrees = if agrees { self.agrees + interval } else { 0.0 };
             }
-            self.implausible = self.agrees < AGREES_FOR;
+            self.implausible = self.agrees < AGREES_FOR || self.jumped > Some(JUMP_WAITS);
             return false;
         }
         self.waits = (self.waits - interval).max(0.0);
@@ -404,6 +406,28 @@ mod tests {
             }
         }
         assert_eq!(convicted(0.5, |n, _| (if n < 100 { 0.0 } else { 0.3 }, 0.0)), None, "none at all");
+    }
+
+    /// It was believed for one reading after each half second of agreement, and convicted again.
+    #[test]
+    fn an_offset_that_began_with_a_jump_is_not_believed_again_in_the_air() {
+        let mut monitor = FlowMonitor::default();
+        let mut convictions = 0;
+        for n in 0..1_000_u32 {
+            // It swings to and fro, and flow says so, too much by 1 m/s from the second on.
+            let velocity = 0.5 * stampfly_types::math::sin(0.03 * n as f32);
+            let before = 0.5 * stampfly_types::math::sin(0.03 * (n as f32 - 1.0));
+            monitor.predict(&Vec3::new(velocity - before, 0.0, 0.0), DT);
+            let flow = Vec3::new(velocity + if n < 100 { 0.0 } else { 1.0 }, 0.0, 0.0);
+            let counts = [flow.x * DT / 0.5, if n % 2 == 0 { 0.002 } else { -0.002 }];
+            convictions += u32::from(monitor.flow(counts, [0.0; 2], &flow, 0.5, DT, true));
+            if !(100..130).contains(&n) {
+                assert_eq!(monitor.is_implausible(), n >= 130, "reading {n}");
+            }
+        }
+        assert_eq!(convictions, 1);
+        monitor.stand([0.0; 2], DT);
+        assert!(!monitor.is_implausible());
     }
 
     #[test]
