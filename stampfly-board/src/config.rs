@@ -53,8 +53,6 @@ pub struct VehicleConfig {
     pub geometric: GeometricConfig,
     /// Innermost loop of the incremental controller; its outer loops are those of the cascade.
     pub indi: IndiConfig,
-    /// Turning over.
-    pub flip: FlipConfig,
     /// Motors and battery.
     pub motor: MotorConfig,
     /// Take-off, route and sticks.
@@ -75,7 +73,6 @@ impl Default for VehicleConfig {
     /// The StampFly as it is built.
     fn default() -> Self {
         let ground_clearance = GROUND_HEIGHT as f32;
-        let flip = FlipConfig::for_airframe(&AIRFRAME);
         let weak = AIRFRAME.rotor_torque() * WEAK_SHARE;
         Self {
             estimator: EstimatorKind::default(),
@@ -85,10 +82,9 @@ impl Default for VehicleConfig {
             cascade: CascadeConfig::for_airframe(&AIRFRAME),
             geometric: GeometricConfig::for_airframe(&AIRFRAME),
             indi: IndiConfig::for_airframe(&AIRFRAME),
-            flip,
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
-            mode: ModeConfig { flip_height: flip.height_min, ..ModeConfig::default() },
+            mode: ModeConfig { flip_height: FlipConfig::for_airframe(&AIRFRAME).height_min, ..ModeConfig::default() },
             failsafe: FailsafeConfig {
                 weak_roll: weak.x,
                 weak_pitch: weak.y,

@@ -1,12 +1,13 @@
 //! Control: state and set-point in, thrust and torque out.
 
 use super::command::present;
+use crate::airframe::AIRFRAME;
 use crate::config::{ControllerKind, VehicleConfig};
 use crate::topics::ControlEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::indi::IndiRate;
 use stampfly_control::{
-    CascadeController, ControlInput, Controller, FlipController, GeometricController, IndiController,
+    CascadeController, ControlInput, Controller, FlipConfig, FlipController, GeometricController, IndiController,
 };
 
 /// The controllers this vehicle can be told to use (`controller.type`).
@@ -39,7 +40,7 @@ impl Control {
             }
             ControllerKind::Cascade => Choice::Cascade(CascadeController::new(&config.cascade)),
         };
-        Self { controller, flip: FlipController::new(&config.flip, &config.indi) }
+        Self { controller, flip: FlipController::new(&FlipConfig::for_airframe(&AIRFRAME), &config.indi) }
     }
 }
 

@@ -53,16 +53,11 @@ pub struct FlipConfig {
     pub height_min: f32,
     /// Largest tilt, rad, rate, rad/s, horizontal and vertical speed, m/s, to begin with.
     pub steady: [f32; 4],
-    /// Least battery voltage, V.
-    pub voltage_min: f32,
     /// Time between two flips.
     pub pause: Duration,
 }
 
 impl FlipConfig {
-    /// Lowest voltage of a lithium cell under load that still gives the thrust of a recovery, V.
-    const CELL_LOWEST: f32 = 3.5;
-
     /// The rule for an airframe. The turn takes 2π/rate + rate/acceleration; before it the vehicle climbs with 0.28 of what
     /// gravity takes in that time, and at the height asked for the rest of it can be braked.
     #[must_use]
@@ -98,7 +93,6 @@ impl FlipConfig {
             attitude,
             height_min: if spare > 0.18 * GRAVITY { fall * fall / (2.0 * spare) } else { f32::INFINITY },
             steady: [0.26, 1.05, 0.3, 0.2],
-            voltage_min: Self::CELL_LOWEST * f32::from(airframe.cells),
             pause: Duration::from_secs(2),
         }
     }

@@ -23,7 +23,7 @@ use crate::timing::StepTimer;
 ///
 /// let mut flip = FlipController::for_airframe(&Airframe::EXAMPLE);
 /// let estimate = StateEstimate { height: 2.0, valid: Validity::ALL, ..Default::default() };
-/// flip.start(Instant::ZERO, FlipDirection::Back, &estimate, None)?;
+/// flip.start(Instant::ZERO, FlipDirection::Back, &estimate)?;
 /// // In place of the controller, while it gives something.
 /// let output = flip.step(Instant::from_micros(2_500), &estimate, [0.0; 4]).expect("it has only begun");
 /// assert!(output.thrust > Airframe::EXAMPLE.hover_thrust());
@@ -78,9 +78,8 @@ impl FlipController {
         now: Instant,
         direction: FlipDirection,
         estimate: &StateEstimate,
-        voltage: Option<f32>,
     ) -> Result<(), FlipRefusal> {
-        self.sequence.start(now, direction, estimate, voltage)?;
+        self.sequence.start(now, direction, estimate)?;
         self.rate.reset();
         Ok(())
     }
@@ -113,11 +112,15 @@ impl FlipController {
     ) -> Option<ControlOutput> {
         let before = core::mem::replace(&mut self.phase, phase);
         if phase != FlightPhase::Flip {
-            self.cancel(now);
-        } else if before != FlightPhase::Flip
+            if before == FlightPhase::Flip {
+                self.cancel(now);
+            }
+            return None;
+        }
+        if before != FlightPhase::Flip
             && let Some(direction) = setpoint.axes.flip()
         {
-            let _ = self.start(now, direction, estimate, None);
+            let _ = self.start(now, direction, estimate);
         }
         self.step(now, estimate, unmet)
     }

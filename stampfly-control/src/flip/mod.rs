@@ -40,8 +40,6 @@ pub enum FlipRefusal {
     Height,
     /// It tilts, turns or moves.
     Unsteady,
-    /// The battery is low.
-    Battery,
 }
 
 impl core::fmt::Display for FlipRefusal {
@@ -51,7 +49,6 @@ impl core::fmt::Display for FlipRefusal {
             Self::Estimate => "tilt, height or climb rate are unknown",
             Self::Height => "too low, or too weak",
             Self::Unsteady => "it tilts, turns or moves",
-            Self::Battery => "the battery is low",
         })
     }
 }
@@ -160,7 +157,7 @@ impl FlipSequencer {
         self.complete
     }
 
-    /// Begins. `voltage` is the battery's, V, under the present load; `None` when somebody else has looked at it.
+    /// Begins. That the battery is up to it, somebody else has to know.
     ///
     /// # Errors
     /// Says why the vehicle must not turn over; nothing has changed then.
@@ -169,7 +166,6 @@ impl FlipSequencer {
         now: Instant,
         direction: FlipDirection,
         estimate: &StateEstimate,
-        voltage: Option<f32>,
     ) -> Result<(), FlipRefusal> {
         let config = &self.config;
         if self.stage != FlipStage::Over || self.over.is_some_and(|over| now.since(over) < config.pause) {
@@ -190,10 +186,6 @@ impl FlipSequencer {
             down.z >= math::cos(tilt) && estimate.angular_rate.norm() <= rate && estimate.velocity.z.abs() <= climb;
         if !(still && stays) {
             return Err(FlipRefusal::Unsteady);
-        }
-        let charged = voltage.is_none_or(|voltage| voltage >= config.voltage_min);
-        if !charged {
-            return Err(FlipRefusal::Battery);
         }
         (self.pitch, self.sense) = match direction {
             FlipDirection::Left => (false, -1.0),

@@ -17,8 +17,8 @@ const NOW: Instant = Instant::from_secs(10);
 
 #[test]
 fn every_condition_refuses() {
-    let start = |estimate: &StateEstimate, voltage| flip().start(NOW, FlipDirection::Left, estimate, voltage);
-    assert_eq!(start(&hover(), None), Ok(()));
+    let start = |estimate: &StateEstimate| flip().start(NOW, FlipDirection::Left, estimate);
+    assert_eq!(start(&hover()), Ok(()));
     for (estimate, refusal) in [
         (StateEstimate { height: 0.3, ..hover() }, FlipRefusal::Height),
         (StateEstimate { valid: Validity::ALL.without(Validity::HEIGHT), ..hover() }, FlipRefusal::Estimate),
@@ -29,16 +29,14 @@ fn every_condition_refuses() {
         (StateEstimate { angular_rate: Vec3::new(0.0, 0.0, 2.0), ..hover() }, FlipRefusal::Unsteady),
         (StateEstimate { attitude: Quat::from_euler_angles(0.3, 0.0, 0.0), ..hover() }, FlipRefusal::Unsteady),
     ] {
-        assert_eq!(start(&estimate, None), Err(refusal), "{estimate:?}");
+        assert_eq!(start(&estimate), Err(refusal), "{estimate:?}");
     }
-    assert_eq!(start(&hover(), Some(6.9)), Err(FlipRefusal::Battery));
-    assert_eq!(start(&hover(), Some(f32::NAN)), Err(FlipRefusal::Battery));
     let mut flip = flip();
-    assert_eq!(flip.start(NOW, FlipDirection::Left, &hover(), None), Ok(()));
-    assert_eq!(flip.start(NOW, FlipDirection::Left, &hover(), None), Err(FlipRefusal::Busy));
+    assert_eq!(flip.start(NOW, FlipDirection::Left, &hover()), Ok(()));
+    assert_eq!(flip.start(NOW, FlipDirection::Left, &hover()), Err(FlipRefusal::Busy));
     flip.cancel(NOW);
-    assert_eq!(flip.start(NOW + PERIOD, FlipDirection::Left, &hover(), None), Err(FlipRefusal::Busy), "a pause first");
-    assert_eq!(flip.start(NOW + Duration::from_secs(2), FlipDirection::Left, &hover(), None), Ok(()));
+    assert_eq!(flip.start(NOW + PERIOD, FlipDirection::Left, &hover()), Err(FlipRefusal::Busy), "a pause first");
+    assert_eq!(flip.start(NOW + Duration::from_secs(2), FlipDirection::Left, &hover()), Ok(()));
 }
 
 #[test]
@@ -46,14 +44,14 @@ fn a_weak_vehicle_never_turns_over() {
     let weak = Airframe { mass: 0.7, ..Airframe::EXAMPLE };
     let mut flip = FlipSequencer::new(&FlipConfig::for_airframe(&weak));
     let high = StateEstimate { height: 100.0, ..hover() };
-    assert_eq!(flip.start(NOW, FlipDirection::Left, &high, None), Err(FlipRefusal::Height));
+    assert_eq!(flip.start(NOW, FlipDirection::Left, &high), Err(FlipRefusal::Height));
 }
 
 /// Steps a vehicle that does exactly as it is told; gives the angle turned about roll and pitch, and the time it took.
 fn flown(direction: FlipDirection, estimate: &mut StateEstimate) -> (f32, f32, f32) {
     let airframe = Airframe::EXAMPLE;
     let (mut flip, mut now) = (flip(), NOW);
-    flip.start(now, direction, estimate, None).expect("nothing speaks against it");
+    flip.start(now, direction, estimate).expect("nothing speaks against it");
     let (mut roll, mut pitch) = (0.0, 0.0);
     while flip.stage() != FlipStage::Over {
         let demand = flip.step(now, estimate);
@@ -98,7 +96,7 @@ fn what_does_not_follow_is_given_up() {
     let spinning = StateEstimate { angular_rate: Vec3::new(33.0, 0.0, 0.0), ..climbing };
     for after_start in [hover(), climbing, spinning] {
         let (mut flip, mut now) = (flip(), NOW);
-        flip.start(now, FlipDirection::Right, &hover(), None).expect("nothing speaks against it");
+        flip.start(now, FlipDirection::Right, &hover()).expect("nothing speaks against it");
         let mut recovered = false;
         while flip.stage() != FlipStage::Over {
             now += PERIOD;
@@ -113,7 +111,7 @@ fn what_does_not_follow_is_given_up() {
 #[test]
 fn an_estimate_that_breaks_ends_it() {
     let mut flip = flip();
-    flip.start(NOW, FlipDirection::Right, &hover(), None).expect("nothing speaks against it");
+    flip.start(NOW, FlipDirection::Right, &hover()).expect("nothing speaks against it");
     let broken = StateEstimate { angular_rate: Vec3::new(f32::NAN, 0.0, 0.0), ..hover() };
     let demand = flip.step(NOW + PERIOD, &broken);
     assert_eq!(flip.stage(), FlipStage::Over);
