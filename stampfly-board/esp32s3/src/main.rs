@@ -36,6 +36,7 @@ mod storage;
 use alloc::boxed::Box;
 use clock::Clock;
 use core::cell::RefCell;
+use core::convert::Infallible;
 use embassy_executor::Spawner;
 use embassy_futures::block_on;
 use esp_hal::clock::CpuClock;
@@ -96,69 +97,82 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
     }
     let peer = block_on(storage.load_peer());
     let Assembly { flight_loop, mut outside, taps } = assemble(&config);
-    let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
-    outside.self_test.self_test.publish(Clock.now(), &tested.message());
-    static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
-    let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
-    static HEALTH: Healths = Healths::new();
-    static PROFILE: Profile = Profile::new(&ACTIVATIONS);
-    let pins: Pins<'static> = split_resources!(chip);
-    let flight = flight::Parts {
-        flight_loop,
-        imu: outside.imu,
-        flow: outside.flow,
-        duties: outside.motors,
-        motors: pins.motors,
-        spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi, interrupts: chip.IO_MUX },
-        watchdog,
-        health: &HEALTH,
-        profile: &PROFILE,
-    };
-    let sensors = sensors::Parts {
-        unit: chip.I2C0,
-        pins: pins.i2c,
-        range: pins.range,
-        tof: outside.tof,
-        tof_front: outside.tof_front,
-        mag: outside.mag,
-        baro: outside.baro,
-        power: outside.power,
-        health: &HEALTH,
-    };
-    let people =
-        people::Parts { pulses: chip.RMT, pins: pins.people, indicator: outside.indicator, button: outside.button_pin };
-    let radio = radio::Parts { unit: chip.WIFI, peer, ends: outside.link };
-    let console = console::Parts {
-        usb: chip.USB_DEVICE,
-        memory,
-        health: &HEALTH,
-        profile: &PROFILE,
-        ends: outside.console,
-        storage,
-        storage_ends: outside.storage,
-        config,
-        tested,
-    };
-    let supervisor = outside.supervisor;
-    let ground = move |spawner: Spawner| {
-        spawner.spawn(sensors::run(sensors).expect("spawned once"));
-        spawner.spawn(people::run(people).expect("spawned once"));
-        spawner.spawn(memory::run(memory, supervisor).expect("spawned once"));
-        spawner.spawn(console::run(console).expect("spawned once"));
-        spawner.spawn(radio::run(radio).expect("spawned once"));
-    };
-    let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
+    // Assembling takes the most stack of all. What only the tasks need lies in a frame that does not exist until it is over.
+    in_a_frame_of_its_own(move || {
+        let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
+        outside.self_test.self_test.publish(Clock.now(), &tested.message());
+        static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
+        let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
+        static HEALTH: Healths = Healths::new();
+        static PROFILE: Profile = Profile::new(&ACTIVATIONS);
+        let pins: Pins<'static> = split_resources!(chip);
+        let flight = flight::Parts {
+            flight_loop,
+            imu: outside.imu,
+            flow: outside.flow,
+            duties: outside.motors,
+            motors: pins.motors,
+            spi: spi::Parts { unit: chip.SPI2, dma: chip.DMA_CH0, pins: pins.spi, interrupts: chip.IO_MUX },
+            watchdog,
+            health: &HEALTH,
+            profile: &PROFILE,
+        };
+        let sensors = sensors::Parts {
+            unit: chip.I2C0,
+            pins: pins.i2c,
+            range: pins.range,
+            tof: outside.tof,
+            tof_front: outside.tof_front,
+            mag: outside.mag,
+            baro: outside.baro,
+            power: outside.power,
+            health: &HEALTH,
+        };
+        let people = people::Parts {
+            pulses: chip.RMT,
+            pins: pins.people,
+            indicator: outside.indicator,
+            button: outside.button_pin,
+        };
+        let radio = radio::Parts { unit: chip.WIFI, peer, ends: outside.link };
+        let console = console::Parts {
+            usb: chip.USB_DEVICE,
+            memory,
+            health: &HEALTH,
+            profile: &PROFILE,
+            ends: outside.console,
+            storage,
+            storage_ends: outside.storage,
+            config,
+            tested,
+        };
+        let supervisor = outside.supervisor;
+        let ground = move |spawner: Spawner| {
+            spawner.spawn(sensors::run(sensors).expect("spawned once"));
+            spawner.spawn(people::run(people).expect("spawned once"));
+            spawner.spawn(memory::run(memory, supervisor).expect("spawned once"));
+            spawner.spawn(console::run(console).expect("spawned once"));
+            spawner.spawn(radio::run(radio).expect("spawned once"));
+        };
+        let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
 
-    #[cfg(feature = "esp32s3")]
-    {
-        cores::start_second(chip.CPU_CTRL, chip.FROM_CPU_INTR1, fly);
-        cores::run(ground)
-    }
-    #[cfg(feature = "esp32c6")]
-    cores::run(move |spawner| {
-        fly(spawner);
-        ground(spawner);
+        #[cfg(feature = "esp32s3")]
+        {
+            cores::start_second(chip.CPU_CTRL, chip.FROM_CPU_INTR1, fly);
+            cores::run(ground)
+        }
+        #[cfg(feature = "esp32c6")]
+        cores::run(move |spawner| {
+            fly(spawner);
+            ground(spawner);
+        })
     })
+}
+
+/// Runs the rest, apart from the caller's stack frame.
+#[inline(never)]
+fn in_a_frame_of_its_own(rest: impl FnOnce() -> Infallible) -> ! {
+    match rest() {}
 }
 
 /// A vehicle whose flight loop stays where it is.

@@ -5,7 +5,7 @@
 //! of its own, so that the rows add up to the sections.
 //!
 //! Stack is a bound, not a measurement: frames and calls come from the machine code. Interrupts come on top of it, which is
-//! why about half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
+//! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
 use super::esp32;
 use crate::arguments::Arguments;
@@ -36,8 +36,8 @@ const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyT
 /// Bytes of stack assumed for a function in ROM, whose code is not in the program. These compute with floating point, copy
 /// memory, wait, or access the flash chip, and call little.
 const ROM: u64 = 512;
-/// Part of its stack that a task may take. The rest, 46 kB for the largest, is for interrupts and for errors of this bound.
-const SHARE: f64 = 0.52;
+/// Part of its stack that a task may take. The rest is for interrupts and for errors of this bound.
+const SHARE: f64 = 0.5;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
