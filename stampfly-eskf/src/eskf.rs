@@ -15,7 +15,7 @@
 //! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
 //! | `eskf/vertical.rs` | range against inertia and barometer |
-//! | `eskf/flow_monitor.rs` | flow against inertia |
+//! | `eskf/flow_monitor/` | flow against inertia: the comparison, jumps, a picture that does not move |
 //! | `eskf/gyro_monitor.rs` | a jump of the gyro's against flow |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 

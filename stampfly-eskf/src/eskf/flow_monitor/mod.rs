@@ -1,0 +1,254 @@
+//! Does optical flow agree with what the accelerometer felt?
+//!
+//! Flow that lies is not rejected: it moves tilt, accelerometer bias and gyro bias until acceleration and flow agree
+//! again. So the comparison undoes what flow did to the predicted acceleration over the last seconds: at once through
+//! tilt and accelerometer bias, and second after second through the gyro bias, which goes on turning the tilt. What
+//! remains of flow's velocity less the integral of that acceleration, over half a second, is what no motion explains: a
+//! frozen reading while the vehicle accelerates, axes swapped or reversed, an offset that begins.
+//!
+//! The limit is the root of a sum of squares, one for each reason why honest readings differ:
+//!
+//! | term | reason |
+//! |---|---|
+//! | constant, and for each metre of distance | accelerometer and tilt; resolution of the picture |
+//! | share of the picture's motion, and of the motion that the body's turning gives it | a reading holds one frame, two or none |
+//! | standard deviation that was added to the tilt | the filter found its own tilt to be wrong, so the acceleration that is restored is wrong, too |
+//!
+//! Two things it leaves to others: a picture that does not move is [`picture`]'s, a velocity that jumps [`jump`]'s.
+//!
+//! Not for an error of scale of some tens of per cent, nor for a constant offset that was there from the beginning: no
+//! other sensor on board measures a constant velocity.
+
+mod jump;
+mod picture;
+
+use jump::Jump;
+use picture::Picture;
+use stampfly_types::{GRAVITY, Vec3};
+
+/// Time constant over which velocities are compared, s, and of the low-pass on their difference.
+const OVER: f32 = 0.5;
+const SMOOTH: f32 = 0.06;
+/// Time constants with which flow's corrections of tilt and accelerometer bias are forgotten, s, and those of the gyro
+/// bias. The latter act through the former, so they have to outlast them.
+const FORGOTTEN: f32 = 2.0;
+const BIAS_FORGOTTEN: f32 = 4.0;
+/// Largest difference, m/s, and for each metre of distance. Over [`OVER`] 0.55 m/s are 1.1 m/s², as much as a tilt that
+/// is wrong by 6.4°.
+const DIFFERENCE: f32 = 0.55;
+const PER_METRE: f32 = 0.15;
+/// Share of the picture's motion. A PMW3901 takes 121 frames a second: of 100 readings every fifth holds two frames, and
+/// one that is read early none. Such a single reading is wrong by all of the motion, of which [`SMOOTH`] lets a seventh
+/// through, and a quarter of two that follow each other.
+const SHARE: f32 = 0.25;
+/// Largest difference for each radian that is added to the tilt's standard deviation, m/s: two deviations of the
+/// velocity that gravity brings about over [`OVER`].
+const PER_RADIAN: f32 = 2.0 * GRAVITY * OVER;
+/// For how long, s.
+const LASTS: f32 = 0.1;
+/// Both velocities begin with the mean of so many readings: a single one may hold two frames, and what it is wrong by would
+/// stay in every difference for [`OVER`].
+const BEGINNING: u32 = 10;
+/// Nearer to the floor than this, m, the picture may be blurred.
+const SHARP: f32 = 0.15;
+/// After a start in the air the filter first has to find tilt and biases, s. A gyro bias of 3°/s takes as long.
+const UNKNOWN: f32 = 20.0;
+/// A vehicle that turns over moves the picture faster than a PMW3901 follows, 7.4 rad/s. Its readings are wrong by metres a second
+/// until it hardly turns any more, rad/s, for so long, s.
+const FAST: f32 = 7.0;
+const CALM: f32 = 1.0;
+const SETTLES: f32 = 0.1;
+/// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
+const MOTION: f32 = 0.2;
+const AGREES_FOR: f32 = 0.5;
+/// Largest mean rate of the picture on a vehicle that stands, rad/s, over [`OVER`] and over the second time, s. The second is
+/// for what begins while the motors spool up.
+const STANDING_RATE: [f32; 2] = [0.6, 1.0];
+const STANDING_SOON: f32 = 0.1;
+
+/// What is remembered of flow and acceleration, horizontal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct FlowMonitor {
+    /// Integral of the acceleration since the last reading, and over which time.
+    change: [f32; 2],
+    elapsed: f32,
+    /// What flow added to the acceleration lately, and to the gyro bias.
+    added: [f32; 2],
+    gyro_bias: [f32; 2],
+    /// Standard deviation that was added to the tilt lately.
+    tilt: f32,
+    /// Flow's and the accelerometer's velocity above their mean of the last half second.
+    flow: [f32; 2],
+    inertial: [f32; 2],
+    last: Option<[f32; 2]>,
+    /// Readings since the comparison began, and how far apart the velocities were in the first of them.
+    readings: u32,
+    apart: [f32; 2],
+    jump: Jump,
+    difference: [f32; 2],
+    differs: f32,
+    agrees: f32,
+    picture: Picture,
+    standing: [[f32; 2]; 2],
+    implausible: bool,
+    /// How long it has to hold back, s.
+    waits: f32,
+    /// The same after a fast turn.
+    settles: f32,
+}
+
+impl FlowMonitor {
+    /// Of a filter that starts in the air, with errors of every kind.
+    pub(super) fn airborne() -> Self {
+        Self { waits: UNKNOWN, ..Self::default() }
+    }
+
+    /// The vehicle stands: what moves it from here on is felt.
+    #[inline]
+    pub(super) fn ready(&mut self) {
+        self.waits = 0.0;
+    }
+
+    /// Is flow not to be believed?
+    pub(super) fn is_implausible(&self) -> bool {
+        self.implausible
+    }
+
+    /// Integrates the change of the velocity, world, in `dt`.
+    #[inline]
+    pub(super) fn predict(&mut self, change: &Vec3, dt: f32) {
+        self.elapsed += dt;
+        self.change[0] += change.x;
+        self.change[1] += change.y;
+    }
+
+    /// Flow changed the predicted acceleration and the gyro bias by this much, world.
+    pub(super) fn corrected(&mut self, acceleration: &Vec3, gyro_bias: &Vec3) {
+        self.added[0] += acceleration.x;
+        self.added[1] += acceleration.y;
+        self.gyro_bias[0] += gyro_bias.x;
+        self.gyro_bias[1] += gyro_bias.y;
+    }
+
+    /// The filter found its tilt to be wrong, and added this standard deviation, rad.
+    pub(super) fn inflated(&mut self, tilt: f32) {
+        self.tilt = tilt;
+    }
+
+    /// Takes the turning of the picture that the body makes, rad/s. Is it, or was it a moment ago, faster than the sensor follows? Then
+    /// the reading says nothing.
+    #[inline]
+    pub(super) fn turns_fast(&mut self, turning: [f32; 2], interval: f32) -> bool {
+        let [x, y] = turning;
+        // Nothing but a fast turn begins it.
+        let limit = if self.settles > 0.0 { CALM } else { FAST };
+        let fast = x * x + y * y > limit * limit;
+        self.settles = if fast { SETTLES } else { (self.settles - interval).max(0.0) };
+        let unusable = self.settles > 0.0;
+        if unusable {
+            self.last = None;
+            self.forget();
+        }
+        unusable
+    }
+
+    /// What was compared until now says nothing.
+    pub(super) fn forget(&mut self) {
+        (self.flow, self.inertial, self.difference) = Default::default();
+        (self.differs, self.agrees) = (0.0, 0.0);
+        (self.readings, self.apart) = Default::default();
+        self.jump.forget();
+    }
+
+    /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
+    pub(super) fn stand(&mut self, rate: [f32; 2], dt: f32) {
+        let mut standing = self.standing;
+        let mut implausible = false;
+        for ((mean, over), limit) in standing.iter_mut().zip([OVER, STANDING_SOON]).zip(STANDING_RATE) {
+            let share = dt / (over + dt);
+            *mean = core::array::from_fn(|axis| mean[axis] + (rate[axis] - mean[axis]) * share);
+            let [x, y] = *mean;
+            implausible |= x * x + y * y > limit * limit;
+        }
+        *self = Self { standing, implausible, ..Self::default() };
+    }
+
+    /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
+    /// rad/s, velocity, world, and the distance to the floor. `known` says that the distance is certain. True when it
+    /// has just become implausible.
+    pub(super) fn flow(
+        &mut self,
+        counts: [f32; 2],
+        turning: [f32; 2],
+        velocity: &Vec3,
+        distance: f32,
+        interval: f32,
+        known: bool,
+    ) -> bool {
+        let velocity = [velocity.x, velocity.y];
+        let change = core::mem::take(&mut self.change);
+        let dt = core::mem::take(&mut self.elapsed);
+        let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0 && interval > 0.0) else {
+            // Where the distance jumps, the velocity does.
+            self.forget();
+            return false;
+        };
+        let fade = OVER / (OVER + dt);
+        let forget = FORGOTTEN / (FORGOTTEN + dt);
+        let smooth = dt / (SMOOTH + dt);
+        let [x, y] = self.gyro_bias;
+        // A tilt that is turned by w changes the acceleration by gravity times w, a quarter turn about the vertical on.
+        // The bias is subtracted from the rate, so it turns the opposite way.
+        self.added[0] += GRAVITY * y * dt;
+        self.added[1] -= GRAVITY * x * dt;
+        self.gyro_bias = self.gyro_bias.map(|bias| bias * (BIAS_FORGOTTEN / (BIAS_FORGOTTEN + dt)));
+        self.tilt *= forget;
+        let ([mut difference, mut motion, mut picture], mut apart) = ([0.0; 3], [0.0; 2]);
+        let begins = self.readings < BEGINNING;
+        self.readings += u32::from(begins);
+        for axis in 0..2 {
+            self.flow[axis] = (self.flow[axis] + velocity[axis] - last[axis]) * fade;
+            self.inertial[axis] = (self.inertial[axis] + change[axis] - self.added[axis] * dt) * fade;
+            self.added[axis] *= forget;
+            apart[axis] = self.flow[axis] - self.inertial[axis];
+            if begins {
+                self.apart[axis] += apart[axis] / BEGINNING as f32;
+                self.flow[axis] -= if self.readings == BEGINNING { self.apart[axis] } else { 0.0 };
+            } else {
+                self.difference[axis] += (apart[axis] - self.difference[axis]) * smooth;
+            }
+            difference += self.difference[axis] * self.difference[axis];
+            motion += self.inertial[axis] * self.inertial[axis];
+            let rate = counts[axis] / interval;
+            picture += rate * rate + turning[axis] * turning[axis];
+        }
+        self.picture.step(counts, turning, distance, interval);
+        let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
+        let uncertain = share * share * picture;
+        if !begins {
+            self.jump.step(apart, distance, uncertain, interval, self.waits == 0.0);
+        }
+        // Of squares: a sum would do as well, and costs a root.
+        let limit = base * base + uncertain + tilt * tilt;
+        self.differs = if difference > limit { self.differs + interval } else { 0.0 };
+        if self.implausible {
+            if motion > MOTION * MOTION && !begins {
+                let agrees = difference < 0.2 * motion && !self.picture.is_frozen() && !self.picture.is_still();
+                self.agrees = if agrees { self.agrees + interval } else { 0.0 };
+            }
+            self.implausible = self.agrees < AGREES_FOR || self.jump.has_jumped();
+            return false;
+        }
+        self.waits = (self.waits - interval).max(0.0);
+        self.implausible = (self.differs > LASTS && self.waits == 0.0)
+            || self.jump.has_jumped()
+            || self.picture.is_frozen()
+            || self.picture.is_blind(distance);
+        self.agrees = 0.0;
+        self.implausible
+    }
+}
+
+#[cfg(test)]
+mod tests;
