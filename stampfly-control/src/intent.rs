@@ -101,7 +101,7 @@ impl Intent {
     pub fn read(input: &ControlInput<'_>) -> Option<Self> {
         let in_motion = match input.flight_status.phase {
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => false,
-            // Who turns the vehicle over does not ask a control law.
+            // A flip has a controller of its own, which is asked first.
             FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => true,
         };
         if !(in_motion && input.flight_status.armed) {

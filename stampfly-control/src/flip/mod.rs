@@ -91,9 +91,9 @@ pub struct FlipDemand {
 ///
 /// let mut flip = FlipSequencer::new(&FlipConfig::for_airframe(&Airframe::EXAMPLE));
 /// let low = StateEstimate { height: 0.2, valid: Validity::ALL, ..Default::default() };
-/// assert_eq!(flip.start(Instant::ZERO, FlipDirection::Right, &low, Some(7.8)), Err(FlipRefusal::Height));
+/// assert_eq!(flip.start(Instant::ZERO, FlipDirection::Right, &low), Err(FlipRefusal::Height));
 /// let high = StateEstimate { height: 2.0, ..low };
-/// flip.start(Instant::ZERO, FlipDirection::Right, &high, Some(7.8))?;
+/// flip.start(Instant::ZERO, FlipDirection::Right, &high)?;
 /// let climb = flip.step(Instant::from_micros(2_500), &high);
 /// assert!(climb.rate.norm() < 1e-3 && climb.thrust > Airframe::EXAMPLE.hover_thrust());
 /// let fast = StateEstimate { velocity: Vec3::new(0.0, 0.0, -3.0), ..high };
