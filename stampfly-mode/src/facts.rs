@@ -28,8 +28,8 @@ pub struct Asked {
 }
 
 /// Less than this, rad/s and m/s, is rest after turning over.
-const TURNS: f32 = 2.0;
-const CLIMBS: f32 = 0.5;
+const REST_RATE: f32 = 2.0;
+const REST_CLIMB: f32 = 0.5;
 
 impl Asked {
     /// Reads the commands of a step.
@@ -125,8 +125,8 @@ impl Facts {
             button,
             cut_off: input.cut_off,
             upright: frame::cos_tilt(&input.estimate.attitude),
-            at_rest: input.estimate.angular_rate.norm_squared() < TURNS * TURNS
-                && input.estimate.velocity.z.abs() < CLIMBS,
+            at_rest: input.estimate.angular_rate.norm_squared() < REST_RATE * REST_RATE
+                && input.estimate.velocity.z.abs() < REST_CLIMB,
         }
     }
 
