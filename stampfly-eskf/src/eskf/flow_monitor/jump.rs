@@ -4,7 +4,7 @@
 //! with every motion that follows, so flow that has jumped is not believed again until the vehicle stands. Not for an offset
 //! that grows: that is the slower comparison's.
 
-use super::SHARP;
+use super::picture::SHARP;
 
 /// Means of so many readings are compared with those two before: one of five holds two frames.
 const BLOCK: u32 = 5;

@@ -49,8 +49,6 @@ const LASTS: f32 = 0.1;
 /// Both velocities begin with the mean of so many readings: a single one may hold two frames, and what it is wrong by would
 /// stay in every difference for [`OVER`].
 const BEGINNING: u32 = 10;
-/// Nearer to the floor than this, m, the picture may be blurred.
-const SHARP: f32 = 0.15;
 /// After a start in the air the filter first has to find tilt and biases, s. A gyro bias of 3°/s takes as long.
 const UNKNOWN: f32 = 20.0;
 /// A vehicle that turns over moves the picture faster than a PMW3901 follows, 7.4 rad/s. Its readings are wrong by metres a second

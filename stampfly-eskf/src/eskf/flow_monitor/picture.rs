@@ -4,8 +4,8 @@
 //! happen by chance for some hundredths of a second. A picture that stands still while the body turns says that the vehicle
 //! moves by turn times distance the opposite way: a vehicle that is carried does so by millimetres.
 
-use super::SHARP;
-
+/// Nearer to the floor than this, m, the picture may be blurred.
+pub(super) const SHARP: f32 = 0.15;
 /// Readings running that are equal and not zero: frozen. At 100 Hz 0.4 s.
 const REPEATED: u32 = 40;
 /// The picture cannot stand still while the body turns by this much, rad: three counts of a PMW3901.
