@@ -25,6 +25,7 @@ const STEPS: &[Step] = &[
     Step::new("fmt", "Check the formatting", steps::fmt::run),
     Step::new("files", "Find dependency cycles between source files", steps::files::run),
     Step::new("constants", "Find constants of the StampFly in generic crates", steps::constants::run),
+    Step::new("lines", "Count the lines of the vehicles", steps::lines::run),
     Step::new("clippy", "Lint every target; a warning fails", steps::clippy::run),
     Step::new("test", "Run `cargo test`, on recorded data as well", steps::test::run).accepting(&[Rest]),
     Step::new("examples", "Run every example to its end", steps::examples::run),

@@ -70,10 +70,9 @@ impl DriverSelector {
             self.demo_started = None;
         }
         let timeout = Duration::from_seconds(parameters.timeout);
+        let heard = sources.operator_age.is_some_and(|age| age <= timeout);
         let selected = match mode {
-            InputMode::Manual if sources.operator_age.is_some_and(|age| age <= timeout) => {
-                DriverInput { throttle, brake, steer }
-            }
+            InputMode::Manual if heard => DriverInput { throttle, brake, steer },
             InputMode::Manual => DriverInput::STOP,
             InputMode::Demo => demo(now.since(started)),
             InputMode::Replay => sources.replay.unwrap_or(DriverInput::STOP),

@@ -34,7 +34,6 @@ pub mod safety;
 pub mod schedule;
 #[cfg(feature = "simulation")]
 pub mod simulation;
-mod tick;
 pub mod topics;
 
 pub use parameters::Parameters;

@@ -226,17 +226,15 @@ impl LogRecord {
     /// The line that describes these signals.
     #[must_use]
     pub fn new(
-        input: &DriverInput,
-        (drive, brake, steering): (&DriveCommand, &BrakeCommand, &SteeringCommand),
+        &DriverInput { throttle, brake, steer }: &DriverInput,
+        (drive, pedal, wheel): (&DriveCommand, &BrakeCommand, &SteeringCommand),
         &VehicleState { t, v, x, y, yaw, yaw_rate, wheel_omega }: &VehicleState,
         &SafetyStatus { estop, system_state, .. }: &SafetyStatus,
     ) -> Self {
-        let &DriverInput { throttle, brake: brake_input, steer } = input;
-        let [drive_accel_cmd, brake_decel_cmd, steer_angle_cmd] =
-            [drive.acceleration, brake.deceleration, steering.angle];
+        let [drive_accel_cmd, brake_decel_cmd, steer_angle_cmd] = [drive.acceleration, pedal.deceleration, wheel.angle];
         let motion = Self { t, x, y, yaw, v, yaw_rate, wheel_omega, ..Self::default() };
         let commands = Self { drive_accel_cmd, brake_decel_cmd, steer_angle_cmd, ..motion };
-        Self { throttle, brake: brake_input, steer, estop, system_state, ..commands }
+        Self { throttle, brake, steer, estop, system_state, ..commands }
     }
 
     /// The driver's input of this line.

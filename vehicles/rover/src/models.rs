@@ -25,6 +25,9 @@ use crate::messages::VehicleState;
 use crate::parameters::{BrakeParameters, EngineParameters, SteeringParameters, VehicleParameters};
 use stampfly_types::{Duration, math};
 
+/// The document's period: how often the components run, and by how much time a model advances in one run.
+pub const TICK: Duration = Duration::from_millis(10);
+
 /// Clamps to 0…1. NaN gives 0, which `f32::clamp` does not promise.
 pub(crate) fn fraction(value: f32) -> f32 {
     if value > 0.0 { value.min(1.0) } else { 0.0 }

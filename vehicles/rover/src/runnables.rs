@@ -6,9 +6,9 @@
 
 use crate::driver_input::{DriverSelector, DriverSources};
 use crate::messages::*;
+use crate::models::TICK;
 use crate::parameters::PROBATION;
 use crate::safety::{SafetyInput, SafetySupervisor};
-use crate::tick::TICK;
 use crate::topics::*;
 use crate::{Parameters, diag, models};
 use serde::{Deserialize, Serialize};
@@ -134,11 +134,10 @@ impl Runnable for EngineSwc {
     fn run(&mut self, activation: &mut Activation, ends: &mut EngineEnds<'_>) {
         let (now, parameters) = (activation.now(), ends.parameters.get());
         let estop = ends.safety_status.get().must_stop(ends.safety_status.age(now), &parameters.safety);
-        let remote = ends.remote_drive.is_new().then(|| ends.remote_drive.get().acceleration);
+        let remote = ends.remote_drive.is_new().then(|| if estop { 0.0 } else { ends.remote_drive.get().acceleration });
         let acceleration = match (remote, self.0) {
             (None, None) => models::drive_acceleration(ends.driver_input.get().throttle, estop, &parameters.engine),
-            (Some(acceleration), _) if !estop => acceleration,
-            (Some(_), _) => 0.0,
+            (Some(acceleration), _) => acceleration,
             // Each command is a heartbeat; without one this component has none either. But what it holds, it lets go.
             (None, Some(held)) if estop && held != 0.0 => 0.0,
             (None, Some(_)) => return,
@@ -193,8 +192,7 @@ impl Runnable for LoggingSwc {
     fn run(&mut self, activation: &mut Activation, ends: &mut LoggingEnds<'_>) {
         let commands = (ends.drive_command.get(), ends.brake_command.get(), ends.steering_command.get());
         let (state, safety) = (ends.vehicle_state.get(), ends.safety_status.get());
-        let line = LogRecord::new(ends.driver_input.get(), commands, state, safety);
-        ends.log_record.publish(activation.now(), &line);
+        ends.log_record.publish(activation.now(), &LogRecord::new(ends.driver_input.get(), commands, state, safety));
     }
 }
 

@@ -4,8 +4,8 @@
 //! replay says something, so an emergency stop acts in the tick that follows it.
 
 use crate::Parameters;
+pub use crate::models::TICK;
 use crate::runnables::*;
-pub use crate::tick::TICK;
 use serde::{Deserialize, Serialize};
 use stampfly_bus::Trigger;
 

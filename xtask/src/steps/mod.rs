@@ -17,6 +17,7 @@ pub mod files;
 pub mod fmt;
 pub mod fuzz;
 pub mod golden;
+pub mod lines;
 pub mod loom;
 pub mod machine;
 pub mod memory;

@@ -129,8 +129,7 @@ async fn operate(clock: Clock, scenario: &Scenario<OperatorCommand, LogRecord>, 
 
 /// Com in this process: one line of a log a tick.
 async fn replay(clock: Clock, lines: &[LogRecord], mut link: LinkEnds<'_>) {
-    let mode = InputMode::Replay;
-    link.operator_command.publish(clock.now(), &OperatorCommand { mode, ..OperatorCommand::default() });
+    link.operator_command.publish(clock.now(), &OperatorCommand { mode: InputMode::Replay, ..Default::default() });
     for line in lines {
         clock.sleep_until(clock.now() + TICK).await;
         link.replay_record.publish(clock.now(), line);

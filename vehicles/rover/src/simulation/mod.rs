@@ -93,7 +93,6 @@ impl Vehicle for Rover {
 
     fn set_parameter(config: &mut Parameters, name: &str, value: ParameterValue) -> Result<(), SetupError> {
         let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
-        let outcome = Parameters::find(name).and_then(|row| row.set(config, value));
-        outcome.map_err(|error| format!("{name}: {error}"))
+        Parameters::find(name).and_then(|row| row.set(config, value)).map_err(|error| format!("{name}: {error}"))
     }
 }
