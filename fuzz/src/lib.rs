@@ -1,4 +1,4 @@
-//! Fuzz targets: what reads bytes from outside must survive any bytes.
+//! Fuzz targets: what reads bytes from outside must survive any bytes, and what flies any sequence of inputs.
 //!
 //! Each target is a plain function that panics when something is wrong. libFuzzer calls it (`fuzz_targets/`), and so does a
 //! test on the stable compiler (`cargo xtask fuzz`), with every file of the target's corpus and some thousands of
@@ -7,6 +7,9 @@
 //! | target | bytes from | checked besides panics |
 //! |---|---|---|
 //! | [`console_line`] | the serial port | lines stay short and printable, parameters in range, an armed vehicle does nothing |
+//! | [`estimator_stream`] | a stream of samples and times | numbers stay finite, the covariance symmetric with a diagonal of variances |
+//! | [`failsafe_stream`] | a stream of inertial samples | a sensor that gives nothing usable is found in time, an alert stays while the vehicle is armed |
+//! | [`mode_machine`] | steps with any commands, gestures, frames, alerts | a kill disarms in its step, phases change by the table, order does not matter |
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
@@ -17,16 +20,24 @@
 
 mod console;
 mod datagrams;
+mod estimator;
+mod failsafe;
 mod flash;
+mod machine;
 mod packets;
 mod parameters;
 mod ulog_file;
 
 pub use console::console_line;
 pub use datagrams::rover_datagrams;
+pub use estimator::estimator_stream;
+pub use failsafe::failsafe_stream;
+pub use machine::mode_machine;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;
 pub use ulog_file::ulog;
+
+use stampfly_types::Vec3;
 
 /// Takes bytes off the front of the input. Past its end everything is zero, so any input is a whole one.
 struct Input<'d>(&'d [u8]);
@@ -42,6 +53,20 @@ impl<'d> Input<'d> {
         let (taken, rest) = self.0.split_at(count.min(self.0.len()));
         self.0 = rest;
         taken
+    }
+
+    /// A number: mostly near what a sensor gives, at times any bits at all, and so no number, infinite or tiny.
+    fn number(&mut self, scale: f32) -> f32 {
+        match self.byte() {
+            255 => f32::from_bits(u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])),
+            254 => f32::NAN,
+            253 => f32::INFINITY,
+            byte => (f32::from(byte) - 126.0) / 126.0 * scale,
+        }
+    }
+
+    fn vector(&mut self, scale: f32) -> Vec3 {
+        Vec3::new(self.number(scale), self.number(scale), self.number(scale))
     }
 
     fn is_empty(&self) -> bool {

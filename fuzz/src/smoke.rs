@@ -1,6 +1,9 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
-use crate::{console_line, parameter_image, radio_packets, rover_datagrams, ulog};
+use crate::{
+    console_line, estimator_stream, failsafe_stream, mode_machine, parameter_image, radio_packets, rover_datagrams,
+    ulog,
+};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -90,6 +93,21 @@ fn console() {
 #[test]
 fn parameters() {
     smoke("parameter_image", parameter_image, 40_000);
+}
+
+#[test]
+fn estimator() {
+    smoke("estimator_stream", estimator_stream, 1_000);
+}
+
+#[test]
+fn failsafe() {
+    smoke("failsafe_stream", failsafe_stream, 10_000);
+}
+
+#[test]
+fn machine() {
+    smoke("mode_machine", mode_machine, 10_000);
 }
 
 #[test]

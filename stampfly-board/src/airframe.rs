@@ -24,6 +24,8 @@ pub const TORQUE_COEFFICIENT: f64 = 4.1e-11;
 pub const MOTOR_VOLTAGE: [f64; 3] = [6.0368e-8, 6.699_042e-4, 1.53e-2];
 /// Moment of inertia of motor and propeller, kg·m² (coast-down).
 pub const ROTOR_INERTIA: f64 = 1.375e-8;
+/// Drag along body x and y over speed, N/(m/s) (typical for the size).
+pub const DRAG: f64 = 0.015;
 /// Height of the body's origin, and of the bottom range finder, when standing, m (range finder logs).
 pub const GROUND_HEIGHT: f64 = 0.03;
 

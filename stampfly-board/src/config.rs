@@ -3,7 +3,7 @@
 //! Each crate owns its own configuration and the rules by which it follows from an airframe; this struct only gathers
 //! them, for the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
 
-use crate::airframe::{AIRFRAME, GROUND_HEIGHT};
+use crate::airframe::{AIRFRAME, DRAG, GROUND_HEIGHT, MASS};
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, FlipConfig, GeometricConfig, IndiConfig, MotorConfig};
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
@@ -77,7 +77,7 @@ impl Default for VehicleConfig {
         Self {
             estimator: EstimatorKind::default(),
             controller: ControllerKind::default(),
-            eskf: EskfConfig { ground_clearance, ..EskfConfig::default() },
+            eskf: EskfConfig { ground_clearance, drag: (DRAG / MASS) as f32, ..EskfConfig::default() },
             complementary: ComplementaryConfig { ground_clearance, ..ComplementaryConfig::default() },
             cascade: CascadeConfig::for_airframe(&AIRFRAME),
             geometric: GeometricConfig::for_airframe(&AIRFRAME),

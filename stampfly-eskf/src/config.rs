@@ -88,6 +88,12 @@ pub struct EskfConfig {
     /// Standard deviation of "is where it stood" while stationary, m.
     pub stationary_position_sigma: f32,
 
+    /// Share of its velocity through still air that a multirotor loses each second to the drag of rotors and body, 1/s. It is the
+    /// only thing that shows the velocity when nothing measures it; half or twice the true one still does. 0: not used.
+    pub drag: f32,
+    /// Standard deviation of the wind, m/s, an error of that velocity.
+    pub wind: f32,
+
     /// Standard deviation of "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the
     /// accelerometer noise it is the time in which the velocity fades.
     pub unobserved_velocity: f32,
@@ -178,6 +184,8 @@ impl Default for EskfConfig {
             stationary_gravity_sigma: 0.1,
             stationary_velocity_sigma: 0.01,
             stationary_position_sigma: 0.005,
+            drag: 0.0,
+            wind: 0.5,
             unobserved_velocity: 0.07,
             gate: 4.0,
             lockout: 0.2,

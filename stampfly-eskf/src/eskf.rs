@@ -11,23 +11,27 @@
 //! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
 //! | `eskf/bridge.rs` | inertial samples that are garbage |
 //! | `eskf/measurements.rs` | one update a sensor |
-//! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, initial heading, unobserved velocity |
+//! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, drag, initial heading, unobserved velocity |
 //! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
 //! | `eskf/vertical.rs` | range against inertia and barometer |
 //! | `eskf/flow_monitor/` | flow against inertia: the comparison, jumps, a picture that does not move |
 //! | `eskf/gyro_monitor.rs` | a jump of the gyro's against flow |
+//! | `eskf/standing.rs` | the gyro against gravity, on the ground |
+//! | `eskf/influence.rs` | what flow did lately, to be undone |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
 mod bridge;
 mod flow_monitor;
 mod gate;
 mod gyro_monitor;
+mod influence;
 mod innovation_bias;
 mod interface;
 mod measurements;
 mod pseudo_measurements;
 mod resets;
+mod standing;
 mod vertical;
 
 use crate::aid::baro::Offset;
@@ -43,15 +47,17 @@ use crate::filter::{
 };
 use crate::level::attitude_from_specific_force;
 use bridge::Bridge;
-use flow_monitor::FlowMonitor;
+use flow_monitor::{FlowMonitor, GyroShift};
 use gate::{Gates, Sensor};
 use gyro_monitor::{GyroJump, GyroMonitor, Near};
+use influence::Influence;
 use innovation_bias::InnovationBiasMonitor;
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
     StateEstimate, TofData, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
+use standing::{Standing, StandingShift};
 use vertical::{Correction, VerticalMonitor};
 
 /// Measurements from farther ahead than this are refused, s.
@@ -64,6 +70,12 @@ const MAX_STEP: f32 = 0.5;
 /// 400 Hz with every second one. A hundredth of the time in which the covariance changes, and half the work. (PX4's
 /// EKF2 takes 10 ms.)
 const COVARIANCE_STEP: f32 = 4e-3;
+/// A vehicle that is told to fly stands until it is this much higher, m.
+const LIFTED: f32 = 0.008;
+/// Largest standard deviation of a velocity that the vehicle brakes by, m/s.
+const BRAKES: f32 = 1.5;
+/// Below this height, m, the ground may carry it, and what it feels is no drag: it comes down level.
+const LEVEL: f32 = 0.12;
 /// Pseudo-measurements are made on every n-th inertial sample.
 const PSEUDO_MEASUREMENT_DIVIDER: u32 = 4;
 
@@ -127,6 +139,8 @@ pub struct Eskf {
     command: EstimatorCommand,
     /// Position of a stationary vehicle, while it is on the ground.
     anchor: Option<Vec3>,
+    /// It has not left the place where it last stood.
+    rests: bool,
     /// World down coordinate of the surface below.
     surface: Option<f32>,
     baro_offset: Option<Offset>,
@@ -142,7 +156,9 @@ pub struct Eskf {
     gates: Gates,
     flow_innovation_bias: InnovationBiasMonitor,
     flow_monitor: FlowMonitor,
+    flow_influence: Influence,
     gyro_monitor: GyroMonitor,
+    standing: Standing,
     vertical: VerticalMonitor,
     status: EstimatorStatus,
 }
@@ -185,6 +201,7 @@ impl Eskf {
             calibration: CalibrationResult::default(),
             command: EstimatorCommand::default(),
             anchor: None,
+            rests: false,
             surface: None,
             baro_offset: None,
             baro_updated: Instant::ZERO,
@@ -198,7 +215,9 @@ impl Eskf {
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
             flow_monitor: FlowMonitor::airborne(),
+            flow_influence: Influence::default(),
             gyro_monitor: GyroMonitor::default(),
+            standing: Standing::default(),
             vertical: VerticalMonitor::airborne(),
             status: EstimatorStatus::default(),
         }
@@ -317,6 +336,17 @@ impl Eskf {
         self.anchor.is_some() || flow || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
     }
 
+    /// Does drag show the velocity? Only where nothing else does.
+    fn feels_drag(&self) -> bool {
+        self.config.drag > 0.0 && self.command.flying && !self.is_velocity_aided()
+    }
+
+    /// Is the horizontal velocity known well enough to brake by it?
+    fn is_velocity_certain(&self) -> bool {
+        let variance = |axis: usize| self.covariance.get(VELOCITY + axis, VELOCITY + axis);
+        variance(0).max(variance(1)) < BRAKES * BRAKES
+    }
+
     /// Height above the surface; a surface that is not known is where the vehicle would stand.
     fn height(&self) -> f32 {
         self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z
@@ -330,9 +360,14 @@ impl Eskf {
     /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.
     fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
         if self.anchor.is_some() {
+            if let Some(shift) = self.standing.step(dt, &accel, &self.rate) {
+                self.correct_standing_gyro(&shift);
+            }
             self.update_gravity(accel, &Vec3::zeros(), self.config.stationary_gravity_sigma);
         } else if !self.is_velocity_aided() {
-            if self.config.gravity_use == GravityUse::WhenUnaided {
+            if self.feels_drag() {
+                self.update_drag(accel, dt);
+            } else if self.config.gravity_use == GravityUse::WhenUnaided {
                 self.update_gravity(accel, &Vec3::zeros(), self.config.gravity_sigma);
             }
             self.reset_unobserved_motion();

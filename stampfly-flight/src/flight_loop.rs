@@ -4,6 +4,7 @@
 //! clock does; a replay and the golden flight call it with what was recorded. It reads no clock: the caller says what
 //! time it is.
 
+use core::mem::MaybeUninit;
 use stampfly_bus::{Activation, AnyTopic, Band, Hook, PublishWords, Schedule, Scheduler, Split, TopicTable};
 use stampfly_types::{ActivationRecord, Instant};
 
@@ -79,6 +80,16 @@ pub struct Assembled<'b, R: Schedule> {
     pub taps: <R::Topics as TopicTable>::Taps<'b>,
 }
 
+/// A vehicle at power-on, whose flight loop lies elsewhere.
+pub struct InPlace<'b, R: Schedule> {
+    /// Every runnable, with the scheduler.
+    pub flight_loop: &'b mut FlightLoop<'b, R>,
+    /// The ends of everybody outside.
+    pub outside: <R::Topics as TopicTable>::Outside<'b>,
+    /// The log's cursors.
+    pub taps: <R::Topics as TopicTable>::Taps<'b>,
+}
+
 impl<'b, R: Schedule> Assembled<'b, R> {
     /// Connects runnables to a fresh bus. `hook` is called after every publish, the scheduler counts from `start`.
     ///
@@ -89,6 +100,22 @@ impl<'b, R: Schedule> Assembled<'b, R> {
         let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
         let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
         Self { flight_loop: FlightLoop { runnables: R::new(config), ends, scheduler, heads }, outside, taps }
+    }
+
+    /// As [`new`](Self::new), for a stack that has no room for a copy of the flight loop: it is made in `slot`.
+    #[inline(never)]
+    #[must_use]
+    pub fn in_place(
+        slot: &'b mut MaybeUninit<FlightLoop<'b, R>>,
+        bus: &'b mut R::Topics,
+        hook: Option<Hook>,
+        config: &R::Config,
+        start: Instant,
+    ) -> InPlace<'b, R> {
+        let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
+        let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
+        let flight_loop = slot.write(FlightLoop { runnables: R::new(config), ends, scheduler, heads });
+        InPlace { flight_loop, outside, taps }
     }
 }
 

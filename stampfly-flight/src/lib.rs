@@ -44,7 +44,7 @@ pub mod task;
 pub mod watchdog;
 
 pub use black_box::BlackBox;
-pub use flight_loop::{Assembled, FlightLoop, Observer, Pending};
+pub use flight_loop::{Assembled, FlightLoop, InPlace, Observer, Pending};
 pub use log_schema::LogSchema;
 pub use mock::Mock;
 pub use newest::{NewestSamples, longest_message};

@@ -171,7 +171,7 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
         (state.wanted, state.pending) = (FlightMode::PosHold, None);
     }
     state.mode = match state.wanted {
-        FlightMode::PosHold if !facts.valid.contains(Validity::VELOCITY_XY) => FlightMode::AltHold,
+        FlightMode::PosHold if !facts.valid.contains(Validity::POSITION_XY) => FlightMode::AltHold,
         wanted => wanted,
     };
     let blind = !facts.valid.contains(Validity::VELOCITY_Z);
@@ -236,7 +236,9 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             let unheard = silent && (lasts(state.silence.map(|s| s.since), config.hover_without_link));
             let unled = silent || facts.sticks == CommandSource::Failsafe;
             let blind = lasts(state.blind, config.blind) || (state.blind.is_some() && unled);
-            let overdue = phase == FlightPhase::TakeOff && waited(config.take_off_timeout);
+            let height_lost = facts.alerts.contains(Alerts::RANGE_IMPLAUSIBLE);
+            // The height of a take-off whose range lied from its beginning is known by nothing else.
+            let broken_off = phase == FlightPhase::TakeOff && (height_lost || waited(config.take_off_timeout));
             asked.land
                 || asked.disarm
                 || pilot.switch.falls
@@ -244,7 +246,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
                 || unheard
                 || blind
                 || lasts(state.adrift, config.adrift)
-                || overdue
+                || broken_off
                 || facts.alerts.intersects(LAND)
         }
         Event::TakeOffComplete => {

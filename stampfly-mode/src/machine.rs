@@ -10,6 +10,7 @@ use crate::facts::Facts;
 pub use crate::input::{Command, ModeInput};
 use crate::pilot::Transmitter;
 use crate::stop_button::StopButton;
+use crate::transitions::is_airborne;
 use stampfly_types::Instant;
 use stampfly_types::messages::{ArmBlocks, ButtonGesture, CommandSource, EstimatorCommand, FlightPhase, FlightStatus};
 
@@ -122,6 +123,7 @@ impl ModeMachine {
             },
             estimator: EstimatorCommand {
                 on_ground: matches!(state.phase, FlightPhase::IdleGround | FlightPhase::Armed),
+                flying: is_airborne(state.phase),
                 origin_resets: state.origin_resets,
                 full_resets: state.full_resets,
             },

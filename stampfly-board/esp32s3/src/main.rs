@@ -51,7 +51,7 @@ use stampfly_board::golden::{Outcome, self_test};
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_board::{VehicleConfig, topics};
 use stampfly_drivers::Timebase;
-use stampfly_flight::{Assembled, FlightLoop};
+use stampfly_flight::{Assembled, FlightLoop, InPlace};
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -96,7 +96,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         esp_println::println!("{unusable} stored parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
-    let Assembly { flight_loop, mut outside, taps } = assemble(&config);
+    let InPlace { flight_loop, mut outside, taps } = assemble(&config);
     // Assembling takes the most stack of all. What only the tasks need lies in a frame that does not exist until it is over.
     in_a_frame_of_its_own(move || {
         let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
@@ -175,22 +175,13 @@ fn in_a_frame_of_its_own(rest: impl FnOnce() -> Infallible) -> ! {
     match rest() {}
 }
 
-/// A vehicle whose flight loop stays where it is.
-struct Assembly {
-    flight_loop: &'static mut FlightLoop<'static, Runnables>,
-    outside: topics::Outside<'static>,
-    taps: topics::Taps<'static>,
-}
-
 /// Makes the bus and the vehicle on it. Apart from [`start`], whose stack the tasks' is on top of.
 #[inline(never)]
-fn assemble(config: &VehicleConfig) -> Assembly {
+fn assemble(config: &VehicleConfig) -> InPlace<'static, Runnables> {
     static BUS: StaticCell<topics::Bus> = StaticCell::new();
     static FLIGHT_LOOP: StaticCell<FlightLoop<'static, Runnables>> = StaticCell::new();
-    let assembled = Assembled::new(BUS.init_with(topics::Bus::new), None, config, Clock.now());
-    // `write`, other than `init`, is inlined: an argument would be a copy, and there is not stack enough for two vehicles.
-    let flight_loop = FLIGHT_LOOP.uninit().write(assembled.flight_loop);
-    Assembly { flight_loop, outside: assembled.outside, taps: assembled.taps }
+    let bus = BUS.init_with(topics::Bus::new);
+    Assembled::in_place(FLIGHT_LOOP.uninit(), bus, None, config, Clock.now())
 }
 
 /// Executors, one a core.

@@ -38,8 +38,15 @@ const SETTLED: Duration = Duration::from_millis(500);
 /// So far from its place, m, and farther away for so long: POS_HOLD does not hold a position.
 const LOST: f32 = 1.5;
 const LOST_FOR: Duration = Duration::from_secs(2);
+/// A vehicle that goes away from the place to which it is flown, by so much, m, is held by something: the place is given up.
+const STRAYS: f32 = 1.0;
+/// Longest time to a place in another mode than the one that was asked for.
+const BY_SIGHT: Duration = Duration::from_secs(10);
 /// Above this nothing touches the ground any more, m.
 const CLEAR: f32 = 0.1;
+/// What is lower than this, m, and does not sink, m/s, stands: a contact lasts for milliseconds, and nobody sees a centimetre.
+const STANDS: f32 = 0.01;
+const SINKS: f32 = 0.1;
 /// How fast the pilot climbs and sinks, m/s.
 const CLIMB: f32 = 0.3;
 /// Highest speed to a place, m/s.
@@ -204,8 +211,9 @@ impl<'b> Pilot<'b> {
     }
 
     async fn fly_to(&mut self, place: Vec3) {
-        let mut since = self.radio.clock().now();
-        let until = since + LONGEST_LEG;
+        let began = self.radio.clock().now();
+        let mut since = began;
+        let mut nearest = f32::MAX;
         loop {
             let seen = self.frame(Aim::Be(place)).await;
             let away = seen.position - place;
@@ -213,8 +221,11 @@ impl<'b> Pilot<'b> {
             if away.xy().norm() > REACHED[0] || away.z.abs() > REACHED[1] {
                 since = now;
             }
+            nearest = nearest.min(away.norm());
+            let strays = away.norm() > nearest + STRAYS;
+            let longest = if self.flown() == self.input.mode { LONGEST_LEG } else { BY_SIGHT };
             // A vehicle that is not flying any more goes nowhere.
-            if now.since(since) >= SETTLED || now >= until || !self.radio.telemetry().armed {
+            if now.since(since) >= SETTLED || now.since(began) >= longest || strays || !self.radio.telemetry().armed {
                 return;
             }
         }
@@ -222,7 +233,11 @@ impl<'b> Pilot<'b> {
 
     async fn land(&mut self, place: Vec3) {
         if self.flown().is_manual() {
-            while !self.frame(Aim::Sink(place)).await.contact && self.radio.telemetry().armed {}
+            // A link that was lost for a moment leaves it in a mode that holds its height.
+            while !self.frame(Aim::Sink(place)).await.contact
+                && self.radio.telemetry().armed
+                && self.flown().is_manual()
+            {}
             self.keep(Aim::Stand, Duration::from_millis(300)).await;
         }
         self.input.arm = false;
@@ -257,7 +272,7 @@ impl<'b> Pilot<'b> {
             velocity: truth.velocity,
             yaw,
             lean: [ahead.x, ahead.y],
-            contact: truth.contact,
+            contact: truth.contact || (truth.position.z > -STANDS && truth.velocity.z < SINKS),
         };
         self.past.push_back(seen);
         if self.past.len() > REACTION { self.past.pop_front().unwrap_or(seen) } else { seen }

@@ -1,7 +1,7 @@
 //! The StampFly as a simulated body: what its [airframe](crate::airframe) does not say, and the two together.
 
 use crate::airframe::{
-    AIRFRAME, GROUND_HEIGHT, INERTIA, MASS, MOTOR_VOLTAGE, ROTOR_INERTIA, ROTOR_OFFSET, THRUST_COEFFICIENT,
+    AIRFRAME, DRAG, GROUND_HEIGHT, INERTIA, MASS, MOTOR_VOLTAGE, ROTOR_INERTIA, ROTOR_OFFSET, THRUST_COEFFICIENT,
     TORQUE_COEFFICIENT,
 };
 use stampfly_sim::plant::PlantParameters;
@@ -24,8 +24,7 @@ pub const PLANT: PlantParameters = PlantParameters {
     // Gives a lag of 20 ms at hover.
     rotor_inertia: ROTOR_INERTIA,
     manufacturing_spread: 1.0,
-    // Typical for the size.
-    drag_horizontal: 0.015,
+    drag_horizontal: DRAG,
     // 1.4 1/s of damping, from theory.
     drag_vertical: 0.0515,
     // A flat plate of its size.

@@ -8,6 +8,7 @@
 
 pub mod attitude;
 pub mod baro;
+pub mod drag;
 pub mod field;
 pub mod flow;
 pub mod gravity;

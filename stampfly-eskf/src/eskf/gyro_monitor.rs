@@ -21,13 +21,15 @@ use stampfly_types::messages::{CalibrationResult, ImuData};
 use stampfly_types::{Duration, Instant, Vec3};
 
 /// A change of the rate from two samples to the next two is a jump when it is larger than this, rad/s, and
-const JUMP: f32 = 0.4;
+const JUMP: f32 = 0.35;
 /// than so many root mean squares of its change from sample to sample.
 const NOISE: f32 = 4.0;
-/// Readings on which a verdict rests: 50 ms, in which a jump of 1 rad/s makes a tilt of 3°.
+/// Readings on which a verdict rests: 50 ms, in which a jump of 1 rad/s makes a tilt of 3°, and twice as many for a jump that is smaller
+/// than this, rad/s.
 const READINGS: u32 = 5;
+const SMALL: f32 = 0.6;
 /// If there are not as many after this time, there is no verdict.
-const PATIENCE: Duration = Duration::from_millis(120);
+const PATIENCE: Duration = Duration::from_millis(170);
 /// Time constant of the mean before a jump, s.
 const BEFORE: f32 = 0.2;
 /// Share of the jump that the picture has to lack along the jump's direction, and may lack across: a reading of 10 ms is
@@ -191,7 +193,8 @@ impl GyroMonitor {
         examination.sum[0] += excess[0];
         examination.sum[1] += excess[1];
         examination.readings += 1;
-        if examination.readings < READINGS {
+        let needed = if squared(examination.jump) < SMALL * SMALL { 2 * READINGS } else { READINGS };
+        if examination.readings < needed {
             return None;
         }
         let Examination { since, jump, velocity, sum, readings } = *examination;

@@ -3,6 +3,10 @@
 use super::gate::Sensor;
 use super::*;
 
+/// A specific force, m/s², or rate, rad/s, beyond this is no measurement: a thousand g is more than any inertial sensor of a vehicle
+/// measures. The squares of much larger ones overflow, and make a covariance that is no number.
+const LARGEST: f32 = 1.0e4;
+
 impl Estimator for Eskf {
     fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {
         let finite = |v: &Vec3| v.iter().all(|x| x.is_finite());
@@ -67,8 +71,8 @@ impl Estimator for Eskf {
     // Inlined into the loop over the samples, it would compute seventy addresses before the loop: 140 instructions.
     #[inline(never)]
     fn predict(&mut self, at: Instant, imu: &ImuData) {
-        let finite = |v: &Vec3| v.x.is_finite() && v.y.is_finite() && v.z.is_finite();
-        let usable = finite(&imu.accel) && finite(&imu.gyro);
+        // No number is not below it either.
+        let usable = imu.accel.norm_squared() < LARGEST * LARGEST && imu.gyro.norm_squared() < LARGEST * LARGEST;
         let dt = at.since(self.now).seconds();
         if !usable {
             self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
@@ -93,7 +97,7 @@ impl Estimator for Eskf {
         let [force, rate] = &mut self.vibration;
         force.add(&imu.accel, motion.dt);
         rate.add(&imu.gyro, motion.dt);
-        let noise = rate.mean_square();
+        let noise = if self.bridge.was_short() { f32::INFINITY } else { rate.mean_square() };
         if let Some(jump) = self.gyro_monitor.predict(at, motion.dt, imu, noise, &before, &change) {
             self.correct_gyro(&jump);
         }
@@ -171,11 +175,14 @@ impl Estimator for Eskf {
         let sound = self.initialized && !self.status.diverged;
         let external = recent(Sensor::Velocity) || recent(Sensor::Position);
         let horizontal = sound && self.is_velocity_aided();
-        let vertical = sound && (self.is_range_aided() || recent(Sensor::Baro) || external || stationary);
+        let drifts = horizontal || (sound && self.feels_drag() && self.is_velocity_certain() && self.height() > LEVEL);
+        let baro = recent(Sensor::Baro) && !self.vertical.knows_nothing();
+        let vertical = sound && (self.is_range_aided() || baro || external || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
             .set(Validity::HEADING, self.initialized)
-            .set(Validity::VELOCITY_XY | Validity::POSITION_XY, horizontal)
+            .set(Validity::VELOCITY_XY, drifts)
+            .set(Validity::POSITION_XY, horizontal)
             .set(Validity::VELOCITY_Z | Validity::POSITION_Z, vertical)
             .set(Validity::HEIGHT, sound && self.surface.is_some() && vertical);
         let sensors = SensorMask::NONE
@@ -216,8 +223,10 @@ impl Eskf {
         if self.anchor.is_some() {
             self.vertical.stand(-bias);
             self.flow_monitor.ready();
+            self.rests = true;
         } else {
             let height = self.height();
+            self.rests &= height < self.config.ground_clearance + LIFTED;
             self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias, height);
             self.flow_monitor.predict(change, dt);
         }

@@ -1,6 +1,7 @@
 //! One update a sensor: time alignment, innovation, gate, then update, rejection, or reset after a lock-out. The
 //! models, and the conditions of each sensor, are in [`aid`](crate::aid).
 
+use super::flow_monitor::Verdict;
 use super::gate::{GateResult, Sensor};
 use super::vertical::Use;
 use super::*;
@@ -18,6 +19,10 @@ const WRONG_CLIMB: f32 = 1.5;
 const GYRO_DISTANCE: f32 = 0.15;
 /// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
 const SHAKEN: f32 = 100.0;
+/// Largest standard deviation of the height, m, and for each metre of distance: flow is the velocity over it, and a velocity that
+/// may be half or twice as large is none.
+const KNOWN_DISTANCE: f32 = 0.1;
+const KNOWN_SHARE: f32 = 0.5;
 
 impl Eskf {
     pub(super) fn update_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
@@ -39,6 +44,7 @@ impl Eskf {
             let measured = anchor.z + below;
             self.surface = Some(self.surface.map_or(measured, |surface| surface + 0.1 * (measured - surface)));
             self.gates.accept(Sensor::Tof, self.now);
+            self.vertical.stand_range(self.now, tof.distance);
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
         let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
@@ -67,25 +73,25 @@ impl Eskf {
             GateResult::Reset => {
                 let velocity = self.state.velocity;
                 let known = self.gates.is_recent(Sensor::Flow, self.now);
-                if self
-                    .vertical
-                    .refuses_jump(known.then(|| math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y)))
-                {
+                let speed = known.then(|| math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y));
+                if self.vertical.refuses_jump(speed, tof.distance / expected) {
                     return Err(Refusal::Implausible);
                 }
                 let down = surface - below - delayed.state.position.z;
                 self.vertical.rejected(self.now);
+                if self.vertical.rejects_since_jump() {
+                    // No vehicle moves so far from one reading to the next: it is the surface that is another one.
+                    self.vertical.stepped();
+                    self.surface = Some(surface - down);
+                    return Ok(self.finish_reset(Sensor::Tof));
+                }
                 self.vertical.moved(-down);
                 self.state.position.z += down;
                 self.covariance.reset(POSITION + 2, 4.0 * variance);
-                // A wrong height comes from a wrong climb rate: the next ranges estimate it anew. Where the range did not
-                // jump, that came from a wrong acceleration in the time of the lock-out.
+                // A wrong height comes from a wrong climb rate, and that from a wrong acceleration in the time of the
+                // lock-out: the next ranges estimate them anew.
                 let time = self.config.lockout;
-                let climb = if self.vertical.rejects_since_jump() {
-                    0.0
-                } else {
-                    (2.0 * down / time).clamp(-WRONG_CLIMB, WRONG_CLIMB)
-                };
+                let climb = (2.0 * down / time).clamp(-WRONG_CLIMB, WRONG_CLIMB);
                 self.covariance.reset(VELOCITY + 2, 1.0 + climb * climb);
                 self.covariance.inflate(ACCEL_BIAS + 2, 0.04 + climb * climb / (time * time));
                 Ok(self.finish_reset(Sensor::Tof))
@@ -112,6 +118,10 @@ impl Eskf {
         let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
         if distance < self.config.flow_min_distance {
             return Err(Refusal::Range);
+        }
+        let uncertain = KNOWN_DISTANCE + KNOWN_SHARE * distance;
+        if self.covariance.get(POSITION + 2, POSITION + 2) > uncertain * uncertain {
+            return Err(Refusal::Missing);
         }
         let end = delayed.age - 0.5 * flow.interval;
         let raw = self.history.mean_rate(end, flow.interval).unwrap_or(self.rate) + self.state.gyro_bias;
@@ -143,18 +153,22 @@ impl Eskf {
         let along = rotate_back(&delayed.rotation, &delayed.state.velocity).z;
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
         let counts = [flow.delta_x, flow.delta_y];
-        if self.anchor.is_some() {
-            self.flow_monitor.stand(self.status.flow_innovation.map(|velocity| velocity / distance), flow.interval);
+        if self.rests {
+            let bias = self.state.gyro_bias;
+            let rate = [measured[0] / distance + bias.y, measured[1] / distance - bias.x];
+            self.flow_monitor.stand(rate, flow.interval);
         } else {
             let shaken = self.vibration[0].mean_square() > SHAKEN;
             let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && !shaken;
             // Less the bias of the ground, which flow cannot have moved.
             let turn = raw - self.calibration.gyro_bias;
-            if self.flow_monitor.flow(counts, [turn.y, -turn.x], &world, distance, flow.interval, known) {
-                // It has moved tilt and biases, too.
-                self.inflate_tilt();
-                for axis in 0..2 {
-                    self.covariance.reset(VELOCITY + axis, 1.0);
+            let turning = [turn.y, -turn.x];
+            match self.flow_monitor.flow(counts, turning, &world, distance, flow.interval, known) {
+                Verdict::Unchanged => {}
+                Verdict::Implausible => self.undo_flow(),
+                Verdict::GyroShifted(shift) => {
+                    self.correct_gyro_shift(&shift, &world, distance);
+                    return Ok(Fusion::Reset);
                 }
             }
         }
@@ -167,18 +181,23 @@ impl Eskf {
         let before = rotate(&self.state.rotation(), &self.force);
         let fusion = match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => {
-                let fusion = self.update(&innovation, ratio);
+                let correction = self.covariance.update(&innovation);
+                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                self.state.correct(&correction);
                 // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
                 // nothing.
                 if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
                     self.inflate_on_innovation_bias();
                 }
-                fusion
+                Fusion::Fused { ratio }
             }
             GateResult::Reject => return Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
-                self.state.velocity.x += world.x - delayed.state.velocity.x;
-                self.state.velocity.y += world.y - delayed.state.velocity.y;
+                let mut correction = [0.0; N];
+                correction[VELOCITY] = world.x - delayed.state.velocity.x;
+                correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
+                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                self.state.correct(&correction);
                 for (axis, variance) in variances.into_iter().enumerate() {
                     self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
                 }

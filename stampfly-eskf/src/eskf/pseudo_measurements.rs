@@ -3,7 +3,8 @@
 //! | pseudo-measurement | active while | stops | gated |
 //! |---|---|---|---|
 //! | [`constrain_stationary`](Eskf::constrain_stationary): velocity zero, position where it stood | commanded `on_ground`, every fourth sample | take-off; an origin reset moves the position to zero | no |
-//! | [`update_gravity`](Eskf::update_gravity): gravity as the vertical | stationary; with [`GravityUse::WhenUnaided`] while nothing holds the velocity; with [`GravityUse::Always`] at every sample in flight | the other cases | yes, reset in `aid/gravity.rs` |
+//! | [`update_gravity`](Eskf::update_gravity): gravity as the vertical | stationary; with [`GravityUse::WhenUnaided`] while nothing holds the velocity, drag included; with [`GravityUse::Always`] at every sample in flight | the other cases | yes, reset in `aid/gravity.rs` |
+//! | [`update_drag`](Eskf::update_drag): the velocity that the body's drag shows | flying with a known `drag` and nothing that holds the velocity, instead of gravity | the other cases | no |
 //! | [`constrain_heading`](Eskf::constrain_heading): heading zero | once, at initialisation | | no |
 //! | [`reset_unobserved_motion`](Eskf::reset_unobserved_motion): velocity to zero at the largest deviation | nothing holds the velocity | flow, velocity or position within the last second, or on the ground | no |
 //! | [`constrain_unobserved_velocity`](Eskf::constrain_unobserved_velocity): velocity near zero | tilt beyond `min_cos_tilt`, flow within the last second, no external velocity or position | the other cases | no |
@@ -14,6 +15,10 @@ use super::*;
 /// Standard deviations beyond which a velocity and a position count as unknown, m/s and m.
 const MAX_VELOCITY_SIGMA: f32 = 3.0;
 const MAX_POSITION_SIGMA: f32 = 10.0;
+/// For how long a gust lasts, s (MIL-F-8785C's low-altitude turbulence has a length of some metres at this height).
+const GUST: f32 = 2.0;
+/// Standard deviation of what else the accelerometer feels along x and y, m/s².
+const FELT: f32 = 0.1;
 /// Standard deviation of the heading where it is defined to be zero, rad.
 const HEADING_SIGMA: f32 = 1e-3;
 
@@ -56,6 +61,18 @@ impl Eskf {
             }
         };
         self.count(Counter::Gravity, fusion);
+    }
+
+    /// Update with the drag of a multirotor in the air, which shows its horizontal velocity, for `dt` seconds.
+    pub(super) fn update_drag(&mut self, accel: Vec3, dt: f32) {
+        let delayed = self.current_state();
+        let rows = aid::drag::specific_force(&delayed.state, &delayed.rotation, self.config.drag);
+        // A gust is the same error in many readings: together they count as one for each of its durations.
+        let wind = self.config.drag * self.config.wind;
+        let variance = (wind * wind + FELT * FELT) * (2.0 * GUST / dt.max(1e-3));
+        let innovation = self.innovation(&delayed, rows, [accel.x, accel.y], [variance; 2]);
+        let ratio = self.test_ratio(&innovation);
+        self.update(&innovation, ratio);
     }
 
     /// Resets the accelerometer's bias along one axis to its initial value and variance.

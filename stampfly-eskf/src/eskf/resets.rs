@@ -5,6 +5,8 @@
 //! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
 //! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
 //! | the second opinion about the range ([`vertical`](super::vertical)) | climb rate, height, vertical accelerometer bias | no |
+//! | the second opinion about flow ([`flow_monitor`](super::flow_monitor)) | what flow did to tilt, gyro bias and velocity in the last second | no |
+//! | the course of flow's difference ([`gyro`](super::flow_monitor)) | gyro bias, tilt, horizontal velocity | no |
 //! | the picture of the floor ([`gyro_monitor`](super::gyro_monitor)) | gyro bias, tilt, horizontal velocity | no |
 //! | [`check_health`](Eskf::check_health): a state that is no number or beyond any flight | position and velocity, on the ground everything | it is divergence |
 
@@ -17,6 +19,17 @@ const GYRO_BIAS_INFLATION: f32 = 0.03;
 /// Uncertain share of a jump of the gyro's, and uncertain velocity after it, m/s.
 const JUMP_UNCERTAIN: f32 = 0.2;
 const JUMP_VELOCITY: f32 = 0.1;
+/// For how long what is left of a jump turns the tilt, s.
+const SETTLES: f32 = 0.5;
+/// What is left when a second of lies is undone: standard deviations of tilt, rad, gyro bias, rad/s, and velocity, m/s.
+const LIE_TILT: f32 = 0.03;
+const LIE_GYRO_BIAS: f32 = 0.01;
+const LIE_VELOCITY: f32 = 0.3;
+/// Standard deviations of tilt, rad, and gyro bias, rad/s, that a shift of the gyro's zero leaves: a tenth of 0.5 rad/s and its tilt.
+const SHIFT_TILT: f32 = 0.05;
+const SHIFT_GYRO_BIAS: f32 = 0.05;
+/// Standard deviation of the gyro's bias after one on the ground, rad/s.
+const STANDING_SHIFT: f32 = 0.01;
 /// Standard deviation of the velocity after a restart in flight, m/s.
 const RESTART_VELOCITY: f32 = 3.0;
 /// A position beyond this does not survive a restart in flight, m.
@@ -56,6 +69,19 @@ impl Eskf {
         }
     }
 
+    /// Undoes what flow did lately, because it lied.
+    pub(super) fn undo_flow(&mut self) {
+        let correction = self.flow_influence.undo(&self.state.rotation());
+        self.state.correct(&correction);
+        for axis in 0..2 {
+            self.covariance.inflate(ATTITUDE + axis, LIE_TILT * LIE_TILT);
+            self.covariance.inflate(GYRO_BIAS + axis, LIE_GYRO_BIAS * LIE_GYRO_BIAS);
+            self.covariance.reset(VELOCITY + axis, LIE_VELOCITY * LIE_VELOCITY);
+            self.reset_accel_bias(axis);
+        }
+        self.reset_history();
+    }
+
     /// Takes a jump that was the gyro's own out of bias, attitude and velocity.
     pub(super) fn correct_gyro(&mut self, jump: &GyroJump) {
         let turned = jump.rate.map(|rate| rate * jump.age);
@@ -74,6 +100,54 @@ impl Eskf {
         self.state.velocity.x = jump.velocity.x;
         self.state.velocity.y = jump.velocity.y;
         self.flow_monitor.forget();
+        // What is left of the jump turns the tilt until flow has corrected it.
+        let [x, y] = jump.rate;
+        self.flow_monitor.inflated(JUMP_UNCERTAIN * SETTLES * math::sqrt(x * x + y * y));
+        self.reset_history();
+        self.status.resets = self.status.resets.wrapping_add(1);
+    }
+
+    /// Takes a shift of the gyro's zero on the ground out of its bias. What it did to the attitude went into the accelerometer's bias as
+    /// well, so both are as after power-on: gravity is the vertical.
+    pub(super) fn correct_standing_gyro(&mut self, shift: &StandingShift) {
+        for axis in 0..2 {
+            self.state.gyro_bias[axis] += shift.rate[axis];
+            self.calibration.gyro_bias[axis] += shift.rate[axis];
+            self.covariance.inflate(GYRO_BIAS + axis, STANDING_SHIFT * STANDING_SHIFT);
+            self.covariance.inflate(ATTITUDE + axis, LIE_TILT * LIE_TILT);
+            self.reset_accel_bias(axis);
+        }
+        let up = rotate_back(&self.state.rotation(), &Vec3::new(0.0, 0.0, -1.0));
+        let tilt = shift.accel.cross(&up) / shift.accel.norm().max(1.0);
+        let mut correction = [0.0; N];
+        correction[ATTITUDE..ATTITUDE + 2].copy_from_slice(&[tilt.x, tilt.y]);
+        self.state.correct(&correction);
+        self.reset_history();
+        self.status.resets = self.status.resets.wrapping_add(1);
+    }
+
+    /// Takes a shift of the gyro's zero out of bias, attitude and velocity. `measured`: flow's velocity, world.
+    pub(super) fn correct_gyro_shift(&mut self, shift: &GyroShift, measured: &Vec3, distance: f32) {
+        let rotation = self.state.rotation();
+        let [bias, tilt] = [shift.bias, shift.tilt].map(|[x, y]| rotate_back(&rotation, &Vec3::new(x, y, 0.0)));
+        let mut correction = [0.0; N];
+        for axis in 0..2 {
+            correction[GYRO_BIAS + axis] = bias[axis];
+            correction[ATTITUDE + axis] = tilt[axis];
+            self.covariance.inflate(ATTITUDE + axis, SHIFT_TILT * SHIFT_TILT);
+            self.covariance.inflate(GYRO_BIAS + axis, SHIFT_GYRO_BIAS * SHIFT_GYRO_BIAS);
+            self.covariance.inflate(VELOCITY + axis, JUMP_VELOCITY * JUMP_VELOCITY);
+            // Here the filter starts again, and what turned on the ground is taken to be the gyro's.
+            self.calibration.gyro_bias[axis] += bias[axis];
+        }
+        self.state.correct(&correction);
+        // The rotation that flow was compensated for is the raw one.
+        let bias = rotate(&self.state.rotation(), &self.state.gyro_bias);
+        self.state.velocity.x = measured.x + distance * bias.y;
+        self.state.velocity.y = measured.y - distance * bias.x;
+        self.flow_influence = Influence::default();
+        self.flow_monitor.start_over();
+        self.flow_monitor.inflated(SHIFT_TILT);
         self.reset_history();
         self.status.resets = self.status.resets.wrapping_add(1);
     }

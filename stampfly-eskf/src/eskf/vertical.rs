@@ -7,7 +7,7 @@
 //!
 //! | the range is implausible when | |
 //! |---|---|
-//! | it repeats itself while the observer moves by [`MOVED`], right after a jump, or for 1.5 s | stuck |
+//! | it repeats itself while the observer moves by [`MOVED`], right after a jump, for 1.5 s, or for 3 s before the take-off | stuck |
 //! | the filter's path while it fuses ranges and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
 //! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
 //! | it jumps more than five times within about two seconds | outliers, an edge below |
@@ -37,6 +37,8 @@ const REPEATED_MOVING: u32 = 6;
 const REPEATED_JUMPED: u32 = 8;
 /// As many whether anything moves or not: 1.5 s.
 const REPEATED_ALWAYS: u32 = 45;
+/// As many on the ground: 3 s. Recorded StampFlys repeat one 24 times there.
+const REPEATED_STANDING: u32 = 90;
 /// A reading that repeats itself so often is not used any more: 0.13 s, in which a take-off rises by 4 cm.
 const UNUSED: u32 = 4;
 /// Below this height the pressure under the propellers changes with it, m.
@@ -53,6 +55,9 @@ const UNKNOWN: f32 = 6.0;
 const LEAP: f32 = 0.05;
 /// At this speed a vehicle may cross an edge or a table within a rejection, m/s.
 const CROSSES: f32 = 0.15;
+/// Nor does it see something rise to less than this share of the distance: a phase that wraps looks so. Over a table the
+/// barometer holds the height, and behind it the range is believed again.
+const NEARER: f32 = 0.5;
 /// A range so far from its predecessor jumps, m.
 const JUMP: f32 = 0.15;
 /// Jumps, less one for every [`JUMP_FADING`] seconds.
@@ -72,8 +77,9 @@ const FIRST: f32 = 2.0;
 const BIAS_FOLLOWS: f32 = 1.0;
 /// The same for the climb rate, until the observer has settled.
 const CLIMB_FOLLOWS: f32 = 1.0;
-/// The height of a pressure step that no climb makes between two readings, m.
-const PRESSURE_STEP: f32 = 1.5;
+/// The height of a pressure step that no climb makes between two readings, m: the difference that convicts a range, so that a step
+/// alone convicts none.
+const PRESSURE_STEP: f32 = HEIGHT;
 
 /// What a filter has to put right that a wrong range has misled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,6 +129,8 @@ pub(super) struct VerticalMonitor {
     range: f32,
     range_at: Instant,
     repeats: u32,
+    /// The same on the ground, before the take-off.
+    stood: u32,
     /// The first of these readings had jumped.
     jumped: bool,
     /// Height of the observer when the range began to repeat itself.
@@ -132,8 +140,13 @@ pub(super) struct VerticalMonitor {
     rejecting: bool,
     /// The first of the readings that are being rejected had jumped.
     rejected_since_jump: bool,
+    /// Or leaped.
+    rejected_since_leap: bool,
     agrees: f32,
     implausible: bool,
+    /// It has been since the take-off: what the range did to the accelerometer's bias, and the propellers to the pressure, cannot be
+    /// told apart.
+    from_start: bool,
 }
 
 impl VerticalMonitor {
@@ -147,6 +160,11 @@ impl VerticalMonitor {
         self.implausible
     }
 
+    /// Has nothing that is to be believed told height and climb rate since the take-off?
+    pub(super) fn knows_nothing(&self) -> bool {
+        self.implausible && self.from_start
+    }
+
     /// The vehicle stands: nothing moves, and the range may say what it wants.
     pub(super) fn stand(&mut self, bias: f32) {
         *self = Self {
@@ -155,8 +173,15 @@ impl VerticalMonitor {
             baro_at: self.baro_at,
             range: self.range,
             range_at: self.range_at,
+            stood: self.stood,
             ..Self::default()
         };
+    }
+
+    /// Takes a range of a vehicle that stands.
+    pub(super) fn stand_range(&mut self, at: Instant, distance: f32) {
+        self.stood = if distance.to_bits() == self.range.to_bits() { self.stood.saturating_add(1) } else { 0 };
+        (self.range, self.range_at) = (distance, at);
     }
 
     /// Integrates a step: the change of the upward velocity without any bias removed, the filter's climb rate, bias and
@@ -189,8 +214,12 @@ impl VerticalMonitor {
         let dt = at.since(self.baro_at).seconds().min(0.2);
         self.baro_at = at;
         let last = self.altitude.replace(altitude).unwrap_or(altitude);
+        let stuck = self.baro_repeats >= REPEATED;
         self.baro_repeats = if altitude.to_bits() == last.to_bits() { self.baro_repeats.saturating_add(1) } else { 0 };
-        if (altitude - last).abs() < PRESSURE_STEP && !self.rejecting {
+        if stuck {
+            // It measured nothing, so there is nothing to compare until it has begun again.
+            self.path = 0.0;
+        } else if (altitude - last).abs() < PRESSURE_STEP && !self.rejecting {
             self.path -= altitude - last;
         }
         let zero = self.zero.get_or_insert(altitude - self.height);
@@ -217,12 +246,13 @@ impl VerticalMonitor {
         let leaps = change > LEAP && self.range > 0.0 && (distance - expected).abs() > LEAP;
         self.rejecting = rejecting;
         if !rejecting {
-            self.rejected_since_jump = jumps;
+            (self.rejected_since_jump, self.rejected_since_leap) = (jumps, leaps);
         }
         if distance.to_bits() == self.range.to_bits() {
             self.repeats = self.repeats.saturating_add(1);
         } else {
             (self.repeats, self.repeats_from, self.jumped) = (0, self.height, jumps);
+            self.stood = 0;
         }
         (self.range, self.range_at) = (distance, at);
         self.jumps = (self.jumps - dt / JUMP_FADING).max(0.0) + f32::from(u8::from(jumps));
@@ -251,9 +281,12 @@ impl VerticalMonitor {
 
     /// The filter has rejected ranges for so long that its height would be reset to them, at this horizontal speed, m/s, if that
     /// is known. Is it the range that is wrong? A height and a climb rate that the range has no part in stay as they are.
-    pub(super) fn refuses_jump(&mut self, speed: Option<f32>) -> bool {
+    /// `share`: of the range that is expected.
+    pub(super) fn refuses_jump(&mut self, speed: Option<f32>, share: f32) -> bool {
+        let nearer = share < NEARER && (self.rejected_since_jump || self.rejected_since_leap);
+        let alone = self.rejected_since_jump && speed.is_some_and(|speed| speed < CROSSES);
         // A filter that started in the air has to find its height first.
-        let wrong = self.age > 0.0 && self.rejected_since_jump && speed.is_some_and(|speed| speed < CROSSES);
+        let wrong = self.age > 0.0 && (nearer || alone);
         if wrong {
             self.leave_out();
         }
@@ -273,6 +306,11 @@ impl VerticalMonitor {
     /// The filter moved its height up by this much, to the range.
     pub(super) fn moved(&mut self, up: f32) {
         self.moved += up;
+        self.moves = self.moves.saturating_add(1);
+    }
+
+    /// The filter took another surface for the one below, which moves nothing.
+    pub(super) fn stepped(&mut self) {
         self.moves = self.moves.saturating_add(1);
     }
 
@@ -296,7 +334,8 @@ impl VerticalMonitor {
         let repeated = if settled { REPEATED_MOVING } else { REPEATED };
         let stuck = self.repeats >= repeated && (self.height - self.repeats_from).abs() > MOVED
             || self.repeats >= REPEATED_JUMPED && self.jumped
-            || self.repeats >= REPEATED_ALWAYS;
+            || self.repeats >= REPEATED_ALWAYS
+            || self.stood >= REPEATED_STANDING;
         let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
         let wrong = stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES);
         if !wrong {
@@ -305,7 +344,8 @@ impl VerticalMonitor {
         // Right after the take-off the observer knows how far it came.
         let young = self.age < SETTLED && !self.restarted;
         let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };
-        let misled = apart || self.moves > 0;
+        let misled = apart || self.moved != 0.0;
+        self.from_start = young;
         self.leave_out();
         misled.then_some(Correction { climb: self.climb, bias: self.bias, higher })
     }

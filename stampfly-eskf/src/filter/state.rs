@@ -56,7 +56,12 @@ impl NominalState {
     pub fn propagate(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) -> Motion {
         let force = accel - self.accel_bias;
         let rate = gyro - self.gyro_bias;
-        let half = small_rotation(rate * (0.5 * dt));
+        let turn = rate * (0.5 * dt);
+        let mut half = small_rotation(turn);
+        if turn.norm_squared() > 1.0 {
+            // The series is no rotation so far out, and its length would multiply the covariance.
+            half = normalize(half);
+        }
         let middle = multiply(self.attitude, half);
         let delta_velocity = rotate(&rotation_matrix(middle), &force) * dt;
         let gained = delta_velocity + Vec3::new(0.0, 0.0, GRAVITY * dt);

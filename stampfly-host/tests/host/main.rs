@@ -13,6 +13,7 @@ mod faults;
 mod figures;
 mod flight_task;
 mod flips;
+mod impact;
 mod in_flight;
 mod losses;
 mod made_up;

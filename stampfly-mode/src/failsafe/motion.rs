@@ -125,6 +125,8 @@ impl MotionMonitor {
             }
             self.suspects = self.suspects.saturating_add(1);
             self.suspected.add(config, imu, contact, limit, rate, false);
+            // What is allowed to the next sample must not grow with a burst.
+            self.rate = self.rate.map(|(_, rate)| (at, rate));
             let burst = if noisy { NOISY_BURST * config.garbled_samples } else { config.garbled_samples };
             if self.suspects <= burst {
                 return (Alerts::NONE, true);

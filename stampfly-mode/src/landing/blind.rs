@@ -19,6 +19,8 @@ use stampfly_types::{Duration, Instant};
 
 /// Share of hover thrust at the start.
 const FIRST_SHARE: f32 = 0.95;
+/// The share, and for how long, of a descent that breaks off a take-off, which may climb by 1 m/s: it takes away 0.5 m/s.
+const BREAK_OFF: (f32, Duration) = (0.87, Duration::from_millis(400));
 /// How fast the share falls, 1/s.
 const FALL: f32 = 0.01;
 /// The least share. What it sinks at, below 0.9 m/s, legs survive.
@@ -41,12 +43,14 @@ pub struct BlindDescent {
     tested: Instant,
     is_testing: bool,
     stands: Option<Instant>,
+    /// It breaks off a take-off.
+    breaks_off: bool,
 }
 
 impl BlindDescent {
-    /// One that begins.
-    pub const fn new(now: Instant) -> Self {
-        Self { began: now, tested: now, is_testing: false, stands: None }
+    /// One that begins, in flight or in a take-off.
+    pub const fn new(now: Instant, breaks_off: bool) -> Self {
+        Self { began: now, tested: now, is_testing: false, stands: None, breaks_off }
     }
 
     /// The ceiling of thrust as a share of hover thrust, and whether the vehicle has stood for `touchdown_time`.
@@ -65,7 +69,9 @@ impl BlindDescent {
                 self.is_testing = false;
             }
         }
-        let share = (FIRST_SHARE - FALL * now.since(self.began).seconds()).max(LEAST_SHARE);
+        let age = now.since(self.began);
+        let share = (FIRST_SHARE - FALL * age.seconds()).max(LEAST_SHARE);
+        let share = if self.breaks_off && age < BREAK_OFF.1 { BREAK_OFF.0 } else { share };
         (if self.is_testing { TEST_SHARE } else { share }, false)
     }
 

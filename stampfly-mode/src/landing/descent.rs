@@ -8,7 +8,7 @@
 //! | blind | without a climb rate, or falling while the height says that it stands | `touchdown` | shares of hover thrust |
 //!
 //! Near the ground the thrust ceiling is ramped down, so the vehicle settles instead of floating on its own ground effect.
-//! The ramp is also the test for touchdown: a vehicle whose specific force does not follow its thrust stands. One that rises
+//! A touch that is felt ends the ramp. The ramp is also the test for touchdown: a vehicle whose specific force does not follow its thrust stands. One that rises
 //! again goes back to the stage of its height. A blind one stays blind.
 //!
 //! No stage has a limit of its own: the machine knows from which height the landing began, and stops the motors of one that
@@ -181,11 +181,13 @@ impl Stage<Landing> for Flare {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Touchdown {
     began: Instant,
+    /// It was felt to touch.
+    struck: bool,
 }
 
 impl Stage<Landing> for Touchdown {
     fn enter(_: &mut Landing, now: Instant, _: &Seen<'_>) -> Self {
-        Self { began: now }
+        Self { began: now, struck: false }
     }
 
     fn limit(&self, _: &Landing) -> Limit<Landing> {
@@ -196,7 +198,10 @@ impl Stage<Landing> for Touchdown {
         match landing.stage(now, seen) {
             LandingStage::Touchdown => {
                 let (config, mut asked) = (seen.config, slowing(seen));
-                let fallen = (now.since(self.began).seconds() / config.ceiling_time.seconds()).min(1.0);
+                self.struck |= seen.weight.is_struck;
+                // Thrust turns over what stands on one leg: once the ground is felt, there is no waiting for the ramp.
+                let ramp = (now.since(self.began).seconds() / config.ceiling_time.seconds()).min(1.0);
+                let fallen = if self.struck { 1.0 } else { ramp };
                 asked.land_detected.thrust_ceiling = 1.0 - (1.0 - config.ceiling_share) * fallen;
                 asked.is_testing = true;
                 landing.step(now, seen, asked)
@@ -214,8 +219,8 @@ pub struct Blind {
 }
 
 impl Stage<Landing> for Blind {
-    fn enter(_: &mut Landing, now: Instant, _: &Seen<'_>) -> Self {
-        Self { descent: BlindDescent::new(now) }
+    fn enter(_: &mut Landing, now: Instant, seen: &Seen<'_>) -> Self {
+        Self { descent: BlindDescent::new(now, seen.breaks_off) }
     }
 
     fn limit(&self, _: &Landing) -> Limit<Landing> {

@@ -74,6 +74,7 @@ pub struct TakeoffLanding {
     config: LandingConfig,
     phase: FlightPhase,
     contact: GroundContact,
+    breaks_off: bool,
     selector: Selector<Flight>,
     weight: WeightTest,
     /// Was thrust being taken away in the step before?
@@ -88,6 +89,7 @@ impl TakeoffLanding {
             config,
             phase: FlightPhase::Init,
             contact: GroundContact::Ground,
+            breaks_off: false,
             selector: Selector::new(),
             weight: WeightTest::default(),
             is_testing: false,
@@ -100,6 +102,7 @@ impl TakeoffLanding {
         let entered = input.phase != before;
         if entered {
             self.is_testing = false;
+            self.breaks_off = before == FlightPhase::TakeOff;
             if input.phase == FlightPhase::Landing {
                 self.weight.begin_landing();
             }
@@ -109,6 +112,7 @@ impl TakeoffLanding {
         let seen = Seen {
             config: &self.config,
             phase: input.phase,
+            breaks_off: self.breaks_off,
             estimate,
             setpoint: input.setpoint,
             weight,

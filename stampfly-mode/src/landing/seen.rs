@@ -18,6 +18,8 @@ impl Vehicle for Multicopter {
 pub struct Seen<'a> {
     pub config: &'a LandingConfig,
     pub phase: FlightPhase,
+    /// The phase before was a take-off, so it may climb.
+    pub breaks_off: bool,
     pub estimate: &'a StateEstimate,
     pub setpoint: &'a Setpoint,
     /// What the weight test says in this cycle.

@@ -32,6 +32,9 @@ const LEAST_SHARE: f32 = 0.15;
 const STANDS: f32 = 0.4;
 /// By more than this: it falls. The air carries the rest, a fifth by its cushion near the ground, more by drag with speed.
 const FALLS: f32 = 0.5;
+/// So much more specific force than its thrust makes, over [`QUICK`], is a blow: it stops 0.1 m/s within 10 ms. Vibration leaves a
+/// twentieth.
+const STRUCK: f32 = 1.4;
 /// So much more specific force for its thrust has a vehicle that drag brakes; one that stands with little thrust has more.
 const CARRIED: f32 = 1.3;
 /// Shares of the thrust and of the specific force of the flight.
@@ -85,6 +88,8 @@ pub struct Answers {
     /// Half of the thrust of the flight is gone, and the specific force is still that of the flight: nothing that flies does
     /// this, at less than 2.5 m/s downwards, however slowly the thrust went.
     pub is_carried: bool,
+    /// Something pushed it up harder than its thrust: it has touched down, at more than about 0.1 m/s.
+    pub is_struck: bool,
 }
 
 /// Filtered thrust and specific force, and what both were before thrust was taken away.
@@ -110,7 +115,8 @@ impl WeightTest {
     /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
     /// reference stays.
     pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Answers {
-        let unknown = Answers { quick: Support::Unknown, steady: Support::Unknown, is_carried: false };
+        let unknown =
+            Answers { quick: Support::Unknown, steady: Support::Unknown, is_carried: false, is_struck: false };
         if !(force.is_finite() && thrust.is_finite()) {
             return unknown;
         }
@@ -134,7 +140,9 @@ impl WeightTest {
             self.before = self.steady;
             return Answers { is_carried, ..unknown };
         }
-        Answers { quick: self.quick.support(self.before), steady: self.steady.support(self.before), is_carried }
+        let is_struck = self.quick.force * self.before.thrust > STRUCK * self.before.force * self.quick.thrust;
+        let [quick, steady] = [self.quick, self.steady].map(|pair| pair.support(self.before));
+        Answers { quick, steady, is_carried, is_struck }
     }
 }
 
@@ -158,6 +166,23 @@ mod tests {
             stands = answers.steady == Support::Stands;
         }
         assert!(stands);
+    }
+
+    /// Hovers, sinks under a ceiling, and is pushed up by so much, m/s², for 10 ms.
+    fn is_struck(push: f32) -> bool {
+        let mut test = WeightTest::default();
+        (0u64..500).any(|step| {
+            let thrust = if step < 400 { 0.36 } else { 0.33 };
+            let push = if (450..454).contains(&step) { push } else { 0.0 };
+            let force = GRAVITY * thrust / 0.36 + push;
+            test.step(Instant::from_micros(2_500 * step), force, thrust, step >= 400).is_struck
+        })
+    }
+
+    #[test]
+    fn a_touch_at_a_fifth_of_a_metre_per_second_is_felt_and_vibration_is_not() {
+        assert!(is_struck(20.0));
+        assert!(!is_struck(5.0));
     }
 
     /// Flies, and lands with this thrust at the end of a second and this share of the specific force that thrust makes.

@@ -119,6 +119,8 @@ message! {
     pub struct EstimatorCommand {
         /// The vehicle stands still on the ground: hold velocity at zero.
         on_ground: bool,
+        /// Its propellers carry it.
+        flying: bool,
         /// A change of this number asks for position and velocity to be set to zero.
         origin_resets: u32,
         /// A change of this number asks for a full new start from calibration.

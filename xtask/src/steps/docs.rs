@@ -58,8 +58,8 @@ const GENERATED: &[(&str, &str, &str)] = &[
         "docs/modes.md",
         "modes",
         "# Modes\n\nThe mode machine: its phases, who may do what, and what it asks for before arming. Printed from the tables of \
-         `stampfly-mode` by `cargo xtask docs --fix`. A test explores every phase with every relevant alert and every set of \
-         up to three events (`stampfly-mode/src/decision/tests.rs`).",
+         `stampfly-mode` by `cargo xtask docs --fix`. A test explores every phase with every alert, every pair of alerts and every set of \
+         up to three events in every order (`stampfly-mode/src/decision/tests.rs`).",
     ),
 ];
 

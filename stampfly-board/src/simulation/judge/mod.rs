@@ -9,14 +9,14 @@
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
 //! | `cut` | the motors stopped for good within 0.3 s of the fault, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
-//! | `crashed` | after the fault it touched the ground faster than 1 m/s or tilted by more than 20°, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted |
+//! | `crashed` | after the fault it touched the ground faster than 1 m/s, or tilted by more than 20° with its motors on, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted, nor that a hand drops it |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
 //! | `transparent` | anything else |
 //!
 //! The commanded path is the mission's, in the world as it was at the start: a set-point that follows a wrong estimate
-//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide, in ACRO three
-//! times.
+//! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide, and where it
+//! flies by sight, in all but POS_HOLD, four times.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -46,9 +46,10 @@ const OFF_GROUND: f32 = 0.05;
 const AWAY: [f32; 2] = [1.0, 5.0];
 /// Bounds of `transparent`, in the same order, m.
 const EXACT: [f32; 2] = [0.15, 0.5];
-/// A pilot's bounds are this many times as wide; in ACRO, where sticks are rates, a pilot without faults is up to 1.3 m beside.
+/// A pilot's bounds are this many times as wide. Where only the pilot's eyes hold the place, gusts of 1 m/s carry a vehicle without faults
+/// 1 m away in more than half of the flights, and 2 m in few.
 const PILOT: f32 = 2.0;
-const ACRO_PILOT: f32 = 3.0;
+const BY_SIGHT: f32 = 4.0;
 /// Motors that stop within this time of a fault were cut.
 const CUT: Duration = Duration::from_millis(300);
 /// A rotor that turns faster than this, rad/s, this long after the motors have stopped, is driven.
@@ -177,8 +178,8 @@ impl Judge {
             course: Course::new(mission),
             wide: match pilot {
                 None => 1.0,
-                Some(FlightMode::Acro) => ACRO_PILOT,
-                Some(_) => PILOT,
+                Some(FlightMode::PosHold) => PILOT,
+                Some(_) => BY_SIGHT,
             },
             alerts: Alerts::NONE,
             spans: Vec::new(),
@@ -277,7 +278,8 @@ impl Judge {
 
         let after_fault = self.has_begun(now);
         if touches && (after_fault && self.injector.faults().next().is_some() || landing) {
-            let tilt = frame::tilt(&truth.attitude).to_degrees();
+            // A leg that touches first turns over what its propellers push, and sets upright what they no longer do.
+            let tilt = if self.motors_on { frame::tilt(&truth.attitude).to_degrees() } else { 0.0 };
             self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt });
         }
         self.course.visit(&truth.position);
@@ -353,15 +355,27 @@ impl Judge {
         }
     }
 
+    /// Did the motors stop in a hand? To be caught is a landing.
+    fn is_caught(&self) -> bool {
+        self.stopped.is_some_and(|(at, _)| {
+            self.injector.faults().enumerate().any(|(place, fault)| {
+                let since = self.injector.begins(place).filter(|since| *since <= at);
+                let holds = fault.value.filter(|_| fault.kind.name == "hand");
+                since.zip(holds).is_some_and(|(since, holds)| at.since(since).seconds_f64() < holds)
+            })
+        })
+    }
+
     /// By the table of the [module](self) documentation.
     fn class(&self, begun: Option<Instant>) -> Class {
         let [above, beside] = self.away;
         let wide = self.wide;
         let from = begun.or(self.start).unwrap_or(self.now);
-        let until = self.stopped.filter(|_| self.runs_on).map_or(self.now, |(at, _)| at);
+        let given_up = self.runs_on || self.is_caught();
+        let until = self.stopped.filter(|_| given_up).map_or(self.now, |(at, _)| at);
         let counts = |touch: &Touch| (from..=until).contains(&touch.at);
         let hard = |touch: &Touch| counts(touch) && (touch.speed > HARD || touch.tilt > TILTED);
-        let lies = !self.runs_on
+        let lies = !given_up
             && self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
         let crashed = lies || self.touches.iter().any(hard);
         let at_once = |at: Instant| begun.is_some_and(|begun| at >= begun && at.since(begun) <= CUT);

@@ -14,14 +14,18 @@
 //! | share of the picture's motion, and of the motion that the body's turning gives it | a reading holds one frame, two or none |
 //! | standard deviation that was added to the tilt | the filter found its own tilt to be wrong, so the acceleration that is restored is wrong, too |
 //!
-//! Two things it leaves to others: a picture that does not move is [`picture`]'s, a velocity that jumps [`jump`]'s.
+//! Three things it leaves to others: a picture that does not move is [`picture`]'s, a velocity that jumps [`jump`]'s, and whether it
+//! is not flow but the gyro that is wrong [`gyro`]'s.
 //!
 //! Not for an error of scale of some tens of per cent, nor for a constant offset that was there from the beginning: no
 //! other sensor on board measures a constant velocity.
 
+mod gyro;
 mod jump;
 mod picture;
 
+pub(super) use gyro::GyroShift;
+use gyro::Record;
 use jump::Jump;
 use picture::Picture;
 use stampfly_types::{GRAVITY, Vec3};
@@ -56,6 +60,8 @@ const UNKNOWN: f32 = 20.0;
 const FAST: f32 = 7.0;
 const CALM: f32 = 1.0;
 const SETTLES: f32 = 0.1;
+/// After a shift of the gyro's zero was put right, the filter needs some time to settle, s.
+const SHIFTED: f32 = 0.5;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
 const MOTION: f32 = 0.2;
 const AGREES_FOR: f32 = 0.5;
@@ -63,6 +69,17 @@ const AGREES_FOR: f32 = 0.5;
 /// for what begins while the motors spool up.
 const STANDING_RATE: [f32; 2] = [0.6, 1.0];
 const STANDING_SOON: f32 = 0.1;
+
+/// What a reading has shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// Nothing new.
+    Unchanged,
+    /// Flow has just become implausible.
+    Implausible,
+    /// What looked so was the gyro.
+    GyroShifted(GyroShift),
+}
 
 /// What is remembered of flow and acceleration, horizontal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,6 +105,7 @@ pub(super) struct FlowMonitor {
     differs: f32,
     agrees: f32,
     picture: Picture,
+    record: Record,
     standing: [[f32; 2]; 2],
     implausible: bool,
     /// How long it has to hold back, s.
@@ -127,6 +145,7 @@ impl FlowMonitor {
         self.added[1] += acceleration.y;
         self.gyro_bias[0] += gyro_bias.x;
         self.gyro_bias[1] += gyro_bias.y;
+        self.record.corrected([acceleration.x, acceleration.y], [gyro_bias.x, gyro_bias.y]);
     }
 
     /// The filter found its tilt to be wrong, and added this standard deviation, rad.
@@ -157,6 +176,13 @@ impl FlowMonitor {
         (self.differs, self.agrees) = (0.0, 0.0);
         (self.readings, self.apart) = Default::default();
         self.jump.forget();
+        self.record = Record::default();
+    }
+
+    /// What flow did to the filter was right, or is undone.
+    pub(super) fn start_over(&mut self) {
+        self.forget();
+        (self.added, self.gyro_bias) = Default::default();
     }
 
     /// Takes a reading of a standing vehicle: rate of the picture less the gyro's without its bias, rad/s.
@@ -169,12 +195,11 @@ impl FlowMonitor {
             let [x, y] = *mean;
             implausible |= x * x + y * y > limit * limit;
         }
-        *self = Self { standing, implausible, ..Self::default() };
+        *self = Self { standing, implausible, readings: BEGINNING, last: Some([0.0; 2]), ..Self::default() };
     }
 
     /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
-    /// rad/s, velocity, world, and the distance to the floor. `known` says that the distance is certain. True when it
-    /// has just become implausible.
+    /// rad/s, velocity, world, and the distance to the floor. `known` says that the distance is certain.
     pub(super) fn flow(
         &mut self,
         counts: [f32; 2],
@@ -183,14 +208,14 @@ impl FlowMonitor {
         distance: f32,
         interval: f32,
         known: bool,
-    ) -> bool {
+    ) -> Verdict {
         let velocity = [velocity.x, velocity.y];
         let change = core::mem::take(&mut self.change);
         let dt = core::mem::take(&mut self.elapsed);
         let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0 && interval > 0.0) else {
             // Where the distance jumps, the velocity does.
             self.forget();
-            return false;
+            return Verdict::Unchanged;
         };
         let fade = OVER / (OVER + dt);
         let forget = FORGOTTEN / (FORGOTTEN + dt);
@@ -221,6 +246,7 @@ impl FlowMonitor {
             let rate = counts[axis] / interval;
             picture += rate * rate + turning[axis] * turning[axis];
         }
+        self.record.reading(velocity, change, dt, distance);
         self.picture.step(counts, turning, distance, interval);
         let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
         let uncertain = share * share * picture;
@@ -236,15 +262,19 @@ impl FlowMonitor {
                 self.agrees = if agrees { self.agrees + interval } else { 0.0 };
             }
             self.implausible = self.agrees < AGREES_FOR || self.jump.has_jumped();
-            return false;
+            return Verdict::Unchanged;
         }
         self.waits = (self.waits - interval).max(0.0);
-        self.implausible = (self.differs > LASTS && self.waits == 0.0)
-            || self.jump.has_jumped()
-            || self.picture.is_frozen()
-            || self.picture.is_blind(distance);
+        let apart = (self.differs > LASTS && self.waits == 0.0) || self.jump.has_jumped();
+        let unmoved = self.picture.is_frozen() || self.picture.is_blind(distance);
+        let shift = if apart && !unmoved { self.record.shift() } else { None };
+        if let Some(shift) = shift {
+            self.waits = SHIFTED;
+            return Verdict::GyroShifted(shift);
+        }
+        self.implausible = apart || unmoved;
         self.agrees = 0.0;
-        self.implausible
+        if self.implausible { Verdict::Implausible } else { Verdict::Unchanged }
     }
 }
 

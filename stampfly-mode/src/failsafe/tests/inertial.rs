@@ -168,3 +168,16 @@ fn a_lost_estimate_stays_an_alert_after_the_reset() {
     rig.mode.armed = false;
     assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::NONE);
 }
+
+/// One sample in twenty is off by 15 rad/s, and two of them come together with opposite signs.
+#[test]
+fn opposite_spikes_are_a_burst_and_no_turn() {
+    let spike = |rate: f32| Vec3::new(rate, 0.0, 0.0);
+    let seen = until(Alerts::GYRO_ANOMALY, |rig, k| match k % 40 {
+        20 => rig.sample(REST, spike(15.0)),
+        21 => rig.sample(REST, spike(-15.0)),
+        22 => rig.sample(REST, spike(-15.0)),
+        _ => rig.sample(REST, Vec3::zeros()),
+    });
+    assert_eq!(seen, None);
+}

@@ -6,7 +6,7 @@ use super::*;
 fn d4_a_pilot_lost_in_a_manual_mode_is_replaced_by_a_hold_and_a_landing() {
     for mode in [FlightMode::Stabilize, FlightMode::Acro] {
         for (valid, expected) in
-            [(Validity::ALL, FlightMode::PosHold), (Validity::ALL.without(Validity::VELOCITY_XY), FlightMode::AltHold)]
+            [(Validity::ALL, FlightMode::PosHold), (Validity::ALL.without(Validity::POSITION_XY), FlightMode::AltHold)]
         {
             let (mut machine, mut world) = piloted(mode);
             world.estimate.valid = valid;

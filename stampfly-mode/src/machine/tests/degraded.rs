@@ -42,6 +42,26 @@ fn d8_a_vehicle_adrift_lands_unless_a_pilot_flies_it() {
     assert_eq!((status.phase, status.mode), (FlightPhase::Flying, FlightMode::AltHold));
 }
 
+/// Its height is known by nothing else yet.
+#[test]
+fn a_take_off_whose_range_lies_is_broken_off() {
+    let (mut machine, mut world) = in_phase(FlightPhase::TakeOff);
+    world.alerts = Alerts::RANGE_IMPLAUSIBLE;
+    assert_eq!(world.step(&mut machine, &[]).flight_status.phase, FlightPhase::Landing);
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    world.alerts = Alerts::RANGE_IMPLAUSIBLE;
+    assert_eq!(world.pass(&mut machine, 3_000).phase, FlightPhase::Flying, "in flight the barometer holds the height");
+}
+
+#[test]
+fn the_estimator_is_told_when_propellers_carry_the_vehicle() {
+    for (phase, flying) in [(FlightPhase::Flying, true), (FlightPhase::Landing, true), (FlightPhase::IdleGround, false)]
+    {
+        let (mut machine, mut world) = in_phase(phase);
+        assert_eq!(world.step(&mut machine, &[]).estimator.flying, flying, "{phase:?}");
+    }
+}
+
 #[test]
 fn d13_a_link_that_flaps_is_lost() {
     let (mut machine, mut world) = in_phase(FlightPhase::Flying);

@@ -3,6 +3,7 @@
 mod arming;
 mod authority;
 mod degraded;
+mod exhaustive;
 mod phases;
 mod stopping;
 

@@ -1,0 +1,80 @@
+//! The estimator under any stream of samples, in any order, at any times.
+
+use crate::Input;
+use stampfly_eskf::{Eskf, EskfConfig, Estimator};
+use stampfly_types::messages::{BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData};
+use stampfly_types::{Duration, Instant, Vec3};
+
+/// Samples, each with a kind and a time step. The first byte says whether the estimator is initialised.
+pub fn estimator_stream(data: &[u8]) {
+    let mut input = Input(data);
+    let mut eskf = Eskf::new(EskfConfig::default());
+    let calibration =
+        CalibrationResult { specific_force: Vec3::new(0.0, 0.0, -9.81), complete: true, ..Default::default() };
+    if input.byte() & 1 == 1 {
+        eskf.initialize(Instant::ZERO, &calibration);
+    }
+    let mut now = Instant::ZERO;
+    while !input.is_empty() {
+        let (kind, step) = (input.byte(), input.byte());
+        now = match step {
+            // Minutes later, back, and before everything.
+            255 => now + Duration::from_secs(600),
+            254 => Instant::from_micros(now.as_micros().saturating_sub(40_000)),
+            253 => Instant::ZERO,
+            _ => now + Duration::from_micros(100 * u64::from(step)),
+        };
+        match kind % 8 {
+            0 => eskf
+                .predict(now, &ImuData { gyro: input.vector(35.0), accel: input.vector(80.0), ..Default::default() }),
+            1 => {
+                let [distance, sigma] = [input.number(3.0), input.number(0.1)];
+                eskf.fuse_tof(now, &TofData { distance, sigma, valid: input.byte() & 1 == 1, ..Default::default() });
+            }
+            2 => {
+                let [delta_x, delta_y, interval] = [input.number(1.0), input.number(1.0), input.number(0.05)];
+                let (quality, valid) = (input.byte(), input.byte() & 1 == 1);
+                eskf.fuse_flow(now, &FlowData { delta_x, delta_y, interval, quality, valid });
+            }
+            3 => _ = eskf.fuse_baro(now, &BaroData { altitude: input.number(10.0), ..Default::default() }),
+            4 => _ = eskf.fuse_mag(now, &MagData { field: input.vector(100.0) }),
+            5 => {
+                let flags = input.byte();
+                let [origin_resets, full_resets] = [u32::from(flags >> 2 & 1), u32::from(flags >> 3 & 1)];
+                let (on_ground, flying) = (flags & 1 != 0, flags & 2 != 0);
+                eskf.command(now, &EstimatorCommand { on_ground, flying, origin_resets, full_resets });
+            }
+            6 => eskf.initialize(now, &calibration),
+            _ => {
+                let velocity = input.vector(5.0);
+                eskf.fuse_velocity(now, &velocity, input.number(1.0));
+            }
+        }
+        check(&eskf);
+    }
+}
+
+/// Whatever came: numbers, a rotation, and a covariance.
+fn check(eskf: &Eskf) {
+    let estimate = eskf.estimate();
+    let vectors = [
+        estimate.position,
+        estimate.velocity,
+        estimate.angular_rate,
+        estimate.specific_force,
+        estimate.gyro_bias,
+        estimate.accel_bias,
+    ];
+    let finite = vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()));
+    assert!(finite && estimate.height.is_finite(), "{estimate:?}");
+    let length = estimate.attitude.coords.norm();
+    assert!((length - 1.0).abs() < 1e-3, "a quaternion of length {length}");
+    let covariance = eskf.covariance();
+    for i in 0..15 {
+        let variance = covariance.get(i, i);
+        assert!(variance.is_finite() && variance >= 0.0, "variance {i} is {variance}");
+        for j in 0..i {
+            assert!(covariance.get(i, j) == covariance.get(j, i), "{i}, {j}: not symmetric");
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Inertial samples that are numbers, and still no measurement.
+
+use stampfly_eskf::{Eskf, EskfConfig, Estimator};
+use stampfly_types::messages::{CalibrationResult, ImuData};
+use stampfly_types::{Instant, Vec3};
+
+#[test]
+fn an_inertial_sample_that_no_sensor_measures_is_refused() {
+    for size in [2.0e4, 1e20, 1e37, f32::INFINITY, f32::NAN] {
+        let mut eskf = Eskf::new(EskfConfig::default());
+        let level = Vec3::new(0.0, 0.0, -9.81);
+        eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: level, ..Default::default() });
+        for step in 1..=20 {
+            let huge = Vec3::new(size, -size, 0.0);
+            let [accel, gyro] = if step % 2 == 0 { [huge, Vec3::zeros()] } else { [level, huge] };
+            eskf.predict(Instant::from_micros(2_500 * step), &ImuData { accel, gyro, ..Default::default() });
+        }
+        assert_eq!(eskf.status().imu_refused, 20, "{size}");
+        assert!(eskf.estimate().velocity.norm() < 0.1, "{size}: {:?}", eskf.estimate());
+    }
+}
+
+/// The longest step of the filter is half a second.
+#[test]
+fn a_turn_of_many_revolutions_in_one_step_leaves_an_attitude() {
+    let mut eskf = Eskf::new(EskfConfig::default());
+    let level = Vec3::new(0.0, 0.0, -9.81);
+    eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: level, ..Default::default() });
+    for step in 1..=5 {
+        let gyro = Vec3::new(-490.0, -35.0, -35.0);
+        eskf.predict(Instant::from_millis(500 * step), &ImuData { accel: level, gyro, ..Default::default() });
+        let length = eskf.nominal().attitude.iter().map(|part| part * part).sum::<f32>();
+        assert!((length - 1.0).abs() < 1e-3, "step {step}: length {length}");
+        assert!((0..15).all(|n| eskf.covariance().get(n, n).is_finite()), "step {step}");
+    }
+}
