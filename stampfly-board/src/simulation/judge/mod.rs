@@ -9,7 +9,7 @@
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
 //! | `cut` | the motors stopped for good within 0.3 s of the fault, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
-//! | `crashed` | after the fault it touched the ground faster than 1 m/s, or tilted by more than 20° with its motors on, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted, nor that a hand drops it |
+//! | `crashed` | after the fault it touched the ground faster than 1 m/s, or tilted by more than 20° with its motors on, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted, nor that a hand drops what has landed in it |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
 //! | `transparent` | anything else |
@@ -355,9 +355,9 @@ impl Judge {
         }
     }
 
-    /// Did the motors stop in a hand? To be caught is a landing.
+    /// Did the motors stop in a hand, when the mission asked to land? To be caught is a landing then.
     fn is_caught(&self) -> bool {
-        self.stopped.is_some_and(|(at, _)| {
+        self.stopped.filter(|_| !self.stopped_early).is_some_and(|(at, _)| {
             self.injector.faults().enumerate().any(|(place, fault)| {
                 let since = self.injector.begins(place).filter(|since| *since <= at);
                 let holds = fault.value.filter(|_| fault.kind.name == "hand");
