@@ -4,13 +4,13 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage | disarmed |
+//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage; at once when two samples running are above it by themselves and from one side | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, four when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
-//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 25 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
+//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 20 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, a force that neither gravity nor the thrust explains | disarmed |
 //! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
@@ -31,7 +31,7 @@
 //! | fault | found after |
 //! |---|---|
 //! | inertial sensor stuck, zero, one axis stuck | 50 ms; motors off within 60 ms |
-//! | samples that are not finite, silence | 25 ms; motors off within 33 ms |
+//! | samples that are not finite, silence | 20 ms; motors off within 25 ms |
 //! | full scale, garbage for good | 10 ms, 25 ms |
 //! | spikes in one sample of five | 0.1 s; it lands |
 //! | scale of a half or less | 0.1 to 0.3 s; motors off |

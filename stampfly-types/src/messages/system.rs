@@ -179,7 +179,7 @@ message_flags! {
         GYRO_ANOMALY = 6,
         /// No inertial sample for 10 ms.
         IMU_DEGRADED = 7,
-        /// No inertial sample for 25 ms: motors off.
+        /// No inertial sample for 20 ms: motors off.
         IMU_LOST = 8,
         /// Upside down or tumbling.
         TUMBLED = 9,
