@@ -154,7 +154,7 @@ parameters! {
     "failsafe.weak.pitch" [0.0001, 0.1] "N*m" failsafe.weak_pitch => "torque about pitch that betrays a weak motor";
     "failsafe.weak.time" [0.02, 2.0] "s" failsafe.weak_motor_time => "for this long it is a weak motor";
     "failsafe.imu.degraded" [0.005, 0.02] "s" failsafe.imu_degraded => "silence of a degraded inertial sensor";
-    "failsafe.imu.lost" [0.015, 0.1] "s" failsafe.imu_lost => "silence of a lost inertial sensor, stops the motors";
+    "failsafe.imu.lost" [0.02, 0.1] "s" failsafe.imu_lost => "silence of a lost inertial sensor, stops the motors";
     "failsafe.link.timeout" [0.1, 5.0] "s" failsafe.link_silence => "silence of a lost link";
     "failsafe.battery.low" [3.2, 4.0] "V" failsafe.battery_low => "low battery: warns, no arming";
     "failsafe.battery.critical" [2.5, 3.2] "V" failsafe.battery_critical => "critical battery: lands";

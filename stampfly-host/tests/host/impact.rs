@@ -19,7 +19,7 @@ use stampfly_sim::vehicle::{Vehicle, Witness};
 use stampfly_types::messages::{Alerts, MotorOutput, SystemAlert};
 use stampfly_types::{Duration, Instant};
 
-/// From the blow, and from the alert. Within 7.5 ms in 19 of 20 flights, 9.4 ms in one.
+/// From the blow, and from the alert.
 const WITHIN: [Duration; 2] = [Duration::from_millis(10), Duration::from_micros(2_500)];
 
 #[derive(Default)]
@@ -65,7 +65,7 @@ impl Witness<Runnables> for Timing {
 
 #[test]
 fn a_wall_stops_the_motors() {
-    let mut longest = [Duration::ZERO; 2];
+    let mut all = Vec::new();
     for seed in 1..=20 {
         let mission = Mission::parse("arm\ntakeoff 0.6\ngoto 2 0 0.6 speed 1.5\nland\n").expect("a mission");
         let faults = vec![Fault::parse("wall=0.6@move", StampFly::FAULTS).expect("a fault")];
@@ -77,7 +77,8 @@ fn a_wall_stops_the_motors() {
         };
         let took = [stopped.since(blow), stopped.since(alerted)];
         assert!(stopped >= alerted && took[0] <= WITHIN[0] && took[1] <= WITHIN[1], "seed {seed}: {took:?}");
-        longest = [longest[0].max(took[0]), longest[1].max(took[1])];
+        all.push(took.map(Duration::as_micros));
     }
-    println!("motors off within {} us of the blow, {} us of the alert", longest[0].as_micros(), longest[1].as_micros());
+    all.sort_unstable();
+    println!("motors off after the blow, and after the alert, us: {all:?}");
 }

@@ -3,13 +3,14 @@
 //! A blow shows in two samples running, and two samples of garbage (a shifted frame, a register of `0x8000`) look like
 //! a blow. What tells them apart is that a burst ends where it began. A sample is *suspect* when [`ImuData::is_garbled`] says so.
 //! Up to `garbled_samples` suspect samples running are set aside, three times as many of a noisy sensor. One more, and it was
-//! no burst: all of them count. A blow so hard that it looks like garbage is therefore seen two samples later than any other.
+//! no burst: all of them count. A blow that looks like garbage is therefore seen two samples later than any other, unless it is
+//! *hard*: the forces of two samples come from one side, and do not repeat each other.
 //!
 //! | evidence | motors off after |
 //! |---|---|
 //! | rate, or force over some 10 ms, above its limit in two believed samples running | the second sample |
-//! | a hard blow: force over some 10 ms above its limit, and in this sample and the one before from one side | the second sample, suspect or not |
 //! | the same in two of four suspect samples running | the fourth sample |
+//! | force over some 10 ms above its limit in this sample, at the end of a hard blow, suspect or not | the second sample |
 //! | up to three suspect samples, then the motion of before | never |
 
 use super::config::FailsafeConfig;
@@ -21,10 +22,8 @@ use stampfly_types::{Instant, Vec3, math};
 const NOISY_BURST: u32 = 3;
 /// Forces of two samples come from one side when the cosine between them is as large: 25°. Of two random ones 5 % are.
 const ONE_SIDE: f32 = 0.9;
-/// A blow may turn the vehicle so many times as fast as what makes a sample suspect. A wall at 1.5 m/s does 1.8 times.
+/// A hard blow changes the rate by up to so many times what makes a sample suspect. A wall at 1.5 m/s does 1.8 times.
 const SPIN: f32 = 2.0;
-/// The period that this is for, s.
-const PERIOD: f32 = 0.0025;
 
 /// What kind of contact would be no accident.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +48,21 @@ impl Contact {
             Self::None
         }
     }
+
+    /// The part of a specific force that would be a blow: not the ground's push from below in a touch-down.
+    fn felt(self, force: &Vec3) -> Vec3 {
+        Vec3::new(force.x, force.y, if self == Self::TouchDown { force.z.max(0.0) } else { force.z })
+    }
+}
+
+/// What is a blow, and what a spin.
+#[derive(Clone, Copy)]
+struct Limits {
+    contact: Contact,
+    /// Of the specific force, m/s².
+    force: f32,
+    /// Of the rate, rad/s.
+    rate: f32,
 }
 
 /// Samples above the limits, and the specific force over the length of a blow.
@@ -56,31 +70,17 @@ impl Contact {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Evidence {
     blow: Option<Vec3>,
-    /// Force of the sample before, where it is above the limit by itself.
-    struck: Option<Vec3>,
-    /// This sample is the second of a hard blow.
-    blow_lasts: bool,
     impacts: u32,
     overspeeds: u32,
 }
 
 impl Evidence {
-    /// Adds a sample; gives the force over the length of a blow. `runs`: evidence has to be in samples running; `smooth`: the
-    /// rate goes on from the sample before.
-    fn add(
-        &mut self,
-        config: &FailsafeConfig,
-        imu: &ImuData,
-        contact: Contact,
-        limit: f32,
-        rate: f32,
-        [runs, smooth]: [bool; 2],
-    ) -> f32 {
+    /// Adds a sample; gives the force over the length of a blow. `runs`: what counts are samples running; `hard`: the sample is
+    /// the second of a hard blow.
+    fn add(&mut self, config: &FailsafeConfig, imu: &ImuData, limits: &Limits, runs: bool, hard: bool) -> f32 {
         let blow = self.blow.get_or_insert(imu.accel);
         *blow += (imu.accel - *blow) * config.blow_weight;
-        let from_below = contact == Contact::TouchDown;
-        let felt = |force: &Vec3| Vec3::new(force.x, force.y, if from_below { force.z.max(0.0) } else { force.z });
-        let force = felt(blow).norm();
+        let force = limits.contact.felt(blow).norm();
         let count = |count: &mut u32, above: bool| {
             *count = if above {
                 count.saturating_add(1)
@@ -90,19 +90,11 @@ impl Evidence {
                 *count
             };
         };
-        count(&mut self.impacts, force >= limit);
-        let strike = felt(&imu.accel);
-        let struck = (smooth && strike.norm_squared() >= limit * limit).then_some(strike);
-        // What repeats itself to the bit is no measurement.
-        let from_one_side = |before: Vec3, now: Vec3| {
-            before != now && before.dot(&now) >= ONE_SIDE * math::sqrt(before.norm_squared() * now.norm_squared())
-        };
-        let before = core::mem::replace(&mut self.struck, struck);
-        self.blow_lasts = force >= limit && before.zip(struck).is_some_and(|(before, now)| from_one_side(before, now));
-        if self.blow_lasts {
+        count(&mut self.impacts, force >= limits.force);
+        if hard && force >= limits.force {
             self.impacts = self.impacts.max(config.motion_samples);
         }
-        count(&mut self.overspeeds, imu.gyro.norm_squared() >= rate * rate);
+        count(&mut self.overspeeds, imu.gyro.norm_squared() >= limits.rate * limits.rate);
         force
     }
 
@@ -123,8 +115,10 @@ pub(super) struct MotionMonitor {
     suspects: u32,
     /// The last rate that was believed.
     rate: Option<(Instant, Vec3)>,
-    /// The rate of the sample before, whatever it was.
-    turned: Vec3,
+    /// The rate of the sample before, believed or not.
+    turned: Option<(Instant, Vec3)>,
+    /// Its force, where it may be the first of a hard blow.
+    struck: Option<Vec3>,
     /// Running mean and variance of the specific force's norm.
     force: [f32; 2],
 }
@@ -145,25 +139,23 @@ impl MotionMonitor {
         let limit = self.impact_limit(config, impact);
         let before = self.rate.map(|(last, rate)| (at.since(last), rate));
         let suspect = imu.is_garbled(before, config.angular_acceleration, config.accel_full_scale);
-        // Samples come at 400 Hz or faster; where they come more slowly, a hard blow is seen as any other.
-        let most = SPIN * config.angular_acceleration * PERIOD;
-        let smooth = (imu.gyro - self.turned).iter().all(|change| change.abs() <= most);
-        self.turned = imu.gyro;
+        let limits = Limits { contact, force: limit, rate };
+        let hard = self.ends_hard_blow(config, at, imu, &limits);
         if suspect {
             if self.suspects == 0 {
                 self.suspected = self.believed;
             }
             self.suspects = self.suspects.saturating_add(1);
-            self.suspected.add(config, imu, contact, limit, rate, [false, smooth]);
+            self.suspected.add(config, imu, &limits, false, hard);
             // What is allowed to the next sample must not grow with a burst.
             self.rate = self.rate.map(|(_, rate)| (at, rate));
             let burst = if noisy { NOISY_BURST * config.garbled_samples } else { config.garbled_samples };
-            if self.suspects <= burst && !self.suspected.blow_lasts {
+            if self.suspects <= burst && !(hard && self.suspected.alerts(config).contains(Alerts::IMPACT)) {
                 return (Alerts::NONE, true);
             }
             self.believed = self.suspected;
         } else {
-            let force = self.believed.add(config, imu, contact, limit, rate, [true, smooth]);
+            let force = self.believed.add(config, imu, &limits, true, hard);
             // An impact must not raise its own threshold: outliers enter clipped.
             let [mean, variance] = self.force;
             let off = if force < limit { force } else { limit } - mean;
@@ -173,6 +165,19 @@ impl MotionMonitor {
         self.suspects = 0;
         self.rate = Some((at, imu.gyro));
         (self.believed.alerts(config), suspect)
+    }
+
+    /// Are this sample and the one before a hard blow?
+    fn ends_hard_blow(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, limits: &Limits) -> bool {
+        let before = self.turned.replace((at, imu.gyro)).map(|(last, rate)| (at.since(last), rate));
+        let garbled = || imu.is_garbled(before, SPIN * config.angular_acceleration, config.accel_full_scale);
+        let force = limits.contact.felt(&imu.accel);
+        let struck = (force.norm_squared() >= limits.force * limits.force && !garbled()).then_some(force);
+        let before = core::mem::replace(&mut self.struck, struck);
+        before.zip(struck).is_some_and(|(before, now)| {
+            // What repeats itself to the bit is no measurement.
+            before != now && before.dot(&now) >= ONE_SIDE * math::sqrt(before.norm_squared() * now.norm_squared())
+        })
     }
 
     /// Force of an impact: `impact`, or more where it vibrates so much.
