@@ -22,7 +22,7 @@ use crate::bound::symmetric;
 use crate::controller::{ControlInput, Controller};
 use crate::intent::{Heading, Horizontal, Intent, Vertical};
 use crate::position::{PositionConfig, PositionController};
-use crate::rate::{RateConfig, RateController, RateLaw};
+use crate::rate::{LEAN, RateConfig, RateController, RateLaw};
 use crate::timing::StepTimer;
 
 /// Gains and limits of all loops.
@@ -114,6 +114,10 @@ pub struct CascadeController<R = RateController> {
     resets: u32,
     /// The path's acceleration one step ago, while a path is followed: its difference is the path's jerk.
     path: Option<Vec3>,
+    /// Its position one step ago, while that is followed.
+    place: Option<Vec3>,
+    /// The body rate without its noise, rad/s.
+    smooth_rate: Vec3,
 }
 
 impl CascadeController {
@@ -139,6 +143,8 @@ impl<R> CascadeController<R> {
             timer: StepTimer::default(),
             resets: 0,
             path: None,
+            place: None,
+            smooth_rate: Vec3::zeros(),
         }
     }
 
@@ -175,8 +181,16 @@ impl<R> CascadeController<R> {
     /// The body's z axis that pushes as asked, in the world frame, and the rate at which the path turns it.
     fn down_axis(&mut self, intent: &Intent, input: &ControlInput<'_>, dt: f32) -> (Vec3, Vec3) {
         let (path, estimate) = (input.setpoint, input.estimate);
+        let before = self.place.take();
         let error = match intent.horizontal {
-            Horizontal::Path => path.position - estimate.position,
+            Horizontal::Path => {
+                // A path that jumps gives up where the vehicle could not go; what kept it from there may be gone.
+                if before.is_some_and(|before| (path.position - before).xy().norm_squared() > JUMP * JUMP) {
+                    self.position.reset();
+                }
+                self.place = Some(path.position);
+                path.position - estimate.position
+            }
             Horizontal::Velocity => Vec3::zeros(),
             Horizontal::Lean { forward, right } => {
                 self.path = None;
@@ -207,6 +221,32 @@ impl<R> CascadeController<R> {
         let jerk = self.path.map_or(Vec3::zeros(), |before| (ahead - before) / dt);
         self.path = Some(ahead);
         (down, turn_rate(&jerk, per_weight))
+    }
+}
+
+/// A rate that is asked for, rad/s; below this it is as well noise.
+const ASKED: f32 = 0.3;
+/// An axis that turns at less than this share of it stands. One that a weak propeller turns the wrong way does not.
+const STANDS: f32 = 0.25;
+/// A path moves by millimetres in a step; one that moves so far, m, has jumped.
+const JUMP: f32 = 0.1;
+/// Propellers shake the rate by as much as is asked for; over this time, s, little is left of it.
+const SMOOTHING: f32 = 0.05;
+
+impl<R> CascadeController<R> {
+    /// The axes about which something keeps the vehicle from turning: the ground, or a hand.
+    ///
+    /// What a stick asks for comes at once, or never. The attitude loop asks for a rate that does not come wherever a constant
+    /// torque leans the vehicle, and the integral has to find that; but for no more than the integral can hold.
+    fn held(&self, intent: &Intent, target: &Vec3) -> [bool; 3] {
+        let tilt =
+            if matches!(intent.horizontal, Horizontal::Rates { .. }) { ASKED } else { LEAN * self.attitude.tilt_gain };
+        let yaw = if matches!(intent.heading, Heading::Stick(_)) { ASKED } else { f32::MAX };
+        let limits = [tilt, tilt, yaw];
+        core::array::from_fn(|axis| {
+            let asked = target[axis].abs();
+            intent.grounded || (asked > limits[axis] && self.smooth_rate[axis].abs() < STANDS * asked)
+        })
     }
 }
 
@@ -265,7 +305,9 @@ impl<R: RateLaw> Controller for CascadeController<R> {
                 feedback + down_in_body * yaw_rate + estimate.attitude.inverse_transform_vector(&turning)
             }
         };
-        let torque = self.rate.step(&target, &estimate.angular_rate, dt, input.unmet, intent.grounded);
+        self.smooth_rate += (estimate.angular_rate - self.smooth_rate) * (dt / (SMOOTHING + dt));
+        let held = self.held(&intent, &target);
+        let torque = self.rate.step(&target, &estimate.angular_rate, dt, input.unmet, held);
         ControlOutput { thrust, torque }
     }
 
@@ -274,6 +316,8 @@ impl<R: RateLaw> Controller for CascadeController<R> {
         self.position.reset();
         self.altitude.reset();
         self.path = None;
+        self.place = None;
+        self.smooth_rate = Vec3::zeros();
     }
 }
 

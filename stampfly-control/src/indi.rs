@@ -95,7 +95,7 @@ impl IndiConfig {
 /// let mut rate = Vec3::zeros();
 /// let mut torque = Vec3::zeros();
 /// for _ in 0..200 {
-///     torque = indi.step(&Vec3::zeros(), &rate, 0.0025, [0.0; 4], false);
+///     torque = indi.step(&Vec3::zeros(), &rate, 0.0025, [0.0; 4], [false; 3]);
 ///     rate.x += (torque.x / config.inertia.x + 0.5) * 0.0025;
 /// }
 /// assert!((torque.x / config.inertia.x + 0.5).abs() < 0.02, "it holds against it");
@@ -135,7 +135,7 @@ impl IndiRate {
 
 impl RateLaw for IndiRate {
     #[inline]
-    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3 {
+    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], held: [bool; 3]) -> Vec3 {
         let config = &self.config;
         let [roll, pitch, yaw, _] = unmet;
         let [last, before] = self.commanded;
@@ -147,12 +147,11 @@ impl RateLaw for IndiRate {
         let filtered = self.acceleration + (acceleration - self.acceleration) * weight(dt, config.damping_time);
         self.acceleration = filtered.map(|value| if value.is_finite() { value } else { 0.0 });
 
-        // On the ground something else turns it that will be gone in the air.
-        if !grounded {
-            let against = self.delivered - config.inertia.component_mul(&acceleration);
-            let change = (against - self.against).zip_map(&config.smoothing, |off, time| off * weight(dt, time));
-            self.against = (self.against + change).zip_map(&config.disturbance_max, finite_within);
-        }
+        // What holds it, as the ground does, will be gone in the air.
+        let free = Vec3::from(held.map(|held| if held { 0.0 } else { 1.0 }));
+        let against = self.delivered - config.inertia.component_mul(&acceleration);
+        let change = (against - self.against).zip_map(&config.smoothing, |off, time| off * weight(dt, time));
+        self.against = (self.against + change.component_mul(&free)).zip_map(&config.disturbance_max, finite_within);
         let demanded = (target - measured).component_mul(&config.bandwidth);
         let damped = demanded - self.acceleration.component_mul(&config.damping);
         let torque = self.against + config.inertia.component_mul(&damped);
@@ -213,7 +212,7 @@ mod tests {
             torque += (late * kept - torque) * weight(DT, config.motor_lag);
             late = asked;
             rate.x += (torque + disturbance) / config.inertia.x * DT;
-            asked = indi.step(&Vec3::zeros(), &rate, DT, unmet, false).x;
+            asked = indi.step(&Vec3::zeros(), &rate, DT, unmet, [false; 3]).x;
         }
         (rate.x, asked)
     }
@@ -239,8 +238,8 @@ mod tests {
             torque += (0.5 * late - torque) * weight(DT, config().motor_lag);
             late = asked;
             rate.x += torque / config().inertia.x * DT;
-            asked = told.step(&target, &rate, DT, half, false).x;
-            silent.step(&target, &rate, DT, MET, false);
+            asked = told.step(&target, &rate, DT, half, [false; 3]).x;
+            silent.step(&target, &rate, DT, MET, [false; 3]);
         }
         let (told, silent) = (told.against().x, silent.against().x);
         assert!(told.abs() < 0.1 * silent, "{told} against {silent} of one that was not told");
@@ -251,7 +250,7 @@ mod tests {
         let config = config();
         let mut indi = IndiRate::new(&config);
         for _ in 0..24_000 {
-            indi.step(&Vec3::new(1.0, -1.0, 1.0), &Vec3::zeros(), DT, MET, false);
+            indi.step(&Vec3::new(1.0, -1.0, 1.0), &Vec3::zeros(), DT, MET, [false; 3]);
         }
         for (against, bound) in indi.against().iter().zip(&config.disturbance_max) {
             assert!(against.abs() <= *bound);
@@ -265,7 +264,7 @@ mod tests {
     fn the_ground_teaches_it_nothing() {
         let mut indi = IndiRate::new(&config());
         for _ in 0..4_000 {
-            indi.step(&Vec3::new(0.3, -0.3, 0.1), &Vec3::zeros(), DT, MET, true);
+            indi.step(&Vec3::new(0.3, -0.3, 0.1), &Vec3::zeros(), DT, MET, [true; 3]);
         }
         assert_eq!(indi.against(), Vec3::zeros());
     }
@@ -279,13 +278,13 @@ mod tests {
             for (target, measured, unmet) in
                 [(broken, 0.0, 0.0), (0.0, if broken.is_finite() { broken } else { 0.0 }, 0.0), (0.0, 0.0, broken)]
             {
-                let torque = indi.step(&Vec3::repeat(target), &Vec3::repeat(measured), DT, [unmet; 4], false);
+                let torque = indi.step(&Vec3::repeat(target), &Vec3::repeat(measured), DT, [unmet; 4], [false; 3]);
                 assert!(torque.iter().zip(&config.torque_max).all(|(torque, max)| torque.abs() <= *max), "{torque}");
             }
             for _ in 0..400 {
-                indi.step(&none, &none, DT, MET, false);
+                indi.step(&none, &none, DT, MET, [false; 3]);
             }
-            assert!(indi.step(&none, &none, DT, MET, false).norm() < 1e-6, "{broken}: {indi:?}");
+            assert!(indi.step(&none, &none, DT, MET, [false; 3]).norm() < 1e-6, "{broken}: {indi:?}");
             indi.reset();
             assert_eq!(indi, IndiRate::new(&config));
         }

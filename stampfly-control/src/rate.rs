@@ -24,7 +24,7 @@ pub const TILT_LEAD: f32 = 8.0 / 9.0;
 pub const YAW_LEAD: f32 = 5.0 / 9.0;
 
 /// How far a full integral of roll or pitch leans a vehicle, rad: 8°.
-const LEAN: f32 = 0.14;
+pub(crate) const LEAN: f32 = 0.14;
 
 /// Gains and limits of the body-rate loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,13 +68,14 @@ impl RateConfig {
 ///
 /// # Contract
 /// * The torque is finite, whatever the target; the measured rate is finite, see [`Horizontal::Nothing`].
-/// * What a loop remembers of a vehicle that something holds stays within a bound, and does not grow while `grounded`.
+/// * What a loop remembers of a vehicle that something holds stays within a bound, and does not grow about an axis that is
+///   `held`.
 ///
 /// [`Horizontal::Nothing`]: crate::intent::Horizontal::Nothing
 pub trait RateLaw {
     /// Torque for a rate, body axes, rad/s in and N·m out, `dt` seconds after the last one. `unmet` is the mixer's report of the
-    /// last step; `grounded`: the vehicle touches the ground, which turns it as well.
-    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3;
+    /// last step; `held`: something else turns the vehicle about this axis or keeps it from turning, as the ground does.
+    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], held: [bool; 3]) -> Vec3;
 
     /// Forgets all that was measured.
     fn reset(&mut self);
@@ -87,7 +88,7 @@ pub trait RateLaw {
 /// use stampfly_control::rate::{RateConfig, RateController};
 /// use stampfly_types::Vec3;
 /// let mut rate = RateController::new(&RateConfig::for_airframe(&Airframe::EXAMPLE));
-/// let torque = rate.step(&Vec3::new(1.0, 0.0, 0.0), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+/// let torque = rate.step(&Vec3::new(1.0, 0.0, 0.0), &Vec3::zeros(), 0.0025, [0.0; 4], [false; 3]);
 /// assert!(torque.x > 0.0 && torque.y == 0.0 && torque.z == 0.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -115,18 +116,19 @@ impl RateController {
     }
 
     /// Torque for a rate, body axes, rad/s in and N·m out. `unmet` is the mixer's report of the last step;
-    /// `grounded` keeps the integrators where they are.
+    /// `held` keeps the integrators of these axes where they are.
     #[inline]
-    pub fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3 {
+    pub fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], held: [bool; 3]) -> Vec3 {
         let [roll, pitch, yaw] = &mut self.axes;
         let [unmet_roll, unmet_pitch, unmet_yaw, _] = unmet;
-        let axis = |pid: &mut Pid, target, measured, unmet, last| {
-            pid.step(target, measured, dt, integration(unmet, last, grounded))
+        let [held_roll, held_pitch, held_yaw] = held;
+        let axis = |pid: &mut Pid, target, measured, unmet, last, held| {
+            pid.step(target, measured, dt, integration(unmet, last, held))
         };
         self.torque = Vec3::new(
-            axis(roll, target.x, measured.x, unmet_roll, self.torque.x),
-            axis(pitch, target.y, measured.y, unmet_pitch, self.torque.y),
-            axis(yaw, target.z, measured.z, unmet_yaw, self.torque.z),
+            axis(roll, target.x, measured.x, unmet_roll, self.torque.x, held_roll),
+            axis(pitch, target.y, measured.y, unmet_pitch, self.torque.y, held_pitch),
+            axis(yaw, target.z, measured.z, unmet_yaw, self.torque.z, held_yaw),
         );
         self.torque
     }
@@ -140,8 +142,8 @@ impl RateController {
 
 impl RateLaw for RateController {
     #[inline]
-    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], grounded: bool) -> Vec3 {
-        self.step(target, measured, dt, unmet, grounded)
+    fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], held: [bool; 3]) -> Vec3 {
+        self.step(target, measured, dt, unmet, held)
     }
 
     fn reset(&mut self) {
@@ -184,9 +186,9 @@ mod tests {
         let config = RateConfig::for_airframe(&Airframe::EXAMPLE);
         let mut rate = RateController::new(&config);
         for _ in 0..24_000 {
-            rate.step(&Vec3::new(1.0, -1.0, 0.0), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+            rate.step(&Vec3::new(1.0, -1.0, 0.0), &Vec3::zeros(), 0.0025, [0.0; 4], [false; 3]);
         }
-        let left = rate.step(&Vec3::zeros(), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+        let left = rate.step(&Vec3::zeros(), &Vec3::zeros(), 0.0025, [0.0; 4], [false; 3]);
         let gain = AttitudeConfig::for_airframe(&Airframe::EXAMPLE).tilt_gain;
         for (torque, kp) in [(left.x, config.roll.kp), (-left.y, config.pitch.kp)] {
             let lean = (torque / (kp * gain)).to_degrees();
@@ -198,9 +200,9 @@ mod tests {
     fn torque_stays_within_its_limits() {
         let config = RateConfig::for_airframe(&Airframe::EXAMPLE);
         let mut rate = RateController::new(&config);
-        let torque = rate.step(&Vec3::new(1e6, -1e6, 1e6), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+        let torque = rate.step(&Vec3::new(1e6, -1e6, 1e6), &Vec3::zeros(), 0.0025, [0.0; 4], [false; 3]);
         assert_eq!(torque, Vec3::new(config.torque_max.x, -config.torque_max.y, config.torque_max.z));
-        let again = rate.step(&Vec3::repeat(f32::NAN), &Vec3::zeros(), 0.0025, [0.0; 4], false);
+        let again = rate.step(&Vec3::repeat(f32::NAN), &Vec3::zeros(), 0.0025, [0.0; 4], [false; 3]);
         assert_eq!(again, torque, "a broken target repeats the last torque");
     }
 }

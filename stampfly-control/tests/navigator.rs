@@ -234,6 +234,27 @@ fn the_path_waits_for_a_vehicle_that_is_held_back() {
 }
 
 #[test]
+fn sticks_that_are_centred_hold_a_vehicle_where_it_was_held_back() {
+    let mut bench = Bench::aloft();
+    bench.command = CommandSetpoint { source: CommandSource::Pilot, roll: 1.0, ..CommandSetpoint::default() };
+    let held = bench.estimate.position;
+    let keep = |bench: &mut Bench| {
+        bench.estimate.position = held;
+        bench.estimate.velocity = Default::default();
+        bench.step().position.y - held.y
+    };
+    for _ in 0..4_000 {
+        keep(&mut bench);
+    }
+    assert!(keep(&mut bench) > 0.5, "the path waits at the end of its leash");
+    bench.command.roll = 0.0;
+    assert!(keep(&mut bench).abs() < 1e-3, "and comes back at once");
+    for _ in 0..400 {
+        assert!(keep(&mut bench).abs() < 1e-3);
+    }
+}
+
+#[test]
 fn landing_sinks_as_told_and_does_not_dig() {
     let mut bench = Bench::aloft();
     let place = bench.setpoint.position.xy();

@@ -95,7 +95,7 @@ impl FlipController {
             return None;
         }
         let target = demand.rate + demand.acceleration.component_mul(&self.ahead);
-        let torque = self.rate.step(&target, &estimate.angular_rate, dt, unmet, false);
+        let torque = self.rate.step(&target, &estimate.angular_rate, dt, unmet, [false; 3]);
         Some(ControlOutput { thrust: possible_thrust(demand.thrust, self.thrust_max, f32::MAX, 1.0), torque })
     }
 

@@ -1,6 +1,6 @@
 //! Makes every set-point of the vehicle: take-off, route, sticks, holding, landing.
 //!
-//! There is one path and it never jumps in flight; what changes is what moves it:
+//! There is one path, and what changes is what moves it. In flight it does not jump, but for the case below the table:
 //!
 //! | phase | horizontally | vertically |
 //! |---|---|---|
@@ -13,7 +13,8 @@
 //! | landing | brakes and holds, the pilot may steer | sinks at the rate the landing manager asks for |
 //!
 //! A path that follows the estimate takes its velocity over as well, so switching to position hold at speed brakes
-//! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it.
+//! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it; when the pilot centres the
+//! sticks meanwhile, the path jumps to the vehicle.
 
 use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, FlipDirection, GuidedCommand, GuidedKind,
@@ -56,6 +57,9 @@ pub struct NavigatorConfig {
     /// While landing, the path is at most this far below the vehicle, m.
     pub landing_lead: f32,
 }
+
+/// A vehicle that follows its path is within this share of the leash.
+const FOLLOWS: f32 = 0.5;
 
 impl Default for NavigatorConfig {
     fn default() -> Self {
@@ -140,6 +144,8 @@ pub struct Navigator {
     /// The throttle stick has been centred since it got its present meaning.
     throttle_centred: bool,
     position_known: bool,
+    /// The sticks moved the path horizontally in the last step, or would have.
+    steered: bool,
     refused: u32,
 }
 
@@ -168,6 +174,7 @@ impl Navigator {
             mode: FlightMode::default(),
             throttle_centred: false,
             position_known: false,
+            steered: false,
             refused: 0,
         }
     }
@@ -386,7 +393,7 @@ impl Navigator {
             return;
         };
         self.path.turn_to(way_point.yaw, dt);
-        if self.strayed(input) {
+        if self.strayed(input, self.config.leash) {
             self.path.drift(0.0, 0.0, dt);
             self.path.sink(0.0, dt);
             self.leg = None;
@@ -412,16 +419,19 @@ impl Navigator {
     fn drift(&mut self, input: &NavigatorInput<'_>, dt: f32) {
         let command = input.command;
         let (mut north, mut east) = (0.0, 0.0);
-        if command.source == CommandSource::Pilot && !self.strayed(input) {
-            let (forward, right) = (stick(command.pitch), stick(command.roll));
-            if forward != 0.0 || right != 0.0 {
-                self.forget_route();
-                let length = math::sqrt(forward * forward + right * right).max(1.0);
-                let speed = self.config.stick_speed / length;
-                let (sin, cos) = math::sin_cos(self.path.heading());
-                north = speed * (forward * cos - right * sin);
-                east = speed * (forward * sin + right * cos);
-            }
+        let (forward, right) = (stick(command.pitch), stick(command.roll));
+        let steered = command.source == CommandSource::Pilot && (forward != 0.0 || right != 0.0);
+        let was_steered = core::mem::replace(&mut self.steered, steered);
+        if was_steered && !steered && self.strayed(input, FOLLOWS * self.config.leash) {
+            // What kept the vehicle from following kept it from where the pilot wanted it: it holds where it is.
+            self.follow_horizontally(input);
+        } else if steered && !self.strayed(input, self.config.leash) {
+            self.forget_route();
+            let length = math::sqrt(forward * forward + right * right).max(1.0);
+            let speed = self.config.stick_speed / length;
+            let (sin, cos) = math::sin_cos(self.path.heading());
+            north = speed * (forward * cos - right * sin);
+            east = speed * (forward * sin + right * cos);
         }
         self.path.drift(north, east, dt);
     }
@@ -464,10 +474,9 @@ impl Navigator {
         self.path.place_vertically(estimate.position.z, if known { estimate.velocity.z } else { 0.0 });
     }
 
-    /// Is the vehicle too far from the path?
-    fn strayed(&self, input: &NavigatorInput<'_>) -> bool {
+    /// Is the vehicle farther from the path than this, m?
+    fn strayed(&self, input: &NavigatorInput<'_>, leash: f32) -> bool {
         let error = self.path.position() - input.estimate.position;
-        let leash = self.config.leash;
         self.position_known && error.x * error.x + error.y * error.y > leash * leash
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! `cargo test -p stampfly-control --test flight -- --nocapture` prints the figures.
 
+mod held;
 mod indi;
 mod plant;
 

@@ -9,11 +9,11 @@ use std::rc::Rc;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
 
-const STICKS: PilotInput =
+pub const STICKS: PilotInput =
     PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: 0.0, mode: FlightMode::PosHold, arm: false, kill: false };
 
 /// The pilot sends this for so long.
-async fn send(hands: &mut Hands<'_>, seconds: f32, frame: PilotInput) {
+pub async fn send(hands: &mut Hands<'_>, seconds: f32, frame: PilotInput) {
     for _ in 0..(seconds / 0.02) as u32 {
         hands.frame(&frame);
         hands.sleep(0.02).await;
@@ -21,7 +21,7 @@ async fn send(hands: &mut Hands<'_>, seconds: f32, frame: PilotInput) {
 }
 
 /// The pilot arms by switch in position hold and climbs for so long.
-async fn climb(hands: &mut Hands<'_>, seconds: f32) {
+pub async fn climb(hands: &mut Hands<'_>, seconds: f32) {
     while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
         send(hands, 0.1, STICKS).await;
     }
@@ -33,7 +33,7 @@ async fn climb(hands: &mut Hands<'_>, seconds: f32) {
 }
 
 /// Where a script leaves an instant.
-fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
+pub fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
     let cell = Rc::new(Cell::new(Instant::ZERO));
     (cell.clone(), cell)
 }

@@ -11,6 +11,7 @@ use stampfly_drivers::{
     Barometer, Button, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
 };
 use stampfly_flight::newest::message;
+use stampfly_sim::plant::Hand;
 use stampfly_sim::sensors::{ButtonModel, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
@@ -30,6 +31,7 @@ pub struct Hands<'b> {
     guided: topics::CommandGuidedTx<'b>,
     pilot: topics::CommandPilotTx<'b>,
     telemetry: topics::TelemetryRx<'b>,
+    world: World,
     pub button: ButtonModel,
     pub imu_silent: &'b Cell<bool>,
     /// Since when the sensors lie.
@@ -89,6 +91,15 @@ impl Hands<'_> {
         self.wait_for(|frame| frame.armed).await;
         self.command(GuidedKind::TakeOff);
         self.wait_for(|frame| frame.phase == FlightPhase::Flying).await;
+    }
+
+    /// A hand holds the vehicle where it is, or lets it go; returns the instant.
+    pub fn hold(&self, holds: bool) -> Instant {
+        let now = self.clock.now();
+        self.world.change_scene(now, |scene, motion| {
+            scene.hand = holds.then_some(Hand { position: motion.position, attitude: motion.attitude });
+        });
+        now
     }
 
     /// Presses the button for a fifth of a second.
@@ -215,6 +226,7 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
             guided: outside.link.command_guided,
             pilot: outside.link.command_pilot,
             telemetry: outside.link.telemetry,
+            world: world.clone(),
             button,
             imu_silent,
             lying,
