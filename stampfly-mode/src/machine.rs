@@ -109,6 +109,10 @@ impl ModeMachine {
             self.refusals.step(&self.config, &checked, &facts);
             self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check)
         };
+        // A throttle that is thrust, and at rest, is none.
+        let by_hand = state.mode.is_manual() && state.commander == CommandSource::Pilot;
+        let throttle = facts.pilot.frame.map(|(_, input)| input.throttle);
+        let rests = by_hand && throttle.is_some_and(|throttle| throttle <= self.config.throttle_rest);
         let asked = facts.asked.arm || facts.pilot.switch.rises || button == Some(ButtonGesture::Click);
         ModeOutput {
             flight_status: FlightStatus {
@@ -123,7 +127,7 @@ impl ModeMachine {
             },
             estimator: EstimatorCommand {
                 on_ground: matches!(state.phase, FlightPhase::IdleGround | FlightPhase::Armed),
-                flying: is_airborne(state.phase),
+                flying: is_airborne(state.phase) && !rests,
                 origin_resets: state.origin_resets,
                 full_resets: state.full_resets,
             },

@@ -228,6 +228,9 @@ impl Eskf {
             let height = self.height();
             self.rests &= height < self.config.ground_clearance + LIFTED;
             self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias, height);
+            if !self.command.flying {
+                self.vertical.rest();
+            }
             self.flow_monitor.predict(change, dt);
         }
     }

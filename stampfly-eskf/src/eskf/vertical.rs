@@ -209,6 +209,12 @@ impl VerticalMonitor {
         }
     }
 
+    /// The propellers stop, and with their vibration goes an error of the accelerometer: what the observer moves by meanwhile does not
+    /// say that a range is stuck.
+    pub(super) fn rest(&mut self) {
+        self.repeats_from = self.height;
+    }
+
     /// Takes an altitude. `stands` as in [`stand`](Self::stand).
     pub(super) fn baro(&mut self, at: Instant, altitude: f32, stands: bool) {
         let dt = at.since(self.baro_at).seconds().min(0.2);

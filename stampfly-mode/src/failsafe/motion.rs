@@ -16,7 +16,7 @@
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use stampfly_types::messages::{Alerts, FlightPhase, ImuData, Validity};
-use stampfly_types::{Instant, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
 /// A burst of a noisy sensor is this many times as long: of one sample in five, four come together every two seconds.
 const NOISY_BURST: u32 = 3;
@@ -49,9 +49,16 @@ impl Contact {
         }
     }
 
-    /// The part of a specific force that would be a blow: not the ground's push from below in a touch-down.
+    /// The part of a specific force that would be a blow: not the ground's push from below in a touch-down, nor as much to the
+    /// sides. Legs that stand beside the centre of mass and stick to the floor push to the sides, and no more than upwards.
     fn felt(self, force: &Vec3) -> Vec3 {
-        Vec3::new(force.x, force.y, if self == Self::TouchDown { force.z.max(0.0) } else { force.z })
+        if self != Self::TouchDown {
+            return *force;
+        }
+        // What carries the weight pushes nothing aside.
+        let (up, beside) = (-force.z - GRAVITY, math::sqrt(force.x * force.x + force.y * force.y));
+        let share = if beside > up { 1.0 - up.max(0.0) / beside } else { 0.0 };
+        Vec3::new(force.x * share, force.y * share, force.z.max(0.0))
     }
 }
 

@@ -9,7 +9,7 @@ use super::picture::SHARP;
 /// Means of so many readings are compared with those two before: one of five holds two frames.
 const BLOCK: u32 = 5;
 /// Largest jump of such a mean, m/s, and for each metre of distance: 1 m/s² over 0.15 s, and the picture's noise.
-const JUMP: f32 = 0.2;
+const JUMP: f32 = 0.26;
 const PER_METRE: f32 = 0.5;
 /// A jump convicts flow after this time, s: one of the gyro's zero looks the same, and is found and undone until then.
 const WAITS: f32 = 0.1;

@@ -60,6 +60,14 @@ fn the_estimator_is_told_when_propellers_carry_the_vehicle() {
         let (mut machine, mut world) = in_phase(phase);
         assert_eq!(world.step(&mut machine, &[]).estimator.flying, flying, "{phase:?}");
     }
+    for mode in [FlightMode::Stabilize, FlightMode::AltHold] {
+        for (throttle, flying) in [(0.0, mode == FlightMode::AltHold), (0.6, true)] {
+            let (mut machine, mut world) = piloted(mode);
+            let status = world.sends(&mut machine, frame(mode, true, throttle));
+            assert_eq!((status.mode, status.commander), (mode, CommandSource::Pilot));
+            assert_eq!(world.step(&mut machine, &[]).estimator.flying, flying, "{mode:?}, throttle {throttle}");
+        }
+    }
 }
 
 #[test]
