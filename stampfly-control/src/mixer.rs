@@ -451,4 +451,27 @@ mod tests {
             prop_assert!(mixed.unmet.iter().all(|share| share.is_finite()));
         }
     }
+
+    #[test]
+    fn rotors_that_cannot_control_are_refused_with_the_reason() {
+        let made = |rotors: &[Rotor], thrust| MultirotorMixer::from_rotors(rotors, thrust).map(|_| ());
+        let rotors = QUADROTOR.rotors;
+        let flat: Vec<_> = rotors.iter().map(|rotor| Rotor { x: 0.0, y: 0.0, ..*rotor }).collect();
+        let without_drag: Vec<_> = rotors.iter().map(|rotor| Rotor { kappa: 0.0, ..*rotor }).collect();
+        for (case, reason) in [
+            (made(&rotors[..3], 0.1), GeometryError::Count),
+            (made(rotors, f32::NAN), GeometryError::Uncontrollable),
+            (made(rotors, 0.0), GeometryError::Uncontrollable),
+            (made(&flat, 0.1), GeometryError::Uncontrollable),
+            (made(&without_drag, 0.1), GeometryError::Uncontrollable),
+        ] {
+            assert_eq!(case, Err(reason));
+        }
+        let words = [GeometryError::Count, GeometryError::Uncontrollable, GeometryError::Unbalanced]
+            .map(|e| std::format!("{e}"));
+        assert!(
+            words[0].contains("four and eight") && words[1].contains("torque") && words[2].contains("share"),
+            "{words:?}"
+        );
+    }
 }

@@ -110,6 +110,13 @@ mod tests {
     };
 
     #[test]
+    fn a_new_one_has_heard_nobody() {
+        let authority = Authority::new(AuthorityConfig::default());
+        assert_eq!(authority, Authority::default());
+        assert_eq!(authority.step(Instant::ZERO, CommandSource::Pilot, false).source, CommandSource::Failsafe);
+    }
+
+    #[test]
     fn only_the_commander_is_followed() {
         let mut authority = Authority::default();
         let now = Instant::from_millis(10);

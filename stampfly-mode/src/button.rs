@@ -120,7 +120,7 @@ mod tests {
     use std::vec::Vec;
 
     fn gestures(pressed: impl Fn(u64) -> bool) -> Vec<ButtonGesture> {
-        let mut button = ButtonDecoder::default();
+        let mut button = ButtonDecoder::new(ButtonConfig::default());
         let events = (0..12_000).step_by(20).filter_map(|ms| button.step(Instant::from_millis(ms), pressed(ms)));
         events.map(|event| event.gesture).collect()
     }

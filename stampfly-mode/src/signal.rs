@@ -159,6 +159,21 @@ mod tests {
     }
 
     #[test]
+    fn every_phase_that_begins_has_its_tone() {
+        use FlightPhase::{Armed, IdleGround, IdleHeld, Init};
+        let mut signaller = Signaller::default();
+        let mut tones =
+            [Init, IdleGround, Armed, IdleGround, IdleHeld, IdleGround].into_iter().zip(0..).map(|(phase, second)| {
+                signaller.step(Instant::from_secs(second), &FlightStatus { phase, ..Default::default() }, Alerts::NONE);
+                signaller.tone
+            });
+        let heard = [(); 6].map(|()| tones.next());
+        // What is set down or lifted says nothing: the last tone stays.
+        let expected = [Tone::Start, Tone::Ready, Tone::Arm, Tone::Disarm, Tone::Disarm, Tone::Disarm];
+        assert_eq!(heard, expected.map(Some));
+    }
+
+    #[test]
     fn a_vehicle_nobody_flies_waits_in_blue_and_calls_in_the_air() {
         let mut signaller = Signaller::default();
         let mut status = |phase, armed, millis| {

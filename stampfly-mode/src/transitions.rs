@@ -202,6 +202,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_event_has_a_guard_of_its_own_and_leads_where_the_table_says() {
+        let guards: std::collections::BTreeSet<_> = Event::ALL.iter().map(|event| event.guard()).collect();
+        assert_eq!(guards.len(), Event::ALL.len());
+        assert!(guards.iter().all(|guard| guard.len() > 10), "{guards:?}");
+        for &phase in FlightPhase::ALL {
+            for event in Event::ALL {
+                let to = TABLE.iter().find(|known| known.from == phase && known.event == event).map(|known| known.to);
+                assert_eq!(next(phase, event), to, "{phase:?}, {event:?}");
+                assert!(to.is_none_or(|to| TABLE.contains(&row(phase, event, to))));
+            }
+        }
+        assert_eq!(next(FlightPhase::Flying, Event::Land), Some(FlightPhase::Landing));
+    }
+
+    #[test]
     fn the_most_urgent_event_of_a_phase_comes_first_and_each_comes_once() {
         let place = |event| Event::ALL.iter().position(|known| *known == event);
         for &phase in FlightPhase::ALL {

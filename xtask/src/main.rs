@@ -31,6 +31,7 @@ const STEPS: &[Step] = &[
     Step::new("examples", "Run every example to its end", steps::examples::run),
     Step::new("doc", "Build the documentation; a warning fails", steps::doc::run),
     Step::new("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
+    Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
     Step::new("consumers", "Build and run one program per crate outside the workspace", steps::consumers::run).beside(),
     Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)

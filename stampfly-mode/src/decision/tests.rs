@@ -422,3 +422,14 @@ fn pilot_facts_default_to_silence() {
     assert_eq!(Heard::default().switch, Switched::default());
     assert_eq!(Asked::read(&[]), Asked::default());
 }
+
+/// `happens` is total: it is not asked where the table has no row, and would say no.
+#[test]
+fn on_the_ground_nothing_stops() {
+    for phase in [FlightPhase::Init, FlightPhase::IdleGround, FlightPhase::IdleHeld, FlightPhase::Flip] {
+        let state = State { phase, ..State::default() };
+        let mut facts = Facts::default();
+        HAPPENINGS.iter().for_each(|(_, happen)| happen(&mut facts));
+        assert!(!happens(Event::Stop, &ModeConfig::default(), true, &state, &facts), "{phase:?}");
+    }
+}

@@ -139,3 +139,16 @@ impl Stage<TakeOff> for Climb {
         Step::Stay(asked)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stage_without_a_limit_says_who_ends_it() {
+        let take_off = TakeOff { began: Instant::ZERO, height: 0.0 };
+        for limit in [SpoolUp.limit(&take_off), LiftOff.limit(&take_off), Climb { in_band: None }.limit(&take_off)] {
+            assert!(matches!(limit, Limit::Unlimited(why) if why.contains("ModeConfig")));
+        }
+    }
+}

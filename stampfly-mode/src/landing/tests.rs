@@ -321,3 +321,8 @@ fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
     assert_eq!(blind_after(0.0, 1.5), None, "it stands, whatever its climb rate says");
     assert_eq!(blind_after(0.45, 0.0), None, "it is not fast");
 }
+
+#[test]
+fn a_selector_begins_without_a_mode() {
+    assert_eq!(Selector::<Flight>::default(), Selector::new());
+}

@@ -207,4 +207,24 @@ mod tests {
         assert!(!is_carried(0.18, 0.5 * GRAVITY + 1.4), "it falls, with 1 m/s of drag");
         assert!(!is_carried(0.18, 0.5 * GRAVITY + 1.4 * 2.0), "with 2 m/s");
     }
+
+    #[test]
+    fn without_numbers_or_a_flight_before_nothing_is_known() {
+        let mut test = WeightTest::default();
+        for broken in [f32::NAN, f32::INFINITY] {
+            for (force, thrust) in [(broken, 0.3), (GRAVITY, broken)] {
+                let answers = test.step(Instant::ZERO, force, thrust, true);
+                assert_eq!((answers.quick, answers.steady), (Support::Unknown, Support::Unknown));
+                assert!(!answers.is_carried && !answers.is_struck);
+            }
+        }
+        // Nothing that carries, or a force that points down, before the test: a share of that is none.
+        for (force, thrust) in [(0.0, 0.0), (-1.0, 0.3)] {
+            let mut test = WeightTest::default();
+            for step in 0u64..200 {
+                let answers = test.step(Instant::from_micros(2_500 * step), force, thrust, step > 80);
+                assert_eq!((answers.quick, answers.steady), (Support::Unknown, Support::Unknown), "{force} {thrust}");
+            }
+        }
+    }
 }

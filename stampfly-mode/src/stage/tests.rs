@@ -311,3 +311,9 @@ fn selectors_compare_by_mode_stage_and_memory() {
     other.switch(PlayMode::Second, Instant::ZERO, &quiet);
     assert_ne!(one.mode(), other.mode());
 }
+
+#[test]
+fn failures_are_told_in_words() {
+    assert_eq!(Failure::Stage.to_string(), "a stage cannot do its work");
+    assert_eq!(Failure::Circle.to_string(), "stages hand over in a circle");
+}

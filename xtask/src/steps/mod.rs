@@ -7,6 +7,7 @@ pub mod clippy;
 pub mod constants;
 pub mod consumers;
 pub mod cortex_m4f;
+pub mod coverage;
 pub mod determinism;
 pub mod doc;
 pub mod docs;

@@ -64,3 +64,18 @@ fn a_take_off_from_a_slope_turns_to_level() {
     }
     assert!(Tips { lean: -0.2, rate: -2.0, ..slope }.tumbled().is_some(), "beyond level");
 }
+
+#[test]
+fn a_flip_may_be_upside_down_for_as_long_as_a_loop_of_a_pilot() {
+    let config = FailsafeConfig::default();
+    let upside_down = |phase, mode| {
+        let mut rig = Rig::flying();
+        (rig.mode.phase, rig.mode.mode) = (phase, mode);
+        rig.estimate.attitude = Quat::from_axis_angle(&Vec3::x_axis(), core::f32::consts::PI);
+        (1..=2_000).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
+    };
+    let flip = upside_down(FlightPhase::Flip, FlightMode::PosHold);
+    assert_eq!(flip, upside_down(FlightPhase::Flying, FlightMode::Acro));
+    let samples = flip.expect("it does not come back") as f32;
+    assert!((samples * PERIOD.seconds() - config.acro_time.seconds()).abs() < 0.01, "{samples} samples");
+}

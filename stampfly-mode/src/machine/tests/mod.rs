@@ -112,6 +112,13 @@ pub(crate) fn in_phase(phase: FlightPhase) -> (ModeMachine, World) {
     (machine, world)
 }
 
+#[test]
+fn a_new_machine_is_one_that_has_just_been_switched_on() {
+    let machine = ModeMachine::new(ModeConfig::default());
+    assert_eq!(machine.state(), ModeMachine::default().state());
+    assert_eq!((machine.state().phase, machine.refusals().count()), (FlightPhase::Init, 0));
+}
+
 fn frame(mode: FlightMode, arm: bool, throttle: f32) -> PilotInput {
     PilotInput { mode, arm, throttle, ..Default::default() }
 }
