@@ -19,6 +19,8 @@ const WRONG_CLIMB: f32 = 1.5;
 const GYRO_DISTANCE: f32 = 0.15;
 /// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
 const SHAKEN: f32 = 100.0;
+/// A vehicle that turns faster, rad/s, does not stand.
+const TURNS: f32 = 0.5;
 /// Largest standard deviation of the height, m, and for each metre of distance: flow is the velocity over it, and a velocity that
 /// may be half or twice as large is none.
 const KNOWN_DISTANCE: f32 = 0.1;
@@ -153,17 +155,21 @@ impl Eskf {
         let along = rotate_back(&delayed.rotation, &delayed.state.velocity).z;
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
         let counts = [flow.delta_x, flow.delta_y];
+        // Less the bias of the ground, which flow cannot have moved.
+        let turn = raw - self.calibration.gyro_bias;
         if self.rests {
-            let bias = self.state.gyro_bias;
-            let rate = [measured[0] / distance + bias.y, measured[1] / distance - bias.x];
-            self.flow_monitor.stand(rate, flow.interval);
+            // One that turns over a leg moves as it turns, and the picture stands still.
+            if turn.x * turn.x + turn.y * turn.y < TURNS * TURNS {
+                let bias = self.state.gyro_bias;
+                let rate = [measured[0] / distance + bias.y, measured[1] / distance - bias.x];
+                self.flow_monitor.stand(rate, flow.interval);
+            }
         } else {
-            let shaken = self.vibration[0].mean_square() > SHAKEN;
-            let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && !shaken;
-            // Less the bias of the ground, which flow cannot have moved.
-            let turn = raw - self.calibration.gyro_bias;
+            let shaken = self.vibration[0].mean_square();
+            let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && shaken <= SHAKEN;
+            let shaken = known.then_some(shaken);
             let turning = [turn.y, -turn.x];
-            match self.flow_monitor.flow(counts, turning, &world, distance, flow.interval, known) {
+            match self.flow_monitor.flow(counts, turning, &world, distance, flow.interval, shaken) {
                 Verdict::Unchanged => {}
                 Verdict::Implausible => self.undo_flow(),
                 Verdict::GyroShifted(shift) => {

@@ -9,7 +9,7 @@ use super::picture::SHARP;
 /// Means of so many readings are compared with those two before: one of five holds two frames.
 const BLOCK: u32 = 5;
 /// Largest jump of such a mean, m/s, and for each metre of distance: 1 m/s² over 0.15 s, and the picture's noise.
-const JUMP: f32 = 0.26;
+const JUMP: f32 = 0.2;
 const PER_METRE: f32 = 0.5;
 /// A jump convicts flow after this time, s: one of the gyro's zero looks the same, and is found and undone until then.
 const WAITS: f32 = 0.1;
@@ -26,8 +26,8 @@ pub(super) struct Jump {
 }
 
 impl Jump {
-    /// Takes how far apart flow's velocity and the accelerometer's are, m/s. `uncertain`: square of what single readings may be
-    /// wrong by, m²/s². Where the filter is not sure of itself, `sure` is false.
+    /// Takes how far apart flow's velocity and the accelerometer's are, m/s. `uncertain`: square of what single readings and
+    /// vibration may be wrong by, m²/s². Where the filter is not sure of itself, `sure` is false.
     pub(super) fn step(&mut self, apart: [f32; 2], distance: f32, uncertain: f32, interval: f32, sure: bool) {
         for (sum, apart) in self.sum.iter_mut().zip(apart) {
             *sum += apart / BLOCK as f32;

@@ -45,6 +45,9 @@ const PER_METRE: f32 = 0.15;
 /// one that is read early none. Such a single reading is wrong by all of the motion, of which [`SMOOTH`] lets a seventh
 /// through, and a quarter of two that follow each other.
 const SHARE: f32 = 0.25;
+/// Square of the velocity that vibration adds up to in the tenth of a second over which jumps are looked for, of its mean square change from
+/// sample to sample, s²: half of that, over 2.5 ms times 0.1 s, and 2.5 standard deviations.
+const SHAKES: f32 = 8.0e-4;
 /// Largest difference for each radian that is added to the tilt's standard deviation, m/s: two deviations of the
 /// velocity that gravity brings about over [`OVER`].
 const PER_RADIAN: f32 = 2.0 * GRAVITY * OVER;
@@ -199,7 +202,8 @@ impl FlowMonitor {
     }
 
     /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
-    /// rad/s, velocity, world, and the distance to the floor. `known` says that the distance is certain.
+    /// rad/s, velocity, world, and the distance to the floor. `shaken`: mean square change of the accelerometer from sample to
+    /// sample, (m/s²)²; `None` where it or the distance says nothing.
     pub(super) fn flow(
         &mut self,
         counts: [f32; 2],
@@ -207,12 +211,13 @@ impl FlowMonitor {
         velocity: &Vec3,
         distance: f32,
         interval: f32,
-        known: bool,
+        shaken: Option<f32>,
     ) -> Verdict {
         let velocity = [velocity.x, velocity.y];
         let change = core::mem::take(&mut self.change);
         let dt = core::mem::take(&mut self.elapsed);
-        let Some(last) = self.last.replace(velocity).filter(|_| known && dt > 0.0 && interval > 0.0) else {
+        let before = self.last.replace(velocity).zip(shaken);
+        let Some((last, shaken)) = before.filter(|_| dt > 0.0 && interval > 0.0) else {
             // Where the distance jumps, the velocity does.
             self.forget();
             return Verdict::Unchanged;
@@ -251,7 +256,7 @@ impl FlowMonitor {
         let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
         let uncertain = share * share * picture;
         if !begins {
-            self.jump.step(apart, distance, uncertain, interval, self.waits == 0.0);
+            self.jump.step(apart, distance, uncertain + SHAKES * shaken, interval, self.waits == 0.0);
         }
         // Of squares: a sum would do as well, and costs a root.
         let limit = base * base + uncertain + tilt * tilt;

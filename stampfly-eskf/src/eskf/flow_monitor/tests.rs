@@ -10,7 +10,7 @@ fn found(mut monitor: FlowMonitor, correction: Vec3) -> Option<u32> {
         monitor.predict(&Vec3::zeros(), DT);
         // Not frozen.
         let counts = [if n % 2 == 0 { 0.002 } else { -0.002 }, 0.0];
-        let implausible = monitor.flow(counts, [0.0; 2], &Vec3::zeros(), 0.3, DT, true);
+        let implausible = monitor.flow(counts, [0.0; 2], &Vec3::zeros(), 0.3, DT, Some(0.0));
         monitor.corrected(&correction, &Vec3::zeros());
         implausible != Verdict::Unchanged
     })
@@ -51,7 +51,7 @@ fn a_picture_stands_still_for_millimetres_not_for_centimetres() {
         (0..30).any(|_| {
             monitor.predict(&Vec3::zeros(), DT);
             // 0.012 rad in all.
-            monitor.flow([0.0; 2], [0.04, 0.0], &Vec3::new(0.0, -0.04 * distance, 0.0), distance, DT, true)
+            monitor.flow([0.0; 2], [0.04, 0.0], &Vec3::new(0.0, -0.04 * distance, 0.0), distance, DT, Some(0.0))
                 == Verdict::Implausible
         })
     };
@@ -67,7 +67,7 @@ fn convicted(distance: f32, reading: impl Fn(u32, &mut FlowMonitor) -> (f32, f32
         let (velocity, rate) = reading(*n, &mut monitor);
         // Not frozen.
         let counts = [rate * DT, if n % 2 == 0 { 0.002 } else { -0.002 }];
-        monitor.flow(counts, [0.0; 2], &Vec3::new(velocity, 0.0, 0.0), distance, DT, true) == Verdict::Implausible
+        monitor.flow(counts, [0.0; 2], &Vec3::new(velocity, 0.0, 0.0), distance, DT, Some(0.0)) == Verdict::Implausible
     })
 }
 
@@ -117,7 +117,7 @@ fn an_offset_that_began_with_a_jump_is_not_believed_again_in_the_air() {
         monitor.predict(&Vec3::new(velocity - before, 0.0, 0.0), DT);
         let flow = Vec3::new(velocity + if n < 100 { 0.0 } else { 1.0 }, 0.0, 0.0);
         let counts = [flow.x * DT / 0.5, if n % 2 == 0 { 0.002 } else { -0.002 }];
-        convictions += u32::from(monitor.flow(counts, [0.0; 2], &flow, 0.5, DT, true) == Verdict::Implausible);
+        convictions += u32::from(monitor.flow(counts, [0.0; 2], &flow, 0.5, DT, Some(0.0)) == Verdict::Implausible);
         if !(100..130).contains(&n) {
             assert_eq!(monitor.is_implausible(), n >= 130, "reading {n}");
         }
