@@ -238,15 +238,15 @@ impl<R> CascadeController<R> {
     ///
     /// What a stick asks for comes at once, or never. The attitude loop asks for a rate that does not come wherever a constant
     /// torque leans the vehicle, and the integral has to find that; but for no more than the integral can hold.
+    #[inline]
     fn held(&self, intent: &Intent, target: &Vec3) -> [bool; 3] {
-        let tilt =
-            if matches!(intent.horizontal, Horizontal::Rates { .. }) { ASKED } else { LEAN * self.attitude.tilt_gain };
+        let by_stick = matches!(intent.horizontal, Horizontal::Rates { .. });
+        let tilt = if by_stick { ASKED } else { LEAN * self.attitude.tilt_gain };
         let yaw = if matches!(intent.heading, Heading::Stick(_)) { ASKED } else { f32::MAX };
-        let limits = [tilt, tilt, yaw];
-        core::array::from_fn(|axis| {
-            let asked = target[axis].abs();
-            intent.grounded || (asked > limits[axis] && self.smooth_rate[axis].abs() < STANDS * asked)
-        })
+        let stands = |asked: f32, rate: f32, limit: f32| asked.abs() > limit && rate.abs() < STANDS * asked.abs();
+        let rate = &self.smooth_rate;
+        [(target.x, rate.x, tilt), (target.y, rate.y, tilt), (target.z, rate.z, yaw)]
+            .map(|(asked, rate, limit)| intent.grounded || stands(asked, rate, limit))
     }
 }
 
@@ -305,7 +305,7 @@ impl<R: RateLaw> Controller for CascadeController<R> {
                 feedback + down_in_body * yaw_rate + estimate.attitude.inverse_transform_vector(&turning)
             }
         };
-        self.smooth_rate += (estimate.angular_rate - self.smooth_rate) * (dt / (SMOOTHING + dt));
+        self.smooth_rate += (estimate.angular_rate - self.smooth_rate) * (dt * (1.0 / SMOOTHING)).min(1.0);
         let held = self.held(&intent, &target);
         let torque = self.rate.step(&target, &estimate.angular_rate, dt, input.unmet, held);
         ControlOutput { thrust, torque }

@@ -56,9 +56,12 @@ impl Contact {
             return *force;
         }
         // What carries the weight pushes nothing aside.
-        let (up, beside) = (-force.z - GRAVITY, math::sqrt(force.x * force.x + force.y * force.y));
-        let share = if beside > up { 1.0 - up.max(0.0) / beside } else { 0.0 };
-        Vec3::new(force.x * share, force.y * share, force.z.max(0.0))
+        let up = (-force.z - GRAVITY).max(0.0);
+        if force.x * force.x + force.y * force.y <= up * up {
+            Vec3::new(0.0, 0.0, force.z.max(0.0))
+        } else {
+            Vec3::new(force.x, force.y, force.z.max(0.0))
+        }
     }
 }
 
