@@ -22,19 +22,52 @@ fn sensors_that_measure_raise_no_alert() {
     assert!(found.is_empty(), "{} of {flights} flights: {found:?}", found.len());
 }
 
-/// Flow was convicted in three of these, because the comparison began with a reading of two frames (D-073).
-#[test]
-fn random_missions_at_twice_the_vibration_raise_no_alert() {
+/// Flies random missions at twice the recorded vibration: no alert but an empty battery's, and these ends.
+fn fly_at_random(arguments: &[&str], flights: usize, ends: &[&str]) {
     let mut campaign = std::process::Command::new(env!("CARGO_BIN_EXE_stampfly"));
-    campaign.args(["campaign", "--mission", "random", "--gust", "0", "--vibration", "2", "--json"]);
-    let output = campaign.args(["--seed", "18", "--flights", "10"]).output().expect("it runs");
+    campaign.args(["campaign", "--mission", "random", "--vibration", "2", "--json"]).args(arguments);
+    let output = campaign.args(["--flights", &flights.to_string()]).output().expect("it runs");
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let flights = report["each"].as_array().expect("flights");
-    assert_eq!(flights.len(), 10);
-    for flight in flights {
+    let each = report["each"].as_array().expect("flights");
+    assert_eq!(each.len(), flights);
+    for flight in each {
         let names = flight["alerts"].as_array().expect("alerts").iter().map(|alert| &alert["name"]);
         let found: Vec<_> =
             names.filter(|name| !["COMM_LOST", "LOW_BATTERY"].map(Into::into).contains(*name)).collect();
-        assert!(found.is_empty() && flight["outcome"] == "transparent", "seed {}: {found:?}", flight["seed"]);
+        let ends_well = flight["outcome"].as_str().is_some_and(|outcome| ends.contains(&outcome));
+        assert!(
+            found.is_empty() && ends_well,
+            "seed {} {arguments:?}: {found:?} {}",
+            flight["seed"],
+            flight["outcome"]
+        );
+    }
+}
+
+/// Flow was convicted in three of these, because the comparison began with a reading of two frames (D-073).
+#[test]
+fn random_missions_at_twice_the_vibration_raise_no_alert() {
+    fly_at_random(&["--gust", "0", "--seed", "18"], 10, &["transparent"]);
+}
+
+/// Each of these raised an alert when 5,000 of them were flown.
+#[test]
+fn random_missions_in_gusts_raise_no_alert() {
+    let flights: [(&str, &[&str]); 5] = [
+        // Flow jumped near the floor, because vibration adds up to a velocity.
+        ("", &["368", "392", "956", "999"]),
+        ("poshold", &["389"]),
+        ("althold", &["392"]),
+        // A range that repeats itself where the motors stop; a leg that sticks to the floor; a take-off that turns over a leg.
+        ("stabilize", &["151", "213", "367", "476"]),
+        ("acro", &["261", "564", "794"]),
+    ];
+    for (mode, seeds) in flights {
+        for seed in seeds {
+            let pilot = ["--pilot", "--mode", mode];
+            let by: &[&str] = if mode.is_empty() { &[] } else { &pilot };
+            let arguments = [&["--gust", "1", "--seed", *seed], by].concat();
+            fly_at_random(&arguments, 1, &["transparent", "degraded"]);
+        }
     }
 }
