@@ -17,6 +17,7 @@ use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
 
 use crate::airframe::Airframe;
 use crate::altitude::{AltitudeConfig, AltitudeController, Climb, ThrustLimits};
+use crate::answer::Answer;
 use crate::attitude::{self, AttitudeConfig};
 use crate::bound::symmetric;
 use crate::controller::{ControlInput, Controller};
@@ -116,8 +117,7 @@ pub struct CascadeController<R = RateController> {
     path: Option<Vec3>,
     /// Its position one step ago, while that is followed.
     place: Option<Vec3>,
-    /// The body rate without its noise, rad/s.
-    smooth_rate: Vec3,
+    answer: Answer,
 }
 
 impl CascadeController {
@@ -144,7 +144,7 @@ impl<R> CascadeController<R> {
             resets: 0,
             path: None,
             place: None,
-            smooth_rate: Vec3::zeros(),
+            answer: Answer::default(),
         }
     }
 
@@ -224,31 +224,8 @@ impl<R> CascadeController<R> {
     }
 }
 
-/// A rate that is asked for, rad/s; below this it is as well noise.
-const ASKED: f32 = 0.3;
-/// An axis that turns at less than this share of it stands. One that a weak propeller turns the wrong way does not.
-const STANDS: f32 = 0.25;
 /// A path moves by millimetres in a step; one that moves so far, m, has jumped.
 const JUMP: f32 = 0.1;
-/// Propellers shake the rate by as much as is asked for; over this time, s, little is left of it.
-const SMOOTHING: f32 = 0.05;
-
-impl<R> CascadeController<R> {
-    /// The axes about which something keeps the vehicle from turning: the ground, or a hand.
-    ///
-    /// What a stick asks for comes at once, or never. The attitude loop asks for a rate that does not come wherever a constant
-    /// torque leans the vehicle, and the integral has to find that; but for no more than the integral can hold.
-    #[inline]
-    fn held(&self, intent: &Intent, target: &Vec3) -> [bool; 3] {
-        let by_stick = matches!(intent.horizontal, Horizontal::Rates { .. });
-        let tilt = if by_stick { ASKED } else { LEAN * self.attitude.tilt_gain };
-        let yaw = if matches!(intent.heading, Heading::Stick(_)) { ASKED } else { f32::MAX };
-        let stands = |asked: f32, rate: f32, limit: f32| asked.abs() > limit && rate.abs() < STANDS * asked.abs();
-        let rate = &self.smooth_rate;
-        [(target.x, rate.x, tilt), (target.y, rate.y, tilt), (target.z, rate.z, yaw)]
-            .map(|(asked, rate, limit)| intent.grounded || stands(asked, rate, limit))
-    }
-}
 
 impl<R: RateLaw> Controller for CascadeController<R> {
     #[inline]
@@ -305,8 +282,8 @@ impl<R: RateLaw> Controller for CascadeController<R> {
                 feedback + down_in_body * yaw_rate + estimate.attitude.inverse_transform_vector(&turning)
             }
         };
-        self.smooth_rate += (estimate.angular_rate - self.smooth_rate) * (dt * (1.0 / SMOOTHING)).min(1.0);
-        let held = self.held(&intent, &target);
+        let trim = LEAN * self.attitude.tilt_gain;
+        let held = self.answer.step(&intent, &target, &estimate.angular_rate, trim, dt);
         let torque = self.rate.step(&target, &estimate.angular_rate, dt, input.unmet, held);
         ControlOutput { thrust, torque }
     }
@@ -317,7 +294,7 @@ impl<R: RateLaw> Controller for CascadeController<R> {
         self.altitude.reset();
         self.path = None;
         self.place = None;
-        self.smooth_rate = Vec3::zeros();
+        self.answer = Answer::default();
     }
 }
 

@@ -47,6 +47,7 @@ pub mod position;
 pub mod rate;
 pub mod timing;
 
+mod answer;
 mod bound;
 
 pub use airframe::{Airframe, Rotor, Spin};

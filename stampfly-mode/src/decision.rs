@@ -181,8 +181,7 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let adrift = state.wanted == FlightMode::PosHold && state.mode != FlightMode::PosHold;
     let adrift = adrift && state.commander != CommandSource::Pilot && is_airborne(state.phase);
     state.adrift = adrift.then(|| state.adrift.unwrap_or(facts.now));
-    let rests = facts.pilot.frame.as_ref().is_none_or(|(_, input)| input.throttle <= config.throttle_rest);
-    state.throttle_rested |= rests;
+    state.throttle_rested |= facts.throttle_rests(config);
 }
 
 /// Pairing ends with the new transmitter's first frame, by the button, or after a time. The link refuses the old

@@ -1,5 +1,6 @@
 //! What is true in one step, as plain data: all that [`decide`](crate::decision::decide) looks at beside its state.
 
+use crate::config::ModeConfig;
 use crate::input::ModeInput;
 use crate::pilot::Heard;
 use stampfly_types::messages::{Alerts, ButtonGesture, CommandSource, GroundContact, GuidedKind, Validity};
@@ -134,6 +135,12 @@ impl Facts {
     #[must_use]
     pub fn known_height(&self) -> Option<f32> {
         (self.valid.contains(Validity::HEIGHT) && self.height.is_finite()).then_some(self.height)
+    }
+
+    /// Would the pilot's throttle, where it is thrust, be none? Also when no pilot is heard.
+    #[must_use]
+    pub fn throttle_rests(&self, config: &ModeConfig) -> bool {
+        self.pilot.frame.as_ref().is_none_or(|(_, input)| input.throttle <= config.throttle_rest)
     }
 
     /// Has the button just been pressed, by a person at the vehicle?

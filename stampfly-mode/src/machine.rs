@@ -109,10 +109,8 @@ impl ModeMachine {
             self.refusals.step(&self.config, &checked, &facts);
             self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check)
         };
-        // A throttle that is thrust, and at rest, is none.
         let by_hand = state.mode.is_manual() && state.commander == CommandSource::Pilot;
-        let throttle = facts.pilot.frame.map(|(_, input)| input.throttle);
-        let rests = by_hand && throttle.is_some_and(|throttle| throttle <= self.config.throttle_rest);
+        let rests = by_hand && facts.throttle_rests(&self.config);
         let asked = facts.asked.arm || facts.pilot.switch.rises || button == Some(ButtonGesture::Click);
         ModeOutput {
             flight_status: FlightStatus {

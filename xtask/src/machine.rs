@@ -33,7 +33,11 @@ pub const XTENSA: Tool = Tool {
     packages: &["llvm-22", "binutils-xtensa-lx106"],
     is_there: || exists("/usr/bin/llc-22") && exists("xtensa-lx106-elf-ld"),
 };
-pub const ALL: [&Tool; 7] = [&VALGRIND, &EMULATED_ARM, &EMULATED_OTHERS, &COMPILER, &CLIPPY, &LINKER, &XTENSA];
+/// LLVM's tools for profiles of the compiler's version.
+pub const COVERAGE: Tool =
+    Tool { packages: &["llvm-22"], is_there: || exists("llvm-profdata-22") && exists("llvm-cov-22") };
+pub const ALL: [&Tool; 8] =
+    [&VALGRIND, &EMULATED_ARM, &EMULATED_OTHERS, &COMPILER, &CLIPPY, &LINKER, &XTENSA, &COVERAGE];
 
 /// Is there such a program, and does it run?
 pub fn exists(program: &str) -> bool {

@@ -4,8 +4,7 @@
 //! the sticks ask. The pilot centres them and the hand opens half a second later: a vehicle that is asked to lean leans, and
 //! a hand gives way by several degrees. A vehicle that stops its motors in the hand has been caught, which is as good.
 
-use crate::losses::harness::{Hands, run};
-use crate::safety_mode::{STICKS, climb, instant, send};
+use crate::losses::harness::{Hands, STICKS, climb, instant, run, send};
 use stampfly_types::messages::{FlightMode, FlightPhase, PilotInput};
 use stampfly_types::{Duration, frame};
 
@@ -75,7 +74,9 @@ fn let_go(mode: FlightMode, on_ground: bool, [roll, pitch, yaw, push]: [f32; 4],
 
 #[test]
 fn held_for_a_minute_with_any_stick() {
-    for mode in [FlightMode::PosHold, FlightMode::AltHold, FlightMode::Stabilize, FlightMode::Acro] {
+    for (mode, least) in
+        [(FlightMode::PosHold, 3), (FlightMode::AltHold, 8), (FlightMode::Stabilize, 22), (FlightMode::Acro, 22)]
+    {
         let (mut worst, mut stopped, mut flown) = (0.0f32, 0, 0);
         for on_ground in [false, true] {
             for (stick, pushed) in PUSHED {
@@ -92,7 +93,8 @@ fn held_for_a_minute_with_any_stick() {
                 }
             }
         }
-        assert!(flown > 0, "{mode:?}: none was let go with its motors on");
+        // One that is caught shows nothing about its integrals.
+        assert!(flown >= least, "{mode:?}: only {flown} were let go with their motors on");
         println!("{mode:?}: {worst:.1} deg after {flown} were let go; {stopped} had stopped their motors");
     }
 }

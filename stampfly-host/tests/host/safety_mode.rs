@@ -1,42 +1,11 @@
 //! Who may do what, on the whole vehicle: a pilot who falls silent, transmitters that are only heard, switches that bounce,
 //! sources that speak for each other. Every test is named after the defect that it keeps out.
 
-use crate::losses::harness::{Hands, Seen, run};
+use crate::losses::harness::{STICKS, Seen, climb, instant, run, send};
 use stampfly_types::messages::{ArmBlocks, CommandSource, FlightMode, FlightPhase, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
-use std::cell::Cell;
-use std::rc::Rc;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
-
-pub const STICKS: PilotInput =
-    PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: 0.0, mode: FlightMode::PosHold, arm: false, kill: false };
-
-/// The pilot sends this for so long.
-pub async fn send(hands: &mut Hands<'_>, seconds: f32, frame: PilotInput) {
-    for _ in 0..(seconds / 0.02) as u32 {
-        hands.frame(&frame);
-        hands.sleep(0.02).await;
-    }
-}
-
-/// The pilot arms by switch in position hold and climbs for so long.
-pub async fn climb(hands: &mut Hands<'_>, seconds: f32) {
-    while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
-        send(hands, 0.1, STICKS).await;
-    }
-    while hands.telemetry().phase != FlightPhase::Flying {
-        send(hands, 0.1, PilotInput { arm: true, ..STICKS }).await;
-    }
-    send(hands, seconds, PilotInput { arm: true, throttle: 1.0, ..STICKS }).await;
-    send(hands, 2.0, PilotInput { arm: true, ..STICKS }).await;
-}
-
-/// Where a script leaves an instant.
-pub fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
-    let cell = Rc::new(Cell::new(Instant::ZERO));
-    (cell.clone(), cell)
-}
 
 /// Speed with which the vehicle first touches the ground after this instant, m/s; it has to end there, disarmed.
 fn touches(what: &str, seen: &Seen, since: Instant) -> f32 {

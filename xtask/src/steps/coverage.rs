@@ -4,7 +4,7 @@
 //! for all of it, and a line that no test reaches is one that nobody has thought of.
 
 use crate::arguments::Arguments;
-use crate::machine::{XTENSA, provide};
+use crate::machine::{COVERAGE, provide};
 use crate::repository::{Failure, Repository, announced, capture, run as run_program};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -14,14 +14,14 @@ use std::fs;
 const CRATES: [&str; 2] = ["stampfly-mode", "stampfly-control"];
 /// Mode machine, failsafe, arming, take-off and landing; and what makes motor commands of a demand.
 const COVERED: [&str; 2] = ["stampfly-mode/src/", "stampfly-control/src/mixer.rs"];
-/// LLVM's tools of the compiler's version, in the package that makes Xtensa programs.
+/// Of [`COVERAGE`].
 const TOOLS: [&str; 2] = ["llvm-profdata-22", "llvm-cov-22"];
 
 /// How often each line of each file ran.
 type Lines = BTreeMap<String, BTreeMap<u32, u64>>;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    provide(repository, &[&XTENSA])?;
+    provide(repository, &[&COVERAGE])?;
     let [build, profiles] = ["coverage", "coverage/profiles"].map(|name| repository.target(name));
     // Profiles of an older build would not fit the new programs.
     if profiles.exists() {

@@ -148,3 +148,18 @@ fn the_picture_of_a_vehicle_that_stands_may_creep_and_not_run() {
     assert!(found(2.0, 10), "while motors spool up");
     assert!(found(0.7, 150) && !found(0.3, 100) && !found(0.7, 50));
 }
+
+#[test]
+fn vibration_adds_up_to_a_velocity_that_is_no_jump() {
+    // Near the floor, where 0.3 m/s are a jump. At twice the recorded vibration samples change by 57 (m/s²)² in the mean square.
+    let found = |shaken: f32| {
+        let mut monitor = FlowMonitor::default();
+        (0..200).any(|n| {
+            monitor.predict(&Vec3::zeros(), DT);
+            let counts = [0.0, if n % 2 == 0 { 0.002 } else { -0.002 }];
+            let velocity = Vec3::new(if n < 100 { 0.0 } else { 0.32 }, 0.0, 0.0);
+            monitor.flow(counts, [0.0; 2], &velocity, 0.17, DT, Some(shaken)) == Verdict::Implausible
+        })
+    };
+    assert!(found(0.0) && !found(57.0));
+}

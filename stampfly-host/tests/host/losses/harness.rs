@@ -17,13 +17,14 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{
-    Alerts, BaroData, EstimatorStatus, FlightPhase, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData,
-    MagData, MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
+    Alerts, BaroData, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, FlowData, GuidedCommand, GuidedKind,
+    ImuData, MagData, MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
 };
 use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
 use std::convert::Infallible;
 use std::pin::Pin;
+use std::rc::Rc;
 
 /// What a script can do.
 pub struct Hands<'b> {
@@ -108,6 +109,36 @@ impl Hands<'_> {
         self.sleep(0.2).await;
         self.button.press(false);
     }
+}
+
+/// Sticks and switches at rest.
+pub const STICKS: PilotInput =
+    PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: 0.0, mode: FlightMode::PosHold, arm: false, kill: false };
+
+/// The pilot sends this for so long.
+pub async fn send(hands: &mut Hands<'_>, seconds: f32, frame: PilotInput) {
+    for _ in 0..(seconds / 0.02) as u32 {
+        hands.frame(&frame);
+        hands.sleep(0.02).await;
+    }
+}
+
+/// The pilot arms by switch in position hold and climbs for so long.
+pub async fn climb(hands: &mut Hands<'_>, seconds: f32) {
+    while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
+        send(hands, 0.1, STICKS).await;
+    }
+    while hands.telemetry().phase != FlightPhase::Flying {
+        send(hands, 0.1, PilotInput { arm: true, ..STICKS }).await;
+    }
+    send(hands, seconds, PilotInput { arm: true, throttle: 1.0, ..STICKS }).await;
+    send(hands, 2.0, PilotInput { arm: true, ..STICKS }).await;
+}
+
+/// Where a script leaves an instant, and where a test finds it.
+pub fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
+    let cell = Rc::new(Cell::new(Instant::ZERO));
+    (cell.clone(), cell)
 }
 
 /// What came of it: every sample of the topics that matter, and the truth beside every motor command.

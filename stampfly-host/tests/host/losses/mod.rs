@@ -1,23 +1,16 @@
 //! What the vehicle does when something it relies on goes away in flight, and how fast.
 
 pub mod harness;
+mod link;
 
-use harness::{Seen, run};
+use harness::{STICKS, Seen, instant, run};
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
-use std::cell::Cell;
-use std::rc::Rc;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
 
 /// A control period: the vehicle's inertial sensor may be 2 % slow.
 const PERIOD: Duration = Duration::from_micros(2_551);
-
-/// Where a script leaves the instant at which it did what the test is about.
-fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
-    let cell = Rc::new(Cell::new(Instant::ZERO));
-    (cell.clone(), cell)
-}
 
 /// It hovers for three seconds after half a second of silence, over its place, then lands there.
 fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Instant) {
@@ -53,9 +46,6 @@ fn a_silent_ground_station() {
         hovers_then_lands(seed, &seen, since.get());
     }
 }
-
-const STICKS: PilotInput =
-    PilotInput { roll: 0.0, pitch: 0.0, yaw: 0.0, throttle: 0.0, mode: FlightMode::PosHold, arm: false, kill: false };
 
 /// A pilot arms by switch, the vehicle takes off by itself, and frames come at 50 Hz until the pilot is gone while
 /// flying forward.

@@ -50,9 +50,14 @@ fn random_missions_at_twice_the_vibration_raise_no_alert() {
     fly_at_random(&["--gust", "0", "--seed", "18"], 10, &["transparent"]);
 }
 
-/// Each of these raised an alert when 5,000 of them were flown.
+/// How random missions in gusts end without a fault: beside the path where nobody holds the place, and in ACRO when the battery is
+/// low, since the simulated pilot is slow. Neither `refused`, `cut` nor `crashed`.
+const ENDS: [&str; 4] = ["transparent", "degraded", "flown-away", "kept-on"];
+
+/// Each of these seeds raised an alert when 5,000 were flown. `FLIGHTS=1000` flies as many for each way to fly, and takes some minutes.
 #[test]
 fn random_missions_in_gusts_raise_no_alert() {
+    let all: Option<usize> = std::env::var("FLIGHTS").ok().and_then(|flights| flights.parse().ok());
     let flights: [(&str, &[&str]); 5] = [
         // Flow jumped near the floor, because vibration adds up to a velocity.
         ("", &["368", "392", "956", "999"]),
@@ -63,11 +68,13 @@ fn random_missions_in_gusts_raise_no_alert() {
         ("acro", &["261", "564", "794"]),
     ];
     for (mode, seeds) in flights {
-        for seed in seeds {
-            let pilot = ["--pilot", "--mode", mode];
-            let by: &[&str] = if mode.is_empty() { &[] } else { &pilot };
-            let arguments = [&["--gust", "1", "--seed", *seed], by].concat();
-            fly_at_random(&arguments, 1, &["transparent", "degraded"]);
+        let pilot = ["--pilot", "--mode", mode];
+        let by: &[&str] = if mode.is_empty() { &[] } else { &pilot };
+        let fly = |seed: &str, flights| fly_at_random(&[&["--gust", "1", "--seed", seed], by].concat(), flights, &ENDS);
+        seeds.iter().for_each(|seed| fly(seed, 1));
+        if let Some(all) = all {
+            fly("1", all);
+            println!("{all} flights {}: no alert", by.join(" "));
         }
     }
 }
