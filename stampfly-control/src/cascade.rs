@@ -76,6 +76,8 @@ impl Default for StickConfig {
 
 /// Below this throttle a vehicle under manual thrust that stands on the ground has its motors off.
 const THROTTLE_OFF: f32 = 0.03;
+/// A path moves by millimetres in a step; one that moves so far, m, has jumped.
+const JUMP: f32 = 0.1;
 
 /// The cascade.
 ///
@@ -223,9 +225,6 @@ impl<R> CascadeController<R> {
         (down, turn_rate(&jerk, per_weight))
     }
 }
-
-/// A path moves by millimetres in a step; one that moves so far, m, has jumped.
-const JUMP: f32 = 0.1;
 
 impl<R: RateLaw> Controller for CascadeController<R> {
     #[inline]

@@ -181,7 +181,8 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let adrift = state.wanted == FlightMode::PosHold && state.mode != FlightMode::PosHold;
     let adrift = adrift && state.commander != CommandSource::Pilot && is_airborne(state.phase);
     state.adrift = adrift.then(|| state.adrift.unwrap_or(facts.now));
-    state.throttle_rested |= facts.throttle_rests(config);
+    // No throttle is one at rest.
+    state.throttle_rested |= pilot.frame.is_none() || facts.throttle_rests(config);
 }
 
 /// Pairing ends with the new transmitter's first frame, by the button, or after a time. The link refuses the old

@@ -137,10 +137,10 @@ impl Facts {
         (self.valid.contains(Validity::HEIGHT) && self.height.is_finite()).then_some(self.height)
     }
 
-    /// Would the pilot's throttle, where it is thrust, be none? Also when no pilot is heard.
+    /// Is the pilot's throttle where thrust would be none? Not when no pilot is heard.
     #[must_use]
     pub fn throttle_rests(&self, config: &ModeConfig) -> bool {
-        self.pilot.frame.as_ref().is_none_or(|(_, input)| input.throttle <= config.throttle_rest)
+        self.pilot.frame.as_ref().is_some_and(|(_, input)| input.throttle <= config.throttle_rest)
     }
 
     /// Has the button just been pressed, by a person at the vehicle?

@@ -109,8 +109,10 @@ impl ModeMachine {
             self.refusals.step(&self.config, &checked, &facts);
             self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check)
         };
-        let by_hand = state.mode.is_manual() && state.commander == CommandSource::Pilot;
-        let rests = by_hand && facts.throttle_rests(&self.config);
+        // A landing makes its own thrust, in every mode.
+        let lands = state.phase == FlightPhase::Landing;
+        let is_thrust = state.mode.is_manual() && state.commander == CommandSource::Pilot && !lands;
+        let rests = is_thrust && facts.throttle_rests(&self.config);
         let asked = facts.asked.arm || facts.pilot.switch.rises || button == Some(ButtonGesture::Click);
         ModeOutput {
             flight_status: FlightStatus {

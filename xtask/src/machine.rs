@@ -33,9 +33,9 @@ pub const XTENSA: Tool = Tool {
     packages: &["llvm-22", "binutils-xtensa-lx106"],
     is_there: || exists("/usr/bin/llc-22") && exists("xtensa-lx106-elf-ld"),
 };
-/// LLVM's tools for profiles of the compiler's version.
-pub const COVERAGE: Tool =
-    Tool { packages: &["llvm-22"], is_there: || exists("llvm-profdata-22") && exists("llvm-cov-22") };
+/// LLVM's programs for profiles: one unites them, one counts lines. Of the compiler's version.
+pub const PROFILES: [&str; 2] = ["llvm-profdata-22", "llvm-cov-22"];
+pub const COVERAGE: Tool = Tool { packages: &["llvm-22"], is_there: || PROFILES.iter().all(|tool| exists(tool)) };
 pub const ALL: [&Tool; 8] =
     [&VALGRIND, &EMULATED_ARM, &EMULATED_OTHERS, &COMPILER, &CLIPPY, &LINKER, &XTENSA, &COVERAGE];
 

@@ -26,3 +26,8 @@ mod rover;
 mod safety_mode;
 mod safety_sensors;
 mod swap;
+
+/// How many flights of each kind somebody wants who has more time: the variable `FLIGHTS`.
+fn flights() -> Option<u64> {
+    std::env::var("FLIGHTS").ok().map(|text| text.parse().expect("FLIGHTS is a number"))
+}

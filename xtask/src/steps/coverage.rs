@@ -4,7 +4,7 @@
 //! for all of it, and a line that no test reaches is one that nobody has thought of.
 
 use crate::arguments::Arguments;
-use crate::machine::{COVERAGE, provide};
+use crate::machine::{COVERAGE, PROFILES, provide};
 use crate::repository::{Failure, Repository, announced, capture, run as run_program};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -14,8 +14,6 @@ use std::fs;
 const CRATES: [&str; 2] = ["stampfly-mode", "stampfly-control"];
 /// Mode machine, failsafe, arming, take-off and landing; and what makes motor commands of a demand.
 const COVERED: [&str; 2] = ["stampfly-mode/src/", "stampfly-control/src/mixer.rs"];
-/// Of [`COVERAGE`].
-const TOOLS: [&str; 2] = ["llvm-profdata-22", "llvm-cov-22"];
 
 /// How often each line of each file ran.
 type Lines = BTreeMap<String, BTreeMap<u32, u64>>;
@@ -42,7 +40,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let data = build.join("all.profdata");
     let raw = fs::read_dir(&profiles).map_err(|e| format!("{}: {e}", profiles.display()))?;
     let raw: Vec<_> = raw.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    let [merge, export] = TOOLS;
+    let [merge, export] = PROFILES;
     capture(repository.command(merge).args(["merge", "-sparse", "-o"]).arg(&data).args(&raw))?;
     let mut export = repository.command(export);
     export.args(["export", "-format=lcov", first, "-instr-profile"]).arg(&data);

@@ -70,6 +70,27 @@ fn the_estimator_is_told_when_propellers_carry_the_vehicle() {
     }
 }
 
+/// While it lands by itself, the landing makes the thrust: the stick may rest, and nobody may be heard.
+#[test]
+fn a_landing_carries_the_vehicle_wherever_the_throttle_is() {
+    let (mut machine, mut world) = piloted(FlightMode::Stabilize);
+    world.sends(&mut machine, frame(FlightMode::Stabilize, true, 0.6));
+    world.alerts = Alerts::CRITICAL_BATTERY;
+    let resting = frame(FlightMode::Stabilize, true, 0.0);
+    let status = world.sends(&mut machine, resting);
+    assert_eq!((status.phase, status.mode), (FlightPhase::Landing, FlightMode::Stabilize));
+    assert!(world.step(&mut machine, &[]).estimator.flying, "the stick rests");
+    world.pilot = None;
+    let lands = world.pass(&mut machine, 1_000);
+    assert_eq!((lands.phase, lands.mode), (FlightPhase::Landing, FlightMode::Stabilize));
+    assert!(world.step(&mut machine, &[]).estimator.flying, "nobody is heard");
+    let (mut machine, mut world) = piloted(FlightMode::Stabilize);
+    world.sends(&mut machine, resting);
+    assert!(!world.step(&mut machine, &[]).estimator.flying, "the pilot makes the thrust");
+    world.pilot = None;
+    assert!(world.step(&mut machine, &[]).estimator.flying, "a stick that is not heard rests nowhere");
+}
+
 #[test]
 fn d13_a_link_that_flaps_is_lost() {
     let (mut machine, mut world) = in_phase(FlightPhase::Flying);
