@@ -44,7 +44,7 @@ type Timed = (Instant, ImuData);
 
 fn sample(seed: u64) -> ImuData {
     let x = seed as f32 * 1e-3;
-    ImuData { accel: Vec3::new(x, -x, -9.81), gyro: Vec3::new(0.5 * x, x, -x), temperature: 25.0 }
+    ImuData { accel: Vec3::new(x, -x, -9.81), gyro: Vec3::new(0.5 * x, x, -x), temperature: 25.0, ..Default::default() }
 }
 
 /// Somebody who measures. A trait, so that each contender is measured by code of its own, without a call in between.

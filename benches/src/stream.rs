@@ -155,6 +155,7 @@ pub fn step(k: usize) -> Step {
         accel: Vec3::new(0.0, 0.0, -middle.force) + ACCEL_BIAS + noise3(0, 0.3),
         gyro: rate(end - 2, end) + GYRO_BIAS + noise3(3, 0.01),
         temperature: 25.0,
+        ..Default::default()
     };
     let distance = |at: &Truth| (FLOOR - at.position.z) / (at.attitude * Vec3::z()).z;
     // Odd steps for the range and the magnetometer, even ones for flow and barometer, which alternate.

@@ -34,7 +34,7 @@ impl Bench {
         self.now += Duration::from_micros(2_500);
         let gyro = rate + GYRO_BIAS + GYRO_DRIFT * (temperature - 25.0) + self.noise() * 0.004;
         let accel = force.component_mul(&ACCEL_GAIN) + ACCEL_BIAS + self.noise() * 0.03;
-        (self.now, ImuData { accel, gyro, temperature })
+        (self.now, ImuData { accel, gyro, temperature, ..Default::default() })
     }
 }
 

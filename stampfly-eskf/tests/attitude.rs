@@ -255,7 +255,7 @@ fn a_magnetometer_that_falls_silent_costs_no_tilt_and_as_much_heading_as_it_says
     for step in 0..200 * 300 {
         let (gyro, accel) = hand.step(true);
         at += Duration::from_micros(5_000);
-        filter.predict(at, &ImuData { accel, gyro, temperature: 25.0 });
+        filter.predict(at, &ImuData { accel, gyro, temperature: 25.0, ..Default::default() });
         if step < 4_000 {
             let field = hand.field(EARTH);
             filter.fuse_mag(at, &MagData { field });
@@ -335,7 +335,7 @@ proptest! {
     fn any_stamps_are_harmless(stamps in prop::collection::vec((any::<u64>(), any::<u64>(), any::<bool>()), 1..60)) {
         let mut filter = AttitudeFilter::new(AttitudeConfig::default());
         filter.initialize(Instant::ZERO, &calibration());
-        let imu = ImuData { accel: Vec3::new(0.0, 0.5, -GRAVITY), gyro: Vec3::new(0.1, 0.0, 1.0), temperature: 25.0 };
+        let imu = ImuData { accel: Vec3::new(0.0, 0.5, -GRAVITY), gyro: Vec3::new(0.1, 0.0, 1.0), temperature: 25.0, ..Default::default() };
         for (imu_at, mag_at, near) in stamps {
             // Half of them close together, the others anywhere.
             let [imu_at, mag_at] = [imu_at, mag_at].map(|at| Instant::from_micros(if near { at % 1_000_000 } else { at }));

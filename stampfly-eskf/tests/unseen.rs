@@ -55,7 +55,7 @@ fn tilted_out_of_sight_the_velocity_fades() {
     let mut fly = |eskf: &mut Eskf, seconds: f32, attitude: Quat, rate: Vec3| {
         for step in 0..(seconds / DT) as u32 {
             at += STEP;
-            eskf.predict(at, &ImuData { accel: force(&attitude), gyro: rate, temperature: 25.0 });
+            eskf.predict(at, &ImuData { accel: force(&attitude), gyro: rate, temperature: 25.0, ..Default::default() });
             if step % 4 == 0 {
                 let distance = 0.5 / math::cos(stampfly_types::frame::tilt(&attitude));
                 eskf.fuse_tof(at, &range(at, distance));
@@ -88,7 +88,7 @@ fn rotation_is_taken_out_of_late_flow_at_the_time_it_was_seen() {
             let (at, time) = (Instant::ZERO + STEP * step, step as f32 * DT);
             let attitude = Quat::from_euler_angles(roll(time), 0.0, 0.0);
             let gyro = Vec3::new(rate(time - 0.5 * DT), 0.0, 0.0);
-            eskf.predict(at, &ImuData { accel: force(&attitude), gyro, temperature: 25.0 });
+            eskf.predict(at, &ImuData { accel: force(&attitude), gyro, temperature: 25.0, ..Default::default() });
             if step % 4 == 0 {
                 eskf.fuse_tof(at, &range(at, 0.5 / math::cos(roll(time))));
                 eskf.fuse_flow(at, &flow(at, 0.0, -0.01 * rate(time - 0.015 - 0.005)));

@@ -52,7 +52,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for step in 0..2_000u32 {
         let at = Instant::from_micros(u64::from(step) * 2_500);
         let (sin, cos) = math::sin_cos(math::TAU * at.since(Instant::ZERO).seconds());
-        let imu = ImuData { accel: Vec3::new(sin, cos, -GRAVITY), gyro: Vec3::new(0.0, 0.0, sin), temperature: 31.5 };
+        let imu = ImuData {
+            accel: Vec3::new(sin, cos, -GRAVITY),
+            gyro: Vec3::new(0.0, 0.0, sin),
+            temperature: 31.5,
+            ..Default::default()
+        };
         publish(&mut log, IMU, Sample { at, generation: step + 1, words: &imu.to_words() })?;
         let mut record = ActivationRecord::new(0, at);
         record.push(InputRecord { generation: step + 1, taken: 1 })?;

@@ -111,7 +111,7 @@ fn formats_explain_the_data() {
     assert!(!TOPICS[0].is_format(&formats[1]));
     assert_eq!(
         formats[0].fields,
-        "uint64_t timestamp;uint32_t generation;float[3] accel;float[3] gyro;float temperature;"
+        "uint64_t timestamp;uint32_t generation;float[3] accel;float[3] gyro;float temperature;float accel_peak;"
     );
     let odd = "uint64_t wide;uint64_t[2] wides;int16_t signed;int16_t[3] signeds;uint16_t half;int32_t integer;\
                uint64_t at;int64_t both_ways;double precise;int8_t small;int8_t[40] many;uint8_t maybe_present;\
@@ -133,9 +133,9 @@ fn formats_explain_the_data() {
 fn wrong_samples_are_refused_and_leave_no_trace() {
     let mut log = start();
     let before = log.sink().0.len();
-    let short = Sample { at: Instant::ZERO, generation: 0, words: &[0; 6] };
+    let short = Sample { at: Instant::ZERO, generation: 0, words: &[0; 7] };
     assert_eq!(log.sample(0, &short), Err(WriteError::WordCount));
-    let long = Sample { at: Instant::ZERO, generation: 0, words: &[0; 8] };
+    let long = Sample { at: Instant::ZERO, generation: 0, words: &[0; 9] };
     assert_eq!(log.sample(0, &long), Err(WriteError::WordCount));
     assert_eq!(log.sample(99, &short), Err(WriteError::UnknownTopic));
     assert_eq!(log.activation(&ActivationRecord::new(1, Instant::ZERO)), Err(WriteError::UnknownTopic));
@@ -203,7 +203,7 @@ fn a_dropout_is_counted_and_marked_once() {
 fn a_full_memory_keeps_a_readable_log() {
     let mut memory = [0; 3_000];
     let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO).unwrap().data(&TOPICS[..2]).unwrap();
-    let words = [0; 7];
+    let words = [0; 8];
     let result =
         (0..).find_map(|n| log.sample(0, &Sample { at: Instant::from_micros(n), generation: 0, words: &words }).err());
     assert_eq!(result, Some(WriteError::Sink(Full)));

@@ -4,7 +4,7 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage; at once when two samples running are above it by themselves and from one side | disarmed |
+//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage; at once when two samples running are above it by themselves and from one side, and, where no contact is expected, when three samples of the chip running agree on 4 g that is no vibration and does not come from above | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, four when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |

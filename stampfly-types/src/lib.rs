@@ -21,7 +21,7 @@
 //! ```
 //! use stampfly_types::{Message, Vec3, messages::ImuData};
 //!
-//! let sample = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::zeros(), temperature: 25.0 };
+//! let sample = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::zeros(), temperature: 25.0, ..Default::default() };
 //! let words = sample.to_words();
 //! assert_eq!(ImuData::from_words(&words), Some(sample));
 //! ```

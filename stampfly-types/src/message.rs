@@ -164,8 +164,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_bit_pattern_survives(accel: [u32; 3], gyro: [u32; 3], temperature: u32) {
-            let words = [accel[0], accel[1], accel[2], gyro[0], gyro[1], gyro[2], temperature];
+        fn every_bit_pattern_survives(words: [u32; 8]) {
             let sample = ImuData::from_words(&words).expect("floats accept every word");
             prop_assert_eq!(sample.to_words(), words);
         }

@@ -61,6 +61,12 @@ impl Surroundings {
             watchdog: Watchdog::new(CUT_OFF),
         }
     }
+
+    /// The world, to look at what no sensor sees.
+    #[must_use]
+    pub fn world(&self) -> World {
+        self.world.clone()
+    }
 }
 
 impl vehicle::Surroundings for Surroundings {

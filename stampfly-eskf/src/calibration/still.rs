@@ -32,7 +32,7 @@ pub struct StillQuality {
 ///     // A sensor has noise: one that repeats itself does not measure, and never completes.
 ///     let noise = Vec3::repeat(if k % 2 == 0 { 1e-3 } else { -1e-3 });
 ///     let accel = Vec3::new(0.0, 0.0, -9.81) + noise;
-///     let still = ImuData { accel, gyro: Vec3::new(0.01, 0.0, 0.0) + noise, temperature: 25.0 };
+///     let still = ImuData { accel, gyro: Vec3::new(0.01, 0.0, 0.0) + noise, temperature: 25.0, ..Default::default() };
 ///     calibration.step(Instant::from_micros(2_500 * k), &still).unwrap();
 /// }
 /// let result = calibration.result();
@@ -145,7 +145,7 @@ mod tests {
     fn still(k: u64) -> ImuData {
         let noise = Vec3::repeat(if k.is_multiple_of(2) { 1e-6 } else { -1e-6 });
         let accel = Vec3::new(0.1, 0.0, -9.8) + noise;
-        ImuData { accel, gyro: Vec3::new(0.01, -0.02, 0.005) + noise, temperature: 30.0 }
+        ImuData { accel, gyro: Vec3::new(0.01, -0.02, 0.005) + noise, temperature: 30.0, ..Default::default() }
     }
 
     #[test]

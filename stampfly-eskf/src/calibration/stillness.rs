@@ -135,7 +135,7 @@ impl Sums {
 /// use stampfly_eskf::calibration::{NotStill, StillAverage, StillnessConfig};
 /// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut average = StillAverage::new(StillnessConfig { samples: 100, settle: 0.5, ..Default::default() });
-/// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0 };
+/// let still = ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro: Vec3::new(0.01, 0.0, 0.0), temperature: 25.0, ..Default::default() };
 /// let first = (0..).find_map(|k| average.step(Instant::from_micros(2_500 * k), &still).unwrap()).unwrap();
 /// assert!((first.gyro.x - 0.01).abs() < 1e-6 && first.samples == 100);
 /// let turning = ImuData { gyro: Vec3::new(5.0, 0.0, 0.0), ..still };

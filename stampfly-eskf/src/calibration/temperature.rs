@@ -113,7 +113,7 @@ impl Bin {
 ///     // Warms up from 20 °C to 50 °C in two and a half minutes.
 ///     let temperature = 20.0 + 0.0005 * k as f32;
 ///     let gyro = Vec3::new(0.0002 * (temperature - 20.0), 0.0, 0.0);
-///     table.step(Instant::from_micros(2_500 * k), &ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro, temperature }).unwrap();
+///     table.step(Instant::from_micros(2_500 * k), &ImuData { accel: Vec3::new(0.0, 0.0, -9.81), gyro, temperature, ..Default::default() }).unwrap();
 /// }
 /// let bias = table.bias(33.0).unwrap();
 /// assert!((bias.gyro.x - 0.0026).abs() < 2e-5 && bias.coverage == Coverage::Inside);

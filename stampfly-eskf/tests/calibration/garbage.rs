@@ -43,7 +43,7 @@ proptest! {
             now += Duration::from_micros(u64::from(jump));
             for _ in 0..repeats {
                 now += Duration::from_micros(2_500);
-                let imu = ImuData { accel, gyro, temperature };
+                let imu = ImuData { accel, gyro, temperature, ..Default::default() };
                 let _ = (calibration.step(now, &imu), six.step(now, &imu), table.step(now, &imu));
                 calibration.add_mag(&MagData { field: accel });
                 calibration.add_baro(&BaroData { altitude: temperature, ..Default::default() });

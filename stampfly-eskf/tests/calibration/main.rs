@@ -61,5 +61,10 @@ impl Errors {
 
 /// Level, with noise.
 fn still(random: &mut Random, gyro: &Vec3, accel: &Vec3, temperature: f32) -> ImuData {
-    ImuData { gyro: gyro + random.noise(GYRO_NOISE), accel: accel + random.noise(ACCEL_NOISE), temperature }
+    ImuData {
+        gyro: gyro + random.noise(GYRO_NOISE),
+        accel: accel + random.noise(ACCEL_NOISE),
+        temperature,
+        ..Default::default()
+    }
 }

@@ -113,6 +113,7 @@ impl Flight {
             accel: force.map(|v| v as f32) + self.accel_bias + self.noise3(0.5),
             gyro: self.rate(before, at).map(|v| v as f32) + self.gyro_bias + self.noise3(0.01),
             temperature: 25.0,
+            ..Default::default()
         }
     }
 

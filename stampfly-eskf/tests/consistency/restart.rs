@@ -69,10 +69,15 @@ fn a_velocity_beyond_any_flight_is_divergence_without_flow_too() {
 #[test]
 fn d21_garbage_of_up_to_three_samples_is_bridged_and_counted() {
     let garbage = [
-        ImuData { accel: Vec3::repeat(-78.45), gyro: Vec3::repeat(-34.9), temperature: 25.0 },
-        ImuData { accel: Vec3::new(30.0, -70.0, 12.0), gyro: Vec3::new(20.0, -3.0, 33.0), temperature: 25.0 },
-        ImuData { accel: Vec3::repeat(78.4), gyro: Vec3::zeros(), temperature: 25.0 },
-        ImuData { accel: Vec3::repeat(f32::NAN), gyro: Vec3::zeros(), temperature: 25.0 },
+        ImuData { accel: Vec3::repeat(-78.45), gyro: Vec3::repeat(-34.9), temperature: 25.0, ..Default::default() },
+        ImuData {
+            accel: Vec3::new(30.0, -70.0, 12.0),
+            gyro: Vec3::new(20.0, -3.0, 33.0),
+            temperature: 25.0,
+            ..Default::default()
+        },
+        ImuData { accel: Vec3::repeat(78.4), gyro: Vec3::zeros(), temperature: 25.0, ..Default::default() },
+        ImuData { accel: Vec3::repeat(f32::NAN), gyro: Vec3::zeros(), temperature: 25.0, ..Default::default() },
     ];
     for broken in garbage {
         for length in 1..=3 {

@@ -176,7 +176,7 @@ proptest! {
         eskf.initialize(at, &calibration);
         for step in steps {
             at = Instant::from_micros(at.as_micros().saturating_add_signed(step));
-            eskf.predict(at, &ImuData { accel: force, gyro: Vec3::new(0.1, -0.2, 0.1), temperature: 25.0 });
+            eskf.predict(at, &ImuData { accel: force, gyro: Vec3::new(0.1, -0.2, 0.1), temperature: 25.0, ..Default::default() });
             eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
             let flow = FlowData { interval: 0.01, quality: 100, valid: true, ..Default::default() };
             eskf.fuse_flow(at, &flow);

@@ -50,6 +50,7 @@ pub fn flight() -> Flight {
                 + shake * 0.6 * Vec3::new(noise(1.0), noise(2.0), noise(3.0)),
             gyro: shake * 0.12 * Vec3::new(noise(4.0) + wobble(9.0, 0.6), noise(5.0), 0.3 * noise(6.0)),
             temperature: 32.0,
+            ..Default::default()
         };
         flight.push("sensor_imu", at, &imu);
         let estimate = StateEstimate {

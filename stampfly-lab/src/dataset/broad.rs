@@ -41,7 +41,7 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
     let stamp = |row: usize| Instant::from_micros((row as f64 * 1e6 / rate + 0.5) as u64);
 
     let rows = gyro.iter().zip(accel).enumerate().map(|(row, (gyro, accel))| {
-        let data = ImuData { accel: body(*accel), gyro: body(*gyro), temperature: 25.0 };
+        let data = ImuData { accel: body(*accel), gyro: body(*gyro), temperature: 25.0, ..Default::default() };
         Sample { at: stamp(row), data }
     });
     let mut recording = Recording::new(Kind::Broad, name, rows.collect(), Clock::Even);

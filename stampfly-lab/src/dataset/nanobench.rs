@@ -72,7 +72,8 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
     let mut rows: Vec<_> = (stamps.iter())
         .zip(accel.zip(gyro))
         .map(|(at, (accel, gyro))| {
-            let data = ImuData { accel: turned(accel) * GRAVITY, gyro: turned(gyro), temperature: 25.0 };
+            let data =
+                ImuData { accel: turned(accel) * GRAVITY, gyro: turned(gyro), temperature: 25.0, ..Default::default() };
             Sample { at: *at, data }
         })
         .collect();

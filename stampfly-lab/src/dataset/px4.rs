@@ -42,7 +42,7 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErrorKi
                 let [ax, ay, az, gx, gy, gz] =
                     values(&row, ["accel x", "accel y", "accel z", "gyro x", "gyro y", "gyro z"])?;
                 let (accel, gyro) = (Vec3::new(ax, ay, az), Vec3::new(gx, gy, gz));
-                imu.push(Sample { at, data: ImuData { accel, gyro, temperature: 25.0 } });
+                imu.push(Sample { at, data: ImuData { accel, gyro, temperature: 25.0, ..Default::default() } });
             }
             "mag" => {
                 let field = Vec3::from(values(&row, ["mag x", "mag y", "mag z"])?) * MICROTESLA;

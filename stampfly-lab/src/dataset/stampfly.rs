@@ -45,7 +45,12 @@ fn vector([x, y, z]: [f64; 3]) -> Vec3 {
 
 /// One inertial row: acceleration, rate.
 fn imu(at: Instant, [ax, ay, az, gx, gy, gz]: [f64; 6]) -> Sample<ImuData> {
-    let data = ImuData { accel: vector([ax, ay, az]), gyro: vector([gx, gy, gz]), temperature: ROOM_TEMPERATURE };
+    let data = ImuData {
+        accel: vector([ax, ay, az]),
+        gyro: vector([gx, gy, gz]),
+        temperature: ROOM_TEMPERATURE,
+        ..Default::default()
+    };
     Sample { at, data }
 }
 

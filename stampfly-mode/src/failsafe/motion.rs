@@ -11,6 +11,7 @@
 //! | rate, or force over some 10 ms, above its limit in two believed samples running | the second sample |
 //! | the same in two of four suspect samples running | the fourth sample |
 //! | force over some 10 ms above its limit in this sample, at the end of a hard blow, suspect or not | the second sample |
+//! | a *sharp* blow, outside a touch-down: the [peak](ImuData::accel_peak) of the chip's own samples is no vibration | the first sample |
 //! | up to three suspect samples, then the motion of before | never |
 
 use super::config::FailsafeConfig;
@@ -24,6 +25,18 @@ const NOISY_BURST: u32 = 3;
 const ONE_SIDE: f32 = 0.9;
 /// A hard blow changes the rate by up to so many times what makes a sample suspect. A wall at 1.5 m/s does 1.8 times.
 const SPIN: f32 = 2.0;
+
+/// A sharp blow has a peak of so much, m/s², and lies so many standard deviations above the mean of the peaks before it: more of
+/// them along the vertical, in which thrust pushes and propellers shake. In 3,000 flights in gusts at twice the recorded vibration the largest
+/// of the peaks that passed the first limit were 6.8 and 8.2 deviations.
+const SHARP: f32 = 4.0 * GRAVITY;
+const SHARP_SIGMAS: f32 = 7.5;
+const UPRIGHT_SIGMAS: f32 = 10.0;
+/// Peaks enter these statistics in full up to this, m/s², and above it up to so many deviations: a blow must not raise its own limit.
+const CALM: f32 = 2.0 * GRAVITY;
+const CLIP_SIGMAS: f32 = 4.0;
+/// Weights of a sample in these means, of 50 and of 500 samples: vibration that begins is in the first, what is rare in the second.
+const SHARP_WEIGHTS: [f32; 2] = [0.02, 0.002];
 
 /// What kind of contact would be no accident.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,6 +144,8 @@ pub(super) struct MotionMonitor {
     struck: Option<Vec3>,
     /// Running mean and variance of the specific force's norm.
     force: [f32; 2],
+    /// The same of the chip's peaks, over both lengths.
+    peaks: [[f32; 2]; 2],
 }
 
 impl MotionMonitor {
@@ -150,6 +165,7 @@ impl MotionMonitor {
         let before = self.rate.map(|(last, rate)| (at.since(last), rate));
         let suspect = imu.is_garbled(before, config.angular_acceleration, config.accel_full_scale);
         let limits = Limits { contact, force: limit, rate };
+        let sharp = self.is_sharp(config, at, imu, contact);
         let hard = self.ends_hard_blow(config, at, imu, &limits);
         if suspect {
             if self.suspects == 0 {
@@ -160,7 +176,7 @@ impl MotionMonitor {
             // What is allowed to the next sample must not grow with a burst.
             self.rate = self.rate.map(|(_, rate)| (at, rate));
             let burst = if noisy { NOISY_BURST * config.garbled_samples } else { config.garbled_samples };
-            if self.suspects <= burst && !(hard && self.suspected.alerts(config).contains(Alerts::IMPACT)) {
+            if self.suspects <= burst && !sharp && !(hard && self.suspected.alerts(config).contains(Alerts::IMPACT)) {
                 return (Alerts::NONE, true);
             }
             self.believed = self.suspected;
@@ -174,7 +190,34 @@ impl MotionMonitor {
         }
         self.suspects = 0;
         self.rate = Some((at, imu.gyro));
-        (self.believed.alerts(config), suspect)
+        let found = self.believed.alerts(config);
+        (if sharp { found.with(Alerts::IMPACT) } else { found }, suspect)
+    }
+
+    /// Does a sharp blow begin in this sample? Where the ground may push, nothing is one: its push is as sharp. Nor does one come from
+    /// above: a vehicle that climbs against a ceiling comes down on its motors.
+    fn is_sharp(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, contact: Contact) -> bool {
+        let peak = imu.accel_peak;
+        let [x, y, z] = [imu.accel.x, imu.accel.y, imu.accel.z];
+        let upright = z * z > x * x + y * y;
+        let sigmas = if upright { UPRIGHT_SIGMAS } else { SHARP_SIGMAS };
+        let mut limit = SHARP;
+        for ([mean, variance], weight) in self.peaks.iter_mut().zip(SHARP_WEIGHTS) {
+            let mut off = peak - *mean;
+            if peak >= CALM {
+                // Roots are rare here: without vibration no peak comes this far.
+                let deviation = math::sqrt(*variance);
+                limit = limit.max(*mean + sigmas * deviation);
+                off = off.min(CLIP_SIGMAS * deviation).max(CALM - *mean);
+            }
+            *mean += weight * off;
+            *variance += weight * (off * off - *variance);
+        }
+        let before = self.turned.map(|(last, rate)| (at.since(last), rate));
+        contact == Contact::None
+            && !(upright && z > 0.0)
+            && (limit..f32::MAX).contains(&peak)
+            && !imu.is_garbled(before, SPIN * config.angular_acceleration, config.accel_full_scale)
     }
 
     /// Are this sample and the one before a hard blow?

@@ -71,7 +71,7 @@ impl Rig {
     /// A sample without noise.
     fn exactly(&mut self, accel: Vec3, gyro: Vec3) -> Alerts {
         self.now += PERIOD;
-        let data = ImuData { accel, gyro, temperature: 25.0 };
+        let data = ImuData { accel, gyro, temperature: 25.0, ..Default::default() };
         self.step(self.now, &[Stamped { at: self.now, generation: 0, data }])
     }
 

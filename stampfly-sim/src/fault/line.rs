@@ -184,7 +184,12 @@ mod tests {
     }
 
     fn imu(number: f32) -> ImuData {
-        ImuData { accel: Vec3::new(number, 2.0, 3.0), gyro: Vec3::new(4.0, 5.0, number), temperature: 25.0 }
+        ImuData {
+            accel: Vec3::new(number, 2.0, 3.0),
+            gyro: Vec3::new(4.0, 5.0, number),
+            temperature: 25.0,
+            ..Default::default()
+        }
     }
 
     /// Before, during and after a fault of one second.

@@ -8,7 +8,7 @@ use crate::vibration::Vibration;
 use crate::world::World;
 use core::convert::Infallible;
 use nalgebra::{Matrix3, Vector3};
-use stampfly_drivers::{Decimator, Sample};
+use stampfly_drivers::{Decimator, Peak, Sample};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
@@ -127,6 +127,7 @@ pub struct ImuModel {
     physics: ImuPhysics,
     schedule: Schedule,
     decimator: Decimator,
+    peak: Peak,
     /// Number of the first chip sample of the next group.
     cursor: u64,
 }
@@ -134,7 +135,14 @@ pub struct ImuModel {
 impl ImuModel {
     pub(crate) fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
         let (physics, schedule) = ImuPhysics::new(world, clock.now(), seed, vibration);
-        Self { physics, schedule, decimator: Decimator::default(), cursor: 0, clock: clock.clone() }
+        Self {
+            physics,
+            schedule,
+            decimator: Decimator::default(),
+            peak: Peak::default(),
+            cursor: 0,
+            clock: clock.clone(),
+        }
     }
 
     /// The present offsets, which an estimator has to find: accelerometer (m/s²) and gyroscope (rad/s), without the
@@ -160,7 +168,7 @@ impl ImuModel {
             // Overrun: the oldest samples are gone, and what the filter remembers with them.
             let first = self.schedule.upcoming(now, MEMORY.as_micros() as f64 * 0.5);
             self.cursor = first;
-            self.decimator = Decimator::default();
+            (self.decimator, self.peak) = Default::default();
         }
         let last = self.cursor + GROUP as u64 - 1;
         self.clock.sleep_until(self.schedule.instant(last) + LATENCY).await;
@@ -184,10 +192,11 @@ impl stampfly_drivers::Imu for ImuModel {
     async fn next(&mut self) -> Result<Sample<ImuData>, Infallible> {
         loop {
             let (at, group) = self.next_group().await;
+            let accel_peak = self.peak.push(&group) / ACCEL_SCALE as f32;
             let Some(sum) = self.decimator.push(&group) else { continue };
             let (accel, gyro) = counts_to_si(sum.map(|sum| f64::from(sum) / f64::from(Decimator::GAIN)));
             let temperature = self.physics.temperature(at);
-            return Ok(Sample { at, data: ImuData { accel, gyro, temperature } });
+            return Ok(Sample { at, data: ImuData { accel, accel_peak, gyro, temperature } });
         }
     }
 }

@@ -14,6 +14,9 @@ message! {
         gyro: Vec3 ["rad/s"],
         /// Die temperature.
         temperature: f32 ["degC"],
+        /// Largest specific force since the sample before that several of the chip's own samples running agree on, for whoever has
+        /// to see a blow as it begins; zero when it is not known. Larger than `accel` wherever it vibrates.
+        accel_peak: f32 ["m/s^2"],
     }
 }
 

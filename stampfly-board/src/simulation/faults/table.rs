@@ -106,8 +106,8 @@ pub const FAULTS: &[FaultKind] = &[
 ];
 
 const GYRO: &[&str] = &["gyro"];
-const ACCEL: &[&str] = &["accel"];
-const IMU: &[&str] = &["accel", "gyro"];
+const ACCEL: &[&str] = &["accel", "accel_peak"];
+const IMU: &[&str] = &["accel", "accel_peak", "gyro"];
 const RANGE: &[&str] = &["distance"];
 const FLOW: &[&str] = &["delta_x", "delta_y"];
 

@@ -32,7 +32,7 @@ fn fly<E: Estimator>(estimator: &mut E, k: u64, n: &mut Numbers) -> (StateEstima
         full_resets: u32::from(k > 580),
     };
     estimator.command(at(k), &command);
-    let imu = ImuData { accel: STILL + n.vector(1.0), gyro: n.vector(0.4), temperature: 25.0 };
+    let imu = ImuData { accel: STILL + n.vector(1.0), gyro: n.vector(0.4), temperature: 25.0, ..Default::default() };
     estimator.predict(at(k), &imu);
     let (distance, quality) = (0.4 + n.number(0.02), 150 + n.number(100.0) as u8);
     if k.is_multiple_of(13) {
@@ -88,7 +88,12 @@ fn attitude_filters_go_on() {
 
 fn still(n: &mut Numbers) -> ImuData {
     let accel = STILL + Vec3::new(0.1, -0.05, 0.02) + n.vector(0.02);
-    ImuData { accel, gyro: Vec3::new(0.01, -0.02, 0.005) + n.vector(0.003), temperature: 24.0 + n.number(0.5) }
+    ImuData {
+        accel,
+        gyro: Vec3::new(0.01, -0.02, 0.005) + n.vector(0.003),
+        temperature: 24.0 + n.number(0.5),
+        ..Default::default()
+    }
 }
 
 #[test]

@@ -64,8 +64,12 @@ fn mode_machine_goes_on() {
 fn failsafe_goes_on() {
     goes_on(Failsafe::default(), 800, |failsafe, k, n| {
         let blow = if k % 150 < 4 { 60.0 } else { 1.0 };
-        let data =
-            ImuData { accel: Vec3::new(0.0, 0.0, -9.81) + n.vector(blow), gyro: n.vector(2.0), temperature: 25.0 };
+        let data = ImuData {
+            accel: Vec3::new(0.0, 0.0, -9.81) + n.vector(blow),
+            gyro: n.vector(2.0),
+            temperature: 25.0,
+            ..Default::default()
+        };
         let imu = [Stamped { at: at(k), generation: 0, data }];
         let estimate = StateEstimate { valid: Validity::ALL, ..Default::default() };
         let status = EstimatorStatus { accel_innovation: n.number(0.5).abs(), ..Default::default() };

@@ -23,7 +23,10 @@ impl Observer for Records {
 /// What comes from outside in one step.
 fn publish(outside: &mut topics::Outside<'_>, k: u64, n: &mut Numbers) {
     let accel = Vec3::new(0.0, 0.0, -9.80665) + n.vector(0.02);
-    outside.imu.sensor_imu.publish(at(k), &ImuData { accel, gyro: n.vector(0.003), temperature: 25.0 });
+    outside
+        .imu
+        .sensor_imu
+        .publish(at(k), &ImuData { accel, gyro: n.vector(0.003), temperature: 25.0, ..Default::default() });
     if k.is_multiple_of(13) {
         outside.tof.sensor_tof.publish(at(k), &TofData { distance: 0.03, sigma: 0.005, status: 0, valid: true });
     }

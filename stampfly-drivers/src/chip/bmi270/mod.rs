@@ -14,7 +14,7 @@ mod interrupt;
 
 use super::port::Port;
 use super::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters};
-use crate::{Decimator, Imu, Sample, Timebase};
+use crate::{Decimator, Imu, Peak, Sample, Timebase};
 use codec::{FRAME_BYTES, Status, register};
 pub use config::{AccelRange, Config, GyroRange, Rate};
 use embedded_hal_async::digital::Wait;
@@ -101,6 +101,7 @@ pub struct Bmi270<'b, R, T, P = NoPin> {
     /// Between the first bit of a FIFO read and its last: set when a call was cancelled there.
     reading: bool,
     decimator: Decimator,
+    peak: Peak,
     /// When to look again.
     due: Instant,
     /// The shortest time a status took: the bus alone, without waiting for it.
@@ -134,6 +135,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
             running: false,
             reading: false,
             decimator: Decimator::default(),
+            peak: Peak::default(),
             due: Instant::ZERO,
             on_bus: Duration::from_secs(1),
             cross_axis: 0.0,
@@ -144,7 +146,8 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
 
     /// The same chip, with the pin its INT1 is wired to. The chip drives it, high when four samples are there.
     pub fn with_interrupt<P: Wait>(self, pin: P) -> Bmi270<'b, R, T, P> {
-        let Self { port, blob, axes, config, reading, decimator, due, on_bus, cross_axis, temperature, .. } = self;
+        let Self { port, blob, axes, config, reading, decimator, peak, due, on_bus, cross_axis, temperature, .. } =
+            self;
         let interrupt = Interrupt::on(pin);
         // It is set up anew, with the interrupt.
         Bmi270 {
@@ -156,6 +159,7 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
             running: false,
             reading,
             decimator,
+            peak,
             due,
             on_bus,
             cross_axis,
@@ -318,7 +322,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
 
     /// Empties the FIFO and forgets what the filter remembers.
     async fn restart_fifo(&mut self) -> Result<(), ChipError<R::Error>> {
-        self.decimator = Decimator::default();
+        (self.decimator, self.peak) = Default::default();
         self.write(register::CMD, &[codec::FIFO_FLUSH]).await?;
         self.reading = false;
         self.due = self.port.now() + self.chip_period(4);
@@ -394,21 +398,24 @@ impl<R: Registers, T: Timebase, P: Wait> Imu for Bmi270<'_, R, T, P> {
         let deadline = self.port.now() + self.chip_period(4 * PATIENCE);
         if core::mem::take(&mut self.reading) {
             // Nobody knows which frames that read took out; those that are still there begin anew.
-            self.decimator = Decimator::default();
+            (self.decimator, self.peak) = Default::default();
         }
         loop {
             let Some((at, group)) = self.group(deadline).await? else {
                 self.restart_fifo().await?;
                 continue;
             };
+            let peak = self.peak.push(&group);
             let Some(sum) = self.decimator.push(&group) else { continue };
             let [ax, ay, az, gx, gy, gz] = sum.map(|sixteenths| sixteenths as f32 / Decimator::GAIN as f32);
-            let accel = Vec3::new(ax, ay, az) * (GRAVITY / self.config.accel_range.counts_per_g());
+            let scale = GRAVITY / self.config.accel_range.counts_per_g();
+            let accel = Vec3::new(ax, ay, az) * scale;
             // The factory's correction of the gyroscope's x axis (register 0x12).
             let gyro = Vec3::new(gx - self.cross_axis * gz, gy, gz)
                 * (core::f32::consts::PI / 180.0 / self.config.gyro_range.counts_per_dps());
             let data = ImuData {
                 accel: self.axes.to_body(accel),
+                accel_peak: peak * scale,
                 gyro: self.axes.to_body(gyro),
                 temperature: self.temperature,
             };

@@ -46,8 +46,13 @@ fn d7_an_inertial_sensor_dead_at_power_on_never_arms() {
 #[test]
 fn d21_two_garbled_samples_are_flown_through() {
     let garbage = [
-        ImuData { accel: Vec3::repeat(-78.45), gyro: Vec3::repeat(-34.9), temperature: 25.0 },
-        ImuData { accel: Vec3::new(40.0, -75.0, 60.0), gyro: Vec3::new(-30.0, 12.0, 25.0), temperature: 25.0 },
+        ImuData { accel: Vec3::repeat(-78.45), gyro: Vec3::repeat(-34.9), temperature: 25.0, ..Default::default() },
+        ImuData {
+            accel: Vec3::new(40.0, -75.0, 60.0),
+            gyro: Vec3::new(-30.0, 12.0, 25.0),
+            temperature: 25.0,
+            ..Default::default()
+        },
     ];
     for seed in SEEDS {
         for broken in garbage {

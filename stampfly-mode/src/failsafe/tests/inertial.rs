@@ -6,7 +6,7 @@ use super::*;
 pub fn still(millis: u64) -> [Stamped<ImuData>; 1] {
     let grain = 1e-3 * (millis % 7) as f32;
     let small = Vec3::new(grain, -grain, 2.0 * grain);
-    let data = ImuData { accel: REST + small, gyro: small, temperature: 25.0 };
+    let data = ImuData { accel: REST + small, gyro: small, temperature: 25.0, ..Default::default() };
     [Stamped { at: Instant::from_millis(millis), generation: 0, data }]
 }
 
@@ -121,6 +121,50 @@ fn a_blow_that_turns_the_vehicle_is_seen_in_two_samples() {
     assert_eq!(sides.map(|force| rig.sample(force, Vec3::new(0.0, 12.0, 0.0))), [Alerts::NONE; 2]);
 }
 
+/// A sample of a vehicle at rest with this peak.
+fn with_peak(rig: &mut Rig, accel_peak: f32, gyro: Vec3) -> Alerts {
+    struck(rig, REST, accel_peak, gyro)
+}
+
+fn struck(rig: &mut Rig, force: Vec3, accel_peak: f32, gyro: Vec3) -> Alerts {
+    rig.now += PERIOD;
+    let data = ImuData { accel: force + rig.noise(0.05), gyro: gyro + rig.noise(0.005), temperature: 25.0, accel_peak };
+    rig.step(rig.now, &[Stamped { at: rig.now, generation: 0, data }])
+}
+
+#[test]
+fn a_sharp_blow_counts_in_the_sample_in_which_it_begins() {
+    let blow = |prepare: fn(&mut Rig), peak: f32, gyro: Vec3| {
+        let mut rig = Rig::flying();
+        prepare(&mut rig);
+        with_peak(&mut rig.settled(), peak, gyro)
+    };
+    assert_eq!(blow(|_| (), 60.0, Vec3::zeros()), Alerts::IMPACT);
+    assert_eq!(blow(|_| (), 30.0, Vec3::zeros()), Alerts::NONE, "3 g for some samples of the chip are no blow");
+    assert_eq!(blow(|rig| rig.mode.phase = FlightPhase::Landing, 60.0, Vec3::zeros()), Alerts::NONE, "the ground");
+    assert_eq!(blow(|rig| rig.estimate.height = 0.05, 60.0, Vec3::zeros()), Alerts::NONE, "a touch-down");
+    assert_eq!(blow(|_| (), 60.0, Vec3::new(0.0, 12.0, 0.0)), Alerts::IMPACT, "a wall turns the vehicle");
+    assert_eq!(blow(|_| (), 60.0, Vec3::new(0.0, 40.0, 0.0)), Alerts::NONE, "no wall turns it so fast");
+    let mut rig = Rig::flying().settled();
+    assert_eq!(struck(&mut rig, -REST, 60.0, Vec3::zeros()), Alerts::NONE, "a ceiling");
+    assert_eq!(struck(&mut rig, Vec3::new(0.0, -15.0, 5.0), 60.0, Vec3::zeros()), Alerts::IMPACT, "a wall");
+    for peak in [f32::NAN, f32::INFINITY] {
+        assert_eq!(blow(|_| (), peak, Vec3::zeros()), Alerts::NONE, "{peak}");
+    }
+}
+
+/// Peaks of 2 g to 5 g that grow within a quarter of a second, as of a bent propeller that is being spun up.
+#[test]
+fn peaks_of_vibration_are_no_blow_and_a_blow_among_them_is_seen() {
+    let mut rig = Rig::flying().settled();
+    for k in 0..4_000 {
+        let strength = (k as f32 / 100.0).min(1.0) * GRAVITY;
+        let peak = strength * (3.5 + 3.0 * rig.noise(1.0).x);
+        assert_eq!(with_peak(&mut rig, peak, Vec3::zeros()), Alerts::NONE, "sample {k}, {peak} m/s^2");
+    }
+    assert_eq!(with_peak(&mut rig, 16.0 * GRAVITY, Vec3::zeros()), Alerts::IMPACT);
+}
+
 #[test]
 fn d21_a_spin_is_still_caught() {
     // A propeller is gone: 100 rad/s² about the vertical.
@@ -135,7 +179,12 @@ fn a_backlog_of_samples_is_no_silence() {
     let backlog: Vec<_> = (1..=14)
         .map(|k| {
             let at = start + PERIOD * k;
-            let data = ImuData { accel: REST + rig.noise(0.05), gyro: rig.noise(0.005), temperature: 25.0 };
+            let data = ImuData {
+                accel: REST + rig.noise(0.05),
+                gyro: rig.noise(0.005),
+                temperature: 25.0,
+                ..Default::default()
+            };
             Stamped { at, generation: 0, data }
         })
         .collect();
@@ -145,7 +194,7 @@ fn a_backlog_of_samples_is_no_silence() {
 #[test]
 fn a_stamp_in_the_future_does_not_hide_silence() {
     let mut rig = Rig::flying().settled();
-    let data = ImuData { accel: REST, gyro: rig.noise(0.1), temperature: 25.0 };
+    let data = ImuData { accel: REST, gyro: rig.noise(0.1), temperature: 25.0, ..Default::default() };
     let late = Stamped { at: rig.now + Duration::from_secs(15), generation: 0, data };
     let from = rig.now;
     assert_eq!(rig.step(from, &[late]), Alerts::NONE);
