@@ -120,7 +120,7 @@ fn formats_explain_the_data() {
     assert_eq!(formats[TOPICS.len() - 1].fields, format!("uint64_t timestamp;uint32_t generation;{odd}"));
     let units = "wide=us wides=us at=us both_ways=us maybe=m/s part_0_known=us part_1_known=us";
     assert!(infos.contains(&("units/odd", units)));
-    assert!(infos.contains(&("units/sensor_imu", "accel=m/s^2 gyro=rad/s temperature=degC")));
+    assert!(infos.contains(&("units/sensor_imu", "accel=m/s^2 gyro=rad/s temperature=degC accel_peak=m/s^2")));
     assert!(infos.contains(&("names/flight_status/mode", "Acro=0 Stabilize=1 AltHold=2 PosHold=3")));
     assert!(
         infos
