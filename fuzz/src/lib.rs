@@ -13,6 +13,7 @@
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
+//! | [`whole_stack`] | edits of all that a flying vehicle is given | every invariant that an open loop can keep |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |
 //!
 //! With a nightly compiler and cargo-fuzz: `cargo +nightly fuzz run console_line`. A file that fails goes into
@@ -26,6 +27,7 @@ mod flash;
 mod machine;
 mod packets;
 mod parameters;
+mod stack;
 mod ulog_file;
 
 pub use console::console_line;
@@ -35,6 +37,7 @@ pub use failsafe::failsafe_stream;
 pub use machine::mode_machine;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;
+pub use stack::whole_stack;
 pub use ulog_file::ulog;
 
 use stampfly_types::Vec3;

@@ -2,7 +2,7 @@
 
 use crate::{
     console_line, estimator_stream, failsafe_stream, mode_machine, parameter_image, radio_packets, rover_datagrams,
-    ulog,
+    ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -123,6 +123,11 @@ fn datagrams() {
 #[test]
 fn logs() {
     smoke("ulog", ulog, 150_000);
+}
+
+#[test]
+fn stack() {
+    smoke("whole_stack", whole_stack, 400);
 }
 
 /// A target that fails is found out, and a mutation reaches what no file of the corpus does.

@@ -244,14 +244,19 @@ const UNSEEN: Duration = Duration::from_millis(5);
 impl Around<'_> {
     fn write(&mut self, now: Instant, output: &MotorOutput) {
         let Ok(()) = self.motors.write(output);
+        self.judge.strikes(now, self.strikes());
         self.judge.motors(now, output.armed && output.duty.iter().any(|duty| *duty > 0.0));
+    }
+
+    fn strikes(&self) -> u64 {
+        self.world.inspect(|plant| plant.ground().strikes())
     }
 
     fn see(&mut self, now: Instant, truth: &Truth) {
         self.seen_at = now;
         let done = self.progress.done.get();
         let clearance = self.world.height_at(now) as f32 - self.standing;
-        let strikes = self.world.inspect(|plant| plant.ground().strikes());
+        let strikes = self.strikes();
         self.judge.see(&Sight { now, truth, clearance, strikes, status: &self.watch.mode, done });
     }
 }

@@ -13,6 +13,7 @@ mod faults;
 mod figures;
 mod flight_task;
 mod flips;
+mod flying_quality;
 mod held;
 mod impact;
 mod in_flight;

@@ -30,8 +30,8 @@ const LAND_WITHIN: Duration = Duration::from_secs(3);
 /// Of I10, m/s.
 const LAND_RATE: f32 = 0.3;
 
-/// The invariants of one flight.
-pub(super) struct Invariants {
+/// The invariants of one flight, for whatever flies it.
+pub struct Invariants {
     /// Names of those that did not hold.
     violations: BTreeSet<&'static str>,
     hover_without_link: Duration,
@@ -46,6 +46,8 @@ pub(super) struct Invariants {
 }
 
 impl Invariants {
+    /// Of a vehicle that hovers for this long when the link is lost.
+    #[must_use]
     pub fn new(hover_without_link: Duration) -> Self {
         Self {
             violations: BTreeSet::new(),
@@ -59,7 +61,7 @@ impl Invariants {
         }
     }
 
-    pub fn require(&mut self, name: &'static str, holds: bool) {
+    pub(super) fn require(&mut self, name: &'static str, holds: bool) {
         if !holds {
             self.violations.insert(name);
         }

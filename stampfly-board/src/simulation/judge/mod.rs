@@ -28,7 +28,7 @@ mod sight;
 use super::mission::Mission;
 use crate::topics::Id;
 use course::Course;
-use invariants::Invariants;
+pub use invariants::Invariants;
 use moments::Moments;
 use serde::Serialize;
 pub(super) use sight::Sight;
@@ -253,6 +253,14 @@ impl Judge {
         self.motors_on = on;
     }
 
+    /// A wall or a ceiling has pushed in so many steps since the start. To be told before the motors: they stop sooner after a
+    /// blow than the truth is looked at.
+    pub fn strikes(&mut self, now: Instant, strikes: u64) {
+        if strikes > self.strikes {
+            (self.strikes, self.struck) = (strikes, Some(now));
+        }
+    }
+
     fn has_begun(&self, now: Instant) -> bool {
         self.injector.faults().next().is_none() || self.injector.first_begun(now).is_some()
     }
@@ -260,9 +268,7 @@ impl Judge {
     /// Looks at the truth, at the control rate.
     pub fn see(&mut self, sight: &Sight<'_>) {
         let Sight { now, truth, clearance, strikes, status, done } = *sight;
-        if strikes > self.strikes {
-            (self.strikes, self.struck) = (strikes, Some(now));
-        }
+        self.strikes(now, strikes);
         self.clearance = clearance;
         (self.now, self.done) = (now, done);
         self.start = self.start.or(Some(now));

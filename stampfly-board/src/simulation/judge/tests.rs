@@ -107,3 +107,20 @@ fn motors_that_stop_after_a_blow_were_cut_by_it() {
     assert_eq!(stopped(4.0, 4.2), "cut", "by the second");
     assert_ne!(stopped(4.0, 4.4), "cut", "too late");
 }
+
+#[test]
+fn a_blow_counts_that_was_not_seen_before_the_motors_stopped() {
+    let stopped = |strikes: u64| {
+        let mut judge = judge(&["wall@1.5"]);
+        let at = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
+        judge.motors(at(1.0), true);
+        show(&mut judge, at(4.0), FlightPhase::Flying, (0.5, 0.0), 1);
+        judge.strikes(at(4.002), strikes);
+        judge.motors(at(4.002), false);
+        show_struck(&mut judge, at(4.5), FlightPhase::IdleGround, (0.0, 3.0), 1, 2);
+        show_struck(&mut judge, at(4.6), FlightPhase::IdleGround, (0.0, 0.0), 1, 2);
+        judge.finish().outcome
+    };
+    assert_eq!(stopped(1), "cut");
+    assert_ne!(stopped(0), "cut", "struck afterwards");
+}
