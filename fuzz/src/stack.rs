@@ -22,6 +22,9 @@ use std::sync::OnceLock;
 
 /// Edits of one input.
 const EDITS: usize = 12;
+/// Instants are earlier by less than this, ms. The time of the flight band is that of its sample, so a vehicle cannot know that all
+/// its inertial samples are older than the 27.5 ms that `I7` allows.
+const LATE: u64 = 20;
 /// Longest time without a turn, turns of the simulation: 20 ms. The cut-off that comes after 25 ms is no part of this.
 const HELD_UP: usize = 8;
 
@@ -84,7 +87,7 @@ fn edit(input: &mut Input, turns: usize) -> Edit {
             (lasts, Change::Word(usize::from(input.byte()), input.number(scale).to_bits()))
         }
         4 => (lasts, Change::Flip(usize::from(input.byte()), 1 << (input.byte() % 32))),
-        5 => (lasts, Change::Stamped(Duration::from_millis(u64::from(input.byte())))),
+        5 => (lasts, Change::Stamped(Duration::from_millis(u64::from(input.byte()) % LATE))),
         6 => (lasts, Change::Forged(u32::from(input.byte()))),
         _ => (lasts % HELD_UP, Change::HeldUp),
     };

@@ -17,7 +17,7 @@ use stampfly_sim::fault::Fault;
 use stampfly_sim::vehicle::{Vehicle, Witness};
 use stampfly_sim::{Truth, plant::WindConfig};
 use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, MotorOutput, StateEstimate};
-use stampfly_types::{Duration, Instant, Message, Vec3, frame};
+use stampfly_types::{Duration, Instant, Message, Vec3, frame, math};
 
 /// Where it hovers, m.
 const HEIGHT: f32 = 0.8;
@@ -68,7 +68,7 @@ impl Witness<Runnables> for Hover {
             self.landing_tilt = self.landing_tilt.max(tilt);
         }
         if self.is_watched(at) {
-            self.attitude.push(self.estimate.attitude.angle_to(&truth.attitude).powi(2));
+            self.attitude.push(square(self.estimate.attitude.angle_to(&truth.attitude)));
             self.heights.push(height);
             self.places.push(truth.position);
             self.headings.push(truth.attitude.euler_angles().2.to_degrees());
@@ -83,13 +83,13 @@ impl Hover {
     }
 
     fn attitude_error(&self) -> f32 {
-        mean(&self.attitude).sqrt().to_degrees()
+        math::sqrt(mean(&self.attitude)).to_degrees()
     }
 
     /// Root mean square about the height that was asked for, and from lowest to highest, m.
     fn height(&self) -> [f32; 2] {
-        let squares: Vec<_> = self.heights.iter().map(|height| (height - HEIGHT).powi(2)).collect();
-        [mean(&squares).sqrt(), span(&self.heights)]
+        let squares: Vec<_> = self.heights.iter().map(|height| square(height - HEIGHT)).collect();
+        [math::sqrt(mean(&squares)), span(&self.heights)]
     }
 
     /// Farthest from where the watching began, m.
@@ -97,6 +97,10 @@ impl Hover {
         let from = self.places.first().expect("it hovered").xy();
         self.places.iter().map(|place| (place.xy() - from).norm()).fold(0.0, f32::max)
     }
+}
+
+fn square(number: f32) -> f32 {
+    number * number
 }
 
 fn mean(numbers: &[f32]) -> f32 {
