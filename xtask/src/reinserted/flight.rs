@@ -113,7 +113,10 @@ mod tests {
     #[test]
     fn words_are_read_as_a_shell_reads_them() {
         let all = |line: &str| words(line).map(|words| words.join("|"));
-        assert_eq!(all("stampfly fly --mission 'arm; land' --seed 1"), Ok("stampfly|fly|--mission|arm; land|--seed|1".into()));
+        assert_eq!(
+            all("stampfly fly --mission 'arm; land' --seed 1"),
+            Ok("stampfly|fly|--mission|arm; land|--seed|1".into())
+        );
         assert_eq!(all("a ''  b"), Ok("a||b".into()));
         assert!(all("a 'b").is_err() && all("a \"b\"").is_err());
     }

@@ -58,8 +58,7 @@ pub fn with_bugs(source: &str, bugs: &[&Bug]) -> Result<String, Failure> {
     for (start, bug) in places {
         let between = source.get(end..start).ok_or_else(|| format!("{}: overlaps another bug", bug.name))?;
         end = start + bug.from.len();
-        let choice =
-            format!("if crate::reinserted::on({:?}) {{ {} }} else {{ {} }}", bug.name, bug.to, bug.from);
+        let choice = format!("if crate::reinserted::on({:?}) {{ {} }} else {{ {} }}", bug.name, bug.to, bug.from);
         text += between;
         text += &match bug.kind {
             Kind::Expression => format!("({choice})"),

@@ -4,7 +4,8 @@ use super::list::Bug;
 use std::fmt::Write;
 
 /// The document, and what is before and after the table.
-pub const PLACE: (&str, &str, &str) = ("docs/safety.md", "<!-- bugs: cargo xtask docs --fix -->\n", "<!-- end of bugs -->");
+pub const PLACE: (&str, &str, &str) =
+    ("docs/safety.md", "<!-- bugs: cargo xtask docs --fix -->\n", "<!-- end of bugs -->");
 
 /// The table. A row begins with no code: in this document such rows are known failures of the campaign.
 pub fn table(bugs: &[Bug]) -> String {

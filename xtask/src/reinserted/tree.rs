@@ -61,7 +61,8 @@ fn copy(from: &Path, to: &Path, files: &BTreeMap<PathBuf, Option<String>>) -> Re
     for (name, text) in files {
         let (source, copy) = (from.join(name), to.join(name));
         let io = |e: std::io::Error| format!("{}: {e}", name.display());
-        let bytes = text.as_ref().map_or_else(|| fs::read(&source), |text| Ok(text.clone().into_bytes())).map_err(io)?;
+        let bytes =
+            text.as_ref().map_or_else(|| fs::read(&source), |text| Ok(text.clone().into_bytes())).map_err(io)?;
         if fs::read(&copy).is_ok_and(|there| there == bytes) {
             continue;
         }
