@@ -74,6 +74,7 @@ const STEPS: &[Step] = &[
     )
     .alone(),
     Step::new("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
+        .beside()
         .accepting(&[Fix, Rest]),
     Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
     Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
