@@ -3,7 +3,7 @@
 //! So one build has all bugs, and with none of them on it is the flight code as it is. What is replaced is an expression, or
 //! statements that end a block or stand in one.
 
-use super::list::Bug;
+use super::list::{Bug, Kind};
 use crate::repository::Failure;
 
 /// The environment variable that names the bug that is on.
@@ -21,26 +21,6 @@ pub(crate) fn on(bug: &str) -> bool {
     ON.get_or_init(|| standard::env::var("REINSERTED_BUG").unwrap_or_default()).as_str() == bug
 }
 "#;
-
-/// What a bug replaces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Part of an expression; has a value wherever it stands.
-    Expression,
-    /// One or more statements, or the last expression of a block.
-    Statement,
-}
-
-impl Kind {
-    /// From the word in the list.
-    pub fn named(word: &str) -> Option<Self> {
-        match word {
-            "expression" => Some(Self::Expression),
-            "statement" => Some(Self::Statement),
-            _ => None,
-        }
-    }
-}
 
 /// The text with these bugs in it, each guarded. Every bug has to be found exactly once, and apart from the others.
 pub fn with_bugs(source: &str, bugs: &[&Bug]) -> Result<String, Failure> {

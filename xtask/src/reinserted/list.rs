@@ -1,6 +1,5 @@
 //! The list of field bugs, `xtask/bugs.toml`. Comments and order survive an update.
 
-use super::guard::Kind;
 use crate::repository::{Failure, Repository};
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,6 +8,26 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
 /// Its path in the repository.
 pub const FILE: &str = "xtask/bugs.toml";
+
+/// What a bug replaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Part of an expression; has a value wherever it stands.
+    Expression,
+    /// One or more statements, or the last expression of a block.
+    Statement,
+}
+
+impl Kind {
+    /// From the word in the list.
+    pub fn named(word: &str) -> Option<Self> {
+        match word {
+            "expression" => Some(Self::Expression),
+            "statement" => Some(Self::Statement),
+            _ => None,
+        }
+    }
+}
 
 /// A bug that somebody's vehicle had.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,23 +88,17 @@ impl List {
     pub fn record(&mut self, name: &str, found: Option<(&str, &str)>) {
         let of_name = |table: &&mut Table| text(table, "name").is_ok_and(|other| other == name);
         let tables = self.document.get_mut("bug").and_then(Item::as_array_of_tables_mut);
-        let Some(table) = tables.and_then(|tables: &mut ArrayOfTables| tables.iter_mut().find(of_name)) else { return };
-        let [flight, ends] = match found {
-            Some((flight, ends)) => {
-                (table["flight"], table["ends"]) = (value(flight), value(ends));
-                table.remove("missed");
-                [flight, ends].map(|text| Some(text.to_owned()))
-            }
-            None => {
-                (table.remove("flight"), table.remove("ends"));
-                [None, None]
-            }
-        };
-        for bug in self.bugs.iter_mut().filter(|bug| bug.name == name) {
-            if flight.is_some() {
-                bug.missed = None;
-            }
-            (bug.flight, bug.ends) = (flight.clone(), ends.clone());
+        let table = tables.and_then(|tables: &mut ArrayOfTables| tables.iter_mut().find(of_name));
+        let Some((table, bug)) = table.zip(self.bugs.iter_mut().find(|bug| bug.name == name)) else { return };
+        if let Some((flight, ends)) = found {
+            (table["flight"], table["ends"]) = (value(flight), value(ends));
+            (bug.flight, bug.ends) = (Some(flight.to_owned()), Some(ends.to_owned()));
+            table.remove("missed");
+            bug.missed = None;
+        } else {
+            table.remove("flight");
+            table.remove("ends");
+            (bug.flight, bug.ends) = (None, None);
         }
     }
 
