@@ -10,6 +10,7 @@ mod machine;
 mod modules;
 mod page;
 mod ratchet;
+mod reinserted;
 mod repository;
 mod step;
 mod steps;
@@ -72,6 +73,9 @@ const STEPS: &[Step] = &[
         steps::campaign::run,
     )
     .alone(),
+    Step::new("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
+        .beside()
+        .accepting(&[Fix, Rest]),
     Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
     Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
     Step::new("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)

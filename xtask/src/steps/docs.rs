@@ -8,11 +8,14 @@
 //! | paths in the columns `home` and `test` of the table of requirements | they exist |
 //! | the guide to tuning | it names every public field of the filter's configuration |
 //! | generated pages | they are what the program prints; `--fix` writes them |
+//! | the table of re-inserted bugs | it is what `xtask/bugs.toml` says; `--fix` writes it |
 //!
 //! Every document is checked that git tracks or would add.
 
 use crate::arguments::Arguments;
 use crate::page::Page;
+use crate::reinserted::list::List;
+use crate::reinserted::page as bugs;
 use crate::repository::{Failure, Repository, capture};
 use std::fs;
 use std::path::Path;
@@ -99,7 +102,23 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
             failures.push(format!("{name} is out of date; run `cargo xtask docs --fix`"));
         }
     }
+    failures.extend(stale_bugs(repository, arguments.fix)?);
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
+}
+
+/// The table of re-inserted bugs, where it is not that of their list.
+fn stale_bugs(repository: &Repository, fix: bool) -> Result<Option<Failure>, Failure> {
+    let (document, begin, end) = bugs::PLACE;
+    let table = bugs::table(&List::read(repository)?.bugs);
+    if repository.between(document, begin, end)? == table {
+        return Ok(None);
+    }
+    if fix {
+        repository.fill(document, begin, end, &table)?;
+        println!("{document}: updated");
+        return Ok(None);
+    }
+    Ok(Some(format!("{document} is out of date; run `cargo xtask docs --fix`")))
 }
 
 fn read(root: &Path, name: &str) -> Result<Page, Failure> {

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod budget;
+pub mod bugs;
 pub mod campaign;
 pub mod clippy;
 pub mod constants;
