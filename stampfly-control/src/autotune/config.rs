@@ -12,8 +12,11 @@ use crate::rate::{TILT_BANDWIDTH, YAW_BANDWIDTH};
 /// of the crossover and four times as much.
 const WINDOW_BANDWIDTHS: f32 = 2.0 * TILT_BANDWIDTH;
 /// Largest torque of the excitation over that of the rate loop. Yaw needs more, because a rotor's drag is weak.
-const TILT_SHARE: f32 = 0.25;
+const TILT_SHARE: f32 = 0.3;
 const YAW_SHARE: f32 = 0.4;
+/// Highest crossover over the bandwidth of the rule for an airframe. Yaw's stays: its torque is little, however good its margins.
+const TILT_QUICKEST: f32 = 1.6;
+const YAW_QUICKEST: f32 = 1.0;
 
 /// Excitation, conditions and goals of an [`Autotune`](super::Autotune).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +57,8 @@ pub struct AutotuneConfig {
     pub phase_margin: f32,
     /// Gain margin that the result keeps, a factor.
     pub gain_margin: f32,
+    /// Highest crossover of the result, rad/s: where more would only drive the motors into their limits.
+    pub crossover_max: f32,
     /// Integral time times crossover, rad: 20 costs 3° of phase.
     pub integral_share: f32,
     /// Factor by which no gain may differ from the present one.
@@ -67,11 +72,12 @@ impl AutotuneConfig {
     #[must_use]
     pub fn for_airframe(airframe: &Airframe, axis: AutotuneAxis) -> Self {
         let attitude = AttitudeConfig::for_airframe(airframe);
-        let (share, bandwidth, attitude_gain) = match axis {
-            AutotuneAxis::Roll | AutotuneAxis::Pitch => (TILT_SHARE, TILT_BANDWIDTH, attitude.tilt_gain),
-            AutotuneAxis::Yaw => (YAW_SHARE, YAW_BANDWIDTH, attitude.heading_gain),
+        let (share, bandwidth, quickest, attitude_gain) = match axis {
+            AutotuneAxis::Roll | AutotuneAxis::Pitch => (TILT_SHARE, TILT_BANDWIDTH, TILT_QUICKEST, attitude.tilt_gain),
+            AutotuneAxis::Yaw => (YAW_SHARE, YAW_BANDWIDTH, YAW_QUICKEST, attitude.heading_gain),
         };
-        let tenths = math::round(10.0 * WINDOW_BANDWIDTHS / (bandwidth * airframe.quickness()));
+        let bandwidth = airframe.quickness() * bandwidth;
+        let tenths = math::round(10.0 * WINDOW_BANDWIDTHS / bandwidth);
         let window = Duration::from_millis(100) * (tenths.clamp(1.0, 600.0) as u64);
         let torque_max = axis.of(&airframe.torque_limit());
         Self {
@@ -79,7 +85,7 @@ impl AutotuneConfig {
             torque_max,
             window,
             windows: [4, 8],
-            spread: [0.05, 0.15],
+            spread: [0.05, 0.25],
             misfit_max: 0.2,
             time_limit: window * 10,
             height_min: 0.5,
@@ -92,6 +98,7 @@ impl AutotuneConfig {
             attitude_gain,
             phase_margin: 0.96,
             gain_margin: 2.512,
+            crossover_max: quickest * bandwidth,
             integral_share: 20.0,
             change_max: 3.0,
         }

@@ -4,7 +4,7 @@
 //! once with what was measured, and the lesser margins count. Candidates are a derivative time and a crossover; the gain follows from
 //! the crossover, the integral time is so long that it costs a fixed phase there (as K. J. Åström and T. Hägglund, *Advanced PID Control*,
 //! chapter 6, do for a fitted plant). From high to low, the first crossover that holds both margins is
-//! the derivative time's, and the highest of those wins.
+//! the derivative time's, and the highest of those wins; of equals the one with the least derivative.
 //!
 //! One candidate a step, so that a search of some hundred does not delay a control loop.
 
@@ -105,7 +105,7 @@ impl Search {
             let _ = self.grid.push(Sample { frequency, warped: warped(frequency, self.period), model, measured });
             return None;
         }
-        let (low, high) = (CROSSOVER_LOW * lowest, CROSSOVER_HIGH * highest);
+        let (low, high) = (CROSSOVER_LOW * lowest, config.crossover_max.min(CROSSOVER_HIGH * highest));
         let crossover = high * math::pow(low / high, f32::from(self.crossover) / f32::from(CROSSOVERS - 1));
         let slower = self.best.is_some_and(|best| best.margins.crossover >= crossover);
         let tuned = if slower { None } else { self.candidate(config, crossover) };

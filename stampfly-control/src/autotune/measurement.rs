@@ -92,7 +92,7 @@ impl Measurement {
         let wanted = config.amplitude * self.envelope(config, now, elapsed) * sum(&carriers);
         let wanted = if wanted.is_finite() { wanted } else { 0.0 };
         let given = within(wanted, (-config.torque_max - torque).min(0.0), (config.torque_max - torque).max(0.0));
-        let lost = given != wanted || !(unmet.abs() <= NOTICEABLE);
+        let lost = given != wanted || unmet.abs() > NOTICEABLE || unmet.is_nan();
         self.cut += (if lost { 1.0 } else { 0.0 } - self.cut) / COUNTED;
         if self.cut > config.saturation_max {
             return Err(AutotuneStop::Saturated);

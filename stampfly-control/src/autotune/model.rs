@@ -128,14 +128,7 @@ fn candidate(points: &[PlantPoint; TONES], lag: f32) -> Candidate {
     let weight = sum(|line| line.3);
     let ln_gain = sum(|line| line.3 * line.1) / weight;
     let late = -sum(|line| line.3 * line.0 * line.2) / sum(|line| line.3 * line.0 * line.0);
-    // Comparisons, so that no number stays none.
-    let delay = if late < 0.0 {
-        0.0
-    } else if late > DELAY_MAX {
-        DELAY_MAX
-    } else {
-        late
-    };
+    let delay = late.clamp(0.0, DELAY_MAX);
     let cost = lines.iter().map(|(frequency, ln, phase, weight)| {
         let (magnitude, angle) = (ln - ln_gain, phase + frequency * delay);
         weight * (magnitude * magnitude + angle * angle)
