@@ -49,7 +49,7 @@ fn main() {
     let mut autotune = Autotune::for_airframe(&AIRFRAME);
     let mut rate_config: RateConfig = config.rate;
     let mut now = Instant::from_secs(10);
-    for axis in AutotuneAxis::ALL {
+    for &axis in AutotuneAxis::ALL {
         let (gains, limit) = (axis.gains(&config.rate), axis.of(&config.rate.torque_max));
         let attitude_gain = autotune.config(axis).attitude_gain;
         let mut pid = Pid::new(gains, limit);

@@ -1,26 +1,58 @@
 //! Which of the three rate loops is tuned.
 
-use stampfly_types::Vec3;
+use stampfly_types::messages::{GuidedKind, SetpointAxes};
+use stampfly_types::{Vec3, message_enum};
 
 use crate::pid::PidGains;
 use crate::rate::RateConfig;
 
-/// A body axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum AutotuneAxis {
-    /// About x.
-    #[default]
-    Roll,
-    /// About y.
-    Pitch,
-    /// About z.
-    Yaw,
+message_enum! {
+    /// A body axis.
+    pub enum AutotuneAxis {
+        /// About x.
+        #[default]
+        Roll = 0,
+        /// About y.
+        Pitch = 1,
+        /// About z.
+        Yaw = 2,
+    }
 }
 
 impl AutotuneAxis {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Roll, Self::Pitch, Self::Yaw];
+    /// The axis that a command asks to tune, if it does.
+    ///
+    /// ```
+    /// use stampfly_control::autotune::AutotuneAxis;
+    /// use stampfly_types::messages::GuidedKind;
+    /// assert_eq!(AutotuneAxis::commanded(GuidedKind::AutotuneYaw), Some(AutotuneAxis::Yaw));
+    /// assert_eq!(AutotuneAxis::commanded(GuidedKind::Hold), None);
+    /// ```
+    #[must_use]
+    pub const fn commanded(kind: GuidedKind) -> Option<Self> {
+        match kind {
+            GuidedKind::AutotuneRoll => Some(Self::Roll),
+            GuidedKind::AutotunePitch => Some(Self::Pitch),
+            GuidedKind::AutotuneYaw => Some(Self::Yaw),
+            _ => None,
+        }
+    }
+
+    /// The flag of a set-point that asks to tune it.
+    #[must_use]
+    pub const fn flag(self) -> SetpointAxes {
+        match self {
+            Self::Roll => SetpointAxes::AUTOTUNE_ROLL,
+            Self::Pitch => SetpointAxes::AUTOTUNE_PITCH,
+            Self::Yaw => SetpointAxes::AUTOTUNE_YAW,
+        }
+    }
+
+    /// The axis that a set-point asks to tune, if it does.
+    #[must_use]
+    pub fn asked(axes: SetpointAxes) -> Option<Self> {
+        Self::ALL.iter().copied().find(|axis| axes.contains(axis.flag()))
+    }
 
     /// The component of a vector about this axis.
     #[must_use]

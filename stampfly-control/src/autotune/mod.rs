@@ -24,6 +24,7 @@ mod measurement;
 mod model;
 mod report;
 mod spectrum;
+mod status;
 mod watch;
 
 pub use axis::AutotuneAxis;
@@ -33,9 +34,10 @@ pub use margins::Margins;
 pub use model::PlantModel;
 pub use report::{AcceptError, AutotuneReport};
 pub use spectrum::PlantPoint;
+pub use status::{AutotuneStage, AutotuneStatus};
 pub use watch::{AutotuneInput, AutotuneStop};
 
-use stampfly_types::messages::FlightStatus;
+use stampfly_types::messages::{FlightStatus, SetpointAxes};
 use stampfly_types::{Instant, Vec3};
 
 use crate::airframe::Airframe;
@@ -43,22 +45,6 @@ use crate::pid::PidGains;
 use design::Search;
 use measurement::{Measured, Measurement};
 use model::Fit;
-
-/// Where tuning is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum AutotuneStage {
-    /// Not begun.
-    #[default]
-    Idle,
-    /// The vehicle is excited.
-    Exciting,
-    /// The vehicle flies as ever; the result is being computed, a bit a step.
-    Computing,
-    /// There is a [report](Autotune::report).
-    Done,
-    /// It ended without one, for a [reason](Autotune::stopped).
-    Stopped,
-}
 
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -129,20 +115,23 @@ pub struct Autotune {
     axis: AutotuneAxis,
     present: PidGains,
     state: State,
+    /// What the set-point asked for in the period before.
+    asked: Option<AutotuneAxis>,
 }
 
 impl Autotune {
     /// Configured by the rules for an airframe.
     #[must_use]
     pub fn for_airframe(airframe: &Airframe) -> Self {
-        Self::new(AutotuneAxis::ALL.map(|axis| AutotuneConfig::for_airframe(airframe, axis)))
+        let axes = [AutotuneAxis::Roll, AutotuneAxis::Pitch, AutotuneAxis::Yaw];
+        Self::new(axes.map(|axis| AutotuneConfig::for_airframe(airframe, axis)))
     }
 
     /// Configured for roll, pitch and yaw.
     #[must_use]
     pub fn new([roll, pitch, yaw]: [AutotuneConfig; 3]) -> Self {
         let present = PidGains::proportional(0.0);
-        Self { roll, pitch, yaw, axis: AutotuneAxis::Roll, present, state: State::Idle }
+        Self { roll, pitch, yaw, axis: AutotuneAxis::Roll, present, state: State::Idle, asked: None }
     }
 
     /// Begins with an axis whose loop has these gains. What was found before and not accepted is forgotten.
@@ -204,6 +193,29 @@ impl Autotune {
         result
     }
 
+    /// One control period of a vehicle whose set-point says what to tune, in place of [`Self::start`], [`Self::step`] and
+    /// [`Self::cancel`]: it begins when the set-point begins to ask for an axis, whose loop has the gains that `present` gives, and ends
+    /// when it no longer does. What speaks against it is the reason of [`Self::stopped`].
+    pub fn follow(
+        &mut self,
+        now: Instant,
+        axes: SetpointAxes,
+        present: impl FnOnce(AutotuneAxis) -> PidGains,
+        input: &AutotuneInput<'_>,
+        torque: &Vec3,
+    ) -> Vec3 {
+        let asked = AutotuneAxis::asked(axes);
+        if core::mem::replace(&mut self.asked, asked) != asked {
+            self.cancel();
+            if let Some(axis) = asked
+                && let Err(stop) = self.start(now, axis, present(axis), input)
+            {
+                (self.axis, self.state) = (axis, State::Stopped(stop));
+            }
+        }
+        self.step(now, input, torque)
+    }
+
     /// Ends it, wherever it is. A result that is there already stays.
     pub fn cancel(&mut self) {
         if matches!(self.stage(), AutotuneStage::Exciting | AutotuneStage::Computing) {
@@ -248,6 +260,14 @@ impl Autotune {
     #[must_use]
     pub fn stopped(&self) -> Option<AutotuneStop> {
         if let State::Stopped(stop) = self.state { Some(stop) } else { None }
+    }
+
+    /// The same for others, who see neither.
+    #[must_use]
+    pub fn status(&self) -> AutotuneStatus {
+        let stop = self.stopped().unwrap_or_default();
+        let (axis, stage) = (self.axis, self.stage());
+        self.report().map_or(AutotuneStatus { axis, stage, stop, ..AutotuneStatus::default() }, AutotuneStatus::of)
     }
 
     /// The configuration of an axis.

@@ -2,11 +2,11 @@
 //!
 //! The same conditions hold before the first step and at every one; whichever fails first is told.
 
-use stampfly_types::math;
 use stampfly_types::messages::{
     Alerts, CommandSetpoint, CommandSource, FlightPhase, FlightStatus, GroundContact, LandDetected, StateEstimate,
     Validity,
 };
+use stampfly_types::{math, message_enum};
 
 use super::config::AutotuneConfig;
 use crate::attitude;
@@ -28,37 +28,38 @@ pub struct AutotuneInput<'a> {
     pub unmet: [f32; 4],
 }
 
-/// Why tuning does not begin, or has ended without a result. The gains are as they were, and nothing is excited any more.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum AutotuneStop {
-    /// An axis is being tuned.
-    Busy,
-    /// Not armed and flying by itself, or too low, or it moves, or whether it does is not known.
-    NotHovering,
-    /// Rate, attitude or torque are no numbers, or the tilt is not known.
-    Estimate,
-    /// It tilts too far or turns too fast.
-    Excursion,
-    /// Torque was cut too often: what is measured then is not what was asked for.
-    Saturated,
-    /// A stick is not centred.
-    Sticks,
-    /// The failsafe has found something.
-    Alert,
-    /// Steps do not follow each other: one was missing for 20 ms, or they are too rare for the highest tone.
-    Timing,
-    /// It takes too long.
-    Timeout,
-    /// Windows differ too much, or no gain, lag and delay explain what was measured.
-    Quality,
-    /// No gains within the bounds keep both margins.
-    Margins,
-    /// The present gains are none to start from, or the ones that were found differ from them by more than they may.
-    Bounds,
-    /// Somebody ended it.
-    Cancelled,
+message_enum! {
+    /// Why tuning does not begin, or has ended without a result. The gains are as they were, and nothing is excited any more.
+    #[non_exhaustive]
+    pub enum AutotuneStop {
+        /// An axis is being tuned.
+        #[default]
+        Busy = 0,
+        /// Not armed and flying by itself, or too low, or it moves, or whether it does is not known.
+        NotHovering = 1,
+        /// Rate, attitude or torque are no numbers, or the tilt is not known.
+        Estimate = 2,
+        /// It tilts too far or turns too fast.
+        Excursion = 3,
+        /// Torque was cut too often: what is measured then is not what was asked for.
+        Saturated = 4,
+        /// A stick is not centred.
+        Sticks = 5,
+        /// The failsafe has found something.
+        Alert = 6,
+        /// Steps do not follow each other: one was missing for 20 ms, or they are too rare for the highest tone.
+        Timing = 7,
+        /// It takes too long.
+        Timeout = 8,
+        /// Windows differ too much, or no gain, lag and delay explain what was measured.
+        Quality = 9,
+        /// No gains within the bounds keep both margins.
+        Margins = 10,
+        /// The present gains are none to start from, or the ones that were found differ from them by more than they may.
+        Bounds = 11,
+        /// Somebody ended it.
+        Cancelled = 12,
+    }
 }
 
 impl core::fmt::Display for AutotuneStop {

@@ -50,7 +50,7 @@ impl Range {
 
 #[test]
 fn on_every_vehicle_of_a_grid_the_margins_hold() {
-    for axis in AutotuneAxis::ALL {
+    for &axis in AutotuneAxis::ALL {
         let [mut gain, mut lag, mut delay, mut before_phase, mut before_gain, mut phase, mut margin, mut seconds] =
             [Range::NONE; 8];
         let (mut done, mut present) = (0, Range::NONE);

@@ -32,7 +32,7 @@ fn excited() -> Rig {
 
 fn with_config(change: impl Fn(&mut AutotuneConfig)) -> Rig {
     let mut rig = rig();
-    let configs = AutotuneAxis::ALL.map(|axis| {
+    let configs = [AutotuneAxis::Roll, AutotuneAxis::Pitch, AutotuneAxis::Yaw].map(|axis| {
         let mut config = *rig.autotune.config(axis);
         change(&mut config);
         config
@@ -250,7 +250,7 @@ proptest! {
             let out = autotune.step(rig.now, &rig.input(), &torque);
             rig.autotune = autotune;
             let excited = rig.autotune.stage() == AutotuneStage::Exciting;
-            for other in AutotuneAxis::ALL {
+            for &other in AutotuneAxis::ALL {
                 let (asked, given) = (other.of(&torque), other.of(&out));
                 if other == axis && excited {
                     prop_assert!(asked.is_finite() && (given - asked).abs() <= 1.001 * config.amplitude + 1e-6 * asked.abs());

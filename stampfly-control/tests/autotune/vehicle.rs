@@ -66,7 +66,7 @@ fn tuned(vehicle: Vehicle, axis: AutotuneAxis, wind: f32) -> (Option<AutotuneRep
 
 #[test]
 fn every_axis_of_a_vehicle_of_unknown_inertia_is_tuned_in_hover() {
-    for axis in AutotuneAxis::ALL {
+    for &axis in AutotuneAxis::ALL {
         for (inertia, wind) in [(0.6, 0.0), (1.0, 0.0), (1.0, 0.3), (1.6, 0.0)] {
             let vehicle =
                 Vehicle { inertia: inertia * AIRFRAME.inertia, noise: [0.05, 0.02, 0.01], ..Vehicle::default() };
