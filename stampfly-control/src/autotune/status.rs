@@ -8,6 +8,7 @@ use stampfly_types::{message, message_enum};
 use super::axis::AutotuneAxis;
 use super::report::AutotuneReport;
 use super::watch::AutotuneStop;
+use crate::rate::RateConfig;
 
 message_enum! {
     /// Where tuning is.
@@ -75,6 +76,32 @@ impl AutotuneStatus {
             lag: model.lag,
             delay: model.delay,
         }
+    }
+}
+
+impl AutotuneStatus {
+    /// Puts the proposed gains where the rate loop of the axis has its own. False if there are none. On the ground: [`AcceptError`] is for
+    /// whoever has the [`Autotune`] itself.
+    ///
+    /// [`AcceptError`]: super::AcceptError
+    /// [`Autotune`]: super::Autotune
+    ///
+    /// ```
+    /// use stampfly_control::autotune::{AutotuneStage, AutotuneStatus};
+    /// use stampfly_control::{Airframe, rate::RateConfig};
+    /// let mut config = RateConfig::for_airframe(&Airframe::EXAMPLE);
+    /// assert!(!AutotuneStatus::default().accept(&mut config));
+    /// let found = AutotuneStatus { stage: AutotuneStage::Done, kp: 0.03, ti: 0.4, td: 0.02, ..Default::default() };
+    /// assert!(found.accept(&mut config) && config.roll.kp == 0.03);
+    /// ```
+    #[must_use]
+    pub fn accept(&self, config: &mut RateConfig) -> bool {
+        let done = self.stage == AutotuneStage::Done;
+        if done {
+            let gains = self.axis.gains_mut(config);
+            (gains.kp, gains.ti, gains.td) = (self.kp, self.ti, self.td);
+        }
+        done
     }
 }
 

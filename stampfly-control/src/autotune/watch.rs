@@ -10,6 +10,7 @@ use stampfly_types::{math, message_enum};
 
 use super::config::AutotuneConfig;
 use crate::attitude;
+use crate::controller::ControlInput;
 
 /// All that a step looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,15 @@ pub struct AutotuneInput<'a> {
     pub alerts: Alerts,
     /// What the mixer could not deliver in the previous step ([`Mixed::unmet`](crate::Mixed)): shares of roll, pitch, yaw, thrust.
     pub unmet: [f32; 4],
+}
+
+impl<'a> AutotuneInput<'a> {
+    /// What a controller looks at, and what the failsafe has found.
+    #[must_use]
+    pub const fn of(input: &ControlInput<'a>, alerts: Alerts) -> Self {
+        let ControlInput { estimate, command, flight_status, land_detected, unmet, .. } = *input;
+        Self { estimate, command, flight_status, land_detected, alerts, unmet }
+    }
 }
 
 message_enum! {

@@ -21,14 +21,7 @@ struct Tuned {
 impl Controller for Tuned {
     fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
         let output = self.inner.step(now, input);
-        let conditions = AutotuneInput {
-            estimate: input.estimate,
-            command: input.command,
-            flight_status: input.flight_status,
-            land_detected: input.land_detected,
-            alerts: Alerts::default(),
-            unmet: input.unmet,
-        };
+        let conditions = AutotuneInput::of(input, Alerts::default());
         if let Some(axis) = self.begin.take() {
             let gains = axis.gains(&RateConfig::for_airframe(&AIRFRAME));
             self.autotune.start(now, axis, gains, &conditions).expect("it hovers");
