@@ -69,8 +69,6 @@ stampfly_bus::topics! {
     setpoint: Setpoint = latest @ 400 Hz from navigation => [landing, control, telemetry];
     /// Thrust and torque.
     control_output: ControlOutput = latest @ 400 Hz from control => [failsafe, landing, actuation];
-    /// What tuning a rate loop has found.
-    autotune: AutotuneStatus = latest @ on event from control => [];
     /// Duty of every motor.
     actuator_motor: MotorOutput = latest @ 400 Hz from actuation => [control, motors];
 
@@ -93,4 +91,6 @@ stampfly_bus::topics! {
     restart_request: RestartRequest = latest @ on event from mode => [supervisor];
     /// Has the cut-off stopped the motors?
     cutoff_state: CutoffState = latest @ on event from cutoff => [mode];
+    /// What tuning a rate loop has found.
+    autotune: AutotuneStatus = latest @ on event from control => [];
 }

@@ -21,7 +21,7 @@ const LIFE_DIVIDER: u32 = 5;
 const ROUND_TRIP: u32 = 4;
 
 /// What an autotune takes to compute its result, at most.
-const COMPUTING: Duration = Duration::from_secs(3);
+const COMPUTING: Duration = Duration::from_secs(4);
 
 /// What the ground station reports about itself.
 #[derive(Debug, Default)]

@@ -160,7 +160,7 @@ mod tests {
     fn margins_of_an_integrator_with_delay_are_those_of_the_book() {
         // L = ω_c/s · e^(−sT): phase margin π/2 − ω_c·T, gain margin π / (2·ω_c·T).
         for (crossover, delay) in [(20.0, 0.01), (40.0, 0.007), (60.0, 0.01)] {
-            let plant = PlantModel { gain: 1.0, lag: 0.0, delay, misfit: 0.0 };
+            let plant = PlantModel { gain: 1.0, lag: 0.0, delay, ..PlantModel::default() };
             let margins = scan(&plant, &PidGains::proportional(crossover), 0.0).expect("it crosses one");
             assert!((margins.crossover / crossover - 1.0).abs() < 2e-3, "{margins:?}");
             assert!((margins.phase - (math::FRAC_PI_2 - crossover * delay)).abs() < 2e-3, "{margins:?}");
@@ -170,18 +170,18 @@ mod tests {
 
     #[test]
     fn an_unstable_loop_has_less_than_no_margin() {
-        let plant = PlantModel { gain: 1.0, lag: 0.018, delay: 0.03, misfit: 0.0 };
+        let plant = PlantModel { gain: 1.0, lag: 0.018, delay: 0.03, ..PlantModel::default() };
         let margins = scan(&plant, &PidGains::proportional(60.0), 0.0).expect("it crosses one");
         assert!(margins.phase < 0.0, "{margins:?}");
         // It lags a whole turn and a third: from one point alone it would have 140 degrees.
-        let plant = PlantModel { gain: 1.0, lag: 0.0, delay: 0.05, misfit: 0.0 };
+        let plant = PlantModel { gain: 1.0, lag: 0.0, delay: 0.05, ..PlantModel::default() };
         let margins = scan(&plant, &PidGains::proportional(110.0), 0.0).expect("it crosses one");
         assert!(margins.phase < 0.0, "{margins:?}");
     }
 
     #[test]
     fn no_crossing_or_no_number_has_no_margins() {
-        let plant = PlantModel { gain: 1.0, lag: 0.0, delay: 0.01, misfit: 0.0 };
+        let plant = PlantModel { gain: 1.0, lag: 0.0, delay: 0.01, ..PlantModel::default() };
         assert_eq!(scan(&plant, &PidGains::proportional(1e-6), 0.0), None);
         assert_eq!(scan(&plant, &PidGains::proportional(f32::NAN), 0.0), None);
     }

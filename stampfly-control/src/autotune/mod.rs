@@ -9,7 +9,7 @@
 //! torque and rate it estimates the plant at eight frequencies ([`PlantPoint`]), fits gain, lag and delay ([`PlantModel`]), and looks for
 //! the quickest PID that keeps a phase and a gain margin ([`Margins`]) with both. It changes no gains: the [report](AutotuneReport) has
 //! the present and the proposed ones with their margins, and [`Autotune::accept`] hands the latter out once the vehicle is disarmed.
-//! It ends by itself in any case, at the latest after [`AutotuneConfig::time_limit`] and a second or two of computing.
+//! It ends by itself in any case, at the latest after [`AutotuneConfig::time_limit`] and three seconds of computing.
 //!
 //! Use it after a change of the airframe: another battery, a payload, other propellers. It needs a vehicle that hovers already, with
 //! gains that are within a [factor](AutotuneConfig::change_max) of the right ones; and a place with room around it, because nobody

@@ -52,6 +52,8 @@ message! {
         inertia: f32 ["kg*m^2"],
         /// Motor lag that was found.
         lag: f32 ["s"],
+        /// Lead that was found; zero for none.
+        lead: f32 ["s"],
         /// Delay that was found.
         delay: f32 ["s"],
     }
@@ -74,6 +76,7 @@ impl AutotuneStatus {
             crossover: [before.crossover, after.crossover],
             inertia: 1.0 / model.gain,
             lag: model.lag,
+            lead: model.lead,
             delay: model.delay,
         }
     }
@@ -127,7 +130,8 @@ impl core::fmt::Display for AutotuneStatus {
                 )?;
                 write!(f, "td {:.4}: {p1:.0} deg, x{g1:.1} at {w1:.0} rad/s; ", self.td)?;
                 let (lag, delay) = (1e3 * self.lag, 1e3 * self.delay);
-                write!(f, "inertia {:.3e} kg*m^2, motors {lag:.1} ms, delay {delay:.1} ms", self.inertia)
+                write!(f, "inertia {:.3e} kg*m^2, motors {lag:.1} ms, delay {delay:.1} ms", self.inertia)?;
+                if self.lead > 0.0 { write!(f, ", lead {:.1} ms", 1e3 * self.lead) } else { Ok(()) }
             }
         }
     }

@@ -191,6 +191,28 @@ fn a_yaw_loop_of_good_margins_gets_no_quicker_than_its_torque() {
     assert!((0.8..1.2).contains(&(report.proposed.kp / report.present.kp)), "{report:?}");
 }
 
+/// The torque of yaw comes from drag and, sooner, from what speeds the rotors up.
+#[test]
+fn heavy_rotors_lead_and_are_known_to() {
+    let axis = AutotuneAxis::Yaw;
+    let nominal = Plant::nominal(axis);
+    for (inertia, lead) in [(0.6, 0.05), (1.0, 0.03), (1.0, 0.06), (1.5, 0.05)] {
+        let plant = Plant { inertia: inertia * nominal.inertia, lead, ..nominal };
+        let (rig, report) = tuned(plant, axis, 2).expect("it is measured");
+        let (phase, gain, _) = true_margins(&plant, &report.proposed, rig.attitude_gain);
+        let model = report.model;
+        println!(
+            "Yaw inertia x{inertia}, lead {lead} s: found x{:.2}, lead {:.3} s, motors {:.1} ms; after {phase:.0} deg, {gain:.1} dB",
+            1.0 / (f64::from(model.gain) * nominal.inertia),
+            model.lead,
+            1e3 * model.lag
+        );
+        assert!((f64::from(model.gain) * plant.inertia - 1.0).abs() < 0.05, "{report:?}");
+        assert!((f64::from(model.lead) / lead - 1.0).abs() < 0.2, "{report:?}");
+        assert!(phase >= PHASE && gain >= GAIN, "{phase} deg, {gain} dB: {report:?}");
+    }
+}
+
 #[test]
 fn the_same_flight_gives_the_same_bits() {
     let plant = Plant { noise: 0.1, ..Plant::nominal(AutotuneAxis::Roll) };

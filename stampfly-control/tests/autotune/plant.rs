@@ -27,6 +27,8 @@ pub struct Plant {
     pub inertia: f64,
     /// Motor lag, s.
     pub lag: f64,
+    /// What a rotor's own inertia gives, s: torque while it speeds up.
+    pub lead: f64,
     /// From motion to its measurement, s; half a period of holding the torque comes on top.
     pub delay: f64,
     /// Standard deviation of the noise on the rate, rad/s.
@@ -39,7 +41,7 @@ impl Plant {
     /// The axis that the gains are for, a little noisy.
     pub fn nominal(axis: AutotuneAxis) -> Self {
         let inertia = f64::from(axis.of(&AIRFRAME.inertia));
-        Self { inertia, lag: f64::from(AIRFRAME.motor_lag), delay: 0.0045, noise: 0.03, gusts: 0.0 }
+        Self { inertia, lag: f64::from(AIRFRAME.motor_lag), lead: 0.0, delay: 0.0045, noise: 0.03, gusts: 0.0 }
     }
 
     /// Body rate over torque at an angular frequency, rad/s: real and imaginary part.
@@ -48,7 +50,9 @@ impl Plant {
         let half = 0.5 * frequency * DT;
         let magnitude = half.sin() / half / (self.inertia * frequency * (1.0 + (frequency * self.lag).powi(2)).sqrt());
         let angle = -half - frequency * self.delay - 0.5 * PI - (frequency * self.lag).atan();
-        (magnitude * angle.cos(), magnitude * angle.sin())
+        let (re, im) = (magnitude * angle.cos(), magnitude * angle.sin());
+        let lead = frequency * self.lead;
+        (re - lead * im, im + lead * re)
     }
 }
 
@@ -239,7 +243,9 @@ impl Rig {
             let off = self.rotors - torque;
             // Exact: the rotors approach the torque, and the rate is their integral.
             let impulse = torque * h + off * self.plant.lag * (1.0 - decay) + self.gust * h;
-            self.rotors = torque + off * decay;
+            let rotors = torque + off * decay;
+            let impulse = impulse + self.plant.lead * (rotors - self.rotors);
+            self.rotors = rotors;
             let before = self.rate;
             self.rate += impulse / self.plant.inertia;
             self.angle += 0.5 * (before + self.rate) * h;
