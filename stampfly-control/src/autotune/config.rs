@@ -15,7 +15,7 @@ const WINDOW_BANDWIDTHS: f32 = 2.0 * TILT_BANDWIDTH;
 const TILT_SHARE: f32 = 0.3;
 const YAW_SHARE: f32 = 0.4;
 /// Highest crossover over the bandwidth of the rule for an airframe. Yaw's stays: its torque is little, however good its margins.
-const TILT_QUICKEST: f32 = 1.6;
+const TILT_QUICKEST: f32 = 1.4;
 const YAW_QUICKEST: f32 = 1.0;
 
 /// Excitation, conditions and goals of an [`Autotune`](super::Autotune).
