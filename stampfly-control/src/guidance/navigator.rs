@@ -245,11 +245,16 @@ impl Navigator {
                 SetpointAxes::NONE
             }
             FlightPhase::TakeOff => self.take_off(entered, input, dt),
-            FlightPhase::Flying => self.fly(now, input, dt) | self.autotune,
+            FlightPhase::Flying => self.fly(now, input, dt) | self.tuning(input),
             FlightPhase::Landing => self.land(entered, input, dt),
             FlightPhase::Flip => self.hold(input, dt),
         };
         Setpoint { remaining: self.route.len() as u32, arrived: self.arrived, ..self.path.setpoint(axes) }
+    }
+
+    /// What to tune, while a program has authority: nobody tunes under a pilot's hands.
+    fn tuning(&self, input: &NavigatorInput<'_>) -> SetpointAxes {
+        if input.flight_status.commander == CommandSource::Guided { self.autotune } else { SetpointAxes::NONE }
     }
 
     fn accept_take_off(&mut self, command: &GuidedCommand) -> Result<(), Refusal> {

@@ -3,10 +3,11 @@
 use super::plant::{PERIOD, Plant, Rig};
 use proptest::prelude::*;
 use stampfly_control::autotune::{AcceptError, Autotune, AutotuneAxis, AutotuneConfig, AutotuneStage, AutotuneStop};
+use stampfly_control::guidance::{Navigator, NavigatorInput};
 use stampfly_control::pid::PidGains;
 use stampfly_types::messages::{
-    Alerts, CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected,
-    StateEstimate, Validity,
+    Alerts, CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, GuidedCommand,
+    GuidedKind, LandDetected, SetpointAxes, StateEstimate, Validity,
 };
 use stampfly_types::{Duration, Instant, Quat, Vec3};
 
@@ -218,6 +219,60 @@ fn gains_are_handed_out_once_and_on_the_ground() {
     assert_eq!(rig.autotune.accept(&landed), Ok((AXIS, proposed)));
     assert_eq!(rig.autotune.accept(&landed), Err(AcceptError::Nothing));
     assert!(rig.autotune.report().is_some(), "what was found, and the gains of before, can still be read");
+}
+
+/// Steps with a set-point that asks for `axes`.
+fn follow(rig: &mut Rig, axes: SetpointAxes, steps: u32) {
+    for _ in 0..steps {
+        let (gains, mut autotune) = (rig.gains, rig.autotune.clone());
+        autotune.follow(rig.now, axes, |_| gains, &rig.input(), &Vec3::zeros());
+        rig.autotune = autotune;
+        rig.now += PERIOD;
+    }
+}
+
+#[test]
+fn a_set_point_begins_it_and_ends_it() {
+    let stage = |rig: &Rig| (rig.autotune.stage(), rig.autotune.stopped(), rig.autotune.status().axis);
+    let mut rig = rig();
+    follow(&mut rig, SetpointAxes::YAW, 10);
+    assert_eq!(stage(&rig), (AutotuneStage::Idle, None, AutotuneAxis::Roll));
+    follow(&mut rig, SetpointAxes::YAW | SetpointAxes::AUTOTUNE_PITCH, 10);
+    assert_eq!(stage(&rig), (AutotuneStage::Exciting, None, AutotuneAxis::Pitch));
+    follow(&mut rig, SetpointAxes::AUTOTUNE_YAW, 10);
+    assert_eq!(stage(&rig), (AutotuneStage::Exciting, None, AutotuneAxis::Yaw));
+    follow(&mut rig, SetpointAxes::NONE, 1);
+    assert_eq!(stage(&rig), (AutotuneStage::Stopped, Some(AutotuneStop::Cancelled), AutotuneAxis::Yaw));
+    // Refused, and not tried again while the set-point asks for it.
+    rig.estimate.height = 0.1;
+    follow(&mut rig, SetpointAxes::AUTOTUNE_ROLL, 1);
+    rig.estimate.height = 1.0;
+    follow(&mut rig, SetpointAxes::AUTOTUNE_ROLL, 10);
+    assert_eq!(stage(&rig), (AutotuneStage::Stopped, Some(AutotuneStop::NotHovering), AutotuneAxis::Roll));
+}
+
+#[test]
+fn a_navigator_asks_for_it_while_a_program_flies() {
+    let mut navigator = Navigator::default();
+    let mut rig = rig();
+    let mut axes = |kind, commander| {
+        navigator.accept(&GuidedCommand { kind, ..GuidedCommand::default() }).expect("no place in it");
+        rig.now += PERIOD;
+        rig.flight_status.commander = commander;
+        let (flight_status, estimate) = (&rig.flight_status, &rig.estimate);
+        let input =
+            NavigatorInput { flight_status, estimate, land_detected: &rig.land_detected, command: &rig.command };
+        AutotuneAxis::asked(navigator.step(rig.now, &input).axes)
+    };
+    assert_eq!(axes(GuidedKind::AutotunePitch, CommandSource::Guided), Some(AutotuneAxis::Pitch));
+    assert_eq!(
+        axes(GuidedKind::None, CommandSource::Guided),
+        Some(AutotuneAxis::Pitch),
+        "a sign of life changes nothing"
+    );
+    assert_eq!(axes(GuidedKind::None, CommandSource::Pilot), None);
+    assert_eq!(axes(GuidedKind::AutotuneYaw, CommandSource::Guided), Some(AutotuneAxis::Yaw));
+    assert_eq!(axes(GuidedKind::Hold, CommandSource::Guided), None);
 }
 
 fn any_float() -> impl Strategy<Value = f32> {

@@ -40,7 +40,7 @@ impl Witness<Runnables> for Timing {
         let limit = f64::from(FailsafeConfig::default().impact);
         self.clock = clock;
         while self.seen + STEP <= clock {
-            self.seen = self.seen + STEP;
+            self.seen += STEP;
             if self.motors_on && self.world.motion_at(self.seen).specific_force.norm() > limit {
                 self.blow.get_or_insert(self.seen);
             }
