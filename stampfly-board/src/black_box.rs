@@ -58,6 +58,7 @@ fn rate(topic: usize) -> LogRate {
         Id::land_detected => LogRate::hertz(5),
         Id::setpoint => LogRate::hertz(10),
         Id::control_output => LogRate::hertz(10),
+        Id::autotune => LogRate::OnChange,
         Id::actuator_motor => LogRate::hertz(20),
         Id::signal => LogRate::Never,
         Id::telemetry => LogRate::Never,

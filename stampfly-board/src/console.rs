@@ -5,6 +5,7 @@
 //! | `pair`, `pair stop` | looks for a transmitter, stops looking |
 //! | `motor test N PERCENT` | turns one motor for [`TEST_TIME`], to see which one it is and which way it turns |
 //! | `motor stop` | stops it |
+//! | `autotune accept` | takes the gains that were found as parameters; `param save` keeps them |
 //!
 //! [`stampfly_flight::console::answer`] does the rest, and [`Command::publish`] carries them out.
 
@@ -13,7 +14,8 @@ use crate::topics::{COUNT, ConsoleEnds, Id, TOPICS};
 use crate::{VehicleConfig, schedule};
 use core::fmt;
 use stampfly_bus::TopicInfo;
-use stampfly_flight::console::{CommandError, SensorLine, Vehicle};
+use stampfly_control::autotune::AutotuneStatus;
+use stampfly_flight::console::{CommandError, SensorLine, Vehicle, list, refused};
 use stampfly_flight::newest::longest_message;
 use stampfly_flight::parameters::Parameters;
 use stampfly_flight::profile::Rows;
@@ -47,6 +49,8 @@ pub enum Command {
     },
     /// Stop the motor test.
     StopMotor,
+    /// Take the gains that were found as parameters.
+    AcceptGains,
 }
 
 impl Command {
@@ -63,6 +67,7 @@ impl Command {
             Self::StopMotor => {
                 ends.motor_test.publish(now, &MotorTest::default());
             }
+            Self::AcceptGains => {}
         }
     }
 }
@@ -98,6 +103,7 @@ pub struct Console<'c> {
 
 const PAIR: &str = "pair [stop]";
 const MOTOR: &str = "motor test N PERCENT | stop";
+const AUTOTUNE: &str = "autotune accept";
 
 impl Vehicle for Console<'_> {
     type Command = Command;
@@ -107,6 +113,7 @@ impl Vehicle for Console<'_> {
         ("pair stop", "stop looking"),
         ("motor test N PERCENT", "turn motor N (1 front right, 2 rear right, 3 rear left, 4 front left) for 2 s"),
         ("motor stop", "stop it"),
+        (AUTOTUNE, "take the gains that were found as parameters"),
     ];
     const TOPICS: &'static [TopicInfo] = &TOPICS;
 
@@ -137,6 +144,9 @@ impl Vehicle for Console<'_> {
         }
         if let Some((_, estimate)) = newest.get::<StateEstimate>(Id::estimate_state as usize) {
             write!(reply, "height   {:.2} m\r\n", estimate.height)?;
+        }
+        if let Some((_, tuned)) = newest.get::<AutotuneStatus>(Id::autotune as usize) {
+            write!(reply, "autotune {tuned}\r\n")?;
         }
         match newest.get::<PilotInput>(Id::command_pilot as usize) {
             Some((at, _)) => write!(reply, "pilot    heard {} ms ago\r\n", now.since(at).as_millis())?,
@@ -174,6 +184,8 @@ impl Vehicle for Console<'_> {
             }
             ["motor", "stop"] => Ok(Command::StopMotor),
             ["motor", ..] => Err(CommandError::Usage(MOTOR)),
+            ["autotune", "accept"] => Ok(Command::AcceptGains),
+            ["autotune", ..] => Err(CommandError::Usage(AUTOTUNE)),
             _ => Err(CommandError::Unknown),
         }
     }
@@ -192,33 +204,16 @@ impl Vehicle for Console<'_> {
                 return write!(reply, "from 0 to {} per cent\r\n", TEST_DUTY * 100.0).map(|()| None);
             }
         }
+        if command == Command::AcceptGains {
+            let tuned = self.newest.get::<AutotuneStatus>(Id::autotune as usize).map(|(_, tuned)| tuned);
+            let landed = self.is_armed() == Some(false);
+            let taken = landed && tuned.is_some_and(|tuned| tuned.accept(&mut self.config.cascade.rate));
+            return reply.write_str(if taken { "taken\r\n" } else { "nothing found, or armed\r\n" }).map(|()| None);
+        }
         Ok(Some(command))
     }
 
     fn needs_disarmed(request: &Command) -> bool {
         *request != Command::StopMotor
     }
-}
-
-/// The last time the vehicle did not arm although it was asked to, and why.
-fn refused(reply: &mut dyn fmt::Write, now: Instant, at: Instant, refusals: &ArmRefusals) -> fmt::Result {
-    write!(reply, "refused  {} times to arm, last {} s ago\r\n", refusals.attempts, now.since(at).as_millis() / 1_000)?;
-    let entries = refusals.check.iter().zip(&refusals.value).zip(&refusals.limit).zip(&refusals.since);
-    for (((check, value), limit), since) in entries.filter(|(((check, ..), _), _)| !check.is_empty()) {
-        reply.write_str("        ")?;
-        for name in check.names() {
-            write!(reply, " {name}")?;
-        }
-        if *limit != 0.0 {
-            write!(reply, " {value:.2}, limit {limit:.2},")?;
-        }
-        write!(reply, " for {} ms\r\n", at.since(*since).as_millis())?;
-    }
-    Ok(())
-}
-
-fn list(reply: &mut dyn fmt::Write, what: &str, mut names: impl Iterator<Item = &'static str>) -> fmt::Result {
-    write!(reply, "{what:<9}{}", names.next().unwrap_or("none"))?;
-    names.try_for_each(|name| write!(reply, " {name}"))?;
-    reply.write_str("\r\n")
 }

@@ -6,8 +6,7 @@
 //! name.
 
 use crate::config::{ControllerKind, EstimatorKind, VehicleConfig};
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
-use stampfly_types::Duration;
+use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters, Value};
 
 /// The name in flash of the transmitter the vehicle is paired with: the six bytes of its address as one value, so that a
 /// power cut cannot leave half of an address.
@@ -19,33 +18,6 @@ struct Line {
     get: fn(&VehicleConfig) -> f32,
     /// Refuses a number that is no value of the field.
     set: fn(&mut VehicleConfig, f32) -> Option<()>,
-}
-
-/// What a parameter can be: a number, a time in seconds, or one of several kinds by its number.
-trait Value: Copy {
-    fn number(self) -> f32;
-    fn from_number(number: f32) -> Option<Self>;
-}
-
-impl Value for f32 {
-    fn number(self) -> f32 {
-        self
-    }
-    fn from_number(number: f32) -> Option<Self> {
-        Some(number)
-    }
-}
-
-/// Whole microseconds. A time comes back exactly: up to 16 seconds every microsecond has a number of its own, and above that
-/// a number is always the same time.
-impl Value for Duration {
-    fn number(self) -> f32 {
-        // Not `seconds`, which is off by one in the last place for some.
-        self.seconds_f64() as f32
-    }
-    fn from_number(number: f32) -> Option<Self> {
-        Some(Self::from_seconds(number))
-    }
 }
 
 macro_rules! kinds {
@@ -251,6 +223,7 @@ impl Parameters for VehicleConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_types::Duration;
     use std::vec::Vec;
 
     #[test]

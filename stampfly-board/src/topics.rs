@@ -5,6 +5,7 @@
 //! `docs/topics.md` and `stampfly topics` are printed from this table.
 
 use crate::messages::*;
+use stampfly_control::autotune::AutotuneStatus;
 use stampfly_types::messages::*;
 
 stampfly_bus::topics! {
@@ -55,7 +56,7 @@ stampfly_bus::topics! {
 
     // Decisions.
     /// Conditions the failsafe has found.
-    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, command, notification, telemetry];
+    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, command, control, notification, telemetry];
     /// State, mode, armed.
     flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
     /// Why the vehicle did not arm when it was asked to; for people.
@@ -90,4 +91,6 @@ stampfly_bus::topics! {
     restart_request: RestartRequest = latest @ on event from mode => [supervisor];
     /// Has the cut-off stopped the motors?
     cutoff_state: CutoffState = latest @ on event from cutoff => [mode];
+    /// What tuning a rate loop has found.
+    autotune: AutotuneStatus = latest @ on event from control => [];
 }

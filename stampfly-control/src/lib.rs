@@ -12,6 +12,7 @@
 //!   [`position`] and [`altitude`]), the same around [`indi`], and [`geometric`] fit it; [`intent`] tells all of them what the
 //!   flight mode and the estimator's validity ask for;
 //! * [`flip`]: turning over once, for as long as it takes in place of the controller;
+//! * [`autotune`]: measuring the vehicle in flight, and the rate loop's gains that follow;
 //! * [`airframe`]: the vehicle as a value, from which mixer, controllers and motor stage are configured;
 //! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry;
 //! * [`motor`] and [`curve`]: thrust to duty;
@@ -31,6 +32,7 @@ extern crate std;
 pub mod airframe;
 pub mod altitude;
 pub mod attitude;
+pub mod autotune;
 pub mod cascade;
 pub mod controller;
 pub mod curve;
@@ -51,6 +53,7 @@ mod answer;
 mod bound;
 
 pub use airframe::{Airframe, Rotor, Spin};
+pub use autotune::Autotune;
 pub use cascade::{CascadeConfig, CascadeController, StickConfig};
 pub use controller::{ControlInput, Controller};
 pub use curve::MotorCurve;

@@ -4,6 +4,7 @@
 //! [`find`] and [`set`] do the rest. Not for runnables: they are configured once, when the vehicle is assembled.
 
 use core::fmt;
+use stampfly_types::Duration;
 
 /// What is known about a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +60,42 @@ pub trait Parameters {
     /// # Errors
     /// When there is no such parameter or it does not take the value; it is unchanged then.
     fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError>;
+}
+
+/// What a parameter can be: a number, a time in seconds, or one of several kinds by its number.
+///
+/// ```
+/// use stampfly_flight::parameters::Value;
+/// use stampfly_types::Duration;
+/// assert_eq!(Duration::from_number(0.5), Some(Duration::from_millis(500)));
+/// assert_eq!(Duration::from_millis(500).number(), 0.5);
+/// ```
+pub trait Value: Copy {
+    /// The number that stands for it.
+    fn number(self) -> f32;
+    /// What a number stands for, if it does.
+    fn from_number(number: f32) -> Option<Self>;
+}
+
+impl Value for f32 {
+    fn number(self) -> f32 {
+        self
+    }
+    fn from_number(number: f32) -> Option<Self> {
+        Some(number)
+    }
+}
+
+/// Whole microseconds. A time comes back exactly: up to 16 seconds every microsecond has a number of its own, and above that
+/// a number is always the same time.
+impl Value for Duration {
+    fn number(self) -> f32 {
+        // Not `seconds`, which is off by one in the last place for some.
+        self.seconds_f64() as f32
+    }
+    fn from_number(number: f32) -> Option<Self> {
+        Some(Self::from_seconds(number))
+    }
 }
 
 /// The number of the parameter of this name.

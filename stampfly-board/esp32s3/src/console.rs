@@ -149,6 +149,8 @@ impl Console {
                         Command::Pair(true) => "looking for a transmitter\r\n",
                         Command::TestMotor { .. } => "turning for two seconds\r\n",
                         Command::Pair(false) | Command::StopMotor => "stopped\r\n",
+                        // Its answer has been given.
+                        Command::AcceptGains => "",
                     })
                     .await;
             }

@@ -5,10 +5,14 @@ use crate::airframe::AIRFRAME;
 use crate::config::{ControllerKind, VehicleConfig};
 use crate::topics::ControlEnds;
 use stampfly_bus::{Activation, Runnable};
+use stampfly_control::autotune::{AutotuneAxis, AutotuneInput, AutotuneStatus};
 use stampfly_control::indi::IndiRate;
+use stampfly_control::rate::RateConfig;
 use stampfly_control::{
-    CascadeController, ControlInput, Controller, FlipConfig, FlipController, GeometricController, IndiController,
+    Autotune, CascadeController, ControlInput, Controller, FlipConfig, FlipController, GeometricController,
+    IndiController, PidGains,
 };
+use stampfly_types::messages::ControlOutput;
 
 /// The controllers this vehicle can be told to use (`controller.type`).
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +31,11 @@ pub struct Control {
     controller: Choice,
     /// Flies in its place while the vehicle turns over.
     flip: FlipController,
+    /// Measures a rate loop when it is asked to, and what was told of it last.
+    autotune: Autotune,
+    told: AutotuneStatus,
+    /// The gains that the cascade flies with.
+    rate: RateConfig,
 }
 
 impl Control {
@@ -40,7 +49,13 @@ impl Control {
             }
             ControllerKind::Cascade => Choice::Cascade(CascadeController::new(&config.cascade)),
         };
-        Self { controller, flip: FlipController::new(&FlipConfig::for_airframe(&AIRFRAME), &config.indi) }
+        Self {
+            controller,
+            flip: FlipController::new(&FlipConfig::for_airframe(&AIRFRAME), &config.indi),
+            autotune: Autotune::for_airframe(&AIRFRAME),
+            told: AutotuneStatus::default(),
+            rate: config.cascade.rate,
+        }
     }
 }
 
@@ -69,6 +84,14 @@ impl Runnable for Control {
             Choice::Geometric(controller) => controller.step(now, &input),
             Choice::Indi(controller) => controller.step(now, &input),
         };
-        ends.control_output.publish(now, &output);
+        let conditions = AutotuneInput::of(&input, ends.system_alert.get().active);
+        let tunes = matches!(self.controller, Choice::Cascade(_));
+        let present = |axis: AutotuneAxis| if tunes { axis.gains(&self.rate) } else { PidGains::proportional(0.0) };
+        let torque = self.autotune.follow(now, input.setpoint.axes, present, &conditions, &output.torque);
+        ends.control_output.publish(now, &ControlOutput { torque, ..output });
+        let status = self.autotune.status();
+        if core::mem::replace(&mut self.told, status) != status {
+            ends.autotune.publish(now, &status);
+        }
     }
 }

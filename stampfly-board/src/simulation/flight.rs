@@ -230,6 +230,7 @@ impl vehicle::Around for Around<'_> {
         Outcome {
             metrics: watch.collector.finish(),
             phases: watch.phases,
+            tuned: watch.tuned,
             finished: self.progress.finished.get(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),

@@ -5,7 +5,9 @@
 
 use super::mission::{LONGEST_LEG, Mission, Step};
 use super::radio::Radio;
+use crate::airframe::AIRFRAME;
 use crate::messages::TelemetryFrame;
+use stampfly_control::autotune::{AutotuneAxis, AutotuneConfig};
 use stampfly_types::messages::{FlightPhase, FlipDirection, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Vec3};
 use std::cell::Cell;
@@ -17,6 +19,9 @@ const LIFE_DIVIDER: u32 = 5;
 
 /// Looks after which telemetry surely knows of a command.
 const ROUND_TRIP: u32 = 4;
+
+/// What an autotune takes to compute its result, at most.
+const COMPUTING: Duration = Duration::from_secs(4);
 
 /// What the ground station reports about itself.
 #[derive(Debug, Default)]
@@ -121,6 +126,18 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
                     link.look().await;
                 }
                 link.wait_awhile_for(|frame| frame.phase != FlightPhase::Flip).await;
+            }
+            Step::Autotune { axis } => {
+                let kind = match axis {
+                    AutotuneAxis::Roll => GuidedKind::AutotuneRoll,
+                    AutotuneAxis::Pitch => GuidedKind::AutotunePitch,
+                    AutotuneAxis::Yaw => GuidedKind::AutotuneYaw,
+                };
+                link.send(GuidedCommand { kind, ..Default::default() }).await;
+                // Telemetry says nothing of it.
+                let longest = AutotuneConfig::for_airframe(&AIRFRAME, axis).time_limit + COMPUTING;
+                link.wait(longest).await;
+                link.send(GuidedCommand { kind: GuidedKind::Hold, ..Default::default() }).await;
             }
             Step::Land => {
                 link.send(GuidedCommand { kind: GuidedKind::Land, ..Default::default() }).await;

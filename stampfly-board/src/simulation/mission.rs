@@ -7,6 +7,7 @@
 //! goto NORTH EAST HEIGHT [yaw DEGREES] [speed M/S] [dwell SECONDS]
 //! hover SECONDS
 //! flip left|right|forward|back
+//! autotune roll|pitch|yaw
 //! land
 //! ```
 //!
@@ -14,9 +15,10 @@
 //!
 //! Positions are metres from the take-off spot, heights above it. A step begins when the one before is done: `arm` when
 //! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `flip` when it
-//! flies on, `land` when it stands
+//! flies on, `autotune` when its time is over, `land` when it stands
 //! and is disarmed. A place that cannot be reached is given up after [`LONGEST_LEG`].
 
+use stampfly_control::autotune::AutotuneAxis;
 use stampfly_sim::Noise;
 use stampfly_types::Duration;
 use stampfly_types::messages::FlipDirection;
@@ -59,6 +61,11 @@ pub enum Step {
     Flip {
         /// Which way.
         direction: FlipDirection,
+    },
+    /// Measure a rate loop, from a hover.
+    Autotune {
+        /// Which one.
+        axis: AutotuneAxis,
     },
     /// Land and disarm.
     Land,
@@ -177,6 +184,10 @@ impl fmt::Display for Step {
                 let (name, _) = DIRECTIONS.iter().find(|(_, known)| *known == direction).unwrap_or(&DIRECTIONS[0]);
                 write!(f, "flip {name}")
             }
+            Self::Autotune { axis } => {
+                let (name, _) = AXES.iter().find(|(_, known)| *known == axis).unwrap_or(&AXES[0]);
+                write!(f, "autotune {name}")
+            }
             Self::Land => f.write_str("land"),
         }
     }
@@ -200,6 +211,16 @@ const DIRECTIONS: [(&str, FlipDirection); 4] = [
     ("back", FlipDirection::Back),
 ];
 
+/// Words for the axes.
+const AXES: [(&str, AutotuneAxis); 3] =
+    [("roll", AutotuneAxis::Roll), ("pitch", AutotuneAxis::Pitch), ("yaw", AutotuneAxis::Yaw)];
+
+fn axis(word: Option<&&str>) -> Result<AutotuneAxis, String> {
+    let word = word.ok_or("axis is missing")?;
+    let known = AXES.iter().find(|(name, _)| name == word);
+    known.map(|(_, axis)| *axis).ok_or_else(|| format!("'{word}' is none of roll, pitch, yaw"))
+}
+
 fn direction(word: Option<&&str>) -> Result<FlipDirection, String> {
     let word = word.ok_or("direction is missing")?;
     let known = DIRECTIONS.iter().find(|(name, _)| name == word);
@@ -220,8 +241,11 @@ fn parse_step(verb: &str, arguments: &[&str]) -> Result<Step, String> {
         "takeoff" => (Step::TakeOff { height: number(arguments.first(), "height", 0.1..=10.0)? }, 1),
         "hover" => (Step::Hover { seconds: number(arguments.first(), "seconds", 0.0..=3600.0)? }, 1),
         "flip" => (Step::Flip { direction: direction(arguments.first())? }, 1),
+        "autotune" => (Step::Autotune { axis: axis(arguments.first())? }, 1),
         "goto" => return parse_goto(arguments),
-        other => return Err(format!("'{other}' is no step; steps are arm, takeoff, goto, hover, flip, land")),
+        other => {
+            return Err(format!("'{other}' is no step; steps are arm, takeoff, goto, hover, flip, autotune, land"));
+        }
     };
     match arguments.get(used) {
         Some(extra) => Err(format!("'{extra}' is too much")),
@@ -268,7 +292,7 @@ mod tests {
             let mission = Mission::random(seed);
             assert_eq!(Mission::parse(&mission.to_string()), Ok(mission));
         }
-        let text = "arm; takeoff 0.5; goto 1 0 0.5 yaw 90 speed 0.5 dwell 1; hover 2; flip back; land";
+        let text = "arm; takeoff 0.5; goto 1 0 0.5 yaw 90 speed 0.5 dwell 1; hover 2; flip back; autotune yaw; land";
         assert_eq!(Mission::parse(text).expect("a mission").to_string(), text);
     }
 
@@ -277,7 +301,7 @@ mod tests {
         let message = |text: &str| Mission::parse(text).expect_err("a mistake").to_string();
         assert_eq!(
             message("arm\n\nfly 3"),
-            "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, flip, land"
+            "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, flip, autotune, land"
         );
         assert_eq!(message("takeoff"), "line 1: height is missing");
         assert_eq!(message("takeoff NaN"), "line 1: height: NaN is not from 0.1 to 10");

@@ -3,6 +3,7 @@
 use super::judge::Judgement;
 use super::metrics::{FIGURES, Metrics};
 use serde::Serialize;
+use stampfly_control::autotune::AutotuneStatus;
 use stampfly_sim::vehicle::{Figure, Verdict};
 use stampfly_types::Instant;
 use stampfly_types::messages::{FlightMode, FlightPhase};
@@ -28,6 +29,8 @@ pub struct Outcome {
     pub metrics: Metrics,
     /// States and modes, in order.
     pub phases: Vec<PhaseChange>,
+    /// What was told of tuning, and when.
+    pub tuned: Vec<(Instant, AutotuneStatus)>,
     /// Was the mission flown to its end?
     pub finished: bool,
     /// Largest true tilt, degrees.
@@ -127,7 +130,8 @@ impl Outcome {
             let until = span.until.map(|until| format!(" until {until:.3} s")).unwrap_or_default();
             (span.since, format!("alert {}{until}", span.name))
         });
-        phases.extend(faults.chain(alerts));
+        let tuned = self.tuned.iter().map(|(at, status)| (at.seconds_f64(), format!("autotune {status}")));
+        phases.extend(faults.chain(alerts).chain(tuned));
         phases
     }
 }

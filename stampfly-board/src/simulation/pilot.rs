@@ -169,7 +169,7 @@ impl<'b> Pilot<'b> {
                 }
                 Step::Hover { seconds } => self.keep(Aim::Be(place), Duration::from_seconds(seconds)).await,
                 // No switch of a transmitter asks for it.
-                Step::Flip { .. } => {}
+                Step::Flip { .. } | Step::Autotune { .. } => {}
                 Step::Land => self.land(place).await,
             }
             progress.done.set(progress.done.get() + 1);

@@ -4,6 +4,7 @@ use super::home::Home;
 use super::metrics::{Collector, Snapshot};
 use super::outcome::PhaseChange;
 use crate::topics::Id;
+use stampfly_control::autotune::AutotuneStatus;
 use stampfly_flight::newest::message;
 use stampfly_sim::Truth;
 use stampfly_types::messages::{FlightStatus, Setpoint, StateEstimate};
@@ -17,6 +18,8 @@ pub(super) struct Watch {
     estimate: StateEstimate,
     pub mode: FlightStatus,
     pub phases: Vec<PhaseChange>,
+    /// What was told of tuning, and when.
+    pub tuned: Vec<(Instant, AutotuneStatus)>,
     pub worst_tilt: f32,
     pub battery: Option<[f32; 2]>,
     pub home: Home,
@@ -33,6 +36,7 @@ impl Watch {
             estimate: StateEstimate::default(),
             mode: FlightStatus::default(),
             phases: Vec::new(),
+            tuned: Vec::new(),
             worst_tilt: 0.0,
             battery: None,
             home,
@@ -56,6 +60,7 @@ impl Watch {
                     self.phases.push(PhaseChange { since: at, phase, mode });
                 }
             }
+            Id::autotune => self.tuned.extend(message(words).map(|status| (at, status))),
             _ => {}
         }
     }

@@ -3,6 +3,7 @@
 use stampfly_board::console::{Command, Console, Newest, Profile};
 use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, schedule};
+use stampfly_control::autotune::{AutotuneAxis, AutotuneStage, AutotuneStatus};
 use stampfly_flight::console::{Request, answer};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert,
@@ -111,4 +112,41 @@ fn everything_in_the_help_is_understood() {
         let (said, _) = ask(&vehicle(Some(false)), &example);
         assert!(!said.contains("usage") && !said.contains("no such command"), "{example}: {said}");
     }
+}
+
+#[test]
+fn gains_that_were_found_are_taken_as_parameters_on_the_ground() {
+    let found = AutotuneStatus {
+        axis: AutotuneAxis::Pitch,
+        stage: AutotuneStage::Done,
+        kp: 7e-4,
+        ti: 0.3,
+        td: 0.02,
+        ..AutotuneStatus::default()
+    };
+    let mut newest = vehicle(Some(false));
+    assert!(!ask(&newest, "status").0.contains("autotune"));
+    newest.note(Id::autotune as usize, Instant::ZERO, &found.to_words());
+    assert!(ask(&newest, "status").0.contains("autotune Pitch: margins"));
+    let taken = |newest: &Newest| {
+        let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
+        let mut console = Console { version: "1", newest, sensors: &[], profile: &profile, config: &mut config };
+        let mut reply = String::new();
+        let request = answer("autotune accept", Instant::from_secs(5), &mut console, &mut reply);
+        assert_eq!(request, Ok(Request::Nothing), "{reply}");
+        config.cascade.rate
+    };
+    let default = VehicleConfig::default().cascade.rate;
+    let pitch = taken(&newest).pitch;
+    assert_eq!((pitch.kp, pitch.ti, pitch.td, pitch.eta), (7e-4, 0.3, 0.02, default.pitch.eta));
+    assert_eq!(taken(&newest).roll, default.roll);
+    for armed in [None, Some(true)] {
+        let mut newest = vehicle(armed);
+        newest.note(Id::autotune as usize, Instant::ZERO, &found.to_words());
+        assert_eq!(taken(&newest), default, "{armed:?}");
+    }
+    let stopped = AutotuneStatus { stage: AutotuneStage::Stopped, ..found };
+    newest.note(Id::autotune as usize, Instant::ZERO, &stopped.to_words());
+    assert_eq!(taken(&newest), default);
+    assert!(ask(&newest, "autotune").0.contains("autotune accept"));
 }

@@ -16,6 +16,7 @@
 //! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it; when the pilot centres the
 //! sticks meanwhile, the path jumps to the vehicle.
 
+use crate::autotune::AutotuneAxis;
 use stampfly_types::messages::{
     CommandSetpoint, CommandSource, FlightMode, FlightPhase, FlightStatus, FlipDirection, GuidedCommand, GuidedKind,
     LandDetected, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
@@ -137,6 +138,8 @@ pub struct Navigator {
     take_off: GuidedCommand,
     /// Which way to turn over, as it was asked for last.
     flip: Option<FlipDirection>,
+    /// Which rate loop to tune; nothing, or one flag.
+    autotune: SetpointAxes,
     /// Height reference: where the vehicle last stood.
     ground: f32,
     phase: FlightPhase,
@@ -169,6 +172,7 @@ impl Navigator {
             arrived: false,
             take_off: GuidedCommand::default(),
             flip: None,
+            autotune: SetpointAxes::NONE,
             ground: 0.0,
             phase: FlightPhase::Init,
             mode: FlightMode::default(),
@@ -184,7 +188,11 @@ impl Navigator {
     /// # Errors
     /// Gives the command back when the route is full or a number is none; [`Self::refused`] counts them.
     pub fn accept(&mut self, command: &GuidedCommand) -> Result<(), Refused> {
+        if command.kind != GuidedKind::None {
+            self.autotune = AutotuneAxis::commanded(command.kind).map_or(SetpointAxes::NONE, AutotuneAxis::flag);
+        }
         let taken = match command.kind {
+            GuidedKind::AutotuneRoll | GuidedKind::AutotunePitch | GuidedKind::AutotuneYaw => Ok(()),
             GuidedKind::None | GuidedKind::Arm | GuidedKind::Disarm | GuidedKind::Kill => Ok(()),
             GuidedKind::FlipLeft | GuidedKind::FlipRight | GuidedKind::FlipForward | GuidedKind::FlipBack => {
                 self.flip = command.kind.flip();
@@ -237,11 +245,16 @@ impl Navigator {
                 SetpointAxes::NONE
             }
             FlightPhase::TakeOff => self.take_off(entered, input, dt),
-            FlightPhase::Flying => self.fly(now, input, dt),
+            FlightPhase::Flying => self.fly(now, input, dt) | self.tuning(input),
             FlightPhase::Landing => self.land(entered, input, dt),
             FlightPhase::Flip => self.hold(input, dt),
         };
         Setpoint { remaining: self.route.len() as u32, arrived: self.arrived, ..self.path.setpoint(axes) }
+    }
+
+    /// What to tune, while a program has authority: nobody tunes under a pilot's hands.
+    fn tuning(&self, input: &NavigatorInput<'_>) -> SetpointAxes {
+        if input.flight_status.commander == CommandSource::Guided { self.autotune } else { SetpointAxes::NONE }
     }
 
     fn accept_take_off(&mut self, command: &GuidedCommand) -> Result<(), Refusal> {

@@ -15,6 +15,7 @@ mod answer;
 mod command;
 mod error;
 mod line_editor;
+mod lines;
 mod piece;
 mod vehicle;
 
@@ -22,5 +23,6 @@ pub use answer::{Request, answer};
 pub use command::{COMMANDS, Command};
 pub use error::{CommandError, MAX_WORDS};
 pub use line_editor::LineEditor;
+pub use lines::{list, refused};
 pub use piece::Piece;
 pub use vehicle::{SensorLine, Vehicle};

@@ -27,6 +27,7 @@ mod rover;
 mod safety_mode;
 mod safety_sensors;
 mod swap;
+mod tunes;
 
 /// How many flights of each kind somebody wants who has more time: the variable `FLIGHTS`.
 fn flights() -> Option<u64> {

@@ -93,6 +93,12 @@ message_enum! {
         FlipForward = 10,
         /// Turn over once backward, nose up.
         FlipBack = 11,
+        /// Tune the roll rate loop, from a hover; any other command ends it.
+        AutotuneRoll = 12,
+        /// Tune the pitch rate loop.
+        AutotunePitch = 13,
+        /// Tune the yaw rate loop.
+        AutotuneYaw = 14,
     }
 }
 
@@ -133,7 +139,10 @@ impl GuidedKind {
             | Self::WayPoint
             | Self::Hold
             | Self::Land
-            | Self::Kill => None,
+            | Self::Kill
+            | Self::AutotuneRoll
+            | Self::AutotunePitch
+            | Self::AutotuneYaw => None,
         }
     }
 }
@@ -222,6 +231,12 @@ message_flags! {
         FLIP_FORWARD = 8,
         /// Turn over once backward.
         FLIP_BACK = 9,
+        /// Tune the roll rate loop, while in [`FlightPhase::Flying`](super::FlightPhase::Flying).
+        AUTOTUNE_ROLL = 10,
+        /// Tune the pitch rate loop.
+        AUTOTUNE_PITCH = 11,
+        /// Tune the yaw rate loop.
+        AUTOTUNE_YAW = 12,
     }
 }
 

@@ -17,7 +17,12 @@ impl Course {
     pub fn new(mission: &Mission) -> Self {
         let places = mission.steps.iter().filter_map(|step| match *step {
             Step::GoTo { place: [north, east, _], .. } => Some(([north, east], false)),
-            Step::Arm | Step::TakeOff { .. } | Step::Hover { .. } | Step::Flip { .. } | Step::Land => None,
+            Step::Arm
+            | Step::TakeOff { .. }
+            | Step::Hover { .. }
+            | Step::Flip { .. }
+            | Step::Autotune { .. }
+            | Step::Land => None,
         });
         Self { steps: mission.steps.clone(), places: places.collect() }
     }
@@ -52,7 +57,7 @@ impl Course {
                     beside = beside.min(distance([place.x, place.y], corner, [north, east]));
                     corner = [north, east];
                 }
-                Step::Arm | Step::Hover { .. } | Step::Flip { .. } | Step::Land => {}
+                Step::Arm | Step::Hover { .. } | Step::Flip { .. } | Step::Autotune { .. } | Step::Land => {}
             }
         }
         (top, beside)
