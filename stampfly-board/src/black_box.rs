@@ -83,7 +83,7 @@ fn armed(topic: usize, words: &[u32]) -> Option<bool> {
 /// use stampfly_board::{VehicleConfig, black_box};
 /// use stampfly_log::ulog::Ram;
 /// use stampfly_types::Instant;
-/// let mut memory = [0; 16_384];
+/// let mut memory = [0; 20_480];
 /// let log = black_box::open(Ram::new(&mut memory), Instant::ZERO, &VehicleConfig::default(), "1.0")?;
 /// assert!(log.sink().written().starts_with(b"ULog"));
 /// # Ok::<(), stampfly_log::ulog::WriteError<stampfly_log::ulog::Full>>(())
