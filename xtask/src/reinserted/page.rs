@@ -18,7 +18,7 @@ pub fn table(bugs: &[Bug]) -> String {
         let _ = writeln!(text, "| {name} | {} | {} | `{flight}` | {ends} |", cell(source), cell(what));
     }
     if !missed.is_empty() {
-        text += "\nNot found, in the flights of the campaign whose faults could show it:\n";
+        text += "\nNot found:\n";
         text += "\n| bug | met in | what is wrong | flights |\n|---|---|---|---|\n";
         for Bug { name, source, what, missed, .. } in missed {
             let why = missed.as_deref().unwrap_or("not looked into");
