@@ -5,7 +5,7 @@ use crate::airframe::AIRFRAME;
 use crate::config::{ControllerKind, VehicleConfig};
 use crate::topics::ControlEnds;
 use stampfly_bus::{Activation, Runnable};
-use stampfly_control::autotune::{AutotuneAxis, AutotuneInput, AutotuneStatus};
+use stampfly_control::autotune::{AutotuneAxis, AutotuneInput};
 use stampfly_control::indi::IndiRate;
 use stampfly_control::rate::RateConfig;
 use stampfly_control::{
@@ -31,9 +31,8 @@ pub struct Control {
     controller: Choice,
     /// Flies in its place while the vehicle turns over.
     flip: FlipController,
-    /// Measures a rate loop when it is asked to, and what was told of it last.
+    /// Measures a rate loop when it is asked to.
     autotune: Autotune,
-    told: AutotuneStatus,
     /// The gains that the cascade flies with.
     rate: RateConfig,
 }
@@ -53,7 +52,6 @@ impl Control {
             controller,
             flip: FlipController::new(&FlipConfig::for_airframe(&AIRFRAME), &config.indi),
             autotune: Autotune::for_airframe(&AIRFRAME),
-            told: AutotuneStatus::default(),
             rate: config.cascade.rate,
         }
     }
@@ -89,8 +87,7 @@ impl Runnable for Control {
         let present = |axis: AutotuneAxis| if tunes { axis.gains(&self.rate) } else { PidGains::proportional(0.0) };
         let torque = self.autotune.follow(now, input.setpoint.axes, present, &conditions, &output.torque);
         ends.control_output.publish(now, &ControlOutput { torque, ..output });
-        let status = self.autotune.status();
-        if core::mem::replace(&mut self.told, status) != status {
+        if let Some(status) = self.autotune.news() {
             ends.autotune.publish(now, &status);
         }
     }

@@ -115,6 +115,8 @@ pub struct Autotune {
     axis: AutotuneAxis,
     present: PidGains,
     state: State,
+    /// Has the status changed since it was last asked for?
+    news: bool,
     /// What the set-point asked for in the period before.
     asked: Option<AutotuneAxis>,
 }
@@ -131,7 +133,7 @@ impl Autotune {
     #[must_use]
     pub fn new([roll, pitch, yaw]: [AutotuneConfig; 3]) -> Self {
         let present = PidGains::proportional(0.0);
-        Self { roll, pitch, yaw, axis: AutotuneAxis::Roll, present, state: State::Idle, asked: None }
+        Self { roll, pitch, yaw, axis: AutotuneAxis::Roll, present, state: State::Idle, news: false, asked: None }
     }
 
     /// Begins with an axis whose loop has these gains. What was found before and not accepted is forgotten.
@@ -145,7 +147,7 @@ impl Autotune {
         present: PidGains,
         input: &AutotuneInput<'_>,
     ) -> Result<(), AutotuneStop> {
-        if matches!(self.stage(), AutotuneStage::Exciting | AutotuneStage::Computing) {
+        if self.is_active() {
             return Err(AutotuneStop::Busy);
         }
         let positive = present.kp > 0.0 && [present.kp, present.td, present.eta].iter().all(|gain| gain.is_finite());
@@ -153,7 +155,8 @@ impl Autotune {
             return Err(AutotuneStop::Bounds);
         }
         watch::check(self.config(axis), input)?;
-        (self.axis, self.present, self.state) = (axis, present, State::Exciting(Measurement::new(now)));
+        (self.axis, self.present) = (axis, present);
+        self.turn_to(State::Exciting(Measurement::new(now)));
         Ok(())
     }
 
@@ -165,6 +168,10 @@ impl Autotune {
     /// * The excitation never takes the torque beyond [`AutotuneConfig::torque_max`].
     pub fn step(&mut self, now: Instant, input: &AutotuneInput<'_>, torque: &Vec3) -> Vec3 {
         let mut result = *torque;
+        // Nearly always: what a vehicle that tunes nothing pays for it.
+        if !self.is_active() {
+            return result;
+        }
         let config = *self.config(self.axis);
         let next = match &mut self.state {
             State::Exciting(measurement) => match excite(measurement, &config, self.axis, now, input, torque) {
@@ -188,7 +195,7 @@ impl Autotune {
             State::Idle | State::Done { .. } | State::Stopped(_) => None,
         };
         if let Some(next) = next {
-            self.state = next;
+            self.turn_to(next);
         }
         result
     }
@@ -210,7 +217,8 @@ impl Autotune {
             if let Some(axis) = asked
                 && let Err(stop) = self.start(now, axis, present(axis), input)
             {
-                (self.axis, self.state) = (axis, State::Stopped(stop));
+                self.axis = axis;
+                self.turn_to(State::Stopped(stop));
             }
         }
         self.step(now, input, torque)
@@ -218,9 +226,17 @@ impl Autotune {
 
     /// Ends it, wherever it is. A result that is there already stays.
     pub fn cancel(&mut self) {
-        if matches!(self.stage(), AutotuneStage::Exciting | AutotuneStage::Computing) {
-            self.state = State::Stopped(AutotuneStop::Cancelled);
+        if self.is_active() {
+            self.turn_to(State::Stopped(AutotuneStop::Cancelled));
         }
+    }
+
+    fn turn_to(&mut self, state: State) {
+        (self.state, self.news) = (state, true);
+    }
+
+    const fn is_active(&self) -> bool {
+        matches!(self.state, State::Exciting(_) | State::Fitting(..) | State::Searching(..))
     }
 
     /// Hands out the proposed gains, once: whoever accepts them puts them where the rate loop has its own.
@@ -268,6 +284,11 @@ impl Autotune {
         let stop = self.stopped().unwrap_or_default();
         let (axis, stage) = (self.axis, self.stage());
         self.report().map_or(AutotuneStatus { axis, stage, stop, ..AutotuneStatus::default() }, AutotuneStatus::of)
+    }
+
+    /// The [status](Self::status), once after each of its changes.
+    pub fn news(&mut self) -> Option<AutotuneStatus> {
+        core::mem::take(&mut self.news).then(|| self.status())
     }
 
     /// The configuration of an axis.

@@ -239,6 +239,8 @@ fn a_set_point_begins_it_and_ends_it() {
     assert_eq!(stage(&rig), (AutotuneStage::Idle, None, AutotuneAxis::Roll));
     follow(&mut rig, SetpointAxes::YAW | SetpointAxes::AUTOTUNE_PITCH, 10);
     assert_eq!(stage(&rig), (AutotuneStage::Exciting, None, AutotuneAxis::Pitch));
+    assert_eq!(rig.autotune.news(), Some(rig.autotune.status()));
+    assert_eq!(rig.autotune.news(), None, "told once");
     follow(&mut rig, SetpointAxes::AUTOTUNE_YAW, 10);
     assert_eq!(stage(&rig), (AutotuneStage::Exciting, None, AutotuneAxis::Yaw));
     follow(&mut rig, SetpointAxes::NONE, 1);
