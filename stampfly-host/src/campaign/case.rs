@@ -4,7 +4,8 @@
 //!
 //! The first flights walk through every *cell*: every fault of the vehicle's table, with its usual value, at every moment
 //! of a short flight, under a program's commands and then in every mode of a pilot. The others draw fault, value, moment,
-//! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults.
+//! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults. With [`Plan::only`], the cells are of these faults alone and all
+//! flights walk through them, again and again with other seeds.
 
 use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
@@ -35,6 +36,9 @@ pub struct Plan {
     pub flights: u64,
     /// Are there flights with two faults?
     pub pairs: bool,
+    /// Faults as `NAME[=VALUE]` to which all flights are confined; empty for a campaign of all faults.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub only: Vec<String>,
     /// What all flights have in common. Each has its own fault and pilot, so these two are empty.
     pub options: Options,
 }
@@ -50,8 +54,8 @@ pub struct Case {
     pub options: Options,
 }
 
-/// A cell of a campaign's first flights: fault, moment, mode of a pilot.
-type Cell = (&'static FaultKind, Moment, Option<&'static str>);
+/// A cell of a campaign's first flights: fault as `NAME[=VALUE]`, moment, mode of a pilot.
+type Cell = (String, Moment, Option<&'static str>);
 
 /// The flights of a campaign.
 #[derive(Clone, Debug)]
@@ -70,14 +74,20 @@ impl Cases {
         let (faults, modes) = (V::FAULTS, V::VARIETY.modes);
         let rounds = Moment::ALL.len();
         let modes_and_none = std::iter::once(None).chain(modes.iter().copied().map(Some));
+        let walked = if plan.only.is_empty() {
+            faults.iter().map(|kind| kind.name.to_owned()).collect()
+        } else {
+            plan.only.clone()
+        };
         // Each round has every fault once, and the moments in turn: a campaign that is cut short has seen some of all.
-        let cells = modes_and_none.flat_map(|mode| {
-            (0..rounds).flat_map(move |round| {
-                let moment = move |place: usize| Moment::ALL[(round + place) % rounds];
-                faults.iter().enumerate().map(move |(place, kind)| (kind, moment(place), mode))
-            })
-        });
-        Self { cells: cells.collect(), plan: plan.clone(), faults, modes, missions: V::VARIETY.missions }
+        let mut cells: Vec<Cell> = Vec::new();
+        for mode in modes_and_none {
+            for round in 0..rounds {
+                let moment = |place: usize| Moment::ALL[(round + place) % rounds];
+                cells.extend(walked.iter().enumerate().map(|(place, fault)| (fault.clone(), moment(place), mode)));
+            }
+        }
+        Self { cells, plan: plan.clone(), faults, modes, missions: V::VARIETY.missions }
     }
 
     /// How many flights walk through the cells: every cell is flown in a campaign that has as many.
@@ -93,9 +103,10 @@ impl Cases {
         let mut options = self.plan.options.clone();
         // Every flight has its own delays, too.
         options.jitter = options.jitter.map(|seed| seed.wrapping_add(index));
-        match usize::try_from(index).ok().and_then(|index| self.cells.get(index)) {
-            Some((kind, moment, mode)) => {
-                options.fault = vec![format!("{}@{}", kind.name, moment.name())];
+        let round = if self.plan.only.is_empty() { index } else { index % (self.cells.len() as u64).max(1) };
+        match usize::try_from(round).ok().and_then(|place| self.cells.get(place)) {
+            Some((fault, moment, mode)) => {
+                options.fault = vec![format!("{fault}@{}", moment.name())];
                 options.pilot = mode.map(Into::into);
                 options.mission = options.mission.or_else(|| self.missions.first().map(|mission| (*mission).into()));
             }

@@ -23,7 +23,7 @@ use std::process::Command;
 const HOP: &str = "arm; takeoff 0.3; land";
 
 fn plan(flights: u64, pairs: bool) -> Plan {
-    Plan { seed: 7, flights, pairs, options: Options::default() }
+    Plan { seed: 7, flights, pairs, only: Vec::new(), options: Options::default() }
 }
 
 /// An empty folder of this test's own.
@@ -69,6 +69,27 @@ fn the_first_flights_are_every_fault_at_every_moment_in_every_mode() {
     let soon: Vec<_> = (0..StampFly::FAULTS.len()).map(|index| Row::of(&cases.case(index as u64))).collect();
     assert_eq!(soon.iter().map(|row| &row.fault).collect::<BTreeSet<_>>().len(), StampFly::FAULTS.len());
     assert_eq!(soon.iter().map(|row| &row.phase).collect::<BTreeSet<_>>().len(), Moment::ALL.len());
+}
+
+#[test]
+fn confined_to_two_faults_all_flights_walk_through_their_cells_again_and_again() {
+    let only = ["tof-stuck=0.03", "flow-bias"].map(String::from).to_vec();
+    let cases = Cases::new::<StampFly>(&Plan { only, ..plan(0, false) });
+    let round = 2 * Moment::ALL.len() * (1 + StampFly::VARIETY.modes.len());
+    assert_eq!(cases.cells(), round);
+    let cell = |index: usize| {
+        let case = cases.case(index as u64);
+        (case.options.fault[0].clone(), case.options.pilot, case.seed)
+    };
+    let first: BTreeSet<_> = (0..round).map(cell).map(|(fault, pilot, _)| (fault, pilot)).collect();
+    assert_eq!(first.len(), round, "no cell twice");
+    assert!(first.contains(&("tof-stuck=0.03@hover".into(), Some("acro".into()))), "{first:?}");
+    let ((fault, pilot, seed), (again, too, another)) = (cell(3), cell(3 + round));
+    assert_eq!((fault, pilot), (again, too));
+    assert_ne!(seed, another);
+    let line = ["campaign", "--faults", "--flights", "4", "--only", "tof-stuck,nothing"];
+    let wrong = stampfly(&folder("only"), &line);
+    assert!(wrong.code != 0 && wrong.err.contains("nothing"), "{}", wrong.err);
 }
 
 #[test]

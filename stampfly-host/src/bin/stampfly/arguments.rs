@@ -211,6 +211,9 @@ pub struct FaultCampaignOptions {
     /// Let half of the random flights have two faults.
     #[arg(long, requires = "faults")]
     pub pairs: bool,
+    /// Confine all flights to these faults: each at every moment in every mode, again and again with other seeds.
+    #[arg(long, value_name = "NAME[=VALUE],…", value_delimiter = ',', requires = "faults", conflicts_with = "pairs")]
+    pub only: Vec<String>,
     /// Folder for the flights (Parquet) and the tables (HTML, CSV). Flights that are already there are not flown again.
     #[arg(long, value_name = "DIR", default_value = "campaign", requires = "faults")]
     pub out: PathBuf,

@@ -53,12 +53,14 @@ struct Campaign<'o> {
 impl<'o> Campaign<'o> {
     fn new<V: Vehicle>(options: &'o CampaignOptions) -> Result<Self, Failure> {
         let CampaignOptions { scene, flights, seed, of_faults, .. } = options;
-        let plan =
-            Plan { seed: *seed, flights: *flights, pairs: of_faults.pairs, options: scene.options(scene.jitter) };
+        let (pairs, only) = (of_faults.pairs, of_faults.only.clone());
+        let plan = Plan { seed: *seed, flights: *flights, pairs, only, options: scene.options(scene.jitter) };
         let cases = Cases::new::<V>(&plan);
-        // What is wrong with the options is wrong with the first flight.
-        let first = cases.case(0);
-        V::setup(&first.options, first.seed)?;
+        // What is wrong with the options is wrong with the first flight, and each of `--only` has its turn in the first.
+        for index in 0..plan.only.len().max(1) as u64 {
+            let case = cases.case(index);
+            V::setup(&case.options, case.seed)?;
+        }
         let out = &of_faults.out;
         let io = |error| format!("--out {}: {error}", out.display());
         std::fs::create_dir_all(out).map_err(io)?;
@@ -280,13 +282,16 @@ impl<'o> Campaign<'o> {
 
     /// What an engine's tasks run, but for the shard.
     fn job<V: Vehicle>(&self) -> Job {
-        let Plan { seed, flights, pairs, options } = &self.plan;
+        let Plan { seed, flights, pairs, only, options } = &self.plan;
         let common = Case { index: 0, seed: *seed, options: options.clone() };
         let mut arguments = vec!["campaign".to_owned(), "--faults".into()];
         // After the name of the command.
         arguments.extend(common.arguments().into_iter().skip(1));
         arguments.extend(["--flights".into(), flights.to_string()]);
         arguments.extend(pairs.then(|| "--pairs".into()));
+        if !only.is_empty() {
+            arguments.extend(["--only".into(), only.join(",")]);
+        }
         arguments.extend((V::NAME != vehicles::DEFAULT).then(|| format!("--vehicle={}", V::NAME)));
         arguments.extend(["--out".into(), self.out.display().to_string()]);
         arguments.extend(self.options.of_faults.again.then(|| "--again".into()));
