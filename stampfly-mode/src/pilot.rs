@@ -92,9 +92,9 @@ impl Transmitter {
         self.unreadable
     }
 
-    /// The arm switch has to be seen off again.
+    /// The arm switch has to be seen off again. Its position is forgotten as well: one that is still off would be seen off.
     pub fn forget(&mut self) {
-        (self.seen_off, self.was_on) = (false, false);
+        (self.arm, self.seen_off, self.was_on) = (Debounced::default(), false, false);
     }
 
     /// Looks at the newest frame, if there is a fresh one. `flies` says whether the pilot has authority: then the sticks are
