@@ -4,8 +4,8 @@
 //!
 //! The first flights walk through every *cell*: every fault of the vehicle's table, with its usual value, at every moment
 //! of a short flight, under a program's commands and then in every mode of a pilot. The others draw fault, value, moment,
-//! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults. With [`Plan::only`], the cells are of these faults alone and all
-//! flights walk through them, again and again with other seeds.
+//! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults.
+//! With [`Plan::only`], the cells are of these faults alone, and all flights walk through them, again and again with other seeds.
 
 use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
@@ -37,7 +37,6 @@ pub struct Plan {
     /// Are there flights with two faults?
     pub pairs: bool,
     /// Faults as `NAME[=VALUE]` to which all flights are confined; empty for a campaign of all faults.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub only: Vec<String>,
     /// What all flights have in common. Each has its own fault and pilot, so these two are empty.
     pub options: Options,

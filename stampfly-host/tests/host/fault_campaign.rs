@@ -342,6 +342,20 @@ fn a_slurm_script_flies_a_shard() {
     assert_eq!((summary["kept"].as_u64(), summary["flights"].as_u64()), (Some(4), Some(4)));
 }
 
+#[test]
+fn tasks_of_an_engine_are_confined_to_the_same_faults() {
+    let here = folder("only_slurm");
+    let line = ["campaign", "--faults", "--flights", "2", "--only", "tof-stuck=0.03,flow-bias", "--mission", HOP];
+    let ran = stampfly(&here, &[&line[..], &["--engine", "slurm", "--json"]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let script = json(&ran)["script"].as_str().expect("a script").to_owned();
+    let task = Command::new("bash").arg(&script).env("SLURM_ARRAY_TASK_ID", "0").env_remove("HQ_TASK_ID").output();
+    assert!(task.expect("bash starts").status.success());
+    let rows = file::read(&here.join("campaign/shard-0-of-1.parquet")).expect("rows").rows;
+    let faults: Vec<_> = rows.iter().map(|row| row.faults.split('@').next().unwrap_or_default()).collect();
+    assert_eq!(faults, ["tof-stuck=0.03", "flow-bias"]);
+}
+
 /// Stands in for HyperQueue's program: notes how it is called, and runs the tasks of the array one after the other.
 const STAND_IN: &str = r#"#!/bin/bash
 echo "$@" > called
