@@ -50,7 +50,7 @@ def _watch(arguments: argparse.Namespace) -> int:
         watch = _watcher(arguments.plot, stack)
         rover = stack.enter_context(RoverClient(arguments.rover, use_json=arguments.json))
         # Subscribes and sends no command, so another program can drive.
-        for record in rover.drive(lambda t: None, arguments.seconds):
+        for record in rover.drive(lambda t: None, arguments.seconds, patience=arguments.seconds):
             watch(record)
             lines += 1
     print(f"{lines} lines of log")

@@ -27,6 +27,9 @@ DEFAULT_ADDRESS: Address = ("127.0.0.1", 47003)
 #: Seconds between repetitions of the subscription, which lapses after two.
 RENEWAL = 0.5
 
+#: Seconds after which a silent rover has gone: as long as a subscription lasts.
+PATIENCE = 2.0
+
 
 class RoverClient:
     """One end of the conversation with a rover.
@@ -115,20 +118,24 @@ class RoverClient:
         return news
 
     def drive(
-        self, command: Callable[[float], Optional[OperatorCommand]], seconds: float, every: int = 1
+        self,
+        command: Callable[[float], Optional[OperatorCommand]],
+        seconds: float,
+        every: int = 1,
+        patience: float = PATIENCE,
     ) -> Iterator[LogRecord]:
         """Sends ``command(t)`` at the rate for ``seconds`` and yields the log, every n-th line.
 
-        ``t`` is the rover's time since its first record here, so a script follows the vehicle's clock; it is 0 until
-        there is a record. ``None`` sends nothing. ``seconds`` are of this computer, so the loop always ends.
+        ``t`` and ``seconds`` are the rover's time since its first record here, so a script follows the vehicle's clock,
+        however fast it goes; ``t`` is 0 until there is a record. ``None`` sends nothing. A rover that is silent for
+        ``patience`` seconds of this computer ends the loop as well.
         """
-        begin = time.monotonic()
-        renew = send = begin
+        heard = renew = send = time.monotonic()
         first: Optional[float] = None
         t = 0.0
-        while True:
+        while t < seconds:
             now = time.monotonic()
-            if now - begin >= seconds:
+            if now - heard >= patience:
                 return
             if now >= renew:
                 self.send(Subscription(every))
@@ -139,14 +146,15 @@ class RoverClient:
                     self.send(asked)
                 # From the plan, not from now, so the rate is kept; but a program that was stopped does not catch up.
                 send = max(send + self.period, now)
-            wake = min(send, renew, begin + seconds)
+            wake = min(send, renew, heard + patience)
             message = self.receive(max(wake - time.monotonic(), 1e-4))
             if isinstance(message, LogRecord):
+                heard = time.monotonic()
                 first = message.t if first is None else first
                 t = message.t - first
                 yield message
 
-    def change_parameters(self, timeout: float = 1.0, **values: float) -> ParameterStatus:
+    def change_parameters(self, timeout: float = 5.0, **values: float) -> ParameterStatus:
         """Changes parameters together and waits until the rover uses them.
 
         Names are written with two underscores for the dot: ``change_parameters(engine__max_accel=1.0)``. Raises
@@ -158,7 +166,7 @@ class RoverClient:
         ]
         return self._request(requests + [ParameterRequest(ParameterAction.Apply)], timeout)
 
-    def roll_back(self, timeout: float = 1.0) -> ParameterStatus:
+    def roll_back(self, timeout: float = 5.0) -> ParameterStatus:
         """Returns to the parameters before the last change, and waits until the rover uses them."""
         return self._request([ParameterRequest(ParameterAction.RollBack)], timeout)
 

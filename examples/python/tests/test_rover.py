@@ -84,10 +84,16 @@ class Client(unittest.TestCase):
             address = simulated.address
         begin = time.monotonic()
         with RoverClient(address) as rover:
-            self.assertEqual(list(rover.drive(lambda t: OperatorCommand(), seconds=0.3)), [])
+            self.assertEqual(list(rover.drive(lambda t: OperatorCommand(), seconds=0.3, patience=0.3)), [])
             with self.assertRaises(TimeoutError):
                 rover.roll_back(timeout=0.2)
         self.assertLess(time.monotonic() - begin, 2.0)
+
+    def test_seconds_are_the_rovers(self) -> None:
+        for speed in (0.5, 2.0):
+            with SimulatedRover(speed=speed) as simulated, RoverClient(simulated.address) as rover:
+                times = [record.t for record in rover.drive(lambda t: None, seconds=0.4)]
+            self.assertTrue(0.4 <= times[-1] - times[0] < 0.5, (speed, times[0], times[-1]))
 
     def test_damaged_and_old_datagrams_are_counted_and_not_returned(self) -> None:
         with SimulatedRover() as simulated, RoverClient(simulated.address) as rover:

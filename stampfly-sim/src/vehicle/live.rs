@@ -1,7 +1,9 @@
-//! A vehicle in the hands of other programs, in real time.
+//! A vehicle in the hands of other programs, in real time or slower or faster.
 //!
 //! Virtual time waits for the wall: the task [`Live::serve`] holds the whole simulation until a tick's time has come, and
-//! hears meanwhile what arrives. What it publishes is in the log, so the flight can be replayed without the programs.
+//! hears meanwhile what arrives. A machine that comes too late for a tick loses the time: the vehicle does not hurry after
+//! it, because nobody could steer it there. What is published is in the log, so the flight can be replayed without the
+//! programs.
 
 use crate::time::Clock;
 use stampfly_types::{Duration, Instant};
@@ -20,8 +22,10 @@ const AFTER_TICK: Duration = Duration::from_millis(1);
 pub struct Live {
     /// Where they are heard and answered.
     pub socket: Arc<UdpSocket>,
-    /// The flight is broken off after this long.
+    /// The flight is broken off after this long, in virtual time.
     pub limit: Duration,
+    /// Virtual seconds in a second of the wall, above 0; 1 is real time.
+    pub speed: f32,
 }
 
 /// What a vehicle makes of datagrams.
@@ -36,11 +40,12 @@ pub trait Link {
 impl Live {
     /// Connects a vehicle to other programs, tick by tick, the first one period after the clock's zero.
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
-        let begun = std::time::Instant::now();
+        let real_period = std::time::Duration::from_micros(period.as_micros()).div_f32(self.speed);
+        let mut until = std::time::Instant::now();
         for tick in 1_u32.. {
             let due = period.as_micros() * u64::from(tick);
             clock.sleep_until(Instant::from_micros(due)).await;
-            let until = begun + std::time::Duration::from_micros(due);
+            until = next_tick(until, std::time::Instant::now(), real_period);
             self.receive(until, &mut |from, bytes| link.hear(clock.now(), from, bytes));
             clock.sleep_until(clock.now() + AFTER_TICK).await;
             // An answer that cannot be sent is lost, as on any network.
@@ -64,5 +69,25 @@ impl Live {
             }
         }
         std::thread::sleep(left());
+    }
+}
+
+/// When the next tick is due. A late one keeps the plan up to a period, so a sleep that was a little long adds nothing.
+fn next_tick(last: std::time::Instant, now: std::time::Instant, period: std::time::Duration) -> std::time::Instant {
+    (last + period).max(now.checked_sub(period).unwrap_or(now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::next_tick;
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn a_late_tick_keeps_the_plan_and_lost_time_is_not_made_up_for() {
+        let (begun, ms) = (Instant::now(), Duration::from_millis);
+        let next = |now| next_tick(begun, begun + ms(now), ms(10)).duration_since(begun);
+        assert_eq!(next(0), ms(10));
+        assert_eq!(next(19), ms(10), "a little late");
+        assert_eq!(next(500), ms(490), "one period, not fifty");
     }
 }

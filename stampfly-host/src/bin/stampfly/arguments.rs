@@ -163,9 +163,12 @@ pub struct ServeOptions {
     /// Where to hear other programs. They are not authenticated: leave it on this machine, or in a network of your own.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:47003")]
     pub listen: SocketAddr,
-    /// For how long.
+    /// For how long, in the vehicle's seconds.
     #[arg(long = "for", value_name = "SECONDS", default_value_t = 600.0, value_parser = seconds)]
     pub seconds: f32,
+    /// How fast its time passes, 0.01 to 100; 1 is real time. Slower gives busy machines and debuggers time.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
+    pub speed: f32,
 }
 
 /// Options of `golden`.
@@ -340,6 +343,12 @@ fn set_parameters(config: &mut VehicleConfig, texts: &[String]) -> Result<(), Fa
 fn seconds(text: &str) -> Result<f32, String> {
     let value: f32 = text.parse().map_err(|_| format!("'{text}' is no number"))?;
     if (0.0..=86_400.0).contains(&value) { Ok(value) } else { Err("0 to 86400 seconds".into()) }
+}
+
+/// Reads how fast time passes.
+fn speed(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| format!("'{text}' is no number"))?;
+    if (0.01..=100.0).contains(&value) { Ok(value) } else { Err("0.01 to 100".into()) }
 }
 
 /// Reads `N,E`.

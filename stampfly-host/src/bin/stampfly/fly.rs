@@ -33,8 +33,8 @@ pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
 pub fn serve(options: &ServeOptions) -> Result<ExitCode, Failure> {
     let socket = UdpSocket::bind(options.listen).map_err(|error| format!("--listen {}: {error}", options.listen))?;
     outln!("listening on {}", socket.local_addr()?);
-    let limit = Duration::from_seconds(options.seconds);
-    vehicles::with(&options.fly.scene.vehicle.name, Fly(&options.fly, Some(Live { socket: socket.into(), limit })))?
+    let live = Live { socket: socket.into(), limit: Duration::from_seconds(options.seconds), speed: options.speed };
+    vehicles::with(&options.fly.scene.vehicle.name, Fly(&options.fly, Some(live)))?
 }
 
 /// A flight of a campaign, from its row.
