@@ -153,8 +153,9 @@ impl Failsafe {
         }
         let config = &self.config;
         let silence = now.since(self.heard_imu);
-        let [weak, lost] = self.motors.step(config, now, input);
-        let [tumbled, mismatch] = self.attitude.step(config, now, input, self.active.contains(Alerts::MOTOR_WEAK));
+        let known_weak = self.active.contains(Alerts::MOTOR_WEAK);
+        let [weak, lost] = self.motors.step(config, now, input, known_weak);
+        let [tumbled, mismatch] = self.attitude.step(config, now, input, known_weak);
         found = found
             .set(Alerts::IMU_LOST, silence >= config.imu_lost)
             .set(Alerts::TUMBLED, tumbled)
@@ -207,7 +208,7 @@ impl Failsafe {
         let [mut faulty, noisy] = self.imu.step(&self.config, imu, suspect);
         if !suspect {
             self.attitude.add(&self.config, imu);
-            faulty |= self.force.step(&self.config, *at, imu, input);
+            faulty |= self.force.step(&self.config, *at, imu, input, self.active.contains(Alerts::MOTOR_WEAK));
         }
         found.set(Alerts::IMU_FAULTY, faulty).set(Alerts::IMU_NOISY, noisy)
     }

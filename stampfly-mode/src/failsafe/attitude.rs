@@ -6,6 +6,9 @@ use crate::lasting::lasts;
 use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, ImuData, Validity};
 use stampfly_types::{Instant, Vec3, frame, math};
 
+/// A manual mode may push back this many times as hard on the ground before it counts as tipping: a stick moves while a leg sticks.
+const BY_HAND: f32 = 2.0;
+
 /// What is remembered of the attitude.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -90,7 +93,9 @@ impl AttitudeMonitor {
                 self.rest = estimate.attitude.transform_vector(&Vec3::z());
                 false
             }
-            FlightPhase::TakeOff | FlightPhase::Landing => {
+            // A manual mode flies from the first push of its throttle on, with its legs still on the ground.
+            FlightPhase::Flying if !mode.is_manual() => false,
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => {
                 let low = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
                 // Motors take some time to stop, and what turns already turns on.
                 let soon = |world: &Vec3| {
@@ -102,8 +107,9 @@ impl AttitudeMonitor {
                 let ((lean, leans), (_, tilts)) = (soon(&self.rest), soon(&Vec3::z()));
                 // A pilot may want to tilt, and a program may land in a gust. Then the controller does not push back. Against a
                 // weak motor it pushes all the time, and on the ground that is what tips the vehicle.
-                let pushes_back =
-                    torque.x * lean.y.signum() < -config.weak_roll || torque.y * lean.x.signum() > config.weak_pitch;
+                let share = if *phase == FlightPhase::Flying { BY_HAND } else { 1.0 };
+                let [roll, pitch] = [config.weak_roll, config.weak_pitch].map(|limit| limit * share);
+                let pushes_back = torque.x * lean.y.signum() < -roll || torque.y * lean.x.signum() > pitch;
                 let takes_off_by_itself = *phase == FlightPhase::TakeOff && !mode.is_manual();
                 low && leans && tilts && (weak || pushes_back || takes_off_by_itself)
             }

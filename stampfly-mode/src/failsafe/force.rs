@@ -48,13 +48,15 @@ pub(super) struct ForceMonitor {
 }
 
 impl ForceMonitor {
-    /// Takes a sample. Has the unexplained part of the force made a speed of `force_speed`?
+    /// Takes a sample. Has the unexplained part of the force made a speed of `force_speed`? With a weak motor the thrust is not
+    /// what is asked for.
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
         at: Instant,
         imu: &ImuData,
         input: &FailsafeInput<'_>,
+        weak: bool,
     ) -> bool {
         let dt = self.last.replace(at).map_or(0.0, |last| at.since(last).seconds().min(LONGEST_STEP));
         let (force, thrust) = self.mean.get_or_insert((imu.accel, input.output.thrust));
@@ -67,7 +69,7 @@ impl ForceMonitor {
         let (excess, limit) = match input.flight_status.phase {
             FlightPhase::IdleGround => (beyond(&STANDING), HANDLED * config.force_speed),
             FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => {
-                let known = config.hover_thrust.is_finite();
+                let known = config.hover_thrust.is_finite() && !weak;
                 let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
                 let unlike_thrust = if known {
                     let carried = thrust * (GRAVITY / config.hover_thrust);

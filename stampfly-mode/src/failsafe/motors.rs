@@ -6,7 +6,8 @@
 //! been so from [`STANDING`] times that on. A vehicle on the ground says nothing, because what holds it looks the same.
 //!
 //! With half of a rotor's thrust a vehicle lands. A controller that asks for more than one rotor's whole share about both axes
-//! does not get it: the other three have nothing left, and the vehicle turns over as it comes down. That motor is lost.
+//! does not get it: the other three have nothing left, and the vehicle turns over as it comes down. That motor is lost. It shows at
+//! once, or it is a weak one.
 
 use super::config::{FailsafeConfig, WEAK_SHARE};
 use super::input::FailsafeInput;
@@ -23,8 +24,8 @@ const STANDING: f32 = 1.5;
 /// A motor is lost from this many times a weak one's torque on: a rotor's share of the weight.
 const LOST: f32 = 1.0 / WEAK_SHARE;
 
-/// A lost motor shows this soon after it was found weak. One that lands after all is not dropped.
-const SOON: Duration = Duration::from_millis(200);
+/// A lost motor asks for that this soon after the torque has become uneven. One that asks later is weak, and lands: it is not dropped.
+const SOON: Duration = Duration::from_millis(160);
 
 /// What is remembered of the torque that the controller asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,17 +36,25 @@ pub(super) struct MotorMonitor {
     usual: [f32; 2],
     uneven: Option<Instant>,
     uncontrolled: Option<Instant>,
-    /// When a motor was found weak.
-    found: Option<Instant>,
 }
 
 impl MotorMonitor {
-    /// Is a motor weak, and is one lost?
-    pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> [bool; 2] {
-        let estimate = input.estimate;
-        // One that lands already has nothing more to find out, and may stand without knowing it.
-        let flies = matches!(input.flight_status.phase, FlightPhase::TakeOff | FlightPhase::Flying);
-        let near = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
+    /// Is a motor weak, and is one lost? `known_weak`: one of them was found weak in this flight.
+    pub(super) fn step(
+        &mut self,
+        config: &FailsafeConfig,
+        now: Instant,
+        input: &FailsafeInput<'_>,
+        known_weak: bool,
+    ) -> [bool; 2] {
+        let (estimate, phase) = (input.estimate, input.flight_status.phase);
+        let height = estimate.valid.contains(Validity::HEIGHT).then_some(estimate.height);
+        let near = height.is_some_and(|height| height < config.lift_height);
+        let flies = matches!(phase, FlightPhase::TakeOff | FlightPhase::Flying) && !near;
+        // One that lands cannot do more about a weak motor, and a lost one drops it from any height. But what stands without
+        // knowing it looks the same.
+        let above = if known_weak { config.lift_height } else { config.touch_height };
+        let lands = phase == FlightPhase::Landing && height.is_some_and(|height| height > above);
         let asked = [input.output.torque.x, input.output.torque.y];
         let limits = [config.weak_roll, config.weak_pitch];
         let (mut became, mut stands, mut exceeds) = (true, true, true);
@@ -57,15 +66,15 @@ impl MotorMonitor {
             stands &= self.mean[axis].abs() > STANDING * limits[axis];
             exceeds &= self.mean[axis].abs() > LOST * limits[axis];
         }
-        let soon = self.found.is_some_and(|found| now.since(found) < SOON);
-        let lost = lasts(&mut self.uncontrolled, now, exceeds && (flies || soon) && !near, config.weak_motor_time);
-        if !flies || near {
-            // What the ground has asked for is no weakness, and is gone soon.
-            (self.usual, self.uneven) = (self.mean, None);
-            return [false, lost];
+        if !flies && !lands {
+            // What the ground has asked for is no weakness, and is gone soon. A motor that was found weak remains it.
+            self.uneven = self.uneven.filter(|_| known_weak);
+            (self.usual, self.uncontrolled) = (self.mean, None);
+            return [false; 2];
         }
-        let weak = lasts(&mut self.uneven, now, became || stands, config.weak_motor_time);
-        self.found = if weak { self.found.or(Some(now)) } else { None };
-        [weak, lost]
+        let uneven = lasts(&mut self.uneven, now, became || stands || known_weak, config.weak_motor_time);
+        let shows = self.uncontrolled.is_some() || self.uneven.is_some_and(|since| now.since(since) < SOON);
+        let lost = lasts(&mut self.uncontrolled, now, exceeds && shows, config.weak_motor_time);
+        [uneven && flies, lost]
     }
 }

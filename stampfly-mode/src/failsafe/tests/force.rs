@@ -22,6 +22,22 @@ fn d7_a_force_of_half_the_thrust_stops_the_motors_within_300_ms() {
 }
 
 #[test]
+fn a_weak_motor_makes_less_thrust_than_is_asked_for_and_that_is_no_fault_of_the_sensor() {
+    let faulty = |weak: bool| {
+        let config =
+            FailsafeConfig { hover_thrust: 0.36, weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
+        let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+        rig.output.thrust = 0.36;
+        rig.output.torque = if weak { Vec3::new(2.0, 2.0, 0.0) } else { Vec3::zeros() };
+        for _ in 0..400 {
+            rig.sample(REST, Vec3::zeros());
+        }
+        (0..400).any(|_| rig.sample(REST * 0.5, Vec3::zeros()).contains(Alerts::IMU_FAULTY))
+    };
+    assert_eq!([true, false].map(faulty), [false, true]);
+}
+
+#[test]
 fn what_gravity_or_thrust_explains_does_not() {
     // Hovering, a loop, a fall, an empty battery, a ceiling.
     for (thrust, force) in [(1.0, 1.0), (2.0, 2.0), (0.0, 0.1), (1.0, 0.7), (2.0, 1.0)] {

@@ -24,29 +24,39 @@ fn a_torque_that_no_three_rotors_make_is_a_lost_motor() {
     };
     let after = lost(FlightPhase::Flying, 1.0, [4.0, -4.0], 400);
     assert!(after.is_some_and(|samples| (40..100).contains(&samples)), "a low-pass and 0.1 s: {after:?}");
+    assert_eq!(lost(FlightPhase::Landing, 0.6, [4.0, -4.0], 400), after, "it drops a vehicle that lands, too");
     for (phase, height, torque, samples, why) in [
         (FlightPhase::Flying, 1.0, [4.0, 2.5], 400, "about one axis"),
         (FlightPhase::Flying, 1.0, [3.0, 3.0], 400, "less than a share"),
         (FlightPhase::Flying, 1.0, [4.0, 4.0], 60, "a gust"),
         (FlightPhase::Flying, 0.03, [4.0, 4.0], 400, "near the ground"),
         (FlightPhase::Armed, 1.0, [4.0, 4.0], 400, "it stands"),
-        (FlightPhase::Landing, 1.0, [4.0, 4.0], 400, "it lands after all"),
+        (FlightPhase::Landing, 0.15, [4.0, 4.0], 400, "it lands, and may stand"),
     ] {
         assert_eq!(lost(phase, height, torque, samples), None, "{why}");
     }
 }
 
 #[test]
-fn a_weak_motor_that_lands_is_lost_soon_or_not_at_all() {
-    let lost = |waits: u32| {
+fn a_weak_motor_is_lost_soon_or_not_at_all() {
+    let lost = |waits: u32, height: f32| {
         let mut rig = rig(FlightPhase::Flying, 1.0);
         found(&mut rig, [1.5, 1.5], 400, Alerts::MOTOR_WEAK).expect("a weak motor");
-        rig.mode.phase = FlightPhase::Landing;
+        (rig.mode.phase, rig.estimate.height) = (FlightPhase::Landing, height);
         found(&mut rig, [1.5, 1.5], waits, Alerts::MOTOR_LOST)
             .or_else(|| found(&mut rig, [8.0, 8.0], 400, Alerts::MOTOR_LOST))
     };
-    assert!(lost(0).is_some_and(|samples| samples < 80), "{:?}", lost(0));
-    assert_eq!(lost(60), None, "it took 150 ms of the 200");
+    assert!(lost(0, 1.0).is_some_and(|samples| samples < 80), "{:?}", lost(0, 1.0));
+    assert!(lost(0, 0.12).is_some(), "a take-off does not come higher before it turns over");
+    assert_eq!(lost(60, 1.0), None, "it was uneven for 100 ms before it was found, and for 150 ms since then");
+    assert_eq!(lost(0, 0.05), None, "near the ground");
+}
+
+#[test]
+fn a_motor_that_becomes_weak_while_it_lands_is_not_told_and_not_dropped() {
+    let mut rig = rig(FlightPhase::Landing, 0.6);
+    assert_eq!(found(&mut rig, [1.5, 1.5], 400, Alerts::MOTOR_WEAK), None);
+    assert_eq!(found(&mut rig, [8.0, 8.0], 400, Alerts::MOTOR_LOST), None);
 }
 
 /// Samples until a motor counts as running, of so many; bursts of a sample ten times a second add to the current, A.

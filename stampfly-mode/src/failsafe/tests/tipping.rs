@@ -11,10 +11,19 @@ struct Tips {
     height: f32,
     torque: f32,
     weak: bool,
+    mode: FlightMode,
 }
 
-const LANDING: Tips =
-    Tips { phase: FlightPhase::Landing, stood: 0.0, lean: 0.1, rate: 4.0, height: 0.05, torque: -1.5, weak: false };
+const LANDING: Tips = Tips {
+    phase: FlightPhase::Landing,
+    stood: 0.0,
+    lean: 0.1,
+    rate: 4.0,
+    height: 0.05,
+    torque: -1.5,
+    weak: false,
+    mode: FlightMode::AltHold,
+};
 
 impl Tips {
     /// Samples until it counts as tumbled.
@@ -22,8 +31,7 @@ impl Tips {
         let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
         let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
         let roll = |angle: f32| Quat::from_axis_angle(&Vec3::x_axis(), angle);
-        (rig.mode.phase, rig.mode.mode, rig.estimate.attitude) =
-            (FlightPhase::Armed, FlightMode::AltHold, roll(self.stood));
+        (rig.mode.phase, rig.mode.mode, rig.estimate.attitude) = (FlightPhase::Armed, self.mode, roll(self.stood));
         for _ in 0..10 {
             rig.sample(REST, Vec3::zeros());
         }
@@ -51,6 +59,20 @@ fn a_vehicle_that_turns_over_a_leg_while_landing_stops() {
         (Tips { rate: -4.0, ..LANDING }, "it turns back"),
         (Tips { torque: 0.0, ..LANDING }, "nothing pushes back: as the pilot wants"),
         (Tips { torque: 1.5, ..LANDING }, "the controller wants it"),
+    ] {
+        assert_eq!(tips.tumbled(), None, "{why}");
+    }
+}
+
+#[test]
+fn a_manual_mode_that_turns_over_on_the_ground_stops() {
+    let flies = Tips { phase: FlightPhase::Flying, mode: FlightMode::Acro, torque: -2.5, ..LANDING };
+    assert!(flies.tumbled().is_some_and(|samples| samples <= 12), "30 ms: {:?}", flies.tumbled());
+    for (tips, why) in [
+        (Tips { height: 0.2, ..flies }, "in the air"),
+        (Tips { torque: -1.5, ..flies }, "a stick and a leg ask for as much"),
+        (Tips { torque: 2.5, ..flies }, "the stick wants it"),
+        (Tips { mode: FlightMode::AltHold, ..flies }, "a mode that holds its height flies when it has taken off"),
     ] {
         assert_eq!(tips.tumbled(), None, "{why}");
     }
