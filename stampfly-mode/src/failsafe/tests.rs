@@ -12,6 +12,7 @@ use stampfly_types::Duration;
 use stampfly_types::messages::{ControlOutput, EstimatorStatus, FlightPhase, PowerData, StateEstimate};
 use stampfly_types::messages::{FlightMode, FlightStatus, Validity};
 use stampfly_types::{GRAVITY, Quat, Vec3};
+use std::vec;
 use std::vec::Vec;
 
 /// A control period at 400 Hz.

@@ -243,3 +243,46 @@ fn opposite_spikes_are_a_burst_and_no_turn() {
     });
     assert_eq!(seen, None);
 }
+
+/// Samples that measure, but for one number.
+fn measured(k: usize) -> ImuData {
+    let noise = Vec3::repeat(1e-3 * (k % 7) as f32);
+    ImuData { accel: REST + noise, gyro: noise, temperature: 25.0, ..Default::default() }
+}
+
+/// What the last of these samples makes of the sensor: a fault, noise. Each is suspect or not.
+fn judged(suspects: impl IntoIterator<Item = bool>) -> [bool; 2] {
+    let (mut monitor, config) = (ImuMonitor::default(), FailsafeConfig::default());
+    let judge = |(k, suspect)| monitor.step(&config, &measured(k), suspect);
+    suspects.into_iter().enumerate().map(judge).last().unwrap_or_default()
+}
+
+#[test]
+fn suspect_samples_are_noise_from_six_close_together_and_a_fault_from_24() {
+    for (suspects, expected) in [(5, [false; 2]), (6, [false, true]), (23, [false, true]), (24, [true; 2])] {
+        assert_eq!(judged(vec![true; suspects]), expected, "{suspects} running");
+    }
+    // However long the fault lasts, it is over after as many good samples as there are until it is found, twice.
+    for (good, expected) in [(48, [true; 2]), (49, [false, true]), (144, [false, true]), (145, [false; 2])] {
+        let samples = [vec![true; 1_000], vec![false; good]].concat();
+        assert_eq!(judged(samples), expected, "{good} good ones later");
+    }
+}
+
+#[test]
+fn an_axis_that_trembles_at_full_scale_does_not_measure() {
+    let config = FailsafeConfig::default();
+    let found = |sensor: fn(&mut ImuData) -> &mut Vec3, full_scale: f32| {
+        let mut monitor = ImuMonitor::default();
+        (1..=100).find(|k| {
+            let mut sample = measured(*k);
+            sensor(&mut sample).y = full_scale + 1e-3 * (k % 7) as f32;
+            monitor.step(&config, &sample, false)[0]
+        })
+    };
+    // Calibration and the filter of the decimation move it by up to 2 %.
+    assert_eq!(found(|sample| &mut sample.accel, 0.985 * config.accel_full_scale), Some(20));
+    assert_eq!(found(|sample| &mut sample.gyro, -0.985 * config.gyro_full_scale), Some(20));
+    assert_eq!(found(|sample| &mut sample.accel, 0.97 * config.accel_full_scale), None);
+    assert_eq!(found(|sample| &mut sample.gyro, -0.97 * config.gyro_full_scale), None);
+}

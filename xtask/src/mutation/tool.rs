@@ -1,0 +1,275 @@
+//! cargo-mutants, the tool that changes the program and runs the tests, and what it says.
+//!
+//! It works in a copy of the sources below cargo's folder for generated files, so the sources themselves never hold a mutant.
+
+use super::list::{FILE, digest};
+use crate::copy::{copy, sources};
+use crate::repository::{Failure, Repository, capture, run as run_program};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const VERSION: &str = "27.1.0";
+const TREE: &str = "mutants/tree";
+/// Its own, for packages of the same names in another folder would be built in turns.
+const BUILD: &str = "mutants/build";
+/// Longest time to build, and of the tests, s: quick ones take one, and all of them ten. What takes longer has survived.
+const BUILD_TIME: &str = "120";
+const QUICK_TIME: &str = "20";
+const TIME: &str = "120";
+
+/// A package and those of its files that are mutated.
+pub struct Mutated {
+    pub package: &'static str,
+    /// From the top of the repository; a folder ends with `/`.
+    pub place: &'static str,
+    /// What the tests are told in the first pass: they find most of the mutants, and take a second. Survivors meet all tests.
+    pub quick: &'static [&'static str],
+}
+
+/// What decides whether motors turn: what [`coverage`](crate::steps::coverage) looks at as well.
+pub const MUTATED: [Mutated; 2] = [
+    Mutated {
+        package: "stampfly-mode",
+        place: "stampfly-mode/src/",
+        quick: &["--skip", "exhaustive", "--skip", "alerts_of_a_kind", "--skip", "entered_once_and_left_once"],
+    },
+    Mutated { package: "stampfly-control", place: "stampfly-control/src/mixer.rs", quick: &["mixer"] },
+];
+
+/// A change of the program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mutant {
+    /// As the tool names it: `FILE:LINE:COLUMN: CHANGE`.
+    pub name: String,
+    pub file: String,
+    /// Without line and column, so that it survives edits: `FILE: CHANGE`, and ` #2` for the second of the same text.
+    pub label: String,
+}
+
+/// What became of a mutant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    Caught,
+    /// No test failed, or none ended in time.
+    Survived,
+    /// It does not compile.
+    Unviable,
+}
+
+/// The copy of the sources, and the program that mutates it.
+pub struct Tool<'r> {
+    repository: &'r Repository,
+    program: PathBuf,
+    tree: PathBuf,
+}
+
+impl<'r> Tool<'r> {
+    /// Installs the program where it is missing, and brings the copy up to date.
+    pub fn ready(repository: &'r Repository) -> Result<Self, Failure> {
+        let place = repository.target(&format!("mutants/cargo-mutants-{VERSION}"));
+        let program = place.join("bin/cargo-mutants");
+        if !program.exists() {
+            let mut install = repository.cargo();
+            install
+                .args(["install", "--quiet", "--locked", "cargo-mutants", "--version", VERSION, "--root"])
+                .arg(&place);
+            run_program(install.arg("--target-dir").arg(place.join("build")))?;
+            // 300 MB that nothing needs again.
+            let _ = fs::remove_dir_all(place.join("build"));
+        }
+        let tree = repository.target(TREE);
+        copy(&repository.root, &tree, &sources(repository)?)?;
+        Ok(Self { repository, program, tree })
+    }
+
+    /// Every mutant of a package, in the order of the sources.
+    pub fn list(&self, mutated: &Mutated) -> Result<Vec<Mutant>, Failure> {
+        let mut command = self.mutants(mutated);
+        let (said, _) = capture(command.args(["--list", "--json"]))?;
+        let list: Value = serde_json::from_str(&said).map_err(|e| format!("{}: {e}", mutated.place))?;
+        let list = list.as_array().ok_or("no list of mutants")?;
+        let name = |mutant: &Value| mutant["name"].as_str().map(str::to_owned);
+        labelled(&list.iter().filter_map(name).collect::<Vec<_>>())
+    }
+
+    /// Do the tests of a package pass, all or the quick ones, when it has no mutant? Without that, every mutant would be caught.
+    pub fn baseline(&self, mutated: &Mutated, all: bool) -> Result<(), Failure> {
+        let tests = if all { &[] } else { mutated.quick };
+        let mut cargo = self.repository.cargo();
+        environment(self.repository, cargo.current_dir(&self.tree));
+        run_program(
+            cargo.args(["test", "--quiet", "--locked", "--lib", "--package", mutated.package, "--"]).args(tests),
+        )
+    }
+
+    /// Tests mutants, first with the quick tests and then, if so wanted, those that survive with all of them.
+    pub fn run(&self, mutated: &Mutated, mutants: &[&Mutant], all: bool) -> Result<BTreeMap<String, Outcome>, Failure> {
+        let mut outcomes = self.pass(mutated, mutants, mutated.quick)?;
+        let survived = |mutant: &&Mutant| outcomes.get(&mutant.label) == Some(&Outcome::Survived);
+        let survivors: Vec<&Mutant> = mutants.iter().copied().filter(survived).collect();
+        if all && !survivors.is_empty() {
+            outcomes.extend(self.pass(mutated, &survivors, &[])?);
+        }
+        Ok(outcomes)
+    }
+
+    fn pass(
+        &self,
+        mutated: &Mutated,
+        mutants: &[&Mutant],
+        tests: &[&str],
+    ) -> Result<BTreeMap<String, Outcome>, Failure> {
+        let place = self.repository.target("mutants");
+        let report = place.join("mutants.out/outcomes.json");
+        let _ = fs::remove_file(&report);
+        let mut command = self.mutants(mutated);
+        let time = if tests.is_empty() { TIME } else { QUICK_TIME };
+        command.args([
+            "--in-place",
+            "--baseline",
+            "skip",
+            "--timeout",
+            time,
+            "--build-timeout",
+            BUILD_TIME,
+            "--no-times",
+        ]);
+        command.arg("--output").arg(&place);
+        command.args(mutants.iter().flat_map(|mutant| ["--re".to_owned(), format!("^{}$", escaped(&mutant.name))]));
+        command.args(["--", "--lib", "--"]).args(tests);
+        // It fails when a mutant survives; whether it ran at all, the report tells.
+        let output = command.output().map_err(|e| format!("cargo-mutants could not be started: {e}"))?;
+        let said = || String::from_utf8_lossy(&output.stderr).into_owned();
+        let report = fs::read_to_string(&report).map_err(|_| format!("cargo-mutants ran nothing: {}", said()))?;
+        let found = outcomes(&report)?;
+        let outcome = |mutant: &&Mutant| {
+            let outcome = found.get(&mutant.name).ok_or_else(|| format!("not run: {}\n{}", mutant.name, said()))?;
+            Ok((mutant.label.clone(), *outcome))
+        };
+        mutants.iter().map(outcome).collect()
+    }
+
+    /// The program, for a package's files.
+    fn mutants(&self, mutated: &Mutated) -> Command {
+        let mut command = self.repository.command(&self.program.to_string_lossy());
+        environment(self.repository, &mut command);
+        let glob =
+            if mutated.place.ends_with('/') { format!("{}**/*.rs", mutated.place) } else { mutated.place.into() };
+        command.args(["mutants", "--no-config", "--colors", "never", "--dir"]).arg(&self.tree).args(["--file", &glob]);
+        command
+    }
+
+    /// Digest of a file's text.
+    pub fn digest(&self, file: &str) -> Result<String, Failure> {
+        fs::read(self.tree.join(file)).map(|text| digest(&text)).map_err(|e| format!("{file}: {e}"))
+    }
+}
+
+/// How tests are built and run: one file changes at a time, so building again is most of the time. Property tests draw the same cases
+/// each time, or a mutant that one case in a thousand shows would be caught on some days.
+fn environment(repository: &Repository, command: &mut Command) {
+    command.env("CARGO_INCREMENTAL", "1").env("CARGO_PROFILE_TEST_DEBUG", "0").env("PROPTEST_RNG_SEED", "1");
+    command.env("CARGO_TARGET_DIR", repository.target(BUILD));
+}
+
+/// Mutants of these names, labelled.
+fn labelled(names: &[String]) -> Result<Vec<Mutant>, Failure> {
+    let parts = |name: &String| {
+        let (place, change) = name.split_once(": ")?;
+        let file = place.split(':').next()?;
+        Some((file.to_owned(), format!("{file}: {change}")))
+    };
+    let parts = |name| parts(name).ok_or_else(|| format!("{FILE}: no name of a mutant: {name}"));
+    let all: Vec<(String, String)> = names.iter().map(parts).collect::<Result<_, _>>()?;
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    let label = |(name, (file, label)): (&String, &'_ (String, String))| (name.clone(), file.clone(), label.clone());
+    let mut mutants = Vec::new();
+    for (place, (name, file, text)) in names.iter().zip(&all).map(label).enumerate() {
+        let count = all.iter().filter(|(_, other)| *other == text).count();
+        let nth = seen.entry(&all[place].1).or_default();
+        *nth += 1;
+        let label = if count == 1 { text } else { format!("{text} #{nth}") };
+        mutants.push(Mutant { name, file, label });
+    }
+    Ok(mutants)
+}
+
+/// What the tool's report says of each mutant, by name.
+fn outcomes(report: &str) -> Result<BTreeMap<String, Outcome>, Failure> {
+    let report: Value = serde_json::from_str(report).map_err(|e| format!("cargo-mutants' report: {e}"))?;
+    let outcomes = report["outcomes"].as_array().ok_or("cargo-mutants' report has no outcomes")?;
+    let outcome = |outcome: &Value| {
+        let name = outcome["scenario"]["Mutant"]["name"].as_str()?;
+        let found = match outcome["summary"].as_str()? {
+            "CaughtMutant" => Outcome::Caught,
+            "Unviable" => Outcome::Unviable,
+            // Missed, or out of time.
+            _ => Outcome::Survived,
+        };
+        Some((name.to_owned(), found))
+    };
+    Ok(outcomes.iter().filter_map(outcome).collect())
+}
+
+/// A name as a regular expression that matches it.
+fn escaped(name: &str) -> String {
+    name.chars()
+        .flat_map(|c| (!c.is_alphanumeric() && c.is_ascii() && c != ' ').then_some('\\').into_iter().chain([c]))
+        .collect()
+}
+
+/// Is this file mutated?
+pub fn owner(file: &Path) -> Option<&'static Mutated> {
+    MUTATED.iter().find(|mutated| file.to_str().is_some_and(|file| file.starts_with(mutated.place)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_have_no_lines_and_tell_equal_changes_apart() {
+        let names =
+            ["a.rs:1:2: replace < with > in f", "a.rs:3:9: replace < with > in f", "a.rs:4:1: replace g with ()"];
+        let mutants = labelled(&names.map(str::to_owned)).expect("names");
+        let labels: Vec<_> = mutants.iter().map(|mutant| mutant.label.as_str()).collect();
+        assert_eq!(
+            labels,
+            ["a.rs: replace < with > in f #1", "a.rs: replace < with > in f #2", "a.rs: replace g with ()"]
+        );
+        assert_eq!((mutants[1].file.as_str(), mutants[1].name.as_str()), ("a.rs", names[1]));
+        assert!(labelled(&["nothing".to_owned()]).is_err());
+    }
+
+    #[test]
+    fn a_report_tells_what_became_of_each() {
+        let one = |name: &str, summary: &str| {
+            format!("{{\"scenario\": {{\"Mutant\": {{\"name\": \"{name}\"}}}}, \"summary\": \"{summary}\"}}")
+        };
+        let list = [one("a", "CaughtMutant"), one("b", "MissedMutant"), one("c", "Timeout"), one("d", "Unviable")];
+        let report =
+            format!("{{\"outcomes\": [{{\"scenario\": \"Baseline\", \"summary\": \"Success\"}}, {}]}}", list.join(","));
+        let found: Vec<_> = outcomes(&report).expect("a report").into_values().collect();
+        assert_eq!(found, [Outcome::Caught, Outcome::Survived, Outcome::Survived, Outcome::Unviable]);
+        assert!(outcomes("{}").is_err());
+    }
+
+    #[test]
+    fn names_are_matched_as_they_are() {
+        assert_eq!(
+            escaped("a/b.rs:1:2: replace + with * in <impl A for B>::c"),
+            "a\\/b\\.rs\\:1\\:2\\: replace \\+ with \\* in \\<impl A for B\\>\\:\\:c"
+        );
+    }
+
+    #[test]
+    fn only_what_decides_is_mutated() {
+        let package = |file: &str| owner(Path::new(file)).map(|mutated| mutated.package);
+        assert_eq!(package("stampfly-mode/src/arming.rs"), Some("stampfly-mode"));
+        assert_eq!(package("stampfly-control/src/mixer.rs"), Some("stampfly-control"));
+        assert_eq!(package("stampfly-control/src/pid.rs"), None);
+    }
+}
