@@ -11,8 +11,8 @@
 //! | `cargo xtask mutants NAME...` | every mutant of the files whose path contains one of the names, some seconds each |
 //! | `cargo xtask mutants all` | every mutant of every file: hours |
 //!
-//! What was run once is not run again until a file of its package changes, so a run that was broken off goes on where it was. `--fix`
-//! records the figures of the files that passed, from which `cargo xtask docs --fix` prints the table in `docs/safety.md`.
+//! What was caught once is not run again until the code of its package changes, and what survived not until its code or tests do, so a run
+//! that was broken off goes on where it was. A test that was removed is noticed when `mutants/outcomes` in cargo's folder is. `--fix` records the figures of the files that passed, from which `cargo xtask docs --fix` prints the table in `docs/safety.md`.
 
 use crate::arguments::Arguments;
 use crate::mutation::list::{FILE, Figures, List, Record, digest};
@@ -85,20 +85,17 @@ fn files(
     for (file, mutants) in chosen {
         let mutated = owner(Path::new(file)).ok_or_else(|| format!("{file} is of no package"))?;
         let begun = Instant::now();
-        let memory = Memory::of(repository, mutated, file)?;
-        let outcomes = match memory.read() {
-            Some(outcomes) => outcomes,
-            None => {
-                if !tested.contains(&mutated.package) {
-                    tool.baseline(mutated, true)?;
-                    tested.push(mutated.package);
-                }
-                let outcomes = tool.run(mutated, mutants, true)?;
-                memory.write(&outcomes)?;
-                outcomes
+        let mut memory = Memory::of(repository, mutated, file)?;
+        let left: Vec<&Mutant> = mutants.iter().copied().filter(|mutant| !memory.knows(&mutant.label)).collect();
+        if !left.is_empty() {
+            if !tested.contains(&mutated.package) {
+                tool.baseline(mutated, true)?;
+                tested.push(mutated.package);
             }
-        };
-        let (figures, wrong) = judged(list, mutants, &outcomes);
+            memory.outcomes.extend(tool.run(mutated, &left, true)?);
+            memory.write()?;
+        }
+        let (figures, wrong) = judged(list, mutants, &memory.outcomes);
         let Figures { mutants, caught, explained, unviable } = figures;
         let seconds = begun.elapsed().as_secs_f64();
         println!("{file:<44} {mutants:>7} {caught:>7} {explained:>9} {unviable:>8} {seconds:>7.0}");
@@ -149,12 +146,19 @@ fn by_file(mutants: &[Mutant]) -> BTreeMap<&str, Vec<&Mutant>> {
     files
 }
 
-/// What became of the mutants of a file when its package was as it is now.
+/// What became of the mutants of a file when the code of its package was as it is now. A test that was added since catches no fewer, so
+/// only survivors are run again when tests change.
+#[derive(Debug)]
 struct Memory {
     path: PathBuf,
-    /// Of every file of the package.
-    package: String,
+    /// Of the package's code without its tests, and of all of it.
+    digests: [String; 2],
+    outcomes: BTreeMap<String, Outcome>,
 }
+
+/// The words of the file of a [`Memory`].
+const WORDS: [(Outcome, &str); 3] =
+    [(Outcome::Caught, "caught"), (Outcome::Survived, "survived"), (Outcome::Unviable, "unviable")];
 
 impl Memory {
     fn of(repository: &Repository, mutated: &Mutated, file: &str) -> Result<Self, Failure> {
@@ -169,45 +173,52 @@ impl Memory {
         }
         files.retain(|file| file.extension().is_some_and(|extension| extension == "rs" || extension == "toml"));
         files.sort();
-        let mut text = Vec::new();
+        let (mut code, mut all) = (String::new(), String::new());
         for file in files {
-            text.extend(fs::read(file).map_err(io)?);
+            let text = fs::read_to_string(&file).map_err(io)?;
+            code += without_tests(&file, &text);
+            all += &text;
         }
         let place = repository.target("mutants/outcomes").join(file.replace('/', "-"));
-        Ok(Self { path: place.with_extension("txt"), package: digest(&text) })
+        let digests = [code, all].map(|text| digest(text.as_bytes()));
+        Ok(Self::read(place.with_extension("txt"), digests))
     }
 
-    /// `None` when the package has changed since.
-    fn read(&self) -> Option<BTreeMap<String, Outcome>> {
-        let text = fs::read_to_string(&self.path).ok()?;
+    fn read(path: PathBuf, digests: [String; 2]) -> Self {
+        let text = fs::read_to_string(&path).unwrap_or_default();
         let mut lines = text.lines();
+        let mut digest = || lines.next().unwrap_or_default();
+        let [same_code, same] = [digest() == digests[0], digest() == digests[1]];
         let outcome = |line: &str| {
-            let (mark, label) = line.split_once(' ')?;
-            let outcome = match mark {
-                "caught" => Outcome::Caught,
-                "survived" => Outcome::Survived,
-                "unviable" => Outcome::Unviable,
-                _ => return None,
-            };
-            Some((label.to_owned(), outcome))
+            let (word, label) = line.split_once(' ')?;
+            let (outcome, _) = WORDS.iter().find(|(_, known)| *known == word)?;
+            Some((label.to_owned(), *outcome))
         };
-        if lines.next() == Some(&self.package) { lines.map(outcome).collect() } else { None }
+        let mut outcomes: BTreeMap<_, _> = lines.filter_map(outcome).collect();
+        outcomes.retain(|_, outcome| same || (same_code && *outcome != Outcome::Survived));
+        Self { path, digests, outcomes }
     }
 
-    fn write(&self, outcomes: &BTreeMap<String, Outcome>) -> Result<(), Failure> {
+    fn knows(&self, label: &str) -> bool {
+        self.outcomes.contains_key(label)
+    }
+
+    fn write(&self) -> Result<(), Failure> {
         let io = |e: std::io::Error| format!("{}: {e}", self.path.display());
-        let mut text = format!("{}\n", self.package);
-        for (label, outcome) in outcomes {
-            let mark = match outcome {
-                Outcome::Caught => "caught",
-                Outcome::Survived => "survived",
-                Outcome::Unviable => "unviable",
-            };
-            text += &format!("{mark} {label}\n");
+        let mut text = self.digests.join("\n");
+        for (label, outcome) in &self.outcomes {
+            let word = WORDS.iter().find(|(known, _)| known == outcome).map_or("", |(_, word)| word);
+            text += &format!("\n{word} {label}");
         }
         fs::create_dir_all(self.path.parent().unwrap_or(&self.path)).map_err(io)?;
         fs::write(&self.path, text).map_err(io)
     }
+}
+
+/// A source file without what only tests need.
+fn without_tests<'t>(file: &Path, text: &'t str) -> &'t str {
+    let is_test = file.ends_with("tests.rs") || file.components().any(|part| part.as_os_str() == "tests");
+    if is_test { "" } else { text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default() }
 }
 
 #[cfg(test)]
@@ -255,14 +266,24 @@ mod tests {
     }
 
     #[test]
-    fn outcomes_are_remembered_until_the_package_changes() {
+    fn what_survived_is_run_again_with_other_tests_and_all_of_it_with_other_code() {
         let path = std::env::temp_dir().join(format!("stampfly-mutants-{}.txt", std::process::id()));
-        let outcomes =
-            BTreeMap::from([("f: a".to_owned(), Outcome::Caught), ("f: b #2".to_owned(), Outcome::Survived)]);
-        let memory = |package: &str| Memory { path: path.clone(), package: package.to_owned() };
-        assert_eq!(memory("1").read(), None);
-        memory("1").write(&outcomes).expect("written");
-        assert_eq!((memory("1").read(), memory("2").read()), (Some(outcomes), None));
+        let read = |digests: [&str; 2]| Memory::read(path.clone(), digests.map(str::to_owned));
+        let mut memory = read(["1", "2"]);
+        assert!(memory.outcomes.is_empty());
+        memory.outcomes = [("f: a".to_owned(), Outcome::Caught), ("f: b #2".to_owned(), Outcome::Survived)].into();
+        memory.write().expect("written");
+        let knows = |digests| ["f: a", "f: b #2"].map(|label| read(digests).knows(label));
+        assert_eq!(knows(["1", "2"]), [true; 2]);
+        assert_eq!(knows(["1", "3"]), [true, false]);
+        assert_eq!(knows(["3", "2"]), [true; 2], "the same text altogether");
+        assert_eq!(knows(["3", "3"]), [false; 2]);
         fs::remove_file(path).expect("the file");
+    }
+
+    #[test]
+    fn tests_are_no_code() {
+        let code = |file: &str| without_tests(Path::new(file), "code\n#[cfg(test)]\nmod tests {\n}\n").len();
+        assert_eq!([code("src/a.rs"), code("src/tests.rs"), code("src/tests/a.rs")], [5, 0, 0]);
     }
 }
