@@ -3,16 +3,20 @@
 //! It works in a copy of the sources below cargo's folder for generated files, so the sources themselves never hold a mutant.
 
 use super::list::{FILE, digest};
-use crate::copy::{copy, sources};
+use crate::copy::{Files, copy, sources};
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use toml_edit::{Array, DocumentMut, Item, value};
 
+const MANIFEST: &str = "Cargo.toml";
 const VERSION: &str = "27.1.0";
 const TREE: &str = "mutants/tree";
+/// The packages of the copy. With all of the workspace cargo itself would take half of the time.
+const PACKAGES: [&str; 3] = ["stampfly-types", "stampfly-control", "stampfly-mode"];
 /// Its own, for packages of the same names in another folder would be built in turns.
 const BUILD: &str = "mutants/build";
 /// Longest time to build, and of the tests, s: quick ones take one, and all of them ten. What takes longer has survived.
@@ -81,7 +85,7 @@ impl<'r> Tool<'r> {
             let _ = fs::remove_dir_all(place.join("build"));
         }
         let tree = repository.target(TREE);
-        copy(&repository.root, &tree, &sources(repository)?)?;
+        copy(&repository.root, &tree, &small(repository, sources(repository)?)?)?;
         Ok(Self { repository, program, tree })
     }
 
@@ -100,9 +104,7 @@ impl<'r> Tool<'r> {
         let tests = if all { &[] } else { mutated.quick };
         let mut cargo = self.repository.cargo();
         environment(self.repository, cargo.current_dir(&self.tree));
-        run_program(
-            cargo.args(["test", "--quiet", "--locked", "--lib", "--package", mutated.package, "--"]).args(tests),
-        )
+        run_program(cargo.args(["test", "--quiet", "--lib", "--package", mutated.package, "--"]).args(tests))
     }
 
     /// Tests mutants, first with the quick tests and then, if so wanted, those that survive with all of them.
@@ -166,6 +168,25 @@ impl<'r> Tool<'r> {
     pub fn digest(&self, file: &str) -> Result<String, Failure> {
         fs::read(self.tree.join(file)).map(|text| digest(&text)).map_err(|e| format!("{file}: {e}"))
     }
+}
+
+/// What a workspace of [`PACKAGES`] alone consists of.
+fn small(repository: &Repository, mut files: Files) -> Result<Files, Failure> {
+    let manifest = repository.root.join(MANIFEST);
+    let text = fs::read_to_string(&manifest).map_err(|e| format!("{MANIFEST}: {e}"))?;
+    files.retain(|file, _| file.components().count() == 1 || PACKAGES.iter().any(|package| file.starts_with(package)));
+    files.insert(MANIFEST.into(), Some(manifest_of(&text)?));
+    Ok(files)
+}
+
+/// The workspace's manifest with [`PACKAGES`] for members.
+fn manifest_of(text: &str) -> Result<String, Failure> {
+    let mut manifest: DocumentMut = text.parse().map_err(|e| format!("{MANIFEST}: {e}"))?;
+    let workspace = manifest.get_mut("workspace").and_then(Item::as_table_mut).ok_or("no workspace")?;
+    workspace.remove("exclude");
+    workspace.remove("default-members");
+    workspace.insert("members", value(PACKAGES.into_iter().collect::<Array>()));
+    Ok(manifest.to_string())
 }
 
 /// How tests are built and run: one file changes at a time, so building again is most of the time. Property tests draw the same cases
@@ -258,6 +279,14 @@ mod tests {
     #[test]
     fn names_are_matched_as_they_are() {
         assert_eq!(escaped("a.rs:1: + with * in <impl A for B>::c"), "a\\.rs:1: \\+ with \\* in <impl A for B>::c");
+    }
+
+    #[test]
+    fn the_copy_has_few_packages() {
+        let text = "[workspace]\nresolver = \"3\"\nmembers = [\"a\"]\nexclude = [\"b\"]\ndefault-members = [\"a\"]\n\n[profile.test]\nopt-level = 2\n";
+        let expected = "[workspace]\nresolver = \"3\"\nmembers = [\"stampfly-types\", \"stampfly-control\", \"stampfly-mode\"]\n\n[profile.test]\nopt-level = 2\n";
+        assert_eq!(manifest_of(text).as_deref(), Ok(expected));
+        assert!(MUTATED.iter().all(|mutated| PACKAGES.contains(&mutated.package)));
     }
 
     #[test]
