@@ -227,4 +227,34 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn support_is_what_the_force_makes_of_the_thrust_that_was_taken_away() {
+        let before = Pair { force: 8.0, thrust: 0.4 };
+        // Shares that are missing of thrust and force.
+        for (taken, missing, expected) in [
+            (0.14, 0.0, Support::Unknown),
+            (0.16, 0.0, Support::Stands),
+            (0.2, 0.07, Support::Stands),
+            (0.2, 0.09, Support::Unknown),
+            (0.2, 0.11, Support::Falls),
+            (0.2, 0.6, Support::Falls),
+            (0.5, 0.18, Support::Stands),
+            (0.5, 0.22, Support::Unknown),
+            (0.5, 0.27, Support::Falls),
+        ] {
+            let now = Pair { force: before.force * (1.0 - missing), thrust: before.thrust * (1.0 - taken) };
+            assert_eq!(now.support(before), expected, "{taken} taken, {missing} missing");
+        }
+    }
+
+    #[test]
+    fn both_go_through_the_same_filter() {
+        let mut pair = Pair { force: 8.0, thrust: 0.4 };
+        for part in [0.75, 0.5625] {
+            pair.filter(Pair { force: 4.0, thrust: 0.8 }, 0.15, 0.05);
+            assert!((pair.force - (4.0 + 4.0 * part)).abs() < 1e-5, "{pair:?}");
+            assert!((pair.thrust - (0.8 - 0.4 * part)).abs() < 1e-6, "{pair:?}");
+        }
+    }
 }
