@@ -29,7 +29,7 @@ pub struct Mutated {
     pub package: &'static str,
     /// From the top of the repository; a folder ends with `/`.
     pub place: &'static str,
-    /// What the tests are told in the first pass: they find most of the mutants, and take a second. Survivors meet all tests.
+    /// What the tests are told in the first pass: they find most of the mutants, and take a second.
     pub quick: &'static [&'static str],
 }
 
@@ -42,6 +42,30 @@ pub const MUTATED: [Mutated; 2] = [
     },
     Mutated { package: "stampfly-control", place: "stampfly-control/src/mixer.rs", quick: &["mixer"] },
 ];
+
+/// The other tests, which take ten seconds and more, and the code that they can see. Survivors of the first pass meet them.
+const SLOW: [(&[&str], &[&str]); 3] = [
+    (
+        &["exhaustive", "alerts_of_a_kind"],
+        &[
+            "stampfly-mode/src/arming.rs",
+            "stampfly-mode/src/decision.rs",
+            "stampfly-mode/src/facts.rs",
+            "stampfly-mode/src/machine.rs",
+            "stampfly-mode/src/pilot.rs",
+            "stampfly-mode/src/state.rs",
+            "stampfly-mode/src/stop_button.rs",
+            "stampfly-mode/src/transitions.rs",
+        ],
+    ),
+    (&["entered_once_and_left_once"], &["stampfly-mode/src/stage/"]),
+    (&[], &["stampfly-control/src/mixer.rs"]),
+];
+
+/// The slow tests that can see this file; `None` when there are none.
+fn slow(file: &str) -> Option<&'static [&'static str]> {
+    SLOW.iter().find(|(_, places)| places.iter().any(|place| file.starts_with(place))).map(|(tests, _)| *tests)
+}
 
 /// A change of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,13 +131,14 @@ impl<'r> Tool<'r> {
         run_program(cargo.args(["test", "--quiet", "--lib", "--package", mutated.package, "--"]).args(tests))
     }
 
-    /// Tests mutants, first with the quick tests and then, if so wanted, those that survive with all of them.
+    /// Tests mutants of one file, first with the quick tests and then, if so wanted, those that survive with the slow ones.
     pub fn run(&self, mutated: &Mutated, mutants: &[&Mutant], all: bool) -> Result<BTreeMap<String, Outcome>, Failure> {
-        let mut outcomes = self.pass(mutated, mutants, mutated.quick)?;
+        let mut outcomes = self.pass(mutated, mutants, mutated.quick, QUICK_TIME)?;
         let survived = |mutant: &&Mutant| outcomes.get(&mutant.label) == Some(&Outcome::Survived);
         let survivors: Vec<&Mutant> = mutants.iter().copied().filter(survived).collect();
-        if all && !survivors.is_empty() {
-            outcomes.extend(self.pass(mutated, &survivors, &[])?);
+        let slow = survivors.first().filter(|_| all).and_then(|mutant| slow(&mutant.file));
+        if let Some(tests) = slow {
+            outcomes.extend(self.pass(mutated, &survivors, tests, TIME)?);
         }
         Ok(outcomes)
     }
@@ -123,12 +148,12 @@ impl<'r> Tool<'r> {
         mutated: &Mutated,
         mutants: &[&Mutant],
         tests: &[&str],
+        time: &str,
     ) -> Result<BTreeMap<String, Outcome>, Failure> {
         let place = self.repository.target("mutants");
         let report = place.join("mutants.out/outcomes.json");
         let _ = fs::remove_file(&report);
         let mut command = self.mutants(mutated);
-        let time = if tests.is_empty() { TIME } else { QUICK_TIME };
         command.args([
             "--in-place",
             "--baseline",
@@ -279,6 +304,14 @@ mod tests {
     #[test]
     fn names_are_matched_as_they_are() {
         assert_eq!(escaped("a.rs:1: + with * in <impl A for B>::c"), "a\\.rs:1: \\+ with \\* in <impl A for B>::c");
+    }
+
+    #[test]
+    fn slow_tests_are_for_what_they_see() {
+        assert_eq!(slow("stampfly-mode/src/stage/active.rs"), Some(&["entered_once_and_left_once"][..]));
+        assert_eq!(slow("stampfly-mode/src/failsafe/motion.rs"), None);
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
+        assert!(SLOW.iter().flat_map(|(_, places)| *places).all(|place| root.join(place).exists()));
     }
 
     #[test]
