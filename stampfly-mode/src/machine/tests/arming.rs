@@ -92,3 +92,16 @@ fn the_machine_blocks_arming_at_the_tilt_of_its_configuration() {
         assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, blocks);
     }
 }
+
+#[test]
+fn an_armed_vehicle_has_no_refusals() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.alerts = Alerts::LOW_BATTERY;
+    assert!(world.step(&mut machine, &[Command::Arm]).refused);
+    assert_eq!(machine.refusals().count(), 1);
+    world.alerts = Alerts::NONE;
+    assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
+    assert_eq!(machine.refusals().count(), 0);
+    assert_eq!(world.pass(&mut machine, 100).blocks, ArmBlocks::NOT_ON_GROUND);
+    assert_eq!(machine.refusals().count(), 0);
+}
