@@ -433,3 +433,68 @@ fn on_the_ground_nothing_stops() {
         assert!(!happens(Event::Stop, &ModeConfig::default(), true, &state, &facts), "{phase:?}");
     }
 }
+
+/// A flight by a program, a step every 20 ms.
+struct Flown {
+    state: State,
+    facts: Facts,
+}
+
+impl Flown {
+    fn new(phase: FlightPhase) -> Self {
+        let wanted = FlightMode::PosHold;
+        let commander = if is_armed(phase) { CommandSource::Guided } else { CommandSource::None };
+        let state = State { phase, wanted, mode: wanted, commander, ..State::default() };
+        Self { state, facts: quiet(&state) }
+    }
+
+    /// For so long with these alerts.
+    fn pass(&mut self, millis: u64, alerts: Alerts) -> &State {
+        self.facts.alerts = alerts;
+        for _ in 0..millis / 20 {
+            self.facts.now += Duration::from_millis(20);
+            self.state = decide(&ModeConfig::default(), &self.state, &self.facts);
+        }
+        &self.state
+    }
+}
+
+#[test]
+fn a_lost_estimate_is_started_anew_once() {
+    let mut flown = Flown::new(FlightPhase::IdleGround);
+    for (alerts, resets) in
+        [(Alerts::ESTIMATE_DIVERGED, 1), (Alerts::NONE, 1), (Alerts::ESTIMATE_DIVERGED, 2), (Alerts::NONE, 2)]
+    {
+        assert_eq!(flown.pass(20, alerts).full_resets, resets);
+        assert_eq!(flown.pass(200, alerts).full_resets, resets);
+    }
+}
+
+/// A command that arms is heard before the failsafe says so.
+#[test]
+fn silence_before_arming_is_none() {
+    let mut flown = Flown::new(FlightPhase::IdleGround);
+    flown.pass(10_000, Alerts::COMM_LOST);
+    flown.facts.asked = Asked { arm: true, any: true, ..Asked::default() };
+    assert_eq!(flown.pass(20, Alerts::COMM_LOST).phase, FlightPhase::Armed);
+    flown.facts.asked = Asked::default();
+    assert_eq!(flown.pass(100, Alerts::COMM_LOST).phase, FlightPhase::Armed);
+}
+
+#[test]
+fn a_silence_is_over_when_the_link_has_been_heard_for_a_second_and_began_two_seconds_ago() {
+    let over_after = |silent: u64| {
+        let mut flown = Flown::new(FlightPhase::Flying);
+        assert!(flown.pass(silent, Alerts::COMM_LOST).silence.is_some());
+        (1..400).find(|_| flown.pass(20, Alerts::NONE).silence.is_none()).map(|steps| silent + 20 * steps)
+    };
+    // The first step of silence, or of sound, has lasted for nothing.
+    assert_eq!(over_after(100), Some(2_020));
+    assert_eq!(over_after(2_000), Some(3_020));
+    let mut flown = Flown::new(FlightPhase::Flying);
+    let lands = (0..10).find(|_| {
+        flown.pass(100, Alerts::COMM_LOST);
+        flown.pass(900, Alerts::NONE).phase == FlightPhase::Landing
+    });
+    assert_eq!(lands, Some(3), "a link that flaps is none");
+}
