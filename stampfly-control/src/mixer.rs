@@ -317,9 +317,14 @@ mod tests {
     }
 
     fn hexacopter() -> Vec<Rotor> {
-        (0..6)
+        ring(6)
+    }
+
+    /// So many rotors on a circle.
+    fn ring(count: u8) -> Vec<Rotor> {
+        (0..count)
             .map(|n| {
-                let angle = f64::from(n) * core::f64::consts::FRAC_PI_3 + 0.3;
+                let angle = f64::from(n) * core::f64::consts::TAU / f64::from(count) + 0.3;
                 Rotor {
                     x: 0.2 * angle.cos() as f32,
                     y: 0.2 * angle.sin() as f32,
@@ -352,6 +357,15 @@ mod tests {
         assert_eq!(MultirotorMixer::from_rotors(&broken, 0.2), Err(GeometryError::Uncontrollable));
         let beside = rotors.map(|rotor| Rotor { x: rotor.x + 0.2, ..rotor });
         assert_eq!(MultirotorMixer::from_rotors(&beside, 0.2), Err(GeometryError::Unbalanced));
+    }
+
+    #[test]
+    fn four_to_eight_rotors_fly() {
+        for (count, flies) in [(3, false), (4, true), (8, true), (9, false)] {
+            let made = MultirotorMixer::from_rotors(&ring(count), 4.0).map(|mixer| mixer.count);
+            assert_eq!(made, if flies { Ok(count.into()) } else { Err(GeometryError::Count) }, "{count}");
+        }
+        assert_eq!(MultirotorMixer::from_rotors(&ring(4), f32::INFINITY), Err(GeometryError::Uncontrollable));
     }
 
     #[test]
