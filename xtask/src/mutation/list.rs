@@ -39,7 +39,7 @@ pub struct List {
     document: DocumentMut,
     /// Label of a mutant, and why it may survive.
     pub explained: BTreeMap<String, String>,
-    /// Labels of the mutants that `ci` runs.
+    /// Labels of the mutants that are run without a name.
     pub sample: Vec<String>,
     pub records: Vec<Record>,
 }
@@ -63,8 +63,10 @@ impl List {
                 }
             }
         }
-        let sample =
-            document.get("ci").and_then(Item::as_table).map_or_else(|| Ok(vec![]), |ci| labels(ci, "mutants"))?;
+        let sample = document
+            .get("sample")
+            .and_then(Item::as_table)
+            .map_or_else(|| Ok(vec![]), |sample| labels(sample, "mutants"))?;
         if let Some(label) = sample.iter().find(|label| explained.contains_key(*label)) {
             return Err(format!("it is to be caught, and explained as well: {label}"));
         }
@@ -129,7 +131,7 @@ pub fn digest(text: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    const TEXT: &str = "# Why.\n[ci]\nmutants = [\"f: z\"]\n\n[[explained]]\nwhy = \"w\"\nmutants = [\n    \"f: x\",\n    \"f: y\",\n]\n\n[files]\n\"a.rs\" = { mutants = 4, caught = 2, explained = 1, unviable = 1, text = \"00\" }\n";
+    const TEXT: &str = "# Why.\n[sample]\nmutants = [\"f: z\"]\n\n[[explained]]\nwhy = \"w\"\nmutants = [\n    \"f: x\",\n    \"f: y\",\n]\n\n[files]\n\"a.rs\" = { mutants = 4, caught = 2, explained = 1, unviable = 1, text = \"00\" }\n";
 
     fn list(text: &str) -> Result<List, Failure> {
         List::parse(text, PathBuf::new())
@@ -158,6 +160,27 @@ mod tests {
         let head = TEXT.split_once("\"a.rs\"").expect("a record").0;
         assert_eq!(read.document.to_string(), format!("{head}{}{}", line("a.rs"), line("b.rs")));
         assert_eq!(read.records.len(), 2);
+    }
+
+    /// Without the tool, which is not there in `ci`.
+    #[test]
+    fn the_committed_list_fits_the_sources_and_its_record() {
+        let repository = Repository::find();
+        let list = List::read(&repository).expect("the list");
+        for label in list.explained.keys().chain(&list.sample) {
+            let (file, change) = label.split_once(": ").expect("a file");
+            let source = fs::read_to_string(repository.root.join(file)).expect(label);
+            let change = change.split(" #").next().unwrap_or(change);
+            if let Some((_, function)) = change.rsplit_once(" in ") {
+                let name = function.rsplit("::").next().unwrap_or(function);
+                assert!(source.contains(&format!("fn {name}")), "{label}");
+            }
+        }
+        for Record { file, figures, .. } in &list.records {
+            let explained = list.explained.keys().filter(|label| label.starts_with(&format!("{file}: "))).count();
+            assert_eq!(figures.explained, explained, "{file}");
+            assert_eq!(figures.caught + figures.explained + figures.unviable, figures.mutants, "{file}");
+        }
     }
 
     #[test]
