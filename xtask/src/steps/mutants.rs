@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-    let mut list = List::read(repository)?;
+    let list = List::read(repository)?;
     let tool = Tool::ready(repository)?;
     let mut mutants = Vec::new();
     for mutated in &MUTATED {
@@ -36,7 +36,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     }
     match arguments.rest.as_slice() {
         [] => sample(&tool, &list, &mutants),
-        names => files(repository, &tool, &mut list, &mutants, names, arguments.fix),
+        names => files(repository, &tool, &list, &mutants, names, arguments.fix),
     }
 }
 
@@ -69,7 +69,7 @@ fn sample(tool: &Tool, list: &List, mutants: &[Mutant]) -> Result<(), Failure> {
 fn files(
     repository: &Repository,
     tool: &Tool,
-    list: &mut List,
+    list: &List,
     mutants: &[Mutant],
     names: &[String],
     fix: bool,
@@ -100,8 +100,9 @@ fn files(
         let seconds = begun.elapsed().as_secs_f64();
         println!("{file:<44} {mutants:>7} {caught:>7} {explained:>9} {unviable:>8} {seconds:>7.0}");
         if wrong.is_empty() && fix {
+            // Hours pass, in which somebody may have edited the list; and what has been run is kept when the rest is broken off.
+            let mut list = List::read(repository)?;
             list.record(Record { file: (*file).to_owned(), figures, digest: tool.digest(file)? });
-            // Hours pass; what has been run is kept when it is broken off.
             list.write()?;
         }
         wrong.iter().for_each(|wrong| println!("  {wrong}"));
