@@ -12,10 +12,11 @@
 //! | `cargo xtask mutants all` | every mutant of every file: hours |
 //!
 //! What was caught once is not run again until the code of its package changes, and what survived not until its code or tests do, so a run
-//! that was broken off goes on where it was. A test that was removed is noticed when `mutants/outcomes` in cargo's folder is. `--fix` records the figures of the files that passed, from which `cargo xtask docs --fix` prints the table in `docs/safety.md`.
+//! that was broken off goes on where it was. A test that was removed is noticed when `mutants/outcomes` in cargo's folder is. `--fix` records the figures of the files that passed, there and in `docs/safety.md`.
 
 use crate::arguments::Arguments;
 use crate::mutation::list::{FILE, Figures, List, Record, digest};
+use crate::mutation::page;
 use crate::mutation::tool::{MUTATED, Mutant, Mutated, Outcome, Tool, owner};
 use crate::repository::{Failure, Repository};
 use std::collections::BTreeMap;
@@ -104,6 +105,8 @@ fn files(
             let mut list = List::read(repository)?;
             list.record(Record { file: (*file).to_owned(), figures, digest: tool.digest(file)? });
             list.write()?;
+            let (document, begin, end) = page::PLACE;
+            repository.fill(document, begin, end, &page::table(&list))?;
         }
         wrong.iter().for_each(|wrong| println!("  {wrong}"));
         failures.extend(wrong);
