@@ -437,7 +437,9 @@ fn complete(away: f32, path: f32, speed: f32) -> Option<f32> {
         manager.step(Instant::from_micros(2_500 * k), &input)
     };
     assert!(!step(0, 0.03, 0.0).takeoff_complete);
-    (1..8_000).find(|k| step(*k, 0.5 - away, speed).takeoff_complete).map(|k| (k - 1) as f32 * DT)
+    let found = (1..8_000).find(|k| step(*k, 0.5 - away, speed).takeoff_complete)?;
+    assert!(step(found + 1, 0.5 - away, speed).takeoff_complete, "and stays so");
+    Some((found - 1) as f32 * DT)
 }
 
 #[test]
