@@ -223,7 +223,7 @@ impl Memory {
 /// A source file without what only tests need.
 fn without_tests<'t>(file: &Path, text: &'t str) -> &'t str {
     let is_test = file.ends_with("tests.rs") || file.components().any(|part| part.as_os_str() == "tests");
-    if is_test { "" } else { text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default() }
+    if is_test { "" } else { text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default().trim_end() }
 }
 
 #[cfg(test)]
@@ -289,6 +289,6 @@ mod tests {
     #[test]
     fn tests_are_no_code() {
         let code = |file: &str| without_tests(Path::new(file), "code\n#[cfg(test)]\nmod tests {\n}\n").len();
-        assert_eq!([code("src/a.rs"), code("src/tests.rs"), code("src/tests/a.rs")], [5, 0, 0]);
+        assert_eq!([code("src/a.rs"), code("src/tests.rs"), code("src/tests/a.rs")], [4, 0, 0]);
     }
 }
