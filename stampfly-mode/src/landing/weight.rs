@@ -248,6 +248,18 @@ mod tests {
         }
     }
 
+    /// A share of nothing, or of a force that points down, is none.
+    #[test]
+    fn without_a_thrust_and_a_force_before_support_is_unknown() {
+        let now = Pair { force: -1.0, thrust: 0.2 };
+        for before in [(-1.0, 0.4), (0.0, 0.4), (8.0, 0.0), (8.0, -0.4), (0.0, 0.0)] {
+            for force in [-1.0, 1.0] {
+                let before = Pair { force: before.0, thrust: before.1 };
+                assert_eq!(Pair { force, ..now }.support(before), Support::Unknown, "{before:?}");
+            }
+        }
+    }
+
     #[test]
     fn both_go_through_the_same_filter() {
         let mut pair = Pair { force: 8.0, thrust: 0.4 };
