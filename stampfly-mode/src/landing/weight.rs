@@ -187,17 +187,35 @@ mod tests {
 
     /// Flies, and lands with this thrust at the end of a second and this share of the specific force that thrust makes.
     fn is_carried(thrust: f32, force: f32) -> bool {
+        is_carried_with(thrust, force, 2_500, None)
+    }
+
+    /// The same with steps of so many microseconds, and with this sample in flight.
+    fn is_carried_with(thrust: f32, force: f32, micros: u64, broken: Option<(f32, f32)>) -> bool {
         let mut test = WeightTest::default();
         let mut answers = None;
-        for step in 0u64..1_600 {
-            let gone = step.saturating_sub(400).min(400) as f32 / 400.0;
+        let second = 1_000_000 / micros;
+        for step in 0..4 * second {
+            let gone = step.saturating_sub(second).min(second) as f32 / second as f32;
             let [thrust, force] = [(0.36, thrust), (GRAVITY, force)].map(|(from, to)| from + (to - from) * gone);
-            if step == 400 {
+            if step == second {
                 test.begin_landing();
             }
-            answers = Some(test.step(Instant::from_micros(2_500 * step), force, thrust, false));
+            let (force, thrust) = broken.filter(|_| step == second / 4).unwrap_or((force, thrust));
+            answers = Some(test.step(Instant::from_micros(micros * step), force, thrust, false));
         }
         answers.is_some_and(|answers| answers.is_carried)
+    }
+
+    #[test]
+    fn a_sample_that_is_no_number_and_long_steps_blind_nobody() {
+        for broken in [(f32::NAN, 0.36), (GRAVITY, f32::NAN), (f32::INFINITY, 0.36), (GRAVITY, f32::INFINITY)] {
+            assert!(is_carried_with(0.18, GRAVITY, 2_500, Some(broken)), "{broken:?}");
+        }
+        for micros in [10_000, 20_000, 50_000] {
+            assert!(is_carried_with(0.18, GRAVITY, micros, None), "{micros} microseconds");
+            assert!(!is_carried_with(0.34, GRAVITY, micros, None), "{micros} microseconds");
+        }
     }
 
     #[test]
