@@ -501,7 +501,9 @@ fn a_silence_is_over_when_the_link_has_been_heard_for_a_second_and_began_two_sec
 
 #[test]
 fn a_lifted_vehicle_that_knows_its_height_stays_lifted() {
-    assert_eq!(Flown::new(FlightPhase::IdleHeld).pass(10_000, Alerts::NONE).phase, FlightPhase::IdleHeld);
+    let mut flown = Flown::new(FlightPhase::IdleHeld);
+    let State { phase, transitions, .. } = *flown.pass(10_000, Alerts::NONE);
+    assert_eq!((phase, transitions), (FlightPhase::IdleHeld, 0));
 }
 
 /// Does an event happen to a vehicle with nothing the matter, a tenth of a second after its phase began, when this is changed?

@@ -6,7 +6,7 @@ use super::list::{FILE, digest};
 use crate::copy::{Files, copy, sources};
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -115,7 +115,9 @@ impl<'r> Tool<'r> {
 
     /// Every mutant of a package, in the order of the sources.
     pub fn list(&self, mutated: &Mutated) -> Result<Vec<Mutant>, Failure> {
-        let mut command = self.mutants(mutated);
+        let glob =
+            if mutated.place.ends_with('/') { format!("{}**/*.rs", mutated.place) } else { mutated.place.into() };
+        let mut command = self.mutants([glob.as_str()]);
         let (said, _) = capture(command.args(["--list", "--json"]))?;
         let list: Value = serde_json::from_str(&said).map_err(|e| format!("{}: {e}", mutated.place))?;
         let list = list.as_array().ok_or("no list of mutants")?;
@@ -133,27 +135,22 @@ impl<'r> Tool<'r> {
 
     /// Tests mutants of one file, first with the quick tests and then, if so wanted, those that survive with the slow ones.
     pub fn run(&self, mutated: &Mutated, mutants: &[&Mutant], all: bool) -> Result<BTreeMap<String, Outcome>, Failure> {
-        let mut outcomes = self.pass(mutated, mutants, mutated.quick, QUICK_TIME)?;
+        let mut outcomes = self.pass(mutants, mutated.quick, QUICK_TIME)?;
         let survived = |mutant: &&Mutant| outcomes.get(&mutant.label) == Some(&Outcome::Survived);
         let survivors: Vec<&Mutant> = mutants.iter().copied().filter(survived).collect();
         let slow = survivors.first().filter(|_| all).and_then(|mutant| slow(&mutant.file));
         if let Some(tests) = slow {
-            outcomes.extend(self.pass(mutated, &survivors, tests, TIME)?);
+            outcomes.extend(self.pass(&survivors, tests, TIME)?);
         }
         Ok(outcomes)
     }
 
-    fn pass(
-        &self,
-        mutated: &Mutated,
-        mutants: &[&Mutant],
-        tests: &[&str],
-        time: &str,
-    ) -> Result<BTreeMap<String, Outcome>, Failure> {
+    fn pass(&self, mutants: &[&Mutant], tests: &[&str], time: &str) -> Result<BTreeMap<String, Outcome>, Failure> {
         let place = self.repository.target("mutants");
         let report = place.join("mutants.out/outcomes.json");
         let _ = fs::remove_file(&report);
-        let mut command = self.mutants(mutated);
+        // The tool runs deleted fields of every file that it is given, whatever else is chosen.
+        let mut command = self.mutants(mutants.iter().map(|mutant| mutant.file.as_str()).collect::<BTreeSet<_>>());
         command.args([
             "--in-place",
             "--baseline",
@@ -179,13 +176,12 @@ impl<'r> Tool<'r> {
         mutants.iter().map(outcome).collect()
     }
 
-    /// The program, for a package's files.
-    fn mutants(&self, mutated: &Mutated) -> Command {
+    /// The program, for these files.
+    fn mutants<'f>(&self, files: impl IntoIterator<Item = &'f str>) -> Command {
         let mut command = self.repository.command(&self.program.to_string_lossy());
         environment(self.repository, &mut command);
-        let glob =
-            if mutated.place.ends_with('/') { format!("{}**/*.rs", mutated.place) } else { mutated.place.into() };
-        command.args(["mutants", "--no-config", "--colors", "never", "--dir"]).arg(&self.tree).args(["--file", &glob]);
+        command.args(["mutants", "--no-config", "--colors", "never", "--dir"]).arg(&self.tree);
+        command.args(files.into_iter().flat_map(|file| ["--file", file]));
         command
     }
 
