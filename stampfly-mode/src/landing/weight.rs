@@ -168,21 +168,45 @@ mod tests {
         assert!(stands);
     }
 
+    /// Hover thrusts of vehicles of 4 g, 40 g and 400 g, N.
+    const SIZES: [f32; 3] = [0.036, 0.36, 3.6];
+
     /// Hovers, sinks under a ceiling, and is pushed up by so much, m/s², for 10 ms.
-    fn is_struck(push: f32) -> bool {
+    fn is_struck(hover: f32, push: f32) -> bool {
         let mut test = WeightTest::default();
         (0u64..500).any(|step| {
-            let thrust = if step < 400 { 0.36 } else { 0.33 };
+            let thrust = if step < 400 { hover } else { 0.92 * hover };
             let push = if (450..454).contains(&step) { push } else { 0.0 };
-            let force = GRAVITY * thrust / 0.36 + push;
+            let force = GRAVITY * thrust / hover + push;
             test.step(Instant::from_micros(2_500 * step), force, thrust, step >= 400).is_struck
         })
     }
 
     #[test]
     fn a_touch_at_a_fifth_of_a_metre_per_second_is_felt_and_vibration_is_not() {
-        assert!(is_struck(20.0));
-        assert!(!is_struck(5.0));
+        for hover in SIZES {
+            assert!(is_struck(hover, 20.0), "{hover} N");
+            assert!(!is_struck(hover, 5.0), "{hover} N");
+        }
+    }
+
+    /// What it was before thrust was taken away is remembered for as long as the force does not follow.
+    #[test]
+    fn what_a_test_has_found_standing_stands_after_it() {
+        for hover in SIZES {
+            let support = |follows: bool| {
+                let mut test = WeightTest::default();
+                let mut answers = None;
+                for step in 0u64..1_200 {
+                    let share = 1.0 - 0.45 * (step.saturating_sub(400).min(400) as f32 / 400.0);
+                    let force = GRAVITY * if follows { share } else { 1.0 };
+                    answers = Some(test.step(Instant::from_micros(2_500 * step), force, share * hover, step < 800));
+                }
+                answers.map(|answers| answers.steady)
+            };
+            assert_eq!(support(false), Some(Support::Stands), "{hover} N");
+            assert_eq!(support(true), Some(Support::Unknown), "{hover} N, in the air");
+        }
     }
 
     /// Flies, and lands with this thrust at the end of a second and this share of the specific force that thrust makes.
