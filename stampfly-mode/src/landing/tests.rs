@@ -462,3 +462,12 @@ fn a_take_off_that_climbs_is_off_the_ground_whatever_its_height_says() {
         assert_eq!(stages(&mut manager, &steps, Validity::ALL)[1], stage, "{climb} m/s");
     }
 }
+
+#[test]
+fn thrust_is_taken_away_at_the_ground_alone() {
+    for (height, testing) in [(Some(1.0), false), (Some(0.2), false), (None, false), (Some(0.04), true)] {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        lands(&mut manager, 1, height, 0.2);
+        assert_eq!(manager.is_testing, testing, "{height:?}");
+    }
+}
