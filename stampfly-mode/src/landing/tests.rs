@@ -471,3 +471,74 @@ fn thrust_is_taken_away_at_the_ground_alone() {
         assert_eq!(manager.is_testing, testing, "{height:?}");
     }
 }
+
+/// It stands on one leg, and thrust turns it over.
+#[test]
+fn a_touch_that_is_felt_ends_the_ramp() {
+    let config = LandingConfig::default();
+    let ceilings = |push: f32| {
+        let mut manager = TakeoffLanding::new(config);
+        let mut ceiling = f32::MAX;
+        let mut step = |k: u64| {
+            let demand = ControlOutput { thrust: ceiling.min(1.0), ..Default::default() };
+            let pushed = if (480..484).contains(&k) { push } else { 0.0 };
+            let estimate = StateEstimate {
+                height: 0.04,
+                velocity: Vec3::new(0.0, 0.0, 0.1),
+                specific_force: Vec3::new(0.0, 0.0, -GRAVITY * demand.thrust - pushed),
+                valid: Validity::ALL,
+                ..Default::default()
+            };
+            let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
+            let setpoint = Setpoint::default();
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            ceiling = manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling;
+            ceiling
+        };
+        (0..484).for_each(|k| drop(step(k)));
+        [step(484), step(500)]
+    };
+    let [before, after] = ceilings(0.0);
+    assert!(before > 0.85 && after > 0.85, "{before}, {after}");
+    assert_eq!(ceilings(25.0), [config.ceiling_share; 2]);
+}
+
+/// The first ceiling of thrust of a landing after this phase, without height and climb rate.
+#[test]
+fn a_blind_landing_gives_up_more_thrust_when_it_breaks_off_a_take_off() {
+    let first = |phase: FlightPhase| {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        let estimate = nothing(0.0, 0.0, 0.0);
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
+        let mut step = |k: u64, phase| {
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling
+        };
+        step(0, phase);
+        step(1, FlightPhase::Landing)
+    };
+    assert_eq!([FlightPhase::TakeOff, FlightPhase::Flying].map(first), [0.87, 0.95]);
+}
+
+/// The height says that it is up, and the estimate that it sinks as it is asked to.
+#[test]
+fn what_something_carries_has_landed_whatever_the_estimate_says() {
+    let landed = |follows: bool| {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        (0..2_400u64).any(|k| {
+            let share = 1.0 - 0.5 * (k.saturating_sub(400).min(800) as f32 / 800.0);
+            let estimate = StateEstimate {
+                height: 1.0,
+                velocity: Vec3::new(0.0, 0.0, 0.3),
+                specific_force: Vec3::new(0.0, 0.0, -GRAVITY * if follows { share } else { 1.0 }),
+                valid: Validity::ALL,
+                ..Default::default()
+            };
+            let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: share, ..Default::default() });
+            let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            manager.step(Instant::from_micros(2_500 * k), &input).landed
+        })
+    };
+    assert!(landed(false) && !landed(true));
+}
