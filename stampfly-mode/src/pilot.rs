@@ -92,9 +92,9 @@ impl Transmitter {
         self.unreadable
     }
 
-    /// The arm switch has to be seen off again.
+    /// The arm switch has to be seen off again. Its position is forgotten as well: one that is still off would be seen off.
     pub fn forget(&mut self) {
-        (self.seen_off, self.was_on) = (false, false);
+        (self.arm, self.seen_off, self.was_on) = (Debounced::default(), false, false);
     }
 
     /// Looks at the newest frame, if there is a fresh one. `flies` says whether the pilot has authority: then the sticks are
@@ -261,5 +261,9 @@ mod tests {
         assert!(!deflected((0.8, 0.0), (0.1, 0.0)), "back to its centre");
         assert!(!deflected((0.8, 0.0), (0.9, 0.0)), "where it was");
         assert!(deflected((0.8, 0.0), (-0.2, 0.0)));
+        let moves = [vec![sticks(0.0, 0.0)], vec![sticks(0.9, 0.0); 10]].concat();
+        for (armed, flies) in [(true, true), (false, false)] {
+            assert!(!heard(&moves, armed, flies).iter().any(|heard| heard.deflected), "nothing to take over");
+        }
     }
 }

@@ -130,3 +130,19 @@ fn arming_is_refused_to_whoever_asked_for_it_and_to_nobody_else() {
         world.step(machine, &[])
     }));
 }
+
+/// The old transmitter's switch was seen off, and its last frame is fresh until the new one's comes.
+#[test]
+fn the_arm_switch_of_a_new_transmitter_must_be_seen_off_though_there_was_no_silence() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    let [on, off] = [true, false].map(|arm| frame(FlightMode::PosHold, arm, 0.0));
+    world.sends(&mut machine, off);
+    world.button = Some(ButtonGesture::HoldPair);
+    world.step(&mut machine, &[]);
+    assert!(world.pass(&mut machine, 180).pairing);
+    world.pilot = Some(on);
+    let status = world.pass(&mut machine, 1_000);
+    assert_eq!((status.pairing, status.armed, status.blocks), (false, false, ArmBlocks::ARM_SWITCH));
+    world.sends(&mut machine, off);
+    assert!(world.sends(&mut machine, on).armed);
+}
