@@ -335,6 +335,13 @@ mod tests {
             .collect()
     }
 
+    /// Four rotors at four distances, each with a share of its own.
+    fn askew() -> Vec<Rotor> {
+        let spins = [Spin::CounterClockwise, Spin::Clockwise, Spin::CounterClockwise, Spin::Clockwise];
+        let places = [(0.05, 0.06), (-0.04, 0.05), (-0.06, -0.04), (0.045, -0.055)];
+        places.into_iter().zip(spins).map(|((x, y), spin)| Rotor { x, y, spin, kappa: 0.01 }).collect()
+    }
+
     #[test]
     fn a_square_has_the_inverse_that_can_be_written_down() {
         for (share, rotor) in MIXER.shares.iter().zip(QUADROTOR.rotors) {
@@ -413,12 +420,17 @@ mod tests {
             .take(rotors.len())
             .map(|s| s.roll * demand.torque.x + s.pitch * demand.torque.y)
             .collect();
-        let feasible = (0..1000).any(|n| {
-            let collective = n as f32 / 999.0 * thrust_max * rotors.len() as f32;
-            mixer.shares.iter().zip(&part).all(|(s, p)| (0.0..=thrust_max).contains(&(s.thrust * collective + p)))
-        });
-        prop_assert!(!feasible || mixed.unmet[0] < 1e-4, "roll and pitch were possible and given up");
-        prop_assert!(mixed.unmet[0] == 0.0 || !feasible);
+        let feasible = |scale: f32| {
+            (0..1000).any(|n| {
+                let collective = n as f32 / 999.0 * thrust_max * rotors.len() as f32;
+                let fits = |(s, p): (&Shares, &f32)| (0.0..=thrust_max).contains(&(s.thrust * collective + scale * p));
+                mixer.shares.iter().zip(&part).all(fits)
+            })
+        };
+        prop_assert!(!feasible(1.0) || mixed.unmet[0] < 1e-4, "roll and pitch were possible and given up");
+        prop_assert!(mixed.unmet[0] == 0.0 || !feasible(1.0));
+        prop_assert!(mixed.unmet[0] == 0.0 || !feasible(1.01 * kept), "more of roll and pitch was possible: {kept}");
+        prop_assert_eq!((mixed.count as usize, mixed.unmet[0]), (rotors.len(), mixed.unmet[1]));
         // Yaw keeps its sign.
         let yaw_kept = 1.0 - mixed.unmet[2];
         prop_assert!((-1e-6..=1.0).contains(&yaw_kept));
@@ -441,6 +453,11 @@ mod tests {
         #[test]
         fn a_hexacopter_keeps_them_too(demand in demands()) {
             keeps_its_promises(&hexacopter(), 4.0, &demand)?;
+        }
+
+        #[test]
+        fn rotors_that_stand_askew_keep_them_too(demand in demands()) {
+            keeps_its_promises(&askew(), 0.3, &demand)?;
         }
 
         #[test]
