@@ -130,9 +130,7 @@ impl MultirotorMixer {
             drag = drag.max(rotors[n].kappa.abs());
             n += 1;
         }
-        if !(arm > 0.0 && drag > 0.0 && arm.is_finite() && drag.is_finite()) {
-            return Err(GeometryError::Uncontrollable);
-        }
+        // Without an arm or drag, or with one that is not finite, a column holds no numbers, and has no inverse.
         let Some(inverse) = inverse(gram(rotors, arm, drag)) else { return Err(GeometryError::Uncontrollable) };
         let none = Shares { thrust: 0.0, collective: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0 };
         let mut shares = [none; MAX_MOTORS];
@@ -488,6 +486,8 @@ mod tests {
         let made = |rotors: &[Rotor], thrust| MultirotorMixer::from_rotors(rotors, thrust).map(|_| ());
         let rotors = QUADROTOR.rotors;
         let flat: Vec<_> = rotors.iter().map(|rotor| Rotor { x: 0.0, y: 0.0, ..*rotor }).collect();
+        let with_x = |x: f32| rotors.iter().map(|rotor| Rotor { x, ..*rotor }).collect::<Vec<_>>();
+        let with_kappa = |kappa: f32| rotors.iter().map(|rotor| Rotor { kappa, ..*rotor }).collect::<Vec<_>>();
         let without_drag: Vec<_> = rotors.iter().map(|rotor| Rotor { kappa: 0.0, ..*rotor }).collect();
         for (case, reason) in [
             (made(&rotors[..3], 0.1), GeometryError::Count),
@@ -495,6 +495,10 @@ mod tests {
             (made(rotors, 0.0), GeometryError::Uncontrollable),
             (made(&flat, 0.1), GeometryError::Uncontrollable),
             (made(&without_drag, 0.1), GeometryError::Uncontrollable),
+            (made(&with_x(f32::INFINITY), 0.1), GeometryError::Uncontrollable),
+            (made(&with_x(f32::NAN), 0.1), GeometryError::Uncontrollable),
+            (made(&with_kappa(f32::INFINITY), 0.1), GeometryError::Uncontrollable),
+            (made(&with_kappa(f32::NAN), 0.1), GeometryError::Uncontrollable),
         ] {
             assert_eq!(case, Err(reason));
         }
