@@ -373,6 +373,18 @@ mod tests {
         assert_eq!(MultirotorMixer::from_rotors(&ring(4), f32::INFINITY), Err(GeometryError::Uncontrollable));
     }
 
+    #[cfg(feature = "serde")]
+    #[test]
+    fn what_is_read_has_no_more_rotors_than_shares() {
+        let mut stored = serde_json::to_value(&MIXER).expect("a value");
+        let mut read = |count: usize| {
+            stored["count"] = count.into();
+            serde_json::from_value::<MultirotorMixer>(stored.clone()).ok()
+        };
+        assert_eq!(read(MIXER.count), Some(MIXER));
+        assert_eq!([MAX_MOTORS, MAX_MOTORS + 1].map(|count| read(count).is_some()), [true, false]);
+    }
+
     #[test]
     fn broken_demands_are_zero() {
         let mixed = MIXER.mix(&ControlOutput { thrust: f32::NAN, torque: Vec3::repeat(f32::INFINITY) });

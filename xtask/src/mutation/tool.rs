@@ -29,6 +29,8 @@ pub struct Mutated {
     pub package: &'static str,
     /// From the top of the repository; a folder ends with `/`.
     pub place: &'static str,
+    /// With which the package is tested; what stands under another is in no test.
+    pub features: &'static [&'static str],
     /// What the tests are told in the first pass: they find most of the mutants, and take a second.
     pub quick: &'static [&'static str],
 }
@@ -38,9 +40,15 @@ pub const MUTATED: [Mutated; 2] = [
     Mutated {
         package: "stampfly-mode",
         place: "stampfly-mode/src/",
+        features: &[],
         quick: &["--skip", "exhaustive", "--skip", "alerts_of_a_kind", "--skip", "entered_once_and_left_once"],
     },
-    Mutated { package: "stampfly-control", place: "stampfly-control/src/mixer.rs", quick: &["mixer"] },
+    Mutated {
+        package: "stampfly-control",
+        place: "stampfly-control/src/mixer.rs",
+        features: &["serde"],
+        quick: &["mixer"],
+    },
 ];
 
 /// The other tests, which take ten seconds and more, and the code that they can see. Survivors of the first pass meet them.
@@ -130,22 +138,29 @@ impl<'r> Tool<'r> {
         let tests = if all { &[] } else { mutated.quick };
         let mut cargo = self.repository.cargo();
         environment(self.repository, cargo.current_dir(&self.tree));
-        run_program(cargo.args(["test", "--quiet", "--lib", "--package", mutated.package, "--"]).args(tests))
+        cargo.args(["test", "--quiet", "--lib", "--package", mutated.package]).args(features(mutated));
+        run_program(cargo.arg("--").args(tests))
     }
 
     /// Tests mutants of one file, first with the quick tests and then, if so wanted, those that survive with the slow ones.
     pub fn run(&self, mutated: &Mutated, mutants: &[&Mutant], all: bool) -> Result<BTreeMap<String, Outcome>, Failure> {
-        let mut outcomes = self.pass(mutants, mutated.quick, QUICK_TIME)?;
+        let mut outcomes = self.pass(mutated, mutants, mutated.quick, QUICK_TIME)?;
         let survived = |mutant: &&Mutant| outcomes.get(&mutant.label) == Some(&Outcome::Survived);
         let survivors: Vec<&Mutant> = mutants.iter().copied().filter(survived).collect();
         let slow = survivors.first().filter(|_| all).and_then(|mutant| slow(&mutant.file));
         if let Some(tests) = slow {
-            outcomes.extend(self.pass(&survivors, tests, TIME)?);
+            outcomes.extend(self.pass(mutated, &survivors, tests, TIME)?);
         }
         Ok(outcomes)
     }
 
-    fn pass(&self, mutants: &[&Mutant], tests: &[&str], time: &str) -> Result<BTreeMap<String, Outcome>, Failure> {
+    fn pass(
+        &self,
+        mutated: &Mutated,
+        mutants: &[&Mutant],
+        tests: &[&str],
+        time: &str,
+    ) -> Result<BTreeMap<String, Outcome>, Failure> {
         let place = self.repository.target("mutants");
         let report = place.join("mutants.out/outcomes.json");
         let _ = fs::remove_file(&report);
@@ -161,7 +176,7 @@ impl<'r> Tool<'r> {
             BUILD_TIME,
             "--no-times",
         ]);
-        command.arg("--output").arg(&place);
+        command.arg("--output").arg(&place).args(features(mutated));
         command.args(mutants.iter().flat_map(|mutant| ["--re".to_owned(), format!("^{}$", escaped(&mutant.name))]));
         command.args(["--", "--lib", "--"]).args(tests);
         // It fails when a mutant survives; whether it ran at all, the report tells.
@@ -189,6 +204,11 @@ impl<'r> Tool<'r> {
     pub fn digest(&self, file: &str) -> Result<String, Failure> {
         fs::read(self.tree.join(file)).map(|text| digest(&text)).map_err(|e| format!("{file}: {e}"))
     }
+}
+
+/// The features of a package, as cargo and the tool are told.
+fn features(mutated: &Mutated) -> impl Iterator<Item = &'static str> {
+    mutated.features.iter().flat_map(|feature| ["--features", feature])
 }
 
 /// What a workspace of [`PACKAGES`] alone consists of.
