@@ -130,9 +130,7 @@ impl MultirotorMixer {
             drag = drag.max(rotors[n].kappa.abs());
             n += 1;
         }
-        if !(arm > 0.0 && drag > 0.0 && arm.is_finite() && drag.is_finite()) {
-            return Err(GeometryError::Uncontrollable);
-        }
+        // Without an arm or drag, or with one that is not finite, a column holds no numbers, and has no inverse.
         let Some(inverse) = inverse(gram(rotors, arm, drag)) else { return Err(GeometryError::Uncontrollable) };
         let none = Shares { thrust: 0.0, collective: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0 };
         let mut shares = [none; MAX_MOTORS];
@@ -317,9 +315,14 @@ mod tests {
     }
 
     fn hexacopter() -> Vec<Rotor> {
-        (0..6)
+        ring(6)
+    }
+
+    /// So many rotors on a circle.
+    fn ring(count: u8) -> Vec<Rotor> {
+        (0..count)
             .map(|n| {
-                let angle = f64::from(n) * core::f64::consts::FRAC_PI_3 + 0.3;
+                let angle = f64::from(n) * core::f64::consts::TAU / f64::from(count) + 0.3;
                 Rotor {
                     x: 0.2 * angle.cos() as f32,
                     y: 0.2 * angle.sin() as f32,
@@ -328,6 +331,21 @@ mod tests {
                 }
             })
             .collect()
+    }
+
+    /// Four rotors at four distances, each with a share of its own.
+    fn askew() -> Vec<Rotor> {
+        let spins = [Spin::CounterClockwise, Spin::Clockwise, Spin::CounterClockwise, Spin::Clockwise];
+        let places = [(0.05, 0.06), (-0.04, 0.05), (-0.06, -0.04), (0.045, -0.055)];
+        let drags = [0.01, 0.012, 0.009, 0.011];
+        places.into_iter().zip(spins).zip(drags).map(|(((x, y), spin), kappa)| Rotor { x, y, spin, kappa }).collect()
+    }
+
+    #[test]
+    fn rotors_that_stand_nearly_in_line_are_refused() {
+        let squeezed = |share: f32| Rotor::quadrotor_x(0.05, 0.01).map(|rotor| Rotor { y: rotor.y * share, ..rotor });
+        assert_eq!(MultirotorMixer::from_rotors(&squeezed(3e-4), 0.2), Err(GeometryError::Uncontrollable));
+        assert!(MultirotorMixer::from_rotors(&squeezed(0.01), 0.2).is_ok());
     }
 
     #[test]
@@ -352,6 +370,27 @@ mod tests {
         assert_eq!(MultirotorMixer::from_rotors(&broken, 0.2), Err(GeometryError::Uncontrollable));
         let beside = rotors.map(|rotor| Rotor { x: rotor.x + 0.2, ..rotor });
         assert_eq!(MultirotorMixer::from_rotors(&beside, 0.2), Err(GeometryError::Unbalanced));
+    }
+
+    #[test]
+    fn four_to_eight_rotors_fly() {
+        for (count, flies) in [(3, false), (4, true), (8, true), (9, false)] {
+            let made = MultirotorMixer::from_rotors(&ring(count), 4.0).map(|mixer| mixer.count);
+            assert_eq!(made, if flies { Ok(count.into()) } else { Err(GeometryError::Count) }, "{count}");
+        }
+        assert_eq!(MultirotorMixer::from_rotors(&ring(4), f32::INFINITY), Err(GeometryError::Uncontrollable));
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn what_is_read_has_no_more_rotors_than_shares() {
+        let mut stored = serde_json::to_value(&MIXER).expect("a value");
+        let mut read = |count: usize| {
+            stored["count"] = count.into();
+            serde_json::from_value::<MultirotorMixer>(stored.clone()).ok()
+        };
+        assert_eq!(read(MIXER.count), Some(MIXER));
+        assert_eq!([MAX_MOTORS, MAX_MOTORS + 1].map(|count| read(count).is_some()), [true, false]);
     }
 
     #[test]
@@ -399,12 +438,17 @@ mod tests {
             .take(rotors.len())
             .map(|s| s.roll * demand.torque.x + s.pitch * demand.torque.y)
             .collect();
-        let feasible = (0..1000).any(|n| {
-            let collective = n as f32 / 999.0 * thrust_max * rotors.len() as f32;
-            mixer.shares.iter().zip(&part).all(|(s, p)| (0.0..=thrust_max).contains(&(s.thrust * collective + p)))
-        });
-        prop_assert!(!feasible || mixed.unmet[0] < 1e-4, "roll and pitch were possible and given up");
-        prop_assert!(mixed.unmet[0] == 0.0 || !feasible);
+        let feasible = |scale: f32| {
+            (0..1000).any(|n| {
+                let collective = n as f32 / 999.0 * thrust_max * rotors.len() as f32;
+                let fits = |(s, p): (&Shares, &f32)| (0.0..=thrust_max).contains(&(s.thrust * collective + scale * p));
+                mixer.shares.iter().zip(&part).all(fits)
+            })
+        };
+        prop_assert!(!feasible(1.0) || mixed.unmet[0] < 1e-4, "roll and pitch were possible and given up");
+        prop_assert!(mixed.unmet[0] == 0.0 || !feasible(1.0));
+        prop_assert!(mixed.unmet[0] == 0.0 || !feasible(1.01 * kept), "more of roll and pitch was possible: {kept}");
+        prop_assert_eq!((mixed.count as usize, mixed.unmet[0]), (rotors.len(), mixed.unmet[1]));
         // Yaw keeps its sign.
         let yaw_kept = 1.0 - mixed.unmet[2];
         prop_assert!((-1e-6..=1.0).contains(&yaw_kept));
@@ -427,6 +471,11 @@ mod tests {
         #[test]
         fn a_hexacopter_keeps_them_too(demand in demands()) {
             keeps_its_promises(&hexacopter(), 4.0, &demand)?;
+        }
+
+        #[test]
+        fn rotors_that_stand_askew_keep_them_too(demand in demands()) {
+            keeps_its_promises(&askew(), 0.3, &demand)?;
         }
 
         #[test]
@@ -457,6 +506,8 @@ mod tests {
         let made = |rotors: &[Rotor], thrust| MultirotorMixer::from_rotors(rotors, thrust).map(|_| ());
         let rotors = QUADROTOR.rotors;
         let flat: Vec<_> = rotors.iter().map(|rotor| Rotor { x: 0.0, y: 0.0, ..*rotor }).collect();
+        let with_x = |x: f32| rotors.iter().map(|rotor| Rotor { x, ..*rotor }).collect::<Vec<_>>();
+        let with_kappa = |kappa: f32| rotors.iter().map(|rotor| Rotor { kappa, ..*rotor }).collect::<Vec<_>>();
         let without_drag: Vec<_> = rotors.iter().map(|rotor| Rotor { kappa: 0.0, ..*rotor }).collect();
         for (case, reason) in [
             (made(&rotors[..3], 0.1), GeometryError::Count),
@@ -464,6 +515,10 @@ mod tests {
             (made(rotors, 0.0), GeometryError::Uncontrollable),
             (made(&flat, 0.1), GeometryError::Uncontrollable),
             (made(&without_drag, 0.1), GeometryError::Uncontrollable),
+            (made(&with_x(f32::INFINITY), 0.1), GeometryError::Uncontrollable),
+            (made(&with_x(f32::NAN), 0.1), GeometryError::Uncontrollable),
+            (made(&with_kappa(f32::INFINITY), 0.1), GeometryError::Uncontrollable),
+            (made(&with_kappa(f32::NAN), 0.1), GeometryError::Uncontrollable),
         ] {
             assert_eq!(case, Err(reason));
         }

@@ -134,11 +134,6 @@ pub(crate) struct Refusals {
 }
 
 impl Refusals {
-    /// Of an armed vehicle, which is not on the ground.
-    pub fn clear(&mut self) {
-        (self.since, self.found) = Default::default();
-    }
-
     pub fn step(&mut self, config: &ModeConfig, state: &State, facts: &Facts) {
         for ((check, since), found) in CHECKS.iter().zip(&mut self.since).zip(&mut self.found) {
             let result = (check.test)(config, state, facts);

@@ -177,4 +177,20 @@ mod tests {
         let setpoint = authority.step(Instant::from_micros(1), CommandSource::Pilot, true);
         assert_eq!((setpoint.roll, setpoint.pitch), (0.0, 1.0));
     }
+
+    #[test]
+    fn sticks_leave_the_dead_band_without_a_jump_and_reach_their_ends() {
+        let mut authority = Authority::default();
+        let sticks = |authority: &mut Authority, throttle, roll, pitch, yaw| {
+            authority.pilot(Instant::ZERO, &PilotInput { throttle, roll, pitch, yaw, ..HALF });
+            let sticks = authority.step(Instant::ZERO, CommandSource::Pilot, true);
+            [sticks.throttle, sticks.roll, sticks.pitch, sticks.yaw]
+        };
+        assert_eq!(sticks(&mut authority, 0.05, -0.05, 0.04, 0.0), [0.0; 4]);
+        let near = sticks(&mut authority, 0.05095, -0.05095, 0.525, -0.24);
+        for (stick, expected) in near.into_iter().zip([0.001, -0.001, 0.5, -0.2]) {
+            assert!((stick - expected).abs() < 1e-6, "{near:?}");
+        }
+        assert_eq!(sticks(&mut authority, -1.0, 1.0, -1.0, 1.0), [-1.0, 1.0, -1.0, 1.0]);
+    }
 }

@@ -149,3 +149,48 @@ impl Facts {
         self.stop_button || self.button == Some(ButtonGesture::Press)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::Vec3;
+    use stampfly_types::messages::{CalibrationResult, LandDetected, StateEstimate};
+
+    #[test]
+    fn a_program_that_only_ends_a_flight_needs_no_authority() {
+        use GuidedKind::{Arm, Disarm, Hold, Kill, Land, TakeOff, WayPoint};
+        for kind in [Arm, TakeOff, WayPoint, Hold] {
+            assert!(Asked::read(&[kind]).flies(), "{kind:?}");
+        }
+        let flip = GuidedKind::ALL.iter().find(|kind| kind.flip().is_some()).expect("a flip");
+        assert!(Asked::read(&[*flip]).flies());
+        for kind in [Kill, Disarm, Land, GuidedKind::None] {
+            assert!(!Asked::read(&[kind]).flies(), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn rest_is_to_turn_climb_and_sink_slowly() {
+        let rests = |rate: f32, sink_rate: f32| {
+            let estimate = StateEstimate {
+                angular_rate: Vec3::new(0.6 * rate, 0.0, -0.8 * rate),
+                velocity: Vec3::new(9.0, 0.0, sink_rate),
+                ..Default::default()
+            };
+            let input = ModeInput {
+                alerts: Alerts::NONE,
+                estimate: &estimate,
+                calibration: &CalibrationResult::default(),
+                land_detected: &LandDetected::default(),
+                pilot: None,
+                sticks: CommandSource::None,
+                commands: &[],
+                button: None,
+                cut_off: false,
+            };
+            Facts::read(Instant::ZERO, &input, Heard::default(), true, false, None).at_rest
+        };
+        assert!(rests(0.0, 0.0) && rests(1.9, 0.45) && rests(1.9, -0.45));
+        assert!(!rests(2.1, 0.0) && !rests(0.0, 0.55) && !rests(0.0, -0.55));
+    }
+}

@@ -98,10 +98,8 @@ impl ModeMachine {
             self.transmitter.forget();
         }
         let blocks = if armed {
-            // There is nothing to arm, and the checks would be half of a step.
-            if phase == FlightPhase::Armed {
-                self.refusals.clear();
-            }
+            // There is nothing to arm, and the checks would be half of a step. All of them passed when it was armed, so none of
+            // their refusals is left.
             ArmBlocks::NOT_ON_GROUND
         } else {
             // The checks of this decision: before what it acknowledged and where it led.

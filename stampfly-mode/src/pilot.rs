@@ -156,6 +156,7 @@ impl Transmitter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec;
     use std::vec::Vec;
 
     /// Frames every 20 ms: what the transmitter says after each of them.
@@ -228,5 +229,41 @@ mod tests {
             }
         }
         assert_eq!(transmitter.unreadable(), 3, "frames, not steps");
+    }
+
+    #[test]
+    fn a_switch_that_was_never_seen_off_or_that_the_ground_has_seen_is_not_found_off() {
+        assert_eq!(switched("+++++__-----", true), [0, 0, 0, 5], "a program has armed");
+        let (mut transmitter, config) = (Transmitter::default(), ModeConfig::default());
+        let mut millis = 0;
+        let mut found_off = |frames: &str, armed: bool| {
+            let frames = frames.chars().map(|c| (c != '_').then(|| PilotInput { arm: c == '+', ..Default::default() }));
+            frames.fold(false, |found, frame| {
+                millis += 20;
+                let at = Instant::from_millis(millis);
+                found | transmitter.step(&config, frame.as_ref().map(|frame| (at, frame)), armed, true).switch.found_off
+            })
+        };
+        assert!(!found_off("--+++++__", true));
+        assert!(!found_off("__", false), "it has landed, and nobody was heard");
+        assert!(!found_off("-----", true));
+    }
+
+    #[test]
+    fn sticks_are_compared_with_where_they_were_and_with_their_centre() {
+        let sticks = |pitch, yaw| Some(PilotInput { pitch, yaw, ..Default::default() });
+        let deflected = |from: (f32, f32), to: (f32, f32)| {
+            let frames = [vec![sticks(from.0, from.1)], vec![sticks(to.0, to.1); 10]].concat();
+            heard(&frames, true, false).iter().any(|heard| heard.deflected)
+        };
+        assert!(deflected((0.0, 0.0), (0.16, 0.0)) && deflected((0.0, 0.0), (0.0, -0.16)));
+        assert!(!deflected((0.0, 0.0), (0.14, -0.14)));
+        assert!(!deflected((0.8, 0.0), (0.1, 0.0)), "back to its centre");
+        assert!(!deflected((0.8, 0.0), (0.9, 0.0)), "where it was");
+        assert!(deflected((0.8, 0.0), (-0.2, 0.0)));
+        let moves = [vec![sticks(0.0, 0.0)], vec![sticks(0.9, 0.0); 10]].concat();
+        for (armed, flies) in [(true, true), (false, false)] {
+            assert!(!heard(&moves, armed, flies).iter().any(|heard| heard.deflected), "nothing to take over");
+        }
     }
 }

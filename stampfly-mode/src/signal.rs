@@ -238,4 +238,73 @@ mod tests {
         }
         assert_eq!(count, 4, "the start, and three warnings");
     }
+
+    /// Whether a light is on at 0, 125 and 500 ms.
+    const SOLID: [bool; 3] = [true, true, true];
+    const SLOW: [bool; 3] = [true, true, false];
+    const FAST: [bool; 3] = [true, false, true];
+
+    fn shown(status: &FlightStatus, alerts: Alerts) -> [[Colour; 3]; 2] {
+        let signals =
+            [0, 125, 500].map(|millis| Signaller::default().step(Instant::from_millis(millis), status, alerts));
+        [signals.map(|signal| signal.status), signals.map(|signal| signal.body)]
+    }
+
+    fn lit(colour: Colour, on: [bool; 3]) -> [Colour; 3] {
+        on.map(|on| if on { colour } else { OFF })
+    }
+
+    #[test]
+    fn every_phase_has_its_light() {
+        for (phase, colour, on) in [
+            (FlightPhase::Init, MAGENTA, SLOW),
+            (FlightPhase::IdleGround, GREEN, SOLID),
+            (FlightPhase::IdleHeld, CYAN, FAST),
+            (FlightPhase::Armed, GREEN, SLOW),
+            (FlightPhase::TakeOff, WHITE, FAST),
+            (FlightPhase::Flying, GREEN, SOLID),
+            (FlightPhase::Landing, ORANGE, SLOW),
+            (FlightPhase::Flip, GREEN, FAST),
+        ] {
+            let status = FlightStatus { phase, ..Default::default() };
+            assert_eq!(shown(&status, Alerts::NONE)[0], lit(colour, on), "{phase:?}");
+            let pairing = FlightStatus { pairing: true, ..status };
+            assert_eq!(shown(&pairing, Alerts::NONE)[0], lit(BLUE, FAST), "{phase:?}");
+        }
+        let held = FlightStatus { phase: FlightPhase::IdleHeld, ..Default::default() };
+        assert_eq!(shown(&held, Alerts::COMM_LOST)[0], lit(CYAN, FAST), "nobody has to be heard by what is carried");
+    }
+
+    #[test]
+    fn every_mode_has_its_light_and_it_blinks_in_the_air() {
+        for (mode, colour) in [
+            (FlightMode::Acro, BLUE),
+            (FlightMode::Stabilize, LIME),
+            (FlightMode::AltHold, ORANGE),
+            (FlightMode::PosHold, MAGENTA),
+        ] {
+            for (phase, on) in [(FlightPhase::Armed, SOLID), (FlightPhase::Flying, SLOW)] {
+                let status = FlightStatus { phase, mode, ..Default::default() };
+                assert_eq!(shown(&status, Alerts::NONE)[1], lit(colour, on), "{mode:?}");
+                assert_eq!(shown(&status, Alerts::CRITICAL_BATTERY)[1], lit(CYAN, FAST), "{mode:?}");
+            }
+            let status = FlightStatus { phase: FlightPhase::Init, mode, ..Default::default() };
+            assert_eq!(shown(&status, Alerts::NONE)[1], lit(WHITE, SOLID), "{mode:?}");
+        }
+    }
+
+    #[test]
+    fn an_error_at_power_on_is_no_change_and_a_fault_is_called_out() {
+        let mut signaller = Signaller::default();
+        let status = FlightStatus { phase: FlightPhase::Flying, ..Default::default() };
+        let mut tone = |second, alerts| {
+            let signal = signaller.step(Instant::from_secs(second), &status, alerts);
+            (signal.tone, signal.tone_count)
+        };
+        assert_eq!(tone(0, Alerts::IMU_NOISY), (Tone::Start, 1));
+        assert_eq!(tone(1, Alerts::IMU_NOISY), (Tone::Error, 2));
+        assert_eq!(tone(2, Alerts::IMU_NOISY), (Tone::Error, 2), "once");
+        assert_eq!(tone(3, Alerts::NONE), (Tone::Error, 2));
+        assert_eq!(tone(4, Alerts::IMU_NOISY), (Tone::Error, 3), "again");
+    }
 }

@@ -5,9 +5,11 @@
 
 mod arguments;
 mod ci;
+mod copy;
 mod elf;
 mod machine;
 mod modules;
+mod mutation;
 mod page;
 mod ratchet;
 mod reinserted;
@@ -76,6 +78,9 @@ const STEPS: &[Step] = &[
     Step::new("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
         .beside()
         .accepting(&[Fix, Rest]),
+    Step::new("mutants", "Change what decides whether motors turn: some test has to fail", steps::mutants::run)
+        .accepting(&[Fix, Rest])
+        .manual(),
     Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
     Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
     Step::new("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)

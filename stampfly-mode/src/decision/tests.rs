@@ -433,3 +433,257 @@ fn on_the_ground_nothing_stops() {
         assert!(!happens(Event::Stop, &ModeConfig::default(), true, &state, &facts), "{phase:?}");
     }
 }
+
+/// A flight by a program, a step every 20 ms.
+struct Flown {
+    state: State,
+    facts: Facts,
+}
+
+impl Flown {
+    fn new(phase: FlightPhase) -> Self {
+        let wanted = FlightMode::PosHold;
+        let commander = if is_armed(phase) { CommandSource::Guided } else { CommandSource::None };
+        let state = State { phase, wanted, mode: wanted, commander, ..State::default() };
+        Self { state, facts: quiet(&state) }
+    }
+
+    /// For so long with these alerts.
+    fn pass(&mut self, millis: u64, alerts: Alerts) -> &State {
+        self.facts.alerts = alerts;
+        for _ in 0..millis / 20 {
+            self.facts.now += Duration::from_millis(20);
+            self.state = decide(&ModeConfig::default(), &self.state, &self.facts);
+        }
+        &self.state
+    }
+}
+
+#[test]
+fn a_lost_estimate_is_started_anew_once() {
+    let mut flown = Flown::new(FlightPhase::IdleGround);
+    for (alerts, resets) in
+        [(Alerts::ESTIMATE_DIVERGED, 1), (Alerts::NONE, 1), (Alerts::ESTIMATE_DIVERGED, 2), (Alerts::NONE, 2)]
+    {
+        assert_eq!(flown.pass(20, alerts).full_resets, resets);
+        assert_eq!(flown.pass(200, alerts).full_resets, resets);
+    }
+}
+
+/// A command that arms is heard before the failsafe says so.
+#[test]
+fn silence_before_arming_is_none() {
+    let mut flown = Flown::new(FlightPhase::IdleGround);
+    flown.pass(10_000, Alerts::COMM_LOST);
+    flown.facts.asked = Asked { arm: true, any: true, ..Asked::default() };
+    assert_eq!(flown.pass(20, Alerts::COMM_LOST).phase, FlightPhase::Armed);
+    flown.facts.asked = Asked::default();
+    assert_eq!(flown.pass(100, Alerts::COMM_LOST).phase, FlightPhase::Armed);
+}
+
+#[test]
+fn a_silence_is_over_when_the_link_has_been_heard_for_a_second_and_began_two_seconds_ago() {
+    let over_after = |silent: u64| {
+        let mut flown = Flown::new(FlightPhase::Flying);
+        assert!(flown.pass(silent, Alerts::COMM_LOST).silence.is_some());
+        (1..400).find(|_| flown.pass(20, Alerts::NONE).silence.is_none()).map(|steps| silent + 20 * steps)
+    };
+    // The first step of silence, or of sound, has lasted for nothing.
+    assert_eq!(over_after(100), Some(2_020));
+    assert_eq!(over_after(2_000), Some(3_020));
+    let mut flown = Flown::new(FlightPhase::Flying);
+    let lands = (0..10).find(|_| {
+        flown.pass(100, Alerts::COMM_LOST);
+        flown.pass(900, Alerts::NONE).phase == FlightPhase::Landing
+    });
+    assert_eq!(lands, Some(3), "a link that flaps is none");
+}
+
+#[test]
+fn a_lifted_vehicle_that_knows_its_height_stays_lifted() {
+    let mut flown = Flown::new(FlightPhase::IdleHeld);
+    let State { phase, transitions, .. } = *flown.pass(10_000, Alerts::NONE);
+    assert_eq!((phase, transitions), (FlightPhase::IdleHeld, 0));
+}
+
+/// Does an event happen to a vehicle with nothing the matter, a tenth of a second after its phase began, when this is changed?
+fn happens_with(event: Event, phase: FlightPhase, mode: FlightMode, change: fn(&mut State, &mut Facts)) -> bool {
+    let config = ModeConfig::default();
+    let Flown { mut state, mut facts } = Flown::new(phase);
+    (state.wanted, state.mode, state.landing_limit) = (mode, mode, Duration::from_secs(60));
+    state.entered = Instant::from_secs(100);
+    facts.now = Instant::from_millis(100_100);
+    change(&mut state, &mut facts);
+    happens(event, &config, mode.is_manual(), &state, &facts)
+}
+
+/// Since so many milliseconds before the step of [`happens_with`].
+fn ago(millis: u64) -> Option<Instant> {
+    Some(Instant::from_millis(100_100 - millis))
+}
+
+#[test]
+fn every_event_happens_for_each_of_its_reasons_and_for_nothing_less() {
+    use FlightMode::{PosHold, Stabilize};
+    use FlightPhase::{Armed, Flying, IdleGround, IdleHeld, Init, Landing, TakeOff};
+    type Change = fn(&mut State, &mut Facts);
+    let table: &[(Event, FlightPhase, FlightMode, &[Change], &[Change])] = &[
+        (
+            Event::Emergency,
+            Flying,
+            PosHold,
+            &[
+                |_, f| f.asked.kill = true,
+                |_, f| f.stop_button = true,
+                |_, f| f.cut_off = true,
+                |_, f| frame(f).kill = true,
+                |_, f| f.alerts = Alerts::MOTOR_LOST,
+            ],
+            &[|_, f| f.alerts = Alerts::MOTOR_WEAK, |_, f| f.button = Some(ButtonGesture::Press)],
+        ),
+        (
+            Event::Stop,
+            Armed,
+            PosHold,
+            &[
+                |_, f| f.asked.disarm = true,
+                |_, f| f.pilot.switch.falls = true,
+                |_, f| f.pilot.switch.found_off = true,
+                |s, f| s.entered = f.now - Duration::from_secs(10),
+            ],
+            &[|_, _| (), |s, f| s.entered = f.now - Duration::from_millis(9_990)],
+        ),
+        (
+            Event::Stop,
+            Flying,
+            Stabilize,
+            &[|_, f| f.pilot.switch.falls = true],
+            &[
+                |_, _| (),
+                |_, f| f.asked.disarm = true,
+                |_, f| f.pilot.switch.found_off = true,
+                |s, f| (s.mode, f.pilot.switch.falls) = (PosHold, true),
+            ],
+        ),
+        (
+            Event::Stop,
+            Flying,
+            PosHold,
+            &[],
+            &[|_, f| f.pilot.switch.falls = true, |s, f| (s.mode, f.pilot.switch.falls) = (Stabilize, true)],
+        ),
+        (
+            Event::Stop,
+            Landing,
+            PosHold,
+            &[
+                |_, f| (f.height, f.asked.disarm) = (0.14, true),
+                |_, f| (f.height, f.pilot.switch.falls) = (0.14, true),
+                |_, f| (f.contact, f.asked.disarm) = (GroundContact::Ground, true),
+                |s, f| (s.landing_by_switch, f.pilot.switch.falls) = (true, true),
+                |s, f| s.entered = f.now - s.landing_limit,
+            ],
+            &[
+                |_, f| f.asked.disarm = true,
+                |_, f| f.pilot.switch.falls = true,
+                |s, f| (s.landing_by_switch, f.height) = (true, 0.14),
+                |s, f| (s.landing_by_switch, f.asked.disarm) = (true, true),
+                |_, f| (f.valid, f.height, f.asked.disarm) = (Validity::TILT, 0.14, true),
+            ],
+        ),
+        (
+            Event::Land,
+            Flying,
+            PosHold,
+            &[
+                |_, f| f.asked.land = true,
+                |_, f| f.asked.disarm = true,
+                |_, f| f.pilot.switch.falls = true,
+                |_, f| f.pilot.switch.found_off = true,
+                |s, f| {
+                    s.silence = ago(3_000).map(|since| Silence { since, heard_since: None });
+                    f.alerts = Alerts::COMM_LOST;
+                },
+                |s, _| s.blind = ago(1_000),
+                |s, f| (s.blind, f.alerts) = (ago(0), Alerts::COMM_LOST),
+                |s, f| (s.blind, f.sticks) = (ago(0), CommandSource::Failsafe),
+                |s, _| s.adrift = ago(1_000),
+                |_, f| f.alerts = Alerts::MOTOR_WEAK,
+            ],
+            &[
+                |s, _| s.silence = ago(9_000).map(|since| Silence { since, heard_since: None }),
+                |_, f| f.alerts = Alerts::COMM_LOST,
+                |_, f| f.sticks = CommandSource::Failsafe,
+                |s, _| (s.blind, s.adrift) = (ago(990), ago(990)),
+                |s, f| (s.entered, f.alerts) = (Instant::ZERO, Alerts::RANGE_IMPLAUSIBLE),
+            ],
+        ),
+        (
+            Event::Land,
+            TakeOff,
+            PosHold,
+            &[|_, f| f.alerts = Alerts::RANGE_IMPLAUSIBLE, |s, f| s.entered = f.now - Duration::from_secs(15)],
+            &[|s, f| s.entered = f.now - Duration::from_millis(14_990)],
+        ),
+        (Event::TakeOffComplete, TakeOff, PosHold, &[|_, f| f.takeoff_complete = true], &[|_, _| ()]),
+        (Event::TakeOffComplete, TakeOff, Stabilize, &[|_, _| ()], &[|_, f| f.contact = GroundContact::Ground]),
+        (
+            Event::TakeOff,
+            Armed,
+            PosHold,
+            &[
+                |_, f| f.asked.take_off = true,
+                |s, f| (s.takes_off, s.entered) = (true, f.now - Duration::from_millis(300)),
+            ],
+            &[|s, _| s.takes_off = true, |s, _| s.entered = Instant::ZERO],
+        ),
+        (
+            Event::TakeOff,
+            Armed,
+            Stabilize,
+            &[|s, f| {
+                (s.commander, f.sticks, s.throttle_rested, frame(f).throttle) =
+                    (CommandSource::Pilot, CommandSource::Pilot, true, 0.11)
+            }],
+            &[
+                |s, f| (s.takes_off, s.entered, f.sticks) = (true, Instant::ZERO, CommandSource::Pilot),
+                |s, f| {
+                    (s.commander, f.sticks, s.throttle_rested, frame(f).throttle) =
+                        (CommandSource::Pilot, CommandSource::Pilot, true, 0.09)
+                },
+                |s, f| (s.commander, f.sticks, frame(f).throttle) = (CommandSource::Pilot, CommandSource::Pilot, 1.0),
+                |s, f| (f.sticks, s.throttle_rested, frame(f).throttle) = (CommandSource::Pilot, true, 1.0),
+                |s, f| (s.commander, s.throttle_rested, frame(f).throttle) = (CommandSource::Pilot, true, 1.0),
+            ],
+        ),
+        (
+            Event::SetDown,
+            IdleHeld,
+            PosHold,
+            &[|_, f| f.height = 0.07, |s, f| (s.unmeasured, f.valid) = (ago(2_000), Validity::TILT)],
+            &[|_, f| f.height = 0.09, |s, f| (s.unmeasured, f.valid, f.height) = (ago(1_990), Validity::TILT, 0.0)],
+        ),
+        (
+            Event::Lifted,
+            IdleGround,
+            PosHold,
+            &[|_, f| f.height = 0.16],
+            &[|_, f| f.height = 0.14, |_, f| (f.valid, f.height) = (Validity::TILT, 9.0)],
+        ),
+        (
+            Event::Ready,
+            Init,
+            PosHold,
+            &[|_, f| f.valid = Validity::TILT],
+            &[|_, f| f.calibrated = false, |_, f| f.valid = Validity::NONE],
+        ),
+    ];
+    for (event, phase, mode, reasons, others) in table {
+        for (changes, expected) in [(reasons, true), (others, false)] {
+            for (place, change) in changes.iter().enumerate() {
+                let found = happens_with(*event, *phase, *mode, *change);
+                assert_eq!(found, expected, "{event:?} in {phase:?}, {mode:?}: change {place} of those {expected}");
+            }
+        }
+    }
+}

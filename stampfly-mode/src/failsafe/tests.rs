@@ -12,6 +12,7 @@ use stampfly_types::Duration;
 use stampfly_types::messages::{ControlOutput, EstimatorStatus, FlightPhase, PowerData, StateEstimate};
 use stampfly_types::messages::{FlightMode, FlightStatus, Validity};
 use stampfly_types::{GRAVITY, Quat, Vec3};
+use std::vec;
 use std::vec::Vec;
 
 /// A control period at 400 Hz.
@@ -128,7 +129,9 @@ fn a_touchdown_by_hand_is_no_crash_and_a_fall_or_a_wall_is() {
     let (below, ahead) = (Vec3::new(5.0, 0.0, -65.0), Vec3::new(-50.0, 0.0, 0.0));
     assert!(!struck(0.03, 1.0, below));
     assert!(!struck(0.03, 0.7, Vec3::new(20.0, 50.0, -68.0)), "a leg that sticks to the floor pushes to the side");
-    assert!(struck(0.03, 0.7, Vec3::new(70.0, 0.0, -20.0)), "what pushes more to the side is none");
+    for blow in [[70.0, 0.0, -20.0], [45.0, 0.0, -30.0], [0.0, -45.0, -30.0], [32.0, 32.0, -30.0]] {
+        assert!(struck(0.03, 0.7, blow.into()), "what pushes more to the side is none: {blow:?}");
+    }
     assert!(struck(0.03, 1.5, below), "a fall");
     assert!(struck(0.5, 0.3, below), "not the ground");
     assert!(struck(0.03, 0.0, ahead), "a wall");

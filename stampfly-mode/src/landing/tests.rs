@@ -2,7 +2,7 @@
 
 use super::*;
 use stampfly_types::messages::Validity;
-use stampfly_types::{GRAVITY, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Vec3, math};
 use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
@@ -286,9 +286,9 @@ fn a_blind_landing_stays_blind_and_the_next_one_sees() {
 fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
     let config = LandingConfig::default();
     // Of the thrust that is missing so much of the specific force is: drag carries the rest. And how fast it becomes fast.
-    let blind_after = |follows: f32, gains: f32| {
+    let blind_after = |sinks: f32, follows: f32, gains: f32| {
         let mut manager = TakeoffLanding::new(config);
-        let (mut sink_rate, mut thrust, mut ceiling, mut fast) = (0.1f32, 1.0f32, f32::MAX, None);
+        let (mut sink_rate, mut thrust, mut ceiling, mut fast) = (sinks, 1.0f32, f32::MAX, None);
         for k in 0..800u64 {
             let now = Instant::from_micros(2_500 * k);
             let demand = ControlOutput { thrust: ceiling.min(1.0), ..Default::default() };
@@ -316,13 +316,229 @@ fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
         }
         None
     };
-    let after = blind_after(0.45, 1.5);
+    let after = blind_after(0.1, 0.45, 1.5);
     assert!(after.is_some_and(|seconds| seconds < 0.15), "{after:?}");
-    assert_eq!(blind_after(0.0, 1.5), None, "it stands, whatever its climb rate says");
-    assert_eq!(blind_after(0.45, 0.0), None, "it is not fast");
+    assert_eq!(blind_after(0.1, 0.0, 1.5), None, "it stands, whatever its climb rate says");
+    for sinks in [0.1, 0.35] {
+        assert_eq!(blind_after(sinks, 0.45, 0.0), None, "it is not fast");
+    }
 }
 
 #[test]
 fn a_selector_begins_without_a_mode() {
     assert_eq!(Selector::<Flight>::default(), Selector::new());
+}
+
+/// A manager that has been told this for so many steps, after a flight.
+fn lands(manager: &mut TakeoffLanding, steps: u64, height: Option<f32>, sink_rate: f32) -> LandDetected {
+    let valid = if height.is_some() { Validity::ALL } else { Validity::TILT | Validity::VELOCITY_Z };
+    let estimate = StateEstimate {
+        height: height.unwrap_or(9.0),
+        velocity: Vec3::new(0.0, 0.0, sink_rate),
+        specific_force: Vec3::new(0.0, 0.0, -GRAVITY),
+        valid,
+        ..Default::default()
+    };
+    let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
+    let input = LandingInput { estimate: &estimate, phase: FlightPhase::Landing, setpoint: &setpoint, demand: &demand };
+    (0..steps).map(|k| manager.step(Instant::from_micros(2_500 * k), &input)).last().unwrap_or_default()
+}
+
+#[test]
+fn the_nearer_the_ground_the_slower_it_descends() {
+    for (height, rate) in [(Some(1.0), 0.3), (Some(0.3), 0.3), (Some(0.2), 0.25), (Some(0.1), 0.2), (None, 0.15)] {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        let asked = lands(&mut manager, 1, height, 0.2);
+        assert!((asked.descent_rate - rate).abs() < 1e-6, "{height:?}: {}", asked.descent_rate);
+        assert_eq!(asked.thrust_ceiling, f32::MAX);
+    }
+}
+
+#[test]
+fn the_ceiling_of_a_touch_down_falls_within_0_8_seconds() {
+    for (steps, ceiling) in [(1, 1.0), (161, 0.8), (321, 0.6), (400, 0.6)] {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        let asked = lands(&mut manager, steps, Some(0.04), 0.1);
+        assert!((asked.thrust_ceiling - ceiling).abs() < 1e-5, "{steps}: {}", asked.thrust_ceiling);
+    }
+}
+
+#[test]
+fn a_landing_that_does_not_sink_touches_something_after_a_second() {
+    let stage = |steps, height, sink_rate| {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        lands(&mut manager, steps, height, sink_rate);
+        manager.stage().to_string()
+    };
+    for height in [Some(0.2), Some(1.0), None] {
+        assert_eq!(stage(403, height, 0.07), "Landing/Touchdown");
+        assert_ne!(stage(400, height, 0.07), "Landing/Touchdown");
+        assert_ne!(stage(800, height, 0.09), "Landing/Touchdown");
+    }
+}
+
+/// Shares of hover thrust at these milliseconds, and when it counts as landed, with this answer of the weight test.
+fn blind(breaks_off: bool, quick: super::weight::Support, millis: &[u64]) -> (Vec<f32>, Option<u64>) {
+    let mut descent = super::blind::BlindDescent::new(Instant::ZERO, breaks_off);
+    let weight =
+        super::weight::Answers { quick, steady: super::weight::Support::Unknown, is_carried: false, is_struck: false };
+    let (mut shares, mut landed) = (vec![], None);
+    for now in (0..20_000).step_by(5) {
+        let (share, lands) = descent.step(Instant::from_millis(now), weight, Duration::from_millis(300));
+        assert_eq!(share == 0.6, descent.is_testing() || lands);
+        if millis.contains(&now) {
+            shares.push(share);
+        }
+        if lands {
+            landed.get_or_insert(now);
+        }
+    }
+    (shares, landed)
+}
+
+#[test]
+fn a_blind_descent_lacks_a_twentieth_of_its_thrust_and_looks_for_the_ground_every_0_9_seconds() {
+    use super::weight::Support::{Falls, Stands, Unknown};
+    let near = |shares: Vec<f32>, expected: &[f32]| {
+        let all = shares.len() == expected.len() && shares.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5);
+        assert!(all, "{shares:?}, expected {expected:?}");
+    };
+    // A test that says nothing is over after 85 ms, one that says that it falls after 60 ms; the next begins 0.9 s after it began.
+    let millis = [0, 895, 900, 955, 960, 980, 985, 1_795, 1_800, 5_000, 15_000];
+    let (shares, landed) = blind(false, Unknown, &millis);
+    near(shares, &[0.95, 0.94105, 0.6, 0.6, 0.6, 0.6, 0.94015, 0.93205, 0.6, 0.9, 0.88]);
+    assert_eq!(landed, None);
+    let (shares, landed) = blind(false, Falls, &millis);
+    near(shares, &[0.95, 0.94105, 0.6, 0.6, 0.9404, 0.9402, 0.94015, 0.93205, 0.6, 0.9, 0.88]);
+    assert_eq!(landed, None);
+    let (shares, landed) = blind(false, Stands, &[960, 985, 1_255, 1_260]);
+    near(shares, &[0.6; 4]);
+    assert_eq!(landed, Some(1_260), "0.3 s after it could be seen");
+    // What breaks off a take-off may climb.
+    near(blind(true, Unknown, &[0, 395, 400]).0, &[0.87, 0.87, 0.946]);
+}
+
+/// Seconds until a take-off that is off the ground is complete: how far from its height, m, and speeds of path and vehicle, m/s.
+fn complete(away: f32, path: f32, speed: f32) -> Option<f32> {
+    let mut manager = TakeoffLanding::new(LandingConfig::default());
+    let mut step = |k: u64, height: f32, speed: f32| {
+        let estimate = StateEstimate {
+            height,
+            position: Vec3::new(0.0, 0.0, -height),
+            velocity: Vec3::new(0.0, 0.0, speed),
+            valid: Validity::ALL,
+            ..Default::default()
+        };
+        let setpoint =
+            Setpoint { position: Vec3::new(0.0, 0.0, -0.5), velocity: Vec3::new(0.0, 0.0, path), ..Default::default() };
+        let demand = ControlOutput { thrust: 1.0, ..Default::default() };
+        let input =
+            LandingInput { estimate: &estimate, phase: FlightPhase::TakeOff, setpoint: &setpoint, demand: &demand };
+        manager.step(Instant::from_micros(2_500 * k), &input)
+    };
+    assert!(!step(0, 0.03, 0.0).takeoff_complete);
+    let found = (1..8_000).find(|k| step(*k, 0.5 - away, speed).takeoff_complete)?;
+    assert!(step(found + 1, 0.5 - away, speed).takeoff_complete, "and stays so");
+    Some((found - 1) as f32 * DT)
+}
+
+#[test]
+fn a_take_off_is_complete_when_it_has_been_at_its_height_for_a_while_or_is_overdue_and_near_it() {
+    let is = |found: Option<f32>, expected: f32| found.is_some_and(|found| (found - expected).abs() < 0.01);
+    for (away, path, speed) in [(0.0, 0.0, 0.0), (0.055, 0.0, 0.0), (-0.055, -0.015, 0.0), (0.0, 0.015, -0.15)] {
+        assert!(is(complete(away, path, speed), 0.4), "{away} m: {:?}", complete(away, path, speed));
+    }
+    for (away, path, speed) in [(0.065, 0.0, 0.0), (-0.11, 0.0, 0.0), (0.0, 0.025, 0.0), (0.0, 0.0, 0.17)] {
+        assert!(is(complete(away, path, speed), 8.0), "{away} m: {:?}", complete(away, path, speed));
+    }
+    assert_eq!(complete(0.13, 0.0, 0.0), None, "something holds it");
+}
+
+#[test]
+fn a_take_off_that_climbs_is_off_the_ground_whatever_its_height_says() {
+    for (climb, stage) in [(0.15, "TakeOff/LiftOff"), (0.17, "TakeOff/Climb"), (-0.17, "TakeOff/LiftOff")] {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        let steps = [(FlightPhase::Armed, 0.03, 0.0), (FlightPhase::TakeOff, 0.03, -climb)];
+        assert_eq!(stages(&mut manager, &steps, Validity::ALL)[1], stage, "{climb} m/s");
+    }
+}
+
+#[test]
+fn thrust_is_taken_away_at_the_ground_alone() {
+    for (height, testing) in [(Some(1.0), false), (Some(0.2), false), (None, false), (Some(0.04), true)] {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        lands(&mut manager, 1, height, 0.2);
+        assert_eq!(manager.is_testing, testing, "{height:?}");
+    }
+}
+
+/// It stands on one leg, and thrust turns it over.
+#[test]
+fn a_touch_that_is_felt_ends_the_ramp() {
+    let config = LandingConfig::default();
+    let ceilings = |push: f32| {
+        let mut manager = TakeoffLanding::new(config);
+        let mut ceiling = f32::MAX;
+        let mut step = |k: u64| {
+            let demand = ControlOutput { thrust: ceiling.min(1.0), ..Default::default() };
+            let pushed = if (480..484).contains(&k) { push } else { 0.0 };
+            let estimate = StateEstimate {
+                height: 0.04,
+                velocity: Vec3::new(0.0, 0.0, 0.1),
+                specific_force: Vec3::new(0.0, 0.0, -GRAVITY * demand.thrust - pushed),
+                valid: Validity::ALL,
+                ..Default::default()
+            };
+            let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
+            let setpoint = Setpoint::default();
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            ceiling = manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling;
+            ceiling
+        };
+        let last = |ceilings: core::ops::Range<u64>, step: &mut dyn FnMut(u64) -> f32| ceilings.map(step).last();
+        [last(0..485, &mut step), last(485..501, &mut step)].map(Option::unwrap_or_default)
+    };
+    let [before, after] = ceilings(0.0);
+    assert!(before > 0.85 && after > 0.85, "{before}, {after}");
+    assert_eq!(ceilings(25.0), [config.ceiling_share; 2]);
+}
+
+/// The first ceiling of thrust of a landing after this phase, without height and climb rate.
+#[test]
+fn a_blind_landing_gives_up_more_thrust_when_it_breaks_off_a_take_off() {
+    let first = |phase: FlightPhase| {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        let estimate = nothing(0.0, 0.0, 0.0);
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
+        let mut step = |k: u64, phase| {
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling
+        };
+        step(0, phase);
+        step(1, FlightPhase::Landing)
+    };
+    assert_eq!([FlightPhase::TakeOff, FlightPhase::Flying].map(first), [0.87, 0.95]);
+}
+
+/// The height says that it is up, and the estimate that it sinks as it is asked to.
+#[test]
+fn what_something_carries_has_landed_whatever_the_estimate_says() {
+    let landed = |follows: bool| {
+        let mut manager = TakeoffLanding::new(LandingConfig::default());
+        (0..2_400u64).any(|k| {
+            let share = 1.0 - 0.5 * (k.saturating_sub(400).min(800) as f32 / 800.0);
+            let estimate = StateEstimate {
+                height: 1.0,
+                velocity: Vec3::new(0.0, 0.0, 0.3),
+                specific_force: Vec3::new(0.0, 0.0, -GRAVITY * if follows { share } else { 1.0 }),
+                valid: Validity::ALL,
+                ..Default::default()
+            };
+            let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: share, ..Default::default() });
+            let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
+            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+            manager.step(Instant::from_micros(2_500 * k), &input).landed
+        })
+    };
+    assert!(landed(false) && !landed(true));
 }

@@ -168,36 +168,78 @@ mod tests {
         assert!(stands);
     }
 
+    /// Hover thrusts of vehicles of 4 g, 40 g and 400 g, N.
+    const SIZES: [f32; 3] = [0.036, 0.36, 3.6];
+
     /// Hovers, sinks under a ceiling, and is pushed up by so much, m/s², for 10 ms.
-    fn is_struck(push: f32) -> bool {
+    fn is_struck(hover: f32, push: f32) -> bool {
         let mut test = WeightTest::default();
         (0u64..500).any(|step| {
-            let thrust = if step < 400 { 0.36 } else { 0.33 };
+            let thrust = if step < 400 { hover } else { 0.92 * hover };
             let push = if (450..454).contains(&step) { push } else { 0.0 };
-            let force = GRAVITY * thrust / 0.36 + push;
+            let force = GRAVITY * thrust / hover + push;
             test.step(Instant::from_micros(2_500 * step), force, thrust, step >= 400).is_struck
         })
     }
 
     #[test]
     fn a_touch_at_a_fifth_of_a_metre_per_second_is_felt_and_vibration_is_not() {
-        assert!(is_struck(20.0));
-        assert!(!is_struck(5.0));
+        for hover in SIZES {
+            assert!(is_struck(hover, 20.0), "{hover} N");
+            assert!(!is_struck(hover, 5.0), "{hover} N");
+        }
+    }
+
+    /// What it was before thrust was taken away is remembered for as long as the force does not follow.
+    #[test]
+    fn what_a_test_has_found_standing_stands_after_it() {
+        for hover in SIZES {
+            let support = |follows: bool| {
+                let mut test = WeightTest::default();
+                let mut answers = None;
+                for step in 0u64..1_200 {
+                    let share = 1.0 - 0.45 * (step.saturating_sub(400).min(400) as f32 / 400.0);
+                    let force = GRAVITY * if follows { share } else { 1.0 };
+                    answers = Some(test.step(Instant::from_micros(2_500 * step), force, share * hover, step < 800));
+                }
+                answers.map(|answers| answers.steady)
+            };
+            assert_eq!(support(false), Some(Support::Stands), "{hover} N");
+            assert_eq!(support(true), Some(Support::Unknown), "{hover} N, in the air");
+        }
     }
 
     /// Flies, and lands with this thrust at the end of a second and this share of the specific force that thrust makes.
     fn is_carried(thrust: f32, force: f32) -> bool {
+        is_carried_with(thrust, force, 2_500, None)
+    }
+
+    /// The same with steps of so many microseconds, and with this sample in flight.
+    fn is_carried_with(thrust: f32, force: f32, micros: u64, broken: Option<(f32, f32)>) -> bool {
         let mut test = WeightTest::default();
         let mut answers = None;
-        for step in 0u64..1_600 {
-            let gone = step.saturating_sub(400).min(400) as f32 / 400.0;
+        let second = 1_000_000 / micros;
+        for step in 0..4 * second {
+            let gone = step.saturating_sub(second).min(second) as f32 / second as f32;
             let [thrust, force] = [(0.36, thrust), (GRAVITY, force)].map(|(from, to)| from + (to - from) * gone);
-            if step == 400 {
+            if step == second {
                 test.begin_landing();
             }
-            answers = Some(test.step(Instant::from_micros(2_500 * step), force, thrust, false));
+            let (force, thrust) = broken.filter(|_| step == second / 4).unwrap_or((force, thrust));
+            answers = Some(test.step(Instant::from_micros(micros * step), force, thrust, false));
         }
         answers.is_some_and(|answers| answers.is_carried)
+    }
+
+    #[test]
+    fn a_sample_that_is_no_number_and_long_steps_blind_nobody() {
+        for broken in [(f32::NAN, 0.36), (GRAVITY, f32::NAN), (f32::INFINITY, 0.36), (GRAVITY, f32::INFINITY)] {
+            assert!(is_carried_with(0.18, GRAVITY, 2_500, Some(broken)), "{broken:?}");
+        }
+        for micros in [10_000, 20_000, 50_000] {
+            assert!(is_carried_with(0.18, GRAVITY, micros, None), "{micros} microseconds");
+            assert!(!is_carried_with(0.34, GRAVITY, micros, None), "{micros} microseconds");
+        }
     }
 
     #[test]
@@ -225,6 +267,48 @@ mod tests {
                 let answers = test.step(Instant::from_micros(2_500 * step), force, thrust, step > 80);
                 assert_eq!((answers.quick, answers.steady), (Support::Unknown, Support::Unknown), "{force} {thrust}");
             }
+        }
+    }
+
+    #[test]
+    fn support_is_what_the_force_makes_of_the_thrust_that_was_taken_away() {
+        let before = Pair { force: 8.0, thrust: 0.4 };
+        // Shares that are missing of thrust and force.
+        for (taken, missing, expected) in [
+            (0.14, 0.0, Support::Unknown),
+            (0.16, 0.0, Support::Stands),
+            (0.2, 0.07, Support::Stands),
+            (0.2, 0.09, Support::Unknown),
+            (0.2, 0.11, Support::Falls),
+            (0.2, 0.6, Support::Falls),
+            (0.5, 0.18, Support::Stands),
+            (0.5, 0.22, Support::Unknown),
+            (0.5, 0.27, Support::Falls),
+        ] {
+            let now = Pair { force: before.force * (1.0 - missing), thrust: before.thrust * (1.0 - taken) };
+            assert_eq!(now.support(before), expected, "{taken} taken, {missing} missing");
+        }
+    }
+
+    /// A share of nothing, or of a force that points down, is none.
+    #[test]
+    fn without_a_thrust_and_a_force_before_support_is_unknown() {
+        let now = Pair { force: -1.0, thrust: 0.2 };
+        for before in [(-1.0, 0.4), (0.0, 0.4), (8.0, 0.0), (8.0, -0.4), (0.0, 0.0)] {
+            for force in [-1.0, 1.0] {
+                let before = Pair { force: before.0, thrust: before.1 };
+                assert_eq!(Pair { force, ..now }.support(before), Support::Unknown, "{before:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn both_go_through_the_same_filter() {
+        let mut pair = Pair { force: 8.0, thrust: 0.4 };
+        for part in [0.75, 0.5625] {
+            pair.filter(Pair { force: 4.0, thrust: 0.8 }, 0.15, 0.05);
+            assert!((pair.force - (4.0 + 4.0 * part)).abs() < 1e-5, "{pair:?}");
+            assert!((pair.thrust - (0.8 - 0.4 * part)).abs() < 1e-6, "{pair:?}");
         }
     }
 }

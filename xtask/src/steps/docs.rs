@@ -8,11 +8,13 @@
 //! | paths in the columns `home` and `test` of the table of requirements | they exist |
 //! | the guide to tuning | it names every public field of the filter's configuration |
 //! | generated pages | they are what the program prints; `--fix` writes them |
-//! | the table of re-inserted bugs | it is what `xtask/bugs.toml` says; `--fix` writes it |
+//! | the tables of re-inserted bugs and of mutants | they are what `xtask/bugs.toml` and `xtask/mutants.toml` say; `--fix` writes them |
 //!
 //! Every document is checked that git tracks or would add.
 
 use crate::arguments::Arguments;
+use crate::mutation::list::List as Mutants;
+use crate::mutation::page as mutants;
 use crate::page::Page;
 use crate::reinserted::list::List;
 use crate::reinserted::page as bugs;
@@ -102,19 +104,26 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
             failures.push(format!("{name} is out of date; run `cargo xtask docs --fix`"));
         }
     }
-    failures.extend(stale_bugs(repository, arguments.fix)?);
+    let bugs = bugs::table(&List::read(repository)?.bugs);
+    let mutants = mutants::table(&Mutants::read(repository)?);
+    for (place, table) in [(bugs::PLACE, bugs), (mutants::PLACE, mutants)] {
+        failures.extend(stale(repository, place, &table, arguments.fix)?);
+    }
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
 }
 
-/// The table of re-inserted bugs, where it is not that of their list.
-fn stale_bugs(repository: &Repository, fix: bool) -> Result<Option<Failure>, Failure> {
-    let (document, begin, end) = bugs::PLACE;
-    let table = bugs::table(&List::read(repository)?.bugs);
+/// A generated table between two marks of a document, where it is not this one.
+fn stale(
+    repository: &Repository,
+    (document, begin, end): (&str, &str, &str),
+    table: &str,
+    fix: bool,
+) -> Result<Option<Failure>, Failure> {
     if repository.between(document, begin, end)? == table {
         return Ok(None);
     }
     if fix {
-        repository.fill(document, begin, end, &table)?;
+        repository.fill(document, begin, end, table)?;
         println!("{document}: updated");
         return Ok(None);
     }

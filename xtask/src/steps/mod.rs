@@ -23,6 +23,7 @@ pub mod lines;
 pub mod loom;
 pub mod machine;
 pub mod memory;
+pub mod mutants;
 pub mod no_std;
 pub mod package;
 pub mod panic_calls;

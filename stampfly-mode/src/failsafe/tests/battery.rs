@@ -54,3 +54,30 @@ fn a_vehicle_without_a_meter_flies_without_one() {
     let rig = rig.settled();
     assert_eq!(rig.failsafe.active, Alerts::NONE);
 }
+
+/// After how many readings of this battery, a disarmed vehicle's after one of 4 V without current, is the alert there?
+fn readings_until(alert: Alerts, voltage: f32, current: f32, millis: u64) -> Option<u64> {
+    let config = FailsafeConfig { idle_current: 0.6, ..FailsafeConfig::default() };
+    let mut monitor = PowerMonitor::default();
+    let mut step = |n: u64, power: PowerData| {
+        let now = Instant::from_millis(n * millis);
+        monitor.step(&config, Alerts::NONE, now, Some((now, &power)), false)
+    };
+    step(0, PowerData { voltage: 4.0, ..Default::default() });
+    (1..100).find(|n| step(*n, PowerData { voltage, current, ..Default::default() }).contains(alert))
+}
+
+#[test]
+fn voltage_and_current_are_means_over_two_and_0_3_seconds() {
+    // Readings that are seldom, because the weight of one is where such a mean goes wrong: 0.5 of 2.5 s, 0.1 of 0.4 s.
+    let count = |left: f32, kept: f32| {
+        let mut part = 1.0;
+        (1..100).find(|_| {
+            part *= kept;
+            part < left
+        })
+    };
+    assert_eq!(readings_until(Alerts::LOW_BATTERY, 3.35, 0.0, 500), count(0.05 / 0.65, 1.0 - 0.5 / 2.5));
+    assert_eq!(readings_until(Alerts::MOTOR_RUNS, 4.0, 1.0, 100), count(0.4, 1.0 - 0.1 / 0.4));
+    assert_eq!(readings_until(Alerts::MOTOR_RUNS, 4.0, 0.55, 100), None);
+}

@@ -99,3 +99,29 @@ fn what_is_unexplained_adds_up_and_a_jerk_does_not() {
         assert!(!stopped([(12, force), (1, 1.0)], false), "30 ms of {force} g");
     }
 }
+
+/// Half of the force that the thrust makes, which a quiet flight of any length does not hide, and one that shakes does.
+#[test]
+fn how_much_it_shakes_is_a_mean_over_a_quarter_of_a_second() {
+    let config = FailsafeConfig { hover_thrust: 0.36, ..FailsafeConfig::default() };
+    let found = |quiet: u32, shakes: f32| {
+        let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
+        rig.output.thrust = 0.36;
+        for _ in 0..quiet {
+            assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::NONE);
+        }
+        // It shakes for an eighth of a second and does not for the next.
+        (0..1_200).find(|n| {
+            let strength = if n / 50 % 2 == 0 { shakes } else { 0.0 };
+            let shake = Vec3::new(0.0, 1.0, 0.0) * if n % 2 == 0 { strength } else { -strength };
+            // The force falls when it has begun to shake.
+            let force = REST * if *n < 100 { 1.0 } else { 0.5 } + shake;
+            rig.sample(force, Vec3::zeros()).contains(Alerts::IMU_FAULTY)
+        })
+    };
+    for quiet in [400, 4_000] {
+        let samples = found(quiet, 0.0);
+        assert!(samples.is_some_and(|samples| (100..220).contains(&samples)), "{quiet} before: {samples:?}");
+    }
+    assert_eq!(found(400, 15.0), None);
+}

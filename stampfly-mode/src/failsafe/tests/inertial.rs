@@ -145,9 +145,13 @@ fn a_sharp_blow_counts_in_the_sample_in_which_it_begins() {
     assert_eq!(blow(|rig| rig.estimate.height = 0.05, 60.0, Vec3::zeros()), Alerts::NONE, "a touch-down");
     assert_eq!(blow(|_| (), 60.0, Vec3::new(0.0, 12.0, 0.0)), Alerts::IMPACT, "a wall turns the vehicle");
     assert_eq!(blow(|_| (), 60.0, Vec3::new(0.0, 40.0, 0.0)), Alerts::NONE, "no wall turns it so fast");
-    let mut rig = Rig::flying().settled();
-    assert_eq!(struck(&mut rig, -REST, 60.0, Vec3::zeros()), Alerts::NONE, "a ceiling");
-    assert_eq!(struck(&mut rig, Vec3::new(0.0, -15.0, 5.0), 60.0, Vec3::zeros()), Alerts::IMPACT, "a wall");
+    let from = |force: [f32; 3]| struck(&mut Rig::flying().settled(), force.into(), 60.0, Vec3::zeros());
+    for ceiling in [[0.0, 0.0, GRAVITY], [10.0, 0.0, 15.0], [0.0, -10.0, 15.0]] {
+        assert_eq!(from(ceiling), Alerts::NONE, "a ceiling: {ceiling:?}");
+    }
+    for wall in [[0.0, -15.0, 5.0], [-15.0, 0.0, 5.0], [15.0, 0.0, 5.0]] {
+        assert_eq!(from(wall), Alerts::IMPACT, "a wall: {wall:?}");
+    }
     for peak in [f32::NAN, f32::INFINITY] {
         assert_eq!(blow(|_| (), peak, Vec3::zeros()), Alerts::NONE, "{peak}");
     }
@@ -163,6 +167,60 @@ fn peaks_of_vibration_are_no_blow_and_a_blow_among_them_is_seen() {
         assert_eq!(with_peak(&mut rig, peak, Vec3::zeros()), Alerts::NONE, "sample {k}, {peak} m/s^2");
     }
     assert_eq!(with_peak(&mut rig, 16.0 * GRAVITY, Vec3::zeros()), Alerts::IMPACT);
+}
+
+/// One in ten of them is large, as of a propeller that touches something in gusts.
+#[test]
+fn vibration_whose_peaks_are_rare_is_no_blow() {
+    let mut rig = Rig::flying().settled();
+    for k in 0..6_000 {
+        let rare = if k % 10 == 9 { 25.0 * (k as f32 / 3_000.0).min(1.0) } else { 0.0 };
+        assert_eq!(with_peak(&mut rig, 19.0 + rare, Vec3::zeros()), Alerts::NONE, "sample {k}");
+    }
+}
+
+/// What has just begun is judged by the mean over a tenth of a second, and there peaks of up to 2 g count in full.
+#[test]
+fn vibration_that_has_just_begun_is_no_blow() {
+    let after = |samples: usize| {
+        let mut rig = Rig::flying().settled();
+        for _ in 0..samples {
+            assert_eq!(with_peak(&mut rig, 1.9 * GRAVITY, Vec3::zeros()), Alerts::NONE);
+        }
+        with_peak(&mut rig, 5.0 * GRAVITY, Vec3::zeros())
+    };
+    assert_eq!([0, 5, 10].map(after), [Alerts::IMPACT, Alerts::NONE, Alerts::NONE]);
+}
+
+#[test]
+fn a_fast_turn_is_no_spin() {
+    let turns = |rate: f32| {
+        until(Alerts::GYRO_ANOMALY, |rig, k| rig.sample(REST, Vec3::new(0.0, 0.0, (0.25 * k as f32).min(rate))))
+    };
+    assert_eq!(turns(13.5), None);
+    assert!(turns(14.5).is_some_and(|samples| samples <= 60));
+}
+
+/// It is flown to the ground, and of one sample in five, four come together every two seconds.
+#[test]
+fn a_burst_of_a_noisy_sensor_is_longer() {
+    let seen = |length: usize| {
+        let mut rig = Rig::flying().settled();
+        let garbage = |rig: &mut Rig| {
+            let [force, rate] = [rig.noise(150.0), rig.noise(69.0)];
+            rig.exactly(force, rate)
+        };
+        let mut noisy = Alerts::NONE;
+        for _ in 0..3 {
+            (0..3).for_each(|_| noisy = garbage(&mut rig));
+            rig.sample(REST, Vec3::zeros());
+        }
+        assert_eq!(noisy, Alerts::IMU_NOISY);
+        let last = (0..length).map(|_| garbage(&mut rig)).last();
+        last.is_some_and(|alerts| alerts != Alerts::IMU_NOISY)
+    };
+    assert!(!seen(9), "three times the burst of a good sensor");
+    assert!(seen(10), "one more");
 }
 
 #[test]
@@ -242,4 +300,47 @@ fn opposite_spikes_are_a_burst_and_no_turn() {
         _ => rig.sample(REST, Vec3::zeros()),
     });
     assert_eq!(seen, None);
+}
+
+/// Samples that measure, but for one number.
+fn measured(k: usize) -> ImuData {
+    let noise = Vec3::repeat(1e-3 * (k % 7) as f32);
+    ImuData { accel: REST + noise, gyro: noise, temperature: 25.0, ..Default::default() }
+}
+
+/// What the last of these samples makes of the sensor: a fault, noise. Each is suspect or not.
+fn judged(suspects: impl IntoIterator<Item = bool>) -> [bool; 2] {
+    let (mut monitor, config) = (ImuMonitor::default(), FailsafeConfig::default());
+    let judge = |(k, suspect)| monitor.step(&config, &measured(k), suspect);
+    suspects.into_iter().enumerate().map(judge).last().unwrap_or_default()
+}
+
+#[test]
+fn suspect_samples_are_noise_from_six_close_together_and_a_fault_from_24() {
+    for (suspects, expected) in [(5, [false; 2]), (6, [false, true]), (23, [false, true]), (24, [true; 2])] {
+        assert_eq!(judged(vec![true; suspects]), expected, "{suspects} running");
+    }
+    // However long the fault lasts, it is over after as many good samples as there are until it is found, twice.
+    for (good, expected) in [(48, [true; 2]), (49, [false, true]), (144, [false, true]), (145, [false; 2])] {
+        let samples = [vec![true; 1_000], vec![false; good]].concat();
+        assert_eq!(judged(samples), expected, "{good} good ones later");
+    }
+}
+
+#[test]
+fn an_axis_that_trembles_at_full_scale_does_not_measure() {
+    let config = FailsafeConfig::default();
+    let found = |sensor: fn(&mut ImuData) -> &mut Vec3, full_scale: f32| {
+        let mut monitor = ImuMonitor::default();
+        (1..=100).find(|k| {
+            let mut sample = measured(*k);
+            sensor(&mut sample).y = full_scale + 1e-3 * (k % 7) as f32;
+            monitor.step(&config, &sample, false)[0]
+        })
+    };
+    // Calibration and the filter of the decimation move it by up to 2 %.
+    assert_eq!(found(|sample| &mut sample.accel, 0.985 * config.accel_full_scale), Some(20));
+    assert_eq!(found(|sample| &mut sample.gyro, -0.985 * config.gyro_full_scale), Some(20));
+    assert_eq!(found(|sample| &mut sample.accel, 0.97 * config.accel_full_scale), None);
+    assert_eq!(found(|sample| &mut sample.gyro, -0.97 * config.gyro_full_scale), None);
 }

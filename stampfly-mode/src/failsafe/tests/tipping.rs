@@ -2,9 +2,11 @@
 
 use super::*;
 
-/// How it stood, rad, and how it leans and turns now, rad and rad/s, all about roll; its height, m, and the torque against it.
+/// How it stood, rad, and how it leans and turns now, rad and rad/s, all about one axis; its height, m, and the torque against it.
 struct Tips {
     phase: FlightPhase,
+    /// Roll or pitch.
+    axis: Vec3,
     stood: f32,
     lean: f32,
     rate: f32,
@@ -14,8 +16,11 @@ struct Tips {
     mode: FlightMode,
 }
 
+const ROLL: Vec3 = Vec3::new(1.0, 0.0, 0.0);
+const PITCH: Vec3 = Vec3::new(0.0, 1.0, 0.0);
 const LANDING: Tips = Tips {
     phase: FlightPhase::Landing,
+    axis: ROLL,
     stood: 0.0,
     lean: 0.1,
     rate: 4.0,
@@ -30,8 +35,8 @@ impl Tips {
     fn tumbled(&self) -> Option<u32> {
         let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
         let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
-        let roll = |angle: f32| Quat::from_axis_angle(&Vec3::x_axis(), angle);
-        (rig.mode.phase, rig.mode.mode, rig.estimate.attitude) = (FlightPhase::Armed, self.mode, roll(self.stood));
+        let lean = |angle: f32| Quat::from_scaled_axis(self.axis * angle);
+        (rig.mode.phase, rig.mode.mode, rig.estimate.attitude) = (FlightPhase::Armed, self.mode, lean(self.stood));
         for _ in 0..10 {
             rig.sample(REST, Vec3::zeros());
         }
@@ -40,9 +45,9 @@ impl Tips {
             let found = (0..400).any(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::MOTOR_WEAK));
             assert!(found, "a weak motor");
         }
-        (rig.mode.phase, rig.estimate.height, rig.estimate.attitude) = (self.phase, self.height, roll(self.lean));
-        rig.estimate.angular_rate.x = self.rate;
-        rig.output.torque = Vec3::new(self.torque, 0.0, 0.0);
+        (rig.mode.phase, rig.estimate.height, rig.estimate.attitude) = (self.phase, self.height, lean(self.lean));
+        rig.estimate.angular_rate = self.axis * self.rate;
+        rig.output.torque = self.axis * self.torque;
         (1..=100).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
     }
 }
@@ -53,7 +58,12 @@ fn a_vehicle_that_turns_over_a_leg_while_landing_stops() {
     assert!(soon(&LANDING), "30 ms: {:?}", LANDING.tumbled());
     assert!(soon(&Tips { lean: -0.1, rate: -4.0, torque: 1.5, ..LANDING }), "to the left");
     assert!(soon(&Tips { torque: 0.0, weak: true, ..LANDING }), "a weak motor pushes it");
+    let pitches = Tips { axis: PITCH, ..LANDING };
+    assert!(soon(&pitches), "backwards: {:?}", pitches.tumbled());
+    assert!(soon(&Tips { lean: -0.1, rate: -4.0, torque: 1.5, ..pitches }), "forwards");
     for (tips, why) in [
+        (Tips { torque: 0.5, ..pitches }, "backwards, and the controller wants it"),
+        (Tips { rate: 0.0, ..pitches }, "it does not pitch"),
         (Tips { height: 0.2, ..LANDING }, "in the air"),
         (Tips { rate: 0.0, ..LANDING }, "it does not turn"),
         (Tips { rate: -4.0, ..LANDING }, "it turns back"),
@@ -100,4 +110,32 @@ fn a_flip_may_be_upside_down_for_as_long_as_a_loop_of_a_pilot() {
     assert_eq!(flip, upside_down(FlightPhase::Flying, FlightMode::Acro));
     let samples = flip.expect("it does not come back") as f32;
     assert!((samples * PERIOD.seconds() - config.acro_time.seconds()).abs() < 0.01, "{samples} samples");
+}
+
+/// After how many of 4,000 samples does gravity contradict an attitude that is level, when the vehicle leans by this, rad?
+fn contradicted(prepare: fn(&mut Rig), lean: f32) -> Option<u32> {
+    let mut rig = Rig::flying();
+    (rig.mode.phase, rig.mode.armed) = (FlightPhase::IdleGround, false);
+    prepare(&mut rig);
+    for _ in 0..400 {
+        assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::NONE);
+    }
+    let force = Quat::from_scaled_axis(PITCH * lean) * REST;
+    let found = (1..=4_000).find(|_| rig.sample(force, Vec3::zeros()).contains(Alerts::TILT_MISMATCH));
+    if found.is_some() {
+        assert!((0..4_000).any(|_| rig.sample(REST, Vec3::zeros()) == Alerts::NONE), "it ends with agreement");
+    }
+    found
+}
+
+/// 10°, and the mean of a second has to be there for half a second.
+#[test]
+fn a_tilt_that_gravity_contradicts_is_an_alert_on_the_ground() {
+    for lean in [0.25, -0.25] {
+        let found = contradicted(|_| (), lean);
+        assert!(found.is_some_and(|samples| (600..760).contains(&samples)), "{lean} rad: {found:?}");
+    }
+    assert_eq!(contradicted(|_| (), 0.16), None, "within what the floor and the sensor are off by");
+    assert_eq!(contradicted(|rig| rig.mode.phase = FlightPhase::Flying, 0.25), None, "in flight it feels its thrust");
+    assert_eq!(contradicted(|rig| rig.estimate.valid = Validity::NONE, 0.25), None, "nothing to contradict");
 }

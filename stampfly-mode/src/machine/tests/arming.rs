@@ -93,6 +93,44 @@ fn the_machine_blocks_arming_at_the_tilt_of_its_configuration() {
     }
 }
 
+#[test]
+fn an_armed_vehicle_has_no_refusals() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    world.alerts = Alerts::LOW_BATTERY;
+    assert!(world.step(&mut machine, &[Command::Arm]).refused);
+    assert_eq!(machine.refusals().count(), 1);
+    world.alerts = Alerts::NONE;
+    assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
+    assert_eq!(machine.refusals().count(), 0);
+    assert_eq!(world.pass(&mut machine, 100).blocks, ArmBlocks::NOT_ON_GROUND);
+    assert_eq!(machine.refusals().count(), 0);
+}
+
+#[test]
+fn arming_is_refused_to_whoever_asked_for_it_and_to_nobody_else() {
+    let refused = |asks: fn(&mut World, &mut ModeMachine) -> ModeOutput| {
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+        world.alerts = Alerts::LOW_BATTERY;
+        world.sends(&mut machine, frame(FlightMode::PosHold, false, 0.0));
+        asks(&mut world, &mut machine).refused
+    };
+    assert!(refused(|world, machine| world.step(machine, &[Command::Arm])));
+    assert!(refused(|world, machine| {
+        world.button = Some(ButtonGesture::Click);
+        world.step(machine, &[])
+    }));
+    assert!(refused(|world, machine| {
+        world.pilot = Some(frame(FlightMode::PosHold, true, 0.0));
+        let outputs = (0..100).map(|_| world.step(machine, &[]));
+        outputs.reduce(|all, output| ModeOutput { refused: all.refused || output.refused, ..output }).expect("steps")
+    }));
+    assert!(!refused(|world, machine| world.step(machine, &[Command::Hold])));
+    assert!(!refused(|world, machine| {
+        world.button = Some(ButtonGesture::Press);
+        world.step(machine, &[])
+    }));
+}
+
 /// The old transmitter's switch was seen off, and its last frame is fresh until the new one's comes.
 #[test]
 fn the_arm_switch_of_a_new_transmitter_must_be_seen_off_though_there_was_no_silence() {

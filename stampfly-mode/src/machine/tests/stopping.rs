@@ -180,3 +180,17 @@ fn a_program_that_repeats_disarm_does_not_fall() {
     world.estimate.height = 0.1;
     assert!(!world.step(&mut machine, &[GuidedKind::Disarm]).flight_status.armed);
 }
+
+/// What is told of a step is what it was decided by.
+#[test]
+fn what_is_acknowledged_in_a_step_refuses_in_it_and_is_told() {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    world.alerts = Alerts::IMPACT;
+    world.step(&mut machine, &[]);
+    world.alerts = Alerts::NONE;
+    world.estimate.height = 0.03;
+    world.button = Some(ButtonGesture::Click);
+    let output = world.step(&mut machine, &[]);
+    assert_eq!((output.refused, output.flight_status.blocks), (true, ArmBlocks::CRASHED));
+    assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::NONE);
+}
