@@ -30,6 +30,9 @@ RENEWAL = 0.5
 #: Seconds after which a silent rover has gone: as long as a subscription lasts.
 PATIENCE = 2.0
 
+#: Seconds to wait for a change of parameters. A rover at a tenth of real time tells of them once a second.
+ANSWER = 5.0
+
 
 class RoverClient:
     """One end of the conversation with a rover.
@@ -154,7 +157,7 @@ class RoverClient:
                 t = message.t - first
                 yield message
 
-    def change_parameters(self, timeout: float = 5.0, **values: float) -> ParameterStatus:
+    def change_parameters(self, timeout: float = ANSWER, **values: float) -> ParameterStatus:
         """Changes parameters together and waits until the rover uses them.
 
         Names are written with two underscores for the dot: ``change_parameters(engine__max_accel=1.0)``. Raises
@@ -166,7 +169,7 @@ class RoverClient:
         ]
         return self._request(requests + [ParameterRequest(ParameterAction.Apply)], timeout)
 
-    def roll_back(self, timeout: float = 5.0) -> ParameterStatus:
+    def roll_back(self, timeout: float = ANSWER) -> ParameterStatus:
         """Returns to the parameters before the last change, and waits until the rover uses them."""
         return self._request([ParameterRequest(ParameterAction.RollBack)], timeout)
 

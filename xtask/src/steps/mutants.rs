@@ -61,7 +61,8 @@ fn sample(tool: &Tool, list: &List, mutants: &[Mutant]) -> Result<(), Failure> {
     for file in by_file(mutants).keys() {
         let recorded = list.records.iter().find(|record| record.file == *file);
         if recorded.map(|record| &record.digest) != Some(&tool.digest(file)?) {
-            println!("{file} has changed since all of its mutants were run");
+            let since = if recorded.is_some() { "has changed since" } else { "has no record that" };
+            println!("{file} {since} all of its mutants were run");
         }
     }
     if survivors.is_empty() { Ok(()) } else { Err(format!("no test catches\n  {}", survivors.join("\n  "))) }

@@ -166,7 +166,7 @@ pub struct ServeOptions {
     /// For how long, in the vehicle's seconds.
     #[arg(long = "for", value_name = "SECONDS", default_value_t = 600.0, value_parser = seconds)]
     pub seconds: f32,
-    /// How fast its time passes, 0.01 to 100; 1 is real time. Slower gives busy machines and debuggers time.
+    /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,
 }
@@ -345,10 +345,10 @@ fn seconds(text: &str) -> Result<f32, String> {
     if (0.0..=86_400.0).contains(&value) { Ok(value) } else { Err("0 to 86400 seconds".into()) }
 }
 
-/// Reads how fast time passes.
+/// Reads how fast time passes. At a hundredth other programs take the vehicle's silence between two answers for its end.
 fn speed(text: &str) -> Result<f32, String> {
     let value: f32 = text.parse().map_err(|_| format!("'{text}' is no number"))?;
-    if (0.01..=100.0).contains(&value) { Ok(value) } else { Err("0.01 to 100".into()) }
+    if (0.1..=100.0).contains(&value) { Ok(value) } else { Err("0.1 to 100".into()) }
 }
 
 /// Reads `N,E`.

@@ -2,6 +2,16 @@
 
 use super::*;
 
+/// On the ground after a blow in flight.
+fn crashed() -> (ModeMachine, World) {
+    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
+    world.alerts = Alerts::IMPACT;
+    world.step(&mut machine, &[]);
+    world.alerts = Alerts::NONE;
+    world.estimate.height = 0.03;
+    (machine, world)
+}
+
 #[test]
 fn d11_what_ends_a_flight_wins_over_arming_in_any_order() {
     for end in [Command::Kill, Command::Disarm, Command::Land] {
@@ -145,11 +155,7 @@ fn a_press_while_a_command_arms_stops_the_motors() {
 
 #[test]
 fn a_press_that_acknowledges_a_crash_does_not_arm() {
-    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
-    world.alerts = Alerts::IMPACT;
-    world.step(&mut machine, &[]);
-    world.alerts = Alerts::NONE;
-    world.estimate.height = 0.03;
+    let (mut machine, mut world) = crashed();
     let millis = Duration::from_millis;
     press(&mut world, &mut machine, millis(5_000), ButtonGesture::Press);
     assert_eq!(world.step(&mut machine, &[]).flight_status.blocks, ArmBlocks::CRASHED, "not yet");
@@ -161,11 +167,7 @@ fn a_press_that_acknowledges_a_crash_does_not_arm() {
 
 #[test]
 fn a_crash_has_to_be_acknowledged() {
-    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
-    world.alerts = Alerts::IMPACT;
-    world.step(&mut machine, &[]);
-    world.alerts = Alerts::NONE;
-    world.estimate.height = 0.03;
+    let (mut machine, mut world) = crashed();
     assert!(!world.step(&mut machine, &[Command::Arm]).flight_status.armed);
     world.step(&mut machine, &[Command::Disarm]);
     assert!(world.step(&mut machine, &[Command::Arm]).flight_status.armed);
@@ -184,11 +186,7 @@ fn a_program_that_repeats_disarm_does_not_fall() {
 /// What is told of a step is what it was decided by.
 #[test]
 fn what_is_acknowledged_in_a_step_refuses_in_it_and_is_told() {
-    let (mut machine, mut world) = in_phase(FlightPhase::Flying);
-    world.alerts = Alerts::IMPACT;
-    world.step(&mut machine, &[]);
-    world.alerts = Alerts::NONE;
-    world.estimate.height = 0.03;
+    let (mut machine, mut world) = crashed();
     world.button = Some(ButtonGesture::Click);
     let output = world.step(&mut machine, &[]);
     assert_eq!((output.refused, output.flight_status.blocks), (true, ArmBlocks::CRASHED));
