@@ -255,6 +255,45 @@ fn sticks_that_are_centred_hold_a_vehicle_where_it_was_held_back() {
 }
 
 #[test]
+fn the_path_waits_for_a_vehicle_that_something_keeps_from_climbing() {
+    for mode in [FlightMode::AltHold, FlightMode::PosHold] {
+        for (throttle, held) in [(1.0, -0.6), (-1.0, -2.5)] {
+            let mut bench = Bench::aloft();
+            bench.mode.mode = mode;
+            bench.command = CommandSetpoint { source: CommandSource::Pilot, ..CommandSetpoint::default() };
+            bench.run(0.1);
+            if throttle < 0.0 {
+                bench.command.throttle = 1.0;
+                bench.run(4.2);
+            }
+            bench.command.throttle = throttle;
+            for _ in 0..4_000 {
+                bench.estimate.position.z = held;
+                let apart = (bench.step().position.z - held).abs();
+                assert!(apart < 0.8, "{mode:?}: {apart} m");
+            }
+            assert_eq!(bench.setpoint.velocity.z, 0.0, "{mode:?}");
+            bench.run(0.1);
+            let before = bench.setpoint.position.z;
+            bench.run(0.5);
+            assert!((before - bench.setpoint.position.z) * throttle > 0.1, "{mode:?}: let go, it goes on");
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_below_a_ceiling_lands_from_where_it_is() {
+    let mut bench = Bench::aloft();
+    let held = bench.estimate.position.z + 0.4;
+    bench.enter(FlightPhase::Landing);
+    for _ in 0..800 {
+        bench.estimate.position.z = held;
+        bench.step();
+    }
+    assert!(bench.setpoint.position.z > held + 0.2, "two seconds later it wants to be lower: {:?}", bench.setpoint);
+}
+
+#[test]
 fn landing_sinks_as_told_and_does_not_dig() {
     let mut bench = Bench::aloft();
     let place = bench.setpoint.position.xy();

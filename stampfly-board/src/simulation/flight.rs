@@ -1,9 +1,10 @@
 //! One flight of the StampFly: what is started around it, and what the executor calls while it flies.
 
+use super::StampFly;
 use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
-use super::judge::{Judge, Sight};
+use super::judge::{Invariants, Judge, Sight};
 use super::outcome::Outcome;
 use super::pilot::{Meaning, Pilot};
 use super::radio::Radio;
@@ -20,7 +21,7 @@ use stampfly_sim::chips;
 use stampfly_sim::fault::Moment;
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_sim::vehicle;
+use stampfly_sim::vehicle::{self, Vehicle as _};
 use stampfly_sim::{Simulation, Truth, World};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
@@ -101,8 +102,8 @@ impl vehicle::Surroundings for Surroundings {
                 tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
             }
         }
-        let hover_without_link = setup.vehicle.mode.hover_without_link;
-        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, hover_without_link);
+        let invariants = Invariants::new(setup.vehicle.mode.hover_without_link, StampFly::options(setup).latest());
+        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, invariants);
         Around {
             clock: clock.clone(),
             world: world.clone(),

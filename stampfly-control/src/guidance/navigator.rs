@@ -55,7 +55,7 @@ pub struct NavigatorConfig {
     pub reached: f32,
     /// The path waits when the vehicle is farther away than this, m.
     pub leash: f32,
-    /// While landing, the path is at most this far below the vehicle, m.
+    /// While landing, the path is at most this far below the vehicle, and no farther above it when that begins, m.
     pub landing_lead: f32,
 }
 
@@ -370,6 +370,11 @@ impl Navigator {
     fn land(&mut self, entered: bool, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         if entered {
             self.forget_route();
+            // What kept the vehicle from climbing after its path does not keep it up there now.
+            let highest = input.estimate.position.z - self.config.landing_lead;
+            if self.path.position().z < highest {
+                self.path.place_vertically(highest, self.path.velocity().z);
+            }
         }
         self.steer_heading(input, dt);
         let rate = input.land_detected.descent_rate;
@@ -457,7 +462,9 @@ impl Navigator {
         };
         // A stick that was pushed before it meant climb must first come back.
         self.throttle_centred |= throttle == 0.0;
-        if throttle == 0.0 || !self.throttle_centred {
+        let climbed = input.estimate.position.z - self.path.position().z;
+        let waits = climbed * throttle > self.config.leash * throttle.abs();
+        if throttle == 0.0 || !self.throttle_centred || waits {
             self.path.sink(0.0, dt);
         } else if throttle > 0.0 {
             self.path.sink_to(self.ground - self.config.height_max, throttle * self.config.climb_rate, dt);

@@ -75,8 +75,8 @@ impl ForceMonitor {
                     let carried = thrust * (GRAVITY / config.hover_thrust);
                     let range = CARRIED * carried.max(GRAVITY) + RECTIFIED * self.shaken;
                     (size - carried).abs() - range
-                } else if input.flight_status.mode.is_manual() {
-                    // It may be falling with its motors at rest.
+                } else if input.flight_status.mode.is_manual() && input.flight_status.phase != FlightPhase::Landing {
+                    // It may be falling with its motors at rest. What lands by itself has none at rest.
                     -GRAVITY
                 } else {
                     GRAVITY

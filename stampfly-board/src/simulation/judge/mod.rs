@@ -8,7 +8,7 @@
 //! | `refused` | the motors never turned |
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
-//! | `cut` | the motors stopped for good within 0.3 s of the fault, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
+//! | `cut` | the motors stopped for good within 0.3 s of the fault, of a later one for which they are to stop, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s, or tilted by more than 20° with its motors on, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted, nor that a hand drops what has landed in it |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
@@ -165,15 +165,10 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub fn new(
-        injector: &Injector,
-        mission: &Mission,
-        pilot: Option<FlightMode>,
-        hover_without_link: Duration,
-    ) -> Self {
+    pub fn new(injector: &Injector, mission: &Mission, pilot: Option<FlightMode>, invariants: Invariants) -> Self {
         Self {
             injector: injector.clone(),
-            invariants: Invariants::new(hover_without_link),
+            invariants,
             moments: Moments::default(),
             course: Course::new(mission),
             wide: match pilot {
@@ -361,6 +356,11 @@ impl Judge {
         }
     }
 
+    /// Are the motors to stop for this fault?
+    fn stops(&self, place: usize) -> bool {
+        self.injector.faults().nth(place).is_some_and(|fault| fault.expected() == Class::Cut)
+    }
+
     /// Did the motors stop in a hand, when the mission asked to land? To be caught is a landing then.
     fn is_caught(&self) -> bool {
         self.stopped.filter(|_| !self.stopped_early).is_some_and(|(at, _)| {
@@ -384,7 +384,11 @@ impl Judge {
         let lies = !given_up
             && self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
         let crashed = lies || self.touches.iter().any(hard);
-        let at_once = |at: Instant| begun.is_some_and(|begun| at >= begun && at.since(begun) <= CUT);
+        let soon = |at: Instant, begun: Instant| at >= begun && at.since(begun) <= CUT;
+        // A second fault may stop them only if it is one for which they are to stop.
+        let stops =
+            |place: usize| self.injector.begins(place).filter(|begins| begun == Some(*begins) || self.stops(place));
+        let at_once = |at: Instant| (0..self.injector.faults().count()).filter_map(stops).any(|begun| soon(at, begun));
         if !self.turned {
             Class::Refused
         } else if above > AWAY[0] || beside > AWAY[1] {

@@ -11,7 +11,7 @@ fn judge(faults: &[&str]) -> Judge {
     let faults: Vec<_> = faults.iter().filter_map(|text| Fault::parse(text, FAULTS).ok()).collect();
     let injector = Injector::new(Instant::ZERO, &faults);
     let mission = Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.8\nland\n").expect("a mission");
-    Judge::new(&injector, &mission, None, Duration::from_secs(3))
+    Judge::new(&injector, &mission, None, Invariants::new(Duration::from_secs(3), Duration::ZERO))
 }
 
 fn status(phase: FlightPhase) -> FlightStatus {
@@ -65,6 +65,25 @@ fn ends_are_told_apart() {
     assert_eq!(cut.touch_speed_mps, Some(3.0));
     assert!(cut.violations.contains(&"I12"), "nothing was changed: {cut:?}");
     assert_eq!(judge(&[fault]).finish().outcome, "refused");
+}
+
+#[test]
+fn a_second_fault_may_stop_the_motors_if_they_are_to_stop_for_it() {
+    let ends = |second: &str, stop: f64| {
+        let mut judge = judge(&["baro-step@2", second]);
+        let at = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
+        show(&mut judge, at(0.5), FlightPhase::Armed, (0.0, 0.0), 1);
+        judge.motors(at(1.0), true);
+        show(&mut judge, at(1.5), FlightPhase::Flying, (0.5, 0.0), 1);
+        show(&mut judge, at(4.1), FlightPhase::Flying, (0.5, 0.0), 1);
+        show(&mut judge, at(stop), FlightPhase::Flying, (0.5, 3.0), 2);
+        judge.motors(at(stop), false);
+        show(&mut judge, at(stop + 0.5), FlightPhase::IdleGround, (0.0, 0.0), 2);
+        judge.finish().outcome
+    };
+    assert_eq!(ends("imu-silent@4", 4.2), "cut");
+    assert_eq!(ends("imu-silent@4", 4.4), "crashed", "too late");
+    assert_eq!(ends("tof-silent@4", 4.2), "crashed", "a range finder is no reason to fall");
 }
 
 /// Flies to the mission's end with a fault that begins when it touches, and stops the motors 0.2 s later at this height.
