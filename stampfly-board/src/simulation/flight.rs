@@ -1,6 +1,5 @@
 //! One flight of the StampFly: what is started around it, and what the executor calls while it flies.
 
-use super::StampFly;
 use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
@@ -21,7 +20,7 @@ use stampfly_sim::chips;
 use stampfly_sim::fault::Moment;
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_sim::vehicle::{self, Vehicle as _};
+use stampfly_sim::vehicle;
 use stampfly_sim::{Simulation, Truth, World};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
@@ -102,7 +101,7 @@ impl vehicle::Surroundings for Surroundings {
                 tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
             }
         }
-        let invariants = Invariants::new(setup.vehicle.mode.hover_without_link, StampFly::options(setup).latest());
+        let invariants = Invariants::new(setup.vehicle.mode.hover_without_link, setup.options().latest());
         let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, invariants);
         Around {
             clock: clock.clone(),
