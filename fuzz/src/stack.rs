@@ -108,7 +108,7 @@ fn play(flight: &[Event], edits: &[Edit], mut watch: impl FnMut(usize, bool)) ->
     let mut bus = Bus::new();
     let Assembled { mut flight_loop, mut outside, mut taps } =
         Assembled::<Runnables>::new(&mut bus, None, &config, start.unwrap_or(Instant::ZERO));
-    let mut invariants = Invariants::new(config.mode.hover_without_link, Duration::ZERO);
+    let mut invariants = Invariants::new(config.mode.hover_without_link);
     let mut last: Vec<Vec<u32>> = vec![Vec::new(); <Bus as TopicTable>::TOPICS.len()];
     let (mut turn, mut motors_on) = (0, false);
     for event in flight {

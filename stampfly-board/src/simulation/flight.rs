@@ -3,7 +3,7 @@
 use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
-use super::judge::{Invariants, Judge, Sight};
+use super::judge::{Judge, Sight};
 use super::outcome::Outcome;
 use super::pilot::{Meaning, Pilot};
 use super::radio::Radio;
@@ -101,8 +101,8 @@ impl vehicle::Surroundings for Surroundings {
                 tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
             }
         }
-        let invariants = Invariants::new(setup.vehicle.mode.hover_without_link, setup.options().latest());
-        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, invariants);
+        let hover_without_link = setup.vehicle.mode.hover_without_link;
+        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, hover_without_link);
         Around {
             clock: clock.clone(),
             world: world.clone(),

@@ -104,7 +104,7 @@ impl Vehicle for StampFly {
     }
 
     fn options(setup: &Setup) -> FlightOptions {
-        setup.options()
+        FlightOptions { start: setup.simulation.start, limit: setup.limit, jitter: setup.jitter }
     }
 
     fn config(setup: &Setup) -> &VehicleConfig {

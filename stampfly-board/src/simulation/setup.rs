@@ -6,7 +6,6 @@ use super::sensing::Sensing;
 use crate::config::VehicleConfig;
 use stampfly_sim::SimulationConfig;
 use stampfly_sim::fault::Fault;
-use stampfly_sim::vehicle::FlightOptions;
 use stampfly_types::Duration;
 use stampfly_types::messages::FlightMode;
 use std::vec::Vec;
@@ -50,11 +49,5 @@ impl Setup {
             limit: Duration::from_secs(180),
             simulation,
         }
-    }
-
-    /// How the flight is run.
-    #[must_use]
-    pub fn options(&self) -> FlightOptions {
-        FlightOptions { start: self.simulation.start, limit: self.limit, jitter: self.jitter }
     }
 }

@@ -1,6 +1,6 @@
 //! Makes every set-point of the vehicle: take-off, route, sticks, holding, landing.
 //!
-//! There is one path, and what changes is what moves it. In flight it does not jump, but for the case below the table:
+//! There is one path, and what changes is what moves it. In flight it does not jump, but for the cases below the table:
 //!
 //! | phase | horizontally | vertically |
 //! |---|---|---|
@@ -14,7 +14,7 @@
 //!
 //! A path that follows the estimate takes its velocity over as well, so switching to position hold at speed brakes
 //! instead of pulling back. A vehicle that cannot keep up (wind, a hand) makes the path wait for it; when the pilot centres the
-//! sticks meanwhile, the path jumps to the vehicle.
+//! sticks meanwhile, the path jumps to the vehicle. When a landing begins, it jumps down to one that something keeps below it.
 
 use crate::autotune::AutotuneAxis;
 use stampfly_types::messages::{
@@ -462,8 +462,8 @@ impl Navigator {
         };
         // A stick that was pushed before it meant climb must first come back.
         self.throttle_centred |= throttle == 0.0;
-        let climbed = input.estimate.position.z - self.path.position().z;
-        let waits = climbed * throttle > self.config.leash * throttle.abs();
+        let above = input.estimate.position.z - self.path.position().z;
+        let waits = above * throttle > self.config.leash * throttle.abs();
         if throttle == 0.0 || !self.throttle_centred || waits {
             self.path.sink(0.0, dt);
         } else if throttle > 0.0 {

@@ -7,7 +7,7 @@
 //! between reading and publishing, as a preemptive executor on two cores would: generations are skipped, and the log
 //! must still replay.
 
-use super::jitter::{self, Jitter};
+use super::jitter::Jitter;
 use super::{Around, Surroundings, Witness};
 use crate::time::Tasks;
 use stampfly_bus::{Band, Schedule, Taps, TopicTable};
@@ -23,14 +23,6 @@ pub struct FlightOptions {
     pub limit: Duration,
     /// Seed of the executor's delays; `None` for an executor that is never late.
     pub jitter: Option<u64>,
-}
-
-impl FlightOptions {
-    /// How late the flight band may start.
-    #[must_use]
-    pub fn latest(&self) -> Duration {
-        self.jitter.map_or(Duration::ZERO, |_| jitter::LATEST)
-    }
 }
 
 /// How a flight ended.

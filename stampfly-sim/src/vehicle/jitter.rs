@@ -9,9 +9,6 @@ pub(super) struct Jitter {
     random: Option<ChaCha8Rng>,
 }
 
-/// The latest start of the flight band.
-pub(super) const LATEST: Duration = Duration::from_millis(8);
-
 impl Jitter {
     pub(super) fn new(seed: Option<u64>) -> Self {
         Self { random: seed.map(ChaCha8Rng::seed_from_u64) }

@@ -8,7 +8,7 @@
 //! | `I4` | the estimate's numbers are finite, and its quaternion is a rotation within 1e-4 |
 //! | `I5` | phases change as [`transitions`] say |
 //! | `I6` | armed, and no command of the commander for 520 ms: the alert `COMM_LOST` |
-//! | `I7` | no inertial sample for 27.5 ms (20 ms, and three periods), and as long as the executor may be late: the motors are off |
+//! | `I7` | no inertial sample for 27.5 ms (20 ms, and three periods): the motors are off |
 //! | `I9` | the instants of a topic never go back |
 //! | `I10` | 3 s, and 1 s for each 0.3 m of height, after an alert that demands landing: the motors are off |
 //!
@@ -35,7 +35,6 @@ pub struct Invariants {
     /// Names of those that did not hold.
     violations: BTreeSet<&'static str>,
     hover_without_link: Duration,
-    imu_silence: Duration,
     last_at: [Option<Instant>; COUNT],
     status: FlightStatus,
     motors_on: bool,
@@ -47,13 +46,12 @@ pub struct Invariants {
 }
 
 impl Invariants {
-    /// Of a vehicle that hovers for this long when the link is lost, under an executor that may be so late.
+    /// Of a vehicle that hovers for this long when the link is lost.
     #[must_use]
-    pub fn new(hover_without_link: Duration, latest: Duration) -> Self {
+    pub fn new(hover_without_link: Duration) -> Self {
         Self {
             violations: BTreeSet::new(),
             hover_without_link,
-            imu_silence: IMU_SILENCE + latest,
             last_at: [None; COUNT],
             status: FlightStatus::default(),
             motors_on: false,
@@ -144,7 +142,7 @@ impl Invariants {
     pub fn see(&mut self, now: Instant, clearance: f32) {
         self.clearance = clearance;
         let imu = self.last_at.get(Id::sensor_imu as usize).copied().flatten();
-        self.require("I7", !self.motors_on || imu.is_none_or(|imu| now.since(imu) <= self.imu_silence));
+        self.require("I7", !self.motors_on || imu.is_none_or(|imu| now.since(imu) <= IMU_SILENCE));
         self.require("I10", !self.motors_on || self.must_be_off.is_none_or(|until| now <= until));
     }
 }

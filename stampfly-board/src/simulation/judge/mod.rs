@@ -165,10 +165,15 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub fn new(injector: &Injector, mission: &Mission, pilot: Option<FlightMode>, invariants: Invariants) -> Self {
+    pub fn new(
+        injector: &Injector,
+        mission: &Mission,
+        pilot: Option<FlightMode>,
+        hover_without_link: Duration,
+    ) -> Self {
         Self {
             injector: injector.clone(),
-            invariants,
+            invariants: Invariants::new(hover_without_link),
             moments: Moments::default(),
             course: Course::new(mission),
             wide: match pilot {

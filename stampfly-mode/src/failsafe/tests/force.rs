@@ -55,17 +55,17 @@ fn on_the_ground_only_gravity_does() {
 
 #[test]
 fn d7_a_force_that_no_flight_has_is_a_fault_of_any_airframe_within_1_1_s() {
-    let lands = |mode: FlightMode, phase: FlightPhase, factor: f32| {
+    let found_in = |mode: FlightMode, phase: FlightPhase, factor: f32| {
         let mut rig = Rig::flying();
         (rig.mode.mode, rig.mode.phase) = (mode, phase);
         let mut rig = rig.settled();
         (0..440).any(|_| rig.sample(REST * factor, Vec3::zeros()).contains(Alerts::IMU_FAULTY))
     };
-    let found = |mode: FlightMode, factor: f32| lands(mode, FlightPhase::Flying, factor);
+    let found = |mode: FlightMode, factor: f32| found_in(mode, FlightPhase::Flying, factor);
     assert!([0.0, 0.1, 2.8].into_iter().all(|factor| found(FlightMode::PosHold, factor)));
     assert!(!found(FlightMode::PosHold, 0.5));
     assert!(!found(FlightMode::Acro, 0.0), "falling with the motors at rest, where the throttle is the pilot's");
-    assert!(lands(FlightMode::Acro, FlightPhase::Landing, 0.1), "what lands by itself has no motors at rest");
+    assert!(found_in(FlightMode::Acro, FlightPhase::Landing, 0.1), "what lands by itself has no motors at rest");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use stampfly_types::messages::{ArmBlocks, FlightMode, FlightPhase, GuidedCommand
 use std::vec::Vec;
 
 fn new() -> Invariants {
-    Invariants::new(Duration::from_secs(3), Duration::ZERO)
+    Invariants::new(Duration::from_secs(3))
 }
 
 fn publish(flight: &mut Invariants, id: Id, at: Instant, message: &impl Message) {
