@@ -77,5 +77,6 @@ mod tests {
         assert!(near(rate.roll.td, 0.016) && near(rate.yaw.td, 0.010), "{rate:?}");
         assert!(near(rate.torque_max.x, 3.0e-3) && near(rate.torque_max.z, 1.0e-3), "{rate:?}");
         assert!(near(config.altitude.thrust_max, 0.62) && near(config.altitude.hover_thrust, 0.361), "{config:?}");
+        assert!(near(crate::VehicleConfig::default().landing.hover_thrust, 0.361));
     }
 }

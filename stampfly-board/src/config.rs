@@ -61,7 +61,7 @@ pub struct VehicleConfig {
     pub mode: ModeConfig,
     /// Detectors of what can go wrong.
     pub failsafe: FailsafeConfig,
-    /// Take-off and landing manager. Its hover thrust is that of the cascade.
+    /// Take-off and landing manager. Its ceilings are shares of the cascade's hover thrust.
     pub landing: LandingConfig,
     /// Whose sticks count.
     pub authority: AuthorityConfig,
@@ -93,7 +93,7 @@ impl Default for VehicleConfig {
                 idle_current: 0.6,
                 ..FailsafeConfig::default()
             },
-            landing: LandingConfig::default(),
+            landing: LandingConfig { hover_thrust: AIRFRAME.hover_thrust(), ..LandingConfig::default() },
             authority: AuthorityConfig::default(),
             button: ButtonConfig::default(),
         }

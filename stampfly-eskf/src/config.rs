@@ -39,6 +39,9 @@ pub struct EskfConfig {
     /// How far vibration may move the accelerometer's vertical zero when the motors start, m/s². Recorded StampFly
     /// flights average −8.7 to −9.2 instead of −9.8.
     pub vibration_bias: f32,
+    /// How fast the accelerometer's vertical zero moves in flight, m/s²/√s, because the vibration changes with the thrust. Used while no
+    /// range shows the zero: the barometer then finds a zero that has moved by 1 m/s² within three seconds.
+    pub thrust_bias_walk: f32,
 
     /// Standard deviation of a range, m.
     pub tof_sigma: f32,
@@ -70,6 +73,9 @@ pub struct EskfConfig {
     pub baro_enable: bool,
     /// How fast the barometer's zero drifts, m/√s: a metre an hour is 0.017.
     pub baro_walk: f32,
+    /// How far starting propellers move the barometer's zero, m, and how uncertain its altitude is near the floor. StampFlys read 0.6 m
+    /// lower at the floor with turning propellers, and 0.2 m lower above it.
+    pub baro_wash: f32,
     /// Standard deviation of a magnetic direction, rad.
     pub mag_sigma: f32,
     /// What of the magnetic field is used.
@@ -163,6 +169,7 @@ impl Default for EskfConfig {
             initial_gyro_bias: 8e-4,
             initial_accel_bias: 0.12,
             vibration_bias: 3.0,
+            thrust_bias_walk: 0.15,
             tof_sigma: 0.005,
             tof_min: 0.02,
             tof_max: 4.0,
@@ -176,6 +183,7 @@ impl Default for EskfConfig {
             baro_sigma: 0.3,
             baro_enable: true,
             baro_walk: 0.02,
+            baro_wash: 0.6,
             mag_sigma: 0.1,
             mag_model: MagModel::Heading,
             mag_enable: false,

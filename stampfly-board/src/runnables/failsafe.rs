@@ -54,7 +54,8 @@ impl Runnable for Failsafe {
                 status: ends.estimate_status.get(),
                 power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
                 command,
-                tof: usable(&ends.sensor_tof, |range| range.valid),
+                // A distance of nothing or less is none, whatever the chip's status says: the estimator does not use it.
+                tof: usable(&ends.sensor_tof, |range| range.valid && range.distance > 0.0),
                 flow: usable(&ends.sensor_flow, |flow| flow.valid || stands),
                 baro: usable(&ends.sensor_baro, |pressure| pressure.altitude.is_finite()),
                 output: ends.control_output.get(),

@@ -311,7 +311,8 @@ impl<'b> Pilot<'b> {
             }
             FlightMode::Acro => {
                 let wanted = 1.5 * (limit(0.6 * error, SPEED) - velocity) / stampfly_types::GRAVITY;
-                2.5 * (limit(wanted + trim, 0.3) - lean) / self.meaning.tilt_rate
+                // 3 1/s: two fifths of what the reaction time would bear, as for the velocity.
+                3.0 * (limit(wanted + trim, 0.3) - lean) / self.meaning.tilt_rate
             }
         });
         let turn = if mode == FlightMode::PosHold { self.meaning.navigator.turn_rate } else { self.meaning.yaw_rate };

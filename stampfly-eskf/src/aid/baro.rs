@@ -11,6 +11,7 @@
 //! | continue | a test ratio of at most one: updates the height and the offset |
 //! | stop | not finite or not new: refused at once, inactive one second after the last accepted altitude |
 //! | reset | rejected for longer than `lockout`: the offset to the altitude, the state stays; not counted towards divergence |
+//! | leaves the ground | starting propellers move the pressure: the offset's variance grows by `baro_wash`², and so does the noise, less with the height ([`wash`]) |
 //! | origin reset by command | the offset shifts with the origin |
 
 use super::Row;
@@ -21,6 +22,19 @@ use crate::filter::{NominalState, POSITION};
 #[must_use]
 pub fn altitude(state: &NominalState, offset: f32) -> Row {
     Row::new(offset - state.position.z, [(POSITION + 2, -1.0)])
+}
+
+/// Height at which the propellers' pressure is half of what it is at the floor, m. A rotor feels the ground up to about two diameters, and
+/// those of small multirotors have 0.05 to 0.1 m.
+const WASH_HEIGHT: f32 = 0.2;
+
+/// Standard deviation of what propellers do to an altitude, m, at this height above the floor, for `floor` at the floor. It fades with the
+/// square of the height.
+#[inline]
+#[must_use]
+pub fn wash(floor: f32, height: f32) -> f32 {
+    let share = height.max(0.0) / WASH_HEIGHT;
+    floor / (1.0 + share * share)
 }
 
 /// Altitude that the barometer reads at the origin, with its variance.
@@ -64,6 +78,11 @@ impl Offset {
         self.value -= down;
     }
 
+    /// Inflates its variance by `variance`, m².
+    pub fn inflate(&mut self, variance: f32) {
+        self.variance += variance;
+    }
+
     /// Propagates the variance over `seconds` of random walk, with `walk` in m/√s.
     pub fn propagate(&mut self, seconds: f32, walk: f32) {
         self.variance += walk * walk * seconds;
@@ -80,6 +99,12 @@ impl Offset {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_wash_fades_with_the_height() {
+        assert_eq!([-0.1, 0.0, 0.2].map(|height| wash(0.6, height)), [0.6, 0.6, 0.3]);
+        assert!(wash(0.6, 1.0) < 0.03 && wash(0.0, 0.1) == 0.0);
+    }
 
     #[test]
     fn jacobian_matches_numerical_differentiation() {

@@ -15,6 +15,7 @@
 //! | continue | the same, and a joint test ratio of both axes of at most one |
 //! | stop | one of these fails: refused at once, inactive one second after the last accepted sample |
 //! | inflate | the mean of its innovations is biased in flight: tilt and horizontal gyro bias inflated, accelerometer bias reset |
+//! | not corrected | height, climb rate and the vertical bias of the accelerometer, whose uncertainty counts |
 //! | reset | rejected for longer than `lockout`: horizontal velocity to the sample, then the same inflation |
 
 use super::Row;

@@ -1,4 +1,4 @@
-//! What a sensor has done to the state within the last second, so that it can be undone.
+//! What a sensor has done to the state within the last seconds, so that it can be undone.
 //!
 //! A sensor is convicted some tenths of a second after it began to lie. Until then it has moved velocity, tilt and gyro bias, and
 //! the wrong tilt has moved the velocity further. All of it is linear, so it is kept as sums and subtracted. What
@@ -8,9 +8,9 @@ use crate::filter::state::{Rotation, rotate, rotate_back};
 use crate::filter::{ATTITUDE, GYRO_BIAS, N, VELOCITY};
 use stampfly_types::{GRAVITY, Vec3};
 
-/// Sums over so many stretches of time, and how long each is, s: a second in all.
-const STRETCHES: usize = 8;
-const STRETCH: f32 = 0.125;
+/// Sums over so many stretches of time, and how long each is, s: three seconds in all.
+const STRETCHES: usize = 12;
+const STRETCH: f32 = 0.25;
 
 /// Corrections of one stretch of time, world: velocity, m/s, tilt, rad, and gyro bias, rad/s, north and east.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,7 +21,7 @@ struct Sum {
     gyro_bias: [f32; 2],
 }
 
-/// Corrections of the last second.
+/// Corrections of the last seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Influence {
@@ -54,11 +54,14 @@ impl Influence {
         }
     }
 
-    /// The correction that undoes all of them, for the present attitude.
-    pub(super) fn undo(&mut self, now: &Rotation) -> [f32; N] {
+    /// The correction that undoes those of the last `seconds`, for the present attitude.
+    pub(super) fn undo(&mut self, now: &Rotation, seconds: f32) -> [f32; N] {
         let ([mut velocity, mut tilt, mut bias], mut age) = ([Vec3::zeros(); 3], 0.5 * self.elapsed);
         let mut next = 0.5 * (self.elapsed + STRETCH);
         for back in 0..STRETCHES {
+            if age > seconds {
+                break;
+            }
             let sum = &self.sums[(self.newest + STRETCHES - back) % STRETCHES];
             // A gyro bias is subtracted from the rate: it turned the body the other way.
             let turn = |axis: usize, age: f32| sum.tilt[axis] - sum.gyro_bias[axis] * age;
@@ -92,30 +95,32 @@ mod tests {
 
     const DT: f32 = 0.01;
 
-    /// Hovers for this long; a lie corrects tilt, bias and velocity at every step from the beginning.
-    fn lied_to(seconds: f32, correction: &[f32; N]) -> NominalState {
+    /// Hovers for this long; a lie corrects tilt, bias and velocity at every step from the beginning. So much of it is undone, s.
+    fn lied_to(seconds: f32, correction: &[f32; N], undone: f32) -> NominalState {
         let (mut state, mut influence) = (NominalState::default(), Influence::default());
         for _ in 0..(seconds / DT) as u32 {
             state.propagate(&Vec3::new(0.0, 0.0, -GRAVITY), &Vec3::zeros(), DT);
             influence.add(correction, &state.rotation(), DT);
             state.correct(correction);
         }
-        let undo = influence.undo(&state.rotation());
+        let undo = influence.undo(&state.rotation(), undone);
         state.correct(&undo);
         assert_eq!(influence, Influence::default(), "it is undone once");
         state
     }
 
     #[test]
-    fn a_lie_of_less_than_a_second_leaves_no_trace() {
+    fn a_lie_that_is_undone_leaves_no_trace() {
         for (place, rate) in
             [(VELOCITY, 1.0), (ATTITUDE, 0.2), (ATTITUDE + 1, 0.2), (GYRO_BIAS, 0.1), (GYRO_BIAS + 1, -0.1)]
         {
-            let mut correction = [0.0; N];
-            correction[place] = rate * DT;
-            let state = lied_to(0.9, &correction);
-            assert!(state.velocity.xy().norm() < 0.06, "{place}: {:?}", state.velocity);
-            assert!(state.gyro_bias.norm() < 1e-5 && 1.0 - state.cos_tilt() < 2e-4, "{place}: {state:?}");
+            for (seconds, share) in [(0.9, 1.0), (2.6, 0.2)] {
+                let mut correction = [0.0; N];
+                correction[place] = rate * share * DT;
+                let state = lied_to(seconds, &correction, seconds);
+                assert!(state.velocity.xy().norm() < 0.06, "{place}: {:?}", state.velocity);
+                assert!(state.gyro_bias.norm() < 1e-5 && 1.0 - state.cos_tilt() < 2e-4, "{place}: {state:?}");
+            }
         }
     }
 
@@ -123,7 +128,7 @@ mod tests {
     fn of_a_longer_one_its_last_second_is_undone() {
         let mut correction = [0.0; N];
         correction[VELOCITY] = DT;
-        let state = lied_to(3.0, &correction);
-        assert!((1.8..2.2).contains(&state.velocity.x), "{:?}", state.velocity);
+        let state = lied_to(3.0, &correction, 1.0);
+        assert!((1.7..2.2).contains(&state.velocity.x), "{:?}", state.velocity);
     }
 }

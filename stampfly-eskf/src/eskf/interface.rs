@@ -63,6 +63,9 @@ impl Estimator for Eskf {
                 self.anchor = None;
                 let vibration = self.config.vibration_bias;
                 self.covariance.inflate(ACCEL_BIAS + 2, vibration * vibration);
+                if let Some(offset) = &mut self.baro_offset {
+                    offset.inflate(self.config.baro_wash * self.config.baro_wash);
+                }
             }
             _ => {}
         }

@@ -10,6 +10,8 @@ use crate::config::MagModel;
 /// Where nothing but the barometer holds the height, the height is reset to one that is this near, m. Farther away one of
 /// them is wrong, and it is not known which: height and climb rate become invalid.
 const BARO_REACH: f32 = 2.0;
+/// A barometer that was silent for longer counts as silent for so long, s: what it says next is not all motion.
+const LONGEST_BARO: f32 = 0.5;
 /// Test ratio of a range that is rejected whatever its gate says.
 const REJECTED: f32 = 2.0;
 /// Largest climb rate that a wrong acceleration is taken to have made within the lock-out, m/s: 7.5 m/s², more than the zero of
@@ -25,6 +27,12 @@ const TURNS: f32 = 0.5;
 /// may be half or twice as large is none.
 const KNOWN_DISTANCE: f32 = 0.1;
 const KNOWN_SHARE: f32 = 0.5;
+
+/// What flow does not correct: height, climb rate and the zero that moves them. A leaning camera sees a part of the climb. Where no range
+/// holds it, at the first instant of a take-off or after a reset, it is so uncertain that a wrong distance, or a leg that
+/// slips, would become climb. How uncertain it is still counts.
+/// In a hand nothing shakes the accelerometer, and what flow knows of the climb is worth having.
+const VERTICAL: [usize; 3] = [POSITION + 2, VELOCITY + 2, ACCEL_BIAS + 2];
 
 impl Eskf {
     pub(super) fn update_tof(&mut self, at: Instant, tof: &TofData) -> Result<Fusion, Refusal> {
@@ -171,7 +179,7 @@ impl Eskf {
             let turning = [turn.y, -turn.x];
             match self.flow_monitor.flow(counts, turning, &world, distance, flow.interval, shaken) {
                 Verdict::Unchanged => {}
-                Verdict::Implausible => self.undo_flow(),
+                Verdict::Implausible(lied) => self.undo_flow(lied),
                 Verdict::GyroShifted(shift) => {
                     self.correct_gyro_shift(&shift, &world, distance);
                     return Ok(Fusion::Reset);
@@ -187,7 +195,9 @@ impl Eskf {
         let before = rotate(&self.state.rotation(), &self.force);
         let fusion = match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => {
-                let correction = self.covariance.update(&innovation);
+                let unheld = self.command.flying;
+                let considered: &[usize] = if unheld { &VERTICAL } else { &[] };
+                let correction = self.covariance.update_considering(&innovation, considered);
                 self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
                 self.state.correct(&correction);
                 // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
@@ -246,8 +256,15 @@ impl Eskf {
         }
         let age = self.admit(Sensor::Baro, at, &[baro.altitude])?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
-        self.vertical.baro(self.now, baro.altitude, self.anchor.is_some());
-        let noise = self.config.baro_sigma * self.config.baro_sigma;
+        self.vertical.baro(self.now, baro.altitude, self.height(), self.anchor.is_some());
+        if self.command.flying && self.anchor.is_none() && self.vertical.is_silent() {
+            // Only a range shows how the accelerometer's zero moves with the thrust; without one it may be anywhere near.
+            let walk = self.config.thrust_bias_walk;
+            let time = self.now.since(self.baro_updated).seconds().min(LONGEST_BARO);
+            self.covariance.inflate(ACCEL_BIAS + 2, walk * walk * time);
+        }
+        let wash = if self.anchor.is_some() { 0.0 } else { aid::baro::wash(self.config.baro_wash, self.height()) };
+        let noise = self.config.baro_sigma * self.config.baro_sigma + wash * wash;
         let here = baro.altitude + delayed.state.position.z;
         let since = core::mem::replace(&mut self.baro_updated, self.now);
         let offset = self.baro_offset.get_or_insert(Offset::new(here, noise));

@@ -5,7 +5,7 @@
 //! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
 //! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
 //! | the second opinion about the range ([`vertical`](super::vertical)) | climb rate, height, vertical accelerometer bias | no |
-//! | the second opinion about flow ([`flow_monitor`](super::flow_monitor)) | what flow did to tilt, gyro bias and velocity in the last second | no |
+//! | the second opinion about flow ([`flow_monitor`](super::flow_monitor)) | what flow did to tilt, gyro bias and velocity in the last second, or since the take-off | no |
 //! | the course of flow's difference ([`gyro`](super::flow_monitor)) | gyro bias, tilt, horizontal velocity | no |
 //! | the picture of the floor ([`gyro_monitor`](super::gyro_monitor)) | gyro bias, tilt, horizontal velocity | no |
 //! | [`check_health`](Eskf::check_health): a state that is no number or beyond any flight | position and velocity, on the ground everything | it is divergence |
@@ -69,9 +69,9 @@ impl Eskf {
         }
     }
 
-    /// Undoes what flow did lately, because it lied.
-    pub(super) fn undo_flow(&mut self) {
-        let correction = self.flow_influence.undo(&self.state.rotation());
+    /// Undoes what flow did in the last `lied` seconds, because it lied.
+    pub(super) fn undo_flow(&mut self, lied: f32) {
+        let correction = self.flow_influence.undo(&self.state.rotation(), lied);
         self.state.correct(&correction);
         for axis in 0..2 {
             self.covariance.inflate(ATTITUDE + axis, LIE_TILT * LIE_TILT);
@@ -99,7 +99,7 @@ impl Eskf {
         self.state.correct(&correction);
         self.state.velocity.x = jump.velocity.x;
         self.state.velocity.y = jump.velocity.y;
-        self.flow_monitor.forget();
+        self.flow_monitor.gyro_jumped();
         // What is left of the jump turns the tilt until flow has corrected it.
         let [x, y] = jump.rate;
         self.flow_monitor.inflated(JUMP_UNCERTAIN * SETTLES * math::sqrt(x * x + y * y));

@@ -7,10 +7,11 @@
 //!
 //! | the range is implausible when | |
 //! |---|---|
-//! | it repeats itself while the observer moves by [`MOVED`], right after a jump, for 1.5 s, or for 3 s before the take-off | stuck |
+//! | it repeats itself while the observer moves by [`MOVED`], right after a jump, for 1.5 s, or from the ground on for 3 s | stuck |
 //! | the filter's path while it fuses ranges and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
 //! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
 //! | it jumps more than five times within about two seconds | outliers, an edge below |
+//! | the barometer has risen by half a metre more than the filter's height within ten seconds of the take-off ([`rise`]) | aliased or scaled from the ground on |
 //! | it jumps and stays there, and the vehicle does not move sideways | aliased, an offset, something below that was not there |
 //!
 //! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust changes. A range that is off by a
@@ -22,6 +23,9 @@
 //! The range is believed again after a second of readings that change, do not jump and lie within [`AGREES`] of where
 //! the filter expects them.
 
+mod rise;
+
+use rise::Rise;
 use stampfly_types::{Duration, Instant};
 
 /// Difference of the paths, which fades with [`FADING`], m. A slope of 20° at 0.5 m/s makes 0.7.
@@ -37,7 +41,7 @@ const REPEATED_MOVING: u32 = 6;
 const REPEATED_JUMPED: u32 = 8;
 /// As many whether anything moves or not: 1.5 s.
 const REPEATED_ALWAYS: u32 = 45;
-/// As many on the ground: 3 s. Recorded StampFlys repeat one 24 times there.
+/// As many from the ground on, those on the ground and those in the air together: 3 s. Recorded StampFlys repeat one 24 times there.
 const REPEATED_STANDING: u32 = 90;
 /// A reading that repeats itself so often is not used any more: 0.13 s, in which a take-off rises by 4 cm.
 const UNUSED: u32 = 4;
@@ -68,6 +72,8 @@ const REMEMBERED: Duration = Duration::from_secs(3);
 /// How near a range has to be to what is expected, m, and for how long, to be believed again, s.
 const AGREES: f32 = 0.15;
 const AGREES_FOR: f32 = 1.0;
+/// A range that has not been used for so long holds neither height nor climb rate, s: six readings.
+const SILENT: f32 = 0.2;
 /// Time constants with which the observer follows the barometer, s: slower at first, because starting propellers change
 /// the pressure by more than half a metre.
 const FOLLOWS: f32 = 1.0;
@@ -122,14 +128,17 @@ pub(super) struct VerticalMonitor {
     altitude: Option<f32>,
     /// Altitudes running that are equal.
     baro_repeats: u32,
+    rise: Rise,
     rejected: Option<Instant>,
     /// Sum of the jumps that the filter's height was moved by lately.
     moved: f32,
     moves: u32,
     range: f32,
     range_at: Instant,
+    /// Since a range was used, or could have been, s.
+    unused: f32,
     repeats: u32,
-    /// The same on the ground, before the take-off.
+    /// The same on the ground, before the take-off. Zero as soon as the range changes.
     stood: u32,
     /// The first of these readings had jumped.
     jumped: bool,
@@ -174,6 +183,8 @@ impl VerticalMonitor {
             range: self.range,
             range_at: self.range_at,
             stood: self.stood,
+            altitude: self.altitude,
+            rise: self.rise,
             ..Self::default()
         };
     }
@@ -192,8 +203,11 @@ impl VerticalMonitor {
         self.height += (self.climb + 0.5 * change) * dt;
         self.climb += change;
         self.age += dt;
-        // What the filter does while it rejects ranges is not what they say.
-        if !self.rejecting {
+        self.unused += dt;
+        // What the filter does while it rejects ranges is not what they say, and without any it is nobody's lie.
+        if self.unused > SILENT {
+            self.path = 0.0;
+        } else if !self.rejecting {
             self.path += (climb - self.path * (1.0 / FADING)) * dt;
         }
         if self.rejected.is_none() && !self.implausible {
@@ -215,12 +229,19 @@ impl VerticalMonitor {
         self.repeats_from = self.height;
     }
 
-    /// Takes an altitude. `stands` as in [`stand`](Self::stand).
-    pub(super) fn baro(&mut self, at: Instant, altitude: f32, stands: bool) {
+    /// Takes an altitude, where the filter believes in this height. `stands` as in [`stand`](Self::stand).
+    pub(super) fn baro(&mut self, at: Instant, altitude: f32, height: f32, stands: bool) {
         let dt = at.since(self.baro_at).seconds().min(0.2);
         self.baro_at = at;
         let last = self.altitude.replace(altitude).unwrap_or(altitude);
         let stuck = self.baro_repeats >= REPEATED;
+        if stuck {
+            self.rise = Rise::default();
+        } else if stands {
+            self.rise.stand(altitude - last, dt);
+        } else if !self.implausible {
+            self.rise.baro(altitude - last, height - CLEARANCE, dt);
+        }
         self.baro_repeats = if altitude.to_bits() == last.to_bits() { self.baro_repeats.saturating_add(1) } else { 0 };
         if stuck {
             // It measured nothing, so there is nothing to compare until it has begun again.
@@ -272,12 +293,15 @@ impl VerticalMonitor {
             }
         }
         if self.implausible || self.repeats >= UNUSED {
-            Use::Ignore
-        } else if leaps {
-            Use::Reject
-        } else {
-            Use::Gate
+            return Use::Ignore;
         }
+        self.unused = 0.0;
+        if leaps { Use::Reject } else { Use::Gate }
+    }
+
+    /// Has no range been used lately?
+    pub(super) fn is_silent(&self) -> bool {
+        self.unused > SILENT
     }
 
     /// The filter rejected a range.
@@ -307,6 +331,7 @@ impl VerticalMonitor {
     /// From here on the range is implausible, and what it did before does not count again.
     fn leave_out(&mut self) {
         (self.implausible, self.path, self.moved, self.moves) = (true, 0.0, 0.0, 0);
+        self.rise = Rise::default();
     }
 
     /// The filter moved its height up by this much, to the range.
@@ -341,18 +366,27 @@ impl VerticalMonitor {
         let stuck = self.repeats >= repeated && (self.height - self.repeats_from).abs() > MOVED
             || self.repeats >= REPEATED_JUMPED && self.jumped
             || self.repeats >= REPEATED_ALWAYS
-            || self.stood >= REPEATED_STANDING;
+            || self.stood.saturating_add(self.repeats) >= REPEATED_STANDING;
         let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
-        let wrong = stuck || apart || self.jumps > JUMPS || (settled && self.moves > MOVES);
+        let above = self.rise.is_above();
+        let wrong = stuck || apart || above.is_some() || self.jumps > JUMPS || (settled && self.moves > MOVES);
         if !wrong {
             return None;
         }
         // Right after the take-off the observer knows how far it came.
         let young = self.age < SETTLED && !self.restarted;
-        let higher = if young { self.height + CLEARANCE - height } else { -self.path - self.moved };
-        let misled = apart || self.moved != 0.0;
+        let (higher, climb) = match above {
+            Some(above) => above,
+            None if young => (self.height + CLEARANCE - height, self.climb),
+            None => (-self.path - self.moved, self.climb),
+        };
+        let misled = apart || above.is_some() || self.moved != 0.0;
+        self.climb = climb;
         self.from_start = young;
         self.leave_out();
-        misled.then_some(Correction { climb: self.climb, bias: self.bias, higher })
+        misled.then_some(Correction { climb, bias: self.bias, higher })
     }
 }
+
+#[cfg(test)]
+mod tests;

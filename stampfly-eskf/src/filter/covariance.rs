@@ -273,6 +273,27 @@ impl Covariance {
         self.update_with::<M, WHOLE_ROWS>(innovation)
     }
 
+    /// The same with states that are only considered (Schmidt, "Application of State-Space Methods to Navigation Problems", 1966): what
+    /// they may be wrong by counts in the innovation, and the measurement corrects neither them nor their covariance.
+    #[inline]
+    pub fn update_considering<const M: usize>(&mut self, innovation: &Innovation<M>, considered: &[usize]) -> [f32; N] {
+        let mut correction = self.update(innovation);
+        for &i in considered {
+            for column in &innovation.gain {
+                let Some((row, of)) = self.rows.get_mut(i).zip(column.get(i)) else { continue };
+                for &j in considered {
+                    if let Some((cell, value)) = row.get_mut(j).zip(column.get(j)) {
+                        *cell += of * value;
+                    }
+                }
+            }
+            if let Some(cell) = correction.get_mut(i).filter(|cell| cell.is_finite()) {
+                *cell = 0.0;
+            }
+        }
+        correction
+    }
+
     #[inline]
     fn update_with<const M: usize, const WHOLE: bool>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
         let Innovation { gain, whitened } = innovation;
@@ -442,6 +463,40 @@ mod tests {
             prop_assert!(p.is_healthy());
             prop_assert!(dense(&p).cholesky().is_some(), "positive definite");
         }
+    }
+
+    #[test]
+    fn considered_states_stay_and_the_rest_is_josephs_form_without_their_gain() {
+        let mut p = Covariance::from_sigmas([0.1, 0.5, 0.1, 0.01, 3.0]);
+        let mut state = NominalState::default();
+        for _ in 0..40 {
+            let (rotation, mut step) = (state.rotation(), PropagationStep::default());
+            step.extend(&state.propagate(&Vec3::new(1.0, 0.0, -9.0), &Vec3::new(0.3, 1.0, 0.0), 0.005));
+            p.propagate(&rotation, &step, &NOISE);
+        }
+        let before = p;
+        let considered = [2, 5, 14];
+        let h = [jacobian(&[(3, 0.9), (5, 0.4), (7, 1.0)]), jacobian(&[(4, 1.0), (5, -0.1), (6, -1.0)])];
+        let (y, r) = ([0.3, -0.2], [0.01, 0.02]);
+        let correction = p.update_considering(&p.innovation(&h, y, r), &considered);
+
+        let exact = dense(&before);
+        let h = SMatrix::<f64, 2, 15>::from_fn(|i, j| f64::from(h[i][j]));
+        let noise = nalgebra::Matrix2::from_diagonal(&nalgebra::Vector2::from(r.map(f64::from)));
+        let mut gain = exact * h.transpose() * (h * exact * h.transpose() + noise).try_inverse().unwrap();
+        for state in considered {
+            gain.row_mut(state).fill(0.0);
+        }
+        let left = Dense::identity() - gain * h;
+        let joseph = left * exact * left.transpose() + gain * noise * gain.transpose();
+        assert!(scaled_difference(&dense(&p), &joseph) < 1e-4, "{}", scaled_difference(&dense(&p), &joseph));
+        let expected = gain * nalgebra::Vector2::from(y.map(f64::from));
+        for (i, (ours, theirs)) in correction.iter().zip(expected.iter()).enumerate() {
+            assert!((f64::from(*ours) - theirs).abs() < 1e-4, "{i}: {ours}, not {theirs}");
+        }
+        assert!(considered.iter().all(|i| correction[*i] == 0.0));
+        let broken = p.update_considering(&p.innovation(&[[f32::NAN; N]], [0.0], [1.0]), &considered);
+        assert!(broken.iter().all(|value| value.is_nan()), "and is not hidden");
     }
 
     #[test]

@@ -19,7 +19,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
-use stampfly_types::messages::TofData;
+use stampfly_types::messages::{EstimatorCommand, TofData};
 use stampfly_types::{Instant, Vec3, math};
 
 /// Tilt, velocity, height: rad, m/s, m. Of the tilt 0.07 rad are what the box's accelerometer bias looks like.
@@ -53,6 +53,7 @@ fn recovery(wrong: &Wrong, seed: u64) -> (f64, Option<f64>) {
     flight.accel_bias = Vector3::from(wrong.accel_bias);
     let mut eskf = Eskf::new(EskfConfig::default());
     eskf.initialize(flight.start, &calibration);
+    eskf.command(flight.start, &EstimatorCommand { flying: true, ..EstimatorCommand::default() });
     // The estimate's own tilt would refuse a range: one that fits it tells where the floor was.
     let cos_tilt = eskf.nominal().cos_tilt();
     let range = flight.tof(flight.start);

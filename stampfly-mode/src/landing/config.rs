@@ -10,6 +10,9 @@ pub struct LandingConfig {
     pub airborne_rise: f32,
     /// Climb rate that counts as airborne, m/s.
     pub airborne_speed: f32,
+    /// Thrust that carries the weight, N. A tenth more of it counts as airborne where no range shows a rise. Infinite, as by default, it
+    /// never does: for a vehicle of which it is not known.
+    pub hover_thrust: f32,
     /// Descent speed, m/s.
     pub descent: f32,
     /// Descent speed at the ground, m/s.
@@ -53,6 +56,7 @@ impl Default for LandingConfig {
             airborne_rise: 0.05,
             // Twice `still_speed`, as for `takeoff_speed`: what the estimate of a vehicle that stands does not reach.
             airborne_speed: 0.16,
+            hover_thrust: f32::INFINITY,
             descent: 0.3,
             touchdown: 0.15,
             flare_height: 0.3,

@@ -29,7 +29,9 @@ use stampfly_types::{Duration, Instant};
 /// be on the ground by then.
 const FREE_FALL: Duration = Duration::from_millis(250);
 /// So is one that sinks faster than it descends by this, m/s, for this long, at no more than this share of its thrust: from 8 cm
-/// it would be on the ground before so much of its thrust is gone. The weight test alone is late, because drag carries a part.
+/// it would be on the ground before so much of its thrust is gone. The weight test alone is late, because drag carries a part. Of one
+/// that is fast already it carries as much as the ground would, and the test says that it stands: that is not asked of one whose
+/// height is below the floor.
 const FAST: f32 = 0.1;
 const FAST_FALL: Duration = Duration::from_millis(60);
 const RAMPED: f32 = 0.9;
@@ -104,7 +106,8 @@ impl Landing {
     #[inline(never)]
     fn step(&mut self, now: Instant, seen: &Seen<'_>, mut asked: Asked) -> Step<Self> {
         let sinks = seen.sink_rate().is_some_and(|rate| rate > seen.config.descent + FAST);
-        let fast = sinks && asked.land_detected.thrust_ceiling < RAMPED && seen.weight.steady != Support::Stands;
+        let stands = seen.weight.steady == Support::Stands && seen.height().is_none_or(|height| height >= 0.0);
+        let fast = sinks && asked.land_detected.thrust_ceiling < RAMPED && !stands;
         self.falls = lasting(&mut self.falling, now, seen.weight.quick == Support::Falls) >= FREE_FALL
             || lasting(&mut self.fast, now, fast) >= FAST_FALL;
         asked.is_testing &= !self.falls;

@@ -3,7 +3,7 @@
 //! | stage | from | to | thrust |
 //! |---|---|---|---|
 //! | spool-up | armed | the machine takes off | none is asked for |
-//! | lift-off | phase TAKEOFF | risen by [`LandingConfig::airborne_rise`], or climbing | under a ceiling that rises |
+//! | lift-off | phase TAKEOFF | risen by [`LandingConfig::airborne_rise`], or climbing; without a range, with more thrust than its weight | under a ceiling that rises |
 //! | climb | off the ground | complete, says the machine | under the same ceiling |
 //!
 //! When to take off, and when to give it up, is the machine's decision: one that something holds down, such as a ceiling, never
@@ -17,7 +17,11 @@ use crate::lasting::lasting;
 use crate::stage::{Limit, Mode, Stage, Step};
 use core::convert::Infallible;
 use stampfly_types::Instant;
-use stampfly_types::messages::{FlightPhase, GroundContact};
+use stampfly_types::messages::{FlightPhase, GroundContact, SensorMask};
+
+/// This share of the thrust that carries the weight lifts the vehicle, in the mean of the weight test's last tenths of a second. Hover thrust
+/// is known to a few per cent, and a take-off asks for 1.15 at least.
+const LIFTS: f32 = 1.1;
 
 /// A take-off: when and where the vehicle was sent off.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,7 +106,11 @@ impl Stage<TakeOff> for LiftOff {
         let config = seen.config;
         let has_risen = seen.height().is_some_and(|height| height - take_off.height > config.airborne_rise);
         let climbs = seen.sink_rate().is_some_and(|rate| rate < -config.airborne_speed);
-        if has_risen || climbs || seen.contact == GroundContact::Air {
+        // Without a range nothing measures so small a rise: not the barometer under propellers that have just started, and not the
+        // accelerometer, whose zero they move. What is left is that thrust lifts what it is larger than.
+        let lifted =
+            seen.weight.thrust > LIFTS * config.hover_thrust && !seen.estimate.sensors.contains(SensorMask::TOF);
+        if has_risen || climbs || lifted || seen.contact == GroundContact::Air {
             return Step::Stage(TakeOffStage::Climb);
         }
         Step::Stay(take_off.asked(config, now, seen, GroundContact::Ground))

@@ -1,7 +1,7 @@
 //! A body with a weight, a floor and rotors that lag, below a manager that is told the truth, or is not.
 
 use super::*;
-use stampfly_types::messages::Validity;
+use stampfly_types::messages::{SensorMask, Validity};
 use stampfly_types::{Duration, GRAVITY, Vec3, math};
 use std::string::{String, ToString};
 use std::vec;
@@ -285,8 +285,9 @@ fn a_blind_landing_stays_blind_and_the_next_one_sees() {
 #[test]
 fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
     let config = LandingConfig::default();
-    // Of the thrust that is missing so much of the specific force is: drag carries the rest. And how fast it becomes fast.
-    let blind_after = |sinks: f32, follows: f32, gains: f32| {
+    // How fast it sinks at this height, what share of the thrust that is missing the specific force misses, because drag carries the rest,
+    // and how fast it becomes fast.
+    let blind_at = |height: f32, sinks: f32, follows: f32, gains: f32| {
         let mut manager = TakeoffLanding::new(config);
         let (mut sink_rate, mut thrust, mut ceiling, mut fast) = (sinks, 1.0f32, f32::MAX, None);
         for k in 0..800u64 {
@@ -297,7 +298,7 @@ fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
                 sink_rate += gains * DT;
             }
             let estimate = StateEstimate {
-                height: 0.03,
+                height,
                 velocity: Vec3::new(0.0, 0.0, sink_rate),
                 specific_force: Vec3::new(0.0, 0.0, -GRAVITY * (1.0 - follows * (1.0 - thrust))),
                 valid: Validity::ALL,
@@ -316,12 +317,16 @@ fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
         }
         None
     };
+    let blind_after = |sinks, follows, gains| blind_at(0.03, sinks, follows, gains);
     let after = blind_after(0.1, 0.45, 1.5);
     assert!(after.is_some_and(|seconds| seconds < 0.15), "{after:?}");
     assert_eq!(blind_after(0.1, 0.0, 1.5), None, "it stands, whatever its climb rate says");
     for sinks in [0.1, 0.35] {
         assert_eq!(blind_after(sinks, 0.45, 0.0), None, "it is not fast");
     }
+    // A range that was too short by 0.3 m, and drag that carried nine tenths of the thrust that was gone.
+    let after = blind_at(-0.01, 0.1, 0.1, 1.5);
+    assert!(after.is_some_and(|seconds| seconds < 0.15), "{after:?}, from below the floor");
 }
 
 #[test]
@@ -380,8 +385,13 @@ fn a_landing_that_does_not_sink_touches_something_after_a_second() {
 /// Shares of hover thrust at these milliseconds, and when it counts as landed, with this answer of the weight test.
 fn blind(breaks_off: bool, quick: super::weight::Support, millis: &[u64]) -> (Vec<f32>, Option<u64>) {
     let mut descent = super::blind::BlindDescent::new(Instant::ZERO, breaks_off);
-    let weight =
-        super::weight::Answers { quick, steady: super::weight::Support::Unknown, is_carried: false, is_struck: false };
+    let weight = super::weight::Answers {
+        quick,
+        steady: super::weight::Support::Unknown,
+        is_carried: false,
+        is_struck: false,
+        thrust: 0.0,
+    };
     let (mut shares, mut landed) = (vec![], None);
     for now in (0..20_000).step_by(5) {
         let (share, lands) = descent.step(Instant::from_millis(now), weight, Duration::from_millis(300));
@@ -461,6 +471,36 @@ fn a_take_off_that_climbs_is_off_the_ground_whatever_its_height_says() {
         let steps = [(FlightPhase::Armed, 0.03, 0.0), (FlightPhase::TakeOff, 0.03, -climb)];
         assert_eq!(stages(&mut manager, &steps, Validity::ALL)[1], stage, "{climb} m/s");
     }
+}
+
+/// Contact with the ground of a take-off at this share of the thrust that carries the weight, N, which neither height nor climb rate
+/// shows, with these sensors.
+fn contact(share: f32, hover_thrust: f32, sensors: SensorMask, millis: u64) -> GroundContact {
+    let mut manager = TakeoffLanding::new(LandingConfig { hover_thrust, ..LandingConfig::default() });
+    let estimate = StateEstimate { sensors, ..everything(0.0, 0.0, 0.0) };
+    let mut contact = GroundContact::Ground;
+    for now in (0..=millis).step_by(5) {
+        let phase = if now == 0 { FlightPhase::Armed } else { FlightPhase::TakeOff };
+        let thrust = if now == 0 { 0.0 } else { share * 0.36 };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
+        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+        contact = manager.step(Instant::from_millis(now), &input).contact;
+    }
+    contact
+}
+
+#[test]
+fn without_a_range_more_thrust_than_its_weight_lifts_a_vehicle() {
+    let blind = SensorMask::IMU | SensorMask::BARO | SensorMask::FLOW;
+    assert_eq!(contact(1.2, 0.36, blind, 1_000), GroundContact::Air);
+    assert_eq!(contact(1.2, 0.36, blind, 200), GroundContact::Ground, "not at once");
+    assert_eq!(contact(1.05, 0.36, blind, 3_000), GroundContact::Ground, "hover thrust is not known so well");
+    assert_eq!(contact(1.2, 0.36, blind | SensorMask::TOF, 3_000), GroundContact::Ground, "a range would show it");
+    assert_eq!(
+        contact(1.2, LandingConfig::default().hover_thrust, blind, 3_000),
+        GroundContact::Ground,
+        "of an unknown airframe"
+    );
 }
 
 #[test]

@@ -78,8 +78,8 @@ impl Pair {
     }
 }
 
-/// Two answers to the same question.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Two answers to the same question, and what else the two quantities say.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answers {
     /// Within 60 ms of thrust being taken away.
     pub quick: Support,
@@ -90,6 +90,8 @@ pub struct Answers {
     pub is_carried: bool,
     /// Something pushed it up harder than its thrust: it has touched down, at more than about 0.1 m/s.
     pub is_struck: bool,
+    /// Mean of the delivered thrust over [`STEADY`], N; zero in the first step.
+    pub thrust: f32,
 }
 
 /// Filtered thrust and specific force, and what both were before thrust was taken away.
@@ -115,8 +117,13 @@ impl WeightTest {
     /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
     /// reference stays.
     pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Answers {
-        let unknown =
-            Answers { quick: Support::Unknown, steady: Support::Unknown, is_carried: false, is_struck: false };
+        let unknown = Answers {
+            quick: Support::Unknown,
+            steady: Support::Unknown,
+            is_carried: false,
+            is_struck: false,
+            thrust: 0.0,
+        };
         if !(force.is_finite() && thrust.is_finite()) {
             return unknown;
         }
@@ -130,6 +137,7 @@ impl WeightTest {
         let input = Pair { force, thrust: self.delivered };
         self.quick.filter(input, QUICK, dt);
         self.steady.filter(input, STEADY, dt);
+        let thrust = self.steady.thrust;
         // What carries itself keeps its ratio of specific force to thrust. What stands does not, and tells nothing of before.
         let is_carried = self.steady.thrust < LITTLE_THRUST * self.flight.thrust
             && self.steady.force > ALL_FORCE * self.flight.force;
@@ -138,11 +146,11 @@ impl WeightTest {
         let taken = self.steady.thrust < self.before.thrust;
         if keeps_ratio && !(testing && taken) {
             self.before = self.steady;
-            return Answers { is_carried, ..unknown };
+            return Answers { is_carried, thrust, ..unknown };
         }
         let is_struck = self.quick.force * self.before.thrust > STRUCK * self.before.force * self.quick.thrust;
         let [quick, steady] = [self.quick, self.steady].map(|pair| pair.support(self.before));
-        Answers { quick, steady, is_carried, is_struck }
+        Answers { quick, steady, is_carried, is_struck, thrust }
     }
 }
 

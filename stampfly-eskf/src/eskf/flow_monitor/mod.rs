@@ -14,16 +14,18 @@
 //! | share of the picture's motion, and of the motion that the body's turning gives it | a reading holds one frame, two or none |
 //! | standard deviation that was added to the tilt | the filter found its own tilt to be wrong, so the acceleration that is restored is wrong, too |
 //!
-//! Three things it leaves to others: a picture that does not move is [`picture`]'s, a velocity that jumps [`jump`]'s, and whether it
-//! is not flow but the gyro that is wrong [`gyro`]'s.
+//! Four things it leaves to others: what lies from the take-off on is [`departure`]'s, a picture that does not move is [`picture`]'s, a
+//! velocity that jumps [`jump`]'s, and whether it is not flow but the gyro that is wrong [`gyro`]'s.
 //!
 //! Not for an error of scale of some tens of per cent, nor for a constant offset that was there from the beginning: no
 //! other sensor on board measures a constant velocity.
 
+mod departure;
 mod gyro;
 mod jump;
 mod picture;
 
+use departure::Departure;
 pub(super) use gyro::GyroShift;
 use gyro::Record;
 use jump::Jump;
@@ -63,6 +65,8 @@ const UNKNOWN: f32 = 20.0;
 const FAST: f32 = 7.0;
 const CALM: f32 = 1.0;
 const SETTLES: f32 = 0.1;
+/// A lie that begins in flight has lasted this long when it is found, s, and what it did in that time is undone.
+const LIED: f32 = 1.0;
 /// After a shift of the gyro's zero was put right, the filter needs some time to settle, s.
 const SHIFTED: f32 = 0.5;
 /// To be believed again flow has to agree with a motion of this much, m/s, for this long, s.
@@ -78,8 +82,8 @@ const STANDING_SOON: f32 = 0.1;
 pub(super) enum Verdict {
     /// Nothing new.
     Unchanged,
-    /// Flow has just become implausible.
-    Implausible,
+    /// Flow has just become implausible, and has lied for so long, s.
+    Implausible(f32),
     /// What looked so was the gyro.
     GyroShifted(GyroShift),
 }
@@ -109,6 +113,7 @@ pub(super) struct FlowMonitor {
     agrees: f32,
     picture: Picture,
     record: Record,
+    departure: Departure,
     standing: [[f32; 2]; 2],
     implausible: bool,
     /// How long it has to hold back, s.
@@ -148,7 +153,9 @@ impl FlowMonitor {
         self.added[1] += acceleration.y;
         self.gyro_bias[0] += gyro_bias.x;
         self.gyro_bias[1] += gyro_bias.y;
-        self.record.corrected([acceleration.x, acceleration.y], [gyro_bias.x, gyro_bias.y]);
+        let (acceleration, gyro_bias) = ([acceleration.x, acceleration.y], [gyro_bias.x, gyro_bias.y]);
+        self.record.corrected(acceleration, gyro_bias);
+        self.departure.corrected(acceleration, gyro_bias);
     }
 
     /// The filter found its tilt to be wrong, and added this standard deviation, rad.
@@ -182,9 +189,17 @@ impl FlowMonitor {
         self.record = Record::default();
     }
 
+    /// The gyro's zero has jumped, and attitude, bias and velocity were put right.
+    pub(super) fn gyro_jumped(&mut self) {
+        self.forget();
+        self.departure.gyro_jumped();
+    }
+
     /// What flow did to the filter was right, or is undone.
     pub(super) fn start_over(&mut self) {
         self.forget();
+        // It was the gyro, whatever was found meanwhile.
+        self.departure = Departure::default();
         (self.added, self.gyro_bias) = Default::default();
     }
 
@@ -198,7 +213,9 @@ impl FlowMonitor {
             let [x, y] = *mean;
             implausible |= x * x + y * y > limit * limit;
         }
-        *self = Self { standing, implausible, readings: BEGINNING, last: Some([0.0; 2]), ..Self::default() };
+        let mut departure = self.departure;
+        departure.stand(dt);
+        *self = Self { standing, implausible, departure, readings: BEGINNING, last: Some([0.0; 2]), ..Self::default() };
     }
 
     /// Takes a reading over `interval`: counts as they came, rad, what the body's own turning makes of the picture,
@@ -216,6 +233,7 @@ impl FlowMonitor {
         let velocity = [velocity.x, velocity.y];
         let change = core::mem::take(&mut self.change);
         let dt = core::mem::take(&mut self.elapsed);
+        self.departure.felt(change, dt);
         let before = self.last.replace(velocity).zip(shaken);
         let Some((last, shaken)) = before.filter(|_| dt > 0.0 && interval > 0.0) else {
             // Where the distance jumps, the velocity does.
@@ -255,6 +273,7 @@ impl FlowMonitor {
         self.picture.step(counts, turning, distance, interval);
         let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
         let uncertain = share * share * picture;
+        self.departure.reading(velocity, interval, uncertain, shaken);
         if !begins {
             self.jump.step(apart, distance, uncertain + SHAKES * shaken, interval, self.waits == 0.0);
         }
@@ -266,20 +285,30 @@ impl FlowMonitor {
                 let agrees = difference < 0.2 * motion && !self.picture.is_frozen() && !self.picture.is_still();
                 self.agrees = if agrees { self.agrees + interval } else { 0.0 };
             }
-            self.implausible = self.agrees < AGREES_FOR || self.jump.has_jumped();
+            self.implausible = self.agrees < AGREES_FOR || self.jump.has_jumped() || self.departure.is_convicted();
             return Verdict::Unchanged;
         }
         self.waits = (self.waits - interval).max(0.0);
-        let apart = (self.differs > LASTS && self.waits == 0.0) || self.jump.has_jumped();
+        let mut apart = (self.differs > LASTS && self.waits == 0.0) || self.jump.has_jumped();
         let unmoved = self.picture.is_frozen() || self.picture.is_blind(distance);
         let shift = if apart && !unmoved { self.record.shift() } else { None };
         if let Some(shift) = shift {
             self.waits = SHIFTED;
             return Verdict::GyroShifted(shift);
         }
+        if self.departure.contradicts() && self.record.shows_a_lie() {
+            self.departure.convict();
+            apart = true;
+        }
         self.implausible = apart || unmoved;
         self.agrees = 0.0;
-        if self.implausible { Verdict::Implausible } else { Verdict::Unchanged }
+        if !self.implausible {
+            return Verdict::Unchanged;
+        }
+        // What lies soon after the take-off has lied since then.
+        let since = self.departure.time().unwrap_or(LIED);
+        self.departure.end();
+        Verdict::Implausible(since)
     }
 }
 

@@ -2,6 +2,11 @@ use super::*;
 
 const DT: f32 = 0.01;
 
+/// Has flow just been found to lie?
+fn is_lie(verdict: Verdict) -> bool {
+    matches!(verdict, Verdict::Implausible(_))
+}
+
 /// A vehicle that stands still in the air, as flow tells; after each reading flow corrects the acceleration by this
 /// much. After how many of 200 readings is flow, or the gyro, not believed?
 fn found(mut monitor: FlowMonitor, correction: Vec3) -> Option<u32> {
@@ -51,8 +56,7 @@ fn a_picture_stands_still_for_millimetres_not_for_centimetres() {
         (0..30).any(|_| {
             monitor.predict(&Vec3::zeros(), DT);
             // 0.012 rad in all.
-            monitor.flow([0.0; 2], [0.04, 0.0], &Vec3::new(0.0, -0.04 * distance, 0.0), distance, DT, Some(0.0))
-                == Verdict::Implausible
+            is_lie(monitor.flow([0.0; 2], [0.04, 0.0], &Vec3::new(0.0, -0.04 * distance, 0.0), distance, DT, Some(0.0)))
         })
     };
     assert!(!found(0.3) && found(1.0));
@@ -67,7 +71,7 @@ fn convicted(distance: f32, reading: impl Fn(u32, &mut FlowMonitor) -> (f32, f32
         let (velocity, rate) = reading(*n, &mut monitor);
         // Not frozen.
         let counts = [rate * DT, if n % 2 == 0 { 0.002 } else { -0.002 }];
-        monitor.flow(counts, [0.0; 2], &Vec3::new(velocity, 0.0, 0.0), distance, DT, Some(0.0)) == Verdict::Implausible
+        is_lie(monitor.flow(counts, [0.0; 2], &Vec3::new(velocity, 0.0, 0.0), distance, DT, Some(0.0)))
     })
 }
 
@@ -117,7 +121,7 @@ fn an_offset_that_began_with_a_jump_is_not_believed_again_in_the_air() {
         monitor.predict(&Vec3::new(velocity - before, 0.0, 0.0), DT);
         let flow = Vec3::new(velocity + if n < 100 { 0.0 } else { 1.0 }, 0.0, 0.0);
         let counts = [flow.x * DT / 0.5, if n % 2 == 0 { 0.002 } else { -0.002 }];
-        convictions += u32::from(monitor.flow(counts, [0.0; 2], &flow, 0.5, DT, Some(0.0)) == Verdict::Implausible);
+        convictions += u32::from(is_lie(monitor.flow(counts, [0.0; 2], &flow, 0.5, DT, Some(0.0))));
         if !(100..130).contains(&n) {
             assert_eq!(monitor.is_implausible(), n >= 130, "reading {n}");
         }
@@ -158,8 +162,52 @@ fn vibration_adds_up_to_a_velocity_that_is_no_jump() {
             monitor.predict(&Vec3::zeros(), DT);
             let counts = [0.0, if n % 2 == 0 { 0.002 } else { -0.002 }];
             let velocity = Vec3::new(if n < 100 { 0.0 } else { 0.32 }, 0.0, 0.0);
-            monitor.flow(counts, [0.0; 2], &velocity, 0.17, DT, Some(shaken)) == Verdict::Implausible
+            is_lie(monitor.flow(counts, [0.0; 2], &velocity, 0.17, DT, Some(shaken)))
         })
     };
     assert!(found(0.0) && !found(57.0));
+}
+
+/// A vehicle that climbs to half a metre within a second and feels nothing: what is said of flow's velocity, a function of time and
+/// distance, and when, s.
+fn climbs(flow: impl Fn(f32, f32) -> f32) -> (FlowMonitor, Option<(f32, Verdict)>) {
+    let mut monitor = FlowMonitor::default();
+    (0..20).for_each(|_| monitor.stand([0.0; 2], DT));
+    for n in 1..=250u16 {
+        let time = f32::from(n) * DT;
+        let distance = (0.03 + 0.5 * time).min(0.5);
+        let velocity = Vec3::new(flow(time, distance), 0.0, 0.0);
+        let counts = [velocity.x / distance * DT, if n % 2 == 0 { 0.002 } else { -0.002 }];
+        monitor.predict(&Vec3::zeros(), DT);
+        let verdict = monitor.flow(counts, [0.0; 2], &velocity, distance, DT, Some(17.0));
+        if verdict != Verdict::Unchanged {
+            return (monitor, Some((time, verdict)));
+        }
+    }
+    (monitor, None)
+}
+
+/// It grows too slowly for any other comparison.
+#[test]
+fn an_offset_from_the_take_off_on_is_undone_from_there_and_not_believed_again_in_the_air() {
+    let (mut monitor, said) = climbs(|_, distance| 1.8 * distance);
+    let Some((when, Verdict::Implausible(lied))) = said else { panic!("{said:?}") };
+    assert!((0.8..2.0).contains(&when) && (lied - when).abs() < 0.02, "{lied} s after {when} s");
+    for n in 0..500 {
+        monitor.predict(&Vec3::new(if n % 200 < 100 { 0.02 } else { -0.02 }, 0.0, 0.0), DT);
+        let velocity = Vec3::new(0.9 + 0.02 * f32::from(100 - (n % 200 - 100i16).abs()), 0.0, 0.0);
+        monitor.flow([velocity.x * DT / 0.5, 0.001], [0.0; 2], &velocity, 0.5, DT, Some(17.0));
+        assert!(monitor.is_implausible(), "reading {n}");
+    }
+    monitor.stand([0.0; 2], DT);
+    assert!(!monitor.is_implausible());
+}
+
+#[test]
+fn a_gyro_that_shifts_as_the_vehicle_takes_off_does_not_convict_flow() {
+    let (monitor, said) = climbs(|time, distance| {
+        let age = (time - 0.1).max(0.0);
+        0.2 * (0.5 * GRAVITY * age * age - distance)
+    });
+    assert!(matches!(said, Some((_, Verdict::GyroShifted(_)))) && !monitor.is_implausible(), "{said:?}");
 }

@@ -1,0 +1,137 @@
+//! Is the vehicle higher than the filter believes, by the barometer and since it stood?
+//!
+//! A range that wraps below the height of a leg says for the whole of a take-off that the vehicle has hardly left the floor, and the
+//! controller pushes until it flies seven metres higher. Neither path nor observer look at the barometer that soon, because
+//! propellers that start change the pressure, and the more the nearer the floor is. But they only raise it: the barometer reads too
+//! low then, by half a metre and more. So one that reads higher than the filter believes is believed.
+//!
+//! For [`LASTS`] after the take-off, because weather changes the pressure as well. Not for a vehicle that is lower than the filter believes.
+
+/// For so long after the vehicle stood, s.
+const LASTS: f32 = 10.0;
+/// How much higher, m: what doors and gusts do to the pressure within seconds.
+const ABOVE: f32 = 0.5;
+/// Time constant with which the place where the vehicle stands is followed, s. Propellers that start do it before the vehicle rises, and
+/// what they do then has to count.
+const STANDS: f32 = 2.0;
+/// Time constant of the tracker, s: a reading is noisy by 0.1 m, and what climbs with full thrust gains 1 m/s in it.
+const TRACKS: f32 = 0.2;
+/// Time between two readings counts as this long at least, s.
+const SHORTEST: f32 = 0.005;
+/// No climb makes so much between two readings, m: the pressure has stepped, and says nothing until the vehicle stands again.
+const STEP: f32 = 0.35;
+
+/// What is remembered since the vehicle stood.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Rise {
+    /// How long ago that was, s; `None` for a vehicle that has not stood.
+    time: Option<f32>,
+    /// How far the altitude has risen above where the vehicle stood, m.
+    risen: f32,
+    /// The same tracked, m, and how fast it rises, m/s.
+    tracked: f32,
+    climb: f32,
+    /// By how much more than the filter's height, m.
+    above: f32,
+}
+
+impl Rise {
+    /// The altitude of a vehicle that stands has changed by this much within `dt` seconds.
+    pub(super) fn stand(&mut self, change: f32, dt: f32) {
+        if change > STEP {
+            *self = Self::default();
+            return;
+        }
+        let risen = (self.risen + change) * (STANDS / (STANDS + dt));
+        *self = Self { time: Some(0.0), risen, tracked: risen, ..Self::default() };
+    }
+
+    /// The altitude has changed by this much within `dt` seconds; the filter believes to be so high above where it stood.
+    pub(super) fn baro(&mut self, change: f32, height: f32, dt: f32) {
+        let Some(time) = &mut self.time else { return };
+        *time += dt;
+        if *time > LASTS || change > STEP {
+            *self = Self::default();
+            return;
+        }
+        self.risen += change;
+        // Both poles at one place, so that what climbs faster and faster is not followed too late.
+        let pole = TRACKS / (TRACKS + dt);
+        self.tracked += self.climb * dt;
+        let off = self.risen - self.tracked;
+        self.tracked += (1.0 - pole * pole) * off;
+        self.climb += (1.0 - pole) * (1.0 - pole) * off / dt.max(SHORTEST);
+        self.above = self.tracked - height;
+    }
+
+    /// If the vehicle is too much higher than the filter believes: by how much at least, m, and how fast it climbs, m/s.
+    pub(super) fn is_above(&self) -> Option<(f32, f32)> {
+        (self.above > ABOVE).then_some((self.above, self.climb))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f32 = 0.04;
+
+    /// Both as functions of the time since the take-off, s. When is the vehicle found to be too high?
+    fn found(altitude: impl Fn(f32) -> f32, height: impl Fn(f32) -> f32) -> Option<f32> {
+        let mut rise = Rise::default();
+        rise.stand(0.0, DT);
+        (1..500u16).map(|n| f32::from(n) * DT).find(|now| {
+            rise.baro(altitude(*now) - altitude(now - DT), height(*now), DT);
+            rise.is_above().is_some()
+        })
+    }
+
+    /// Propellers that start, and the floor below them.
+    fn wash(height: f32) -> f32 {
+        -0.2 - 0.4 * (1.0 - height / 0.5).clamp(0.0, 1.0)
+    }
+
+    #[test]
+    fn a_vehicle_that_climbs_while_the_filter_believes_it_stands_is_found() {
+        let climbs = |now: f32| 0.5 * now * now;
+        let when = found(|now| climbs(now) + wash(climbs(now)), |_| 0.02).expect("found");
+        assert!(climbs(when) < 0.9, "{} m", climbs(when));
+    }
+
+    #[test]
+    fn what_propellers_and_the_floor_do_to_the_pressure_is_no_rise() {
+        let climbs = |now: f32| (0.4 * now).min(0.8);
+        let starts = |now: f32| if now > 0.0 { climbs(now) + wash(climbs(now)) } else { 0.0 };
+        assert_eq!(found(starts, climbs), None, "though they start within a reading");
+        assert_eq!(found(|now| if now > 1.0 { 2.0 } else { 0.0 }, |_| 0.0), None, "nor a step");
+        let mut stepped = Rise::default();
+        stepped.stand(0.0, DT);
+        // Propellers have started within the same reading.
+        stepped.stand(2.4, DT);
+        (0..20).for_each(|_| stepped.baro(0.05, 0.0, DT));
+        assert_eq!(stepped.is_above(), None, "nor one on the ground");
+        assert_eq!(found(|_| 0.0, |now| 0.4 * now), None, "nor one that is lower");
+    }
+
+    #[test]
+    fn propellers_that_start_while_it_stands_are_no_rise_when_it_leaves_the_ground() {
+        let mut rise = Rise::default();
+        rise.stand(-0.6, DT);
+        (0..3).for_each(|_| rise.stand(0.0, DT));
+        let climbs = |n: u16| (0.02 * f32::from(n)).min(0.5);
+        for n in 1..100 {
+            let change = [n, n - 1].map(|n| climbs(n) + 0.8 * climbs(n));
+            rise.baro(change[0] - change[1], climbs(n), DT);
+            assert_eq!(rise.is_above(), None, "reading {n}");
+        }
+    }
+
+    #[test]
+    fn what_begins_later_is_left_to_others() {
+        assert_eq!(found(|now| 0.3 * (now - LASTS).max(0.0), |_| 0.0), None);
+        let mut rise = Rise::default();
+        (0..20).for_each(|_| rise.baro(0.2, 0.0, DT));
+        assert_eq!(rise.is_above(), None, "it has not stood");
+    }
+}
