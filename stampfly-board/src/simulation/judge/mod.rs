@@ -8,7 +8,7 @@
 //! | `refused` | the motors never turned |
 //! | `flown-away` | after the fault, 1 m above the highest commanded height, or 5 m beside the commanded path |
 //! | `kept-on` | the motors were on at the end |
-//! | `cut` | the motors stopped for good within 0.3 s of the fault, of a later one for which they are to stop, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
+//! | `cut` | the motors stopped for good within 0.3 s of the fault, of several one for which they are to stop, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s, or tilted by more than 20° with its motors on, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted, nor that a hand drops what has landed in it |
 //! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
@@ -361,9 +361,13 @@ impl Judge {
         }
     }
 
-    /// Are the motors to stop for this fault?
-    fn stops(&self, place: usize) -> bool {
-        self.injector.faults().nth(place).is_some_and(|fault| fault.expected() == Class::Cut)
+    /// Did the motors stop at once after a fault? Of several only those count for which they are to stop.
+    fn stopped_by_fault(&self, at: Instant) -> bool {
+        let alone = self.injector.faults().count() == 1;
+        self.injector.faults().enumerate().any(|(place, fault)| {
+            let since = self.injector.begins(place).filter(|since| *since <= at);
+            (alone || fault.expected() == Class::Cut) && since.is_some_and(|since| at.since(since) <= CUT)
+        })
     }
 
     /// Did the motors stop in a hand, when the mission asked to land? To be caught is a landing then.
@@ -389,11 +393,6 @@ impl Judge {
         let lies = !given_up
             && self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
         let crashed = lies || self.touches.iter().any(hard);
-        let soon = |at: Instant, begun: Instant| at >= begun && at.since(begun) <= CUT;
-        // A second fault may stop them only if it is one for which they are to stop.
-        let stops =
-            |place: usize| self.injector.begins(place).filter(|begins| begun == Some(*begins) || self.stops(place));
-        let at_once = |at: Instant| (0..self.injector.faults().count()).filter_map(stops).any(|begun| soon(at, begun));
         if !self.turned {
             Class::Refused
         } else if above > AWAY[0] || beside > AWAY[1] {
@@ -402,7 +401,7 @@ impl Judge {
             Class::KeptOn
         } else if self.stopped.is_some_and(|(at, height)| {
             let at_the_end = !self.stopped_early && height <= OFF_GROUND && !crashed;
-            !at_the_end && (at_once(at) || self.stopped_by_blow)
+            !at_the_end && (self.stopped_by_fault(at) || self.stopped_by_blow)
         }) {
             Class::Cut
         } else if crashed {
