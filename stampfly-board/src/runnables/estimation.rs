@@ -25,13 +25,17 @@ pub struct Estimation {
 
 impl Estimation {
     /// An estimation that waits for its calibration.
+    ///
+    /// Not inlined, and each filter is made where it stays: the stack has no room for copies of one beside all other runnables.
+    #[inline(never)]
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let estimator = match config.estimator {
-            EstimatorKind::Complementary => Choice::Complementary(Complementary::new(config.complementary)),
-            EstimatorKind::Eskf => Choice::Eskf(Eskf::new(config.eskf)),
-        };
-        Self { estimator, started: false }
+        match config.estimator {
+            EstimatorKind::Complementary => {
+                Self { estimator: Choice::Complementary(Complementary::new(config.complementary)), started: false }
+            }
+            EstimatorKind::Eskf => Self { estimator: Choice::Eskf(Eskf::new(config.eskf)), started: false },
+        }
     }
 }
 

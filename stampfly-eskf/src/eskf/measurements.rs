@@ -195,9 +195,10 @@ impl Eskf {
         let before = rotate(&self.state.rotation(), &self.force);
         let fusion = match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
             GateResult::Fuse => {
-                let unheld = self.command.flying;
-                let considered: &[usize] = if unheld { &VERTICAL } else { &[] };
-                let correction = self.covariance.update_considering(&innovation, considered);
+                let mut correction = self.covariance.update(&innovation);
+                if self.command.flying {
+                    self.covariance.consider(&innovation, VERTICAL, &mut correction);
+                }
                 self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
                 self.state.correct(&correction);
                 // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows

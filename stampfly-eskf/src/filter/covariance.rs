@@ -273,25 +273,29 @@ impl Covariance {
         self.update_with::<M, WHOLE_ROWS>(innovation)
     }
 
-    /// The same with states that are only considered (Schmidt, "Application of State-Space Methods to Navigation Problems", 1966): what
-    /// they may be wrong by counts in the innovation, and the measurement corrects neither them nor their covariance.
+    /// Takes an update back for states that are only considered (Schmidt, "Application of State-Space Methods to Navigation Problems",
+    /// 1966): what they may be wrong by has counted in the innovation, and the measurement corrects neither them nor their
+    /// covariance.
+    ///
+    /// Must follow [`Self::update`] with this innovation, which returned this correction, directly.
     #[inline]
-    pub fn update_considering<const M: usize>(&mut self, innovation: &Innovation<M>, considered: &[usize]) -> [f32; N] {
-        let mut correction = self.update(innovation);
-        for &i in considered {
+    pub fn consider<const M: usize, const K: usize>(
+        &mut self,
+        innovation: &Innovation<M>,
+        states: [usize; K],
+        correction: &mut [f32; N],
+    ) {
+        for i in states {
             for column in &innovation.gain {
-                let Some((row, of)) = self.rows.get_mut(i).zip(column.get(i)) else { continue };
-                for &j in considered {
-                    if let Some((cell, value)) = row.get_mut(j).zip(column.get(j)) {
-                        *cell += of * value;
-                    }
+                for j in states {
+                    self.rows[i][j] += column[i] * column[j];
                 }
             }
-            if let Some(cell) = correction.get_mut(i).filter(|cell| cell.is_finite()) {
-                *cell = 0.0;
+            // What is no number stays to be seen.
+            if correction[i].is_finite() {
+                correction[i] = 0.0;
             }
         }
-        correction
     }
 
     #[inline]
@@ -478,7 +482,9 @@ mod tests {
         let considered = [2, 5, 14];
         let h = [jacobian(&[(3, 0.9), (5, 0.4), (7, 1.0)]), jacobian(&[(4, 1.0), (5, -0.1), (6, -1.0)])];
         let (y, r) = ([0.3, -0.2], [0.01, 0.02]);
-        let correction = p.update_considering(&p.innovation(&h, y, r), &considered);
+        let innovation = p.innovation(&h, y, r);
+        let mut correction = p.update(&innovation);
+        p.consider(&innovation, considered, &mut correction);
 
         let exact = dense(&before);
         let h = SMatrix::<f64, 2, 15>::from_fn(|i, j| f64::from(h[i][j]));
@@ -495,7 +501,9 @@ mod tests {
             assert!((f64::from(*ours) - theirs).abs() < 1e-4, "{i}: {ours}, not {theirs}");
         }
         assert!(considered.iter().all(|i| correction[*i] == 0.0));
-        let broken = p.update_considering(&p.innovation(&[[f32::NAN; N]], [0.0], [1.0]), &considered);
+        let innovation = p.innovation(&[[f32::NAN; N]], [0.0], [1.0]);
+        let mut broken = p.update(&innovation);
+        p.consider(&innovation, considered, &mut broken);
         assert!(broken.iter().all(|value| value.is_nan()), "and is not hidden");
     }
 

@@ -17,7 +17,7 @@ pub use format::{Writer, tables};
 
 use crate::newest::MAX_MESSAGE;
 use crate::{Assembled, Observer};
-use format::{Entry, Header, Reader};
+use format::Entry;
 use heapless::Vec;
 use stampfly_bus::{Band, PublishWords, Schedule, Taps, TopicTable};
 use stampfly_log::FlightHash;
@@ -121,18 +121,7 @@ pub fn play<R: Schedule>(
     let (header, entries) = format::open::<R>(record)?;
     // Not taken apart by value: a second copy of a vehicle is more than some stacks have room for.
     let mut assembled = Assembled::<R>::new(bus, None, config, header.start);
-    fly(&mut assembled, &header, entries, tolerance, observer)
-}
-
-/// Feeds the entries to a vehicle. Not inlined: what its runnables need on the stack is not there yet while the vehicle is made.
-#[inline(never)]
-fn fly<R: Schedule>(
-    Assembled { flight_loop, outside, taps }: &mut Assembled<'_, R>,
-    header: &Header,
-    entries: Reader<'_>,
-    tolerance: f32,
-    observer: &mut impl PlayObserver,
-) -> Result<Report, GoldenError> {
+    let Assembled { flight_loop, outside, taps } = &mut assembled;
     let (mut hash, mut output) = (FlightHash::new(), Vec::<u32, MAX_MESSAGE>::new());
     let mut drain = |observer: &mut _, hash: &mut FlightHash, output: &mut Vec<u32, MAX_MESSAGE>| {
         taps.drain(&mut |topic, at, generation, words| {
