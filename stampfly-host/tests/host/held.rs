@@ -75,7 +75,7 @@ fn let_go(mode: FlightMode, on_ground: bool, [roll, pitch, yaw, push]: [f32; 4],
 #[test]
 fn held_for_a_minute_with_any_stick() {
     for (mode, least) in
-        [(FlightMode::PosHold, 2), (FlightMode::AltHold, 8), (FlightMode::Stabilize, 22), (FlightMode::Acro, 22)]
+        [(FlightMode::PosHold, 3), (FlightMode::AltHold, 8), (FlightMode::Stabilize, 22), (FlightMode::Acro, 22)]
     {
         let (mut worst, mut stopped, mut flown) = (0.0f32, 0, 0);
         for on_ground in [false, true] {

@@ -10,8 +10,8 @@ pub struct LandingConfig {
     pub airborne_rise: f32,
     /// Climb rate that counts as airborne, m/s.
     pub airborne_speed: f32,
-    /// Thrust that carries the weight, N. A tenth more of it counts as airborne where no range shows a rise. Infinite, as by default, it
-    /// never does: for a vehicle of which it is not known.
+    /// Thrust that carries the weight, N. A tenth more of it counts as airborne where no range shows a rise, and what needs only half of it
+    /// while it lands is carried by something else. Infinite, as by default, it says nothing: for a vehicle of which it is not known.
     pub hover_thrust: f32,
     /// Descent speed, m/s.
     pub descent: f32,

@@ -7,7 +7,7 @@
 //!
 //! The test costs height: with 40 % of the thrust missing, a vehicle in the air has gained 0.2 m/s after 60 ms.
 
-use stampfly_types::Instant;
+use stampfly_types::{GRAVITY, Instant};
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ const FALLS: f32 = 0.5;
 const STRUCK: f32 = 1.4;
 /// So much more specific force for its thrust has a vehicle that drag brakes; one that stands with little thrust has more.
 const CARRIED: f32 = 1.3;
-/// Shares of the thrust and of the specific force of the flight.
+/// Shares of the thrust and of the specific force of the flight, or of what carries the weight.
 const LITTLE_THRUST: f32 = 0.55;
 const ALL_FORCE: f32 = 0.9;
 /// A step that lasts longer is treated as this long, s.
@@ -104,14 +104,19 @@ pub struct WeightTest {
     quick: Pair,
     steady: Pair,
     before: Pair,
-    /// Both when the landing began.
+    /// Both when the landing began, and not less than in a hover.
     flight: Pair,
 }
 
 impl WeightTest {
-    /// A landing begins.
-    pub fn begin_landing(&mut self) {
+    /// A landing begins, of a vehicle whose weight this thrust carries, N; infinite when it is not known. One that something holds before it
+    /// lands has given its thrust to that already.
+    pub fn begin_landing(&mut self, hover_thrust: f32) {
         self.flight = self.steady;
+        if hover_thrust.is_finite() {
+            let Pair { force, thrust } = &mut self.flight;
+            (*force, *thrust) = (force.max(GRAVITY), thrust.max(hover_thrust));
+        }
     }
 
     /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
@@ -157,7 +162,6 @@ impl WeightTest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stampfly_types::GRAVITY;
 
     /// A take-off is given up a tenth of a second after its motors started: thrust went on rising when the test began.
     #[test]
@@ -231,7 +235,7 @@ mod tests {
             let gone = step.saturating_sub(second).min(second) as f32 / second as f32;
             let [thrust, force] = [(0.36, thrust), (GRAVITY, force)].map(|(from, to)| from + (to - from) * gone);
             if step == second {
-                test.begin_landing();
+                test.begin_landing(f32::INFINITY);
             }
             let (force, thrust) = broken.filter(|_| step == second / 4).unwrap_or((force, thrust));
             answers = Some(test.step(Instant::from_micros(micros * step), force, thrust, false));
@@ -256,6 +260,25 @@ mod tests {
         assert!(!is_carried(0.34, GRAVITY), "at its rate of descent");
         assert!(!is_carried(0.18, 0.5 * GRAVITY + 1.4), "it falls, with 1 m/s of drag");
         assert!(!is_carried(0.18, 0.5 * GRAVITY + 1.4 * 2.0), "with 2 m/s");
+    }
+
+    #[test]
+    fn what_a_hand_carried_before_the_landing_is_carried() {
+        let carried = |hover_thrust: f32, thrust: f32, force: f32| {
+            let mut test = WeightTest::default();
+            let mut answers = None;
+            for step in 0u64..800 {
+                if step == 400 {
+                    test.begin_landing(hover_thrust);
+                }
+                answers = Some(test.step(Instant::from_micros(2_500 * step), force, thrust, false));
+            }
+            answers.is_some_and(|answers| answers.is_carried)
+        };
+        assert!(carried(0.36, 0.15, GRAVITY));
+        assert!(!carried(f32::INFINITY, 0.15, GRAVITY), "nobody knows what carries it");
+        assert!(!carried(0.36, 0.25, GRAVITY), "a vehicle that is a third lighter than it is said to be flies");
+        assert!(!carried(0.36, 0.15, 0.42 * GRAVITY), "so does one that falls when it begins to land");
     }
 
     #[test]
