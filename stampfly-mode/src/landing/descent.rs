@@ -18,12 +18,12 @@
 
 use super::blind::BlindDescent;
 use super::seen::{Asked, Multicopter, Seen};
-use super::weight::Support;
+use super::weight::{ALL_FORCE, LITTLE_THRUST, Support};
 use crate::lasting::lasting;
 use crate::stage::{Limit, Mode, Stage, Step};
 use core::convert::Infallible;
 use stampfly_types::messages::GroundContact;
-use stampfly_types::{Duration, Instant};
+use stampfly_types::{Duration, GRAVITY, Instant};
 
 /// A vehicle that falls for this long while its ramp goes down is in the air, whatever its height says: from 6 cm it would
 /// be on the ground by then.
@@ -116,15 +116,26 @@ impl Landing {
         self.finish(now, seen, asked, landed)
     }
 
-    /// What the ground carries has landed, whatever the stage says.
+    /// What the ground or a hand carries has landed, whatever the stage says.
     fn finish(&mut self, now: Instant, seen: &Seen<'_>, mut asked: Asked, landed: bool) -> Step<Self> {
-        let carried = lasting(&mut self.carried, now, seen.weight.is_carried) >= CARRIED;
+        let carried = lasting(&mut self.carried, now, seen.weight.is_carried || is_held(seen)) >= CARRIED;
         asked.land_detected.landed = landed || carried;
         if asked.land_detected.landed {
             asked.land_detected.contact = GroundContact::Ground;
         }
         Step::Stay(asked)
     }
+}
+
+/// Does something hold the vehicle up, with so little thrust that it would fall? A hand that has it before the landing begins takes its
+/// thrust away before, so that there is no flight to compare with. Thrust that is known badly, for a battery that lies, carries a
+/// vehicle that sinks.
+fn is_held(seen: &Seen<'_>) -> bool {
+    let (weight, hover_thrust) = (seen.weight, seen.config.hover_thrust);
+    hover_thrust.is_finite()
+        && weight.thrust < LITTLE_THRUST * hover_thrust
+        && weight.force > ALL_FORCE * GRAVITY
+        && seen.sink_rate().is_some_and(|rate| rate.abs() < seen.config.still_speed)
 }
 
 /// At its height's speed: all of the descent above the flare height, slower below, slowest where nobody knows.

@@ -13,7 +13,7 @@
 //! | LANDING | landing | descend, flare, touchdown, blind |
 //!
 //! A vehicle whose specific force does not follow its thrust stands. So does one that has lost half of its thrust, in whatever
-//! way and however long ago, and none of its specific force. Neither height nor climb rate can make a vehicle in the air count as landed. One that
+//! way, and none of its specific force, and one that does not sink with half of the thrust that carries its weight. Neither height nor climb rate can make a vehicle in the air count as landed. One that
 //! falls although its height says that it stands gets its thrust back, and comes down blind, as one without height and climb
 //! rate does.
 
@@ -104,7 +104,7 @@ impl TakeoffLanding {
             self.is_testing = false;
             self.breaks_off = before == FlightPhase::TakeOff;
             if input.phase == FlightPhase::Landing {
-                self.weight.begin_landing(self.config.hover_thrust);
+                self.weight.begin_landing();
             }
         }
         let estimate = input.estimate;

@@ -391,6 +391,7 @@ fn blind(breaks_off: bool, quick: super::weight::Support, millis: &[u64]) -> (Ve
         is_carried: false,
         is_struck: false,
         thrust: 0.0,
+        force: 0.0,
     };
     let (mut shares, mut landed) = (vec![], None);
     for now in (0..20_000).step_by(5) {
@@ -501,6 +502,36 @@ fn without_a_range_more_thrust_than_its_weight_lifts_a_vehicle() {
         GroundContact::Ground,
         "of an unknown airframe"
     );
+}
+
+/// Lands at a metre with this thrust, N, specific force upwards, m/s², and climb rate down, m/s, as long before. Has it landed within two
+/// seconds?
+fn lands_in_a_hand(hover_thrust: f32, thrust: f32, force: f32, sink_rate: Option<f32>) -> bool {
+    let mut manager = TakeoffLanding::new(LandingConfig { hover_thrust, ..LandingConfig::default() });
+    let estimate = StateEstimate {
+        specific_force: Vec3::new(0.0, 0.0, -force),
+        valid: Validity::ALL.set(Validity::VELOCITY_Z, sink_rate.is_some()),
+        ..everything(1.0, -sink_rate.unwrap_or_default(), 0.0)
+    };
+    (0u64..1_600).any(|step| {
+        let phase = if step < 800 { FlightPhase::Flying } else { FlightPhase::Landing };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
+        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand };
+        manager.step(Instant::from_micros(2_500 * step), &input).landed
+    })
+}
+
+#[test]
+fn what_a_hand_carried_before_the_landing_is_carried() {
+    assert!(lands_in_a_hand(0.36, 0.15, GRAVITY, Some(0.0)));
+    assert!(!lands_in_a_hand(f32::INFINITY, 0.15, GRAVITY, Some(0.0)), "nobody knows what carries it");
+    assert!(!lands_in_a_hand(0.36, 0.25, GRAVITY, Some(0.0)), "a third lighter than it is said to be, it flies");
+    assert!(
+        !lands_in_a_hand(0.36, 0.15, GRAVITY, Some(0.2)),
+        "nor is one carried that sinks, whatever its battery says"
+    );
+    assert!(!lands_in_a_hand(0.36, 0.15, GRAVITY, None), "or may sink");
+    assert!(!lands_in_a_hand(0.36, 0.15, 0.42 * GRAVITY, Some(0.0)), "or falls");
 }
 
 #[test]
