@@ -117,6 +117,8 @@ impl Landing {
     }
 
     /// What the ground or a hand carries has landed, whatever the stage says.
+    // As above.
+    #[inline(never)]
     fn finish(&mut self, now: Instant, seen: &Seen<'_>, mut asked: Asked, landed: bool) -> Step<Self> {
         let carried = lasting(&mut self.carried, now, seen.weight.is_carried || is_held(seen)) >= CARRIED;
         asked.land_detected.landed = landed || carried;
