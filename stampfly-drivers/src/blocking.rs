@@ -91,7 +91,7 @@ impl<D: delay::DelayNs> asynchronous::delay::DelayNs for Blocking<D> {
 /// A [`Timebase`] of a blocking delay and a function that tells the time since power-on.
 ///
 /// ```
-/// # #[derive(Clone)] struct Delay;
+/// # struct Delay;
 /// # impl embedded_hal::delay::DelayNs for Delay { fn delay_ns(&mut self, _: u32) {} }
 /// use stampfly_drivers::{Timebase, blocking::BlockingClock};
 /// use stampfly_types::Instant;
@@ -123,7 +123,7 @@ impl<D: delay::DelayNs, F> asynchronous::delay::DelayNs for BlockingClock<D, F> 
     }
 }
 
-impl<D: delay::DelayNs + Clone, F: Fn() -> Instant + Clone> Timebase for BlockingClock<D, F> {
+impl<D: delay::DelayNs, F: Fn() -> Instant> Timebase for BlockingClock<D, F> {
     fn now(&self) -> Instant {
         (self.now)()
     }

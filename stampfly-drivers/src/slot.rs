@@ -147,7 +147,7 @@ enum Opening {
     AfterLead(Instant),
 }
 
-impl<T: Timebase> Slots<T> {
+impl<T: Timebase + Clone> Slots<T> {
     /// A bus whose lead has this rhythm.
     pub const fn new(clock: T, rhythm: Rhythm) -> Self {
         Self {
@@ -220,7 +220,8 @@ impl<T: Timebase> Slots<T> {
                         Poll::Pending
                     });
                     // Whichever comes first.
-                    let _ = within(&clock, latest.since(clock.now()), ended).await;
+                    let left = latest.since(clock.now());
+                    let _ = within(&mut clock, left, ended).await;
                 }
             }
         }
@@ -273,9 +274,9 @@ impl Drop for Turn<'_> {
 }
 
 /// The end of a lead's transfer, however it ended.
-struct Ended<'s, T: Timebase>(&'s Slots<T>);
+struct Ended<'s, T: Timebase + Clone>(&'s Slots<T>);
 
-impl<T: Timebase> Drop for Ended<'_, T> {
+impl<T: Timebase + Clone> Drop for Ended<'_, T> {
     fn drop(&mut self) {
         self.0.ended.set(self.0.clock.now());
         self.0.transfers.set(self.0.transfers.get().wrapping_add(1));
@@ -286,7 +287,7 @@ impl<D: ErrorType, T> ErrorType for Lead<'_, D, T> {
     type Error = D::Error;
 }
 
-impl<D: SpiDevice, T: Timebase> SpiDevice for Lead<'_, D, T> {
+impl<D: SpiDevice, T: Timebase + Clone> SpiDevice for Lead<'_, D, T> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), D::Error> {
         // Dropped in the opposite order: first the end is noted, then the guest is woken.
         let _turn = self.slots.lead().await;
@@ -299,10 +300,10 @@ impl<D: ErrorType, T> ErrorType for Guest<'_, D, T> {
     type Error = SlotError<D::Error>;
 }
 
-impl<D: SpiDevice, T: Timebase> SpiDevice for Guest<'_, D, T> {
+impl<D: SpiDevice, T: Timebase + Clone> SpiDevice for Guest<'_, D, T> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
         let _turn = self.slots.open(self.longest).await;
-        let outcome = within(&self.slots.clock, self.longest, self.device.transaction(operations)).await;
+        let outcome = within(&mut self.slots.clock.clone(), self.longest, self.device.transaction(operations)).await;
         outcome.ok_or(SlotError::TooLong)?.map_err(SlotError::Device)
     }
 }

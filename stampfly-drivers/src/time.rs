@@ -10,9 +10,18 @@ use stampfly_types::{Duration, Instant};
 ///
 /// Implemented by boards on a hardware timer and by the simulator on virtual time. Only drivers and the tasks
 /// that run them hold one; everything that computes is told the time instead.
-pub trait Timebase: DelayNs + Clone {
+///
+/// Each driver has its own, so that delays need not be `Clone`, as those of many boards are not. One that exists but once is lent
+/// to one driver after the other: `&mut T` is a time base as well.
+pub trait Timebase: DelayNs {
     /// Time since power-on.
     fn now(&self) -> Instant;
+}
+
+impl<T: Timebase> Timebase for &mut T {
+    fn now(&self) -> Instant {
+        T::now(self)
+    }
 }
 
 /// Waits until an instant; returns at once when it has passed.
@@ -26,9 +35,8 @@ pub async fn sleep_until<T: Timebase>(clock: &mut T, instant: Instant) {
 /// The outcome of a future, or `None` when it takes longer than `limit`; it is dropped then.
 ///
 /// The future is polled first, so one that never waits costs no timer.
-pub(crate) async fn within<T: Timebase, F: Future>(clock: &T, limit: Duration, future: F) -> Option<F::Output> {
-    let mut alarm = clock.clone();
-    let mut alarm = pin!(alarm.delay_us(u32::try_from(limit.as_micros()).unwrap_or(u32::MAX)));
+pub(crate) async fn within<T: Timebase, F: Future>(clock: &mut T, limit: Duration, future: F) -> Option<F::Output> {
+    let mut alarm = pin!(clock.delay_us(u32::try_from(limit.as_micros()).unwrap_or(u32::MAX)));
     let mut future = pin!(future);
     poll_fn(|context| {
         if let Poll::Ready(value) = future.as_mut().poll(context) {

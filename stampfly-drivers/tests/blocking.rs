@@ -13,7 +13,7 @@ thread_local! {
     static NOW: Cell<u64> = const { Cell::new(0) };
 }
 
-#[derive(Clone)]
+/// Like that of many a board it cannot be cloned.
 struct Delay;
 
 impl DelayNs for Delay {
@@ -34,7 +34,7 @@ impl ErrorType for Wire {
 impl I2c for Wire {
     fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), Infallible> {
         match operations {
-            [Operation::Write([0]), Operation::Write(data)] => self.configuration.copy_from_slice(data),
+            [Operation::Write([0, data @ ..])] => self.configuration.copy_from_slice(data),
             [Operation::Write([register]), Operation::Read(into)] => into.copy_from_slice(&match register {
                 0 => self.configuration,
                 0xFE => [0x54, 0x49],

@@ -29,6 +29,9 @@
 //!   the ground: samples are missing meanwhile.
 //!
 //! # What they expect of the board
+//! A register is written in one piece on I2C, whatever a bus does between the operations of a transaction: Linux and some controllers start
+//! again there. On SPI the chip select stays low for a whole transaction, as `SpiDevice` asks.
+//!
 //! On a shared SPI every chip select has to be high before the first transfer to any chip: one that floats low answers
 //! into its neighbour's data.
 //!

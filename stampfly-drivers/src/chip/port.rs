@@ -14,6 +14,8 @@ pub trait Registers<A = u8> {
     type Error: Debug;
     /// How long a transfer on these wires may take.
     const LIMIT: TransferLimit;
+    /// So many bytes may be written at once; even. What is longer is for the driver to divide.
+    const LONGEST_WRITE: usize;
 
     /// Reads registers from `register` on.
     ///
@@ -27,6 +29,11 @@ pub trait Registers<A = u8> {
     /// When the bus refuses.
     async fn write(&mut self, register: A, data: &[u8]) -> Result<(), Self::Error>;
 }
+
+/// Bytes of data in an I2C write: as many as Linux's SMBus calls and the buffers of small controllers hold.
+const I2C_WRITE: usize = 32;
+/// The same with a register of two bytes.
+const MESSAGE: usize = I2C_WRITE + 2;
 
 /// Registers behind an I2C address; addresses of two bytes go out high byte first.
 #[derive(Debug)]
@@ -46,15 +53,25 @@ impl<I: I2c> I2cRegisters<I> {
     }
 
     async fn write_after(&mut self, register: &[u8], data: &[u8]) -> Result<(), I::Error> {
-        // Two writes in one transaction go out without a second start: no buffer needed to join them.
-        let mut operations = [i2c::Operation::Write(register), i2c::Operation::Write(data)];
-        self.bus.transaction(self.address, &mut operations).await
+        // Register and data in one piece. Two writes in one transaction have to do as well, says embedded-hal; but Linux makes a message
+        // of each, and the start between them ends the first: the chip takes the data for an address
+        // (rust-embedded/linux-embedded-hal#82).
+        let mut message = [0; MESSAGE];
+        let (start, rest) = message.split_at_mut(register.len().min(MESSAGE));
+        start.copy_from_slice(register);
+        let Some(place) = rest.get_mut(..data.len()) else {
+            let mut operations = [i2c::Operation::Write(register), i2c::Operation::Write(data)];
+            return self.bus.transaction(self.address, &mut operations).await;
+        };
+        place.copy_from_slice(data);
+        self.bus.write(self.address, message.get(..register.len() + data.len()).unwrap_or_default()).await
     }
 }
 
 impl<I: I2c> Registers for I2cRegisters<I> {
     type Error = I::Error;
     const LIMIT: TransferLimit = TransferLimit::I2C;
+    const LONGEST_WRITE: usize = I2C_WRITE;
 
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), I::Error> {
         self.read_after(&[register], into).await
@@ -68,6 +85,7 @@ impl<I: I2c> Registers for I2cRegisters<I> {
 impl<I: I2c> Registers<u16> for I2cRegisters<I> {
     type Error = I::Error;
     const LIMIT: TransferLimit = TransferLimit::I2C;
+    const LONGEST_WRITE: usize = I2C_WRITE;
 
     async fn read(&mut self, register: u16, into: &mut [u8]) -> Result<(), I::Error> {
         self.read_after(&register.to_be_bytes(), into).await
@@ -86,6 +104,8 @@ pub struct SpiRegisters<S>(pub S);
 impl<S: SpiDevice> Registers for SpiRegisters<S> {
     type Error = S::Error;
     const LIMIT: TransferLimit = TransferLimit::SPI;
+    /// Small enough for the DMA buffers of small parts.
+    const LONGEST_WRITE: usize = 256;
 
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), S::Error> {
         // The dummy byte is clocked in while a second byte is clocked out.
@@ -114,7 +134,7 @@ impl<R, T: Timebase> Port<R, T> {
         R: Registers<A>,
     {
         let mut bytes = [0; N];
-        bounded(&self.clock, R::LIMIT.of(N), self.registers.read(register, &mut bytes)).await?;
+        bounded(&mut self.clock, R::LIMIT.of(N), self.registers.read(register, &mut bytes)).await?;
         Ok(bytes)
     }
 
@@ -134,7 +154,7 @@ impl<R, T: Timebase> Port<R, T> {
     where
         R: Registers<A>,
     {
-        bounded(&self.clock, R::LIMIT.of(data.len()), self.registers.write(register, data)).await
+        bounded(&mut self.clock, R::LIMIT.of(data.len()), self.registers.write(register, data)).await
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -147,8 +167,9 @@ impl<R, T: Timebase> Port<R, T> {
     }
 
     /// The outcome of a future, or `None` when it is not there at `instant`.
-    pub(crate) async fn until<F: Future>(&self, instant: Instant, future: F) -> Option<F::Output> {
-        within(&self.clock, instant.since(self.now()), future).await
+    pub(crate) async fn until<F: Future>(&mut self, instant: Instant, future: F) -> Option<F::Output> {
+        let left = instant.since(self.now());
+        within(&mut self.clock, left, future).await
     }
 
     pub(crate) async fn wait_until(&mut self, instant: Instant) {
@@ -165,7 +186,7 @@ impl<I, T> Port<I2cRegisters<I>, T> {
 
 /// A transfer, given up after `limit`.
 pub(crate) async fn bounded<T: Timebase, V, E>(
-    clock: &T,
+    clock: &mut T,
     limit: Duration,
     transfer: impl Future<Output = Result<V, E>>,
 ) -> Result<V, ChipError<E>> {

@@ -33,11 +33,14 @@ struct Chip {
     /// The flow sensor's bank of registers, 128 of them.
     bank: u16,
     awake: Rc<Cell<bool>>,
+    /// Registers have addresses of two bytes.
+    is_wide: bool,
 }
 
 impl Chip {
     fn new(content: &[(u16, &[u8])]) -> Self {
-        let mut chip = Self { memory: [0; 4096], bank: 0, pieces: Vec::new(), awake: Rc::new(Cell::new(true)) };
+        let is_wide = content.iter().any(|(register, _)| *register > 0xFF);
+        let mut chip = Self { memory: [0; 4096], bank: 0, pieces: Vec::new(), awake: Rc::new(Cell::new(true)), is_wide };
         for (register, data) in content {
             chip.store(*register, data);
         }
@@ -65,17 +68,21 @@ impl I2c for Chip {
         if !self.awake.get() {
             return Err(i2c::ErrorKind::NoAcknowledge(i2c::NoAcknowledgeSource::Address));
         }
-        let [i2c::Operation::Write(address), data] = operations else { panic!("not a register access") };
-        let register = address.iter().fold(0, |number, byte| number << 8 | u16::from(*byte));
-        match data {
-            i2c::Operation::Read(into) => {
+        let number = |address: &[u8]| address.iter().fold(0, |number, byte| number << 8 | u16::from(*byte));
+        match operations {
+            [i2c::Operation::Write(address), i2c::Operation::Read(into)] => {
+                let register = number(address);
                 self.load(register, into);
                 // A range finder numbers its results.
                 if let Some((_, result)) = self.pieces.iter_mut().find(|piece| piece.0 == 0x89 && register == 0x89) {
                     result[2] = result[2].wrapping_add(1);
                 }
             }
-            i2c::Operation::Write(data) => self.store(register, data),
+            [i2c::Operation::Write(message)] => {
+                let (address, data) = message.split_at(if self.is_wide { 2 } else { 1 });
+                self.store(number(address), data);
+            }
+            _ => panic!("not a register access"),
         }
         Ok(())
     }

@@ -96,9 +96,7 @@ impl<F: FnMut(Access<'_>) -> Result<(), Fault>> i2c::I2c for I2cBus<F> {
             [i2c::Operation::Write([register]), i2c::Operation::Read(into)] => {
                 (self.chip)(Access::Read(*register, into))
             }
-            [i2c::Operation::Write([register]), i2c::Operation::Write(data)] => {
-                (self.chip)(Access::Write(*register, data))
-            }
+            [i2c::Operation::Write([register, data @ ..])] => (self.chip)(Access::Write(*register, data)),
             other => panic!("not a register access: {other:?}"),
         };
         finish(&self.clock, outcome).await

@@ -151,16 +151,19 @@ impl I2c for Bus {
         assert!(answering.len() < 2, "two chips answer at {address:#04x}");
         for chip in answering {
             let mut chip = chip.borrow_mut();
-            let [Operation::Write([high, low]), data] = operations else { panic!("not a register access") };
+            let [Operation::Write([high, low, written @ ..]), read @ ..] = operations else {
+                panic!("not a register access")
+            };
             let register = u16::from_be_bytes([*high, *low]);
             outcome = match chip.faults.iter().position(|fault| fault.0 == register) {
                 Some(position) => Err(chip.faults.remove(position).1),
                 None => Ok(()),
             };
-            match data {
+            match read {
                 _ if outcome.is_err() => {}
-                Operation::Read(into) => chip.read(register, into),
-                Operation::Write(data) => chip.write(register, data),
+                [Operation::Read(into)] => chip.read(register, into),
+                [] => chip.write(register, written),
+                other => panic!("not a register access: {other:?}"),
             }
         }
         finish(&self.0, outcome).await

@@ -42,6 +42,8 @@ struct State {
     /// Clock pulses until the data line is free.
     held: Cell<u8>,
     noise: RefCell<Noise>,
+    /// Every operation begins with a start.
+    restarts: Cell<bool>,
 }
 
 /// A handle to the bus. Clones are the same bus; each may belong to another driver.
@@ -81,7 +83,14 @@ impl I2cBus {
             busy_until: Cell::new(clock.now()),
             held: Cell::new(0),
             noise: RefCell::new(Noise::new(seed, STREAM)),
+            restarts: Cell::new(false),
         }))
+    }
+
+    /// From now on a start comes before every operation, also between two of one direction, which embedded-hal asks to be joined. Linux
+    /// makes a message of each operation, and so do some other controllers' drivers.
+    pub fn restart_between_operations(&self) {
+        self.0.restarts.set(true);
     }
 
     /// Solders a chip to the bus at a 7-bit address. Where several have the same, all of them take what is written, and
@@ -131,11 +140,24 @@ impl I2cBus {
         let (bits, stretch, outcome) = match self.stretch(address) {
             _ if !self.sda_is_high() => (1, Duration::ZERO, Err(BusError::ArbitrationLost)),
             None => (2 + BYTE, Duration::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
-            Some(stretch) => (length(operations), stretch, Ok(())),
+            Some(stretch) => (self.length(operations), stretch, Ok(())),
         };
         let end = start + Duration::from_micros((bits * BIT).div_ceil(1_000)) + stretch;
         self.0.busy_until.set(end);
         (start, end, outcome)
+    }
+
+    /// Bits of a whole transfer: a start and the address at every change of direction, or before every operation, the bytes, and the stop.
+    fn length(&self, operations: &[Operation<'_>]) -> u64 {
+        let mut before = None;
+        operations.iter().fold(1, |bits, operation| {
+            let (direction, bytes) = match operation {
+                Operation::Read(bytes) => (Some(true), bytes.len()),
+                Operation::Write(bytes) => (Some(false), bytes.len()),
+            };
+            let starts = core::mem::replace(&mut before, direction) != direction || self.0.restarts.get();
+            bits + BYTE * bytes as u64 + if starts { 1 + BYTE } else { 0 }
+        })
     }
 
     /// Exchanges the bytes of a transfer that began at `start`.
@@ -151,7 +173,7 @@ impl I2cBus {
         let (mut bits, mut index, mut before) = (0, 0, None);
         for operation in operations {
             let direction = Some(matches!(operation, Operation::Read(_)));
-            if core::mem::replace(&mut before, direction) != direction {
+            if core::mem::replace(&mut before, direction) != direction || self.0.restarts.get() {
                 bits += 1 + BYTE;
                 index = 0;
             }
@@ -187,19 +209,6 @@ impl I2cBus {
         }
         Ok(())
     }
-}
-
-/// Bits of a whole transfer: a start and the address at every change of direction, the bytes, and the stop.
-fn length(operations: &[Operation<'_>]) -> u64 {
-    let mut before = None;
-    operations.iter().fold(1, |bits, operation| {
-        let (direction, bytes) = match operation {
-            Operation::Read(bytes) => (Some(true), bytes.len()),
-            Operation::Write(bytes) => (Some(false), bytes.len()),
-        };
-        let turn = core::mem::replace(&mut before, direction) != direction;
-        bits + BYTE * bytes as u64 + if turn { 1 + BYTE } else { 0 }
-    })
 }
 
 impl ErrorType for I2cBus {

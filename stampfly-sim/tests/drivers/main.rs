@@ -9,6 +9,7 @@ mod bmp280;
 #[path = "../chips/compensation.rs"]
 mod compensation;
 mod ina3221;
+mod linux;
 mod mounting;
 mod neighbours;
 #[path = "../hover/pilot.rs"]

@@ -25,8 +25,6 @@ pub use interrupt::NoPin;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
-/// Configuration data in one transfer. Even, and small enough for the DMA buffers of small parts.
-const CHUNK: usize = 256;
 /// The chip may be accessed this long after power-on and after leaving power saving (§4 "Start-up").
 const POWER_UP: Duration = Duration::from_micros(450);
 /// Idle time after a write in normal mode, "Interface" and timing tables of the data sheet.
@@ -284,8 +282,8 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.write(register::PWR_CONF, &[0]).await?;
         self.port.wait(POWER_UP).await;
         self.write(register::INIT_CTRL, &[0]).await?;
-        for (number, chunk) in self.blob.chunks(CHUNK).enumerate() {
-            self.write(register::INIT_ADDR_0, &codec::init_address(number * CHUNK)).await?;
+        for (number, chunk) in self.blob.chunks(R::LONGEST_WRITE).enumerate() {
+            self.write(register::INIT_ADDR_0, &codec::init_address(number * R::LONGEST_WRITE)).await?;
             self.write(register::INIT_DATA, chunk).await?;
         }
         self.write(register::INIT_CTRL, &[1]).await?;

@@ -282,7 +282,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             Operation::DelayNs(ADDRESS_TO_DATA),
             Operation::Read(&mut bytes),
         ];
-        bounded(&self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
         if let Some(motion) = Motion::decode(&bytes) {
             return Ok(motion);
         }
@@ -295,7 +295,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         let mut bytes = [0];
         let mut operations =
             [Operation::Write(&[register]), Operation::DelayNs(ADDRESS_TO_DATA), Operation::Read(&mut bytes)];
-        bounded(&self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
         self.wait(AFTER_READ).await;
         let [value] = bytes;
         Ok(value)
@@ -309,7 +309,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
 
     async fn write(&mut self, register: u8, value: u8) -> Result<(), ChipError<S::Error>> {
         let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(WRITE_HOLD)];
-        bounded(&self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
         self.wait(AFTER_WRITE).await;
         Ok(())
     }
