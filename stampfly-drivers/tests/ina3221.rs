@@ -6,7 +6,7 @@ use common::{Access, AnyChip, Clock, Fault, I2cBus, cancel};
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::ina3221::{Config, Ina3221};
 use stampfly_drivers::chip::{ChipError, I2cRegisters};
-use stampfly_drivers::{PowerMonitor, Timebase};
+use stampfly_drivers::{PowerMonitor, Sample, Timebase};
 use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -109,9 +109,43 @@ fn both_identifications_are_checked_and_an_impossible_shunt_is_refused() {
         assert_eq!(block_on(battery.next()), Err(ChipError::Identification { found }));
     }
     for shunt_ohms in [0.0, -0.01, f32::NAN, f32::INFINITY] {
-        let (_, _, mut battery) = bench(Config { shunt_ohms, ..Config::default() });
+        let (_, _, mut battery) =
+            bench(Config { shunts_ohms: [Some(shunt_ohms), Some(0.01), None], ..Config::default() });
         assert_eq!(block_on(battery.next()), Err(ChipError::InvalidConfiguration));
     }
+    let (_, _, mut battery) = bench(Config { shunts_ohms: [Some(0.1), None, None], ..Config::default() });
+    assert_eq!(block_on(battery.next()), Err(ChipError::InvalidConfiguration), "none on the battery's channel");
+}
+
+#[test]
+fn three_supplies_are_measured_in_one_cycle() {
+    let (_, chip, mut monitor) = bench(Config { shunts_ohms: [Some(0.1), Some(0.01), None], ..Config::default() });
+    chip.borrow_mut().cycle *= 2;
+    // 0.05 A over 100 mΩ: 125 counts; 5.0 V: 625 counts.
+    (chip.borrow_mut().registers[1], chip.borrow_mut().registers[2]) = (125 << 3, 625 << 3);
+    let mut before = block_on(monitor.next_of_all()).expect("a sample").at;
+    for _ in 0..20 {
+        let Sample { at, data } = block_on(monitor.next_of_all()).expect("a sample");
+        let [Some(first), Some(battery), None] = data else { panic!("{data:?}") };
+        assert!((first.current - 0.05).abs() < 1e-6 && (first.voltage - 5.0).abs() < 1e-5, "{first:?}");
+        assert!((battery.current - 2.0).abs() < 1e-5 && (battery.voltage - 3.8).abs() < 1e-5, "{battery:?}");
+        assert!(at.since(before).as_micros().abs_diff(chip.borrow().cycle) <= 2_200);
+        before = at;
+    }
+    assert_eq!(chip.borrow().registers[0], 0x66DF, "channels 1 and 2");
+    let battery = block_on(monitor.next()).expect("the next result").data;
+    assert!((battery.power - 7.6).abs() < 1e-4, "{battery:?}");
+}
+
+#[test]
+fn what_a_driver_is_made_of_is_given_back() {
+    let (clock, chip, mut battery) = bench(Config::default());
+    let before = block_on(battery.next()).expect("a sample").at;
+    let (bus, its_clock) = battery.release();
+    assert_eq!(its_clock.now(), clock.now());
+    let mut again = Ina3221::new(bus, Ina3221::A0_GROUND, its_clock, Config::default());
+    assert!(block_on(again.next()).expect("a sample").at > before);
+    assert_eq!(chip.borrow().registers[0], 0x26DF);
 }
 
 #[test]

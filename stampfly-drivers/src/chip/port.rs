@@ -48,6 +48,10 @@ impl<I: I2c> I2cRegisters<I> {
         Self { bus, address }
     }
 
+    pub(crate) fn release(self) -> I {
+        self.bus
+    }
+
     async fn read_after(&mut self, register: &[u8], into: &mut [u8]) -> Result<(), I::Error> {
         self.bus.write_read(self.address, register, into).await
     }
@@ -127,6 +131,10 @@ pub(crate) struct Port<R, T> {
 impl<R, T: Timebase> Port<R, T> {
     pub(crate) const fn new(registers: R, clock: T) -> Self {
         Self { registers, clock }
+    }
+
+    pub(crate) fn release(self) -> (R, T) {
+        (self.registers, self.clock)
     }
 
     pub(crate) async fn read<A, const N: usize>(&mut self, register: A) -> Result<[u8; N], ChipError<R::Error>>

@@ -31,7 +31,8 @@ fn the_chip_is_told_what_the_configuration_says() {
         (Channel::Two, Average::A16, ConversionTime::Us4156, 0x25B7),
         (Channel::Three, Average::A1024, ConversionTime::Us8244, 0x1FFF),
     ] {
-        let (simulation, attached, mut driver) = bench(Config { channel, average, time, ..Config::default() });
+        let shunts_ohms = Channel::ALL.map(|measured| (measured == channel).then_some(0.01));
+        let (simulation, attached, mut driver) = bench(Config { channel, shunts_ohms, average, time });
         assert_eq!(block_on(&simulation.clock, driver.start()), Ok(()));
         assert_eq!(attached.peek(0), word, "{channel:?} {average:?} {time:?}");
     }

@@ -31,6 +31,12 @@ impl Interrupt<NoPin> {
     }
 }
 
+impl<P> Interrupt<P> {
+    pub(super) fn release(self) -> Option<P> {
+        self.pin
+    }
+}
+
 impl<P: Wait> Interrupt<P> {
     pub(super) const fn on(pin: P) -> Self {
         Self { pin: Some(pin), wrong: 0, raised: false }

@@ -122,6 +122,22 @@ impl<'b, I: I2c, T: Timebase> Bmi270<'b, I2cRegisters<I>, T> {
     }
 }
 
+impl<S: SpiDevice, T: Timebase, P> Bmi270<'_, SpiRegisters<S>, T, P> {
+    /// Takes the driver apart: the device, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
+    pub fn release(self) -> (S, T, Option<P>) {
+        let (SpiRegisters(device), clock) = self.port.release();
+        (device, clock, self.interrupt.release())
+    }
+}
+
+impl<I: I2c, T: Timebase, P> Bmi270<'_, I2cRegisters<I>, T, P> {
+    /// Takes the driver apart: the bus, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
+    pub fn release(self) -> (I, T, Option<P>) {
+        let (registers, clock) = self.port.release();
+        (registers.release(), clock, self.interrupt.release())
+    }
+}
+
 impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
     fn new(registers: R, clock: T, blob: &'b [u8], axes: AxisMap, config: Config) -> Self {
         Self {

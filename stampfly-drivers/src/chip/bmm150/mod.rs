@@ -70,6 +70,12 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
         Self { port, axes, config, trim: None, due: Instant::ZERO }
     }
 
+    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+    pub fn release(self) -> (I, T) {
+        let (registers, clock) = self.port.release();
+        (registers.release(), clock)
+    }
+
     /// Sets the chip up: power, reset, identification, trim, repetitions, rate. 7 ms.
     ///
     /// # Errors

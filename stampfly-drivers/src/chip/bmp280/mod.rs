@@ -78,6 +78,12 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
         Self { port, config, calibration: None, due: Instant::ZERO }
     }
 
+    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+    pub fn release(self) -> (I, T) {
+        let (registers, clock) = self.port.release();
+        (registers.release(), clock)
+    }
+
     /// Sets the chip up: reset, identification, calibration, filter. A few milliseconds.
     ///
     /// # Errors

@@ -79,17 +79,27 @@ impl ConversionTime {
     }
 }
 
-/// CONFIGURATION: one channel only, the same time for shunt and bus.
+/// CONFIGURATION: the channels that have a shunt, the same time for shunt and bus.
 #[must_use]
 pub const fn configuration(config: &Config) -> u16 {
     let time = config.time as u16;
-    (0x4000 >> config.channel as u16) | (config.average as u16) << 9 | time << 6 | time << 3 | CONTINUOUS
+    let [one, two, three] = enabled(config);
+    let channels = one << 14 | two << 13 | three << 12;
+    channels | (config.average as u16) << 9 | time << 6 | time << 3 | CONTINUOUS
 }
 
-/// From one result to the next.
+/// Is each channel measured? One or zero.
+const fn enabled(config: &Config) -> [u16; 3] {
+    let [one, two, three] = config.shunts_ohms;
+    [one.is_some() as u16, two.is_some() as u16, three.is_some() as u16]
+}
+
+/// From one result to the next: shunt and bus of one channel after the other.
 #[must_use]
 pub const fn cycle(config: &Config) -> Duration {
-    Duration::from_micros(2 * config.average.conversions() * config.time.micros())
+    let [one, two, three] = enabled(config);
+    let channels = (one + two + three) as u64;
+    Duration::from_micros(channels * 2 * config.average.conversions() * config.time.micros())
 }
 
 /// Voltage over the shunt, V: 13 bits, left-justified, 40 µV each, §8.6.2.
@@ -130,8 +140,11 @@ mod tests {
         // Reset value 0x7127: three channels, no average, 1.1 ms, continuous.
         let config = Config { average: Average::A1, time: ConversionTime::Us1100, ..Config::default() };
         assert_eq!(configuration(&config), 0x2127, "channel 2 only");
-        assert_eq!(configuration(&Config { channel: Channel::One, ..config }), 0x4127);
-        assert_eq!(configuration(&Config { channel: Channel::Three, ..config }), 0x1127);
+        let shunt = Some(0.01);
+        for (shunts_ohms, word) in [([shunt, None, None], 0x4127), ([None, None, shunt], 0x1127), ([shunt; 3], 0x7127)]
+        {
+            assert_eq!(configuration(&Config { shunts_ohms, ..config }), word);
+        }
         assert_eq!(configuration(&Config { average: Average::A1024, ..config }), 0x2F27);
         assert_eq!((Channel::Two.shunt_register(), Channel::Two.bus_register()), (3, 4));
     }
@@ -151,5 +164,7 @@ mod tests {
         let cycle = cycle(&Config::default());
         assert_eq!(cycle, Duration::from_micros(2 * 64 * 588));
         assert!(cycle < Duration::from_millis(100));
+        let all = Config { shunts_ohms: [Some(0.1); 3], ..Config::default() };
+        assert_eq!(super::cycle(&all), cycle * 3, "one channel after the other");
     }
 }

@@ -1,23 +1,41 @@
-//! What an INA3221 and its driver are told: channel, shunt, averages. How the registers say it is in
+//! What an INA3221 and its driver are told: channels, shunts, averages. How the registers say it is in
 //! [`codec`](super::codec).
 
 /// What the chip and the driver are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Where the shunt is.
+    /// The channel of [`PowerMonitor::next`](crate::PowerMonitor::next), and of the self test: the battery's.
     pub channel: Channel,
-    /// Resistance of the shunt, Ω.
-    pub shunt_ohms: f32,
-    /// Conversions in a sample.
+    /// Resistance of each channel's shunt, Ω; `None` for one that is not measured. Each that is makes a sample take longer.
+    pub shunts_ohms: [Option<f32>; 3],
+    /// Conversions in a sample, of each channel.
     pub average: Average,
     /// Time of one conversion, of shunt and bus alike.
     pub time: ConversionTime,
 }
 
+impl Config {
+    /// Resistance of a channel's shunt, Ω, if it is measured.
+    #[must_use]
+    pub const fn shunt(&self, channel: Channel) -> Option<f32> {
+        let [one, two, three] = self.shunts_ohms;
+        match channel {
+            Channel::One => one,
+            Channel::Two => two,
+            Channel::Three => three,
+        }
+    }
+}
+
 impl Default for Config {
     /// The StampFly's: 0.01 Ω on channel 2 (R12 of its schematic); 64 times 588 µs, a sample every 75 ms.
     fn default() -> Self {
-        Self { channel: Channel::Two, shunt_ohms: 0.01, average: Average::A64, time: ConversionTime::Us588 }
+        Self {
+            channel: Channel::Two,
+            shunts_ohms: [None, Some(0.01), None],
+            average: Average::A64,
+            time: ConversionTime::Us588,
+        }
     }
 }
 
@@ -28,6 +46,11 @@ pub enum Channel {
     One,
     Two,
     Three,
+}
+
+impl Channel {
+    /// In the chip's order.
+    pub const ALL: [Self; 3] = [Self::One, Self::Two, Self::Three];
 }
 
 /// Conversions averaged into one.

@@ -1,4 +1,6 @@
-//! The INA3221, a monitor of up to three supplies by Texas Instruments, here of one: the battery.
+//! The INA3221, a monitor of up to three supplies by Texas Instruments.
+//!
+//! As a [`PowerMonitor`] it measures one of them, the battery; [`Ina3221::next_of_all`] gives every channel that has a shunt.
 //!
 //! The chip averages by itself without a gap, so the samples' mean is the mean current. Use it for state of charge and
 //! for the voltage the motors see. Not as an over-current cut-off: a sample is tens of milliseconds old.
@@ -69,10 +71,12 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
     /// Sets the chip up: identification, reset, configuration. A millisecond.
     ///
     /// # Errors
-    /// Another chip, a shunt that cannot be, the bus.
+    /// Another chip, a shunt that cannot be or none on [`Config::channel`], the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
         self.running = false;
-        if !(self.config.shunt_ohms.is_finite() && self.config.shunt_ohms > 0.0) {
+        let can_be = |ohms: f32| ohms.is_finite() && ohms > 0.0;
+        let measured = self.config.shunt(self.config.channel).is_some();
+        if !(measured && self.config.shunts_ohms.into_iter().flatten().all(can_be)) {
             return Err(ChipError::InvalidConfiguration);
         }
         for (register, value) in
@@ -91,8 +95,8 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         Ok(())
     }
 
-    /// Sets the chip up, has it keep its settings and make one conversion, whatever the average. 6 ms, within 0.2 s
-    /// however slow the bus.
+    /// Sets the chip up, has it keep its settings and make one conversion, whatever the average. 6 ms, 2.2 ms more for
+    /// every further channel, within 0.2 s however slow the bus.
     ///
     /// The chip has no self test of its own: this one asks whether there is a supply on the configured channel, and whether
     /// the shunt's voltage can be measured. 0 V do not pass: no battery, another channel's shunt and a dead converter look
@@ -122,6 +126,35 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         if codec::is_measurable(shunt, bus) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
+    /// The next result of every channel that has a shunt, in the chip's order. A result that this has given does not come from
+    /// [`next`](PowerMonitor::next) as well, and the other way round.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start) and [`next`](PowerMonitor::next).
+    pub async fn next_of_all(&mut self) -> Result<Sample<[Option<PowerData>; 3]>, ChipError<I::Error>> {
+        let at = self.ready().await?;
+        let mut data = [None; 3];
+        for (place, channel) in data.iter_mut().zip(Channel::ALL) {
+            if let Some(ohms) = self.config.shunt(channel) {
+                *place = Some(self.measured(channel, ohms).await?);
+            }
+        }
+        Ok(Sample { at, data })
+    }
+
+    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+    pub fn release(self) -> (I, T) {
+        let (registers, clock) = self.port.release();
+        (registers.release(), clock)
+    }
+
+    /// What the registers of a channel hold.
+    async fn measured(&mut self, channel: Channel, shunt_ohms: f32) -> Result<PowerData, ChipError<I::Error>> {
+        let current = codec::shunt_volts(self.read(channel.shunt_register()).await?) / shunt_ohms;
+        let voltage = codec::bus_volts(self.read(channel.bus_register()).await?);
+        Ok(PowerData { voltage, current, power: voltage * current })
+    }
+
     /// Refuses a chip that does not hold this configuration.
     async fn keeps(&mut self, config: &Config) -> Result<(), ChipError<I::Error>> {
         let kept = self.read(register::CONFIGURATION).await?;
@@ -137,8 +170,11 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         self.port.write(register::CONFIGURATION, &configuration.to_be_bytes()).await
     }
 
-    /// Waits for the flag that a result is there, and gives the instant it was seen.
+    /// Starts the chip if it does not run, waits for the flag that a result is there, and gives the middle of its average.
     async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
+        if !self.running {
+            self.start().await?;
+        }
         let cycle = codec::cycle(&self.config);
         let asked = self.port.now();
         let deadline = asked + cycle + cycle;
@@ -155,7 +191,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
             if flags & codec::CONVERSION_READY != 0 && !stale {
                 // A little early: the chip's clock may be fast by a few per cent.
                 self.due = now + cycle - cycle / 16;
-                return Ok(now);
+                return Ok(now - cycle / 2);
             }
             stale = false;
             if now > deadline {
@@ -171,14 +207,10 @@ impl<I: I2c, T: Timebase> PowerMonitor for Ina3221<I2cRegisters<I>, T> {
     type Error = ChipError<I::Error>;
 
     async fn next(&mut self) -> Result<Sample<PowerData>, Self::Error> {
-        if !self.running {
-            self.start().await?;
-        }
-        let seen = self.ready().await?;
-        let current =
-            codec::shunt_volts(self.read(self.config.channel.shunt_register()).await?) / self.config.shunt_ohms;
-        let voltage = codec::bus_volts(self.read(self.config.channel.bus_register()).await?);
-        let at = seen - codec::cycle(&self.config) / 2;
-        Ok(Sample { at, data: PowerData { voltage, current, power: voltage * current } })
+        let at = self.ready().await?;
+        let channel = self.config.channel;
+        // The start refuses a channel without a shunt.
+        let shunt = self.config.shunt(channel).ok_or(ChipError::InvalidConfiguration)?;
+        Ok(Sample { at, data: self.measured(channel, shunt).await? })
     }
 }

@@ -122,6 +122,11 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         }
     }
 
+    /// Takes the driver apart: the device and the clock. The chip goes on counting.
+    pub fn release(self) -> (S, T) {
+        (self.device, self.clock)
+    }
+
     /// Sets the chip up: reset, both identifications, calibration, performance registers, which it reads back. About
     /// 75 ms, twice that when something reads back otherwise.
     ///

@@ -11,7 +11,8 @@ use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::Duration;
 
 fn monitor_of(channel: Channel, spoil: Spoil) -> Bench<Ina3221<I2cRegisters<Spoilt<I2cBus>>, Clock>> {
-    let (simulation, config) = (standing(), Config { channel, ..Default::default() });
+    let shunts_ohms = Channel::ALL.map(|measured| (measured == channel).then_some(0.01));
+    let (simulation, config) = (standing(), Config { channel, shunts_ohms, ..Default::default() });
     let clock = simulation.clock.clone();
     let bus = I2cBus::new(&clock, 1);
     let attached = bus.attach(Ina3221::A0_GROUND, chips::Ina3221::new(&simulation.world, &clock, 1));
