@@ -285,15 +285,19 @@ impl Covariance {
         states: [usize; K],
         correction: &mut [f32; N],
     ) {
+        // Checked, and free where the states are constants: they are inlined.
         for i in states {
             for column in &innovation.gain {
+                let Some((row, of)) = self.rows.get_mut(i).zip(column.get(i)) else { continue };
                 for j in states {
-                    self.rows[i][j] += column[i] * column[j];
+                    if let Some((cell, value)) = row.get_mut(j).zip(column.get(j)) {
+                        *cell += of * value;
+                    }
                 }
             }
             // What is no number stays to be seen.
-            if correction[i].is_finite() {
-                correction[i] = 0.0;
+            if let Some(cell) = correction.get_mut(i).filter(|cell| cell.is_finite()) {
+                *cell = 0.0;
             }
         }
     }
