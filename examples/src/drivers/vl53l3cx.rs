@@ -36,7 +36,7 @@ pub struct Found {
 ///
 /// # Errors
 /// Those of [`Vl53l3cx::self_test`], of either.
-pub async fn self_test<I: I2c, X: OutputPin, T: Timebase>(
+pub async fn self_test<I: I2c, X: OutputPin, T: Timebase + Clone>(
     [bus_down, bus_ahead]: [I; 2],
     [shutdown_down, shutdown_ahead]: [X; 2],
     clock: T,
@@ -55,7 +55,7 @@ pub async fn self_test<I: I2c, X: OutputPin, T: Timebase>(
 ///
 /// # Errors
 /// Either driver's.
-pub async fn run<I: I2c, X: OutputPin, T: Timebase>(
+pub async fn run<I: I2c, X: OutputPin, T: Timebase + Clone>(
     [bus_down, bus_ahead]: [I; 2],
     [shutdown_down, shutdown_ahead]: [X; 2],
     clock: T,
