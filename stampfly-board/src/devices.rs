@@ -24,7 +24,7 @@ use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
-use stampfly_drivers::chip::{Axis, AxisMap, I2cRegisters, SpiRegisters};
+use stampfly_drivers::chip::{Axis, AxisMap, I2cRegisters, SpiRegisters, TransferLimit};
 use stampfly_drivers::slot::Rhythm;
 use stampfly_types::Duration;
 
@@ -53,16 +53,18 @@ pub fn flow<S: SpiDevice, T: Timebase>(spi: S, clock: T) -> Pmw3901<S, T> {
 /// The magnetometer.
 pub fn magnetometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmm150<I2cRegisters<I>, T> {
     Bmm150::new(i2c, Bmm150::ALL_LOW, clock, MAGNETOMETER_AXES, bmm150::Config::default())
+        .with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 /// The barometer.
 pub fn barometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmp280<I2cRegisters<I>, T> {
-    Bmp280::new(i2c, Bmp280::SDO_LOW, clock, bmp280::Config::default())
+    Bmp280::new(i2c, Bmp280::SDO_LOW, clock, bmp280::Config::default()).with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 /// The battery monitor.
 pub fn power<I: I2c, T: Timebase>(i2c: I, clock: T) -> Ina3221<I2cRegisters<I>, T> {
     Ina3221::new(i2c, Ina3221::A0_GROUND, clock, ina3221::Config::default())
+        .with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 /// The range finder that looks down. Create both range finders before either is used: creating one resets it.
@@ -73,6 +75,7 @@ pub fn range_down<I: I2c, X: OutputPin, T: Timebase>(
     clock: T,
 ) -> Vl53l3cx<'_, I, X, T> {
     Vl53l3cx::new(i2c, shutdown, boot, 0x30, clock, vl53l3cx::Config::default())
+        .with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 /// The range finder that looks ahead. On the battery hat: it answers on USB power, but cannot measure.
@@ -83,6 +86,7 @@ pub fn range_ahead<I: I2c, X: OutputPin, T: Timebase>(
     clock: T,
 ) -> Vl53l3cx<'_, I, X, T> {
     Vl53l3cx::new(i2c, shutdown, boot, 0x31, clock, vl53l3cx::Config::default())
+        .with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
-use stampfly_drivers::chip::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
+use stampfly_drivers::chip::{AxisMap, ChipError, Registers, SpiRegisters, TransferLimit};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
 use stampfly_types::Duration;
 
@@ -83,8 +83,7 @@ fn a_transfer_is_given_up_at_its_limit_and_not_before() {
 #[test]
 fn what_the_flight_band_reads_ends_well_within_its_period() {
     type Spi = SpiRegisters<SpiBus<fn(Access<'_>) -> Result<(), Fault>>>;
-    type I2c = I2cRegisters<I2cBus<fn(Access<'_>) -> Result<(), Fault>>>;
-    let [spi, i2c] = [<Spi as Registers>::LIMIT, <I2c as Registers>::LIMIT];
+    let [spi, i2c] = [<Spi as Registers>::LIMIT, TransferLimit::I2C_SENSORS];
     // Both sensors once, and four frames of the FIFO.
     assert!(spi.of(12) <= Duration::from_micros(350) && spi.of(52) <= Duration::from_micros(450), "{:?}", spi.of(52));
     assert!((1..=256).all(|bytes| spi.of(bytes) <= Duration::from_millis(1)), "everything a driver sends at once");
@@ -115,15 +114,32 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
         let boot = BootAddress::default();
         let clock = Clock::new();
         let bus = || Broken { clock: clock.clone(), fault };
-        let imu = bmi270::Config::default();
+        let (imu, sensors) = (bmi270::Config::default(), TransferLimit::I2C_SENSORS);
         let worst = [
             worst!(clock, Bmi270::spi(bus(), clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
-            worst!(clock, Bmi270::i2c(bus(), 0x68, clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
-            worst!(clock, Bmp280::new(bus(), 0x76, clock.clone(), bmp280::Config::default())),
-            worst!(clock, Ina3221::new(bus(), 0x40, clock.clone(), ina3221::Config::default())),
-            worst!(clock, Bmm150::new(bus(), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())),
+            worst!(
+                clock,
+                Bmi270::i2c(bus(), 0x68, clock.clone(), &[0; 2], AxisMap::IDENTITY, imu).with_transfer_limit(sensors)
+            ),
+            worst!(
+                clock,
+                Bmp280::new(bus(), 0x76, clock.clone(), bmp280::Config::default()).with_transfer_limit(sensors)
+            ),
+            worst!(
+                clock,
+                Ina3221::new(bus(), 0x40, clock.clone(), ina3221::Config::default()).with_transfer_limit(sensors)
+            ),
+            worst!(
+                clock,
+                Bmm150::new(bus(), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())
+                    .with_transfer_limit(sensors)
+            ),
             worst!(clock, Pmw3901::new(bus(), clock.clone(), AxisMap::IDENTITY, pmw3901::Config::default())),
-            worst!(clock, Vl53l3cx::new(bus(), Pin, &boot, 0x30, clock.clone(), vl53l3cx::Config::default())),
+            worst!(
+                clock,
+                Vl53l3cx::new(bus(), Pin, &boot, 0x30, clock.clone(), vl53l3cx::Config::default())
+                    .with_transfer_limit(sensors)
+            ),
         ];
         // The last two first leave their chips the time to start up.
         let milliseconds = [1, 11, 11, 11, 15, 60, 125];

@@ -12,7 +12,7 @@ use stampfly_types::{Duration, Instant};
 pub trait Registers<A = u8> {
     /// The bus's error.
     type Error: Debug;
-    /// How long a transfer on these wires may take.
+    /// How long a transfer on these wires may take, unless the driver is told otherwise.
     const LIMIT: TransferLimit;
     /// So many bytes may be written at once; even. What is longer is for the driver to divide.
     const LONGEST_WRITE: usize;
@@ -126,13 +126,20 @@ impl<S: SpiDevice> Registers for SpiRegisters<S> {
 pub(crate) struct Port<R, T> {
     registers: R,
     clock: T,
+    limit: TransferLimit,
+}
+
+impl<R, T> Port<R, T> {
+    pub(crate) const fn new(registers: R, clock: T, limit: TransferLimit) -> Self {
+        Self { registers, clock, limit }
+    }
+
+    pub(crate) const fn limit_transfers(&mut self, limit: TransferLimit) {
+        self.limit = limit;
+    }
 }
 
 impl<R, T: Timebase> Port<R, T> {
-    pub(crate) const fn new(registers: R, clock: T) -> Self {
-        Self { registers, clock }
-    }
-
     pub(crate) fn release(self) -> (R, T) {
         (self.registers, self.clock)
     }
@@ -142,7 +149,7 @@ impl<R, T: Timebase> Port<R, T> {
         R: Registers<A>,
     {
         let mut bytes = [0; N];
-        bounded(&mut self.clock, R::LIMIT.of(N), self.registers.read(register, &mut bytes)).await?;
+        bounded(&mut self.clock, self.limit.of(N), self.registers.read(register, &mut bytes)).await?;
         Ok(bytes)
     }
 
@@ -162,7 +169,7 @@ impl<R, T: Timebase> Port<R, T> {
     where
         R: Registers<A>,
     {
-        bounded(&mut self.clock, R::LIMIT.of(data.len()), self.registers.write(register, data)).await
+        bounded(&mut self.clock, self.limit.of(data.len()), self.registers.write(register, data)).await
     }
 
     pub(crate) fn now(&self) -> Instant {

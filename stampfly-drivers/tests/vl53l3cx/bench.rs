@@ -5,6 +5,7 @@ use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_hal_async::i2c::{self, I2c, Operation};
 use stampfly_drivers::Timebase;
 use stampfly_drivers::blocking::block_on;
+use stampfly_drivers::chip::TransferLimit;
 use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, Vl53l3cx};
 use stampfly_types::Duration;
 use std::cell::RefCell;
@@ -211,6 +212,7 @@ impl Bench {
             let bus = Bus(self.clock.clone(), self.chips.clone());
             let pin = Xshut(self.chips[index].clone());
             Vl53l3cx::new(bus, pin, &self.boot, 0x30 + index as u8, self.clock.clone(), config)
+                .with_transfer_limit(TransferLimit::I2C_SENSORS)
         })
     }
 

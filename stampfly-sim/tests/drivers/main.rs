@@ -8,6 +8,7 @@ mod bmm150;
 mod bmp280;
 #[path = "../chips/compensation.rs"]
 mod compensation;
+mod display;
 mod ina3221;
 mod linux;
 mod mounting;

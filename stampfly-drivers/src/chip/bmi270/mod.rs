@@ -13,7 +13,7 @@ mod config;
 mod interrupt;
 
 use super::port::Port;
-use super::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters};
+use super::{AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
 use crate::{Decimator, Imu, Peak, Sample, Timebase};
 use codec::{FRAME_BYTES, Status, register};
 pub use config::{AccelRange, Config, GyroRange, Rate};
@@ -131,6 +131,13 @@ impl<S: SpiDevice, T: Timebase, P> Bmi270<'_, SpiRegisters<S>, T, P> {
 }
 
 impl<I: I2c, T: Timebase, P> Bmi270<'_, I2cRegisters<I>, T, P> {
+    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+    #[must_use]
+    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+        self.port.limit_transfers(limit);
+        self
+    }
+
     /// Takes the driver apart: the bus, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
     pub fn release(self) -> (I, T, Option<P>) {
         let (registers, clock) = self.port.release();
@@ -141,7 +148,7 @@ impl<I: I2c, T: Timebase, P> Bmi270<'_, I2cRegisters<I>, T, P> {
 impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
     fn new(registers: R, clock: T, blob: &'b [u8], axes: AxisMap, config: Config) -> Self {
         Self {
-            port: Port::new(registers, clock),
+            port: Port::new(registers, clock, R::LIMIT),
             interrupt: Interrupt::none(),
             blob,
             axes,

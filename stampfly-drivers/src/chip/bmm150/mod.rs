@@ -7,7 +7,7 @@ pub mod codec;
 mod config;
 
 use super::port::Port;
-use super::{AxisMap, ChipError, I2cRegisters};
+use super::{AxisMap, ChipError, I2cRegisters, TransferLimit};
 use crate::{Magnetometer, Sample, Timebase};
 use codec::{Reading, Trim, register};
 pub use config::{Config, Preset, Rate};
@@ -66,8 +66,15 @@ impl Bmm150<(), ()> {
 impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     /// A driver of the chip with this address.
     pub const fn new(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
-        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
         Self { port, axes, config, trim: None, due: Instant::ZERO }
+    }
+
+    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+    #[must_use]
+    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+        self.port.limit_transfers(limit);
+        self
     }
 
     /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
@@ -94,11 +101,12 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
         let deadline = self.port.now() + SELF_TEST_LIMIT;
         loop {
             self.port.wait(POLL).await;
+            let looks = self.port.now();
             let [mode]: [u8; 1] = self.port.read(register::MODE).await?;
             if mode & 1 == 0 {
                 break;
             }
-            if self.port.now() > deadline {
+            if looks > deadline {
                 return Err(ChipError::SelfTest);
             }
         }
@@ -141,6 +149,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
         let mut stale = asked > self.due + period / 8;
         self.port.wait_until(self.due).await;
         loop {
+            let looks = self.port.now();
             let reading = Reading::decode(&self.port.read(register::DATA_X_LSB).await?);
             let now = self.port.now();
             if reading.power & codec::POWER_ON == 0 || reading.mode != codec::mode_bits(&self.config) {
@@ -153,7 +162,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
                 return Ok((now, reading));
             }
             stale = false;
-            if now > deadline {
+            if looks > deadline {
                 self.trim = None;
                 return Err(ChipError::NoSample);
             }

@@ -8,7 +8,7 @@ pub mod codec;
 mod config;
 
 use super::port::Port;
-use super::{ChipError, I2cRegisters};
+use super::{ChipError, I2cRegisters, TransferLimit};
 use crate::{Barometer, Sample, Timebase};
 use codec::{Calibration, Reading, register};
 pub use config::{Config, Filter, Oversampling};
@@ -20,8 +20,10 @@ use stampfly_types::{Duration, Instant};
 const START_UP: Duration = Duration::from_millis(2);
 /// How long the chip may copy its calibration.
 const COPY_LIMIT: Duration = Duration::from_millis(20);
-/// How often a conversion is started before the chip counts as broken.
+/// How often a conversion may not start, as far as can be seen, before the chip counts as broken.
 const ATTEMPTS: usize = 2;
+/// How often it is started in all: where neighbours fill the bus, the look at it may come when it is over, and tells nothing.
+const STARTS: usize = 16;
 const POLL: Duration = Duration::from_millis(1);
 /// What the chip can measure, Pa with eight bits after the point, §1 table 2.
 const RANGE: core::ops::RangeInclusive<u32> = 30_000 << 8..=110_000 << 8;
@@ -74,8 +76,15 @@ impl Bmp280<(), ()> {
 impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     /// A driver of the chip with this address.
     pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
-        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
         Self { port, config, calibration: None, due: Instant::ZERO }
+    }
+
+    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+    #[must_use]
+    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+        self.port.limit_transfers(limit);
+        self
     }
 
     /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
@@ -93,7 +102,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     }
 
     /// Sets the chip up, has it keep its settings and make one conversion. 20 ms by default, within 0.4 s however slow the
-    /// bus; an oversampling of 16 adds 60 ms.
+    /// bus, with [`TransferLimit::I2C_SENSORS`]; an oversampling of 16 adds 60 ms.
     ///
     /// The chip has no self test of its own: this one asks whether pressure and temperature are what it can measure at all.
     /// Afterwards the chip is set up, and the next sample comes in its rhythm.
@@ -137,11 +146,12 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
         self.port.wait(START_UP).await;
         let deadline = self.port.now() + COPY_LIMIT;
         loop {
+            let looks = self.port.now();
             let [status]: [u8; 1] = self.port.read(register::STATUS).await?;
             if status & codec::COPYING == 0 {
                 break;
             }
-            if self.port.now() > deadline {
+            if looks > deadline {
                 return Err(ChipError::Configuration { status });
             }
             self.port.wait(POLL).await;
@@ -159,14 +169,20 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     /// Without one the data registers hold the conversion before, and nothing tells the two apart.
     async fn begin(&mut self) -> Result<Instant, ChipError<I::Error>> {
         let limit = codec::conversion_limit(&self.config);
-        for _ in 0..ATTEMPTS {
-            let begun = self.port.now();
-            self.due = begun + self.config.interval.max(limit);
+        let mut failed = 0;
+        for _ in 0..STARTS {
+            self.due = self.port.now() + self.config.interval.max(limit);
             let control = codec::oversampling_bits(&self.config) | codec::FORCED;
             self.port.write(register::CTRL_MEAS, &[control]).await?;
+            // Not before the write: that may have waited for the bus.
+            let begun = self.port.now();
             let [status, mode]: [u8; 2] = self.port.read(register::STATUS).await?;
             if status & codec::MEASURING != 0 || mode & codec::MODE != 0 {
                 return Ok(begun);
+            }
+            failed += usize::from(self.port.now().since(begun) < limit / 2);
+            if failed == ATTEMPTS {
+                break;
             }
         }
         self.calibration = None;
@@ -179,6 +195,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
         let limit = codec::conversion_limit(&self.config);
         self.port.wait_until(begun + limit).await;
         loop {
+            let looks = self.port.now();
             let reading = Reading::decode(&self.port.read(register::STATUS).await?);
             if (reading.oversampling_bits, reading.filter_bits) != wanted {
                 self.calibration = None;
@@ -187,7 +204,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
             if !reading.measuring {
                 return Ok(reading);
             }
-            if self.port.now() > begun + limit + limit {
+            if looks > begun + limit + limit {
                 self.calibration = None;
                 return Err(ChipError::NoSample);
             }

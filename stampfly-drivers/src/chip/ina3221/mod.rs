@@ -9,7 +9,7 @@ pub mod codec;
 mod config;
 
 use super::port::Port;
-use super::{ChipError, I2cRegisters};
+use super::{ChipError, I2cRegisters, TransferLimit};
 use crate::{PowerMonitor, Sample, Timebase};
 use codec::register;
 pub use config::{Average, Channel, Config, ConversionTime};
@@ -64,7 +64,7 @@ impl Ina3221<(), ()> {
 impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
     /// A driver of the chip with this address.
     pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
-        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
         Self { port, config, running: false, due: Instant::ZERO }
     }
 
@@ -96,7 +96,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
     }
 
     /// Sets the chip up, has it keep its settings and make one conversion, whatever the average. 6 ms, 2.2 ms more for
-    /// every further channel, within 0.2 s however slow the bus.
+    /// every further channel, within 0.2 s however slow the bus, with [`TransferLimit::I2C_SENSORS`].
     ///
     /// The chip has no self test of its own: this one asks whether there is a supply on the configured channel, and whether
     /// the shunt's voltage can be measured. 0 V do not pass: no battery, another channel's shunt and a dead converter look
@@ -115,8 +115,12 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         self.write(codec::configuration(&single)).await?;
         self.keeps(&single).await?;
         let deadline = self.port.now() + SELF_TEST_LIMIT;
-        while self.read(register::MASK_ENABLE).await? & codec::CONVERSION_READY == 0 {
-            if self.port.now() > deadline {
+        loop {
+            let looks = self.port.now();
+            if self.read(register::MASK_ENABLE).await? & codec::CONVERSION_READY != 0 {
+                break;
+            }
+            if looks > deadline {
                 return Err(ChipError::NoSample);
             }
             self.port.wait(POLL).await;
@@ -140,6 +144,13 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
             }
         }
         Ok(Sample { at, data })
+    }
+
+    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+    #[must_use]
+    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+        self.port.limit_transfers(limit);
+        self
     }
 
     /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
@@ -182,6 +193,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         let mut stale = asked > self.due + cycle / 8;
         self.port.wait_until(self.due).await;
         loop {
+            let looks = self.port.now();
             if self.read(register::CONFIGURATION).await? != codec::configuration(&self.config) {
                 self.running = false;
                 return Err(ChipError::Restarted);
@@ -194,7 +206,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
                 return Ok(now - cycle / 2);
             }
             stale = false;
-            if now > deadline {
+            if looks > deadline {
                 self.running = false;
                 return Err(ChipError::NoSample);
             }

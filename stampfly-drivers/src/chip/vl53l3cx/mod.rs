@@ -13,7 +13,7 @@ pub mod codec;
 mod config;
 
 use super::port::Port;
-use super::{ChipError, I2cRegisters};
+use super::{ChipError, I2cRegisters, TransferLimit};
 use crate::{RangeFinder, Sample, Timebase};
 pub use boot::BootAddress;
 use codec::{RESULT_BYTES, register};
@@ -120,7 +120,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
     pub fn new(bus: I, mut xshut: X, boot: &'b BootAddress, address: u8, clock: T, config: Config) -> Self {
         // A pin that refuses is reported by the first start.
         let _ = xshut.set_low();
-        let port = Port::new(I2cRegisters::new(bus, address), clock);
+        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
         Self {
             port,
             xshut,
@@ -134,6 +134,13 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             block: None,
             reading: None,
         }
+    }
+
+    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+    #[must_use]
+    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+        self.port.limit_transfers(limit);
+        self
     }
 
     /// Takes the driver apart: the bus, the pin and the clock. The chip goes on measuring at its address.
@@ -177,7 +184,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
     }
 
     /// Resets and sets the chip up, has it keep its times and limits and measure three times. 0.15 s by default; within 21 periods
-    /// and one second, however slow the bus.
+    /// and one second, however slow the bus, with [`TransferLimit::I2C_SENSORS`].
     ///
     /// The chip's own tests of laser and detector come with every measurement: this one asks whether they passed and whether
     /// measurements go on. No target is a pass, so a laser that the chip believes in but somebody covered is not found.
@@ -237,10 +244,11 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         let deadline = port.now() + BOOT_LIMIT;
         loop {
             // A chip that has not started does not answer.
+            let looks = port.now();
             match port.read(register::FIRMWARE_SYSTEM_STATUS).await {
                 Ok([status]) if status & 1 != 0 => break,
-                Ok([status]) if port.now() > deadline => return Err(ChipError::Configuration { status }),
-                Err(error) if port.now() > deadline => return Err(error),
+                Ok([status]) if looks > deadline => return Err(ChipError::Configuration { status }),
+                Err(error) if looks > deadline => return Err(error),
                 _ => port.wait(RESET).await,
             }
         }
@@ -318,6 +326,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.port.wait_until(self.due).await;
         let mut before = None;
         loop {
+            let looks = self.port.now();
             let [mut control, mut status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
             if control != codec::ACTIVE_HIGH {
                 // Twice, before a wrong bit on the bus costs a start.
@@ -352,7 +361,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
                     continue;
                 }
             }
-            if now > deadline {
+            if looks > deadline {
                 self.ranging = false;
                 return Err(ChipError::NoSample);
             }

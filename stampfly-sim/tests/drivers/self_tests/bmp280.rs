@@ -5,7 +5,7 @@ use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::Barometer;
 use stampfly_drivers::chip::bmp280::{Bmp280, Config};
-use stampfly_drivers::chip::{ChipError, I2cRegisters};
+use stampfly_drivers::chip::{ChipError, I2cRegisters, TransferLimit};
 use stampfly_sim::chips::{self, Faults, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::Duration;
@@ -17,7 +17,9 @@ fn barometer(spoil: Spoil) -> Bench<Bmp280<I2cRegisters<Spoilt<I2cBus>>, Clock>>
     let attached = bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &clock, 1));
     clock.advance_to(clock.now() + Duration::from_millis(2));
     let bus = Spoilt { bus, clock: clock.clone(), spoil };
-    (clock.clone(), attached, Bmp280::new(bus, Bmp280::SDO_LOW, clock, config))
+    let driver =
+        Bmp280::new(bus, Bmp280::SDO_LOW, clock.clone(), config).with_transfer_limit(TransferLimit::I2C_SENSORS);
+    (clock, attached, driver)
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::PowerMonitor;
 use stampfly_drivers::chip::ina3221::{Channel, Config, Ina3221};
-use stampfly_drivers::chip::{ChipError, I2cRegisters};
+use stampfly_drivers::chip::{ChipError, I2cRegisters, TransferLimit};
 use stampfly_sim::chips::{self, Faults, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::Duration;
@@ -17,7 +17,9 @@ fn monitor_of(channel: Channel, spoil: Spoil) -> Bench<Ina3221<I2cRegisters<Spoi
     let bus = I2cBus::new(&clock, 1);
     let attached = bus.attach(Ina3221::A0_GROUND, chips::Ina3221::new(&simulation.world, &clock, 1));
     let bus = Spoilt { bus, clock: clock.clone(), spoil };
-    (clock.clone(), attached, Ina3221::new(bus, Ina3221::A0_GROUND, clock, config))
+    let driver =
+        Ina3221::new(bus, Ina3221::A0_GROUND, clock.clone(), config).with_transfer_limit(TransferLimit::I2C_SENSORS);
+    (clock, attached, driver)
 }
 
 fn monitor(spoil: Spoil) -> Bench<Ina3221<I2cRegisters<Spoilt<I2cBus>>, Clock>> {

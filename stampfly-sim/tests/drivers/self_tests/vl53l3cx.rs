@@ -4,8 +4,8 @@ use super::{Bench, FAILED, Outcome, configuration, identification, put, restless
 use crate::spoilt::{Spoil, Spoilt};
 use crate::standing;
 use stampfly_drivers::RangeFinder;
-use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, Vl53l3cx};
+use stampfly_drivers::chip::{ChipError, TransferLimit};
 use stampfly_sim::chips::{self, Faults, I2cBus, ShutdownPin};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, block_on};
@@ -21,7 +21,9 @@ fn range_at(mount: Mount, spoil: Spoil) -> Bench<Range> {
     let attached = bus.attach(Vl53l3cx::BOOT_ADDRESS, chip);
     let bus = Spoilt { bus, clock: clock.clone(), spoil };
     let boot = Box::leak(Box::new(BootAddress::new()));
-    (clock.clone(), attached, Vl53l3cx::new(bus, pin, boot, 0x30, clock, config))
+    let driver =
+        Vl53l3cx::new(bus, pin, boot, 0x30, clock.clone(), config).with_transfer_limit(TransferLimit::I2C_SENSORS);
+    (clock, attached, driver)
 }
 
 fn range(spoil: Spoil) -> Bench<Range> {
