@@ -2,7 +2,7 @@
 //!
 //! Components are told what time it is; the ones that integrate need the span since last time. A span can be
 //! wrong: zero after a repeated stamp, seconds after a stall. Integrating such a span would do more harm than a
-//! slightly wrong one, so it is bounded.
+//! slightly wrong one, so it is bounded. Within the bounds, from 20 Hz to 10 kHz, a component adds up a second in a second.
 
 use stampfly_types::{Duration, Instant};
 
@@ -14,7 +14,8 @@ use stampfly_types::{Duration, Instant};
 /// let mut timer = StepTimer::default();
 /// assert_eq!(timer.step(Instant::from_micros(10_000)), 0.0025, "the first span is the nominal one");
 /// assert_eq!(timer.step(Instant::from_micros(14_000)), 0.004);
-/// assert_eq!(timer.step(Instant::from_micros(900_000)), 0.02, "a stall counts as 20 ms");
+/// assert_eq!(timer.step(Instant::from_micros(14_125)), 0.000125, "8 kHz");
+/// assert_eq!(timer.step(Instant::from_micros(900_000)), 0.06, "a stall counts as 60 ms");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -25,10 +26,10 @@ pub struct StepTimer {
 impl StepTimer {
     /// The span of the first step: one period at 400 Hz.
     pub const NOMINAL: Duration = Duration::from_micros(2_500);
-    /// No span is shorter.
-    pub const SHORTEST: Duration = Duration::from_micros(500);
-    /// No span is longer.
-    pub const LONGEST: Duration = Duration::from_micros(20_000);
+    /// No span is shorter: a loop at 10 kHz.
+    pub const SHORTEST: Duration = Duration::from_micros(100);
+    /// No span is longer: a loop at 20 Hz that is a fifth late.
+    pub const LONGEST: Duration = Duration::from_micros(60_000);
 
     /// Seconds since the previous call, within [`Self::SHORTEST`] and [`Self::LONGEST`].
     pub fn step(&mut self, now: Instant) -> f32 {
@@ -40,5 +41,30 @@ impl StepTimer {
     /// The next span is the nominal one again.
     pub fn reset(&mut self) {
         self.last = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_is_a_second_at_any_rate() {
+        for hertz in [20u64, 50, 250, 400, 1_000, 4_000, 8_000] {
+            let mut timer = StepTimer::default();
+            timer.step(Instant::ZERO);
+            let sum: f32 = (1..=hertz).map(|n| timer.step(Instant::from_micros(n * 1_000_000 / hertz))).sum();
+            assert!((sum - 1.0).abs() < 1e-3, "{sum} s at {hertz} Hz");
+        }
+    }
+
+    #[test]
+    fn a_repeated_stamp_and_a_stall_are_bounded() {
+        let mut timer = StepTimer::default();
+        timer.step(Instant::from_secs(1));
+        assert_eq!(timer.step(Instant::from_secs(1)), StepTimer::SHORTEST.seconds());
+        assert_eq!(timer.step(Instant::from_secs(9)), StepTimer::LONGEST.seconds());
+        timer.reset();
+        assert_eq!(timer.step(Instant::from_secs(9)), StepTimer::NOMINAL.seconds());
     }
 }

@@ -15,7 +15,6 @@ use super::excitation::{TONES, angle, carriers, frequencies, sum};
 use super::spectrum::{PlantPoint, Spectrum};
 use super::watch::AutotuneStop;
 use crate::bound::within;
-use crate::timing::StepTimer;
 
 /// Length of the ramps, as the part of a window.
 const RISE_PART: u64 = 2;
@@ -28,6 +27,8 @@ const HIGHEST: u32 = 51;
 const COUNTED: f32 = 200.0;
 /// A share that was not delivered below this is rounding.
 const NOTICEABLE: f32 = 0.01;
+/// After a longer gap the excitation is not what the spectrum takes it for: half a period of 25 Hz.
+const LONGEST_GAP: Duration = Duration::from_millis(20);
 
 /// The points, and what they were measured with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +76,7 @@ impl Measurement {
         unmet: f32,
     ) -> Result<f32, AutotuneStop> {
         let gap = self.last.replace(now).map(|last| now.since(last));
-        if gap.is_some_and(|gap| gap == Duration::ZERO || gap > StepTimer::LONGEST) {
+        if gap.is_some_and(|gap| gap == Duration::ZERO || gap > LONGEST_GAP) {
             return Err(AutotuneStop::Timing);
         }
         let elapsed = now.since(self.began);
