@@ -61,14 +61,14 @@ impl<I: I2c> I2cRegisters<I> {
         // of each, and the start between them ends the first: the chip takes the data for an address
         // (rust-embedded/linux-embedded-hal#82).
         let mut message = [0; MESSAGE];
-        let (start, rest) = message.split_at_mut(register.len().min(MESSAGE));
-        start.copy_from_slice(register);
-        let Some(place) = rest.get_mut(..data.len()) else {
+        let Some(joined) = message.get_mut(..register.len() + data.len()) else {
             let mut operations = [i2c::Operation::Write(register), i2c::Operation::Write(data)];
             return self.bus.transaction(self.address, &mut operations).await;
         };
-        place.copy_from_slice(data);
-        self.bus.write(self.address, message.get(..register.len() + data.len()).unwrap_or_default()).await
+        for (place, byte) in joined.iter_mut().zip(register.iter().chain(data)) {
+            *place = *byte;
+        }
+        self.bus.write(self.address, joined).await
     }
 }
 
