@@ -19,7 +19,7 @@
 //!   (Creating a [`vl53l3cx`] driver pulls the chip's XSHUT low, so that it is not in its neighbour's way.)
 //! * A transfer that takes longer than its length allows ([`TransferLimit`]) is given up ([`ChipError::BusTimeout`]),
 //!   and so is a chip that makes no new sample in time ([`ChipError::NoSample`]): by the last look at it that began after that time, so that
-//!   waiting for a shared bus is not the chip's.
+//!   waiting for a shared bus is not the chip's. But a [`bmi270`] on I2C fills two thirds of a bus by itself: its samples do not wait.
 //! * A chip that lost its configuration (brown-out, ESD) is [`ChipError::Restarted`] once, and the next call sets it up
 //!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s do not, and it is asked once a second.
 //! * No conversion is delivered twice, also not when a command to the chip is garbled on its way.

@@ -207,3 +207,28 @@ pub(crate) async fn bounded<T: Timebase, V, E>(
 ) -> Result<V, ChipError<E>> {
     within(clock, limit, transfer).await.ok_or(ChipError::BusTimeout)?.map_err(ChipError::Bus)
 }
+
+/// The method of every driver on I2C that changes how long a transfer may take.
+macro_rules! transfer_limit {
+    () => {
+        /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+        #[must_use]
+        pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+            self.port.limit_transfers(limit);
+            self
+        }
+    };
+}
+
+/// The method of a driver on nothing but a port that gives bus and clock back.
+macro_rules! release {
+    () => {
+        /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+        pub fn release(self) -> (I, T) {
+            let (registers, clock) = self.port.release();
+            (registers.release(), clock)
+        }
+    };
+}
+
+pub(super) use {release, transfer_limit};

@@ -131,12 +131,7 @@ impl<S: SpiDevice, T: Timebase, P> Bmi270<'_, SpiRegisters<S>, T, P> {
 }
 
 impl<I: I2c, T: Timebase, P> Bmi270<'_, I2cRegisters<I>, T, P> {
-    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
-    #[must_use]
-    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
-        self.port.limit_transfers(limit);
-        self
-    }
+    super::port::transfer_limit!();
 
     /// Takes the driver apart: the bus, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
     pub fn release(self) -> (I, T, Option<P>) {
@@ -271,11 +266,12 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         let deadline = self.port.now() + GYRO_SELF_TEST_LIMIT;
         loop {
             self.port.wait(Duration::from_millis(1)).await;
+            let looks = self.port.now();
             let [running]: [u8; 1] = self.port.read(register::GYR_CRT_CONF).await?;
             if running & codec::GYRO_TEST_RUNS == 0 {
                 break;
             }
-            if self.port.now() > deadline {
+            if looks > deadline {
                 return Err(ChipError::SelfTest);
             }
         }
@@ -312,11 +308,12 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.write(register::INIT_CTRL, &[1]).await?;
         let deadline = self.port.now() + START_UP_LIMIT;
         loop {
+            let looks = self.port.now();
             let [status]: [u8; 1] = self.port.read(register::INTERNAL_STATUS).await?;
             match status & 0x0F {
                 Status::RUNNING => return Ok(()),
                 // Not initialised yet.
-                0 if self.port.now() < deadline => self.port.wait(Duration::from_millis(1)).await,
+                0 if looks < deadline => self.port.wait(Duration::from_millis(1)).await,
                 _ => return Err(ChipError::Configuration { status }),
             }
         }

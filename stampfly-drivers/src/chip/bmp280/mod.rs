@@ -80,18 +80,9 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
         Self { port, config, calibration: None, due: Instant::ZERO }
     }
 
-    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
-    #[must_use]
-    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
-        self.port.limit_transfers(limit);
-        self
-    }
+    super::port::transfer_limit!();
 
-    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
-    pub fn release(self) -> (I, T) {
-        let (registers, clock) = self.port.release();
-        (registers.release(), clock)
-    }
+    super::port::release!();
 
     /// Sets the chip up: reset, identification, calibration, filter. A few milliseconds.
     ///

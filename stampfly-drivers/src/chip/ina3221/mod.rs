@@ -146,18 +146,9 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         Ok(Sample { at, data })
     }
 
-    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
-    #[must_use]
-    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
-        self.port.limit_transfers(limit);
-        self
-    }
+    super::port::transfer_limit!();
 
-    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
-    pub fn release(self) -> (I, T) {
-        let (registers, clock) = self.port.release();
-        (registers.release(), clock)
-    }
+    super::port::release!();
 
     /// What the registers of a channel hold.
     async fn measured(&mut self, channel: Channel, shunt_ohms: f32) -> Result<PowerData, ChipError<I::Error>> {

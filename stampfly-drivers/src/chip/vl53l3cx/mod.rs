@@ -136,12 +136,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
         }
     }
 
-    /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
-    #[must_use]
-    pub fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
-        self.port.limit_transfers(limit);
-        self
-    }
+    super::port::transfer_limit!();
 
     /// Takes the driver apart: the bus, the pin and the clock. The chip goes on measuring at its address.
     pub fn release(self) -> (I, X, T) {
