@@ -122,7 +122,10 @@ fn attitudes(steps: &[Step], measure: &mut impl Measure<[f32; 4]>) {
     let inputs: Vec<Upwards> = steps.iter().map(Upwards::new).collect();
 
     // The first is what the others are compared with.
-    let upwards = |q: Quat| [q.w, q.i, -q.j, -q.k];
+    let upwards = |q: Quat| {
+        let [w, x, y, z] = q.wxyz();
+        [w, x, -y, -z]
+    };
     let mut filter = AttitudeFilter::from_calibration(AttitudeConfig::default(), &stream::calibration());
     measure.contender("AttitudeFilter", |k| {
         let step = at(steps, k);
@@ -210,7 +213,8 @@ impl EskfInput {
     fn new(step: &Step) -> Self {
         let Truth { position, velocity, attitude, .. } = &step.truth;
         let vector = |v: &Vec3| na25::Vector3::new(v.x, v.y, v.z);
-        let truth = na25::Quaternion::new(attitude.w, attitude.i, attitude.j, attitude.k);
+        let [w, x, y, z] = attitude.wxyz();
+        let truth = na25::Quaternion::new(w, x, y, z);
         Self {
             accel: vector(&step.imu.accel),
             gyro: vector(&step.imu.gyro),

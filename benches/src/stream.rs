@@ -206,7 +206,7 @@ fn path(half_steps: i32) -> Truth {
     // Near level, so the real part is far from zero.
     let w = 0.5 * math::sqrt(1.0 + forward.x + right.y + down.z);
     let vector = Vec3::new(right.z - down.y, down.x - forward.z, forward.y - right.x) / (4.0 * w);
-    let attitude = Quat::new_unchecked([vector.x, vector.y, vector.z, w].into());
+    let attitude = Quat::new_unchecked(w, vector.x, vector.y, vector.z);
     Truth { position, velocity, attitude, force }
 }
 

@@ -23,7 +23,7 @@ struct Bench {
 impl Bench {
     /// Noise that is the same on every machine: a linear congruential generator, −1 to 1.
     fn noise(&mut self) -> Vec3 {
-        Vec3::from_fn(|_, _| {
+        Vec3::from_fn(|_| {
             self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (self.random >> 8) as f32 / 8_388_608.0 - 1.0
         })
@@ -58,7 +58,7 @@ fn main() {
     }
     let quality = calibration.quality().expect("complete");
     let bias = calibration.result().gyro_bias;
-    println!("  gyro bias {:.2?} mrad/s, off by {:.2}", (bias * 1e3).as_slice(), (bias - GYRO_BIAS).amax() * 1e3);
+    println!("  gyro bias {:.2?} mrad/s, off by {:.2}", (bias * 1e3).to_array(), (bias - GYRO_BIAS).amax() * 1e3);
     println!("  noise {:.1} mrad/s, |a| − g {:+.2} m/s²", quality.gyro_noise.amax() * 1e3, quality.force_error);
 
     println!("Six positions, {} bytes: put it on each face, on its feet twice.", size_of::<SixPosition>());
@@ -80,9 +80,9 @@ fn main() {
         }
     }
     let (accel, quality) = six.solve().expect("all faces");
-    println!("  bias {:.3?} m/s², off by {:.4}", accel.bias.as_slice(), (accel.bias - ACCEL_BIAS).amax());
+    println!("  bias {:.3?} m/s², off by {:.4}", accel.bias.to_array(), (accel.bias - ACCEL_BIAS).amax());
     let scale = accel.scale.component_mul(&ACCEL_GAIN) - Vec3::repeat(1.0);
-    println!("  scale {:.4?}, off by {:.5}", accel.scale.as_slice(), scale.amax());
+    println!("  scale {:.4?}, off by {:.5}", accel.scale.to_array(), scale.amax());
     println!(
         "  |a| − g {:.3} m/s² before, {:.4} after, {} hold to check it",
         quality.residual_before, quality.residual, quality.redundancy
@@ -121,7 +121,7 @@ fn main() {
         }
     }
     let (mag, quality) = fit.solve().expect("turned all ways");
-    println!("  hard iron {:.1?} µT, off by {:.2}", mag.offset.as_slice(), (mag.offset - HARD_IRON).amax());
+    println!("  hard iron {:.1?} µT, off by {:.2}", mag.offset.to_array(), (mag.offset - HARD_IRON).amax());
     println!(
         "  field {:.1} µT, stretched {:.2} : 1, residual {:.2} µT, coverage {:.0} %, {} samples taken",
         mag.strength,

@@ -7,7 +7,6 @@
 //! section III. There is no trigonometry and no singularity short of upside down, and the result is an even
 //! function of q: q and −q, the same attitude, give the same bits.
 
-use nalgebra::Quaternion;
 use stampfly_types::{Quat, Vec3, math};
 
 use crate::airframe::Airframe;
@@ -55,9 +54,7 @@ impl Default for AttitudeConfig {
 #[must_use]
 #[inline]
 pub fn rate_towards(config: &AttitudeConfig, attitude: &Quat, target: &Quat) -> Vec3 {
-    let error = attitude.quaternion().conjugate() * target.quaternion();
-    let Quaternion { coords } = error;
-    let (x, y, z, w) = (coords.x, coords.y, coords.z, coords.w);
+    let [w, x, y, z] = (attitude.inverse() * *target).wxyz();
     let upright = math::sqrt(w * w + z * z);
     if upright < 1e-3 {
         // Upside down: every horizontal axis is as short as the other; take the roll axis. The heading has no
@@ -99,23 +96,23 @@ pub fn from_down_axis(down: &Vec3, (cos_half_yaw, sin_half_yaw): (f32, f32)) -> 
     let w = 1.0 + down.z;
     let norm_squared = w * w + down.x * down.x + down.y * down.y;
     if norm_squared < 1e-6 {
-        return Quat::new_unchecked(Quaternion::new(cos_half_yaw, 0.0, 0.0, sin_half_yaw));
+        return Quat::new_unchecked(cos_half_yaw, 0.0, 0.0, sin_half_yaw);
     }
     let scale = 1.0 / math::sqrt(norm_squared);
     let (w, x, y) = (w * scale, -down.y * scale, down.x * scale);
-    Quat::new_unchecked(Quaternion::new(
+    Quat::new_unchecked(
         w * cos_half_yaw,
         x * cos_half_yaw + y * sin_half_yaw,
         y * cos_half_yaw - x * sin_half_yaw,
         w * sin_half_yaw,
-    ))
+    )
 }
 
 /// Cosine and sine of half the heading of an attitude, in the sense of [`from_down_axis`].
 #[must_use]
 #[inline]
 pub fn half_heading(attitude: &Quat) -> (f32, f32) {
-    let (w, z) = (attitude.w, attitude.k);
+    let [w, _, _, z] = attitude.wxyz();
     let norm = math::sqrt(w * w + z * z);
     if norm < 1e-3 { (1.0, 0.0) } else { (w / norm, z / norm) }
 }
@@ -124,7 +121,7 @@ pub fn half_heading(attitude: &Quat) -> (f32, f32) {
 #[must_use]
 #[inline]
 pub fn down_in_body(attitude: &Quat) -> Vec3 {
-    let (w, x, y, z) = (attitude.w, attitude.i, attitude.j, attitude.k);
+    let [w, x, y, z] = attitude.wxyz();
     Vec3::new(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
 }
 
@@ -136,7 +133,7 @@ mod tests {
 
     prop_compose! {
         fn attitudes()(w in -1f32..1.0, x in -1f32..1.0, y in -1f32..1.0, z in -1f32..1.0) -> Quat {
-            Quat::from_quaternion(Quaternion::new(w + 1e-3, x, y, z))
+            Quat::new_unchecked(w + 1e-3, x, y, z).normalize()
         }
     }
 
@@ -144,10 +141,9 @@ mod tests {
         #[test]
         fn both_quaternions_of_an_attitude_give_the_same_bits(q in attitudes(), target in attitudes()) {
             let config = AttitudeConfig::default();
-            let minus = |q: &Quat| Quat::new_unchecked(-q.into_inner());
             let rate = rate_towards(&config, &q, &target);
-            prop_assert_eq!(rate, rate_towards(&config, &minus(&q), &target));
-            prop_assert_eq!(rate, rate_towards(&config, &q, &minus(&target)));
+            prop_assert_eq!(rate, rate_towards(&config, &-q, &target));
+            prop_assert_eq!(rate, rate_towards(&config, &q, &-target));
         }
 
         #[test]
@@ -159,7 +155,7 @@ mod tests {
             for _ in 0..2000 {
                 let rate = rate_towards(&config, &q, &target);
                 path += rate.norm() * 0.002;
-                q *= Quat::new(rate * 0.002);
+                q *= Quat::from_scaled_axis(rate * 0.002);
                 angle = q.angle_to(&target);
             }
             prop_assert!(angle < 0.01, "still {angle} away");
@@ -180,7 +176,7 @@ mod tests {
         fn rates_stay_within_their_limits(q in attitudes(), target in attitudes()) {
             let config = AttitudeConfig::default();
             let rate = rate_towards(&config, &q, &target);
-            prop_assert!(rate.xy().norm() <= config.tilt_rate_max * 1.001);
+            prop_assert!(rate.horizontal().norm() <= config.tilt_rate_max * 1.001);
             prop_assert!(rate.z.abs() <= config.heading_rate_max);
         }
     }
@@ -188,8 +184,8 @@ mod tests {
     #[test]
     fn half_a_turn_has_one_direction() {
         let config = AttitudeConfig::default();
-        let (here, there) = (Quat::identity(), Quat::new_unchecked(Quaternion::new(0.0, 0.0, 0.0, 1.0)));
-        let minus = Quat::new_unchecked(Quaternion::new(-0.0, -0.0, -0.0, -1.0));
+        let (here, there) = (Quat::identity(), Quat::new_unchecked(0.0, 0.0, 0.0, 1.0));
+        let minus = Quat::new_unchecked(-0.0, -0.0, -0.0, -1.0);
         assert_eq!(rate_towards(&config, &here, &there), rate_towards(&config, &here, &minus));
         assert!(rate_towards(&config, &here, &there).z > 0.0);
     }
@@ -198,6 +194,6 @@ mod tests {
     fn upside_down_rights_itself() {
         let config = AttitudeConfig::default();
         let rate = rate_towards(&config, &Quat::from_euler_angles(math::PI, 0.0, 0.0), &Quat::identity());
-        assert_eq!(rate.xy().norm(), config.tilt_rate_max);
+        assert_eq!(rate.horizontal().norm(), config.tilt_rate_max);
     }
 }

@@ -187,7 +187,7 @@ impl<R> CascadeController<R> {
         let error = match intent.horizontal {
             Horizontal::Path => {
                 // A path that jumps gives up where the vehicle could not go; what kept it from there may be gone.
-                if before.is_some_and(|before| (path.position - before).xy().norm_squared() > JUMP * JUMP) {
+                if before.is_some_and(|before| (path.position - before).horizontal().norm_squared() > JUMP * JUMP) {
                     self.position.reset();
                 }
                 self.place = Some(path.position);

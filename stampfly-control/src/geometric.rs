@@ -8,9 +8,9 @@
 //! Choose it for agile paths and for study. The cascade rejects more: this law has no integral on the attitude, so a
 //! motor that is weaker than the others leaves a small lean, which the position integral has to make up for.
 
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::Matrix3;
 use stampfly_types::messages::ControlOutput;
-use stampfly_types::{GRAVITY, Instant, Vec3, math};
+use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
 
 use crate::airframe::Airframe;
 use crate::attitude;
@@ -188,7 +188,7 @@ impl Controller for GeometricController {
         let force = self.specific_force(&intent, input, dt);
         let tilt_known = !matches!(intent.horizontal, Horizontal::Damp | Horizontal::Nothing);
         let estimate = input.estimate;
-        let rotation = if tilt_known { estimate.attitude.to_rotation_matrix() } else { Rotation3::identity() };
+        let rotation = Matrix3::from(if tilt_known { estimate.attitude } else { Quat::identity() });
         let down = rotation * Vec3::z();
 
         let hover = config.mass * GRAVITY;
@@ -220,9 +220,9 @@ impl Controller for GeometricController {
                 (Vec3::zeros(), Vec3::new(right * reach, -forward * reach, yaw_rate))
             }
             Horizontal::Path | Horizontal::Velocity | Horizontal::Lean { .. } => {
-                let wanted = attitude::from_down_axis(&-force.normalize(), heading).to_rotation_matrix();
-                let in_body = rotation.inverse() * wanted;
-                (attitude_error(in_body.matrix()), rotation.inverse() * Vec3::z() * yaw_rate)
+                let wanted = Matrix3::from(attitude::from_down_axis(&-force.normalize(), heading));
+                let back = rotation.transpose();
+                (attitude_error(&(back * wanted)), back * Vec3::z() * yaw_rate)
             }
         };
         // Equation (16) with the inertia factored out of the gains. The path's own angular acceleration is left out:

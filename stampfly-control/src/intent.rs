@@ -13,10 +13,10 @@
 //!
 //! Write a control law against [`Intent`] and it behaves like the others in every mode and every failure.
 
+use stampfly_types::Vec3;
 use stampfly_types::messages::{
     FlightMode, FlightPhase, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
-use stampfly_types::{Quat, Vec3};
 
 use crate::controller::ControlInput;
 
@@ -187,7 +187,7 @@ impl Known {
     fn read(estimate: &StateEstimate) -> Self {
         let valid = |bits| estimate.valid.contains(bits);
         let rate = is_finite(&estimate.angular_rate);
-        let tilt = rate && valid(Validity::TILT) && is_rotation(&estimate.attitude);
+        let tilt = rate && valid(Validity::TILT) && estimate.attitude.is_unit();
         let (velocity, position) = (&estimate.velocity, &estimate.position);
         let velocity_xy = tilt && valid(Validity::VELOCITY_XY) && (velocity.x + velocity.y).is_finite();
         let velocity_z = tilt && valid(Validity::VELOCITY_Z) && velocity.z.is_finite();
@@ -227,11 +227,6 @@ fn usable_axes(path: &Setpoint) -> SetpointAxes {
 
 fn is_finite(vector: &Vec3) -> bool {
     (vector.x + vector.y + vector.z).is_finite()
-}
-
-fn is_rotation(attitude: &Quat) -> bool {
-    // False for NaN as well.
-    (attitude.quaternion().norm_squared() - 1.0).abs() < 0.02
 }
 
 #[cfg(test)]

@@ -296,7 +296,7 @@ fn a_vehicle_below_a_ceiling_lands_from_where_it_is() {
 #[test]
 fn landing_sinks_as_told_and_does_not_dig() {
     let mut bench = Bench::aloft();
-    let place = bench.setpoint.position.xy();
+    let place = bench.setpoint.position.horizontal();
     bench.enter(FlightPhase::Landing);
     bench.run(1.0);
     assert!((bench.setpoint.velocity.z - 0.3).abs() < 1e-3);
@@ -305,7 +305,7 @@ fn landing_sinks_as_told_and_does_not_dig() {
     for _ in 0..2_000 {
         bench.step();
         assert!(bench.setpoint.position.z <= 0.25 + 1e-5);
-        assert_eq!(bench.setpoint.position.xy(), place);
+        assert_eq!(bench.setpoint.position.horizontal(), place);
     }
     bench.land_detected.descent_rate = f32::NAN;
     bench.step();
@@ -365,7 +365,7 @@ proptest! {
                 let before = bench.setpoint;
                 bench.follow();
                 let moved = bench.setpoint.position - before.position;
-                prop_assert!(moved.xy().amax() <= 1.0 * DT + 2e-4, "{moved:?} in {piece:?}");
+                prop_assert!(moved.horizontal().amax() <= 1.0 * DT + 2e-4, "{moved:?} in {piece:?}");
                 prop_assert!(moved.z.abs() <= 0.6 * DT + 2e-4, "{moved:?} in {piece:?}");
                 let faster = bench.setpoint.velocity - before.velocity;
                 prop_assert!(faster.amax() <= 1.5 * DT + 1.1e-3, "{faster:?} in {piece:?}");
@@ -385,7 +385,7 @@ proptest! {
             bench.land_detected.descent_rate = rate;
             bench.estimate.position = Vec3::new(x, y, z);
             bench.estimate.velocity = Vec3::new(u, v, w);
-            bench.estimate.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(q0, q1, q2, q3));
+            bench.estimate.attitude = Quat::new_unchecked(q0, q1, q2, q3);
             let _ = bench.send(GuidedKind::WayPoint, [x, v, q0]);
             let point = bench.step();
             let all = point.position.iter().chain(&point.velocity).chain(&point.acceleration);

@@ -109,7 +109,7 @@ impl Complementary {
 
     fn turn(&mut self, by: Vec3) {
         let mut correction = [0.0; crate::filter::N];
-        correction[crate::filter::ATTITUDE..crate::filter::GYRO_BIAS].copy_from_slice(by.as_slice());
+        correction[crate::filter::ATTITUDE..crate::filter::GYRO_BIAS].copy_from_slice(&by.to_array());
         self.state.correct(&correction);
     }
 }

@@ -26,7 +26,7 @@ fn vector([x, y, z]: [f64; 3]) -> Vec3 {
 }
 
 fn assert_close(attitude: &Quat, sample: &Value, what: &str) {
-    let ours = [attitude.w, attitude.i, attitude.j, attitude.k].map(f64::from);
+    let ours = attitude.wxyz().map(f64::from);
     let theirs = array::<4>(&sample["q"]);
     let sign = ours.iter().zip(&theirs).map(|(a, b)| a * b).sum::<f64>().signum();
     for (a, b) in ours.iter().zip(&theirs) {

@@ -165,7 +165,7 @@ impl TelemetryPacket {
             [low, high] => f32::from(i16::from_le_bytes([*low, *high])),
             _ => 0.0,
         });
-        let mut vector = || Vec3::from_fn(|_, _| values.next().unwrap_or(0.0));
+        let mut vector = || Vec3::from_fn(|_| values.next().unwrap_or(0.0));
         let on = |bit: u8| *warnings & (1 << bit) != 0;
         Ok(Self {
             counter: *counter,

@@ -175,12 +175,12 @@ impl World {
         let motion = self.motion_at(instant);
         let state = self.0.borrow();
         Truth {
-            attitude: motion.attitude.cast(),
-            position: motion.position.cast(),
-            velocity: motion.velocity.cast(),
-            angular_rate: motion.rate.cast(),
-            specific_force: motion.specific_force.cast(),
-            wind: state.plant.wind().velocity(-motion.position.z).cast(),
+            attitude: motion.attitude.cast::<f32>().into(),
+            position: motion.position.cast::<f32>().into(),
+            velocity: motion.velocity.cast::<f32>().into(),
+            angular_rate: motion.rate.cast::<f32>().into(),
+            specific_force: motion.specific_force.cast::<f32>().into(),
+            wind: state.plant.wind().velocity(-motion.position.z).cast::<f32>().into(),
             rotor_speed: motion.rotor_speed.map(|speed| speed as f32),
             battery_voltage: state.plant.battery().voltage() as f32,
             battery_current: motion.current as f32,

@@ -99,17 +99,13 @@ const fn join([low, high]: [u32; 2]) -> u64 {
     low as u64 | (high as u64) << 32
 }
 
-crate::__field!(Vec3, FieldKind::F32, 3, |v| [v.x, v.y, v.z].map(f32::to_bits), |words| {
-    let [x, y, z] = <[u32; 3]>::map(words, f32::from_bits);
-    Some(Vec3::new(x, y, z))
+crate::__field!(Vec3, FieldKind::F32, 3, |v| v.to_array().map(f32::to_bits), |words| {
+    Some(Vec3::from(<[u32; 3]>::map(words, f32::from_bits)))
 });
 
-// Stored w, x, y, z. Refused when the norm is not within 1 % of one, so that a broken log cannot bring in a unit quaternion
-// that is none.
-crate::__field!(Quat, FieldKind::F32, 4, |v| [v.w, v.i, v.j, v.k].map(f32::to_bits), |words| {
-    let [w, x, y, z] = <[u32; 4]>::map(words, f32::from_bits);
-    let norm_squared = w * w + x * x + y * y + z * z;
-    (norm_squared - 1.0).abs().lt(&0.02).then(|| Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z)))
+// Stored w, x, y, z. A broken log cannot bring in a unit quaternion that is none.
+crate::__field!(Quat, FieldKind::F32, 4, |v| v.wxyz().map(f32::to_bits), |words| {
+    Quat::try_from(<[u32; 4]>::map(words, f32::from_bits)).ok()
 });
 
 impl<T: Field, const N: usize> Field for [T; N] {

@@ -33,6 +33,7 @@ extern crate std;
 pub mod activation;
 pub mod field;
 pub mod frame;
+#[cfg(feature = "math")]
 pub mod math;
 pub mod message;
 pub mod messages;

@@ -40,8 +40,7 @@ impl Input {
 }
 
 fn angles(truth: &Truth) -> Vector3<f32> {
-    let (roll, pitch, yaw) = truth.attitude.euler_angles();
-    Vector3::new(roll, pitch, yaw)
+    Vector3::from(stampfly_types::frame::roll_pitch_yaw(&truth.attitude))
 }
 
 /// The filter at a point of the path.

@@ -171,7 +171,7 @@ impl Collector {
                 self.tilt = Some(self.tilt.map_or(tilt, |t| t.max(tilt)));
             }
             let away = truth.position - rest.from;
-            rest.farthest = rest.farthest.max(away.xy().norm());
+            rest.farthest = rest.farthest.max(away.horizontal().norm());
         } else {
             self.end_rest(at);
         }
@@ -210,7 +210,7 @@ impl Collector {
             takeoff_overshoot_m: self.highest.and_then(overshoot).map(|o| o.max(0.0)),
             touchdown_speed_mps: self.touchdown.map(f64::from),
             hover_tilt_max_deg: self.tilt.map(f64::from),
-            land_error_m: self.last.filter(|_| landed).map(|last| f64::from(last.place.xy().norm())),
+            land_error_m: self.last.filter(|_| landed).map(|last| f64::from(last.place.horizontal().norm())),
             hover_drift_m: self.longest.map(|(_, farthest)| f64::from(farthest)),
         }
     }

@@ -183,8 +183,9 @@ impl<'b> Pilot<'b> {
     /// A vehicle that moves away from where it should be does not hold its place, whatever it believes: a pilot then takes the
     /// mode in which it only holds its height.
     fn mistrust(&mut self, place: Vec3, seen: &Seen, now: Instant) {
-        let error = (place - seen.position).xy();
-        let lost = self.flown() == FlightMode::PosHold && error.norm() > LOST && error.dot(&seen.velocity.xy()) < 0.0;
+        let error = (place - seen.position).horizontal();
+        let lost =
+            self.flown() == FlightMode::PosHold && error.norm() > LOST && error.dot(&seen.velocity.horizontal()) < 0.0;
         let since = if lost { *self.lost.get_or_insert(now) } else { now };
         self.lost = self.lost.filter(|_| lost);
         if now.since(since) >= LOST_FOR {
@@ -218,7 +219,7 @@ impl<'b> Pilot<'b> {
             let seen = self.frame(Aim::Be(place)).await;
             let away = seen.position - place;
             let now = self.radio.clock().now();
-            if away.xy().norm() > REACHED[0] || away.z.abs() > REACHED[1] {
+            if away.horizontal().norm() > REACHED[0] || away.z.abs() > REACHED[1] {
                 since = now;
             }
             nearest = nearest.min(away.norm());

@@ -98,8 +98,10 @@ impl core::error::Error for AutotuneStop {}
 pub(super) fn check(config: &AutotuneConfig, input: &AutotuneInput<'_>) -> Result<(), AutotuneStop> {
     let (estimate, status, command) = (input.estimate, input.flight_status, input.command);
     // Comparisons are false for what is no number, and then refuse.
-    let unit = (estimate.attitude.quaternion().norm_squared() - 1.0).abs() < 0.02;
-    if !(unit && estimate.valid.contains(Validity::TILT) && estimate.angular_rate.iter().all(|rate| rate.is_finite())) {
+    if !(estimate.attitude.is_unit()
+        && estimate.valid.contains(Validity::TILT)
+        && estimate.angular_rate.iter().all(|rate| rate.is_finite()))
+    {
         return Err(AutotuneStop::Estimate);
     }
     if input.alerts.intersects(config.alerts) {
@@ -112,8 +114,8 @@ pub(super) fn check(config: &AutotuneConfig, input: &AutotuneInput<'_>) -> Resul
         && input.land_detected.contact == GroundContact::Air;
     let high = estimate.valid.contains(Validity::HEIGHT) && estimate.height >= config.height_min;
     let drifts = estimate.valid.contains(Validity::VELOCITY_XY);
-    let rests =
-        (!drifts || estimate.velocity.xy().norm() <= config.speed_max) && estimate.velocity.z.abs() <= config.speed_max;
+    let rests = (!drifts || estimate.velocity.horizontal().norm() <= config.speed_max)
+        && estimate.velocity.z.abs() <= config.speed_max;
     if !(by_itself && high && rests) {
         return Err(AutotuneStop::NotHovering);
     }

@@ -181,7 +181,7 @@ impl FlipSequencer {
         }
         let [tilt, rate, drift, climb] = config.steady;
         let down = attitude::down_in_body(&estimate.attitude);
-        let stays = !estimate.valid.contains(Validity::VELOCITY_XY) || estimate.velocity.xy().norm() <= drift;
+        let stays = !estimate.valid.contains(Validity::VELOCITY_XY) || estimate.velocity.horizontal().norm() <= drift;
         let still =
             down.z >= math::cos(tilt) && estimate.angular_rate.norm() <= rate && estimate.velocity.z.abs() <= climb;
         if !(still && stays) {
@@ -320,9 +320,8 @@ impl FlipSequencer {
 /// Are the numbers known that a flip is flown by? The height is not among them: upside down no range measures it.
 fn is_known(estimate: &StateEstimate) -> bool {
     let needed = Validity::TILT.with(Validity::VELOCITY_Z);
-    let attitude = estimate.attitude.quaternion().norm_squared();
     let numbers = estimate.angular_rate.sum() + estimate.velocity.z;
-    estimate.valid.contains(needed) && (attitude - 1.0).abs() < 0.02 && numbers.is_finite()
+    estimate.valid.contains(needed) && estimate.attitude.is_unit() && numbers.is_finite()
 }
 
 #[cfg(test)]

@@ -57,8 +57,8 @@ fn flown(direction: FlipDirection, estimate: &mut StateEstimate) -> (f32, f32, f
         let demand = flip.step(now, estimate);
         let dt = PERIOD.seconds();
         estimate.angular_rate = demand.rate;
-        estimate.attitude *= Quat::new(demand.rate * dt);
-        estimate.attitude.renormalize();
+        estimate.attitude *= Quat::from_scaled_axis(demand.rate * dt);
+        estimate.attitude = estimate.attitude.normalize();
         let push = estimate.attitude * Vec3::new(0.0, 0.0, -demand.thrust / airframe.mass);
         estimate.velocity += (push + Vec3::new(0.0, 0.0, GRAVITY)) * dt;
         estimate.position += estimate.velocity * dt;

@@ -265,7 +265,7 @@ mod tests {
                 let rounding = steps as f32 * 2.0 * f32::EPSILON;
                 prop_assert!((moved - along * moved.dot(&along)).norm() < 2e-3 + rounding, "off the line");
                 prop_assert!(path.velocity().norm() <= speed * 1.001 + 1e-4);
-                prop_assert!(path.velocity().xy().amax() <= 1.001 && path.velocity().z.abs() <= 0.601);
+                prop_assert!(path.velocity().horizontal().amax() <= 1.001 && path.velocity().z.abs() <= 0.601);
                 steps += 1;
                 prop_assert!(steps < 100_000, "never arrives: {path:?}");
             }

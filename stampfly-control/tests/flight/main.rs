@@ -115,7 +115,7 @@ fn mission<C: Controller>(controller: C, vehicle: Vehicle, wind: f32) -> Figures
         flight.fly(0.0025, |f| {
             gust(f, wind);
             navigate(f, &mut navigator);
-            figures.path.add((f.setpoint.position - f.state.position).xy().norm());
+            figures.path.add((f.setpoint.position - f.state.position).horizontal().norm());
             figures.height.add(f.setpoint.position.z - f.state.position.z);
         });
         assert!(flight.now.since(start) < Duration::from_secs(30), "the route does not end");
@@ -371,7 +371,7 @@ fn poison<C: Controller>(controller: C) {
                 let mut setpoint = f.setpoint;
                 let mut stick = f.command;
                 match place {
-                    0 => estimate.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(value, value, 0.0, 0.0)),
+                    0 => estimate.attitude = Quat::new_unchecked(value, value, 0.0, 0.0),
                     1 => estimate.angular_rate.x = value,
                     2 => estimate.velocity.x = value,
                     3 => estimate.velocity.z = value,
@@ -421,7 +421,7 @@ fn both_quaternions_of_an_attitude_give_the_same_torque() {
     let mut flight = Flight::hovering(cascade(), Vehicle::default());
     flight.state.attitude = Quat::from_euler_angles(0.3, -0.2, 2.0);
     let estimate = StateEstimate { attitude: flight.state.attitude, valid: Validity::ALL, ..StateEstimate::default() };
-    let minus = StateEstimate { attitude: Quat::new_unchecked(-estimate.attitude.into_inner()), ..estimate };
+    let minus = StateEstimate { attitude: -estimate.attitude, ..estimate };
     let output = |estimate: &StateEstimate| {
         cascade().step(
             flight.now,

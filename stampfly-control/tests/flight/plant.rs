@@ -229,8 +229,8 @@ impl<C: Controller> Flight<C> {
         let turning = (torque - body.rate.cross(&momentum) - body.rate * (TURNING_DRAG * body.rate.norm()))
             .component_div(&self.vehicle.inertia);
         body.rate += turning * dt;
-        body.attitude *= Quat::new(body.rate * dt);
-        body.attitude.renormalize();
+        body.attitude *= Quat::from_scaled_axis(body.rate * dt);
+        body.attitude = body.attitude.normalize();
     }
 }
 

@@ -14,7 +14,7 @@
 
 use super::config::AttitudeConfig;
 use super::low_pass::LowPass;
-use nalgebra::{Matrix3, SVector};
+use nalgebra::{Matrix3, SVector, Vector3};
 use stampfly_types::Vec3;
 
 /// Share of the weight of a level axis that the pull on the vertical one has.
@@ -70,7 +70,7 @@ impl GyroBias {
 
     /// One standard deviation along an axis of the body, rad/s.
     pub fn sigma_along(&self, axis: &Vec3) -> f32 {
-        stampfly_types::math::sqrt(axis.dot(&(self.covariance * axis)))
+        stampfly_types::math::sqrt(axis.dot(&(self.covariance * *axis)))
     }
 
     /// Propagates the variance by the bias' random walk. Also keeps what [`update_moving`](Self::update_moving) needs,
@@ -132,11 +132,12 @@ impl GyroBias {
 
     /// The scalar measurement `row · bias = measured`.
     fn update(&mut self, config: &AttitudeConfig, row: &Vec3, measured: f32, noise: f32) {
+        let row = Vector3::from(*row);
         let spread = self.covariance * row;
         let gain = spread / (row.dot(&spread) + noise);
         // Not `clamp`, which panics when a configured limit is negative or no number.
         let limited = |part: f32| part.max(-config.bias_limit).min(config.bias_limit);
-        self.value += gain * limited(measured - row.dot(&self.value));
+        self.value += Vec3::from(gain * limited(measured - row.dot(&self.value.into())));
         self.covariance -= gain * spread.transpose();
         let off = (self.value - self.calibrated).map(limited);
         self.value = self.calibrated + off;

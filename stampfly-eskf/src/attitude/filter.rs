@@ -30,6 +30,7 @@ use super::magnetic::Magnetic;
 use super::rotation::{from_vector, product, upwards, within};
 use super::stationary::StationaryDetector;
 use crate::level::attitude_from_specific_force;
+use nalgebra::Matrix3;
 use stampfly_types::messages::CalibrationResult;
 use stampfly_types::{Quat, Vec3, frame};
 
@@ -118,11 +119,11 @@ impl AttitudeFilter {
             return filter;
         }
         let [w, x, y, z] = attitude_from_specific_force(specific_force);
-        let level = Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
+        let level = Quat::new_unchecked(w, x, y, z);
         let sigma = if *complete { config.rest_bias_sigma } else { config.initial_bias_sigma };
         filter.bias = GyroBias::new(&config, *gyro_bias, sigma);
         if *complete {
-            filter.force = LowPass::settled_at(config.accel_time, *specific_force);
+            filter.force = LowPass::settled_at(config.accel_time, (*specific_force).into());
         }
         filter.level = level;
         if within(field, LARGEST_FIELD) && field.norm() > 1.0 {
@@ -154,20 +155,20 @@ impl AttitudeFilter {
         let middle = product(&self.strapdown, &half);
         self.strapdown = product(&middle, &half);
         // Rate and force are both means over the step, or samples at the same instant: the force belongs to the middle.
-        self.force.step(&(middle * accel), dt);
-        if let Some(correction) = upwards(&(self.level * self.force.value())) {
+        self.force.step(&(middle * accel).into(), dt);
+        if let Some(correction) = upwards(&(self.level * Vec3::from(*self.force.value()))) {
             self.level = product(&correction, &self.level);
         }
         self.accel = *accel;
-        let turn = (self.level * self.strapdown).to_rotation_matrix();
-        self.bias.predict(config, turn.matrix(), dt);
-        let vertical = turn.matrix().row(2).transpose();
+        let turn = Matrix3::from(self.level * self.strapdown);
+        self.bias.predict(config, &turn, dt);
+        let vertical = turn.row(2).transpose().into();
         self.heading.predict(self.bias.sigma_along(&vertical), self.rate.norm(), dt);
         self.stationary.step(config, accel, gyro, self.bias.calibrated(), dt);
         if self.stationary.is_stationary(config) {
-            self.bias.update_stationary(config, self.stationary.rate(), dt);
+            self.bias.update_stationary(config, &self.stationary.rate(), dt);
         } else if self.force.is_settled() {
-            let leaning = self.level * self.force.rate();
+            let leaning = self.level * Vec3::from(*self.force.rate());
             let norm = self.force.value().norm().max(1.0);
             self.bias.update_moving(config, [leaning.y / norm, -leaning.x / norm], dt);
         }

@@ -14,7 +14,7 @@
 //! nothing turns.
 
 use super::config::AttitudeConfig;
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use stampfly_types::Vec3;
 
 /// Squared distance, in variances, beyond which a component of a sample is an outlier.
@@ -79,7 +79,7 @@ impl HardIron {
         if !self.used {
             return Vec3::zeros();
         }
-        let offset = self.state.fixed_rows::<3>(3).into_owned();
+        let offset = self.iron();
         let variance = self.covariance.diagonal().fixed_rows::<3>(3).sum();
         let chance = config.hard_iron_least * config.hard_iron_least + variance;
         // James and Stein's estimator, positive part: zero while the offset is no longer than its own deviation.
@@ -88,14 +88,19 @@ impl HardIron {
 
     /// The world's field in the level frame, µT.
     pub fn field(&self) -> Vec3 {
-        self.state.fixed_rows::<3>(0).into_owned()
+        self.state.fixed_rows::<3>(0).into_owned().into()
+    }
+
+    /// The offset as estimated, body, µT.
+    fn iron(&self) -> Vec3 {
+        self.state.fixed_rows::<3>(3).into_owned().into()
     }
 
     /// Does the offset explain why the strength changes? Only looked at while the body turns.
     fn watch(&mut self, field: &Vec3, dt: f32) {
         self.watched = (self.watched + dt).min(WATCH);
         let share = (dt / self.watched).min(1.0);
-        let without = field - self.state.fixed_rows::<3>(3);
+        let without = field - self.iron();
         for (spread, value) in self.strength.iter_mut().zip([field.norm(), without.norm()]) {
             spread.add(value, share);
         }
@@ -106,7 +111,7 @@ impl HardIron {
 
     /// Takes a field, body, µT, `dt` seconds after the one before, with the rotation into the level frame.
     pub fn step(&mut self, config: &AttitudeConfig, level: &Matrix3<f32>, field: &Vec3, turning: bool, dt: f32) {
-        let turned = level * field;
+        let turned = level * Vector3::from(*field);
         if turning {
             self.watch(field, dt);
         }
@@ -168,8 +173,7 @@ mod tests {
             let [a, b, c] = [1.1, 1.7, 0.4].map(|rate| swing * math::sin(rate * t));
             let attitude = Quat::from_euler_angles(a, b, 2.0 * c);
             let field = attitude.inverse() * EARTH + offset;
-            let level = attitude.to_rotation_matrix();
-            hard_iron.step(&config, level.matrix(), &field, swing > 0.0, DT);
+            hard_iron.step(&config, &attitude.into(), &field, swing > 0.0, DT);
         }
     }
 

@@ -57,7 +57,7 @@ impl Mahony {
             return;
         }
         let dt = dt.min(0.5);
-        let [x, y, z, w] = *self.attitude.coords.as_ref();
+        let [w, x, y, z] = self.attitude.wxyz();
         let mut rate = *gyro;
         let norm = accel.norm();
         if norm.is_finite() && norm > 0.0 {
@@ -74,7 +74,7 @@ impl Mahony {
         let [w, x, y, z] = [w + change[0], x + change[1], y + change[2], z + change[3]];
         let norm = math::sqrt(w * w + x * x + y * y + z * z);
         if norm.is_finite() && norm > 0.0 {
-            self.attitude = Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z) / norm);
+            self.attitude = Quat::new_unchecked(w / norm, x / norm, y / norm, z / norm);
         }
     }
 }

@@ -27,11 +27,11 @@ impl StationaryDetector {
 
     /// Takes an inertial sample; `calibrated` is the gyro bias of the start.
     pub fn step(&mut self, config: &AttitudeConfig, accel: &Vec3, gyro: &Vec3, calibrated: &Vec3, dt: f32) {
-        self.gyro.step(gyro, dt);
-        self.accel.step(accel, dt);
-        let quiet = (gyro - self.gyro.value()).norm() < config.rest_rate
-            && (accel - self.accel.value()).norm() < config.rest_force
-            && (self.gyro.value() - calibrated).amax() < config.bias_limit;
+        self.gyro.step(&(*gyro).into(), dt);
+        self.accel.step(&(*accel).into(), dt);
+        let quiet = (gyro - self.rate()).norm() < config.rest_rate
+            && (accel - Vec3::from(*self.accel.value())).norm() < config.rest_force
+            && (self.rate() - calibrated).amax() < config.bias_limit;
         self.quiet_for = if quiet { (self.quiet_for + dt).min(config.rest_time) } else { 0.0 };
     }
 
@@ -41,8 +41,8 @@ impl StationaryDetector {
     }
 
     /// Mean rate of the last moment, rad/s.
-    pub fn rate(&self) -> &Vec3 {
-        self.gyro.value()
+    pub fn rate(&self) -> Vec3 {
+        (*self.gyro.value()).into()
     }
 }
 

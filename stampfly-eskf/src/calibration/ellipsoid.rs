@@ -268,14 +268,14 @@ impl EllipsoidFit {
         let b = Vec3::new(bx, by, bz);
         let (axes, squares) = principal_axes(shape);
         let (least, most) = (squares.min(), squares.max());
-        let inverse = axes * Matrix3::from_diagonal(&squares.map(|value| 1.0 / value)) * axes.transpose();
+        let inverse = axes * Matrix3::from_diagonal(&squares.map(|value| 1.0 / value).into()) * axes.transpose();
         let center = inverse * b;
         let square = constant + b.dot(&center);
         if !(least > 0.0 && square > 0.0 && squares.sum().is_finite() && square.is_finite()) {
             return Err(EllipsoidFailure::NotPositive);
         }
         // Radius of the sphere of the same volume.
-        let gain = math::cbrt(math::sqrt(squares.product()));
+        let gain = math::cbrt(math::sqrt(squares.x * squares.y * squares.z));
         let strength = math::sqrt(square) / gain * UNIT;
         let stretch = math::sqrt(most / least);
         let coverage = self.coverage(&center, &inverse, square);
@@ -294,7 +294,7 @@ impl EllipsoidFit {
         if residual.is_nan() || residual > config.residual_max {
             return Err(EllipsoidFailure::Residual { residual });
         }
-        let roots = Matrix3::from_diagonal(&squares.map(|value| math::sqrt(value) / gain));
+        let roots = Matrix3::from_diagonal(&squares.map(|value| math::sqrt(value) / gain).into());
         let matrix = axes * roots * axes.transpose();
         let correction = MagCorrection { offset: self.origin + center * UNIT, matrix, strength };
         Ok((correction, EllipsoidQuality { residual: residual * strength, coverage, stretch, samples }))

@@ -86,7 +86,7 @@ impl Trim {
 /// let mut level = LevelTrim::default();
 /// let (trim, quality) = (0..).find_map(|k| level.step(Instant::from_micros(2_500 * k), &felt).unwrap()).unwrap();
 /// assert!((trim.roll - 0.02).abs() < 1e-5 && trim.pitch.abs() < 1e-5);
-/// assert!(trim.correct(felt.accel).xy().norm() < 1e-4 && quality.force_error.abs() < 1e-3);
+/// assert!(trim.correct(felt.accel).horizontal().norm() < 1e-4 && quality.force_error.abs() < 1e-3);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -123,12 +123,12 @@ impl LevelTrim {
     /// Why the sample, or with its last sample the stretch, does not count.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<(Trim, LevelTrimQuality)>, LevelTrimRefusal> {
         let Some(mean) = self.average.step(now, imu).map_err(LevelTrimRefusal::Moving)? else { return Ok(None) };
-        let tilt = math::atan2(mean.accel.xy().norm(), -mean.accel.z);
+        let tilt = math::atan2(mean.accel.horizontal().norm(), -mean.accel.z);
         if tilt > self.tilt_max {
             return Err(LevelTrimRefusal::Tilted { tilt });
         }
         let quality = LevelTrimQuality {
-            noise: mean.accel_noise.xy().amax() / (GRAVITY * math::sqrt(mean.samples as f32)),
+            noise: mean.accel_noise.horizontal().amax() / (GRAVITY * math::sqrt(mean.samples as f32)),
             force_error: mean.accel.norm() - GRAVITY,
             samples: mean.samples,
         };

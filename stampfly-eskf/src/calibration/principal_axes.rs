@@ -33,7 +33,7 @@ mod tests {
             let matrix = Matrix3::new(a, d, e, d, b, f, e, f, c);
             let (axes, squares) = principal_axes(matrix);
             prop_assert!((axes * axes.transpose() - Matrix3::identity()).amax() < 1e-5);
-            prop_assert!((axes * Matrix3::from_diagonal(&squares) * axes.transpose() - matrix).amax() < 1e-5);
+            prop_assert!((axes * Matrix3::from_diagonal(&squares.into()) * axes.transpose() - matrix).amax() < 1e-5);
         }
     }
 }

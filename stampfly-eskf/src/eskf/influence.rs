@@ -118,7 +118,7 @@ mod tests {
                 let mut correction = [0.0; N];
                 correction[place] = rate * share * DT;
                 let state = lied_to(seconds, &correction, seconds);
-                assert!(state.velocity.xy().norm() < 0.06, "{place}: {:?}", state.velocity);
+                assert!(state.velocity.horizontal().norm() < 0.06, "{place}: {:?}", state.velocity);
                 assert!(state.gyro_bias.norm() < 1e-5 && 1.0 - state.cos_tilt() < 2e-4, "{place}: {state:?}");
             }
         }

@@ -311,7 +311,7 @@ impl Eskf {
         if !self.config.mag_enable {
             return Err(Refusal::NotUsed);
         }
-        let age = self.admit(Sensor::Mag, at, mag.field.as_slice())?;
+        let age = self.admit(Sensor::Mag, at, &mag.field.to_array())?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let strength = mag.field.norm();
         if !(10.0..=100.0).contains(&strength) {
@@ -405,7 +405,7 @@ impl Eskf {
     }
 
     pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
-        let [x, y, z, w]: [f32; 4] = attitude.coords.into();
+        let [w, x, y, z] = attitude.wxyz();
         let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-8);

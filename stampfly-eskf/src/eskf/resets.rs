@@ -211,7 +211,7 @@ impl Eskf {
             self.restart();
         } else if velocity.amax() > 50.0
             || position.z.abs() > 100.0
-            || (position.xy().amax() > 100.0 && self.is_velocity_aided())
+            || (position.horizontal().amax() > 100.0 && self.is_velocity_aided())
         {
             self.status.diverged = true;
         }

@@ -385,7 +385,9 @@ mod tests {
         let mut transition = Dense::identity();
         let eye = nalgebra::Matrix3::identity();
         transition.fixed_view_mut::<3, 3>(0, 3).copy_from(&(eye * dt));
-        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&-(step.delta_velocity.map(f64::from).cross_matrix() * r));
+        transition
+            .fixed_view_mut::<3, 3>(3, 6)
+            .copy_from(&-(nalgebra::Vector3::from(step.delta_velocity).map(f64::from).cross_matrix() * r));
         transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&(-r * dt));
         transition.fixed_view_mut::<3, 3>(6, 6).copy_from(&matrix(&rotation_matrix(step.delta_rotation)).transpose());
         transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&(-eye * dt));

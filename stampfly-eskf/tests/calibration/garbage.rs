@@ -74,7 +74,7 @@ proptest! {
         for field in fields {
             let _ = fit.add(&if sphere && field.norm() > 1.0 { field / field.norm() * 50.0 } else { field });
             if let Ok((correction, quality)) = fit.solve() {
-                let columns = correction.matrix.column_iter().map(|column| column.into_owned()).collect::<Vec<_>>();
+                let columns = correction.matrix.column_iter().map(|column| column.into_owned().into()).collect::<Vec<_>>();
                 prop_assert!(finite(&columns) && finite(&[correction.offset]));
                 prop_assert!(quality.residual.is_finite() && (15.0..=90.0).contains(&correction.strength));
             }

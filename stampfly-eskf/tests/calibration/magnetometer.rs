@@ -32,7 +32,7 @@ fn hard_and_soft_iron_are_found_from_all_directions() {
         offsets.0.push((correction.offset - offset).norm());
         let direction = random.direction();
         let corrected = correction.correct(shape * direction * strength + offset);
-        angles.0.push(corrected.angle(&direction).to_degrees());
+        angles.0.push(nalgebra::Vector3::from(corrected).angle(&direction.into()).to_degrees());
         residuals.0.push(quality.residual);
         assert!(quality.coverage == 1.0 && quality.samples > 900, "{quality:?}");
         assert!((correction.matrix - correction.matrix.transpose()).amax() < 1e-5);

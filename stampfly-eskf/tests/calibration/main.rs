@@ -32,11 +32,11 @@ impl Random {
     }
 
     fn vector(&mut self, limit: f32) -> Vec3 {
-        Vec3::from_fn(|_, _| self.within(limit))
+        Vec3::from_fn(|_| self.within(limit))
     }
 
     fn noise(&mut self, sigma: f32) -> Vec3 {
-        Vec3::from_fn(|_, _| StandardNormal.sample(&mut self.0)) * sigma
+        Vec3::from_fn(|_| StandardNormal.sample(&mut self.0)) * sigma
     }
 
     /// Any direction, each as likely as another.

@@ -100,7 +100,7 @@ impl Flight {
     }
 
     fn noise3(&mut self, sigma: f32) -> Vec3 {
-        Vec3::from_fn(|_, _| self.noise(sigma))
+        Vec3::from_fn(|_| self.noise(sigma))
     }
 
     /// The inertial sample that ends at this instant.
@@ -110,8 +110,8 @@ impl Flight {
         let gravity = Vector3::new(0.0, 0.0, f64::from(GRAVITY));
         let force = middle.attitude.inverse() * (middle.acceleration - gravity);
         ImuData {
-            accel: force.map(|v| v as f32) + self.accel_bias + self.noise3(0.5),
-            gyro: self.rate(before, at).map(|v| v as f32) + self.gyro_bias + self.noise3(0.01),
+            accel: narrow(force) + self.accel_bias + self.noise3(0.5),
+            gyro: narrow(self.rate(before, at)) + self.gyro_bias + self.noise3(0.01),
             temperature: 25.0,
             ..Default::default()
         }
@@ -146,18 +146,18 @@ impl Flight {
     }
 
     pub fn mag(&mut self, at: Instant) -> MagData {
-        let field = self.pose(at).attitude.inverse() * FIELD.map(f64::from);
-        MagData { field: field.map(|v| v as f32) + self.noise3(0.5) }
+        let field = self.pose(at).attitude.inverse() * wide(FIELD);
+        MagData { field: narrow(field) + self.noise3(0.5) }
     }
 
     /// What a still vehicle would have measured in the attitude of the beginning.
     pub fn calibration(&self) -> CalibrationResult {
         let attitude = self.pose(self.start).attitude;
         let level = attitude.inverse() * Vector3::new(0.0, 0.0, -f64::from(GRAVITY));
-        let field = attitude.inverse() * FIELD.map(f64::from);
+        let field = attitude.inverse() * wide(FIELD);
         CalibrationResult {
-            specific_force: level.map(|v| v as f32),
-            field: field.map(|v| v as f32),
+            specific_force: narrow(level),
+            field: narrow(field),
             gyro_bias: self.gyro_bias,
             complete: true,
             ..CalibrationResult::default()
@@ -185,15 +185,23 @@ impl Flight {
     /// How far off the estimate is: tilt (rad), velocity (m/s), height (m).
     pub fn errors(&self, eskf: &Eskf, at: Instant) -> [f64; 3] {
         let (pose, estimate) = (self.pose(at), eskf.estimate());
-        let down = (estimate.attitude.inverse() * Vec3::z()).map(f64::from);
+        let down = wide(estimate.attitude.inverse() * Vec3::z());
         let tilt = down.angle(&(pose.attitude.inverse() * Vector3::z()));
         let body = |velocity: Vector3<f64>, attitude: UnitQuaternion<f64>| attitude.inverse() * velocity;
-        let [x, y, z, w] = estimate.attitude.coords.map(f64::from).into();
+        let [w, x, y, z] = estimate.attitude.wxyz().map(f64::from);
         let attitude = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
         // In the body, because nothing but a magnetometer shows the heading.
-        let velocity = body(estimate.velocity.map(f64::from), attitude) - body(pose.velocity, pose.attitude);
+        let velocity = body(wide(estimate.velocity), attitude) - body(pose.velocity, pose.attitude);
         [tilt, velocity.norm(), (f64::from(estimate.height) + pose.position.z).abs()]
     }
+}
+
+fn wide(vector: Vec3) -> Vector3<f64> {
+    Vector3::from(vector).cast()
+}
+
+fn narrow(vector: Vector3<f64>) -> Vec3 {
+    vector.cast::<f32>().into()
 }
 
 /// Is the covariance finite, exactly symmetric and positive definite, by a Cholesky factorisation in double precision?

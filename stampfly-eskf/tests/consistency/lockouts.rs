@@ -14,13 +14,12 @@
 //! Recovered means within [`LIMITS`] from then on.
 
 use super::flight::{Flight, is_sound};
-use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{EstimatorCommand, TofData};
-use stampfly_types::{Instant, Vec3, math};
+use stampfly_types::{Instant, Quat, Vec3, math};
 
 /// Tilt, velocity, height: rad, m/s, m. Of the tilt 0.07 rad are what the box's accelerometer bias looks like.
 const LIMITS: [f64; 3] = [0.1, 0.3, 0.1];
@@ -48,9 +47,9 @@ fn recovery(wrong: &Wrong, seed: u64) -> (f64, Option<f64>) {
     let mut calibration = flight.calibration();
     let (sin, cos) = math::sin_cos(wrong.direction);
     let axis = Vec3::new(cos, sin, 0.0);
-    calibration.specific_force = Rotation3::new(axis * wrong.tilt) * calibration.specific_force;
-    flight.gyro_bias = Vector3::from(wrong.gyro_bias);
-    flight.accel_bias = Vector3::from(wrong.accel_bias);
+    calibration.specific_force = Quat::from_scaled_axis(axis * wrong.tilt) * calibration.specific_force;
+    flight.gyro_bias = Vec3::from(wrong.gyro_bias);
+    flight.accel_bias = Vec3::from(wrong.accel_bias);
     let mut eskf = Eskf::new(EskfConfig::default());
     eskf.initialize(flight.start, &calibration);
     eskf.command(flight.start, &EstimatorCommand { flying: true, ..EstimatorCommand::default() });

@@ -162,10 +162,8 @@ impl<'a> Builder<'a> {
         let [w, x, y, z] = parts.map(|column| self.grid.resample(series, column, Pick::Newest));
         let mut angles = [const { Vec::new() }; 3];
         for (((w, x), y), z) in w.into_iter().zip(x).zip(y).zip(z) {
-            let quaternion = nalgebra::Quaternion::new(w as f32, x as f32, y as f32, z as f32);
-            let seen = quaternion.coords.iter().all(|value| value.is_finite());
-            let attitude = Quat::new_unchecked(quaternion);
-            let euler = if seen { frame::roll_pitch_yaw(&attitude) } else { [f32::NAN; 3] };
+            let attitude = Quat::try_from([w, x, y, z].map(|value| value as f32));
+            let euler = attitude.map_or([f32::NAN; 3], |attitude| frame::roll_pitch_yaw(&attitude));
             angles.iter_mut().zip(euler).for_each(|(values, angle)| values.push(f64::from(angle) * DEGREES));
         }
         Some(angles)

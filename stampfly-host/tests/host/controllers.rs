@@ -84,7 +84,7 @@ impl Witness<Runnables> for Seen {
             Some(Id::control_output) if self.flies => {
                 let torque = message::<ControlOutput>(words).map(|output| output.torque);
                 if let (Some(now), Some(before)) = (torque, self.torque) {
-                    self.worked.add((now - before).xy().norm_squared());
+                    self.worked.add((now - before).horizontal().norm_squared());
                 }
                 self.torque = torque;
             }
@@ -94,7 +94,7 @@ impl Witness<Runnables> for Seen {
 
     fn beside(&mut self, _: usize, _: Instant, _: u32, words: &[u32]) {
         if let Some(truth) = message::<Truth>(words).filter(|_| self.flies) {
-            self.turned.add(truth.angular_rate.xy().norm_squared());
+            self.turned.add(truth.angular_rate.horizontal().norm_squared());
             self.tilt = self.tilt.max(frame::tilt(&truth.attitude));
         }
     }

@@ -81,14 +81,16 @@ impl Witness<Runnables> for Seen {
         if self.left.is_none() {
             self.above = self.above.max(-away.z);
             self.below = self.below.max(away.z);
-            self.beside = self.beside.max(away.xy().norm());
+            self.beside = self.beside.max(away.horizontal().norm());
         }
         if let Some(ended) = self.ended {
             if at.since(ended) < Duration::from_millis(100) {
-                self.tilt_error = self.tilt_error.max((truth.attitude * Vec3::z()).angle(&self.upright));
+                self.tilt_error = self
+                    .tilt_error
+                    .max(nalgebra::Vector3::from(truth.attitude * Vec3::z()).angle(&self.upright.into()));
             }
             if at.since(ended) >= Duration::from_secs(3) && self.left.is_none() {
-                self.left = Some([away.norm(), (truth.position - self.position).xy().norm()]);
+                self.left = Some([away.norm(), (truth.position - self.position).horizontal().norm()]);
             }
         } else {
             let dt = self.last.map_or(0.0, |last| at.since(last).seconds());

@@ -71,7 +71,7 @@ impl Witness<Runnables> for Hover {
             self.attitude.push(square(self.estimate.attitude.angle_to(&truth.attitude)));
             self.heights.push(height);
             self.places.push(truth.position);
-            self.headings.push(truth.attitude.euler_angles().2.to_degrees());
+            self.headings.push(frame::yaw(&truth.attitude).to_degrees());
             self.tilt = self.tilt.max(tilt);
         }
     }
@@ -94,8 +94,8 @@ impl Hover {
 
     /// Farthest from where the watching began, m.
     fn drift(&self) -> f32 {
-        let from = self.places.first().expect("it hovered").xy();
-        self.places.iter().map(|place| (place.xy() - from).norm()).fold(0.0, f32::max)
+        let from = self.places.first().expect("it hovered").horizontal();
+        self.places.iter().map(|place| (place.horizontal() - from).norm()).fold(0.0, f32::max)
     }
 }
 

@@ -97,7 +97,7 @@ fn on_cameras(flown: &Flown, delay: Duration, tell: bool) -> [f64; 2] {
     let mut pictures: Vec<(Instant, Vec3)> = Vec::new();
     for (at, truth) in &flown.truth {
         if pictures.last().is_none_or(|(last, _)| at.since(*last) >= CAMERA_PERIOD) {
-            pictures.push((*at, truth.position + Vec3::from_fn(|_, _| normal() * CAMERA_SIGMA)));
+            pictures.push((*at, truth.position + Vec3::from_fn(|_| normal() * CAMERA_SIGMA)));
         }
     }
     let mut pictures = pictures.into_iter().peekable();

@@ -66,7 +66,7 @@ struct Mean {
 
 impl Mean {
     fn add(&mut self, value: Vec3) {
-        self.sum += value.map(f64::from);
+        self.sum += wide(value);
         self.count += 1.0;
     }
 }
@@ -179,11 +179,11 @@ impl Observation {
         let turned = widen(&truth.attitude) * attitude.inverse();
         let mut error = SVector::<f64, N>::zeros();
         let mut put = |block: usize, value: SVector<f64, 3>| error.fixed_rows_mut::<3>(block).copy_from(&value);
-        put(POSITION, (truth.position - nominal.position).map(f64::from));
-        put(VELOCITY, (truth.velocity - nominal.velocity).map(f64::from));
+        put(POSITION, wide(truth.position - nominal.position));
+        put(VELOCITY, wide(truth.velocity - nominal.velocity));
         put(ATTITUDE, turned.scaled_axis());
-        put(GYRO_BIAS, -nominal.gyro_bias.map(f64::from));
-        put(ACCEL_BIAS, -nominal.accel_bias.map(f64::from));
+        put(GYRO_BIAS, -wide(nominal.gyro_bias));
+        put(ACCEL_BIAS, -wide(nominal.accel_bias));
         let mut into_world = SMatrix::<f64, N, N>::identity();
         into_world.fixed_view_mut::<3, 3>(ATTITUDE, ATTITUDE).copy_from(rotation.matrix());
         let covariance = SMatrix::from_fn(|i, j| f64::from(estimator.covariance().get(i, j)));
@@ -262,12 +262,12 @@ impl Snapshot {
 }
 
 fn widen(quat: &Quat) -> nalgebra::UnitQuaternion<f64> {
-    nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(
-        f64::from(quat.w),
-        f64::from(quat.i),
-        f64::from(quat.j),
-        f64::from(quat.k),
-    ))
+    let [w, x, y, z] = quat.wxyz().map(f64::from);
+    nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z))
+}
+
+fn wide(vector: Vec3) -> SVector<f64, 3> {
+    nalgebra::Vector3::from(vector).cast()
 }
 
 impl Observer for Observation {

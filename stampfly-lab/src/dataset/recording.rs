@@ -179,6 +179,6 @@ pub(super) fn attitude(w: f64, x: f64, y: f64, z: f64) -> Option<Quat> {
     let norm = (w * w + x * x + y * y + z * z).sqrt();
     ((norm - 1.0).abs() < 0.05).then(|| {
         let [w, x, y, z] = [w, x, y, z].map(|value| (value / norm) as f32);
-        Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z))
+        Quat::new_unchecked(w, x, y, z)
     })
 }

@@ -52,7 +52,7 @@ pub struct Accuracy {
 }
 
 fn exact(attitude: &Quat) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(attitude.quaternion().cast())
+    UnitQuaternion::new_normalize(UnitQuaternion::from(*attitude).into_inner().cast())
 }
 
 impl Accuracy {

@@ -183,5 +183,5 @@ fn apart(instances: &[Instance], reckoned: &[(Instant, [f32; 2])]) -> Option<f64
 fn is_finite(state: &StateEstimate) -> bool {
     let StateEstimate { attitude, position, velocity, height, .. } = state;
     let rest = position.iter().chain(velocity.iter()).chain([height]);
-    attitude.coords.iter().chain(rest).all(|value| value.is_finite())
+    attitude.wxyz().iter().chain(rest).all(|value| value.is_finite())
 }

@@ -88,8 +88,8 @@ fn glance(recording: &Recording, first: Instant) -> CalibrationResult {
 /// Heading in the recording's world: from magnetic north where the world is defined by it, otherwise as it was seen.
 fn heading(recording: &Recording, at: Instant, calibration: &CalibrationResult) -> f32 {
     let [w, x, y, z] = attitude_from_specific_force(&calibration.specific_force);
-    let level = Quat::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
-    if recording.kind == Kind::Broad && calibration.field.xy().norm() > 1.0 {
+    let level = Quat::new_unchecked(w, x, y, z);
+    if recording.kind == Kind::Broad && calibration.field.horizontal().norm() > 1.0 {
         let field = level * calibration.field;
         return -math::atan2(field.y, field.x);
     }

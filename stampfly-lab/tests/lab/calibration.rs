@@ -108,8 +108,8 @@ fn a_magnetometer_turned_by_hand_draws_a_sphere() {
             assert!(quality.residual < 0.025 * correction.strength && quality.coverage > 0.9, "{name}: {quality:?}");
             // The trials are calibrated, so what is found is our own iron and, in one of them, a phone.
             assert!((correction.offset - offset).amax() < 4.0, "{name}: {correction:?}");
-            let straight = correction.matrix * nalgebra::Matrix3::from_diagonal(&gain);
-            let gains = straight.diagonal() / straight.trace() * 3.0;
+            let straight = correction.matrix * nalgebra::Matrix3::from_diagonal(&gain.into());
+            let gains = Vec3::from(straight.diagonal()) / straight.trace() * 3.0;
             assert!((gains - none).amax() < 0.04, "{name}: {gains}");
         }
     }

@@ -56,7 +56,7 @@ fn frames_of_a_trial_become_ours() {
     assert_eq!((recording.kind, recording.imu.len(), recording.mag.len()), (Kind::Broad, 3, 3));
     let truth = recording.truth[2];
     let force = truth.attitude.unwrap() * recording.imu[2].data.accel;
-    assert!((force.z + 9.81).abs() < 1e-5 && force.xy().norm() < 1e-5, "up is up: {force:?}");
+    assert!((force.z + 9.81).abs() < 1e-5 && force.horizontal().norm() < 1e-5, "up is up: {force:?}");
     let field = truth.attitude.unwrap() * recording.mag[2].data.field;
     assert!((field.x - 20.0).abs() < 1e-4 && (field.z - 40.0).abs() < 1e-4, "north and down: {field:?}");
     let place = truth.position.unwrap();

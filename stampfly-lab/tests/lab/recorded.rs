@@ -149,7 +149,7 @@ fn nanobench_frames_agree_with_physics() {
     for (name, flight) in &flights {
         assert_eq!(flight.kind, Kind::NanoBench, "{name}");
         let force = mean_force(flight);
-        assert!((-10.3..-9.3).contains(&force.z) && force.xy().norm() < 0.6, "{name}: {force:?}");
+        assert!((-10.3..-9.3).contains(&force.z) && force.horizontal().norm() < 0.6, "{name}: {force:?}");
         let correlation = rate_correlation(flight, Duration::from_millis(50));
         // Slow circles hardly turn about z, hence the low bound; a wrong axis or sign gives zero or less.
         assert!(correlation.min() > 0.3 && correlation.sum() > 1.6, "{name}: {correlation:?}");
@@ -185,7 +185,7 @@ fn broad_frames_agree_with_physics() {
     for (name, trial) in &trials {
         assert_eq!(trial.kind, Kind::Broad, "{name}");
         let force = mean_force(trial);
-        assert!((-9.9..-9.7).contains(&force.z) && force.xy().norm() < 0.15, "{name}: {force:?}");
+        assert!((-9.9..-9.7).contains(&force.z) && force.horizontal().norm() < 0.15, "{name}: {force:?}");
         let correlation = rate_correlation(trial, Duration::from_millis(20));
         assert!(correlation.min() > 0.95, "{name}: {correlation:?}");
         // The field points north and, in central Europe, steeply down.

@@ -55,7 +55,7 @@ impl Rig {
 
     /// Uniform, as large as the noise of the sensor.
     fn noise(&mut self, size: f32) -> Vec3 {
-        Vec3::from_fn(|_, _| {
+        Vec3::from_fn(|_| {
             self.noise ^= self.noise << 13;
             self.noise ^= self.noise >> 17;
             self.noise ^= self.noise << 5;
@@ -361,7 +361,7 @@ fn a_weak_motor_is_looked_for_in_flight_only() {
 fn tumbled(phase: FlightPhase, mode: FlightMode, height: f32, [stood, tilt]: [f32; 2], torque: f32) -> Option<u32> {
     let config = FailsafeConfig { weak_roll: 1.0, weak_pitch: 1.0, ..FailsafeConfig::default() };
     let mut rig = Rig { failsafe: Failsafe::new(config), ..Rig::flying() };
-    let roll = |angle: f32| Quat::from_axis_angle(&Vec3::x_axis(), angle);
+    let roll = |angle: f32| Quat::from_axis_angle(&Vec3::x(), angle);
     (rig.mode.phase, rig.mode.mode, rig.estimate.attitude) = (FlightPhase::Armed, mode, roll(stood));
     for _ in 0..10 {
         rig.sample(REST, Vec3::zeros());

@@ -55,7 +55,7 @@ impl Wind {
         let gust = deviation.component_mul(&noise.normal3());
         // This drive keeps the variance where it starts.
         let drive = deviation * (1.0 - keep * keep).sqrt();
-        Self { noise, mean: config.mean.cast(), gust, keep, drive, countdown: DECIMATION }
+        Self { noise, mean: Vector3::from(config.mean).cast(), gust, keep, drive, countdown: DECIMATION }
     }
 
     pub(crate) fn step(&mut self) {

@@ -66,8 +66,10 @@ impl MotionCapture for CameraModel {
             }
             let motion = self.world.motion_at(at);
             let data = ExternalPose {
-                position: (self.turn * (motion.position - self.origin) + position).cast(),
-                attitude: (self.turn * motion.attitude * UnitQuaternion::from_scaled_axis(attitude)).cast(),
+                position: (self.turn * (motion.position - self.origin) + position).cast::<f32>().into(),
+                attitude: (self.turn * motion.attitude * UnitQuaternion::from_scaled_axis(attitude))
+                    .cast::<f32>()
+                    .into(),
                 position_sigma: POSITION as f32,
                 attitude_sigma: ATTITUDE as f32,
             };

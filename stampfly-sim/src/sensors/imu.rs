@@ -149,7 +149,7 @@ impl ImuModel {
     /// rectification of vibration.
     #[must_use]
     pub fn bias(&self) -> (Vec3, Vec3) {
-        (self.physics.accel_bias.cast(), self.physics.gyro_bias.cast())
+        (self.physics.accel_bias.cast::<f32>().into(), self.physics.gyro_bias.cast::<f32>().into())
     }
 
     /// Chip sample `number` in counts: accelerometer x, y, z, gyroscope x, y, z.
@@ -183,7 +183,10 @@ impl ImuModel {
 #[must_use]
 pub fn counts_to_si(counts: [f64; 6]) -> (Vec3, Vec3) {
     let [ax, ay, az, gx, gy, gz] = counts;
-    ((Vector3::new(ax, ay, az) / ACCEL_SCALE).cast(), (Vector3::new(gx, gy, gz) / GYRO_SCALE).cast())
+    (
+        (Vector3::new(ax, ay, az) / ACCEL_SCALE).cast::<f32>().into(),
+        (Vector3::new(gx, gy, gz) / GYRO_SCALE).cast::<f32>().into(),
+    )
 }
 
 impl stampfly_drivers::Imu for ImuModel {

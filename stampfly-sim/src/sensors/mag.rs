@@ -76,7 +76,7 @@ impl MagModel {
     /// The offset that a calibration has to find, µT, body.
     #[must_use]
     pub fn hard_iron(&self) -> stampfly_types::Vec3 {
-        self.physics.hard_iron.cast()
+        self.physics.hard_iron.cast::<f32>().into()
     }
 }
 
@@ -89,6 +89,6 @@ impl Magnetometer for MagModel {
         self.clock.sleep_until(at + READ_OUT).await;
         self.schedule.reported(number);
         let field = self.physics.field(at).map(|value| (value / RESOLUTION).round() * RESOLUTION);
-        Ok(Sample { at, data: MagData { field: field.cast() } })
+        Ok(Sample { at, data: MagData { field: field.cast::<f32>().into() } })
     }
 }

@@ -44,7 +44,7 @@ fn takes_off_hovers_in_gusts_and_lands() {
         for truth in at(8) {
             assert!(!truth.contact);
             assert!((truth.position.z + 0.8).abs() < 0.15, "height {} with seed {seed}", truth.position.z);
-            assert!(truth.position.xy().norm() < 1.2, "drift {} with seed {seed}", truth.position.xy());
+            assert!(truth.position.horizontal().norm() < 1.2, "drift {} with seed {seed}", truth.position.horizontal());
             assert!(tilt(&truth.attitude) < 0.3 && truth.rotor_speed.iter().all(|w| (2500.0..3600.0).contains(w)));
             assert!((3.8..4.3).contains(&truth.battery_voltage) && (3.0..5.0).contains(&truth.battery_current));
         }
@@ -59,5 +59,5 @@ fn still_air_and_a_perfect_vehicle_give_a_perfect_hover() {
     config.plant.manufacturing_spread = 0.0;
     config.pose = Some(stampfly_sim::plant::Pose::hovering(1.0));
     let record = fly(&config, 5, |_| Some(-1.0));
-    assert!(record.iter().all(|t| (t.position.z + 1.0).abs() < 0.05 && t.position.xy().norm() < 1e-4));
+    assert!(record.iter().all(|t| (t.position.z + 1.0).abs() < 0.05 && t.position.horizontal().norm() < 1e-4));
 }

@@ -35,7 +35,7 @@ impl Course {
     /// The vehicle is here.
     pub fn visit(&mut self, position: &Vec3) {
         for ([north, east], visited) in &mut self.places {
-            let away = position.xy() - Vec3::new(*north, *east, 0.0).xy();
+            let away = position.horizontal() - Vec3::new(*north, *east, 0.0).horizontal();
             *visited |= away.norm() < VISITED;
         }
     }
@@ -48,7 +48,7 @@ impl Course {
     /// The highest height commanded until this step, and the distance of a place from the path until there.
     pub fn commanded(&self, done: usize, place: &Vec3) -> (f32, f32) {
         let (mut top, mut corner) = (0.0_f32, [0.0, 0.0]);
-        let mut beside = place.xy().norm();
+        let mut beside = place.horizontal().norm();
         for step in self.steps.iter().take(done + 1) {
             match *step {
                 Step::TakeOff { height } => top = top.max(height),
@@ -83,7 +83,7 @@ mod tests {
         let course = Course::new(&Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.8\nland\n").expect("a mission"));
         let place = Vec3::new(0.5, 0.3, 0.0);
         let (top, beside) = course.commanded(1, &place);
-        assert!(top == 0.5 && (beside - place.xy().norm()).abs() < 1e-6);
+        assert!(top == 0.5 && (beside - place.horizontal().norm()).abs() < 1e-6);
         let (top, beside) = course.commanded(2, &place);
         assert!(top == 0.8 && (beside - 0.3).abs() < 1e-6);
         assert_eq!(distance([2.0, 0.0], [0.0, 0.0], [1.0, 0.0]), 1.0, "beyond its end");

@@ -157,7 +157,8 @@ fn is_sound(estimate: &StateEstimate, words: &[u32]) -> bool {
     let mut numbers = fields
         .filter(|(_, field)| field.kind == FieldKind::F32)
         .flat_map(|(start, field)| words.get(start..start + field.words).unwrap_or_default());
-    numbers.all(|word| f32::from_bits(*word).is_finite()) && (estimate.attitude.into_inner().norm() - 1.0).abs() <= 1e-4
+    numbers.all(|word| f32::from_bits(*word).is_finite())
+        && (stampfly_types::math::sqrt(estimate.attitude.norm_squared()) - 1.0).abs() <= 1e-4
 }
 
 #[cfg(test)]

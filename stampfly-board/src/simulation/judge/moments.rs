@@ -33,7 +33,7 @@ impl Moments {
             (Moment::Spool, motors_on),
             (Moment::TakeOff, clearance > CLIMBED),
             (Moment::Hover, hovers),
-            (Moment::Move, hovers && truth.velocity.xy().norm() > MOVES),
+            (Moment::Move, hovers && truth.velocity.horizontal().norm() > MOVES),
             (Moment::Landing, sinks && truth.velocity.z > 0.1),
             (Moment::Touch, touches),
         ];

@@ -41,7 +41,7 @@ impl Numbers {
     }
 
     fn vector(&mut self, most: f32) -> Vec3 {
-        Vec3::from_fn(|_, _| self.number(most))
+        Vec3::from_fn(|_| self.number(most))
     }
 
     /// True once in so many times.

@@ -43,12 +43,12 @@ impl AttitudeFilter {
         // Where the body was when the field was what this sample says.
         let late = age + self.config.mag_delay - self.config.inertial_delay;
         let then = product(&self.strapdown, &from_vector(&(self.rate * -late)));
-        let turn = (self.level * then).to_rotation_matrix();
-        self.remove_hard_iron(turn.matrix(), field, dt);
+        let turn = Matrix3::from(self.level * then);
+        self.remove_hard_iron(&turn, field, dt);
         let config = &self.config;
         let stationary = self.stationary.is_stationary(config);
         let level = turn * (field - self.offset);
-        let vertical = turn.matrix().row(2).transpose();
+        let vertical = turn.row(2).transpose().into();
         let status = self.magnetic.step(config, &level, self.rate.norm(), dt);
         match status {
             FieldStatus::Clean { ratio } => {
@@ -102,7 +102,7 @@ impl AttitudeFilter {
         if change > NEW_OFFSET * earth.norm() {
             self.offset = offset;
             self.magnetic = Magnetic::new(Some(&earth));
-            self.heading.inflate(change / earth.xy().norm().max(1.0));
+            self.heading.inflate(change / earth.horizontal().norm().max(1.0));
             self.heading.clear_declination();
             self.bias.interrupt(1.0);
         } else {

@@ -184,7 +184,7 @@ impl Seen {
         let mut stretch =
             self.truths.iter().filter(|(at, _)| (since..=until).contains(at)).map(|(_, truth)| truth.position);
         let from = stretch.next().expect("a stretch");
-        stretch.map(|place| (place - from).xy().norm()).fold(0.0, f32::max)
+        stretch.map(|place| (place - from).horizontal().norm()).fold(0.0, f32::max)
     }
 }
 

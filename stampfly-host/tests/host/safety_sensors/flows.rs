@@ -59,7 +59,7 @@ fn d8_flow_that_lies_is_found_and_does_not_crash_the_vehicle() {
             assert!(!valid.contains(Validity::POSITION_XY) && valid.contains(Validity::HEIGHT), "{what}, seed {seed}");
             // What is left of the velocity comes from drag.
             let truth = &seen.truths.iter().find(|(at, _)| at >= when).expect("a truth").1;
-            let wrong = (estimate.velocity - truth.velocity).xy().norm();
+            let wrong = (estimate.velocity - truth.velocity).horizontal().norm();
             assert!(!valid.contains(Validity::VELOCITY_XY) || wrong < 0.5, "{what}, seed {seed}: {wrong} m/s");
         }
     }

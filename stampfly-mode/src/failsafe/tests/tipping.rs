@@ -103,7 +103,7 @@ fn a_flip_may_be_upside_down_for_as_long_as_a_loop_of_a_pilot() {
     let upside_down = |phase, mode| {
         let mut rig = Rig::flying();
         (rig.mode.phase, rig.mode.mode) = (phase, mode);
-        rig.estimate.attitude = Quat::from_axis_angle(&Vec3::x_axis(), core::f32::consts::PI);
+        rig.estimate.attitude = Quat::from_axis_angle(&Vec3::x(), core::f32::consts::PI);
         (1..=2_000).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::TUMBLED))
     };
     let flip = upside_down(FlightPhase::Flip, FlightMode::PosHold);
