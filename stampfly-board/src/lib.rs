@@ -1,9 +1,11 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! The StampFly assembled.
 //!
 //! Two tables say it all: [`topics`], who publishes what for whom, and [`schedule`], what runs when. The rest is
 //! [runnables], one a component. What the vehicle is, in numbers, is its [airframe]. `stampfly-flight` runs them: on the hardware, in simulation, in a replay.
 #![no_std]
-#![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 #[cfg(any(test, feature = "simulation"))]
 extern crate std;
@@ -24,3 +26,9 @@ pub mod simulation;
 pub mod topics;
 
 pub use config::{ControllerKind, EstimatorKind, VehicleConfig};
+/// The tables' ends.
+pub use stampfly_bus as bus;
+/// What runs the tables.
+pub use stampfly_flight as flight;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;

@@ -229,6 +229,12 @@ fn documentation(attribute: TokenStream) -> Option<Literal> {
     }
 }
 
+/// For generated code that is about this name: an error is shown at the name, local variables are the generator's. Without that, a
+/// variable of the code around would be another one of the same name.
+pub fn located(name: &Ident) -> Span {
+    Span::call_site().located_at(name.span())
+}
+
 /// `sensor_imu` as a type's name: `SensorImu`, with an ending.
 pub fn type_name(name: &Ident, ending: &str) -> Ident {
     let text = name.to_string();

@@ -9,21 +9,23 @@
 //! | `input` | a cursor over tokens: expect a word, a list, a number, or fail with a position |
 //! | `topics` | the topic table: grammar, checks, generated code |
 //! | `schedule` | the activation table: the same |
+//! | `root` | where the generated code finds the bus |
 
 mod input;
+mod root;
 mod schedule;
 mod topics;
 
 use proc_macro::TokenStream;
 
-/// See `stampfly_bus::topics!`.
+/// See `stampfly_bus::topics!`. The table stands behind the path to the bus.
 #[proc_macro]
 pub fn topics(table: TokenStream) -> TokenStream {
-    topics::expand(table.into()).unwrap_or_else(input::Error::into_tokens).into()
+    root::expand(table.into(), topics::expand).into()
 }
 
-/// See `stampfly_bus::schedule!`.
+/// See `stampfly_bus::schedule!`. The table stands behind the path to the bus.
 #[proc_macro]
 pub fn schedule(table: TokenStream) -> TokenStream {
-    schedule::expand(table.into()).unwrap_or_else(input::Error::into_tokens).into()
+    root::expand(table.into(), schedule::expand).into()
 }

@@ -1,6 +1,6 @@
 //! The activation table: its lines, the checks on them, and the code that follows.
 
-use crate::input::{Attributes, Error, Input, Result, once};
+use crate::input::{Attributes, Error, Input, Result, located, once};
 use proc_macro2::{Ident, Span, TokenStream, TokenTree};
 use quote::{quote, quote_spanned};
 
@@ -182,7 +182,7 @@ impl Row {
         let name = &self.name;
         let no_rate = format!("`{name}` is activated by a topic without a rate");
         let late = format!("`{name}` may not have finished when it is due again");
-        quote_spanned!(name.span() => const _: () = match RESPONSES[Id::#name as usize] {
+        quote_spanned!(located(name) => const _: () = match RESPONSES[Id::#name as usize] {
             Ok(_) => {}
             Err(::stampfly_bus::Unbounded::NoRate) => panic!(#no_rate),
             Err(_) => panic!(#late),
@@ -200,15 +200,15 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
     let in_time = rows.iter().map(Row::in_time);
     let new = rows.iter().map(|row| {
         let (name, runnable) = (&row.name, &row.runnable);
-        quote_spanned!(name.span() => #name: <#runnable>::new(config))
+        quote_spanned!(located(name) => #name: <#runnable>::new(config))
     });
     let places: Vec<_> = names.iter().map(|name| quote!(index if index == Id::#name as usize)).collect();
     let reads =
         // At the line's own name, so that a runnable with the ends of another is reported there.
-        names.iter().map(|name| quote_spanned!(name.span() => ::stampfly_bus::ReadInputs::read(&mut ends.#name, activation)));
+        names.iter().map(|name| quote_spanned!(located(name) => ::stampfly_bus::ReadInputs::read(&mut ends.#name, activation)));
     let runs = rows.iter().map(|row| {
         let (name, runnable) = (&row.name, &row.runnable);
-        quote_spanned!(name.span() =>
+        quote_spanned!(located(name) =>
             <#runnable as ::stampfly_bus::Runnable>::run(&mut self.#name, activation, &mut ends.#name))
     });
     let inputs = rows.iter().map(|row| {

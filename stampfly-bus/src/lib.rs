@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! Typed topics on a lock-free broadcast ring, and the table that says what runs when.
 //!
 //! A vehicle is two tables. [`topics!`] says what is published, by whom, how often and for whom; [`schedule!`]
@@ -40,12 +43,18 @@ mod table;
 mod topic;
 
 pub use activation::{Activation, ReadInputs, Runnable};
+/// Its vectors are in signatures here.
+pub use heapless;
 pub use input::{NewestInput, SamplesInput};
 pub use line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
-pub use macros::{schedule, topics};
 pub use response::{JITTER, Unbounded, response_time};
 pub use schedule::Schedule;
 pub use scheduler::{ActivationState, Scheduler};
+/// For [`topics!`] and [`schedule!`].
+#[doc(hidden)]
+pub use stampfly_bus_macros::{schedule as __schedule, topics as __topics};
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;
 pub use stampfly_types::activation::MAX_INPUTS;
 pub use stampfly_types::{Duration, Instant, Message, Stamped, message, message_enum, message_flags};
 pub use table::{LATEST_DEPTH, PublishWords, Split, Taps, TopicInfo, TopicTable};
@@ -56,8 +65,3 @@ pub use topic::{
 #[cfg(loom)]
 #[doc(hidden)]
 pub use sync::weaken;
-
-/// The README's example, compiled and run.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -59,7 +59,10 @@
 /// ```
 ///
 /// Publishing from two places, reading without being named and forgetting a participant do not compile.
-pub use stampfly_bus_macros::topics;
+#[macro_export]
+macro_rules! topics {
+    ($($table:tt)*) => { $crate::__topics! { $crate $($table)* } };
+}
 
 /// Declares what runs when, in a module of its own.
 ///
@@ -130,4 +133,7 @@ pub use stampfly_bus_macros::topics;
 /// }
 /// # fn main() { assert_eq!(ACTIVATIONS[0].name, "control"); }
 /// ```
-pub use stampfly_bus_macros::schedule;
+#[macro_export]
+macro_rules! schedule {
+    ($($table:tt)*) => { $crate::__schedule! { $crate $($table)* } };
+}

@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! From state and set-point to motor duty, in exchangeable pieces.
 //!
 //! ```text
@@ -21,10 +24,6 @@
 //! Units are SI, the body frame is FRD, the world NED (see [`stampfly_types::frame`]). Numbers that are not finite
 //! are stopped at the entrance of each piece: they select a degraded behaviour and never reach a state or an output.
 #![no_std]
-
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
 
 #[cfg(test)]
 extern crate std;
@@ -63,4 +62,8 @@ pub use indi::{IndiConfig, IndiController};
 pub use intent::Intent;
 pub use mixer::{GeometryError, Mixed, Mixer, MultirotorMixer};
 pub use motor::{MotorConfig, MotorStage};
+/// Its complex numbers are in signatures here.
+pub use nalgebra;
 pub use pid::{Integration, Pid, PidGains};
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;

@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! State estimation for small vehicles.
 //!
 //! | estimator | use it for | size | not for |
@@ -13,7 +16,6 @@
 //! All but the last implement [`Estimator`]. They need no allocation and no other crate of the family than
 //! `stampfly-types`, and give the same bits on every machine.
 #![no_std]
-#![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 #[cfg(test)]
 extern crate std;
@@ -35,3 +37,7 @@ pub use eskf::Eskf;
 pub use estimator::{Estimator, Fusion, Refusal};
 pub use level::attitude_from_specific_force;
 pub use measurements::{Aiding, Measurements, feed};
+/// Its matrices are in signatures here.
+pub use nalgebra;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;

@@ -245,7 +245,7 @@ macro_rules! datagrams {
 
             fn is_valid(&self) -> bool {
                 match self {
-                    $(Self::$Name(message) => $crate::__types::text::is_finite(message) && {
+                    $(Self::$Name(message) => $crate::types::text::is_finite(message) && {
                         let $message = message;
                         $valid
                     }),+

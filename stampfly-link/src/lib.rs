@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! The radio link of the StampFly, without a radio.
 //!
 //! | type | what it is | when to use it |
@@ -56,16 +59,10 @@ pub use sequence::SequenceFilter;
 pub use session::{Counters, PairingRefused, Rejected, Session};
 pub use telemetry::{LinkState, TelemetryError, TelemetryPacket};
 
-/// For [`datagrams!`].
-#[doc(hidden)]
-pub use stampfly_types as __types;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;
 
 /// The checksum of every packet that has one: the sum of the bytes before it, modulo 256.
 fn checksum(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |sum, byte| sum.wrapping_add(*byte))
 }
-
-/// The README's example, compiled and run.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! The flight record: what happened, in a file that public tools open and that a replay can trust.
 //!
 //! | module | what it is | when to use it |
@@ -45,4 +48,6 @@ pub mod trace;
 pub mod ulog;
 
 pub use hash::FlightHash;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;
 pub use trace::ActivationTopic;

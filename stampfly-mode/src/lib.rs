@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! What the vehicle is doing, whether it may, and who decides.
 //!
 //! | module | decides | steps |
@@ -48,3 +51,5 @@ pub use landing::{LandingConfig, LandingInput, TakeoffLanding};
 pub use machine::{Command, ModeInput, ModeMachine, ModeOutput};
 pub use pilot::{Heard, Switched};
 pub use signal::Signaller;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;

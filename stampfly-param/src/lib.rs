@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! Parameters: a table of them, a change while the vehicle runs, and values that survive a power cut.
 //!
 //! | type | what it is |
@@ -38,11 +41,7 @@ pub use set::{ParameterAction, ParameterRequest, ParameterSet, ParameterStatus};
 pub use store::{ParameterStore, key};
 pub use table::{Parameter, ParameterError, ParameterTable};
 
-/// For [`parameters!`].
-#[doc(hidden)]
-pub use stampfly_types as __types;
-
-/// The README's example, compiled.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+/// Its traits are in signatures here.
+pub use embedded_storage_async;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;

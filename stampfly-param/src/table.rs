@@ -148,8 +148,8 @@ macro_rules! parameters {
             }
 
             // The numbers of a group are one field of the message, because a message's own default is zeros.
-            impl $crate::__types::Field for $Group {
-                const KIND: $crate::__types::FieldKind = $crate::__types::FieldKind::F32;
+            impl $crate::types::Field for $Group {
+                const KIND: $crate::types::FieldKind = $crate::types::FieldKind::F32;
                 const COUNT: usize = [$($default),+].len();
                 const SIZE: usize = Self::COUNT;
                 fn initial() -> Self {
@@ -165,7 +165,7 @@ macro_rules! parameters {
             }
         )+
 
-        $crate::__types::message! {
+        $crate::types::message! {
             $(#[$set_doc])*
             $vis struct $Set { $($(#[$group_doc])* $group: $Group ["SI"]),+ }
         }

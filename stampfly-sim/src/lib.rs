@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! A simulated quadrotor behind the same traits as a real one.
 //!
 //! * [`time`]: virtual time and a deterministic executor;
@@ -28,9 +31,8 @@ mod world;
 
 pub use noise::Noise;
 pub use simulation::{Simulation, SimulationConfig};
+/// The traits that simulated sensors and motors implement.
+pub use stampfly_drivers as drivers;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;
 pub use world::{Truth, World};
-
-/// The README's example, compiled and run.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

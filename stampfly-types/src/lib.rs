@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! The vocabulary of the StampFly flight stack.
 //!
 //! Every other crate of the family depends on this one and on none of its siblings, so what two crates

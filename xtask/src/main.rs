@@ -36,7 +36,6 @@ const STEPS: &[Step] = &[
     Step::new("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
     Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
-    Step::new("consumers", "Build and run one program per crate outside the workspace", steps::consumers::run).beside(),
     Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
         .accepting(&[Seconds]),
     Step::new("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run).accepting(&[File]),
@@ -58,7 +57,12 @@ const STEPS: &[Step] = &[
     )
     .beside()
     .accepting(&[File]),
-    Step::new("package", "Build each crate from its package, as committed", steps::package::run).beside(),
+    Step::new(
+        "package",
+        "Build each crate from its package, and run the first example of its README",
+        steps::package::run,
+    )
+    .beside(),
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
     Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).alone(),

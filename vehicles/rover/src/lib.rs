@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //! A rover made from the StampFly flight stack: the second vehicle of the family, a software-defined vehicle in the
 //! architecture of AUTOSAR (software components over a runtime environment, pure models below).
 //!
@@ -38,8 +41,5 @@ pub mod topics;
 
 pub use parameters::Parameters;
 pub use schedule::Runnables;
-
-/// The README's example, compiled.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+/// Messages, time, vectors: the words that signatures here are written in.
+pub use stampfly_types as types;

@@ -6,7 +6,6 @@ pub mod bugs;
 pub mod campaign;
 pub mod clippy;
 pub mod constants;
-pub mod consumers;
 pub mod cortex_m4f;
 pub mod coverage;
 pub mod determinism;

@@ -1,6 +1,9 @@
-//! `package`: each library, as committed, builds from the archive that would be published.
+//! `package`: each library, as committed, builds from the archive that would be published, and a program that adds it alone runs the
+//! first example of its README.
 //!
 //! Works on a fresh clone, so that a file that exists but was never committed is noticed.
+
+mod example;
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Library, Repository, capture, run as run_program};
@@ -15,8 +18,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let clone = repository.target("package-clone");
     let _ = fs::remove_dir_all(&clone);
     run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
-    // Into the folder of `consumers`, whose programs have the same dependencies with the same features.
-    let folder = repository.target("consumers");
+    let folder = repository.target("archives");
     let libraries = repository.libraries()?;
     let inside = |arguments: &[&str]| {
         let mut cargo = repository.cargo();
@@ -33,7 +35,8 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let _ = fs::remove_dir_all(folder.join("package"));
     forget_unpacked(&libraries);
     run_program(&mut inside(&["clean", "--quiet"]))?;
-    run_program(&mut inside(&["package", "--locked", "--quiet"]))
+    run_program(&mut inside(&["package", "--locked", "--quiet"]))?;
+    example::run(repository, &folder.join("package"), &libraries)
 }
 
 /// Removes what cargo's home keeps unpacked of these libraries: it is of an older commit and has the same version.
