@@ -58,17 +58,17 @@ async fn life(mut writes: usize) -> bool {
     let mut store = ParameterStore::open(flash, 0..4 * PAGE as u32).await.expect("four pages");
     let mode = FlightStatus::default();
     let disarmed = || Disarmed::proven_by(&mode).expect("standing on a table");
-    store.save(disarmed(), NAME, 0.0012, 0.0..=0.01).await.expect("power");
+    store.save_within(disarmed(), NAME, 0.0012, 0.0..=0.01).await.expect("power");
 
     let mut flash = store.into_flash();
     core::mem::swap(&mut flash.writes_left, &mut writes);
     let mut store = ParameterStore::open(flash, 0..4 * PAGE as u32).await.expect("four pages");
-    let saved = store.save(disarmed(), NAME, 0.0018, 0.0..=0.01).await.is_ok();
+    let saved = store.save_within(disarmed(), NAME, 0.0018, 0.0..=0.01).await.is_ok();
 
     let mut flash = store.into_flash();
     flash.writes_left = usize::MAX;
     let mut store = ParameterStore::open(flash, 0..4 * PAGE as u32).await.expect("four pages");
-    let gain = store.load(NAME, 0.0..=0.01).await.expect("readable").expect("one of the two");
+    let gain = store.load_within(NAME, 0.0..=0.01).await.expect("readable").expect("one of the two");
     println!("{:<32} {NAME} = {gain}", if saved { "saved" } else { "power lost while saving" });
     assert!(gain == 0.0012 || gain == 0.0018, "never anything else");
     saved

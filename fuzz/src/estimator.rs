@@ -67,7 +67,7 @@ fn check(eskf: &Eskf) {
     ];
     let finite = vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()));
     assert!(finite && estimate.height.is_finite(), "{estimate:?}");
-    let length = estimate.attitude.coords.norm();
+    let length = stampfly_types::math::sqrt(estimate.attitude.norm_squared());
     assert!((length - 1.0).abs() < 1e-3, "a quaternion of length {length}");
     let covariance = eskf.covariance();
     for i in 0..15 {

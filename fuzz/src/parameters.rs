@@ -36,11 +36,11 @@ fn use_store(flash: Flash) {
     // Without power nothing can be said, and there is no flash left to look at: the store owned it.
     let Ok(mut store) = open(flash) else { return };
     let before = NAMES.map(|name| load(&mut store, name));
-    let _ = block_on(store.load_bytes::<6>(ADDRESS));
+    let _ = block_on(store.load::<[u8; 6]>(ADDRESS));
     let mut expected = before;
     for (index, name) in NAMES.into_iter().enumerate() {
         let value = index as f32 + 0.5;
-        match block_on(store.save(disarmed(), name, value, BOUNDS)) {
+        match block_on(store.save_within(disarmed(), name, value, BOUNDS)) {
             Ok(()) => expected[index] = Some(value),
             // Half of it may be there.
             Err(SaveError::Flash(FlashError::Power)) => return restart(store, None),
@@ -52,7 +52,7 @@ fn use_store(flash: Flash) {
                     Err(_) => return restart(store, None),
                 }
                 expected = [None; 3];
-                if block_on(store.save(disarmed(), name, value, BOUNDS)).is_err() {
+                if block_on(store.save_within(disarmed(), name, value, BOUNDS)).is_err() {
                     return restart(store, None);
                 }
                 expected[index] = Some(value);
@@ -79,7 +79,7 @@ fn open(flash: Flash) -> Result<ParameterStore<Flash>, stampfly_param::OpenError
 
 /// A value that is there and may be used.
 fn load(store: &mut ParameterStore<Flash>, name: &str) -> Option<f32> {
-    let value = block_on(store.load(name, BOUNDS)).ok().flatten();
+    let value = block_on(store.load_within(name, BOUNDS)).ok().flatten();
     assert!(value.is_none_or(|value| BOUNDS.contains(&value)), "{name}: {value:?}");
     value
 }
@@ -93,9 +93,9 @@ pub fn image_of_a_store() -> Vec<u8> {
     let mut store = open(Flash::new(vec![0xFF; PAGES * PAGE])).expect("five pages");
     for round in 0..20u8 {
         for name in NAMES {
-            block_on(store.save(disarmed(), name, f32::from(round), BOUNDS)).expect("a flash with power");
+            block_on(store.save_within(disarmed(), name, f32::from(round), BOUNDS)).expect("a flash with power");
         }
     }
-    block_on(store.save_bytes(disarmed(), ADDRESS, [2, 0, 0, 0, 0, 7])).expect("a flash with power");
+    block_on(store.save(disarmed(), ADDRESS, [2, 0, 0, 0, 0, 7])).expect("a flash with power");
     store.into_flash().into_bytes()
 }

@@ -1,5 +1,6 @@
 //! What can go wrong, by operation.
 
+use crate::{AnyValue, Kind};
 use core::fmt;
 use sequential_storage::Error;
 
@@ -22,8 +23,15 @@ pub enum LoadError<E> {
     /// What is stored is outside its range, or not a number: the range has changed, or the flash lies.
     OutOfRange {
         /// What is stored.
-        stored: f32,
+        stored: AnyValue,
     },
+    /// What is stored is of another type than asked for.
+    OtherKind {
+        /// Of which.
+        stored: Kind,
+    },
+    /// Another name has the same number in flash, and is stored.
+    NameTaken,
     /// The pages make no sense. [`ParameterStore::erase`](crate::ParameterStore::erase) helps.
     Corrupted,
     /// The flash.
@@ -36,6 +44,10 @@ pub enum LoadError<E> {
 pub enum SaveError<E> {
     /// The value is outside its range, or not a number.
     OutOfRange,
+    /// The name is longer than [`LONGEST_NAME`](crate::LONGEST_NAME).
+    NameTooLong,
+    /// Another name has the same number in flash: one in four thousand million pairs has. Give it another name.
+    NameTaken,
     /// More names than the pages have room for.
     Full,
     /// The flash took the value and gives back something else.
@@ -84,6 +96,7 @@ impl<E> From<Error<E>> for SaveError<E> {
     }
 }
 
+const TAKEN: &str = "another name has the same number in flash";
 const NOT_KEPT: &str = "the flash does not keep what is written";
 
 impl<E: fmt::Debug> fmt::Display for OpenError<E> {
@@ -100,6 +113,8 @@ impl<E: fmt::Debug> fmt::Display for LoadError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfRange { stored } => write!(f, "the stored {stored} is out of range"),
+            Self::OtherKind { stored } => write!(f, "the stored value is a {stored:?}"),
+            Self::NameTaken => f.write_str(TAKEN),
             Self::Corrupted => f.write_str("the stored parameters are damaged"),
             Self::Flash(error) => write!(f, "flash: {error:?}"),
         }
@@ -110,6 +125,8 @@ impl<E: fmt::Debug> fmt::Display for SaveError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfRange => f.write_str("the value is out of range"),
+            Self::NameTooLong => f.write_str("the name is too long"),
+            Self::NameTaken => f.write_str(TAKEN),
             Self::Full => f.write_str("no room for another parameter"),
             Self::NotKept => f.write_str(NOT_KEPT),
             Self::Corrupted => f.write_str("the stored parameters are damaged"),

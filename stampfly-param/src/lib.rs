@@ -7,14 +7,17 @@
 //! |---|---|
 //! | [`parameters!`] | declares a vehicle's parameters: name, default, range, unit |
 //! | [`ParameterSet`] | applies a change as a whole at the next period, and rolls it back |
-//! | [`ParameterStore`] | loads and saves values by name, on any NOR flash |
+//! | [`ParameterStore`] | loads and saves values by name, on any NOR flash; [`blocking::ParameterStore`] without `async` |
+//! | [`Storable`], [`AnyValue`] | what can be saved: numbers, yes or no, up to 16 bytes |
+//! | [`RamFlash`] | a flash that forgets, for desktop programs and tests |
 //! | [`Disarmed`] | the proof without which nothing is written |
 //! | [`key`] | the number a name has in flash |
 //!
 //! Use it at power-on, to overlay a vehicle's defaults with what its owner has saved, and from a console. Not in flight:
 //! while flash is written, an ESP32 runs nothing that is not in RAM, for up to 200 ms.
 //!
-//! A name is stored as its 32-bit FNV-1a hash. A table of parameters should be tested for two names with one hash.
+//! A value is stored with its type and its name, and found by the name's 32-bit FNV-1a hash. Two names with one hash are told
+//! apart: the second is refused.
 //!
 //! # What a power cut can do
 //! A value is appended and becomes valid with its last word, so after a cut each name has the value before it or the one
@@ -28,18 +31,23 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod blocking;
 mod disarmed;
 mod error;
 mod pages;
+mod ram;
 mod set;
 mod store;
 mod table;
+mod value;
 
 pub use disarmed::Disarmed;
 pub use error::{EraseError, LoadError, OpenError, SaveError};
+pub use ram::RamFlash;
 pub use set::{ParameterAction, ParameterRequest, ParameterSet, ParameterStatus};
 pub use store::{ParameterStore, key};
 pub use table::{Parameter, ParameterError, ParameterTable};
+pub use value::{AnyValue, Kind, LONGEST_NAME, Storable};
 
 /// Its traits are in signatures here.
 pub use embedded_storage_async;

@@ -9,7 +9,7 @@ use core::ops::Range;
 use embedded_storage_async::nor_flash::NorFlash;
 
 /// Changes when values are kept in another way: what an older version has kept is then erased.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// A whole number of words of every flash there is.
 const LENGTH: usize = 32;

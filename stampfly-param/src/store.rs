@@ -1,12 +1,12 @@
-//! The store: a name, a number, a place in flash.
+//! The store: a name, a value, a place in flash.
 
 use crate::pages::Pages;
-use crate::{Disarmed, EraseError, LoadError, OpenError, SaveError};
+use crate::value::{Item, LONGEST, LONGEST_NAME};
+use crate::{AnyValue, Disarmed, EraseError, LoadError, OpenError, SaveError, Storable};
 use core::ops::{Range, RangeInclusive};
 use embedded_storage_async::nor_flash::NorFlash;
-use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage, Value};
+use sequential_storage::map::{MapConfig, MapStorage};
 
 /// A name's number in flash: its 32-bit FNV-1a hash.
 ///
@@ -26,33 +26,44 @@ pub const fn key(name: &str) -> u32 {
     hash
 }
 
-/// Room for one key and one value, aligned as flash likes it.
+/// Room for one key, the kind, one value and one name, a whole number of words, aligned as flash likes it.
 #[repr(align(4))]
-struct Scratch([u8; 32]);
+struct Scratch([u8; 4 + 4 + LONGEST + LONGEST_NAME]);
 
-/// The longest value, bytes.
-const LONGEST: usize = 16;
+impl Scratch {
+    const fn new() -> Self {
+        Self([0; 4 + 4 + LONGEST + LONGEST_NAME])
+    }
+}
 
 type NoCache = Cache<Uncached, Uncached, Uncached, u32>;
 
-/// Values with names, in flash.
+/// Values with names, in flash. On a flash that blocks: [`blocking::ParameterStore`](crate::blocking::ParameterStore).
 ///
 /// ```
 /// # #[path = "../tests/flash/mod.rs"] mod flash;
 /// # use flash::Flash;
 /// use embassy_futures::block_on;
-/// use stampfly_param::{Disarmed, ParameterStore};
+/// use stampfly_param::{Disarmed, LoadError, ParameterStore, Kind};
 /// use stampfly_types::messages::FlightStatus;
 ///
 /// let disarmed = || Disarmed::proven_by(&FlightStatus::default()).unwrap();
 /// block_on(async {
 ///     let mut store = ParameterStore::open(Flash::new(), 0..1280).await.unwrap();
-///     assert_eq!(store.load("hover.thrust", 0.1..=0.6).await, Ok(None));
-///     assert!(store.save(disarmed(), "hover.thrust", 0.36, 0.1..=0.6).await.is_ok());
-///     assert_eq!(store.load("hover.thrust", 0.1..=0.6).await, Ok(Some(0.36)));
-///     assert!(store.save(disarmed(), "hover.thrust", f32::NAN, 0.1..=0.6).await.is_err());
-///     assert!(store.save_bytes(disarmed(), "link.peer", [2, 0, 0, 0, 0, 7]).await.is_ok());
-///     assert_eq!(store.load_bytes("link.peer").await, Ok(Some([2, 0, 0, 0, 0, 7])));
+///     assert_eq!(store.load::<u32>("serial").await, Ok(None));
+///     assert!(store.save(disarmed(), "serial", 16_777_217_u32).await.is_ok());
+///     assert_eq!(store.load("serial").await, Ok(Some(16_777_217_u32)));
+///     assert_eq!(store.load::<f32>("serial").await, Err(LoadError::OtherKind { stored: Kind::U32 }));
+///
+///     assert!(store.save_within(disarmed(), "hover.thrust", 0.36_f32, 0.1..=0.6).await.is_ok());
+///     assert!(store.save_within(disarmed(), "hover.thrust", f32::NAN, 0.1..=0.6).await.is_err());
+///     assert_eq!(store.load_within("hover.thrust", 0.1..=0.6).await, Ok(Some(0.36_f32)));
+///
+///     assert!(store.save(disarmed(), "link.peer", [2, 0, 0, 0, 0, 7]).await.is_ok());
+///     let mut listed = Vec::new();
+///     store.for_each(|name, value| listed.push(format!("{name} = {value}"))).await.unwrap();
+///     listed.sort();
+///     assert_eq!(listed, ["hover.thrust = 0.36", "link.peer = 020000000007", "serial = 16777217"]);
 /// });
 /// ```
 pub struct ParameterStore<F: NorFlash> {
@@ -82,70 +93,107 @@ impl<F: NorFlash> ParameterStore<F> {
     /// The value of this name, or `None` when none was ever saved. Reads flash only.
     ///
     /// # Errors
-    /// When there is a value nobody may use; the default applies then.
-    pub async fn load(&mut self, name: &str, range: RangeInclusive<f32>) -> Result<Option<f32>, LoadError<F::Error>> {
-        let Some(bits) = self.stored::<u32>(name).await? else { return Ok(None) };
-        let stored = f32::from_bits(bits);
-        if range.contains(&stored) { Ok(Some(stored)) } else { Err(LoadError::OutOfRange { stored }) }
+    /// When there is a value nobody may use, one of another type among them; the default applies then.
+    pub async fn load<T: Storable>(&mut self, name: &str) -> Result<Option<T>, LoadError<F::Error>> {
+        let Some(stored) = self.stored(name).await? else { return Ok(None) };
+        // A boolean that is neither is damage.
+        let other = if stored.kind() == T::KIND {
+            LoadError::Corrupted
+        } else {
+            LoadError::OtherKind { stored: stored.kind() }
+        };
+        stored.get().map(Some).ok_or(other)
     }
 
-    /// The bytes of this name, or `None` when none were ever saved. Reads flash only.
+    /// The same, believed within a range only: a later version of the program may allow less than the one that saved it.
     ///
     /// # Errors
-    /// When there is something else than so many bytes.
-    pub async fn load_bytes<const N: usize>(&mut self, name: &str) -> Result<Option<[u8; N]>, LoadError<F::Error>> {
-        Ok(self.stored(name).await?)
+    /// As [`load`](Self::load), and when the value is out of range or not a number.
+    pub async fn load_within<T: Storable + PartialOrd>(
+        &mut self,
+        name: &str,
+        range: RangeInclusive<T>,
+    ) -> Result<Option<T>, LoadError<F::Error>> {
+        match self.load(name).await? {
+            Some(stored) if !range.contains(&stored) => Err(LoadError::OutOfRange { stored: stored.into() }),
+            found => Ok(found),
+        }
     }
 
     /// Saves the value of this name, and looks whether it is there. Up to 200 ms on an ESP32, when a page has to be
-    /// erased.
+    /// erased. What is there already is not written again; a value of another type is replaced.
     ///
     /// # Errors
-    /// When the value is out of range, or the flash does not take it. What was stored before still is.
-    pub async fn save(
+    /// When the flash does not take it, or the name is too long or has the number of another. What was stored before still is.
+    pub async fn save<T: Storable>(&mut self, _: Disarmed, name: &str, value: T) -> Result<(), SaveError<F::Error>> {
+        if name.len() > LONGEST_NAME {
+            return Err(SaveError::NameTooLong);
+        }
+        let value = value.into();
+        match self.stored(name).await {
+            Ok(stored) if stored == Some(value) => return Ok(()),
+            Err(LoadError::NameTaken) => return Err(SaveError::NameTaken),
+            // Whatever is there will be replaced, damage too.
+            _ => {}
+        }
+        let mut scratch = Scratch::new();
+        self.map.store_item(&mut scratch.0, &key(name), &Item { name, value }).await?;
+        match self.stored(name).await {
+            Ok(stored) if stored == Some(value) => Ok(()),
+            Err(LoadError::Flash(error)) => Err(SaveError::Flash(error)),
+            Err(LoadError::Corrupted) => Err(SaveError::Corrupted),
+            _ => Err(SaveError::NotKept),
+        }
+    }
+
+    /// The same, for a value that has a range.
+    ///
+    /// # Errors
+    /// As [`save`](Self::save), and when the value is out of range or not a number.
+    pub async fn save_within<T: Storable + PartialOrd>(
         &mut self,
         disarmed: Disarmed,
         name: &str,
-        value: f32,
-        range: RangeInclusive<f32>,
+        value: T,
+        range: RangeInclusive<T>,
     ) -> Result<(), SaveError<F::Error>> {
         if !range.contains(&value) {
             return Err(SaveError::OutOfRange);
         }
-        // By bits, so that −0 is not taken for 0.
-        self.keep(disarmed, name, value.to_bits()).await
+        self.save(disarmed, name, value).await
     }
 
-    /// Saves the bytes of this name, 16 at most, as [`save`](Self::save) saves a number: all of them or none, whatever
-    /// happens to the power. For what is no number, such as an address.
+    /// Shows every name with its newest value, in the order of their numbers in flash. Reads all pages once for each name: for a
+    /// console, not for a control loop.
     ///
     /// # Errors
-    /// When the flash does not take them. What was stored before still is.
-    pub async fn save_bytes<const N: usize>(
-        &mut self,
-        disarmed: Disarmed,
-        name: &str,
-        bytes: [u8; N],
-    ) -> Result<(), SaveError<F::Error>> {
-        const { assert!(N <= LONGEST, "too long for a value") }
-        self.keep(disarmed, name, bytes).await
-    }
-
-    async fn keep<V>(&mut self, _: Disarmed, name: &str, value: V) -> Result<(), SaveError<F::Error>>
-    where
-        V: for<'d> Value<'d> + PartialEq,
-    {
-        if self.stored(name).await.is_ok_and(|stored| stored.as_ref() == Some(&value)) {
-            return Ok(());
+    /// When the pages make no sense, or the flash does not obey. What was shown before is right.
+    pub async fn for_each(&mut self, mut show: impl FnMut(&str, AnyValue)) -> Result<(), LoadError<F::Error>> {
+        let mut shown: Option<u32> = None;
+        loop {
+            let mut next: Option<u32> = None;
+            let mut scratch = Scratch::new();
+            let mut items = self.map.fetch_all_items(&mut scratch.0).await?;
+            while let Some((key, _)) = items.next::<Item<'_>>(&mut scratch.0).await? {
+                if shown.is_none_or(|shown| key > shown) && next.is_none_or(|next| key < next) {
+                    next = Some(key);
+                }
+            }
+            let Some(key) = next else { return Ok(()) };
+            // Items of a name lie there in the order they were saved; this finds the last one.
+            if let Some(Item { name, value }) = self.map.fetch_item(&mut scratch.0, &key).await? {
+                show(name, value);
+            }
+            shown = next;
         }
-        let mut scratch = Scratch([0; 32]);
-        self.map.store_item(&mut scratch.0, &key(name), &value).await?;
-        if self.stored(name).await?.as_ref() == Some(&value) { Ok(()) } else { Err(SaveError::NotKept) }
     }
 
-    async fn stored<V: for<'d> Value<'d>>(&mut self, name: &str) -> Result<Option<V>, Error<F::Error>> {
-        let mut scratch = Scratch([0; 32]);
-        self.map.fetch_item(&mut scratch.0, &key(name)).await
+    async fn stored(&mut self, name: &str) -> Result<Option<AnyValue>, LoadError<F::Error>> {
+        let mut scratch = Scratch::new();
+        match self.map.fetch_item::<Item<'_>>(&mut scratch.0, &key(name)).await? {
+            Some(item) if item.name != name => Err(LoadError::NameTaken),
+            found => Ok(found.map(|item| item.value)),
+        }
     }
 
     /// Forgets every value: all defaults apply again. Should the power fail in between, the next start finishes it.

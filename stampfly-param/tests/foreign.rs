@@ -5,10 +5,10 @@ mod flash;
 use embassy_futures::block_on;
 use flash::Flash;
 use proptest::prelude::*;
-use stampfly_param::{Disarmed, LoadError, ParameterStore};
+use stampfly_param::{AnyValue, Disarmed, Kind, LONGEST_NAME, LoadError, ParameterStore, SaveError, key};
 use stampfly_types::messages::FlightStatus;
 
-const RANGE: core::ops::Range<u32> = 0..1280;
+const RANGE: core::ops::Range<u32> = 0..2304;
 const PAGE: usize = 256;
 /// As many as a StampFly has.
 const VALUES: usize = 35;
@@ -17,23 +17,26 @@ fn open(flash: Flash) -> Result<ParameterStore<Flash>, stampfly_param::OpenError
     block_on(ParameterStore::open(flash, RANGE))
 }
 
+fn disarmed() -> Disarmed {
+    Disarmed::proven_by(&FlightStatus::default()).expect("standing on a table")
+}
+
 fn name(index: usize) -> String {
     format!("value.{index}")
 }
 
 /// Is nothing there, and does everything that is saved stay?
 fn works(flash: Flash) {
-    let mut store = open(flash).expect("five pages");
-    let disarmed = || Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
+    let mut store = open(flash).expect("nine pages");
     for index in 0..VALUES {
-        assert_eq!(block_on(store.load(&name(index), -1e3..=1e3)), Ok(None));
+        assert_eq!(block_on(store.load_within(&name(index), -1e3..=1e3)), Ok(None));
     }
     for index in 0..VALUES {
-        assert_eq!(block_on(store.save(disarmed(), &name(index), index as f32, -1e3..=1e3)), Ok(()));
+        assert_eq!(block_on(store.save_within(disarmed(), &name(index), index as f32, -1e3..=1e3)), Ok(()));
     }
-    let mut store = open(store.into_flash()).expect("five pages");
+    let mut store = open(store.into_flash()).expect("nine pages");
     for index in 0..VALUES {
-        assert_eq!(block_on(store.load(&name(index), -1e3..=1e3)), Ok(Some(index as f32)), "after a restart");
+        assert_eq!(block_on(store.load_within(&name(index), -1e3..=1e3)), Ok(Some(index as f32)), "after a restart");
     }
 }
 
@@ -102,7 +105,7 @@ fn whatever_was_there_is_erased() {
 #[test]
 fn no_power_cut_while_erasing_leaves_anything_behind() {
     for (what, image) in images() {
-        let words = open(Flash::with(image.clone())).expect("five pages").into_flash().words_written;
+        let words = open(Flash::with(image.clone())).expect("nine pages").into_flash().words_written;
         assert!(words > RANGE.end as usize / 4, "{what} is erased");
         for cut in 0..words {
             let mut flash = Flash::with(image.clone()).cut_after(cut, cut % 2 == 0);
@@ -117,10 +120,9 @@ fn no_power_cut_while_erasing_leaves_anything_behind() {
 /// Forgetting everything is the same work, and a start finishes what a cut has left.
 #[test]
 fn no_power_cut_while_forgetting_leaves_half() {
-    let disarmed = || Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
-    let mut store = open(Flash::new()).expect("five pages");
+    let mut store = open(Flash::new()).expect("nine pages");
     for index in 0..VALUES {
-        assert_eq!(block_on(store.save(disarmed(), &name(index), index as f32, -1e3..=1e3)), Ok(()));
+        assert_eq!(block_on(store.save_within(disarmed(), &name(index), index as f32, -1e3..=1e3)), Ok(()));
     }
     let full = store.into_flash();
     let words = RANGE.end as usize / 4;
@@ -134,18 +136,17 @@ fn no_power_cut_while_forgetting_leaves_half() {
 /// A store of another size is not taken for this one.
 #[test]
 fn a_store_of_another_size_is_foreign() {
-    let disarmed = Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
     let mut small = block_on(ParameterStore::open(Flash::new(), 0..1024)).expect("four pages");
-    assert_eq!(block_on(small.save(disarmed, &name(0), 1.0, 0.0..=1.0)), Ok(()));
+    assert_eq!(block_on(small.save_within(disarmed(), &name(0), 1.0, 0.0..=1.0)), Ok(()));
     works(small.into_flash());
 }
 
 /// What is ours is opened without a word written.
 #[test]
 fn a_store_is_opened_without_writing() {
-    let flash = open(Flash::new()).expect("five pages").into_flash();
+    let flash = open(Flash::new()).expect("nine pages").into_flash();
     let before = flash.words_written;
-    let flash = open(flash).expect("five pages").into_flash();
+    let flash = open(flash).expect("nine pages").into_flash();
     assert_eq!(flash.words_written, before);
 }
 
@@ -156,11 +157,11 @@ proptest! {
     #[test]
     fn any_image_becomes_a_store(
         fill in any::<u8>(),
-        scattered in prop::collection::vec((0usize..1280, any::<u8>()), 0..400),
-        edges in prop::collection::vec((0usize..5, any::<bool>(), prop::sample::select(vec![0u32, !0, ACTIVE, FULL])), 0..10),
-        cut in prop::option::of(0usize..320),
+        scattered in prop::collection::vec((0..RANGE.end as usize, any::<u8>()), 0..400),
+        edges in prop::collection::vec((0usize..9, any::<bool>(), prop::sample::select(vec![0u32, !0, ACTIVE, FULL])), 0..10),
+        cut in prop::option::of(0usize..RANGE.end as usize / 4),
     ) {
-        let mut image = vec![fill; 1280];
+        let mut image = vec![fill; RANGE.end as usize];
         for (place, byte) in scattered {
             image[place] = byte;
         }
@@ -177,12 +178,49 @@ proptest! {
     }
 }
 
-/// Bytes where a number is asked for, or fewer of them, are nobody's value.
+/// A value of one type is none of another, and is told apart from damage.
 #[test]
-fn too_few_bytes_are_no_value() {
-    let disarmed = Disarmed::proven_by(&FlightStatus::default()).expect("disarmed");
-    let mut store = open(Flash::new()).expect("five pages");
-    assert_eq!(block_on(store.save_bytes(disarmed, "x", [1, 2])), Ok(()));
-    assert_eq!(block_on(store.load("x", 0.0..=1.0)), Err(LoadError::Corrupted));
-    assert_eq!(block_on(store.load_bytes::<6>("x")), Err(LoadError::Corrupted));
+fn a_value_of_another_type_is_no_value() {
+    let mut store = open(Flash::new()).expect("nine pages");
+    assert_eq!(block_on(store.save(disarmed(), "x", [1, 2])), Ok(()));
+    let stored = Kind::Bytes(2);
+    assert_eq!(block_on(store.load_within("x", 0.0..=1.0)), Err(LoadError::OtherKind { stored }));
+    assert_eq!(block_on(store.load::<[u8; 6]>("x")), Err(LoadError::OtherKind { stored }));
+    assert_eq!(block_on(store.load::<u16>("x")), Err(LoadError::OtherKind { stored }));
+    assert_eq!(block_on(store.save(disarmed(), "x", 16_777_217_u32)), Ok(()), "a new type replaces it");
+    assert_eq!(block_on(store.load("x")), Ok(Some(16_777_217_u32)));
+}
+
+/// These have one hash.
+const TWINS: [&str; 2] = ["costarring", "liquid"];
+
+#[test]
+fn two_names_with_one_hash_are_told_apart() {
+    let [first, second] = TWINS;
+    assert_eq!(key(first), key(second));
+    let mut store = open(Flash::new()).expect("nine pages");
+    assert_eq!(block_on(store.save(disarmed(), first, 1u8)), Ok(()));
+    assert_eq!(block_on(store.load::<u8>(second)), Err(LoadError::NameTaken));
+    assert_eq!(block_on(store.save(disarmed(), second, 2u8)), Err(SaveError::NameTaken));
+    assert_eq!(block_on(store.load(first)), Ok(Some(1u8)));
+}
+
+#[test]
+fn a_list_shows_each_name_once_with_its_newest_value() {
+    let mut store = open(Flash::new()).expect("nine pages");
+    // More than the pages hold at a time.
+    for round in 0..60u16 {
+        for index in 0..7 {
+            assert_eq!(block_on(store.save(disarmed(), &name(index), round + index as u16)), Ok(()));
+        }
+    }
+    let mut listed = Vec::new();
+    block_on(store.for_each(|name, value| listed.push((name.to_string(), value)))).expect("readable");
+    listed.sort_by(|a, b| a.0.cmp(&b.0));
+    let expected: Vec<_> = (0..7).map(|index| (name(index), AnyValue::from(59 + index as u16))).collect();
+    assert_eq!(listed, expected);
+    let long = "x".repeat(LONGEST_NAME + 1);
+    assert_eq!(block_on(store.save(disarmed(), &long, 1u8)), Err(SaveError::NameTooLong));
+    assert_eq!(block_on(store.save(disarmed(), &long[1..], 1u8)), Ok(()));
+    assert_eq!(block_on(store.load(&long[1..])), Ok(Some(1u8)));
 }

@@ -91,7 +91,7 @@ impl Storage {
         let Some(store) = &mut self.store else { return 0 };
         let mut unusable = 0;
         for (index, info) in parameters::all().enumerate() {
-            match store.load(info.name, info.min..=info.max).await {
+            match store.load_within(info.name, info.min..=info.max).await {
                 Ok(None) => {}
                 Ok(Some(value)) => unusable += usize::from(config.set(index, value).is_err()),
                 Err(_) => unusable += 1,
@@ -102,7 +102,7 @@ impl Storage {
 
     /// The transmitter the vehicle belongs to, if it has one.
     pub async fn load_peer(&mut self) -> Option<Address> {
-        let stored = self.store.as_mut()?.load_bytes(PEER).await.ok()?;
+        let stored = self.store.as_mut()?.load(PEER).await.ok()?;
         stored.map(Address).filter(|address| address.is_station())
     }
 
@@ -118,7 +118,7 @@ impl Storage {
         for (index, info) in parameters::all().enumerate() {
             let disarmed = proven(&mut mode)?;
             let Some(value) = config.get(index) else { break };
-            store.save(disarmed, info.name, value, info.min..=info.max).await.map_err(StorageError::Save)?;
+            store.save_within(disarmed, info.name, value, info.min..=info.max).await.map_err(StorageError::Save)?;
         }
         Ok(())
     }
@@ -132,7 +132,7 @@ impl Storage {
     ) -> Result<(), StorageError> {
         let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
-        store.save_bytes(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
+        store.save(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
     }
 
     /// Forgets everything that was kept, the transmitter included.

@@ -5,7 +5,7 @@ use embedded_storage_async::nor_flash::{
 };
 
 const PAGE: usize = 256;
-const PAGES: usize = 5;
+const PAGES: usize = 9;
 
 /// The power was cut, or somebody asked for something a flash does not do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,8 +15,8 @@ const NOT_ALONE: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-l
 pub fn run(repository: &Repository, archives: &Path, libraries: &[Library]) -> Result<(), Failure> {
     let place = std::env::temp_dir().join(format!("stampfly-first-examples-{}", std::process::id()));
     let outcome = registry(repository, archives, &place, libraries).and_then(|registry| {
-        let alone = libraries.iter().filter(|library| !NOT_ALONE.contains(&library.name.as_str()));
-        alone.map(|library| program(repository, library, &registry, &place)).collect()
+        let mut alone = libraries.iter().filter(|library| !NOT_ALONE.contains(&library.name.as_str()));
+        alone.try_for_each(|library| program(repository, library, &registry, &place))
     });
     // Nothing depends on its removal.
     let _ = fs::remove_dir_all(&place);
@@ -66,7 +66,7 @@ fn archive(archives: &Path, library: &str) -> Result<Archive, Failure> {
         let version = name.strip_prefix(library)?.strip_prefix('-')?;
         version.starts_with(|first: char| first.is_ascii_digit()).then_some(Archive { path, name })
     });
-    Ok(archives.next().ok_or_else(|| format!("`{library}` has no archive"))?)
+    archives.next().ok_or_else(|| format!("`{library}` has no archive"))
 }
 
 fn program(repository: &Repository, library: &Library, registry: &Path, place: &Path) -> Result<(), Failure> {
@@ -100,7 +100,7 @@ fn first_example(page: &str) -> Option<String> {
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
     let io = |e: std::io::Error| format!("{}: {e}", path.display());
     fs::create_dir_all(path.parent().unwrap_or(path)).map_err(io)?;
-    Ok(fs::write(path, text).map_err(io)?)
+    fs::write(path, text).map_err(io)
 }
 
 #[cfg(test)]
