@@ -65,8 +65,8 @@ impl ImuMonitor {
             (&mut self.gyro, &imu.gyro, config.gyro_full_scale),
         ];
         for (axes, values, full_scale) in sensors {
-            for (axis, value) in axes.iter_mut().zip(values) {
-                longest = longest.max(axis.step(*value, full_scale * FULL));
+            for (axis, value) in axes.iter_mut().zip(values.to_array()) {
+                longest = longest.max(axis.step(value, full_scale * FULL));
             }
         }
         let count = |count: u32, weight: u32, limit: u32| {

@@ -116,21 +116,21 @@ impl Vec3 {
     #[inline]
     #[must_use]
     pub fn component_mul(&self, other: &Self) -> Self {
-        self.zip_map(other, |a, b| a * b)
+        Self::new(self.x * other.x, self.y * other.y, self.z * other.z)
     }
 
     /// Each number divided by the one of `other` beside it.
     #[inline]
     #[must_use]
     pub fn component_div(&self, other: &Self) -> Self {
-        self.zip_map(other, |a, b| a / b)
+        Self::new(self.x / other.x, self.y / other.y, self.z / other.z)
     }
 
     /// Each number without its sign.
     #[inline]
     #[must_use]
     pub fn abs(&self) -> Self {
-        self.map(f32::abs)
+        Self::new(self.x.abs(), self.y.abs(), self.z.abs())
     }
 
     /// The largest of the numbers. One that is no number is passed over.
@@ -272,11 +272,11 @@ impl IndexMut<usize> for Vec3 {
     }
 }
 
-operator!(Add, add, Vec3, Vec3, Vec3, |a, b| a.zip_map(&b, |a, b| a + b));
-operator!(Sub, sub, Vec3, Vec3, Vec3, |a, b| a.zip_map(&b, |a, b| a - b));
-operator!(Mul, mul, Vec3, f32, Vec3, |a, b| a.map(|a| a * b));
+operator!(Add, add, Vec3, Vec3, Vec3, |a, b| Vec3::new(a.x + b.x, a.y + b.y, a.z + b.z));
+operator!(Sub, sub, Vec3, Vec3, Vec3, |a, b| Vec3::new(a.x - b.x, a.y - b.y, a.z - b.z));
+operator!(Mul, mul, Vec3, f32, Vec3, |a, b| Vec3::new(a.x * b, a.y * b, a.z * b));
 operator!(Mul, mul, f32, Vec3, Vec3, |a, b| b * a);
-operator!(Div, div, Vec3, f32, Vec3, |a, b| a.map(|a| a / b));
+operator!(Div, div, Vec3, f32, Vec3, |a, b| Vec3::new(a.x / b, a.y / b, a.z / b));
 
 /// An operation that changes its left side.
 macro_rules! assignment {
@@ -305,7 +305,7 @@ impl Neg for Vec3 {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        self.map(|value| -value)
+        Self::new(-self.x, -self.y, -self.z)
     }
 }
 

@@ -36,10 +36,10 @@ impl ImuData {
         angular_acceleration: f32,
         accel_full_scale: f32,
     ) -> bool {
-        let full = self.accel.iter().all(|axis| axis.abs() >= Self::FULL * accel_full_scale);
+        let full = self.accel.to_array().iter().all(|axis| axis.abs() >= Self::FULL * accel_full_scale);
         let jumps = before.is_some_and(|(elapsed, rate)| {
             let limit = angular_acceleration * elapsed.clamp(Self::PERIOD, Self::STEADY).seconds();
-            elapsed < Self::GAP && (self.gyro - rate).iter().any(|change| change.abs() > limit)
+            elapsed < Self::GAP && (self.gyro - rate).amax() > limit
         });
         full || jumps
     }
