@@ -1,32 +1,46 @@
-//! A stranger's program: a sensor of its own behind the stack's trait.
+//! A stranger's program: a lamp and a barometer, from the crate that has every driver.
 
-use stampfly_drivers::{Imu, Sample, SensorErrorKind};
-use stampfly_types::{Duration, GRAVITY, Instant, Vec3, messages::ImuData};
-use std::future::Future;
+use stampfly_drivers::blocking::{BlockingClock, Blocking, block_on};
+use stampfly_drivers::chip::bmp280::{Bmp280, Config};
+use stampfly_drivers::embedded_hal::{delay::DelayNs, i2c};
+use stampfly_drivers::smart_leds_trait::{RGB8, SmartLedsWrite};
+use stampfly_drivers::stampfly_types::{Instant, messages::Signal};
+use stampfly_drivers::{Barometer, Indicator, Lights, SensorError, SensorErrorKind};
+use std::convert::Infallible;
 
-struct Still(Instant);
+/// Where colours, bytes and times go: nowhere.
+struct Nowhere;
 
-#[derive(Debug)]
-struct Never;
-
-impl stampfly_drivers::SensorError for Never {
-    fn kind(&self) -> SensorErrorKind {
-        SensorErrorKind::Timeout
+impl SmartLedsWrite for Nowhere {
+    type Error = Infallible;
+    type Color = RGB8;
+    fn write<T, I>(&mut self, _: T) -> Result<(), Infallible>
+    where
+        T: IntoIterator<Item = I>,
+        I: Into<RGB8>,
+    {
+        Ok(())
     }
 }
 
-impl Imu for Still {
-    type Error = Never;
-    async fn next(&mut self) -> Result<Sample<ImuData>, Never> {
-        self.0 += Duration::from_micros(2_500);
-        Ok(Sample { at: self.0, data: ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() } })
+impl i2c::ErrorType for Nowhere {
+    type Error = i2c::ErrorKind;
+}
+
+impl i2c::I2c for Nowhere {
+    fn transaction(&mut self, _: u8, _: &mut [i2c::Operation<'_>]) -> Result<(), i2c::ErrorKind> {
+        Err(i2c::ErrorKind::Bus)
     }
+}
+
+impl DelayNs for Nowhere {
+    fn delay_ns(&mut self, _: u32) {}
 }
 
 fn main() {
-    let mut imu = Still(Instant::ZERO);
-    let sample = std::pin::pin!(imu.next());
-    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
-    let std::task::Poll::Ready(Ok(Sample { at, .. })) = sample.poll(&mut context) else { panic!("it has a sample at once") };
-    assert_eq!(at, Instant::from_micros(2_500));
+    let mut lights = Lights::<_, 1>::status(Nowhere);
+    lights.show(&Signal::default());
+    let clock = BlockingClock::new(Nowhere, || Instant::ZERO);
+    let mut barometer = Bmp280::new(Blocking(Nowhere), Bmp280::SDO_LOW, clock, Config::default());
+    assert_eq!(block_on(barometer.next()).map_err(|error| error.kind()), Err(SensorErrorKind::Bus));
 }

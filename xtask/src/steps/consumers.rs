@@ -20,7 +20,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let outcome = repository
         .libraries()?
         .iter()
-        .filter(|library| !NOT_ALONE.contains(&library.name.as_str()))
+        .filter(|library| library.published && !NOT_ALONE.contains(&library.name.as_str()))
         .try_for_each(|library| consume(repository, library, &place));
     // Nothing depends on its removal.
     let _ = fs::remove_dir_all(&place);

@@ -1,0 +1,32 @@
+//! A stranger's program: the pressure of the air, with nothing but this crate added.
+
+use stampfly_bmp280::blocking::{Blocking, BlockingClock, block_on};
+use stampfly_bmp280::embedded_hal::delay::DelayNs;
+use stampfly_bmp280::embedded_hal::i2c::{ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation};
+use stampfly_bmp280::{Barometer, Bmp280, ChipError, Config, Instant};
+
+/// A bus with nobody on it.
+struct Nobody;
+
+impl ErrorType for Nobody {
+    type Error = ErrorKind;
+}
+
+impl I2c for Nobody {
+    fn transaction(&mut self, _: u8, _: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
+        Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address))
+    }
+}
+
+struct Delay;
+
+impl DelayNs for Delay {
+    fn delay_ns(&mut self, _: u32) {}
+}
+
+fn main() {
+    let clock = BlockingClock::new(Delay, || Instant::ZERO);
+    let mut sensor = Bmp280::new(Blocking(Nobody), Bmp280::SDO_LOW, clock, Config::default());
+    let failed = block_on(sensor.next()).expect_err("nobody answers");
+    assert_eq!(failed, ChipError::Bus(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address)));
+}
