@@ -1,32 +1,32 @@
-//! A stranger's program: the flow of the floor, with nothing but this crate added.
+//! A stranger's program, with nothing but this crate added: the first example of its README.
 
 use stampfly_pmw3901::blocking::{Blocking, BlockingClock, block_on};
-use stampfly_pmw3901::embedded_hal::delay::DelayNs;
-use stampfly_pmw3901::embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
-use stampfly_pmw3901::{AxisMap, ChipError, Config, Instant, OpticalFlow, Pmw3901};
+use stampfly_pmw3901::embedded_hal::{delay::DelayNs, spi};
+use stampfly_pmw3901::{AxisMap, Config, Instant, OpticalFlow, Pmw3901};
 
-/// A bus with nobody on it.
-struct Nobody;
+/// Stands for the bus and the delay of your board: nobody answers here.
+struct Board;
 
-impl ErrorType for Nobody {
-    type Error = ErrorKind;
+impl spi::ErrorType for Board {
+    type Error = spi::ErrorKind;
 }
 
-impl SpiDevice for Nobody {
-    fn transaction(&mut self, _: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
-        Err(ErrorKind::ModeFault)
+impl spi::SpiDevice for Board {
+    fn transaction(&mut self, _: &mut [spi::Operation<'_, u8>]) -> Result<(), spi::ErrorKind> {
+        Err(spi::ErrorKind::Other)
     }
 }
 
-struct Delay;
-
-impl DelayNs for Delay {
+impl DelayNs for Board {
     fn delay_ns(&mut self, _: u32) {}
 }
 
 fn main() {
-    let clock = BlockingClock::new(Delay, || Instant::ZERO);
-    let mut sensor = Pmw3901::new(Blocking(Nobody), clock, AxisMap::IDENTITY, Config::default());
-    let failed = block_on(sensor.next()).expect_err("nobody answers");
-    assert_eq!(failed, ChipError::Bus(ErrorKind::ModeFault));
+    // A function that tells the time since power-on.
+    let clock = BlockingClock::new(Board, || Instant::ZERO);
+    let mut sensor = Pmw3901::new(Blocking(Board), clock, AxisMap::IDENTITY, Config::default());
+    match block_on(sensor.next()) {
+        Ok(sample) => println!("{} rad about x, quality {}", sample.data.delta_x, sample.data.quality),
+        Err(error) => println!("{error}"),
+    }
 }

@@ -8,9 +8,8 @@ use toml_edit::{DocumentMut, Item};
 /// Why something failed, in words.
 pub type Failure = String;
 
-/// Libraries for a PC. Every other one has to build for bare metal.
-const HOST_ONLY: &[&str] =
-    &["stampfly-bus-macros", "stampfly-driver-fakes", "stampfly-host", "stampfly-lab", "stampfly-sim"];
+/// Published libraries for a PC. Every other one has to build for bare metal.
+const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab", "stampfly-sim"];
 
 /// Folder of the vehicles after the first.
 pub const VEHICLES: &str = "vehicles";
@@ -65,7 +64,7 @@ impl Repository {
             let name = package.get("name").and_then(Item::as_str).unwrap_or_default().to_owned();
             if name.starts_with("stampfly-") && self.root.join(&folder).join("src/lib.rs").exists() {
                 let published = package.get("publish").and_then(Item::as_bool).unwrap_or(true);
-                let bare_metal = !HOST_ONLY.contains(&name.as_str());
+                let bare_metal = published && !HOST_ONLY.contains(&name.as_str());
                 libraries.push(Library { name, folder, bare_metal, published });
             }
         }

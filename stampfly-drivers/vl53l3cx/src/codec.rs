@@ -11,6 +11,8 @@ use stampfly_types::Duration;
 
 /// Register addresses.
 pub mod register {
+    /// Resets the chip: [`HOLD`](super::HOLD), a pause, [`LET_GO`](super::LET_GO), as ST's drivers of the VL53L1 do.
+    pub const SOFT_RESET: u16 = 0x0000;
     /// The address the chip answers at, 7 bits.
     pub const I2C_SLAVE_DEVICE_ADDRESS: u16 = 0x0001;
     /// Bounds of the search for the detector's bias voltage.
@@ -47,6 +49,10 @@ pub const MODELS: [u8; 3] = [0xEA, 0xEB, 0xEC];
 pub const MODULE_TYPE: u8 = 0xAA;
 /// Where every chip of the family answers after a start.
 pub const BOOT_ADDRESS: u8 = 0x29;
+/// The chip stands still.
+pub const HOLD: u8 = 0x00;
+/// The chip starts.
+pub const LET_GO: u8 = 0x01;
 /// The interrupt rises when a measurement is there. Reset leaves the opposite, which tells a restarted chip.
 pub const ACTIVE_HIGH: u8 = 0x01;
 /// Measure again and again, in the rhythm of the inter-measurement period.

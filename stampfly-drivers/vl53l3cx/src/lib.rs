@@ -7,12 +7,12 @@ extern crate std;
 mod boot;
 pub mod codec;
 mod config;
+mod xshut;
 
 pub use boot::BootAddress;
 use codec::{RESULT_BYTES, register};
 pub use codec::{RangeStatus, Reading};
 pub use config::{Config, DistanceMode};
-use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::{Error, ErrorKind};
 use embedded_hal_async::i2c::I2c;
 use stampfly_driver_core::chip::Port;
@@ -22,8 +22,12 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_
 pub use stampfly_types::messages::TofData;
 pub use stampfly_types::{Duration, Instant};
 
+pub use xshut::{NoXshut, Xshut};
+
 /// In reset. The data sheet gives no shortest time.
 const RESET: Duration = Duration::from_millis(1);
+/// In reset by the register: 100 µs in ST's drivers.
+const SOFT_RESET: Duration = Duration::from_micros(100);
 /// From reset to the first access; 1.2 ms at most (§ "Power sequence").
 const BOOT: Duration = Duration::from_millis(4);
 /// How long the firmware may take to start.
@@ -58,6 +62,11 @@ const ADVANCES: usize = 2;
 /// the other has moved.
 ///
 /// A lone chip may stay: [`BOOT_ADDRESS`](Vl53l3cx::BOOT_ADDRESS) as its address.
+///
+/// # Without a pin
+/// [`NoXshut`] instead of one. The chip is looked for at its address, where somebody may have put it, and then at 0x29; it is reset by a
+/// register and looked for again. One such chip may share a bus with others that have pins: start it before them, at an address of its own. Two
+/// without a pin may as well, if somebody else has moved them apart. A start takes 4 ms longer, for a chip that has its power since just now.
 ///
 /// # Times
 /// The first sample takes 10 ms and two measurements, 80 ms in all. `next` ends within two periods and 20 ms
@@ -107,11 +116,11 @@ impl Vl53l3cx<'_, (), (), ()> {
     pub const BOOT_ADDRESS: u8 = codec::BOOT_ADDRESS;
 }
 
-impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
-    /// A driver of the chip on this pin, which it puts into reset, to be moved to this address.
+impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
+    /// A driver of the chip on this pin, which it puts into reset, to be moved to this address; without a pin [`NoXshut`].
     pub fn new(bus: I, mut xshut: X, boot: &'b BootAddress, address: u8, clock: T, config: Config) -> Self {
         // A pin that refuses is reported by the first start.
-        let _ = xshut.set_low();
+        let _ = xshut.hold();
         let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
         Self {
             port,
@@ -210,7 +219,7 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
     async fn wake(&mut self) -> Result<(), ChipError<I::Error>> {
         let Self { port, xshut, boot, address, .. } = self;
         // Before anything else: a chip that came back by itself must not stand in its neighbour's way.
-        xshut.set_low().map_err(|_| ChipError::Pin)?;
+        xshut.hold().map_err(|_| ChipError::Pin)?;
         let deadline = port.now() + NEIGHBOUR_LIMIT;
         while boot.is_taken() {
             if port.now() > deadline {
@@ -219,25 +228,36 @@ impl<'b, I: I2c, X: OutputPin, T: Timebase> Vl53l3cx<'b, I, X, T> {
             port.wait(RESET).await;
         }
         let mut waking = boot.take(xshut).ok_or(ChipError::AddressTaken)?;
-        port.move_to(codec::BOOT_ADDRESS);
-        port.wait(RESET).await;
-        match identification(port).await {
-            Ok(_) => return Err(ChipError::AddressTaken),
-            Err(ChipError::BusTimeout) => return Err(ChipError::BusTimeout),
-            Err(_) => {}
+        // Where the chip may be when it has started.
+        let mut places = [codec::BOOT_ADDRESS; 2];
+        if X::WIRED {
+            port.move_to(codec::BOOT_ADDRESS);
+            port.wait(RESET).await;
+            if answers(port).await? {
+                return Err(ChipError::AddressTaken);
+            }
+            waking.release().map_err(|_| ChipError::Pin)?;
+        } else {
+            // It may have its power since just now.
+            port.wait(BOOT).await;
+            reset_by_register(port, *address).await?;
+            places = [*address, codec::BOOT_ADDRESS];
         }
-        waking.release().map_err(|_| ChipError::Pin)?;
         port.wait(BOOT).await;
         let deadline = port.now() + BOOT_LIMIT;
         loop {
+            let [place, other] = places;
+            port.move_to(place);
             // A chip that has not started does not answer.
             let looks = port.now();
             match port.read(register::FIRMWARE_SYSTEM_STATUS).await {
                 Ok([status]) if status & 1 != 0 => break,
                 Ok([status]) if looks > deadline => return Err(ChipError::Configuration { status }),
                 Err(error) if looks > deadline => return Err(error),
-                _ => port.wait(RESET).await,
+                Ok(_) => {}
+                Err(_) => places = [other, place],
             }
+            port.wait(RESET).await;
         }
         let [model, module] = identification(port).await?;
         if !codec::MODELS.contains(&model) || module != codec::MODULE_TYPE {
@@ -365,12 +385,49 @@ async fn identification<I: I2c, T: Timebase>(
     port.read(register::IDENTIFICATION_MODEL_ID).await
 }
 
+/// Is somebody at the port's address?
+async fn answers<I: I2c, T: Timebase>(port: &mut Port<I2cRegisters<I>, T>) -> Result<bool, ChipError<I::Error>> {
+    match identification(port).await {
+        Err(ChipError::BusTimeout) => Err(ChipError::BusTimeout),
+        outcome => Ok(outcome.is_ok()),
+    }
+}
+
+/// Resets the chip that is at this address or has not been moved yet. What it says of itself is asked afterwards: one that a dropped
+/// start left standing still says nothing.
+async fn reset_by_register<I: I2c, T: Timebase>(
+    port: &mut Port<I2cRegisters<I>, T>,
+    address: u8,
+) -> Result<(), ChipError<I::Error>> {
+    port.move_to(codec::BOOT_ADDRESS);
+    if address != codec::BOOT_ADDRESS {
+        let taken = answers(port).await?;
+        port.move_to(address);
+        match answers(port).await? {
+            // Once reset, both would be there.
+            true if taken => return Err(ChipError::AddressTaken),
+            true => {}
+            false => port.move_to(codec::BOOT_ADDRESS),
+        }
+    }
+    port.write(register::SOFT_RESET, &[codec::HOLD]).await?;
+    port.wait(SOFT_RESET).await;
+    // No document says which of its addresses it has now.
+    match port.write(register::SOFT_RESET, &[codec::LET_GO]).await {
+        Err(ChipError::Bus(_)) if address != codec::BOOT_ADDRESS => {
+            port.move_to(codec::BOOT_ADDRESS);
+            port.write(register::SOFT_RESET, &[codec::LET_GO]).await
+        }
+        outcome => outcome,
+    }
+}
+
 /// A little early: the chip's clock may be fast by some per cent.
 fn early(span: Duration) -> Duration {
     span - span / 8
 }
 
-impl<I: I2c, X: OutputPin, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
+impl<I: I2c, X: Xshut, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
     type Error = ChipError<I::Error>;
 
     async fn next(&mut self) -> Result<Sample<TofData>, Self::Error> {

@@ -7,7 +7,7 @@ use stampfly_driver_core::blocking::block_on;
 use stampfly_driver_core::chip::TransferLimit;
 use stampfly_driver_fakes::closure::{Clock, Fault, finish};
 use stampfly_types::Duration;
-use stampfly_vl53l3cx::{BootAddress, Config, Vl53l3cx};
+use stampfly_vl53l3cx::{BootAddress, Config, NoXshut, Vl53l3cx};
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
@@ -42,6 +42,12 @@ pub struct Chip {
     pub deaf: bool,
     /// Until the interrupt is taken back the chip has this measurement and makes no other.
     pub held: Option<u64>,
+    /// Held in reset by its register, where it still answers, but says nothing.
+    pub held_by_register: bool,
+    /// The clock stands still once the register holds it.
+    pub stops_clock: bool,
+    /// What its address is while and after the register holds it: the first again, or as it was.
+    pub keeps_address: bool,
     /// Faults of the next accesses to a register.
     pub faults: Vec<(u16, Fault)>,
 }
@@ -65,7 +71,30 @@ impl Chip {
             flip: 0,
             deaf: false,
             held: None,
+            held_by_register: false,
+            stops_clock: false,
+            keeps_address: false,
             faults: Vec::new(),
+        }
+    }
+
+    /// What the register of the reset does.
+    fn reset_by_register(&mut self, let_go: bool) {
+        let address = self.address;
+        if let_go && !self.held_by_register {
+            return;
+        }
+        self.restart();
+        self.resets += u32::from(!let_go);
+        self.held_by_register = !let_go;
+        if self.keeps_address {
+            self.address = address;
+        }
+        if !let_go {
+            self.up = Some(0);
+            if core::mem::take(&mut self.stops_clock) {
+                self.clock.stop(true);
+            }
         }
     }
 
@@ -93,6 +122,9 @@ impl Chip {
     }
 
     pub fn write(&mut self, register: u16, data: &[u8]) {
+        if register == 0x0000 {
+            return self.reset_by_register(data == [1]);
+        }
         for (offset, value) in data.iter().enumerate() {
             self.registers[usize::from(register) + offset] = *value;
         }
@@ -133,6 +165,9 @@ impl Chip {
             self.registers[0x96..0x98].copy_from_slice(&self.target.1.to_be_bytes());
         }
         into.copy_from_slice(&self.registers[usize::from(register)..][..into.len()]);
+        if self.held_by_register {
+            into.fill(0);
+        }
     }
 }
 
@@ -214,6 +249,12 @@ impl Bench {
             Vl53l3cx::new(bus, pin, &self.boot, 0x30 + index as u8, self.clock.clone(), config)
                 .with_transfer_limit(TransferLimit::I2C_SENSORS)
         })
+    }
+
+    /// A driver of the first chip, which has no pin.
+    pub fn without_pin(&self, address: u8) -> Vl53l3cx<'_, Bus, NoXshut, Clock> {
+        let bus = Bus(self.clock.clone(), self.chips.clone());
+        Vl53l3cx::new(bus, NoXshut, &self.boot, address, self.clock.clone(), Config::default())
     }
 
     pub fn drivers(&self) -> [Driver<'_>; 2] {

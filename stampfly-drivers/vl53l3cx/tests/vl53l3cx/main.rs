@@ -2,6 +2,7 @@
 
 mod bench;
 mod neighbours;
+mod no_pin;
 
 use bench::{Bench, Bus, Chip, Xshut};
 use stampfly_driver_core::blocking::block_on;
