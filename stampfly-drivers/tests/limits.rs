@@ -1,11 +1,9 @@
 //! A bus that never answers: every transfer ends within the limit of its length.
 
-mod common;
-
-use common::{Access, Clock, Fault, I2cBus, SpiBus, finish};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal_async::{i2c, spi};
+use stampfly_driver_fakes::closure::{Access, Clock, Fault, I2cBus, SpiBus, finish};
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
@@ -66,7 +64,7 @@ fn silent(_: Access<'_>) -> Result<(), Fault> {
 
 #[test]
 fn a_transfer_is_given_up_at_its_limit_and_not_before() {
-    let clock = Clock::new();
+    let clock = Clock::default();
     let bus = SpiBus { clock: clock.clone(), chip: silent };
     let mut imu = Bmi270::spi(bus, clock.clone(), &[0; 2], AxisMap::IDENTITY, bmi270::Config::default());
     let begun = clock.now();
@@ -112,7 +110,7 @@ macro_rules! worst {
 fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() {
     for fault in [Fault::Nack, Fault::Hang] {
         let boot = BootAddress::default();
-        let clock = Clock::new();
+        let clock = Clock::default();
         let bus = || Broken { clock: clock.clone(), fault };
         let (imu, sensors) = (bmi270::Config::default(), TransferLimit::I2C_SENSORS);
         let worst = [

@@ -3,11 +3,12 @@
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use toml_edit::{DocumentMut, Item};
 
 /// Why something failed, in words.
 pub type Failure = String;
 
-/// Libraries for a PC. Every other one has to build for bare metal.
+/// Published libraries for a PC. Every other one has to build for bare metal.
 const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab", "stampfly-sim"];
 
 /// Folder of the vehicles after the first.
@@ -19,7 +20,7 @@ pub struct Repository {
     pub root: PathBuf,
 }
 
-/// A published library of this repository.
+/// A library of this repository.
 pub struct Library {
     /// Package name.
     pub name: String,
@@ -27,6 +28,8 @@ pub struct Library {
     pub folder: PathBuf,
     /// Has it to build for bare metal?
     pub bare_metal: bool,
+    /// Is it for others? If not, only tests and examples of the repository use it.
+    pub published: bool,
 }
 
 impl Repository {
@@ -48,23 +51,32 @@ impl Repository {
         self.root.join(folder).canonicalize().ok().filter(|folder| folder.is_dir())
     }
 
-    /// Every library crate: the folders `stampfly-*`, whose packages are called the same, and `vehicles/*`, whose packages
-    /// are called `stampfly-*`. A new crate is checked without being listed.
+    /// Every library crate: the members of the workspace that are called `stampfly-*` and have a `src/lib.rs`. A new crate is
+    /// checked without being listed anywhere else.
     pub fn libraries(&self) -> Result<Vec<Library>, Failure> {
+        let workspace = self.manifest(Path::new(""))?;
+        let members = workspace.get("workspace").and_then(|table| table.get("members")).and_then(Item::as_array);
+        let members = members.ok_or("Cargo.toml: no members")?.iter().filter_map(|member| member.as_str());
         let mut libraries = Vec::new();
-        for parent in ["", VEHICLES] {
-            let path = self.root.join(parent);
-            let entries = std::fs::read_dir(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-            libraries.extend(entries.filter_map(|entry| {
-                let folder = entry.ok()?.file_name().into_string().ok()?;
-                let name = if parent.is_empty() { folder.clone() } else { format!("stampfly-{folder}") };
-                let is_library = name.starts_with("stampfly-") && path.join(&folder).join("src/lib.rs").exists();
-                let bare_metal = !HOST_ONLY.contains(&name.as_str());
-                is_library.then(|| Library { name, folder: Path::new(parent).join(folder), bare_metal })
-            }));
+        for folder in members.map(PathBuf::from) {
+            let manifest = self.manifest(&folder)?;
+            let package = manifest.get("package").ok_or_else(|| format!("{}: no package", folder.display()))?;
+            let name = package.get("name").and_then(Item::as_str).unwrap_or_default().to_owned();
+            if name.starts_with("stampfly-") && self.root.join(&folder).join("src/lib.rs").exists() {
+                let published = package.get("publish").and_then(Item::as_bool).unwrap_or(true);
+                let bare_metal = published && !HOST_ONLY.contains(&name.as_str());
+                libraries.push(Library { name, folder, bare_metal, published });
+            }
         }
         libraries.sort_by(|a, b| a.name.cmp(&b.name));
         if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
+    }
+
+    /// What cargo is told about a folder.
+    fn manifest(&self, folder: &Path) -> Result<DocumentMut, Failure> {
+        let path = self.root.join(folder).join("Cargo.toml");
+        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        text.parse().map_err(|e| format!("{}: {e}", path.display()))
     }
 
     /// The text between two marks of a document.

@@ -6,6 +6,7 @@
 //!
 //! | register | content | after reset |
 //! |---|---|---|
+//! | 0x0000 | 0 holds the chip still, 1 then starts it anew at 0x29, as ST's drivers of the VL53L1 do | 1 |
 //! | 0x0001 | address, 7 bits; acts from the end of the transfer | 0x29 |
 //! | 0x0010, 0x00E5 | bit 0: the firmware runs | 1, 3 |
 //! | 0x0030 | bit 4: interrupt line active low | 0x11 |
@@ -47,6 +48,7 @@ use embedded_hal::digital::{ErrorType, OutputPin};
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
+const SOFT_RESET: u16 = 0x0000;
 const ADDRESS: u16 = 0x0001;
 const FIRMWARE: [(u16, u8); 2] = [(0x0010, 1), (0x00E5, 3)];
 const POLARITY: u16 = 0x0030;
@@ -158,6 +160,7 @@ impl State {
         self.registers.fill(0);
         self.begin = None;
         self.pending = false;
+        self.set(SOFT_RESET, &[1]);
         self.set(ADDRESS, &[FIRST_ADDRESS]);
         for (register, value) in FIRMWARE {
             self.set(register, &[value]);
@@ -167,6 +170,11 @@ impl State {
         self.set(PERIOD_B, &[0x09]);
         self.set(OSCILLATOR, &SLOW_OSCILLATOR.to_be_bytes());
         self.set(MODEL, &[self.id, 0xAA, 0x10]);
+    }
+
+    /// Held by its register: it answers, and does nothing.
+    fn stands_still(&self) -> bool {
+        self.byte(SOFT_RESET) & 1 == 0
     }
 
     fn true_time(&self, microseconds: f64) -> Duration {
@@ -276,6 +284,9 @@ impl Chip for Vl53l3cx {
     fn read(&mut self, register: u16, now: Instant) -> u16 {
         let mut state = self.0.borrow_mut();
         state.update(now);
+        if state.stands_still() {
+            return 0;
+        }
         if register == LINE {
             let asserted = state.pending && state.byte(INTERRUPT_AT) & 0x20 != 0;
             return u16::from(asserted != (state.byte(POLARITY) & 0x10 != 0));
@@ -288,6 +299,12 @@ impl Chip for Vl53l3cx {
         state.update(now);
         let byte = value as u8;
         match register {
+            SOFT_RESET if byte & 1 == 0 => {
+                state.set(SOFT_RESET, &[byte]);
+                state.begin = None;
+            }
+            SOFT_RESET if state.stands_still() => state.restart(Some(now + BOOT)),
+            _ if state.stands_still() => {}
             CLEAR if byte & 1 != 0 => {
                 state.pending = false;
                 state.set(RESULT, &[0]);

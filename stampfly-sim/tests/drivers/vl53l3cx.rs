@@ -4,7 +4,7 @@ use crate::{hover, registers, standing};
 use core::cell::RefCell;
 use stampfly_drivers::RangeFinder;
 use stampfly_drivers::chip::ChipError;
-use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, DistanceMode, Vl53l3cx};
+use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, DistanceMode, NoXshut, Vl53l3cx};
 use stampfly_sim::chips::{self, Attached, I2cBus, ShutdownPin};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, Tasks, block_on};
@@ -145,4 +145,26 @@ fn the_self_test_of_one_is_not_noticed_by_the_other() {
         assert!(block_on(clock, ahead.next()).is_ok(), "still there");
     }
     assert_eq!(block_on(clock, ahead.self_test()), Ok(()), "one is broken, the other is not");
+}
+
+#[test]
+fn a_chip_without_a_pin_starts_before_its_neighbour_and_again_after_a_dip_of_the_supply() {
+    let (simulation, boot) = (standing(), BootAddress::new());
+    let Bench { bus, pins: [_, ahead_pin], attached } = bench(&simulation);
+    let (clock, config) = (&simulation.clock, Config::default());
+    let mut below = Vl53l3cx::new(bus.clone(), NoXshut, &boot, BELOW, clock.clone(), config);
+    let mut ahead = Vl53l3cx::new(bus, ahead_pin, &boot, AHEAD, clock.clone(), config);
+    for _ in 0..3 {
+        block_on(clock, below.next()).expect("a measurement");
+    }
+    block_on(clock, ahead.next()).expect("a measurement");
+    assert!(block_on(clock, below.next()).expect("a measurement").data.valid);
+    // Moved already, and reset where it is.
+    assert_eq!(block_on(clock, below.self_test()), Ok(()));
+    assert_eq!(registers(&attached[0], 0x0001), [BELOW]);
+    assert!(block_on(clock, ahead.next()).is_ok(), "notices nothing");
+    attached[0].reset();
+    assert_eq!(block_on(clock, below.next()), Err(ChipError::Restarted));
+    assert!(block_on(clock, below.next()).is_ok());
+    assert_eq!(registers(&attached[0], 0x0001), [BELOW]);
 }

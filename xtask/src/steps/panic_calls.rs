@@ -92,7 +92,7 @@ mod tests {
         let allowed = |place, callee| ALLOWED.iter().any(|row| call(place, callee).is_allowed_by(row));
         assert!(allowed("/x/esp-hal-1.2.2/src/gpio/mod.rs:9", BOUNDS));
         assert!(allowed(
-            "/x/stampfly-drivers/src/slot.rs:9",
+            "/x/stampfly-drivers/core/src/slot.rs:9",
             "core::panicking::panic_const::panic_const_async_fn_resumed"
         ));
         assert!(!allowed("/x/stampfly-eskf/src/eskf.rs:9", BOUNDS));

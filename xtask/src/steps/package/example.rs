@@ -63,8 +63,7 @@ fn archive(archives: &Path, library: &str) -> Result<Archive, Failure> {
     let mut archives = entries.flatten().filter_map(|entry| {
         let path = entry.path();
         let name = path.file_name()?.to_str()?.strip_suffix(".crate")?.to_owned();
-        let version = name.strip_prefix(library)?.strip_prefix('-')?;
-        version.starts_with(|first: char| first.is_ascii_digit()).then_some(Archive { path, name })
+        super::is_of(library, &name).then_some(Archive { path, name })
     });
     archives.next().ok_or_else(|| format!("`{library}` has no archive"))
 }

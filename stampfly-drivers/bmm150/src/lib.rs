@@ -1,0 +1,171 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+pub mod codec;
+mod config;
+
+use codec::{Reading, Trim, register};
+pub use config::{Config, Preset, Rate};
+use embedded_hal_async::i2c::I2c;
+use stampfly_driver_core::chip::Port;
+pub use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, I2cRegisters, TransferLimit};
+pub use stampfly_driver_core::{Magnetometer, Sample, Timebase};
+pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_hal, embedded_hal_async};
+pub use stampfly_types::messages::MagData;
+pub use stampfly_types::{Duration, Instant};
+
+/// From power-on of the chip's logic to the first access: 3 ms.
+const START_UP: Duration = Duration::from_millis(3);
+/// How long the self test may take.
+const SELF_TEST_LIMIT: Duration = Duration::from_millis(20);
+/// How often the data is looked at once it may be new.
+const POLL: Duration = Duration::from_millis(2);
+
+/// The driver. Implements [`Magnetometer`].
+///
+/// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip. A field beyond the
+/// range is [`ChipError::Data`]. The chip keeps only its newest sample and does not say since when: a reader that comes
+/// late gets the one after it, and so does one whose call was dropped on the bus. `next` ends within two periods and
+/// 20 ms, 10 ms later when it sets the chip up.
+///
+/// ```
+/// # use stampfly_driver_fakes::memory::{Chip, Clock};
+/// # let trim = [0, 0, 9, 9, 9, 0, 0, 26, 26, 9, 9, 0xFB, 0x02, 0xAB, 0x60, 0x8D, 0x1B, 0, 0, 0xFD, 29];
+/// # let (bus, clock) = (Chip::new(&[
+/// #     (0x40, &[0x32]), (0x42, &[0x20, 0x03, 0x40, 0x06, 0xE8, 0x03, 0x35, 0x6E]), (0x5D, &trim),
+/// # ]), Clock::default());
+/// use stampfly_bmm150::{AxisMap, Bmm150, Config, Magnetometer, blocking::block_on};
+///
+/// let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, AxisMap::IDENTITY, Config::default());
+/// let sample = block_on(compass.next()).expect("a measurement");
+/// assert!(sample.data.field.norm() > 20.0, "microtesla");
+/// ```
+#[derive(Debug)]
+pub struct Bmm150<R, T> {
+    port: Port<R, T>,
+    axes: AxisMap,
+    config: Config,
+    /// `None` while the chip is not set up.
+    trim: Option<Trim>,
+    /// When the next sample may be there.
+    due: Instant,
+}
+
+impl Bmm150<(), ()> {
+    /// Address with CSB and SDO at ground, as on the StampFly.
+    pub const ALL_LOW: u8 = 0x10;
+}
+
+impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
+    /// A driver of the chip with this address.
+    pub const fn new(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
+        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
+        Self { port, axes, config, trim: None, due: Instant::ZERO }
+    }
+
+    stampfly_driver_core::transfer_limit!();
+
+    stampfly_driver_core::release!();
+
+    /// Sets the chip up: power, reset, identification, trim, repetitions, rate. 7 ms.
+    ///
+    /// # Errors
+    /// Another chip, one without trim, an impossible configuration, the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.set_up().await.map(|_| ())
+    }
+
+    /// Lets the chip deflect its own sensors. 10 to 30 ms; leaves the chip to be set up by the next call.
+    ///
+    /// # Errors
+    /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
+    pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.wake().await?;
+        self.port.write(register::MODE, &[codec::SELF_TEST]).await?;
+        let deadline = self.port.now() + SELF_TEST_LIMIT;
+        loop {
+            self.port.wait(POLL).await;
+            let looks = self.port.now();
+            let [mode]: [u8; 1] = self.port.read(register::MODE).await?;
+            if mode & 1 == 0 {
+                break;
+            }
+            if looks > deadline {
+                return Err(ChipError::SelfTest);
+            }
+        }
+        let data = self.port.read(register::DATA_X_LSB).await?;
+        if codec::passes_self_test(&data) { Ok(()) } else { Err(ChipError::SelfTest) }
+    }
+
+    /// From whatever state to sleep, with the identification checked.
+    async fn wake(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.trim = None;
+        // Without power nothing but this register answers.
+        self.port.write(register::POWER, &[codec::POWER_ON]).await?;
+        self.port.wait(START_UP).await;
+        self.port.write(register::POWER, &[codec::SOFT_RESET]).await?;
+        self.port.wait(START_UP).await;
+        let [found]: [u8; 1] = self.port.read(register::CHIP_ID).await?;
+        if found == codec::CHIP_ID_VALUE { Ok(()) } else { Err(ChipError::Identification { found: u16::from(found) }) }
+    }
+
+    async fn set_up(&mut self) -> Result<Trim, ChipError<I::Error>> {
+        if self.config.preset.duration() > self.config.rate.period() {
+            return Err(ChipError::InvalidConfiguration);
+        }
+        self.wake().await?;
+        let trim = Trim::decode(&self.port.read_twice(register::TRIM).await?).ok_or(ChipError::Data)?;
+        let [xy, z] = self.config.preset.codes();
+        self.port.write(register::REPETITIONS_XY, &[xy]).await?;
+        self.port.write(register::REPETITIONS_Z, &[z]).await?;
+        self.port.write(register::MODE, &[codec::mode_bits(&self.config)]).await?;
+        self.due = self.port.now() + self.config.preset.duration();
+        self.trim = Some(trim);
+        Ok(trim)
+    }
+
+    /// Waits for new data, and gives it with the instant it was seen.
+    async fn reading(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
+        let period = self.config.rate.period();
+        let asked = self.port.now();
+        let deadline = asked + period + period;
+        let mut stale = asked > self.due + period / 8;
+        self.port.wait_until(self.due).await;
+        loop {
+            let looks = self.port.now();
+            let reading = Reading::decode(&self.port.read(register::DATA_X_LSB).await?);
+            let now = self.port.now();
+            if reading.power & codec::POWER_ON == 0 || reading.mode != codec::mode_bits(&self.config) {
+                self.trim = None;
+                return Err(ChipError::Restarted);
+            }
+            if reading.ready && !stale {
+                // A little early: the chip's clock may be fast by a few per cent.
+                self.due = now + period - period / 16;
+                return Ok((now, reading));
+            }
+            stale = false;
+            if looks > deadline {
+                self.trim = None;
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+    }
+}
+
+impl<I: I2c, T: Timebase> Magnetometer for Bmm150<I2cRegisters<I>, T> {
+    type Error = ChipError<I::Error>;
+
+    async fn next(&mut self) -> Result<Sample<MagData>, Self::Error> {
+        let trim = match self.trim {
+            Some(trim) => trim,
+            None => self.set_up().await?,
+        };
+        let (seen, reading) = self.reading().await?;
+        let field = trim.compensate(&reading).ok_or(ChipError::Data)?;
+        let at = seen - self.config.preset.duration() / 2;
+        Ok(Sample { at, data: MagData { field: self.axes.to_body(field) } })
+    }
+}

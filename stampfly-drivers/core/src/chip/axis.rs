@@ -1,0 +1,116 @@
+//! How a chip is turned on its board.
+//!
+//! Every driver delivers in the body frame; which chip axis points where is the board's knowledge and comes in as an
+//! [`AxisMap`]. Not for mounting errors of a few degrees: those are calibration.
+
+use stampfly_types::Vec3;
+
+/// A chip axis, in its own or in the opposite direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Axis {
+    PlusX,
+    MinusX,
+    PlusY,
+    MinusY,
+    PlusZ,
+    MinusZ,
+}
+
+impl Axis {
+    const fn number(self) -> u8 {
+        match self {
+            Self::PlusX | Self::MinusX => 0,
+            Self::PlusY | Self::MinusY => 1,
+            Self::PlusZ | Self::MinusZ => 2,
+        }
+    }
+
+    const fn is_negative(self) -> bool {
+        matches!(self, Self::MinusX | Self::MinusY | Self::MinusZ)
+    }
+
+    fn of(self, chip: &Vec3) -> f32 {
+        match self {
+            Self::PlusX => chip.x,
+            Self::MinusX => -chip.x,
+            Self::PlusY => chip.y,
+            Self::MinusY => -chip.y,
+            Self::PlusZ => chip.z,
+            Self::MinusZ => -chip.z,
+        }
+    }
+}
+
+/// Which chip axis points along each body axis (FRD).
+///
+/// ```
+/// use stampfly_driver_core::chip::{Axis, AxisMap};
+/// use stampfly_types::Vec3;
+/// // A chip that lies upside down, its x axis to the right.
+/// let map = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
+/// assert_eq!(map.to_body(Vec3::new(1.0, 2.0, 3.0)), Vec3::new(2.0, 1.0, -3.0));
+/// assert_eq!(AxisMap::new(Axis::PlusX, Axis::PlusX, Axis::PlusZ), None, "an axis is used twice");
+/// assert_eq!(AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::PlusZ), None, "a mirror");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisMap {
+    forward: Axis,
+    right: Axis,
+    down: Axis,
+}
+
+impl AxisMap {
+    /// The chip's axes are the body's.
+    pub const IDENTITY: Self = Self { forward: Axis::PlusX, right: Axis::PlusY, down: Axis::PlusZ };
+
+    /// A map of the chip axes that point forward, to the right and down; `None` when it is not a rotation.
+    #[must_use]
+    pub const fn new(forward: Axis, right: Axis, down: Axis) -> Option<Self> {
+        let (first, second, third) = (forward.number(), right.number(), down.number());
+        if first == second || second == third || third == first {
+            return None;
+        }
+        let cyclic = (first + 1) % 3 == second;
+        let negative = forward.is_negative() ^ right.is_negative() ^ down.is_negative();
+        if cyclic == negative { None } else { Some(Self { forward, right, down }) }
+    }
+
+    /// A vector in chip axes, turned into body axes.
+    #[must_use]
+    pub fn to_body(self, chip: Vec3) -> Vec3 {
+        Vec3::new(self.forward.of(&chip), self.right.of(&chip), self.down.of(&chip))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_all_signed_triples_exactly_the_24_rotations_are_maps() {
+        use Axis::{MinusX, MinusY, MinusZ, PlusX, PlusY, PlusZ};
+        let all = [PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ];
+        let mut rotations = 0;
+        for forward in all {
+            for right in all {
+                for down in all {
+                    let rows =
+                        [forward, right, down].map(|axis| [Vec3::x(), Vec3::y(), Vec3::z()].map(|unit| axis.of(&unit)));
+                    let columns = rows.map(Vec3::from);
+                    let determinant = columns[0].cross(&columns[1]).dot(&columns[2]);
+                    assert_eq!(AxisMap::new(forward, right, down).is_some(), determinant == 1.0);
+                    rotations += i32::from(determinant == 1.0);
+                }
+            }
+        }
+        assert_eq!(rotations, 24);
+    }
+
+    #[test]
+    fn the_identity_is_a_rotation_and_changes_nothing() {
+        let AxisMap { forward, right, down } = AxisMap::IDENTITY;
+        assert_eq!(AxisMap::new(forward, right, down), Some(AxisMap::IDENTITY));
+        assert_eq!(AxisMap::IDENTITY.to_body(Vec3::new(1.0, -2.0, 3.0)), Vec3::new(1.0, -2.0, 3.0));
+    }
+}

@@ -1,0 +1,86 @@
+//! One trait per kind of sensor.
+
+use crate::SensorError;
+use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
+use stampfly_types::{Duration, Instant};
+
+/// A measurement and the instant it is valid for. How good it is, is part of the measurement: `valid`, `sigma`, `quality`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample<T> {
+    /// The instant the data is valid for.
+    pub at: Instant,
+    /// The measurement.
+    pub data: T,
+}
+
+impl<T> Sample<T> {
+    /// How old the data is at `now`; zero when it is stamped in the future.
+    ///
+    /// ```
+    /// use stampfly_driver_core::Sample;
+    /// use stampfly_types::{Duration, Instant};
+    /// let sample = Sample { at: Instant::from_micros(1_000), data: () };
+    /// assert_eq!((sample.age(Instant::from_micros(3_000)), sample.age(Instant::ZERO)), (Duration::from_micros(2_000), Duration::ZERO));
+    /// ```
+    #[must_use]
+    pub fn age(&self, now: Instant) -> Duration {
+        now.since(self.at)
+    }
+}
+
+macro_rules! sensor_trait {
+    ($(#[$meta:meta])* $Name:ident, $Data:ty) => {
+        $(#[$meta])*
+        pub trait $Name {
+            /// The driver's error.
+            type Error: SensorError;
+
+            /// Waits for the next sample. See the crate's contract of sensor traits.
+            ///
+            /// # Errors
+            /// When this sample is lost; the next call tries again.
+            async fn next(&mut self) -> Result<Sample<$Data>, Self::Error>;
+        }
+
+        impl<T: $Name + ?Sized> $Name for &mut T {
+            type Error = T::Error;
+            async fn next(&mut self) -> Result<Sample<$Data>, Self::Error> {
+                T::next(self).await
+            }
+        }
+    };
+}
+
+sensor_trait! {
+    /// A six-axis inertial measurement unit, at the vehicle's control rate.
+    ///
+    /// A chip that samples faster is decimated by its driver with a filter, never by skipping.
+    Imu, ImuData
+}
+sensor_trait! {
+    /// A magnetometer with its factory compensation applied.
+    Magnetometer, MagData
+}
+sensor_trait! {
+    /// A barometer with its factory compensation applied.
+    Barometer, BaroData
+}
+sensor_trait! {
+    /// A range finder along a fixed beam.
+    ///
+    /// A range that the chip does not vouch for is a sample with `valid: false`, not an error: "nothing in the
+    /// beam" is an answer.
+    RangeFinder, TofData
+}
+sensor_trait! {
+    /// An optical flow sensor. The angles are the sum since the previous sample; none is lost between two calls.
+    OpticalFlow, FlowData
+}
+sensor_trait! {
+    /// A system of cameras in the room. Its samples are stamped when they were seen and arrive tens of milliseconds later.
+    MotionCapture, ExternalPose
+}
+sensor_trait! {
+    /// A battery monitor.
+    PowerMonitor, PowerData
+}

@@ -1,0 +1,211 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+pub mod codec;
+mod config;
+
+use codec::register;
+pub use config::{Average, Channel, Config, ConversionTime};
+use embedded_hal_async::i2c::I2c;
+use stampfly_driver_core::chip::Port;
+pub use stampfly_driver_core::chip::{ChipError, I2cRegisters, TransferLimit};
+pub use stampfly_driver_core::{PowerMonitor, Sample, Timebase};
+pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_hal, embedded_hal_async};
+pub use stampfly_types::messages::PowerData;
+pub use stampfly_types::{Duration, Instant};
+
+/// From a reset to the first access. The data sheet gives no figure.
+const AFTER_RESET: Duration = Duration::from_millis(1);
+/// How often the flag is looked at once it may be up.
+const POLL: Duration = Duration::from_millis(2);
+/// The single conversion of the self test takes 2.2 ms.
+const SELF_TEST_LIMIT: Duration = Duration::from_millis(10);
+
+/// The driver. Implements [`PowerMonitor`].
+///
+/// `Sample::at` is the middle of the average. The resolution of 40 µV is 4 mA at 0.01 Ω, the range ±16 A. The chip
+/// keeps only its newest result and does not say since when: a reader that comes late gets the one after it. `next` ends
+/// within two averages and 20 ms.
+///
+/// ```
+/// # use stampfly_driver_fakes::memory::{Chip, Clock};
+/// # let (bus, clock) = (Chip::new(&[
+/// #     (0xFE, &[0x54, 0x49]), (0xFF, &[0x32, 0x20]), (0x0F, &[0, 1]), (3, &[0, 200]), (4, &[0x0F, 0xA0]),
+/// # ]), Clock::default());
+/// use stampfly_ina3221::{Config, Ina3221, PowerMonitor, blocking::block_on};
+///
+/// let mut battery = Ina3221::new(bus, Ina3221::A0_GROUND, clock, Config::default());
+/// let sample = block_on(battery.next()).expect("a result");
+/// assert_eq!(sample.data.voltage, 4.0);
+/// assert!((sample.data.current - 0.1).abs() < 1e-6);
+/// ```
+#[derive(Debug)]
+pub struct Ina3221<R, T> {
+    port: Port<R, T>,
+    config: Config,
+    running: bool,
+    /// When the next result may be there.
+    due: Instant,
+}
+
+impl Ina3221<(), ()> {
+    /// Address with A0 at ground, as on the StampFly.
+    pub const A0_GROUND: u8 = 0x40;
+}
+
+impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
+    /// A driver of the chip with this address.
+    pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
+        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
+        Self { port, config, running: false, due: Instant::ZERO }
+    }
+
+    /// Sets the chip up: identification, reset, configuration. A millisecond.
+    ///
+    /// # Errors
+    /// Another chip, a shunt that cannot be or none on [`Config::channel`], the bus.
+    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.running = false;
+        let can_be = |ohms: f32| ohms.is_finite() && ohms > 0.0;
+        let measured = self.config.shunt(self.config.channel).is_some();
+        if !(measured && self.config.shunts_ohms.into_iter().flatten().all(can_be)) {
+            return Err(ChipError::InvalidConfiguration);
+        }
+        for (register, value) in
+            [(register::MANUFACTURER, codec::MANUFACTURER_VALUE), (register::DIE, codec::DIE_VALUE)]
+        {
+            let found = self.read(register).await?;
+            if found != value {
+                return Err(ChipError::Identification { found });
+            }
+        }
+        self.write(codec::RESET).await?;
+        self.port.wait(AFTER_RESET).await;
+        self.write(codec::configuration(&self.config)).await?;
+        self.due = self.port.now() + codec::cycle(&self.config);
+        self.running = true;
+        Ok(())
+    }
+
+    /// Sets the chip up, has it keep its settings and make one conversion, whatever the average. 6 ms, 2.2 ms more for
+    /// every further channel, within 0.2 s however slow the bus, with [`TransferLimit::I2C_SENSORS`].
+    ///
+    /// The chip has no self test of its own: this one asks whether there is a supply on the configured channel, and whether
+    /// the shunt's voltage can be measured. 0 V do not pass: no battery, another channel's shunt and a dead converter look
+    /// the same. Leaves the chip to be set up by the next call.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start); [`ChipError::Configuration`] when the settings were not kept, with the upper byte of
+    /// what is there instead; [`ChipError::NoSample`] without a conversion; [`ChipError::SelfTest`] for a supply that is
+    /// not above 0 V and at most 26 V, or a shunt beyond the scale of ±163.8 mV, as an open one is.
+    pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
+        self.start().await?;
+        self.running = false;
+        let config = self.config;
+        self.keeps(&config).await?;
+        let single = Config { average: Average::A1, time: ConversionTime::Us1100, ..config };
+        self.write(codec::configuration(&single)).await?;
+        self.keeps(&single).await?;
+        let deadline = self.port.now() + SELF_TEST_LIMIT;
+        loop {
+            let looks = self.port.now();
+            if self.read(register::MASK_ENABLE).await? & codec::CONVERSION_READY != 0 {
+                break;
+            }
+            if looks > deadline {
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+        let shunt = self.read(config.channel.shunt_register()).await?;
+        let bus = self.read(config.channel.bus_register()).await?;
+        if codec::is_measurable(shunt, bus) { Ok(()) } else { Err(ChipError::SelfTest) }
+    }
+
+    /// The next result of every channel that has a shunt, in the chip's order. A result that this has given does not come from
+    /// [`next`](PowerMonitor::next) as well, and the other way round.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start) and [`next`](PowerMonitor::next).
+    pub async fn next_of_all(&mut self) -> Result<Sample<[Option<PowerData>; 3]>, ChipError<I::Error>> {
+        let at = self.ready().await?;
+        let mut data = [None; 3];
+        for (place, channel) in data.iter_mut().zip(Channel::ALL) {
+            if let Some(ohms) = self.config.shunt(channel) {
+                *place = Some(self.measured(channel, ohms).await?);
+            }
+        }
+        Ok(Sample { at, data })
+    }
+
+    stampfly_driver_core::transfer_limit!();
+
+    stampfly_driver_core::release!();
+
+    /// What the registers of a channel hold.
+    async fn measured(&mut self, channel: Channel, shunt_ohms: f32) -> Result<PowerData, ChipError<I::Error>> {
+        let current = codec::shunt_volts(self.read(channel.shunt_register()).await?) / shunt_ohms;
+        let voltage = codec::bus_volts(self.read(channel.bus_register()).await?);
+        Ok(PowerData { voltage, current, power: voltage * current })
+    }
+
+    /// Refuses a chip that does not hold this configuration.
+    async fn keeps(&mut self, config: &Config) -> Result<(), ChipError<I::Error>> {
+        let kept = self.read(register::CONFIGURATION).await?;
+        let [status, _] = kept.to_be_bytes();
+        if kept == codec::configuration(config) { Ok(()) } else { Err(ChipError::Configuration { status }) }
+    }
+
+    async fn read(&mut self, register: u8) -> Result<u16, ChipError<I::Error>> {
+        Ok(u16::from_be_bytes(self.port.read(register).await?))
+    }
+
+    async fn write(&mut self, configuration: u16) -> Result<(), ChipError<I::Error>> {
+        self.port.write(register::CONFIGURATION, &configuration.to_be_bytes()).await
+    }
+
+    /// Starts the chip if it does not run, waits for the flag that a result is there, and gives the middle of its average.
+    async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
+        if !self.running {
+            self.start().await?;
+        }
+        let cycle = codec::cycle(&self.config);
+        let asked = self.port.now();
+        let deadline = asked + cycle + cycle;
+        // A flag that may have been up for long tells nothing about when: take it down and wait for the next.
+        let mut stale = asked > self.due + cycle / 8;
+        self.port.wait_until(self.due).await;
+        loop {
+            let looks = self.port.now();
+            if self.read(register::CONFIGURATION).await? != codec::configuration(&self.config) {
+                self.running = false;
+                return Err(ChipError::Restarted);
+            }
+            let flags = self.read(register::MASK_ENABLE).await?;
+            let now = self.port.now();
+            if flags & codec::CONVERSION_READY != 0 && !stale {
+                // A little early: the chip's clock may be fast by a few per cent.
+                self.due = now + cycle - cycle / 16;
+                return Ok(now - cycle / 2);
+            }
+            stale = false;
+            if looks > deadline {
+                self.running = false;
+                return Err(ChipError::NoSample);
+            }
+            self.port.wait(POLL).await;
+        }
+    }
+}
+
+impl<I: I2c, T: Timebase> PowerMonitor for Ina3221<I2cRegisters<I>, T> {
+    type Error = ChipError<I::Error>;
+
+    async fn next(&mut self) -> Result<Sample<PowerData>, Self::Error> {
+        let at = self.ready().await?;
+        let channel = self.config.channel;
+        // The start refuses a channel without a shunt.
+        let shunt = self.config.shunt(channel).ok_or(ChipError::InvalidConfiguration)?;
+        Ok(Sample { at, data: self.measured(channel, shunt).await? })
+    }
+}
