@@ -31,6 +31,7 @@
 extern crate std;
 
 pub mod activation;
+mod atmosphere;
 pub mod field;
 pub mod frame;
 pub mod math;
@@ -45,6 +46,7 @@ pub mod text;
 pub mod time;
 
 pub use activation::{ActivationRecord, InputRecord};
+pub use atmosphere::pressure_altitude;
 pub use field::Field;
 pub use frame::{GRAVITY, Quat, Vec3};
 pub use message::Message;

@@ -66,10 +66,10 @@ const EMPTY: Interval = Interval {
 pub struct History {
     #[cfg_attr(feature = "serde", serde(with = "stored::intervals"))]
     intervals: [Interval; DEPTH],
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "stored::place"))]
-    newest: usize,
     /// An interval shorter than this takes in the next sample, s.
     merged: f32,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "stored::place"))]
+    newest: usize,
 }
 
 impl Default for History {
@@ -80,7 +80,7 @@ impl Default for History {
 
 impl History {
     /// No sample. A constant, because a filter that is made on a small stack has no room for two of them.
-    pub(crate) const EMPTY: Self = Self { intervals: [EMPTY; DEPTH], newest: 0, merged: MIN_INTERVAL };
+    pub(crate) const EMPTY: Self = Self { intervals: [EMPTY; DEPTH], merged: MIN_INTERVAL, newest: 0 };
 
     /// An empty memory that reaches back `horizon` seconds, 0.1 at least. A longer one is as large and coarser.
     ///
