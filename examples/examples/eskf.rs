@@ -33,7 +33,7 @@ fn main() {
         eskf.predict(at, &ImuData { accel: Vec3::new(0.0, 0.0, felt), ..Default::default() });
         if step % 13 == 0 {
             let distance = height + 0.02 * noise(&mut random);
-            eskf.fuse_tof(at, &TofData { distance, valid: true, ..Default::default() });
+            _ = eskf.fuse_tof(at, &TofData { distance, valid: true, ..Default::default() });
         }
         let estimate = eskf.estimate();
         if step > 2_000 {

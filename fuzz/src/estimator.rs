@@ -29,12 +29,12 @@ pub fn estimator_stream(data: &[u8]) {
                 .predict(now, &ImuData { gyro: input.vector(35.0), accel: input.vector(80.0), ..Default::default() }),
             1 => {
                 let [distance, sigma] = [input.number(3.0), input.number(0.1)];
-                eskf.fuse_tof(now, &TofData { distance, sigma, valid: input.byte() & 1 == 1, ..Default::default() });
+                _ = eskf.fuse_tof(now, &TofData { distance, sigma, valid: input.byte() & 1 == 1, ..Default::default() });
             }
             2 => {
                 let [delta_x, delta_y, interval] = [input.number(1.0), input.number(1.0), input.number(0.05)];
                 let (quality, valid) = (input.byte(), input.byte() & 1 == 1);
-                eskf.fuse_flow(now, &FlowData { delta_x, delta_y, interval, quality, valid });
+                _ = eskf.fuse_flow(now, &FlowData { delta_x, delta_y, interval, quality, valid });
             }
             3 => _ = eskf.fuse_baro(now, &BaroData { altitude: input.number(10.0), ..Default::default() }),
             4 => _ = eskf.fuse_mag(now, &MagData { field: input.vector(100.0) }),
@@ -47,7 +47,7 @@ pub fn estimator_stream(data: &[u8]) {
             6 => eskf.initialize(now, &calibration),
             _ => {
                 let velocity = input.vector(5.0);
-                eskf.fuse_velocity(now, &velocity, input.number(1.0));
+                _ = eskf.fuse_velocity(now, &velocity, &input.vector(1.0));
             }
         }
         check(&eskf);

@@ -245,11 +245,19 @@ impl Estimator for Complementary {
         Fusion::Refused(Refusal::NotUsed)
     }
 
-    fn fuse_velocity(&mut self, _: Instant, velocity: &Vec3, _: f32) -> Fusion {
-        if !velocity.iter().all(|v| v.is_finite()) {
-            return Fusion::Refused(Refusal::NotFinite);
+    fn fuse_velocity(&mut self, _: Instant, velocity: &Vec3, sigma: &Vec3) -> Fusion {
+        for axis in 0..3 {
+            // An axis that was not measured stays as it is.
+            let error = if sigma[axis].is_infinite() { 0.0 } else { velocity[axis] - self.state.velocity[axis] };
+            if !error.is_finite() {
+                return Fusion::Refused(Refusal::NotFinite);
+            }
         }
-        self.state.velocity += (velocity - self.state.velocity) * 0.1;
+        for axis in 0..3 {
+            if !sigma[axis].is_infinite() {
+                self.state.velocity[axis] += (velocity[axis] - self.state.velocity[axis]) * 0.1;
+            }
+        }
         self.flow_fused = Some(self.now);
         Fusion::Fused { ratio: 0.0 }
     }

@@ -1,7 +1,9 @@
 //! Everything about the error-state Kalman filter that can be tuned, with the reason for each default.
 
-/// Tuning of [`Eskf`](crate::Eskf). One set serves a sensor suite; the defaults are the StampFly's (BMI270, VL53L3CX,
-/// PMW3901, BMP280).
+use stampfly_types::Vec3;
+
+/// Tuning of [`Eskf`](crate::Eskf). One set serves a sensor suite; the defaults are those of a small vehicle indoors (BMI270,
+/// VL53L3CX, PMW3901, BMP280); [`EskfConfig::outdoors`] is for satellite receivers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EskfConfig {
@@ -71,6 +73,10 @@ pub struct EskfConfig {
     pub baro_sigma: f32,
     /// Use the barometer.
     pub baro_enable: bool,
+    /// While something from outside measures the height, the barometer only learns its zero, and holds the height when the other
+    /// is silent for two seconds. Its zero is kept apart from the state, without their correlation, so that beside a receiver,
+    /// which is worse than the barometer from second to second, its many samples would claim a height that nobody knows.
+    pub baro_backup: bool,
     /// How fast the barometer's zero drifts, m/√s: a metre an hour is 0.017.
     pub baro_walk: f32,
     /// How far starting propellers move the barometer's zero, m, and how uncertain its altitude is near the floor. StampFlys read 0.6 m
@@ -106,11 +112,86 @@ pub struct EskfConfig {
 
     /// Gates, in standard deviations.
     pub gate: f32,
-    /// Lock-out time: after this long with every measurement of a sensor rejected, the state is reset to it, s.
+    /// Lock-out time: after this long with every measurement of a sensor rejected, the state is reset to it, s. Of range, flow,
+    /// barometer, magnetometer and gravity.
     pub lockout: f32,
+    /// The same for position, velocity and attitude from outside, s. A receiver between walls is wrong for seconds.
+    pub external_lockout: f32,
+    /// Measurements rejected running that a reset needs besides the time: two bad fixes of a slow receiver are no lock-out.
+    pub lockout_samples: u16,
+
+    /// Oldest measurement that is placed in time, s: the delay of the slowest sensor, and what its clock may be wrong by. The
+    /// memory has the same size for any; beyond 0.11 s it becomes coarser, see [`History`](crate::filter::History).
+    pub horizon: f32,
+    /// For how long position and velocity from outside, and measurements of one's own, hold the outputs valid, s. Meanwhile the
+    /// inertial sensor carries them and the covariance says how far.
+    pub aiding_timeout: f32,
+    /// Standard deviation at which a velocity that nothing measures is given up and set to zero, m/s.
+    pub unaided_velocity: f32,
+    /// Largest standard deviation of a position that nothing measures, m.
+    pub unaided_position: f32,
+    /// A position farther from the origin along any axis is divergence, m. At 100 km an `f32` resolves 8 mm, and the earth is no
+    /// longer flat.
+    pub max_position: f32,
+    /// A velocity above this along any axis is divergence, m/s.
+    pub max_velocity: f32,
+
+    /// What is known about the heading at the start.
+    pub start_heading: StartHeading,
+    /// The earth's field at the place, true NED; its length does not matter. `None`: north is magnetic north, and the inclination
+    /// that of the calibration. [`aid::field::earth`](crate::aid::field::earth) makes one from declination and inclination. With
+    /// [`StartHeading::Nose`] it is not looked at.
+    pub earth_field: Option<Vec3>,
 }
 
 impl EskfConfig {
+    /// For a vehicle under the open sky: satellite receiver up to half a second late, barometer, perhaps a magnetometer, its own
+    /// inertial sensor at any rate. Set noise densities, `mag_enable` and what the start knows of the heading to yours.
+    ///
+    /// | differs from the default | because |
+    /// |---|---|
+    /// | `horizon` 0.5 s | receivers report 50 to 300 ms late |
+    /// | `external_lockout` 5 s of at least 10 fixes | a reflected signal lasts seconds |
+    /// | `aiding_timeout` 10 s | receivers pause under trees and bridges |
+    /// | `unaided_velocity`, `unaided_position` | a vehicle that nothing measures is not standing |
+    /// | `initial_position` 10 km | the first fix says where it is; a barometer has nothing to be compared with until then |
+    /// | `baro_backup` | a receiver's height beside a barometer's |
+    /// | `start_heading` unknown | the receiver knows north, the nose does not |
+    /// | `accel_noise`, `initial_accel_bias` | vibration is told by `accel_vibration`; start-up bias of any MEMS part |
+    /// | `vibration_bias`, `baro_wash` 0 | no small multirotor's propellers |
+    ///
+    /// ```
+    /// use stampfly_eskf::{EskfConfig, StartHeading, aid::field};
+    /// let declination = 7.5f32.to_radians();
+    /// let config = EskfConfig {
+    ///     mag_enable: true,
+    ///     start_heading: StartHeading::Magnetic,
+    ///     earth_field: Some(field::earth(declination, 50f32.to_radians())),
+    ///     ..EskfConfig::outdoors()
+    /// };
+    /// assert!(config.horizon >= 0.3);
+    /// ```
+    #[must_use]
+    pub fn outdoors() -> Self {
+        Self {
+            accel_noise: 0.05,
+            initial_position: 1e4,
+            initial_velocity: 1.0,
+            initial_accel_bias: 0.2,
+            vibration_bias: 0.0,
+            baro_wash: 0.0,
+            baro_backup: true,
+            external_lockout: 5.0,
+            lockout_samples: 10,
+            horizon: 0.5,
+            aiding_timeout: 10.0,
+            unaided_velocity: 50.0,
+            unaided_position: 5e3,
+            start_heading: StartHeading::Unknown,
+            ..Self::default()
+        }
+    }
+
     /// Squared Mahalanobis distance at which the gate of a measurement of so many axes lies. A vector of more axes is
     /// more often far away by chance: its gate is wider, for the same chance (6·10⁻⁵ at four standard deviations).
     ///
@@ -122,12 +203,47 @@ impl EskfConfig {
     #[inline]
     #[must_use]
     pub fn gate_distance(&self, axes: usize) -> f32 {
-        self.gate * self.gate * GATE_OF_AXES.get(axes).copied().unwrap_or(1.0)
+        self.gate * self.gate * Self::axes_factor(axes)
+    }
+
+    /// Squared gate of so many axes, relative to that of one.
+    #[inline]
+    pub(crate) fn axes_factor(axes: usize) -> f32 {
+        GATE_OF_AXES.get(axes).copied().unwrap_or(GATE_OF_MORE)
     }
 }
 
 /// Squared gate, relative to that of one axis.
 const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
+/// The same for more than three: that of six, 31.9 of 16, which is on the safe side for four and five.
+const GATE_OF_MORE: f32 = 1.8;
+
+/// What is known about the heading at the start, and with it where north is.
+///
+/// With all but the first, `north` is true north, or magnetic north without [`EskfConfig::earth_field`], and
+/// [`Validity::HEADING`](stampfly_types::messages::Validity::HEADING) is set only while the heading is known to a third of
+/// a radian.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum StartHeading {
+    /// "North" is where the nose points at the start: for rooms, where nothing tells another north. **Not for satellite
+    /// receivers**, whose north is another one: their velocities would contradict the attitude.
+    #[default]
+    Nose,
+    /// Not known: the first changes of a velocity from outside show it. Until then horizontal velocity, position and heading are
+    /// not valid. The vehicle must stand at its calibration and then accelerate, in any direction.
+    Unknown,
+    /// From the field of the calibration. Without one it is [`Unknown`](Self::Unknown).
+    Magnetic,
+    /// Given: by a pilot, by two antennas, by a mark on the runway.
+    Given {
+        /// Heading, rad, east of north.
+        heading: f32,
+        /// Its standard deviation, rad.
+        sigma: f32,
+    },
+}
 
 /// What of the magnetic field is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -182,6 +298,7 @@ impl Default for EskfConfig {
             flow_min_distance: 0.02,
             baro_sigma: 0.3,
             baro_enable: true,
+            baro_backup: false,
             baro_walk: 0.02,
             baro_wash: 0.6,
             mag_sigma: 0.1,
@@ -197,6 +314,16 @@ impl Default for EskfConfig {
             unobserved_velocity: 0.07,
             gate: 4.0,
             lockout: 0.2,
+            external_lockout: 2.0,
+            lockout_samples: 5,
+            horizon: 0.1,
+            aiding_timeout: 1.0,
+            unaided_velocity: 3.0,
+            unaided_position: 10.0,
+            max_position: 1e5,
+            max_velocity: 300.0,
+            start_heading: StartHeading::Nose,
+            earth_field: None,
         }
     }
 }

@@ -11,6 +11,8 @@
 //! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
 //! | `eskf/bridge.rs` | inertial samples that are garbage |
 //! | `eskf/measurements.rs` | one update a sensor |
+//! | `eskf/external.rs` | position, velocity, attitude from outside; measurements with a model of one's own |
+//! | `eskf/alignment.rs` | north, from how a measured velocity changes |
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, drag, initial heading, unobserved velocity |
 //! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
@@ -21,7 +23,9 @@
 //! | `eskf/influence.rs` | what flow did lately, to be undone |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
+mod alignment;
 mod bridge;
+mod external;
 mod flow_monitor;
 mod gate;
 mod gyro_monitor;
@@ -37,15 +41,17 @@ mod vertical;
 use crate::aid::baro::Offset;
 use crate::aid::gravity::Acceleration;
 use crate::aid::{self, Row};
-use crate::config::{EskfConfig, GravityUse};
+use crate::config::{EskfConfig, GravityUse, StartHeading};
 use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::covariance::{Covariance, Innovation, ProcessNoise};
-use crate::filter::history::MAX_AGE;
-use crate::filter::state::{Rotation, multiply, rotate, rotate_back};
+use crate::filter::state::{Rotation, multiply, rotate, rotate_back, rotation_matrix};
 use crate::filter::{
     ACCEL_BIAS, ATTITUDE, GYRO_BIAS, History, N, NominalState, POSITION, PropagationStep, VELOCITY, Vibration,
 };
 use crate::level::attitude_from_specific_force;
+use crate::measurements::Aiding;
+use crate::tally::{Tallies, Tally};
+use alignment::Alignment;
 use bridge::Bridge;
 use flow_monitor::{FlowMonitor, GyroShift};
 use gate::{Gates, Sensor};
@@ -113,7 +119,7 @@ impl Mean {
 ///     let at = Instant::from_micros(k * 2_500);
 ///     eskf.predict(at, &ImuData { accel: still, ..Default::default() });
 ///     if k % 13 == 0 {
-///         eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
+///         _ = eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
 ///     }
 /// }
 /// let estimate = eskf.estimate();
@@ -161,6 +167,8 @@ pub struct Eskf {
     standing: Standing,
     vertical: VerticalMonitor,
     status: EstimatorStatus,
+    alignment: Alignment,
+    tallies: Tallies,
 }
 
 /// The state at the time of a measurement: EKF2's delayed time horizon, computed back for each measurement.
@@ -194,7 +202,7 @@ impl Eskf {
             state: NominalState::default(),
             pending_step: PropagationStep::default(),
             pending_rotation: NominalState::default().rotation(),
-            history: History::EMPTY,
+            history: History::reaching(config.horizon),
             vibration: [Vibration::default(); 2],
             now: Instant::ZERO,
             initialized: false,
@@ -220,6 +228,8 @@ impl Eskf {
             standing: Standing::default(),
             vertical: VerticalMonitor::airborne(),
             status: EstimatorStatus::default(),
+            alignment: Alignment::KNOWN,
+            tallies: Tallies::default(),
         }
     }
 
@@ -243,7 +253,15 @@ impl Eskf {
     /// Age of a measurement, s. Refuses measurements before initialisation, and those that are not finite, not new, too old or
     /// from the future. [`state_at`](Self::state_at) follows, and is not part of it: a result that holds a state beside a
     /// refusal of one byte is copied byte by byte, 700 instructions a measurement.
+    #[inline]
     fn admit(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<f32, Refusal> {
+        let age = self.place_in_time(at, values)?;
+        if self.gates.is_new(sensor, at) { Ok(age) } else { Err(Refusal::Repeated) }
+    }
+
+    /// The same for measurements of which several may have one stamp.
+    #[inline]
+    fn place_in_time(&self, at: Instant, values: &[f32]) -> Result<f32, Refusal> {
         if !self.initialized {
             return Err(Refusal::NotInitialized);
         }
@@ -251,13 +269,13 @@ impl Eskf {
             return Err(Refusal::NotFinite);
         }
         let age = self.now.signed_seconds_since(at);
-        if age > MAX_AGE {
+        if age > self.config.horizon {
             return Err(Refusal::Stale);
         }
         if age < -MAX_AHEAD {
             return Err(Refusal::Future);
         }
-        if self.gates.is_new(sensor, at) { Ok(age) } else { Err(Refusal::Repeated) }
+        Ok(age)
     }
 
     /// The state at the time of a measurement of this age, s. `None` when the history does not go back so far, as right
@@ -313,11 +331,49 @@ impl Eskf {
     fn constrain<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
         let innovation = self.innovation(&self.current_state(), rows, values, [sigma * sigma; M]);
         let ratio = self.test_ratio(&innovation);
-        self.update(&innovation, ratio);
+        _ = self.update(&innovation, ratio);
+    }
+
+    /// What became of a sensor's measurements since this filter was made, restarts included.
+    ///
+    /// ```
+    /// use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Refusal};
+    /// use stampfly_types::{Instant, Vec3};
+    /// let mut eskf = Eskf::new(EskfConfig::outdoors());
+    /// _ = eskf.fuse_position(Instant::ZERO, &Vec3::zeros(), &Vec3::new(1.0, 1.0, f32::INFINITY));
+    /// assert_eq!(eskf.tally(Aiding::Position).refused(Refusal::NotInitialized), 1);
+    /// ```
+    #[must_use]
+    pub fn tally(&self, sensor: Aiding) -> Tally {
+        self.tallies.of(sensor)
+    }
+
+    /// Counts what became of a measurement.
+    fn tallied(&mut self, sensor: Aiding, fusion: Fusion) -> Fusion {
+        self.tallies.add(sensor, fusion);
+        fusion
+    }
+
+    /// Is north where this filter has it? The nose's north always is.
+    fn is_north_known(&self) -> bool {
+        !self.alignment.is_sought()
+    }
+
+    /// Does something from outside show horizontal position or velocity, or the vertical ones?
+    fn is_aided_outside(&self, sensor: Sensor) -> bool {
+        self.gates.is_recent_within(sensor, self.now, self.config.aiding_timeout)
     }
 
     /// Counts a measurement in the status.
     fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {
+        let sensor = match counter {
+            Counter::Tof => Aiding::Tof,
+            Counter::Flow => Aiding::Flow,
+            Counter::Baro => Aiding::Baro,
+            Counter::Mag => Aiding::Mag,
+            Counter::Gravity => Aiding::Gravity,
+        };
+        self.tallies.add(sensor, fusion);
         if let Some(offered) = self.status.offered.get_mut(counter as usize) {
             *offered = offered.wrapping_add(1);
         }
@@ -332,8 +388,7 @@ impl Eskf {
     /// Is the velocity measured, or held by the zero-velocity update?
     fn is_velocity_aided(&self) -> bool {
         let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.flow_monitor.is_implausible();
-        let by = [Sensor::Velocity, Sensor::Position];
-        self.anchor.is_some() || flow || by.into_iter().any(|sensor| self.gates.is_recent(sensor, self.now))
+        self.anchor.is_some() || flow || self.is_aided_outside(Sensor::Level)
     }
 
     /// Does drag show the velocity? Only where nothing else does.
@@ -371,10 +426,7 @@ impl Eskf {
                 self.update_gravity(accel, &Vec3::zeros(), self.config.gravity_sigma);
             }
             self.reset_unobserved_motion();
-        } else if self.state.cos_tilt() < self.config.min_cos_tilt
-            && !self.gates.is_recent(Sensor::Velocity, self.now)
-            && !self.gates.is_recent(Sensor::Position, self.now)
-        {
+        } else if self.state.cos_tilt() < self.config.min_cos_tilt && !self.is_aided_outside(Sensor::Level) {
             self.constrain_unobserved_velocity(dt);
         }
     }

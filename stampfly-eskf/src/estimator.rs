@@ -9,6 +9,7 @@ use stampfly_types::{Instant, Quat, Vec3};
 ///
 /// The test ratio is the squared Mahalanobis distance of the innovation, yᵀ·S⁻¹·y, divided by the gate's: at one the
 /// measurement sits on the gate.
+#[must_use = "a measurement may have been refused, for ever, and nothing else says so at once"]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fusion {
     /// It went into the estimate.
@@ -43,7 +44,7 @@ pub enum Refusal {
     Range,
     /// The vehicle is tilted too far for the sensor's model.
     Tilt,
-    /// Older than the estimator can still place: a tenth of a second, or before it started.
+    /// Older than the estimator can still place ([`EskfConfig::horizon`](crate::EskfConfig::horizon)), or before it started.
     Stale,
     /// Stamped later than the last inertial sample by more than clocks differ: two hundredths of a second.
     Future,
@@ -68,8 +69,8 @@ impl Fusion {
 /// # Timing
 /// Call [`predict`](Self::predict) for every inertial sample in order, and the `fuse_` functions for other samples
 /// as they arrive. Time is an argument: `at` is the instant a sample is valid for. Samples may arrive late: the
-/// [`Eskf`](crate::Eskf) compares them with the state of their own time, up to a tenth of a second ago, and refuses
-/// older ones.
+/// [`Eskf`](crate::Eskf) compares them with the state of their own time, as far back as its
+/// [`horizon`](crate::EskfConfig::horizon), and refuses older ones.
 ///
 /// # Validity
 /// [`estimate`](Self::estimate) marks every output that may not be used. Input that is not finite never reaches the
@@ -96,12 +97,14 @@ pub trait Estimator {
     /// Uses a magnetic field.
     fn fuse_mag(&mut self, at: Instant, mag: &MagData) -> Fusion;
 
-    /// Uses a velocity measured from outside, world NED, with one standard deviation per axis in m/s.
-    fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Fusion;
+    /// Uses a velocity measured from outside, world NED, m/s, with the standard deviation of each axis, m/s. An axis with an
+    /// infinite one was not measured and is not looked at: a receiver without a vertical speed, a wheel on a level floor.
+    fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: &Vec3) -> Fusion;
 
-    /// Uses a position measured from outside, world NED, m, with one standard deviation for all axes. An estimator without
-    /// a use for it refuses.
-    fn fuse_position(&mut self, _at: Instant, _position: &Vec3, _sigma: f32) -> Fusion {
+    /// Uses a position measured from outside, world NED, m, with the standard deviation of each axis, m; a satellite receiver
+    /// calls them h_acc and v_acc. An axis with an infinite one was not measured: that is a fix in two dimensions. An
+    /// estimator without a use for positions refuses.
+    fn fuse_position(&mut self, _at: Instant, _position: &Vec3, _sigma: &Vec3) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 

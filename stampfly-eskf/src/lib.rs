@@ -5,7 +5,7 @@
 //!
 //! | estimator | use it for | size | not for |
 //! |---|---|---|---|
-//! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture | 4.2 kB, half of it the past tenth of a second | – |
+//! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture, satellite receiver, sensors of your own | 6.5 kB, a third of it the memory for late measurements | – |
 //! | [`Complementary`] | the same where memory and time are short | 0.4 kB | aggressive flight |
 //! | [`AttitudeFilter`](attitude::AttitudeFilter) | attitude without position sensors, field bent or not | 1.2 kB | position, velocity |
 //! | [`Mahony`](attitude::Mahony) | the least that levels a multirotor | 20 bytes | unknown gyro bias, heading |
@@ -30,9 +30,10 @@ mod estimator;
 pub mod filter;
 mod level;
 mod measurements;
+mod tally;
 
 pub use complementary::{Complementary, ComplementaryConfig};
-pub use config::{EskfConfig, GravityUse, MagModel};
+pub use config::{EskfConfig, GravityUse, MagModel, StartHeading};
 pub use eskf::Eskf;
 pub use estimator::{Estimator, Fusion, Refusal};
 pub use level::attitude_from_specific_force;
@@ -41,3 +42,4 @@ pub use measurements::{Aiding, Measurements, feed};
 pub use nalgebra;
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;
+pub use tally::Tally;

@@ -5,7 +5,7 @@
 
 use crate::estimator::{Estimator, Fusion};
 use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, TofData};
-use stampfly_types::{Instant, Stamped};
+use stampfly_types::{Instant, Stamped, Vec3};
 
 /// The samples since the last step, each list oldest first.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,6 +40,12 @@ pub enum Aiding {
     Position,
     /// Attitude seen from outside.
     Attitude,
+    /// Velocity seen from outside.
+    Velocity,
+    /// Gravity as the vertical, which the filter asks its accelerometer for.
+    Gravity,
+    /// A measurement with a model of the user's ([`Eskf::fuse`](crate::Eskf::fuse)).
+    Own,
 }
 
 /// Feeds an estimator: first the inertial samples, then the others, sensor by sensor. `fused` is told what became of each
@@ -81,7 +87,8 @@ pub fn feed<E: Estimator + ?Sized>(
     }
     for Stamped { at, data, .. } in *pose {
         if data.position_sigma > 0.0 {
-            fused(Aiding::Position, *at, estimator.fuse_position(*at, &data.position, data.position_sigma));
+            let sigma = data.position_sigma;
+            fused(Aiding::Position, *at, estimator.fuse_position(*at, &data.position, &Vec3::new(sigma, sigma, sigma)));
         }
         if data.attitude_sigma > 0.0 {
             fused(Aiding::Attitude, *at, estimator.fuse_attitude(*at, &data.attitude, data.attitude_sigma));

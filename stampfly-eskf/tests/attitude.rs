@@ -191,7 +191,7 @@ fn delays_of_the_sensors_are_made_up_for() {
             let gyro = Vec3::new(0.0, 0.0, rate((time - 0.5 * DT - 0.004).max(0.0)));
             filter.step(&Vec3::new(0.0, 0.0, -GRAVITY), &gyro, DT);
             let seen = frame::from_yaw(angle((time - 0.015).max(0.0))).inverse() * EARTH;
-            filter.field(&seen, 0.0, DT);
+            _ = filter.field(&seen, 0.0, DT);
             let error = math::wrap_angle(frame::yaw(&filter.attitude()) - angle(time)).abs();
             worst = worst.max(error);
         }
@@ -219,7 +219,7 @@ fn as_an_estimator_it_reports_validity_and_refusals() {
     assert_eq!(filter.fuse_tof(at, &TofData::default()), not_used);
     assert_eq!(filter.fuse_flow(at, &FlowData::default()), not_used);
     assert_eq!(filter.fuse_baro(at, &BaroData::default()), not_used);
-    assert_eq!(filter.fuse_velocity(at, &Vec3::zeros(), 0.1), not_used);
+    assert_eq!(filter.fuse_velocity(at, &Vec3::zeros(), &Vec3::new(0.1, 0.1, 0.1)), not_used);
     let estimate = filter.estimate();
     assert_eq!(estimate.valid, Validity::NONE.set(Validity::TILT | Validity::HEADING, true));
     assert!(estimate.sensors.contains(SensorMask::MAG) && estimate.sensors.contains(SensorMask::STATIONARY));
@@ -258,7 +258,7 @@ fn a_magnetometer_that_falls_silent_costs_no_tilt_and_as_much_heading_as_it_says
         filter.predict(at, &ImuData { accel, gyro, temperature: 25.0, ..Default::default() });
         if step < 4_000 {
             let field = hand.field(EARTH);
-            filter.fuse_mag(at, &MagData { field });
+            _ = filter.fuse_mag(at, &MagData { field });
         }
         if step == 10 {
             assert!(!filter.estimate().valid.contains(Validity::HEADING), "one look at an unknown field");
@@ -315,7 +315,7 @@ proptest! {
         let mut mahony = Mahony::new(0.5);
         for (accel, gyro, field, dt, age) in &inputs {
             filter.step(accel, gyro, *dt);
-            filter.field(field, *age, *dt);
+            _ = filter.field(field, *age, *dt);
             mahony.step(accel, gyro, *dt);
             prop_assert!(is_unit(&filter.attitude()), "{:?}", filter.attitude());
             prop_assert!(is_unit(&mahony.attitude()), "{:?}", mahony.attitude());
@@ -340,7 +340,7 @@ proptest! {
             // Half of them close together, the others anywhere.
             let [imu_at, mag_at] = [imu_at, mag_at].map(|at| Instant::from_micros(if near { at % 1_000_000 } else { at }));
             filter.predict(imu_at, &imu);
-            filter.fuse_mag(mag_at, &MagData { field: EARTH });
+            _ = filter.fuse_mag(mag_at, &MagData { field: EARTH });
             prop_assert!(is_unit(&filter.estimate().attitude));
         }
     }
@@ -358,7 +358,7 @@ proptest! {
                 filter.step(&force, &rate, DT);
                 if let Some(field) = field {
                     let seen = hand.attitude.inverse() * field;
-                    filter.field(&seen, 0.0, DT);
+                    _ = filter.field(&seen, 0.0, DT);
                 }
             }
             filter.attitude().inverse() * Vec3::z()
@@ -379,7 +379,7 @@ proptest! {
                 let (rate, force) = hand.step(true);
                 filter.step(&force, &rate, DT);
                 let seen = hand.attitude.inverse() * field;
-                filter.field(&seen, 0.0, DT);
+                _ = filter.field(&seen, 0.0, DT);
             }
             filter.attitude()
         };
@@ -400,7 +400,7 @@ proptest! {
             since += DT;
             if drops.random_bool(0.9) {
                 filter.step(&force, &rate, since);
-                filter.field(&(hand.attitude.inverse() * EARTH), 0.0, since);
+                _ = filter.field(&(hand.attitude.inverse() * EARTH), 0.0, since);
                 since = 0.0;
             }
         }

@@ -58,8 +58,8 @@ fn tilted_out_of_sight_the_velocity_fades() {
             eskf.predict(at, &ImuData { accel: force(&attitude), gyro: rate, temperature: 25.0, ..Default::default() });
             if step % 4 == 0 {
                 let distance = 0.5 / math::cos(stampfly_types::frame::tilt(&attitude));
-                eskf.fuse_tof(at, &range(at, distance));
-                eskf.fuse_flow(at, &flow(at, 0.01 * 0.3 / distance, -0.01 * rate.x));
+                _ = eskf.fuse_tof(at, &range(at, distance));
+                _ = eskf.fuse_flow(at, &flow(at, 0.01 * 0.3 / distance, -0.01 * rate.x));
             }
         }
     };
@@ -90,8 +90,8 @@ fn rotation_is_taken_out_of_late_flow_at_the_time_it_was_seen() {
             let gyro = Vec3::new(rate(time - 0.5 * DT), 0.0, 0.0);
             eskf.predict(at, &ImuData { accel: force(&attitude), gyro, temperature: 25.0, ..Default::default() });
             if step % 4 == 0 {
-                eskf.fuse_tof(at, &range(at, 0.5 / math::cos(roll(time))));
-                eskf.fuse_flow(at, &flow(at, 0.0, -0.01 * rate(time - 0.015 - 0.005)));
+                _ = eskf.fuse_tof(at, &range(at, 0.5 / math::cos(roll(time))));
+                _ = eskf.fuse_flow(at, &flow(at, 0.0, -0.01 * rate(time - 0.015 - 0.005)));
             }
             worst = worst.max(eskf.estimate().velocity.y.abs());
         }

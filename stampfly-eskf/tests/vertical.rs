@@ -74,16 +74,16 @@ impl Rig {
         self.eskf.predict(at, &ImuData { accel, temperature: 25.0, ..ImuData::default() });
         if self.steps.is_multiple_of(13) && self.range {
             let distance = self.height + self.clearance + 0.5e-3 * dither;
-            self.eskf.fuse_tof(at, &TofData { distance, valid: true, ..TofData::default() });
+            _ = self.eskf.fuse_tof(at, &TofData { distance, valid: true, ..TofData::default() });
         }
         if let Some(rate) = self.slips.filter(|_| self.steps.is_multiple_of(4)) {
             let flow =
                 FlowData { delta_x: 0.01 * rate, delta_y: 2e-5 * dither, interval: 0.01, quality: 100, valid: true };
-            self.eskf.fuse_flow(at, &flow);
+            _ = self.eskf.fuse_flow(at, &flow);
         }
         if self.steps.is_multiple_of(8) {
             let altitude = 100.0 + self.height + self.pressure + 0.05 * dither;
-            self.eskf.fuse_baro(at, &BaroData { altitude, ..BaroData::default() });
+            _ = self.eskf.fuse_baro(at, &BaroData { altitude, ..BaroData::default() });
         }
     }
 

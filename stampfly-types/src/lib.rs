@@ -34,6 +34,8 @@
 extern crate std;
 
 pub mod activation;
+#[cfg(feature = "math")]
+mod atmosphere;
 pub mod field;
 pub mod frame;
 #[cfg(feature = "math")]
@@ -49,6 +51,8 @@ pub mod text;
 pub mod time;
 
 pub use activation::{ActivationRecord, InputRecord};
+#[cfg(feature = "math")]
+pub use atmosphere::pressure_altitude;
 pub use field::Field;
 pub use frame::{GRAVITY, Quat, Vec3};
 pub use message::Message;

@@ -2,7 +2,8 @@
 
 use super::config::Config;
 pub use super::config::{Filter, Oversampling};
-use stampfly_types::{Duration, math};
+use stampfly_types::Duration;
+pub use stampfly_types::pressure_altitude;
 
 /// Register addresses, §4.2.
 pub mod register {
@@ -168,12 +169,6 @@ impl Calibration {
         let temperature = (fine * 5 + 128) >> 8;
         Some(Compensated { temperature: i32::try_from(temperature).ok()?, pressure: u32::try_from(pressure).ok()? })
     }
-}
-
-/// Pressure altitude above 101 325 Pa in the standard atmosphere (ICAO doc 7488, troposphere), m.
-#[must_use]
-pub fn pressure_altitude(pascals: f32) -> f32 {
-    44_330.77 * (1.0 - math::pow(pascals / 101_325.0, 0.190_263))
 }
 
 #[cfg(test)]

@@ -7,10 +7,10 @@
 //!
 //! | external attitude in [`Eskf`](crate::Eskf) | condition |
 //! |---|---|
-//! | start | initialised, finite, new, at most 0.1 s old |
+//! | start | initialised, finite, new, at most `horizon` old |
 //! | continue | the same, and a joint test ratio of the three axes of at most one |
 //! | stop | no condition of its own: inactive one second after the last accepted sample |
-//! | reset | rejected for longer than `lockout`: attitude to the sample, history emptied; its variance reset, velocity and gyro bias inflated |
+//! | reset | rejected for longer than `external_lockout`: attitude to the sample, history emptied; its variance reset, velocity and gyro bias inflated |
 
 use super::Row;
 use crate::filter::ATTITUDE;

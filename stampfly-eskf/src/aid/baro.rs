@@ -9,6 +9,7 @@
 //! |---|---|
 //! | start | `baro_enable`; the first altitude defines the offset |
 //! | continue | a test ratio of at most one: updates the height and the offset |
+//! | beside a receiver | with `baro_backup`: it only learns its offset while an outside height is younger than two seconds |
 //! | stop | not finite or not new: refused at once, inactive one second after the last accepted altitude |
 //! | reset | rejected for longer than `lockout`: the offset to the altitude, the state stays; not counted towards divergence |
 //! | leaves the ground | starting propellers move the pressure: the offset's variance grows by `baro_wash`², and so does the noise, less with the height ([`wash`]) |

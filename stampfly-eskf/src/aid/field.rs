@@ -18,7 +18,22 @@
 use super::Row;
 use crate::filter::ATTITUDE;
 use crate::filter::state::{Rotation, rotate_back};
-use stampfly_types::Vec3;
+use stampfly_types::{Vec3, math};
+
+/// Direction of the earth's field, true NED, unit length, at a place with this declination (magnetic north east of true north) and
+/// inclination (below the horizon), rad. Both come from a map, such as the World Magnetic Model.
+///
+/// ```
+/// // Tokyo, 2025: 7.9° west, 50° down.
+/// let field = stampfly_eskf::aid::field::earth(-7.9f32.to_radians(), 50f32.to_radians());
+/// assert!(field.x > 0.6 && field.y < 0.0 && field.z > 0.7);
+/// ```
+#[must_use]
+pub fn earth(declination: f32, inclination: f32) -> Vec3 {
+    let (sin, cos) = (math::sin(declination), math::cos(declination));
+    let level = math::cos(inclination);
+    Vec3::new(level * cos, level * sin, math::sin(inclination))
+}
 
 /// Predicted direction of the field along body x, y and z, for the direction `reference` (world, unit length).
 #[inline]

@@ -3,7 +3,7 @@
 //! A model returns rows: the predicted reading and the non-zero entries of its Jacobian with respect to the fifteen
 //! error states. Each file derives its Jacobian in a comment, tests it against numerical differentiation, and lists
 //! when [`Eskf`](crate::Eskf) starts, continues, stops and resets with it. Beyond those conditions every measurement
-//! must be finite, newer than the sensor's last, at most 0.1 s old and at most 0.02 s ahead of the last inertial
+//! must be finite, newer than the sensor's last, at most [`horizon`](crate::EskfConfig::horizon) old and at most 0.02 s ahead of the last inertial
 //! sample.
 
 pub mod attitude;

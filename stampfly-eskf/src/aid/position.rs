@@ -6,10 +6,10 @@
 //!
 //! | external position in [`Eskf`](crate::Eskf) | condition |
 //! |---|---|
-//! | start | initialised, finite, new, at most 0.1 s old |
-//! | continue | the same, and a joint test ratio of the three axes of at most one |
-//! | stop | no condition of its own: inactive one second after the last accepted sample |
-//! | reset | rejected for longer than `lockout`: position to the sample, the surface with it; variance of position and velocity reset, attitude inflated |
+//! | start | initialised, finite, new, at most `horizon` old |
+//! | continue | the same, and a joint test ratio of the axes given of at most one |
+//! | stop | no condition of its own: inactive `aiding_timeout` after the last accepted sample |
+//! | reset | rejected for longer than `external_lockout`: position to the sample, the surface with it; variance of position and velocity reset, attitude inflated |
 
 use super::Row;
 use crate::filter::{NominalState, POSITION};

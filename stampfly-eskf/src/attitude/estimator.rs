@@ -101,7 +101,7 @@ impl Estimator for AttitudeFilter {
         fusion
     }
 
-    fn fuse_velocity(&mut self, _: Instant, _: &Vec3, _: f32) -> Fusion {
+    fn fuse_velocity(&mut self, _: Instant, _: &Vec3, _: &Vec3) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 

@@ -2,14 +2,14 @@
 //!
 //! A measurement with a test ratio above one is rejected. That is right for an outlier and wrong for a filter that has
 //! diverged: its gates would reject the very sensors that could correct it. So the state is reset to a sensor that has
-//! been rejected for longer than [`lockout`](crate::EskfConfig::lockout), and many resets in a row report divergence.
+//! been rejected for longer than [`lockout`](crate::EskfConfig::lockout), and several times running, and many resets in a row report divergence.
 //!
 //! | of any sensor | condition |
 //! |---|---|
 //! | start | its first measurement with a test ratio of at most one |
 //! | continue ([`Gates::is_recent`]) | the last accepted measurement is less than a second old |
 //! | stop | a second without an accepted measurement |
-//! | reset ([`GateResult::Reset`]) | every measurement rejected for longer than `lockout` |
+//! | reset ([`GateResult::Reset`]) | every measurement rejected for longer than `lockout`, and at least `lockout_samples` of them |
 //! | divergence ([`Gates::count_reset`]) | eight resets, each within 1.5 s of the one before |
 
 use stampfly_types::{Duration, Instant};
@@ -31,10 +31,13 @@ pub(super) enum Sensor {
     Velocity,
     Position,
     Attitude,
+    /// Anything from outside that shows the horizontal position or velocity, and the vertical one.
+    Level,
+    Down,
 }
 
 /// Number of [`Sensor`]s.
-const SENSORS: usize = Sensor::Attitude as usize + 1;
+const SENSORS: usize = Sensor::Down as usize + 1;
 
 /// Time stamps of one sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,6 +49,8 @@ struct SensorRecord {
     fused: Option<Instant>,
     /// Since when every one has been rejected.
     gated_since: Option<Instant>,
+    /// How many.
+    gated: u16,
 }
 
 /// What the gate decides about a measurement.
@@ -92,16 +97,24 @@ impl Gates {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
     }
 
-    /// Tests a measurement's ratio against its gate, with a lock-out time in seconds.
+    /// Has one of its measurements been accepted within so many seconds?
+    pub(super) fn is_recent_within(&self, sensor: Sensor, now: Instant, seconds: f32) -> bool {
+        let within = Duration::from_micros((seconds * 1e6) as u64);
+        self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < within)
+    }
+
+    /// Tests a measurement's ratio against its gate, with a lock-out time in seconds and how many rejected ones it takes.
     #[inline]
-    pub(super) fn test(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32) -> GateResult {
+    pub(super) fn test(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32, samples: u16) -> GateResult {
         let record = self.record(sensor);
         if ratio <= 1.0 {
             self.accept(sensor, now);
             return GateResult::Fuse;
         }
         let since = *record.gated_since.get_or_insert(now);
-        if now.since(since).seconds() > lockout { GateResult::Reset } else { GateResult::Reject }
+        record.gated = record.gated.saturating_add(1);
+        let locked_out = now.since(since).seconds() > lockout && record.gated >= samples;
+        if locked_out { GateResult::Reset } else { GateResult::Reject }
     }
 
     /// Records an accepted measurement.
@@ -110,6 +123,7 @@ impl Gates {
         let record = self.record(sensor);
         record.fused = Some(now);
         record.gated_since = None;
+        record.gated = 0;
     }
 
     /// Was its last measurement rejected?
@@ -119,7 +133,9 @@ impl Gates {
 
     /// Restarts the lock-out time of a sensor, after an inflation that should let it pass.
     pub(super) fn restart_lockout(&mut self, sensor: Sensor, now: Instant) {
-        self.record(sensor).gated_since = Some(now);
+        let record = self.record(sensor);
+        record.gated_since = Some(now);
+        record.gated = 0;
     }
 
     /// Records a reset of the state to a sensor. True when the resets mean divergence.
@@ -144,15 +160,25 @@ mod tests {
     fn a_sensor_rejected_for_the_lockout_time_resets_the_state() {
         let mut gates = Gates::default();
         let at = |millis: u64| Instant::from_millis(millis);
-        assert_eq!(gates.test(Sensor::Tof, at(0), 0.5, 0.2), GateResult::Fuse);
+        assert_eq!(gates.test(Sensor::Tof, at(0), 0.5, 0.2, 1), GateResult::Fuse);
         assert!(gates.is_recent(Sensor::Tof, at(900)) && !gates.is_recent(Sensor::Tof, at(1_100)));
         for millis in [1_100, 1_200, 1_300] {
-            assert_eq!(gates.test(Sensor::Tof, at(millis), 9.0, 0.2), GateResult::Reject, "{millis}");
+            assert_eq!(gates.test(Sensor::Tof, at(millis), 9.0, 0.2, 1), GateResult::Reject, "{millis}");
         }
-        assert_eq!(gates.test(Sensor::Tof, at(1_301), 9.0, 0.2), GateResult::Reset);
+        assert_eq!(gates.test(Sensor::Tof, at(1_301), 9.0, 0.2, 1), GateResult::Reset);
         // One that fits in between starts the count anew.
-        gates.test(Sensor::Tof, at(1_310), 0.1, 0.2);
-        assert_eq!(gates.test(Sensor::Tof, at(1_600), 9.0, 0.2), GateResult::Reject);
+        gates.test(Sensor::Tof, at(1_310), 0.1, 0.2, 1);
+        assert_eq!(gates.test(Sensor::Tof, at(1_600), 9.0, 0.2, 1), GateResult::Reject);
+    }
+
+    #[test]
+    fn a_slow_sensor_is_not_locked_out_by_two_measurements() {
+        let mut gates = Gates::default();
+        let at = |seconds: u64| Instant::from_millis(10_000 + 1_000 * seconds);
+        let told = [0, 1, 2, 3].map(|second| gates.test(Sensor::Position, at(second), 9.0, 0.2, 4));
+        assert_eq!(told, [GateResult::Reject, GateResult::Reject, GateResult::Reject, GateResult::Reset]);
+        gates.accept(Sensor::Position, at(4));
+        assert_eq!(gates.test(Sensor::Position, at(5), 9.0, 0.2, 4), GateResult::Reject, "the count begins anew");
     }
 
     #[test]

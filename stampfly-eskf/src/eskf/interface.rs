@@ -7,6 +7,11 @@ use super::*;
 /// measures. The squares of much larger ones overflow, and make a covariance that is no number.
 const LARGEST: f32 = 1.0e4;
 
+/// A heading with this standard deviation, rad, is any heading: that of all round, π/√3, and more.
+const UNKNOWN_HEADING: f32 = 1.5;
+/// A heading that is known worse than this, rad, is not valid: 20°.
+const CERTAIN_HEADING: f32 = 0.35;
+
 impl Estimator for Eskf {
     fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {
         let finite = |v: &Vec3| v.iter().all(|x| x.is_finite());
@@ -15,12 +20,13 @@ impl Estimator for Eskf {
         }
         // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the
         // stack.
-        let command = self.command;
+        let (command, tallies) = (self.command, self.tallies);
         *self = Self::new(self.config);
         self.now = at;
         self.initialized = true;
         self.calibration = *calibration;
         self.command = command;
+        self.tallies = tallies;
         self.state.gyro_bias = calibration.gyro_bias;
         self.gyro_monitor = GyroMonitor::new(at, calibration);
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
@@ -29,7 +35,10 @@ impl Estimator for Eskf {
         self.field =
             (calibration.field.norm() > 1.0).then(|| rotate(&self.pending_rotation, &calibration.field.normalize()));
         self.anchor = self.command.on_ground.then(Vec3::zeros);
-        self.constrain_heading();
+        match self.start_heading() {
+            None => self.constrain_heading(),
+            Some((heading, sigma)) => self.set_start_heading(heading, sigma),
+        }
     }
 
     fn command(&mut self, at: Instant, command: &EstimatorCommand) {
@@ -160,30 +169,34 @@ impl Estimator for Eskf {
         self.count(Counter::Mag, fusion)
     }
 
-    fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Fusion {
-        self.update_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused)
+    fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: &Vec3) -> Fusion {
+        let fusion = self.update_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused);
+        self.tallied(Aiding::Velocity, fusion)
     }
 
-    fn fuse_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Fusion {
-        self.update_position(at, position, sigma).unwrap_or_else(Fusion::Refused)
+    fn fuse_position(&mut self, at: Instant, position: &Vec3, sigma: &Vec3) -> Fusion {
+        let fusion = self.update_position(at, position, sigma).unwrap_or_else(Fusion::Refused);
+        self.tallied(Aiding::Position, fusion)
     }
 
     fn fuse_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Fusion {
-        self.update_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused)
+        let fusion = self.update_attitude(at, attitude, sigma).unwrap_or_else(Fusion::Refused);
+        self.tallied(Aiding::Attitude, fusion)
     }
 
     fn estimate(&self) -> StateEstimate {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
         let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let external = recent(Sensor::Velocity) || recent(Sensor::Position);
-        let horizontal = sound && self.is_velocity_aided();
+        let external = self.is_aided_outside(Sensor::Level);
+        let north = self.is_north_known();
+        let horizontal = sound && north && self.is_velocity_aided();
         let drifts = horizontal || (sound && self.feels_drag() && self.is_velocity_certain() && self.height() > LEVEL);
         let baro = recent(Sensor::Baro) && !self.vertical.knows_nothing();
-        let vertical = sound && (self.is_range_aided() || baro || external || stationary);
+        let vertical = sound && (self.is_range_aided() || baro || self.is_aided_outside(Sensor::Down) || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
-            .set(Validity::HEADING, self.initialized)
+            .set(Validity::HEADING, self.initialized && north && self.is_heading_certain())
             .set(Validity::VELOCITY_XY, drifts)
             .set(Validity::POSITION_XY, horizontal)
             .set(Validity::VELOCITY_Z | Validity::POSITION_Z, vertical)
@@ -196,7 +209,7 @@ impl Estimator for Eskf {
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
             .set(SensorMask::STATIONARY, stationary)
-            .set(SensorMask::EXTERNAL, external || recent(Sensor::Attitude));
+            .set(SensorMask::EXTERNAL, external || self.is_aided_outside(Sensor::Down) || recent(Sensor::Attitude));
         let p = &self.covariance;
         StateEstimate {
             attitude: self.state.quat(),
@@ -219,6 +232,62 @@ impl Estimator for Eskf {
 }
 
 impl Eskf {
+    /// Heading at the start and its standard deviation, rad, and none where the nose defines north. Sets the field that the
+    /// magnetometer is compared with, and whether north has to be found.
+    fn start_heading(&mut self) -> Option<(f32, f32)> {
+        let seen = self.field;
+        if self.config.start_heading != StartHeading::Nose {
+            self.field = match (self.config.earth_field, seen) {
+                // Magnetic north, and the inclination that was seen.
+                (None, Some(seen)) => Some(Vec3::new(math::sqrt(seen.x * seen.x + seen.y * seen.y), 0.0, seen.z)),
+                (given, _) => given.filter(|field| field.norm() > 0.0).map(|field| field.normalize()),
+            };
+        }
+        match self.config.start_heading {
+            StartHeading::Nose => None,
+            StartHeading::Given { heading, sigma } if heading.is_finite() && sigma.is_finite() => {
+                Some((heading, sigma))
+            }
+            StartHeading::Magnetic if self.config.mag_enable => match (seen, self.field) {
+                // The nose is as far from the field it saw as from the earth's.
+                (Some(seen), Some(earth)) => {
+                    let heading = math::atan2(earth.y, earth.x) - math::atan2(seen.y, seen.x);
+                    Some((heading, self.config.mag_sigma))
+                }
+                _ => Some((0.0, UNKNOWN_HEADING)),
+            },
+            _ => Some((0.0, UNKNOWN_HEADING)),
+        }
+    }
+
+    /// Turns the attitude, whose heading is zero, to this one.
+    fn set_start_heading(&mut self, heading: f32, sigma: f32) {
+        if sigma >= UNKNOWN_HEADING {
+            self.alignment = Alignment::SOUGHT;
+            return self.constrain_heading();
+        }
+        let (sin, cos) = math::sin_cos(0.5 * heading);
+        self.state.attitude = multiply([cos, 0.0, 0.0, sin], self.state.attitude);
+        self.pending_rotation = self.state.rotation();
+        for (axis, part) in self.pending_rotation[2].into_iter().enumerate() {
+            self.covariance.inflate(ATTITUDE + axis, part * part * sigma * sigma);
+        }
+    }
+
+    /// Is the heading known well enough to be used? The nose's north is known by definition.
+    fn is_heading_certain(&self) -> bool {
+        if self.config.start_heading == StartHeading::Nose {
+            return true;
+        }
+        let [x, y, z] = self.state.rotation()[2];
+        let p = |i: usize, j: usize| self.covariance.get(ATTITUDE + i, ATTITUDE + j);
+        let variance = x * x * p(0, 0)
+            + y * y * p(1, 1)
+            + z * z * p(2, 2)
+            + 2.0 * (x * y * p(0, 1) + x * z * p(0, 2) + y * z * p(1, 2));
+        variance < CERTAIN_HEADING * CERTAIN_HEADING
+    }
+
     /// Shows a change of the velocity to those that watch range and flow.
     #[inline]
     fn watch(&mut self, change: &Vec3, dt: f32) {

@@ -12,6 +12,10 @@ use crate::config::MagModel;
 const BARO_REACH: f32 = 2.0;
 /// A barometer that was silent for longer counts as silent for so long, s: what it says next is not all motion.
 const LONGEST_BARO: f32 = 0.5;
+/// A receiver that is silent for longer leaves the height to the barometer, s.
+const FIX_SILENT: f32 = 2.0;
+/// Variance of the height, m², beyond which the barometer's first offset is as uncertain as that height: after a receiver's first fix.
+const VAGUE_HEIGHT: f32 = 1.0;
 /// Test ratio of a range that is rejected whatever its gate says.
 const REJECTED: f32 = 2.0;
 /// Largest climb rate that a wrong acceleration is taken to have made within the lock-out, m/s: 7.5 m/s², more than the zero of
@@ -74,7 +78,7 @@ impl Eskf {
         self.status.tof_innovation = tof.distance - row.predicted;
         self.status.tof_ratio = ratio;
         let gated = if use_as == Use::Reject { ratio.max(REJECTED) } else { ratio };
-        match self.gates.test(Sensor::Tof, self.now, gated, self.config.lockout) {
+        match self.gates.test(Sensor::Tof, self.now, gated, self.config.lockout, self.config.lockout_samples) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => {
                 self.vertical.rejected(self.now);
@@ -193,36 +197,37 @@ impl Eskf {
         self.acceleration.update(middle, world);
         let (raw, bias) = (self.force + self.state.accel_bias, self.state.gyro_bias);
         let before = rotate(&self.state.rotation(), &self.force);
-        let fusion = match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout) {
-            GateResult::Fuse => {
-                let mut correction = self.covariance.update(&innovation);
-                if self.command.flying {
-                    self.covariance.consider(&innovation, VERTICAL, &mut correction);
+        let fusion =
+            match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout, self.config.lockout_samples) {
+                GateResult::Fuse => {
+                    let mut correction = self.covariance.update(&innovation);
+                    if self.command.flying {
+                        self.covariance.consider(&innovation, VERTICAL, &mut correction);
+                    }
+                    self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                    self.state.correct(&correction);
+                    // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
+                    // nothing.
+                    if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
+                        self.inflate_on_innovation_bias();
+                    }
+                    Fusion::Fused { ratio }
                 }
-                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
-                self.state.correct(&correction);
-                // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
-                // nothing.
-                if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
-                    self.inflate_on_innovation_bias();
+                GateResult::Reject => return Ok(Fusion::Gated { ratio }),
+                GateResult::Reset => {
+                    let mut correction = [0.0; N];
+                    correction[VELOCITY] = world.x - delayed.state.velocity.x;
+                    correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
+                    self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                    self.state.correct(&correction);
+                    for (axis, variance) in variances.into_iter().enumerate() {
+                        self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
+                    }
+                    // A wrong velocity comes from a wrong tilt or bias.
+                    self.inflate_tilt();
+                    self.finish_reset(Sensor::Flow)
                 }
-                Fusion::Fused { ratio }
-            }
-            GateResult::Reject => return Ok(Fusion::Gated { ratio }),
-            GateResult::Reset => {
-                let mut correction = [0.0; N];
-                correction[VELOCITY] = world.x - delayed.state.velocity.x;
-                correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
-                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
-                self.state.correct(&correction);
-                for (axis, variance) in variances.into_iter().enumerate() {
-                    self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
-                }
-                // A wrong velocity comes from a wrong tilt or bias.
-                self.inflate_tilt();
-                self.finish_reset(Sensor::Flow)
-            }
-        };
+            };
         let rotation = self.state.rotation();
         let after = rotate(&rotation, &(raw - self.state.accel_bias));
         self.flow_monitor.corrected(&(after - before), &rotate(&rotation, &(self.state.gyro_bias - bias)));
@@ -257,6 +262,10 @@ impl Eskf {
         }
         let age = self.admit(Sensor::Baro, at, &[baro.altitude])?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
+        if self.is_nowhere(2) {
+            // An altitude of what? The first fix says.
+            return Err(Refusal::Missing);
+        }
         self.vertical.baro(self.now, baro.altitude, self.height(), self.anchor.is_some());
         if self.command.flying && self.anchor.is_none() && self.vertical.is_silent() {
             // Only a range shows how the accelerometer's zero moves with the thrust; without one it may be anywhere near.
@@ -268,25 +277,31 @@ impl Eskf {
         let noise = self.config.baro_sigma * self.config.baro_sigma + wash * wash;
         let here = baro.altitude + delayed.state.position.z;
         let since = core::mem::replace(&mut self.baro_updated, self.now);
-        let offset = self.baro_offset.get_or_insert(Offset::new(here, noise));
+        let height = self.covariance.get(POSITION + 2, POSITION + 2);
+        let first = if height > VAGUE_HEIGHT { noise + height } else { noise };
+        let offset = self.baro_offset.get_or_insert(Offset::new(here, first));
         offset.propagate(self.now.since(since).seconds(), self.config.baro_walk);
         let offset = *offset;
         let row = aid::baro::altitude(&delayed.state, offset.value());
         let residual = baro.altitude - row.predicted;
+        let backup = self.config.baro_backup && self.gates.is_recent_within(Sensor::Down, self.now, FIX_SILENT);
         let innovation = self.innovation(delayed, [row], [baro.altitude], [noise + offset.variance()]);
         let ratio = self.test_ratio(&innovation);
         self.status.baro_innovation = residual;
         self.status.baro_ratio = ratio;
-        match self.gates.test(Sensor::Baro, self.now, ratio, self.config.lockout) {
+        match self.gates.test(Sensor::Baro, self.now, ratio, self.config.lockout, self.config.lockout_samples) {
             GateResult::Fuse => {
                 if let Some(offset) = &mut self.baro_offset {
                     offset.update(residual, noise + self.covariance.get(POSITION + 2, POSITION + 2));
+                }
+                if backup {
+                    return Ok(Fusion::Fused { ratio });
                 }
                 Ok(self.update(&innovation, ratio))
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
-                if self.is_range_aided() || self.anchor.is_some() {
+                if backup || self.is_range_aided() || self.anchor.is_some() {
                     // A jump of the air pressure does not move the vehicle: reset the offset, which is no sign of
                     // divergence, and no aiding either.
                     self.baro_offset = Some(Offset::new(here, noise));
@@ -341,7 +356,7 @@ impl Eskf {
 
     fn gate_mag<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32) -> Fusion {
         self.status.mag_ratio = ratio;
-        let verdict = self.gates.test(Sensor::Mag, self.now, ratio, self.config.lockout);
+        let verdict = self.gates.test(Sensor::Mag, self.now, ratio, self.config.lockout, self.config.lockout_samples);
         if verdict == GateResult::Fuse {
             return self.update(innovation, ratio);
         }
@@ -355,77 +370,6 @@ impl Eskf {
             }
         }
         Fusion::Gated { ratio }
-    }
-
-    pub(super) fn update_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
-        let age = self.admit(Sensor::Velocity, at, &[velocity.x, velocity.y, velocity.z, sigma])?;
-        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
-        let variance = (sigma * sigma).max(1e-6);
-        let rows = aid::velocity::world(&delayed.state);
-        let innovation = self.innovation(delayed, rows, (*velocity).into(), [variance; 3]);
-        let ratio = self.test_ratio(&innovation);
-        self.acceleration.update(at, *velocity);
-        match self.gates.test(Sensor::Velocity, self.now, ratio, self.config.lockout) {
-            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
-            GateResult::Reject => Ok(Fusion::Gated { ratio }),
-            GateResult::Reset => {
-                self.state.velocity += velocity - delayed.state.velocity;
-                for axis in 0..3 {
-                    self.covariance.reset(VELOCITY + axis, 4.0 * variance);
-                    self.covariance.inflate(ATTITUDE + axis, 0.01);
-                }
-                Ok(self.finish_reset(Sensor::Velocity))
-            }
-        }
-    }
-
-    pub(super) fn update_position(&mut self, at: Instant, position: &Vec3, sigma: f32) -> Result<Fusion, Refusal> {
-        let age = self.admit(Sensor::Position, at, &[position.x, position.y, position.z, sigma])?;
-        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
-        let variance = (sigma * sigma).max(1e-8);
-        let rows = aid::position::world(&delayed.state);
-        let innovation = self.innovation(delayed, rows, (*position).into(), [variance; 3]);
-        let ratio = self.test_ratio(&innovation);
-        match self.gates.test(Sensor::Position, self.now, ratio, self.config.lockout) {
-            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
-            GateResult::Reject => Ok(Fusion::Gated { ratio }),
-            GateResult::Reset => {
-                let jump = position - delayed.state.position;
-                self.state.position += jump;
-                // The surface did not move relative to the vehicle.
-                self.surface = self.surface.map(|surface| surface + jump.z);
-                for axis in 0..3 {
-                    self.covariance.reset(POSITION + axis, 4.0 * variance);
-                    self.covariance.reset(VELOCITY + axis, 1.0);
-                    self.covariance.inflate(ATTITUDE + axis, 0.01);
-                }
-                Ok(self.finish_reset(Sensor::Position))
-            }
-        }
-    }
-
-    pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
-        let [w, x, y, z] = attitude.wxyz();
-        let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
-        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
-        let variance = (sigma * sigma).max(1e-8);
-        let error = aid::attitude::error(delayed.state.attitude, [w, x, y, z]);
-        let innovation = self.innovation(delayed, aid::attitude::rows(), error.into(), [variance; 3]);
-        let ratio = self.test_ratio(&innovation);
-        match self.gates.test(Sensor::Attitude, self.now, ratio, self.config.lockout) {
-            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
-            GateResult::Reject => Ok(Fusion::Gated { ratio }),
-            GateResult::Reset => {
-                self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
-                self.reset_history();
-                for axis in 0..3 {
-                    self.covariance.reset(ATTITUDE + axis, 4.0 * variance);
-                    self.covariance.inflate(VELOCITY + axis, 0.1);
-                    self.covariance.inflate(GYRO_BIAS + axis, 1e-5);
-                }
-                Ok(self.finish_reset(Sensor::Attitude))
-            }
-        }
     }
 }
 

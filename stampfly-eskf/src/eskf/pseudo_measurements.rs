@@ -12,9 +12,6 @@
 use super::gate::{GateResult, Sensor};
 use super::*;
 
-/// Standard deviations beyond which a velocity and a position count as unknown, m/s and m.
-const MAX_VELOCITY_SIGMA: f32 = 3.0;
-const MAX_POSITION_SIGMA: f32 = 10.0;
 /// For how long a gust lasts, s (MIL-F-8785C's low-altitude turbulence has a length of some metres at this height).
 const GUST: f32 = 2.0;
 /// Standard deviation of what else the accelerometer feels along x and y, m/s².
@@ -43,7 +40,13 @@ impl Eskf {
         let predicted = Vec3::new(rows[0].predicted, rows[1].predicted, rows[2].predicted);
         self.status.accel_innovation = math::atan2(accel.cross(&predicted).norm(), accel.dot(&predicted));
         self.status.accel_ratio = ratio;
-        let fusion = match self.gates.test(Sensor::Gravity, self.now, ratio, 4.0 * self.config.lockout) {
+        let fusion = match self.gates.test(
+            Sensor::Gravity,
+            self.now,
+            ratio,
+            4.0 * self.config.lockout,
+            self.config.lockout_samples,
+        ) {
             GateResult::Fuse => self.update(&innovation, ratio),
             GateResult::Reject => Fusion::Gated { ratio },
             GateResult::Reset => {
@@ -54,13 +57,13 @@ impl Eskf {
                     self.covariance.inflate(ATTITUDE + axis, 0.1);
                     // A wrong tilt turned gravity into velocity, and into accelerometer bias.
                     self.state.velocity[axis] = 0.0;
-                    self.covariance.reset(VELOCITY + axis, MAX_VELOCITY_SIGMA * MAX_VELOCITY_SIGMA);
+                    self.covariance.reset(VELOCITY + axis, self.config.unaided_velocity * self.config.unaided_velocity);
                     self.reset_accel_bias(axis);
                 }
                 Fusion::Gated { ratio }
             }
         };
-        self.count(Counter::Gravity, fusion);
+        _ = self.count(Counter::Gravity, fusion);
     }
 
     /// Update with the drag of a multirotor in the air, which shows its horizontal velocity, for `dt` seconds.
@@ -72,7 +75,7 @@ impl Eskf {
         let variance = (wind * wind + FELT * FELT) * (2.0 * GUST / dt.max(1e-3));
         let innovation = self.innovation(&delayed, rows, [accel.x, accel.y], [variance; 2]);
         let ratio = self.test_ratio(&innovation);
-        self.update(&innovation, ratio);
+        _ = self.update(&innovation, ratio);
     }
 
     /// Resets the accelerometer's bias along one axis to its initial value and variance.
@@ -93,8 +96,7 @@ impl Eskf {
     /// the velocity is the integral of a small tilt error and soon larger than any that the vehicle can fly; at zero it
     /// waits for the next measurement.
     pub(super) fn reset_unobserved_motion(&mut self) {
-        const LIMITS: [(usize, f32); 2] = [(VELOCITY, MAX_VELOCITY_SIGMA), (POSITION, MAX_POSITION_SIGMA)];
-        for (block, limit) in LIMITS {
+        for (block, limit) in [(VELOCITY, self.config.unaided_velocity), (POSITION, self.config.unaided_position)] {
             for axis in 0..3 {
                 if self.covariance.get(block + axis, block + axis) > limit * limit {
                     self.covariance.reset(block + axis, limit * limit);

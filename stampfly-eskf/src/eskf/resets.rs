@@ -30,16 +30,18 @@ const SHIFT_TILT: f32 = 0.05;
 const SHIFT_GYRO_BIAS: f32 = 0.05;
 /// Standard deviation of the gyro's bias after one on the ground, rad/s.
 const STANDING_SHIFT: f32 = 0.01;
+/// Standard deviation that the tilt gains until north is found, rad.
+const ALIGNED_TILT: f32 = 0.03;
 /// Standard deviation of the velocity after a restart in flight, m/s.
 const RESTART_VELOCITY: f32 = 3.0;
-/// A position beyond this does not survive a restart in flight, m.
-const KEPT_POSITION: f32 = 50.0;
+/// A position beyond this share of the largest does not survive a restart in flight.
+const KEPT_POSITION: f32 = 0.5;
 
 impl Eskf {
     /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time
     /// is wrong. Late measurements are refused until it has filled again.
     pub(super) fn reset_history(&mut self) {
-        self.history = History::default();
+        self.history.clear();
         self.pending_step = PropagationStep::default();
         self.pending_rotation = self.state.rotation();
     }
@@ -152,6 +154,24 @@ impl Eskf {
         self.status.resets = self.status.resets.wrapping_add(1);
     }
 
+    /// Turns the world about its vertical, in which the heading had not been known, by `turn`, rad. The heading has the standard deviation
+    /// `sigma` then, and the tilt that of a vehicle that has moved without any measurement of it.
+    pub(super) fn turn_to_north(&mut self, turn: f32, sigma: f32) {
+        let (sin, cos) = math::sin_cos(0.5 * turn);
+        let turn = [cos, 0.0, 0.0, sin];
+        self.state.attitude = multiply(turn, self.state.attitude);
+        let rotation = rotation_matrix(turn);
+        self.history.turn(&rotation);
+        self.state.velocity = rotate(&rotation, &self.state.velocity);
+        self.pending_step = PropagationStep::default();
+        self.pending_rotation = self.state.rotation();
+        let vertical = self.pending_rotation[2];
+        for (axis, part) in vertical.iter().enumerate() {
+            self.covariance.inflate(ATTITUDE + axis, part * part * sigma * sigma + ALIGNED_TILT * ALIGNED_TILT);
+        }
+        self.alignment.found();
+    }
+
     /// Starts position and velocity again, in flight. Attitude, heading and biases are better than those of the
     /// calibration at power-on, so they stay; their variance grows by what drove the estimate away.
     pub(super) fn restart_motion(&mut self) {
@@ -174,7 +194,8 @@ impl Eskf {
             self.covariance.inflate(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
         }
         // Where that is, is a matter of definition; a jump would be flown back.
-        self.state.position = self.state.position.map(|axis| if axis.abs() < KEPT_POSITION { axis } else { 0.0 });
+        let kept = KEPT_POSITION * self.config.max_position;
+        self.state.position = self.state.position.map(|axis| if axis.abs() < kept { axis } else { 0.0 });
         self.state.velocity = Vec3::zeros();
         self.surface = None;
         self.baro_offset = None;
@@ -209,9 +230,9 @@ impl Eskf {
         let NominalState { position, velocity, .. } = &self.state;
         if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
             self.restart();
-        } else if velocity.amax() > 50.0
-            || position.z.abs() > 100.0
-            || (position.horizontal().amax() > 100.0 && self.is_velocity_aided())
+        } else if velocity.amax() > self.config.max_velocity
+            || position.z.abs() > self.config.max_position
+            || (position.horizontal().amax() > self.config.max_position && self.is_velocity_aided())
         {
             self.status.diverged = true;
         }

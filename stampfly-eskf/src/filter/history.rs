@@ -5,12 +5,21 @@
 //! is a correction of the past ones, too, without touching them. (Velocity changes keep the attitude they were added
 //! with: a correction by θ leaves an error of θ times the change until they are forgotten.) Samples that come faster
 //! than every 2.5 ms are merged, so the memory reaches back [`MAX_AGE`] at any rate of the inertial sensor.
+//!
+//! For a satellite receiver that is 300 ms late, [`History::reaching`] makes one that reaches farther in the same 2.1 kB: it
+//! merges more. Within what is merged, rate and force count as constant.
+//!
+//! | reaches back | bytes | merges up to | for |
+//! |---|---|---|---|
+//! | 0.1 s | 2.1 kB | 2.4 ms | flow, cameras |
+//! | 0.3 s | 2.1 kB | 6.5 ms | receivers at 10 Hz and more, slow turns between flow samples |
+//! | 0.5 s | 2.1 kB | 11 ms | any receiver; flow loses the turn within a picture |
 
 use super::PropagationStep;
-use super::state::{Motion, multiply, small_rotation};
+use super::state::{Motion, Rotation, multiply, rotate, small_rotation};
 use stampfly_types::Vec3;
 
-/// Largest age of a measurement that can be placed in time, s.
+/// Largest age of a measurement that can be placed in time by a memory of the usual reach, s.
 pub const MAX_AGE: f32 = 0.1;
 /// An interval shorter than this takes in the next sample, s. A little less than the 2.5 ms of 400 Hz, for clocks that
 /// run fast.
@@ -57,6 +66,8 @@ const EMPTY: Interval = Interval {
 pub struct History {
     #[cfg_attr(feature = "serde", serde(with = "stored::intervals"))]
     intervals: [Interval; DEPTH],
+    /// An interval shorter than this takes in the next sample, s.
+    merged: f32,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "stored::place"))]
     newest: usize,
 }
@@ -69,13 +80,45 @@ impl Default for History {
 
 impl History {
     /// No sample. A constant, because a filter that is made on a small stack has no room for two of them.
-    pub(crate) const EMPTY: Self = Self { intervals: [EMPTY; DEPTH], newest: 0 };
+    pub(crate) const EMPTY: Self = Self { intervals: [EMPTY; DEPTH], merged: MIN_INTERVAL, newest: 0 };
+
+    /// An empty memory that reaches back `horizon` seconds, 0.1 at least. A longer one is as large and coarser.
+    ///
+    /// ```
+    /// use stampfly_eskf::filter::{History, NominalState};
+    /// use stampfly_types::Vec3;
+    /// let (mut state, mut history) = (NominalState::default(), History::reaching(0.5));
+    /// for _ in 0..8_000 {
+    ///     history.add(&state.propagate(&Vec3::new(1.0, 0.0, -9.80665), &Vec3::zeros(), 1.25e-4));
+    /// }
+    /// // Half a second ago, at 8 kHz.
+    /// let then = history.since(0.5).unwrap().state_at_start(&state);
+    /// assert!((then.velocity.x - 0.5).abs() < 1e-3);
+    /// ```
+    #[must_use]
+    pub fn reaching(horizon: f32) -> Self {
+        // A memory that holds one interval less than it could: the newest is being filled.
+        Self { merged: MIN_INTERVAL.max(horizon / (DEPTH - 2) as f32), ..Self::EMPTY }
+    }
+
+    /// Forgets all samples.
+    pub fn clear(&mut self) {
+        self.intervals = [EMPTY; DEPTH];
+        self.newest = 0;
+    }
+
+    /// Turns what was gained about the world's vertical, after the heading has been set: what was kept points elsewhere now.
+    pub(crate) fn turn(&mut self, rotation: &Rotation) {
+        for interval in &mut self.intervals {
+            interval.delta_velocity = rotate(rotation, &interval.delta_velocity);
+        }
+    }
 
     /// Appends the motion of one inertial sample.
     #[inline]
     pub fn add(&mut self, motion: &Motion) {
         if let Some(newest) = self.intervals.get_mut(self.newest)
-            && newest.length < MIN_INTERVAL
+            && newest.length < self.merged
         {
             let length = newest.length + motion.dt;
             newest.rate = (newest.rate * newest.length + motion.rate * motion.dt) / length;

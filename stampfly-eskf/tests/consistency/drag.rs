@@ -22,7 +22,7 @@ fn hovers(believed: f32, flying: bool, tilt: f32) -> (f32, Vec3, Validity) {
         // A tilt that the filter does not know of accelerates it.
         velocity += (drag + GRAVITY * tilt) * 1e-6 * DT as f32;
         if step % 13 == 0 {
-            eskf.fuse_tof(
+            _ = eskf.fuse_tof(
                 Instant::from_micros(step * DT),
                 &TofData { distance: 0.8, valid: true, ..Default::default() },
             );

@@ -169,16 +169,16 @@ impl Flight {
         let at = self.at(steps);
         eskf.predict(at, &self.imu(at));
         if steps.is_multiple_of(13) {
-            eskf.fuse_tof(at, &self.tof(at));
+            _ = eskf.fuse_tof(at, &self.tof(at));
         }
         if steps.is_multiple_of(4) {
-            eskf.fuse_flow(at, &self.flow(at));
+            _ = eskf.fuse_flow(at, &self.flow(at));
         }
         if steps.is_multiple_of(8) {
-            eskf.fuse_baro(at, &self.baro(at));
+            _ = eskf.fuse_baro(at, &self.baro(at));
         }
         if steps.is_multiple_of(16) {
-            eskf.fuse_mag(at, &self.mag(at));
+            _ = eskf.fuse_mag(at, &self.mag(at));
         }
     }
 

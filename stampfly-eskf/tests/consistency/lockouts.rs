@@ -57,7 +57,7 @@ fn recovery(wrong: &Wrong, seed: u64) -> (f64, Option<f64>) {
     let cos_tilt = eskf.nominal().cos_tilt();
     let range = flight.tof(flight.start);
     let distance = (range.distance + wrong.height) / cos_tilt.max(0.8);
-    eskf.fuse_tof(flight.start, &TofData { distance, ..range });
+    _ = eskf.fuse_tof(flight.start, &TofData { distance, ..range });
 
     let (mut wrong_at, mut lost_at) = (0.0, None);
     for step in 1..=(WATCHED * 400.0) as u64 {

@@ -17,7 +17,7 @@ fn two_hours_leave_it_as_sound_as_the_first_minute() {
         let imu = flight.imu(at);
         eskf.predict(at, &imu);
         if step % 13 == 0 {
-            eskf.fuse_tof(at, &flight.tof(at));
+            _ = eskf.fuse_tof(at, &flight.tof(at));
         }
         if step % 4 == 0
             && let Fusion::Fused { ratio } | Fusion::Gated { ratio } = eskf.fuse_flow(at, &flight.flow(at))
@@ -26,10 +26,10 @@ fn two_hours_leave_it_as_sound_as_the_first_minute() {
             flows += 1;
         }
         if step % 8 == 0 {
-            eskf.fuse_baro(at, &flight.baro(at));
+            _ = eskf.fuse_baro(at, &flight.baro(at));
         }
         if step % 16 == 0 {
-            eskf.fuse_mag(at, &flight.mag(at));
+            _ = eskf.fuse_mag(at, &flight.mag(at));
         }
         if step % 24_000 == 0 {
             let minute = step / 24_000;

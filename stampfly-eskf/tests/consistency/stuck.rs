@@ -34,7 +34,7 @@ fn fly(broken: Broken, seconds: u64, mut told: impl FnMut(Fusion)) -> (Eskf, [f6
             told(eskf.fuse_flow(at, &(broken.flow)(flight.flow(at))));
         }
         if step % 8 == 0 {
-            eskf.fuse_baro(at, &flight.baro(at));
+            _ = eskf.fuse_baro(at, &flight.baro(at));
         }
         assert!(is_sound(&eskf) || step % 50 != 0, "step {step}");
     }
@@ -121,7 +121,7 @@ fn a_bent_field_costs_little_tilt() {
         let at = flight.at(step);
         let imu = flight.imu(at);
         eskf.predict(at, &imu);
-        eskf.fuse_flow(at, &flight.flow(at));
+        _ = eskf.fuse_flow(at, &flight.flow(at));
         // The motors' current bends it by up to twice its strength, on and off.
         let bend = if step / 800 % 2 == 1 { Vec3::new(-50.0, 70.0, 0.0) } else { Vec3::zeros() };
         let told = eskf.fuse_mag(at, &MagData { field: flight.mag(at).field + bend });

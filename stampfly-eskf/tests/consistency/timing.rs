@@ -134,17 +134,17 @@ proptest! {
             let (a, b, c) = (stamp(), stamp(), stamp());
             if step % 4 == 0 {
                 let flow = flight.flow(a);
-                eskf.fuse_flow(a, &flow);
+                _ = eskf.fuse_flow(a, &flow);
             }
             let imu = flight.imu(now);
             eskf.predict(now, &imu);
             if step % 13 == 0 {
                 let tof = flight.tof(b);
-                eskf.fuse_tof(b, &tof);
+                _ = eskf.fuse_tof(b, &tof);
             }
             if step % 8 == 0 {
                 let baro = flight.baro(c);
-                eskf.fuse_baro(c, &baro);
+                _ = eskf.fuse_baro(c, &baro);
             }
         }
         let [tilt, velocity, height] = flight.errors(&eskf, flight.at(2_000));
@@ -177,10 +177,10 @@ proptest! {
         for step in steps {
             at = Instant::from_micros(at.as_micros().saturating_add_signed(step));
             eskf.predict(at, &ImuData { accel: force, gyro: Vec3::new(0.1, -0.2, 0.1), temperature: 25.0, ..Default::default() });
-            eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
+            _ = eskf.fuse_tof(at, &TofData { distance: 0.5, valid: true, ..Default::default() });
             let flow = FlowData { interval: 0.01, quality: 100, valid: true, ..Default::default() };
-            eskf.fuse_flow(at, &flow);
-            eskf.fuse_mag(at, &MagData { field: super::flight::FIELD });
+            _ = eskf.fuse_flow(at, &flow);
+            _ = eskf.fuse_mag(at, &MagData { field: super::flight::FIELD });
             prop_assert!(is_sound(&eskf), "after a step of {step} µs");
             let estimate = eskf.estimate();
             prop_assert!(estimate.velocity.iter().chain(estimate.position.iter()).all(|v| v.is_finite()));

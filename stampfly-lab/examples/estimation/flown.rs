@@ -54,16 +54,16 @@ impl Given {
     /// The other sensors.
     pub fn fuse(&self, estimator: &mut impl Estimator) {
         for (at, sample) in &self.tof {
-            estimator.fuse_tof(*at, sample);
+            _ = estimator.fuse_tof(*at, sample);
         }
         for (at, sample) in &self.flow {
-            estimator.fuse_flow(*at, sample);
+            _ = estimator.fuse_flow(*at, sample);
         }
         for (at, sample) in &self.mag {
-            estimator.fuse_mag(*at, sample);
+            _ = estimator.fuse_mag(*at, sample);
         }
         for (at, sample) in &self.baro {
-            estimator.fuse_baro(*at, sample);
+            _ = estimator.fuse_baro(*at, sample);
         }
     }
 }

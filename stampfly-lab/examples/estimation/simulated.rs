@@ -107,7 +107,11 @@ fn on_cameras(flown: &Flown, delay: Duration, tell: bool) -> [f64; 2] {
     for given in &flown.given {
         given.predict(&mut eskf, &mut started);
         while let Some((at, position)) = pictures.next_if(|(at, _)| *at + delay <= given.now) {
-            eskf.fuse_position(if tell { at } else { given.now }, &position, CAMERA_SIGMA);
+            _ = eskf.fuse_position(
+                if tell { at } else { given.now },
+                &position,
+                &Vec3::new(CAMERA_SIGMA, CAMERA_SIGMA, CAMERA_SIGMA),
+            );
         }
         let flying = |truth: &&Truth| !truth.contact && truth.position.z < -0.3;
         if let Some(truth) = flown.truth.get(&given.now).filter(flying) {

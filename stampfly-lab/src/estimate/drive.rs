@@ -135,7 +135,10 @@ fn through(recording: &Recording, start: &Start, mut estimator: impl Estimator) 
             tally("baro", estimator.fuse_baro(at, &data));
         }
         for (at, data) in up_to(&mut velocity, sample.at) {
-            tally("velocity", estimator.fuse_velocity(at, &data, VELOCITY_SIGMA));
+            tally(
+                "velocity",
+                estimator.fuse_velocity(at, &data, &Vec3::new(VELOCITY_SIGMA, VELOCITY_SIGMA, VELOCITY_SIGMA)),
+            );
         }
         updates += 1;
         instances.push(Instance { at: sample.at, state: estimator.estimate(), status: estimator.status() });

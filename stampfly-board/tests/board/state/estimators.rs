@@ -36,21 +36,21 @@ fn fly<E: Estimator>(estimator: &mut E, k: u64, n: &mut Numbers) -> (StateEstima
     estimator.predict(at(k), &imu);
     let (distance, quality) = (0.4 + n.number(0.02), 150 + n.number(100.0) as u8);
     if k.is_multiple_of(13) {
-        estimator.fuse_tof(at(k), &TofData { distance, sigma: 0.01, status: 0, valid: !n.once_in(8) });
+        _ = estimator.fuse_tof(at(k), &TofData { distance, sigma: 0.01, status: 0, valid: !n.once_in(8) });
     }
     if k % 4 == 1 {
         let [delta_x, delta_y] = [n.number(0.01), n.number(0.01)];
-        estimator.fuse_flow(at(k - 1), &FlowData { delta_x, delta_y, interval: 0.01, quality, valid: true });
+        _ = estimator.fuse_flow(at(k - 1), &FlowData { delta_x, delta_y, interval: 0.01, quality, valid: true });
     }
     if k % 16 == 2 {
         let altitude = 100.0 + n.number(0.3);
-        estimator.fuse_baro(at(k), &BaroData { pressure: 1e5, temperature: 25.0, altitude });
-        estimator.fuse_mag(at(k), &MagData { field: EARTH + n.vector(2.0) });
+        _ = estimator.fuse_baro(at(k), &BaroData { pressure: 1e5, temperature: 25.0, altitude });
+        _ = estimator.fuse_mag(at(k), &MagData { field: EARTH + n.vector(2.0) });
     }
     if k % 40 == 3 {
-        estimator.fuse_velocity(at(k), &n.vector(0.1), 0.2);
-        estimator.fuse_position(at(k), &n.vector(0.1), 0.2);
-        estimator.fuse_attitude(at(k), &Quat::from_euler_angles(n.number(0.1), n.number(0.1), n.number(0.1)), 0.1);
+        _ = estimator.fuse_velocity(at(k), &n.vector(0.1), &Vec3::new(0.2, 0.2, 0.2));
+        _ = estimator.fuse_position(at(k), &n.vector(0.1), &Vec3::new(0.2, 0.2, 0.2));
+        _ = estimator.fuse_attitude(at(k), &Quat::from_euler_angles(n.number(0.1), n.number(0.1), n.number(0.1)), 0.1);
     }
     (estimator.estimate(), estimator.status())
 }

@@ -1,0 +1,344 @@
+//! What others measure: position, velocity and attitude from outside, and sensors with a model of the user's.
+//!
+//! Each axis has its own standard deviation; one with an infinite deviation was not measured. For the sensors that the
+//! filter knows by itself see [`measurements`](super::measurements).
+
+use super::alignment::Step;
+use super::gate::{GateResult, Sensor};
+use super::*;
+use crate::measurements::Aiding;
+
+/// Smallest variances that are believed: of a velocity, (m/s)², and of a position, m².
+const LEAST_VELOCITY: f32 = 1e-6;
+const LEAST_POSITION: f32 = 1e-8;
+/// Variance of a position that says nothing yet, m²: a kilometre. The first fix is the position then.
+const NOWHERE: f32 = 1e6;
+
+/// A vector of the world with axes that may be missing, beside what was predicted.
+struct Axes {
+    rows: [Row; 3],
+    measured: [f32; 3],
+    variances: [f32; 3],
+    given: [bool; 3],
+}
+
+impl Axes {
+    /// An axis that is not given is predicted exactly and tells nothing.
+    fn new(mut rows: [Row; 3], values: &Vec3, sigma: &Vec3, least: f32) -> Self {
+        let mut axes = Self { rows, measured: (*values).into(), variances: [1.0; 3], given: [true; 3] };
+        for axis in 0..3 {
+            if sigma[axis].is_infinite() {
+                axes.given[axis] = false;
+                rows[axis].jacobian = [0.0; N];
+                axes.measured[axis] = rows[axis].predicted;
+            } else {
+                axes.variances[axis] = (sigma[axis] * sigma[axis]).max(least);
+            }
+        }
+        axes.rows = rows;
+        axes
+    }
+
+    fn count(&self) -> usize {
+        self.given.iter().filter(|given| **given).count()
+    }
+
+    /// Leaves the horizontal axes out.
+    fn drop_level(&mut self) {
+        for axis in 0..2 {
+            self.given[axis] = false;
+            self.rows[axis].jacobian = [0.0; N];
+            self.measured[axis] = self.rows[axis].predicted;
+            self.variances[axis] = 1.0;
+        }
+    }
+}
+
+/// Finite where it counts: every axis that is given, and no deviation that is no number.
+fn is_given(values: &Vec3, sigma: &Vec3) -> [f32; 3] {
+    core::array::from_fn(|axis| {
+        if sigma[axis].is_nan() {
+            f32::NAN
+        } else if sigma[axis].is_infinite() {
+            0.0
+        } else {
+            values[axis]
+        }
+    })
+}
+
+impl Eskf {
+    pub(super) fn update_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: &Vec3) -> Result<Fusion, Refusal> {
+        let age = self.admit(Sensor::Velocity, at, &is_given(velocity, sigma))?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
+        let mut axes = Axes::new(aid::velocity::world(&delayed.state), velocity, sigma, LEAST_VELOCITY);
+        if !self.is_north_known() && axes.given[0] && axes.given[1] {
+            self.align(at, delayed, &axes);
+            axes.drop_level();
+        }
+        if axes.count() == 0 {
+            return if self.is_north_known() { Err(Refusal::Missing) } else { Ok(Fusion::Fused { ratio: 0.0 }) };
+        }
+        let innovation = self.innovation(delayed, axes.rows, axes.measured, axes.variances);
+        let ratio = innovation.nis() / self.config.gate_distance(axes.count());
+        self.acceleration.update(at, axes.measured.into());
+        match self.test_external(Sensor::Velocity, ratio) {
+            GateResult::Fuse => {
+                self.aided(&axes.given);
+                Ok(self.update(&innovation, ratio))
+            }
+            GateResult::Reject => Ok(Fusion::Gated { ratio }),
+            GateResult::Reset => {
+                self.aided(&axes.given);
+                self.state.velocity += Vec3::from(axes.measured) - delayed.state.velocity;
+                for axis in 0..3 {
+                    if axes.given[axis] {
+                        self.covariance.reset(VELOCITY + axis, 4.0 * axes.variances[axis]);
+                    }
+                    self.covariance.inflate(ATTITUDE + axis, 0.01);
+                }
+                Ok(self.finish_reset(Sensor::Velocity))
+            }
+        }
+    }
+
+    pub(super) fn update_position(&mut self, at: Instant, position: &Vec3, sigma: &Vec3) -> Result<Fusion, Refusal> {
+        let age = self.admit(Sensor::Position, at, &is_given(position, sigma))?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
+        let mut axes = Axes::new(aid::position::world(&delayed.state), position, sigma, LEAST_POSITION);
+        let first = core::array::from_fn::<_, 3, _>(|axis| axes.given[axis] && self.is_nowhere(axis));
+        if !self.is_north_known() || first.contains(&true) {
+            // Without a heading the inertial sensor does not carry the position from fix to fix.
+            let placed =
+                core::array::from_fn(|axis| first[axis] || (axis < 2 && axes.given[axis] && !self.is_north_known()));
+            self.place(delayed, &axes, placed);
+            if !self.is_north_known() {
+                axes.drop_level();
+            }
+            if first.contains(&true) || axes.count() == 0 {
+                self.aided(&first);
+                self.gates.accept(Sensor::Position, self.now);
+                return Ok(Fusion::Fused { ratio: 0.0 });
+            }
+        }
+        if axes.count() == 0 {
+            return Err(Refusal::Missing);
+        }
+        let innovation = self.innovation(delayed, axes.rows, axes.measured, axes.variances);
+        let ratio = innovation.nis() / self.config.gate_distance(axes.count());
+        match self.test_external(Sensor::Position, ratio) {
+            GateResult::Fuse => {
+                self.aided(&axes.given);
+                Ok(self.update(&innovation, ratio))
+            }
+            GateResult::Reject => Ok(Fusion::Gated { ratio }),
+            GateResult::Reset => {
+                self.aided(&axes.given);
+                self.place(delayed, &axes, axes.given);
+                for axis in 0..3 {
+                    if axes.given[axis] {
+                        self.covariance.reset(VELOCITY + axis, 1.0);
+                    }
+                    self.covariance.inflate(ATTITUDE + axis, 0.01);
+                }
+                Ok(self.finish_reset(Sensor::Position))
+            }
+        }
+    }
+
+    /// May the position along this axis be anywhere?
+    pub(super) fn is_nowhere(&self, axis: usize) -> bool {
+        self.covariance.get(POSITION + axis, POSITION + axis) > NOWHERE
+    }
+
+    /// Moves the position to a measured one along these axes.
+    fn place(&mut self, delayed: &DelayedState, axes: &Axes, along: [bool; 3]) {
+        let jump = Vec3::from(axes.measured) - delayed.state.position;
+        for axis in 0..3 {
+            if along[axis] {
+                self.state.position[axis] += jump[axis];
+                self.covariance.reset(POSITION + axis, 4.0 * axes.variances[axis]);
+            }
+        }
+        if along[2] {
+            // The surface did not move relative to the vehicle.
+            self.surface = self.surface.map(|surface| surface + jump.z);
+        }
+    }
+
+    fn test_external(&mut self, sensor: Sensor, ratio: f32) -> GateResult {
+        self.gates.test(sensor, self.now, ratio, self.config.external_lockout, self.config.lockout_samples)
+    }
+
+    /// Position or velocity along these axes has been measured from outside.
+    fn aided(&mut self, [north, east, down]: &[bool; 3]) {
+        if *north || *east {
+            self.gates.accept(Sensor::Level, self.now);
+        }
+        if *down {
+            self.gates.accept(Sensor::Down, self.now);
+        }
+    }
+
+    /// Shows a horizontal velocity to who looks for north.
+    fn align(&mut self, at: Instant, delayed: &DelayedState, axes: &Axes) {
+        self.gates.accept(Sensor::Velocity, self.now);
+        self.gates.accept(Sensor::Level, self.now);
+        let [north, east, _] = axes.measured;
+        let (felt, variance) = (delayed.state.velocity, axes.variances[0].max(axes.variances[1]));
+        match self.alignment.step(at, [felt.x, felt.y], [north, east], variance) {
+            Step::Waits => {}
+            Step::Window => self.follow(delayed, axes),
+            Step::Found { turn, sigma } => {
+                self.turn_to_north(turn, sigma);
+                let Some(delayed) = &self.state_at(delayed.age) else { return };
+                self.follow(delayed, axes);
+            }
+        }
+    }
+
+    /// Sets the horizontal velocity to a measured one.
+    fn follow(&mut self, delayed: &DelayedState, axes: &Axes) {
+        for axis in 0..2 {
+            self.state.velocity[axis] += axes.measured[axis] - delayed.state.velocity[axis];
+            self.covariance.reset(VELOCITY + axis, 4.0 * axes.variances[axis] + 0.04);
+        }
+    }
+
+    pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
+        let [w, x, y, z] = attitude.wxyz();
+        let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
+        let variance = (sigma * sigma).max(1e-8);
+        let error = aid::attitude::error(delayed.state.attitude, [w, x, y, z]);
+        let innovation = self.innovation(delayed, aid::attitude::rows(), error.into(), [variance; 3]);
+        let ratio = self.test_ratio(&innovation);
+        let verdict =
+            if self.is_north_known() { self.test_external(Sensor::Attitude, ratio) } else { GateResult::Reset };
+        match verdict {
+            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
+            GateResult::Reject => Ok(Fusion::Gated { ratio }),
+            GateResult::Reset => {
+                self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
+                self.reset_history();
+                for axis in 0..3 {
+                    self.covariance.reset(ATTITUDE + axis, 4.0 * variance);
+                    self.covariance.inflate(VELOCITY + axis, 0.1);
+                    self.covariance.inflate(GYRO_BIAS + axis, 1e-5);
+                }
+                self.alignment.found();
+                Ok(self.finish_reset(Sensor::Attitude))
+            }
+        }
+    }
+
+    /// Uses a measurement with a model of one's own.
+    ///
+    /// `model` is asked for the state at `at`, which may be late as far as the [`horizon`](EskfConfig::horizon), and gives for
+    /// each axis what the sensor should read in that state, and how that changes with the fifteen
+    /// [errors](crate::filter): position (0–2) and velocity (3–5) in the world, attitude (6–8) as a small rotation of the
+    /// body, gyro bias (9–11), accelerometer bias (12–14). `variances` are those of the noise of each axis, in the squared
+    /// unit of the measurement, positive and independent. `gate` is in standard deviations; infinite lets all pass.
+    ///
+    /// A gated measurement is left out and never resets the state: the filter does not know which part of it is wrong. There
+    /// is no check for repeated stamps, because many sensors may share this door. While the heading is not known, all that
+    /// hangs on it is refused as [`Refusal::Missing`]: any horizontal position or velocity.
+    ///
+    /// Airspeed along the nose of a plane in still air, wheel speed, and the range to a beacon:
+    ///
+    /// ```
+    /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, StartHeading, aid::{Row, velocity}, filter::{NominalState, POSITION}};
+    /// use stampfly_types::{Instant, Vec3, messages::{CalibrationResult, ImuData}};
+    ///
+    /// let still = Vec3::new(0.0, 0.0, -9.80665);
+    /// let start_heading = StartHeading::Given { heading: 0.0, sigma: 0.02 };
+    /// let mut eskf = Eskf::new(EskfConfig { start_heading, initial_position: 5.0, ..EskfConfig::outdoors() });
+    /// eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: still, ..Default::default() });
+    /// let beacon = Vec3::new(30.0, 40.0, 0.0);
+    /// for k in 1..=400u64 {
+    ///     let at = Instant::from_micros(k * 5_000);
+    ///     eskf.predict(at, &ImuData { accel: still, ..Default::default() });
+    ///     if k % 10 != 0 {
+    ///         continue;
+    ///     }
+    ///     // Airspeed, m/s: the first component of the velocity in the body. A wheel: the same, and the side does not slip.
+    ///     let speed = |state: &NominalState| { let [x, y, _] = velocity::body(state); [x, y] };
+    ///     assert!(eskf.fuse(at, speed, [0.0, 0.0], [0.04, 0.01], 5.0).is_fused());
+    ///     // A range to a beacon, m, a fifth of a second late.
+    ///     let range = |state: &NominalState| {
+    ///         let away = state.position - beacon;
+    ///         let distance = away.norm().max(0.1);
+    ///         let [x, y, z] = [away.x / distance, away.y / distance, away.z / distance];
+    ///         [Row::new(distance, [(POSITION, x), (POSITION + 1, y), (POSITION + 2, z)])]
+    ///     };
+    ///     if k > 50 {
+    ///         assert!(eskf.fuse(Instant::from_micros(k * 5_000 - 200_000), range, [48.0], [0.25], 5.0).is_fused());
+    ///     }
+    /// }
+    /// // Two metres nearer to the beacon than where it thought it was.
+    /// assert!(((eskf.estimate().position - beacon).norm() - 48.0).abs() < 0.3);
+    /// ```
+    ///
+    /// # Errors
+    /// The answer says [`Fusion::Refused`] before the start, when the state of that time is no longer known or not yet, and
+    /// when a number is not finite or a variance not positive.
+    pub fn fuse<const M: usize>(
+        &mut self,
+        at: Instant,
+        model: impl FnOnce(&NominalState) -> [Row; M],
+        measured: [f32; M],
+        variances: [f32; M],
+        gate: f32,
+    ) -> Fusion {
+        let fusion = self.update_own(at, model, measured, variances, gate).unwrap_or_else(Fusion::Refused);
+        self.tallied(Aiding::Own, fusion)
+    }
+
+    fn update_own<const M: usize>(
+        &mut self,
+        at: Instant,
+        model: impl FnOnce(&NominalState) -> [Row; M],
+        measured: [f32; M],
+        variances: [f32; M],
+        gate: f32,
+    ) -> Result<Fusion, Refusal> {
+        let age = self.place_in_time(at, &measured)?;
+        let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
+        let rows = model(&delayed.state);
+        let finite = |row: &Row| row.predicted.is_finite() && row.jacobian.iter().all(|v| v.is_finite());
+        if !rows.iter().all(finite) || !variances.iter().all(|v| v.is_finite() && *v > 0.0) || gate.is_nan() {
+            return Err(Refusal::NotFinite);
+        }
+        let sees = |state: usize| rows.iter().any(|row| row.jacobian.get(state).is_some_and(|v| *v != 0.0));
+        let given = core::array::from_fn(|axis| sees(POSITION + axis) || sees(VELOCITY + axis));
+        if !self.is_north_known() && (given[0] || given[1]) {
+            return Err(Refusal::Missing);
+        }
+        let innovation = self.innovation(delayed, rows, measured, variances);
+        let ratio = innovation.nis() / (gate * gate * EskfConfig::axes_factor(M));
+        // No number is not below the gate either.
+        if ratio <= 1.0 {
+            self.aided(&given);
+            Ok(self.update(&innovation, ratio))
+        } else {
+            Ok(Fusion::Gated { ratio })
+        }
+    }
+
+    /// The vehicle stands still at `at`: its velocity is zero with this standard deviation along each axis, m/s. For what knows
+    /// it from elsewhere: wheels that do not turn, a closed clamp. It may stand beside a receiver's late velocities.
+    ///
+    /// While the heading is not known it holds the vertical velocity only.
+    pub fn fuse_zero_velocity(&mut self, at: Instant, sigma: f32) -> Fusion {
+        let variance = sigma * sigma;
+        let gate = self.config.gate;
+        if self.is_north_known() {
+            return self.fuse(at, aid::velocity::world, [0.0; 3], [variance; 3], gate);
+        }
+        let down = |state: &NominalState| {
+            let [_, _, down] = aid::velocity::world(state);
+            [down]
+        };
+        self.fuse(at, down, [0.0], [variance], gate)
+    }
+}

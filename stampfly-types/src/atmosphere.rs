@@ -1,0 +1,33 @@
+//! Height from air pressure, for whoever has a barometer: [`BaroData`](crate::messages::BaroData) holds both.
+//!
+//! Use it to fill `BaroData::altitude` from a driver that tells pressure only. It is an altitude above a pressure, not above the
+//! sea: weather moves it by tens of metres, and estimators take its offset for unknown.
+
+use crate::math;
+
+/// Pressure altitude above 101 325 Pa in the standard atmosphere (ICAO doc 7488, troposphere), m. Good to half a metre up to a
+/// kilometre; not a number for a pressure below zero.
+///
+/// ```
+/// use stampfly_types::{messages::BaroData, pressure_altitude};
+/// let pressure = 95_460.8;
+/// let baro = BaroData { pressure, temperature: 12.0, altitude: pressure_altitude(pressure) };
+/// assert!((baro.altitude - 500.0).abs() < 0.5);
+/// ```
+#[must_use]
+pub fn pressure_altitude(pascals: f32) -> f32 {
+    44_330.77 * (1.0 - math::pow(pascals / 101_325.0, 0.190_263))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn altitudes_are_those_of_the_standard_atmosphere() {
+        // ICAO doc 7488: 0, 500 and 1000 m.
+        for (pascals, metres) in [(101_325.0, 0.0), (95_460.8, 500.0), (89_874.6, 1_000.0)] {
+            assert!((pressure_altitude(pascals) - metres).abs() < 0.5, "{}", pressure_altitude(pascals));
+        }
+    }
+}
