@@ -50,7 +50,8 @@ pub struct AttitudeConfig {
     /// A different field that stays the same for so long, while the body turns, is the new reference, s. Turning is
     /// asked for because a body that lies beside a magnet sees a constant field too.
     pub mag_renew_time: f32,
-    /// Without any reference, a field that stays the same for so long is it, s.
+    /// Without any reference, a field that stays the same for so long while the body turns, or while it turns slowly by a whole
+    /// circle in sum, is it, s.
     pub mag_first_time: f32,
     /// The body turns, for the two above, at more than this, rad/s.
     pub mag_renew_rate: f32,

@@ -16,6 +16,9 @@ use stampfly_types::{Vec3, math};
 
 /// Time constant that takes the noise out of strength and dip, s.
 const SMOOTHING: f32 = 0.05;
+/// Without any reference, a field is one that stays the same while the body turns slowly by so much in sum, rad: a whole circle, there
+/// and back. A boat of 10°/s needs about a minute.
+const SLOW_TURNS: f32 = core::f32::consts::TAU;
 
 /// A field as it is known without a heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,6 +84,8 @@ pub(super) struct Magnetic {
     agrees_for: f32,
     home_agrees_for: f32,
     candidate_for: f32,
+    /// By how much the body has turned since the candidate, where it was slow, rad.
+    slowly_turned: f32,
 }
 
 impl Magnetic {
@@ -95,6 +100,7 @@ impl Magnetic {
             agrees_for: f32::MAX,
             home_agrees_for: 0.0,
             candidate_for: 0.0,
+            slowly_turned: 0.0,
         }
     }
 
@@ -130,15 +136,21 @@ impl Magnetic {
                 candidate.follow(&now, follow);
                 if rate >= config.mag_renew_rate {
                     self.candidate_for += dt;
+                } else if rate >= config.rest_rate {
+                    self.slowly_turned += rate * dt;
                 }
             }
             candidate => {
                 *candidate = Some(now);
                 self.candidate_for = 0.0;
+                self.slowly_turned = 0.0;
             }
         }
-        let enough = if self.reference.is_none() { config.mag_first_time } else { config.mag_renew_time };
-        if !clean && self.candidate_for >= enough {
+        let found = match self.reference {
+            None => self.candidate_for >= config.mag_first_time || self.slowly_turned >= SLOW_TURNS,
+            Some(_) => self.candidate_for >= config.mag_renew_time,
+        };
+        if !clean && found {
             let before = core::mem::replace(&mut self.reference, self.candidate);
             self.home = self.home.or(before);
             (self.agrees_for, self.home_agrees_for) = (config.mag_agree_time, 0.0);
@@ -181,6 +193,17 @@ mod tests {
         assert_eq!(seconds(&mut magnetic, 30.0, EARTH, 0.0), (0, [0, 0, 0, 3_000]));
         let (clean, others) = seconds(&mut magnetic, 10.0, EARTH, 1.0);
         assert!(clean > 400 && others[1] == 1, "{clean} {others:?}");
+    }
+
+    #[test]
+    fn slow_turns_make_a_first_reference_and_no_other() {
+        let mut magnetic = Magnetic::new(None);
+        let (clean, others) = seconds(&mut magnetic, 60.0, EARTH, 0.15);
+        assert!(clean > 1_500 && others[1] == 1, "{clean} {others:?}");
+        let (_, others) = seconds(&mut magnetic, 120.0, EARTH * 1.3, 0.15);
+        assert_eq!(others[1], 0, "another place takes a body that turns");
+        let (_, others) = seconds(&mut Magnetic::new(None), 600.0, EARTH, 0.02);
+        assert_eq!(others[1], 0, "that is the gyro's bias");
     }
 
     #[test]
