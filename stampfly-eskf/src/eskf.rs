@@ -168,6 +168,8 @@ pub struct Eskf {
     vertical: VerticalMonitor,
     status: EstimatorStatus,
     alignment: Alignment,
+    /// That of the configuration, in the units of comparisons: asked for several times an inertial sample.
+    aiding_timeout: Duration,
     tallies: Tallies,
 }
 
@@ -229,6 +231,7 @@ impl Eskf {
             vertical: VerticalMonitor::airborne(),
             status: EstimatorStatus::default(),
             alignment: Alignment::KNOWN,
+            aiding_timeout: Duration::from_seconds(config.aiding_timeout),
             tallies: Tallies::default(),
         }
     }
@@ -361,7 +364,7 @@ impl Eskf {
 
     /// Does something from outside show horizontal position or velocity, or the vertical ones?
     fn is_aided_outside(&self, sensor: Sensor) -> bool {
-        self.gates.is_recent_within(sensor, self.now, self.config.aiding_timeout)
+        self.gates.is_recent_within(sensor, self.now, self.aiding_timeout)
     }
 
     /// Counts a measurement in the status.

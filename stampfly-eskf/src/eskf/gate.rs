@@ -97,9 +97,8 @@ impl Gates {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
     }
 
-    /// Has one of its measurements been accepted within so many seconds?
-    pub(super) fn is_recent_within(&self, sensor: Sensor, now: Instant, seconds: f32) -> bool {
-        let within = Duration::from_micros((seconds * 1e6) as u64);
+    /// Has one of its measurements been accepted within this time?
+    pub(super) fn is_recent_within(&self, sensor: Sensor, now: Instant, within: Duration) -> bool {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < within)
     }
 

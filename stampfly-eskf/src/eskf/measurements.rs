@@ -12,8 +12,8 @@ use crate::config::MagModel;
 const BARO_REACH: f32 = 2.0;
 /// A barometer that was silent for longer counts as silent for so long, s: what it says next is not all motion.
 const LONGEST_BARO: f32 = 0.5;
-/// A receiver that is silent for longer leaves the height to the barometer, s.
-const FIX_SILENT: f32 = 2.0;
+/// A receiver that is silent for longer leaves the height to the barometer.
+const FIX_SILENT: Duration = Duration::from_secs(2);
 /// Variance of the height, m², beyond which the barometer's first offset is as uncertain as that height: after a receiver's first fix.
 const VAGUE_HEIGHT: f32 = 1.0;
 /// Test ratio of a range that is rejected whatever its gate says.
