@@ -149,21 +149,25 @@ impl Estimator for Eskf {
         self.check_health();
     }
 
+    #[inline(never)]
     fn fuse_tof(&mut self, at: Instant, tof: &TofData) -> Fusion {
         let fusion = self.update_tof(at, tof).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Tof, fusion)
     }
 
+    #[inline(never)]
     fn fuse_flow(&mut self, at: Instant, flow: &FlowData) -> Fusion {
         let fusion = self.update_flow(at, flow).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Flow, fusion)
     }
 
+    #[inline(never)]
     fn fuse_baro(&mut self, at: Instant, baro: &BaroData) -> Fusion {
         let fusion = self.update_baro(at, baro).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Baro, fusion)
     }
 
+    #[inline(never)]
     fn fuse_mag(&mut self, at: Instant, mag: &MagData) -> Fusion {
         let fusion = self.update_mag(at, mag).unwrap_or_else(Fusion::Refused);
         self.count(Counter::Mag, fusion)
@@ -184,6 +188,7 @@ impl Estimator for Eskf {
         self.tallied(Aiding::Attitude, fusion)
     }
 
+    #[inline(never)]
     fn estimate(&self) -> StateEstimate {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
         let stationary = self.anchor.is_some();
