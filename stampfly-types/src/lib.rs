@@ -32,6 +32,8 @@ extern crate std;
 
 pub mod activation;
 pub mod field;
+#[doc(hidden)]
+pub mod formatted;
 pub mod frame;
 pub mod math;
 pub mod message;
