@@ -8,6 +8,8 @@ pub mod indicator;
 
 pub use indicator::{Buzzer, Indicator, Lights, SetFrequency};
 pub use stampfly_bmi270::Peak;
+#[cfg(feature = "embassy-time")]
+pub use stampfly_driver_core::EmbassyClock;
 pub use stampfly_driver_core::{
     ArmToken, Barometer, Button, Command, CommandLink, Decimator, Imu, Interlock, Magnetometer, MotionCapture,
     MotorError, MotorOutputs, OpticalFlow, PinButton, PowerMonitor, PwmMotors, RangeFinder, Recovery, RecoveryError,

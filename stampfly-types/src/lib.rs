@@ -37,6 +37,8 @@ pub mod activation;
 #[cfg(feature = "math")]
 mod atmosphere;
 pub mod field;
+#[doc(hidden)]
+pub mod formatted;
 pub mod frame;
 #[cfg(feature = "math")]
 pub mod math;

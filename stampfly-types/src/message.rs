@@ -143,6 +143,8 @@ macro_rules! message {
         }
 
         $crate::__serde_message!($Name);
+
+        $crate::__defmt!($Name);
     };
 }
 

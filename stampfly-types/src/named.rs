@@ -61,6 +61,8 @@ macro_rules! message_enum {
         );
 
         $crate::__serde_field!($Name);
+
+        $crate::__defmt!($Name);
     };
 }
 
@@ -152,6 +154,8 @@ macro_rules! message_flags {
         );
 
         $crate::__serde_field!($Name);
+
+        $crate::__defmt!($Name);
     };
 }
 

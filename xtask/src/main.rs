@@ -34,6 +34,7 @@ const STEPS: &[Step] = &[
     Step::new("examples", "Run every example to its end", steps::examples::run),
     Step::new("doc", "Build the documentation; a warning fails", steps::doc::run),
     Step::new("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
+    Step::new("features", "Check each library with each of its features alone", steps::features::run).beside(),
     Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
     Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)

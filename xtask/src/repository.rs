@@ -30,6 +30,8 @@ pub struct Library {
     pub bare_metal: bool,
     /// Is it for others? If not, only tests and examples of the repository use it.
     pub published: bool,
+    /// Its features, without `default`.
+    pub features: Vec<String>,
 }
 
 impl Repository {
@@ -65,7 +67,9 @@ impl Repository {
             if name.starts_with("stampfly-") && self.root.join(&folder).join("src/lib.rs").exists() {
                 let published = package.get("publish").and_then(Item::as_bool).unwrap_or(true);
                 let bare_metal = published && !HOST_ONLY.contains(&name.as_str());
-                libraries.push(Library { name, folder, bare_metal, published });
+                let features = manifest.get("features").and_then(Item::as_table).into_iter().flatten();
+                let features = features.map(|(feature, _)| feature.to_owned()).filter(|feature| feature != "default");
+                libraries.push(Library { name, folder, bare_metal, published, features: features.collect() });
             }
         }
         libraries.sort_by(|a, b| a.name.cmp(&b.name));

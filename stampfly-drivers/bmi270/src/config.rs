@@ -2,6 +2,7 @@
 
 /// What the chip is told to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// Full scale of the accelerometer.
     pub accel_range: AccelRange,
@@ -20,6 +21,7 @@ impl Default for Config {
 
 /// Full scale of the accelerometer, register 0x41.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum AccelRange {
     G2,
@@ -30,6 +32,7 @@ pub enum AccelRange {
 
 /// Full scale of the gyroscope, °/s, register 0x43.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum GyroRange {
     Dps125,
@@ -41,6 +44,7 @@ pub enum GyroRange {
 
 /// Samples per second as delivered. The chip samples four times as often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Rate {
     Hz400,

@@ -15,6 +15,8 @@ use interrupt::Interrupt;
 pub use interrupt::NoPin;
 pub use peak::Peak;
 use stampfly_driver_core::Decimator;
+#[cfg(feature = "embassy-time")]
+pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::Port;
 pub use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
 pub use stampfly_driver_core::{Imu, Sample, Timebase};

@@ -2,6 +2,7 @@
 
 /// What the chip is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// Repetitions in a sample.
     pub preset: Preset,
@@ -19,6 +20,7 @@ impl Default for Config {
 
 /// How often the axes are measured for one sample (table "Recommended presets").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Preset {
     LowPower,
@@ -29,6 +31,7 @@ pub enum Preset {
 
 /// Samples per second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Rate {
     Hz2,

@@ -5,6 +5,7 @@ use stampfly_types::Duration;
 
 /// What the driver and the chip are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// Pressure conversions in a sample.
     pub pressure: Oversampling,
@@ -30,6 +31,7 @@ impl Default for Config {
 
 /// Conversions averaged into one, §3.3.1 and §3.3.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Oversampling {
     X1,
@@ -41,6 +43,7 @@ pub enum Oversampling {
 
 /// Coefficient of the chip's low-pass, §3.3.3: a step has arrived by three quarters after about as many samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Filter {
     Off,

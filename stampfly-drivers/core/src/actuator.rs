@@ -27,6 +27,7 @@ pub trait MotorOutputs {
 
 /// A motor channel refused its duty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorError {
     /// Index of the first channel that refused.
     pub channel: usize,

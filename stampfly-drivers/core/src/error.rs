@@ -9,6 +9,7 @@ use core::fmt::{self, Debug, Display};
 
 /// The kind of a sensor error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SensorErrorKind {
     /// The bus refused or garbled the transfer.

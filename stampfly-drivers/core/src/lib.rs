@@ -12,6 +12,8 @@ pub mod actuator;
 pub mod blocking;
 pub mod chip;
 mod decimator;
+#[cfg(feature = "embassy-time")]
+mod embassy;
 pub mod error;
 mod interlock;
 pub mod link;
@@ -24,6 +26,8 @@ pub mod time;
 
 pub use actuator::{MotorError, MotorOutputs, PwmMotors};
 pub use decimator::Decimator;
+#[cfg(feature = "embassy-time")]
+pub use embassy::EmbassyClock;
 pub use error::{SensorError, SensorErrorKind};
 pub use interlock::{ArmToken, Interlock};
 pub use link::{Button, Command, CommandLink, PinButton};

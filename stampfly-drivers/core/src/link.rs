@@ -6,6 +6,7 @@ use stampfly_types::messages::{GuidedCommand, PilotInput};
 
 /// One authentic command.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
     /// A frame from a pilot's transmitter.
     Pilot(PilotInput),

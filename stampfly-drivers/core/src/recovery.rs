@@ -19,6 +19,7 @@ const PATIENCE: u8 = 100;
 
 /// What was wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Recovery {
     /// Nothing: the data line was free. A STOP was sent nevertheless.
     WasFree,
@@ -31,6 +32,7 @@ pub enum Recovery {
 
 /// Why the bus is not free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RecoveryError {
     /// The clock line stays low: a short circuit, no supply, or a device that stretches the clock for ever.

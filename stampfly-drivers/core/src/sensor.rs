@@ -6,6 +6,7 @@ use stampfly_types::{Duration, Instant};
 
 /// A measurement and the instant it is valid for. How good it is, is part of the measurement: `valid`, `sigma`, `quality`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sample<T> {
     /// The instant the data is valid for.
     pub at: Instant,

@@ -56,6 +56,7 @@ use stampfly_types::{Duration, Instant};
 
 /// When the lead transfers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rhythm {
     /// From the beginning of one burst of the lead's transfers to that of the next.
     pub period: Duration,
@@ -110,6 +111,7 @@ pub struct Guest<'s, D, T> {
 
 /// Why the guest's transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlotError<E> {
     /// The device says so.
     Device(E),

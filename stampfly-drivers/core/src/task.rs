@@ -92,6 +92,7 @@ const MAX_DOUBLINGS: u32 = 4;
 /// assert_eq!(pauses, [5, 5, 10, 20, 40, 80, 80]);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Backoff {
     /// The first pause.
     pub pause: Duration,

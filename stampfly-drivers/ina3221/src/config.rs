@@ -3,6 +3,7 @@
 
 /// What the chip and the driver are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// The channel of [`PowerMonitor::next`](crate::PowerMonitor::next), and of the self test: the battery's.
     pub channel: Channel,
@@ -41,6 +42,7 @@ impl Default for Config {
 
 /// Which pair of pins the shunt is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Channel {
     One,
@@ -55,6 +57,7 @@ impl Channel {
 
 /// Conversions averaged into one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Average {
     A1,
@@ -69,6 +72,7 @@ pub enum Average {
 
 /// Time of one conversion, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum ConversionTime {
     Us140,

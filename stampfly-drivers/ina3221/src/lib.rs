@@ -7,6 +7,8 @@ mod config;
 use codec::register;
 pub use config::{Average, Channel, Config, ConversionTime};
 use embedded_hal_async::i2c::I2c;
+#[cfg(feature = "embassy-time")]
+pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::Port;
 pub use stampfly_driver_core::chip::{ChipError, I2cRegisters, TransferLimit};
 pub use stampfly_driver_core::{PowerMonitor, Sample, Timebase};

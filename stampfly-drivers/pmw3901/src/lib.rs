@@ -5,6 +5,8 @@ pub mod codec;
 
 use codec::{Motion, Step, register};
 use embedded_hal_async::spi::{Operation, SpiDevice};
+#[cfg(feature = "embassy-time")]
+pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::bounded;
 pub use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, TransferLimit};
 use stampfly_driver_core::time::sleep_until;
@@ -41,6 +43,7 @@ const BLIND: Duration = Duration::from_secs(10);
 
 /// What the driver is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// Time between two samples. Pictures come at 121 Hz: faster than that gives empty samples.
     pub interval: Duration,

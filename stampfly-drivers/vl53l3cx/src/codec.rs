@@ -198,6 +198,7 @@ pub const fn inter_measurement(period: Duration, oscillator: u16) -> [u8; 4] {
 
 /// What the chip says about a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RangeStatus {
     /// A target, at this distance.
@@ -278,6 +279,7 @@ impl RangeStatus {
 
 /// One measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
     /// The status register's code.
     pub code: u8,

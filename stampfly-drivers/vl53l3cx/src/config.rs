@@ -5,6 +5,7 @@ use stampfly_types::Duration;
 
 /// What the chip and the driver are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// How far to look.
     pub mode: DistanceMode,
@@ -30,6 +31,7 @@ impl Default for Config {
 
 /// How far the chip looks: a longer light pulse period sees further, but not so well in sunlight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DistanceMode {
     /// Up to 1.3 m.
     Short,

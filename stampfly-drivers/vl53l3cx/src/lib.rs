@@ -15,6 +15,8 @@ pub use codec::{RangeStatus, Reading};
 pub use config::{Config, DistanceMode};
 use embedded_hal::i2c::{Error, ErrorKind};
 use embedded_hal_async::i2c::I2c;
+#[cfg(feature = "embassy-time")]
+pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::Port;
 pub use stampfly_driver_core::chip::{ChipError, I2cRegisters, TransferLimit};
 pub use stampfly_driver_core::{RangeFinder, Sample, Timebase};

@@ -13,6 +13,7 @@ pub mod doc;
 pub mod docs;
 pub mod esp32;
 pub mod examples;
+pub mod features;
 pub mod figures;
 pub mod files;
 pub mod fmt;

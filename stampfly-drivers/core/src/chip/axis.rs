@@ -7,6 +7,7 @@ use stampfly_types::Vec3;
 
 /// A chip axis, in its own or in the opposite direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Axis {
     PlusX,
@@ -54,6 +55,7 @@ impl Axis {
 /// assert_eq!(AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::PlusZ), None, "a mirror");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AxisMap {
     forward: Axis,
     right: Axis,

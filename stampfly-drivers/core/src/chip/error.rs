@@ -6,6 +6,7 @@ use core::fmt::{self, Debug, Display};
 
 /// An error of a chip driver; `E` is the bus's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ChipError<E> {
     /// The bus refused or garbled the transfer.

@@ -19,6 +19,7 @@ use stampfly_types::Duration;
 /// assert!(TransferLimit::I2C_SENSORS.of(17) < Duration::from_millis(12), "a range, a hundred kilohertz, a busy bus");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TransferLimit {
     byte: Duration,
     margin: Duration,

@@ -1,0 +1,39 @@
+//! `features`: each feature of each library compiles alone, and all of them together; what has a test of its own is tested.
+//!
+//! Inside the workspace every crate is built with the features that the others ask for, and those that nobody asks for are not built
+//! at all. Here a crate is checked by itself, without its default features, and with each of its features in turn.
+
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Library, Repository, run as run_program};
+
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    let libraries = repository.libraries()?;
+    let with_features: Vec<&Library> = libraries.iter().filter(|library| !library.features.is_empty()).collect();
+    if with_features.is_empty() {
+        return Err("no library has a feature: are manifests read as they should be?".to_owned());
+    }
+    for library in with_features {
+        check(repository, library, &["--no-default-features"])?;
+        for feature in &library.features {
+            check(repository, library, &["--no-default-features", "--features", feature])?;
+        }
+        check(repository, library, &["--all-features"])?;
+    }
+    // A clock that can be asked on this PC, too.
+    run_program(in_the_folder(repository, "test").args(TESTED))
+}
+
+/// What a feature adds that does something by itself.
+const TESTED: [&str; 7] = ["--quiet", "-p", "stampfly-driver-core", "--features", "embassy-time", "--test", "embassy"];
+
+fn check(repository: &Repository, library: &Library, arguments: &[&str]) -> Result<(), Failure> {
+    run_program(in_the_folder(repository, "check").args(["--quiet", "-p", &library.name]).args(arguments))
+}
+
+/// A cargo with a build folder of its own: what is built with other features is built anew each time.
+fn in_the_folder(repository: &Repository, command: &str) -> std::process::Command {
+    let mut cargo = repository.cargo();
+    cargo.env("CARGO_PROFILE_DEV_DEBUG", "false").env("RUSTFLAGS", "-D warnings");
+    cargo.args([command, "--target-dir"]).arg(repository.target("features"));
+    cargo
+}
