@@ -43,13 +43,13 @@ pub struct CascadeConfig {
 }
 
 impl CascadeConfig {
-    /// Rate, attitude and altitude loops of the airframe; position and sticks as for any vehicle.
+    /// All loops of the airframe; sticks as for any vehicle.
     #[must_use]
     pub fn for_airframe(airframe: &Airframe) -> Self {
         Self {
             rate: RateConfig::for_airframe(airframe),
             attitude: AttitudeConfig::for_airframe(airframe),
-            position: PositionConfig::default(),
+            position: PositionConfig::for_airframe(airframe),
             altitude: AltitudeConfig::for_airframe(airframe),
             sticks: StickConfig::default(),
         }
