@@ -228,13 +228,13 @@ impl<R> CascadeController<R> {
 
 impl<R: RateLaw> Controller for CascadeController<R> {
     #[inline]
-    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
+    fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.flight_status.control_resets != self.resets {
             self.resets = input.flight_status.control_resets;
             self.reset();
         }
-        let Some(intent) = Intent::read(input) else {
+        let Some(intent) = intent else {
             self.reset();
             return ControlOutput::default();
         };

@@ -178,13 +178,13 @@ impl GeometricController {
 }
 
 impl Controller for GeometricController {
-    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
+    fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.flight_status.control_resets != self.resets {
             self.resets = input.flight_status.control_resets;
             self.reset();
         }
-        let Some(intent) = Intent::read(input) else {
+        let Some(intent) = intent else {
             self.reset();
             return ControlOutput::default();
         };
