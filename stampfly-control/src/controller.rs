@@ -6,26 +6,10 @@
 //! [`IndiController`](crate::IndiController) the same with an innermost loop that learns at once what else turns the vehicle,
 //! [`GeometricController`](crate::GeometricController) the proof that another law fits the same socket.
 
+pub use crate::input::ControlInput;
 use crate::intent::Intent;
 use stampfly_types::Instant;
-use stampfly_types::messages::{CommandSetpoint, ControlOutput, FlightStatus, LandDetected, Setpoint, StateEstimate};
-
-/// All a controller may look at in one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ControlInput<'a> {
-    /// Where the vehicle is, and which parts of that may be believed.
-    pub estimate: &'a StateEstimate,
-    /// The sticks, for the modes in which they command angles or rates.
-    pub command: &'a CommandSetpoint,
-    /// Where the vehicle should be.
-    pub setpoint: &'a Setpoint,
-    /// Flight phase and mode. A change of `control_resets` resets the controller.
-    pub flight_status: &'a FlightStatus,
-    /// Contact with the ground and the thrust ceiling while landing.
-    pub land_detected: &'a LandDetected,
-    /// What the mixer could not deliver in the previous step ([`Mixed::unmet`](crate::Mixed)).
-    pub unmet: [f32; 4],
-}
+use stampfly_types::messages::ControlOutput;
 
 /// A control law.
 ///

@@ -19,7 +19,7 @@ use stampfly_types::messages::{
     FlightMode, FlightPhase, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 
-use crate::controller::ControlInput;
+use crate::input::ControlInput;
 
 /// What is asked, as far as it can be done.
 #[derive(Clone, Copy, Debug, PartialEq)]

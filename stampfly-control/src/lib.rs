@@ -55,6 +55,7 @@ pub mod timing;
 
 mod answer;
 mod bound;
+mod input;
 
 pub use airframe::{Airframe, Rotor, Spin};
 pub use autotune::Autotune;
