@@ -43,13 +43,13 @@ pub struct CascadeConfig {
 }
 
 impl CascadeConfig {
-    /// Rate, attitude and altitude loops of the airframe; position and sticks as for any vehicle.
+    /// All loops of the airframe; sticks as for any vehicle.
     #[must_use]
     pub fn for_airframe(airframe: &Airframe) -> Self {
         Self {
             rate: RateConfig::for_airframe(airframe),
             attitude: AttitudeConfig::for_airframe(airframe),
-            position: PositionConfig::default(),
+            position: PositionConfig::for_airframe(airframe),
             altitude: AltitudeConfig::for_airframe(airframe),
             sticks: StickConfig::default(),
         }
@@ -228,13 +228,13 @@ impl<R> CascadeController<R> {
 
 impl<R: RateLaw> Controller for CascadeController<R> {
     #[inline]
-    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
+    fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.flight_status.control_resets != self.resets {
             self.resets = input.flight_status.control_resets;
             self.reset();
         }
-        let Some(intent) = Intent::read(input) else {
+        let Some(intent) = intent else {
             self.reset();
             return ControlOutput::default();
         };

@@ -52,18 +52,22 @@ pub struct GeometricConfig {
 }
 
 impl GeometricConfig {
-    /// Mass, inertia and limits from the airframe; the gains hold for any.
+    /// Mass, inertia and limits from the airframe. The gains hold for any whose motors are quick. Slower ones stretch time by
+    /// one over [`Airframe::quickness`]: a gain is a power of a frequency, so it shrinks with as many powers of the quickness, and
+    /// what is left of damping and phase is what it was.
     #[must_use]
     pub fn for_airframe(airframe: &Airframe) -> Self {
+        let quickness = airframe.quickness();
+        let squared = quickness * quickness;
         Self {
             mass: airframe.mass,
             inertia: airframe.inertia,
-            position: 14.0,
-            velocity: 7.0,
-            integral: 12.0,
+            position: 14.0 * squared,
+            velocity: 7.0 * quickness,
+            integral: 12.0 * (squared * quickness),
             integral_max: 4.0,
-            attitude: [450.0, 80.0],
-            rate: [32.0, 16.0],
+            attitude: [450.0 * squared, 80.0 * squared],
+            rate: [32.0 * quickness, 16.0 * quickness],
             tilt_max: 0.35,
             thrust_max: airframe.thrust_limit(),
             torque_max: airframe.torque_limit(),
@@ -174,13 +178,13 @@ impl GeometricController {
 }
 
 impl Controller for GeometricController {
-    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
+    fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.flight_status.control_resets != self.resets {
             self.resets = input.flight_status.control_resets;
             self.reset();
         }
-        let Some(intent) = Intent::read(input) else {
+        let Some(intent) = intent else {
             self.reset();
             return ControlOutput::default();
         };

@@ -11,14 +11,15 @@
 //! | tilt | damp the rotation | hover thrust, a little less |
 //! | angular rate | no torque | hover thrust, a little less |
 //!
-//! Write a control law against [`Intent`] and it behaves like the others in every mode and every failure.
+//! Write a control law against [`Intent`] and it behaves like the others in every mode and every failure. Write a flight mode that makes
+//! one, and every law flies it: [`Controller`](crate::Controller) has an example.
 
 use stampfly_types::Vec3;
 use stampfly_types::messages::{
     FlightMode, FlightPhase, GroundContact, Setpoint, SetpointAxes, StateEstimate, Validity, stick,
 };
 
-use crate::controller::ControlInput;
+use crate::input::ControlInput;
 
 /// What is asked, as far as it can be done.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,6 +155,50 @@ impl Intent {
             grounded: input.land_detected.contact == GroundContact::Ground,
             tan_tilt_max: if settles { SETTLING } else { f32::INFINITY },
         })
+    }
+}
+
+impl Intent {
+    /// What of an intent can be done with this estimate and this set-point, by the table of the [module](self): for a mode that makes
+    /// its own. Numbers that are none are taken for zero. The set-point's `axes` are not looked at: the intent says what to follow.
+    #[must_use]
+    pub fn possible(self, input: &ControlInput<'_>) -> Self {
+        let known = Known::read(input.estimate);
+        let every = HORIZONTAL.with(VERTICAL).with(SetpointAxes::YAW).with(SetpointAxes::YAW_RATE);
+        let axes = usable_axes(&Setpoint { axes: every, ..*input.setpoint });
+        let horizontal = match self.horizontal {
+            _ if !known.rate => Horizontal::Nothing,
+            Horizontal::Nothing => Horizontal::Nothing,
+            // Rates need no attitude.
+            Horizontal::Rates { forward, right } => Horizontal::Rates { forward: stick(forward), right: stick(right) },
+            _ if !known.tilt => Horizontal::Damp,
+            Horizontal::Path if known.position_xy && axes.contains(SetpointAxes::POSITION_XY) => Horizontal::Path,
+            Horizontal::Path | Horizontal::Velocity => {
+                let follow = known.velocity_xy && axes.intersects(HORIZONTAL);
+                if follow { Horizontal::Velocity } else { Horizontal::LEVEL }
+            }
+            Horizontal::Lean { forward, right } => Horizontal::Lean { forward: stick(forward), right: stick(right) },
+            Horizontal::Damp => Horizontal::Damp,
+        };
+        let vertical = match self.vertical {
+            Vertical::Throttle(throttle) => Vertical::Throttle(stick(throttle).max(0.0)),
+            Vertical::Descend => Vertical::Descend,
+            Vertical::Path if known.position_z && axes.contains(SetpointAxes::POSITION_Z) => Vertical::Path,
+            Vertical::Path | Vertical::Velocity => {
+                let follow = known.velocity_z && axes.intersects(VERTICAL);
+                if follow { Vertical::Velocity } else { Vertical::Descend }
+            }
+        };
+        let finite = |rate: f32| if rate.is_finite() { rate } else { 0.0 };
+        let heading = match self.heading {
+            Heading::Hold { yaw, rate } if known.tilt && known.heading && yaw.is_finite() => {
+                Heading::Hold { yaw, rate: finite(rate) }
+            }
+            Heading::Hold { rate, .. } | Heading::Rate(rate) => Heading::Rate(finite(rate)),
+            Heading::Stick(deflection) => Heading::Stick(stick(deflection)),
+        };
+        // No number is level.
+        Self { horizontal, vertical, heading, tan_tilt_max: self.tan_tilt_max.max(0.0), ..self }
     }
 }
 
@@ -369,5 +414,105 @@ mod tests {
         {
             assert_eq!(tan_tilt_max(phase, ceiling), f32::INFINITY, "{phase:?} {ceiling}");
         }
+    }
+
+    use crate::{Airframe, CascadeConfig, CascadeController, Controller, GeometricConfig, GeometricController};
+    use proptest::prelude::*;
+    use stampfly_types::{Instant, Quat};
+
+    fn any_intent() -> impl Strategy<Value = Intent> {
+        (0u8..6, 0u8..4, 0u8..3, any::<[f32; 6]>(), any::<bool>()).prop_map(
+            |(h, v, y, [a, b, c, d, e, f], grounded)| Intent {
+                horizontal: match h {
+                    0 => Horizontal::Path,
+                    1 => Horizontal::Velocity,
+                    2 => Horizontal::Lean { forward: a, right: b },
+                    3 => Horizontal::Rates { forward: a, right: b },
+                    4 => Horizontal::Damp,
+                    _ => Horizontal::Nothing,
+                },
+                vertical: match v {
+                    0 => Vertical::Path,
+                    1 => Vertical::Velocity,
+                    2 => Vertical::Throttle(c),
+                    _ => Vertical::Descend,
+                },
+                heading: match y {
+                    0 => Heading::Hold { yaw: d, rate: e },
+                    1 => Heading::Rate(d),
+                    _ => Heading::Stick(d),
+                },
+                grounded,
+                tan_tilt_max: f,
+            },
+        )
+    }
+
+    fn strange() -> impl Strategy<Value = f32> {
+        prop_oneof![Just(0.0), Just(f32::NAN), Just(f32::INFINITY), -100f32..100.0, any::<f32>()]
+    }
+
+    proptest! {
+        #[test]
+        fn no_intent_makes_what_is_no_number(
+            intents in prop::collection::vec(any_intent(), 1..6), n in prop::array::uniform16(strange()), bits: u32,
+        ) {
+            let mut estimate = StateEstimate { valid: Validity::ALL, ..StateEstimate::default() };
+            if bits & 1 == 1 { estimate.attitude = Quat::new_unchecked(n[0], n[1], n[2], n[3]) }
+            if bits & 2 == 2 { estimate.angular_rate = Vec3::new(n[4], n[5], n[6]) }
+            if bits & 4 == 4 { estimate.valid = Validity::NONE }
+            estimate.velocity = Vec3::new(n[7], n[8], n[9]);
+            let setpoint = Setpoint {
+                position: Vec3::new(n[10], n[11], n[12]), velocity: Vec3::new(n[13], 0.0, n[14]),
+                acceleration: Vec3::new(n[15], n[0], n[1]), ..Setpoint::default()
+            };
+            let (command, flight_status) = (CommandSetpoint::default(), FlightStatus::default());
+            let land_detected = LandDetected { thrust_ceiling: f32::MAX, ..LandDetected::default() };
+            let input = ControlInput {
+                estimate: &estimate, command: &command, setpoint: &setpoint, flight_status: &flight_status,
+                land_detected: &land_detected, unmet: [0.0; 4],
+            };
+            let airframe = Airframe::EXAMPLE;
+            let mut cascade = CascadeController::new(&CascadeConfig::for_airframe(&airframe));
+            let mut geometric = GeometricController::new(&GeometricConfig::for_airframe(&airframe));
+            for (n, intent) in intents.iter().enumerate() {
+                let (now, intent) = (Instant::from_micros(2_500 * n as u64), Some(intent.possible(&input)));
+                for output in [cascade.follow(now, intent, &input), geometric.follow(now, intent, &input)] {
+                    prop_assert!((0.0..=airframe.thrust_limit()).contains(&output.thrust), "{:?}: {:?}", intent, output);
+                    let limit = airframe.torque_limit();
+                    prop_assert!(output.torque.iter().zip(limit.iter()).all(|(t, max)| t.abs() <= max * 1.0001), "{:?}: {:?}", intent, output);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_intent_of_ones_own_degrades_as_the_familys_do() {
+        let setpoint = Setpoint::default();
+        let case = |valid: Validity| {
+            let estimate = StateEstimate { valid, ..StateEstimate::default() };
+            let input = ControlInput {
+                estimate: &estimate,
+                command: &CommandSetpoint::default(),
+                setpoint: &setpoint,
+                flight_status: &FlightStatus::default(),
+                land_detected: &LandDetected::default(),
+                unmet: [0.0; 4],
+            };
+            let heading = Heading::Hold { yaw: 1.0, rate: 0.5 };
+            let (horizontal, vertical) = (Horizontal::Path, Vertical::Path);
+            let asked = Intent { horizontal, vertical, heading, grounded: false, tan_tilt_max: f32::NAN };
+            let possible = asked.possible(&input);
+            assert_eq!(possible.tan_tilt_max, 0.0);
+            (possible.horizontal, possible.vertical, possible.heading)
+        };
+        let hold = Heading::Hold { yaw: 1.0, rate: 0.5 };
+        let all = Validity::ALL;
+        assert_eq!(case(all), (Horizontal::Path, Vertical::Path, hold));
+        let lost = all.without(Validity::POSITION_XY | Validity::POSITION_Z);
+        assert_eq!(case(lost), (Horizontal::Velocity, Vertical::Velocity, hold));
+        let lost = lost.without(Validity::VELOCITY_XY | Validity::VELOCITY_Z);
+        assert_eq!(case(lost), (Horizontal::LEVEL, Vertical::Descend, hold));
+        assert_eq!(case(Validity::NONE), (Horizontal::Damp, Vertical::Descend, Heading::Rate(0.5)));
     }
 }

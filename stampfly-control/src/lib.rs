@@ -17,7 +17,8 @@
 //! * [`flip`]: turning over once, for as long as it takes in place of the controller;
 //! * [`autotune`]: measuring the vehicle in flight, and the rate loop's gains that follow;
 //! * [`airframe`]: the vehicle as a value, from which mixer, controllers and motor stage are configured;
-//! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry;
+//! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry, [`layout`] for the usual ones; [`surfaces`] of an aeroplane
+//!   and [`drive`] for wheels;
 //! * [`motor`] and [`curve`]: thrust to duty;
 //! * [`filter`], [`pid`] and [`timing`]: building blocks.
 //!
@@ -35,21 +36,25 @@ pub mod autotune;
 pub mod cascade;
 pub mod controller;
 pub mod curve;
+pub mod drive;
 pub mod filter;
 pub mod flip;
 pub mod geometric;
 pub mod guidance;
 pub mod indi;
 pub mod intent;
+pub mod layout;
 pub mod mixer;
 pub mod motor;
 pub mod pid;
 pub mod position;
 pub mod rate;
+pub mod surfaces;
 pub mod timing;
 
 mod answer;
 mod bound;
+mod input;
 
 pub use airframe::{Airframe, Rotor, Spin};
 pub use autotune::Autotune;

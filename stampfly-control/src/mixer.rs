@@ -89,6 +89,7 @@ struct Shares {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MultirotorMixer {
+    thrust_min: f32,
     shares: [Shares; MAX_MOTORS],
     #[cfg_attr(feature = "serde", serde(deserialize_with = "up_to_max_motors"))]
     count: usize,
@@ -150,7 +151,40 @@ impl MultirotorMixer {
             };
             n += 1;
         }
-        Ok(Self { shares, count: rotors.len(), thrust_max })
+        Ok(Self { thrust_min: 0.0, shares, count: rotors.len(), thrust_max })
+    }
+
+    /// The same for motors that push with at least `thrust_min` N, in place of zero. Above zero are motors that must not stop in the air:
+    /// [`MotorConfig::idle_thrust`](crate::MotorConfig::idle_thrust) says what idling pushes. Below zero are motors that reverse, for
+    /// flight on the back.
+    ///
+    /// ```
+    /// use stampfly_control::{Mixer, MultirotorMixer, Rotor};
+    /// use stampfly_types::{Vec3, messages::ControlOutput};
+    /// let rotors = Rotor::quadrotor_plus(0.2, 0.015);
+    /// let mixer = MultirotorMixer::from_rotors(&rotors, 5.0)?.with_thrust_min(0.2)?;
+    /// let demand = ControlOutput { thrust: 0.0, torque: Vec3::new(0.1, 0.0, 0.0) };
+    /// let mixed = mixer.mix(&demand);
+    /// assert!(mixed.thrust[..4].iter().all(|thrust| *thrust >= 0.2), "none stops, and it still rolls");
+    /// assert!((0.2 * (mixed.thrust[1] - mixed.thrust[0]) - 0.1).abs() < 1e-6);
+    /// # Ok::<(), stampfly_control::GeometryError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`GeometryError::Uncontrollable`] when no collective thrust is left between the least and the largest, or the number is none.
+    pub const fn with_thrust_min(self, thrust_min: f32) -> Result<Self, GeometryError> {
+        if !(thrust_min > -1e6 && thrust_min < self.thrust_max) {
+            return Err(GeometryError::Uncontrollable);
+        }
+        // Where some rotors carry more than others, one may be at its largest before another is at its least.
+        let (mut low, mut high) = (f32::MIN, f32::MAX);
+        let mut n = 0;
+        while n < self.count && n < MAX_MOTORS {
+            low = low.max(thrust_min * self.shares[n].collective);
+            high = high.min(self.thrust_max * self.shares[n].collective);
+            n += 1;
+        }
+        if low < high { Ok(Self { thrust_min, ..self }) } else { Err(GeometryError::Uncontrollable) }
     }
 
     /// Largest share of `tilt` (each rotor's part of roll and pitch) for which some collective thrust keeps every
@@ -158,11 +192,11 @@ impl MultirotorMixer {
     fn tilt_scale(&self, tilt: &[f32; MAX_MOTORS]) -> f32 {
         let mut scale = 1.0f32;
         let rotors = || self.shares.iter().zip(tilt).take(self.count);
-        // Collective u must satisfy −s·p_i ≤ a_i·u and a_j·u ≤ max − s·p_j for all pairs.
+        // Collective u must satisfy min − s·p_i ≤ a_i·u and a_j·u ≤ max − s·p_j for all pairs.
         for (lower, p_lower) in rotors() {
             for (upper, p_upper) in rotors() {
                 let spread = p_upper * upper.collective - p_lower * lower.collective;
-                let room = self.thrust_max * upper.collective;
+                let room = self.thrust_max * upper.collective - self.thrust_min * lower.collective;
                 if scale * spread > room {
                     scale = room / spread;
                 }
@@ -173,10 +207,12 @@ impl MultirotorMixer {
 
     /// The collective thrusts for which every motor can deliver this much roll and pitch.
     fn collective_range(&self, tilt: &[f32; MAX_MOTORS]) -> (f32, f32) {
-        let (mut low, mut high) = (0.0f32, f32::MAX);
+        // Roll and pitch add nothing to the sum of all thrusts.
+        let (mut low, mut high) = (self.thrust_min * self.count as f32, f32::MAX);
         for (share, part) in self.shares.iter().zip(tilt).take(self.count) {
             // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
-            let (least, most) = (-part * share.collective, (self.thrust_max - part) * share.collective);
+            let (least, most) =
+                ((self.thrust_min - part) * share.collective, (self.thrust_max - part) * share.collective);
             low = if least > low { least } else { low };
             high = if most < high { most } else { high };
         }
@@ -209,15 +245,15 @@ impl Mixer for MultirotorMixer {
         let mut mixed = Mixed { count: self.count as u8, ..Mixed::default() };
         let mut yaw_scale = 1.0f32;
         for ((thrust, share), part) in mixed.thrust.iter_mut().zip(&self.shares).zip(&tilt).take(self.count) {
-            *thrust = within(share.thrust * collective + part, 0.0, self.thrust_max);
+            *thrust = within(share.thrust * collective + part, self.thrust_min, self.thrust_max);
             let twist = share.yaw * yaw;
-            let room = if twist > 0.0 { self.thrust_max - *thrust } else { *thrust };
+            let room = if twist > 0.0 { self.thrust_max - *thrust } else { *thrust - self.thrust_min };
             if yaw_scale * twist.abs() > room {
                 yaw_scale = room / twist.abs();
             }
         }
         for (thrust, share) in mixed.thrust.iter_mut().zip(&self.shares).take(self.count) {
-            *thrust = within(*thrust + yaw_scale * share.yaw * yaw, 0.0, self.thrust_max);
+            *thrust = within(*thrust + yaw_scale * share.yaw * yaw, self.thrust_min, self.thrust_max);
         }
         let missing = wanted - collective;
         let unmet_thrust = if missing == 0.0 { 0.0 } else { symmetric(missing / wanted.abs().max(1e-3), 1.0) };
@@ -394,6 +430,14 @@ mod tests {
     }
 
     #[test]
+    fn a_least_thrust_that_leaves_nothing_is_refused() {
+        for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, QUADROTOR.motor_thrust_max, 9.0] {
+            assert_eq!(MIXER.with_thrust_min(wrong), Err(GeometryError::Uncontrollable), "{wrong}");
+        }
+        assert_eq!(MIXER.with_thrust_min(0.0), Ok(MIXER));
+    }
+
+    #[test]
     fn broken_demands_are_zero() {
         let mixed = MIXER.mix(&ControlOutput { thrust: f32::NAN, torque: Vec3::repeat(f32::INFINITY) });
         assert_eq!(mixed.thrust, [0.0; MAX_MOTORS]);
@@ -489,6 +533,30 @@ mod tests {
             prop_assert_eq!(mixed.unmet, [0.0; 4]);
             prop_assert!((got.thrust - demand.thrust).abs() < 1.4e-6 * QUADROTOR.full_thrust());
             prop_assert!((got.torque - demand.torque).norm() < 2e-6 * QUADROTOR.torque_limit().x);
+        }
+
+        #[test]
+        fn motors_that_idle_or_reverse_keep_within_their_limits(
+            shares in demands(), low in -1f32..0.2, which in 0usize..3,
+        ) {
+            let rotors = [QUADROTOR.rotors.to_vec(), hexacopter(), ring(8)][which].clone();
+            let (max, min) = (2.3, 2.3 * low);
+            let mixer = MultirotorMixer::from_rotors(&rotors, max).and_then(|mixer| mixer.with_thrust_min(min)).expect("flies");
+            let demand = demand_on(&rotors, max, &shares);
+            let mixed = mixer.mix(&demand);
+            let got = produced(&rotors, &mixed);
+            for thrust in mixed.thrust.iter().take(rotors.len()) {
+                prop_assert!((min..=max).contains(thrust), "{thrust} below {min}");
+            }
+            // Roll and pitch first: what is reported is what is made, and all of it while any collective thrust gives it.
+            let kept = 1.0 - mixed.unmet[0];
+            prop_assert!((got.torque.x - kept * demand.torque.x).abs() < 1e-3 * max);
+            prop_assert!((got.torque.y - kept * demand.torque.y).abs() < 1e-3 * max);
+            prop_assert!((got.torque.z - (1.0 - mixed.unmet[2]) * demand.torque.z).abs() < 1e-4 * max);
+            let parts: Vec<f32> = mixer.shares.iter().take(rotors.len())
+                .map(|s| s.roll * demand.torque.x + s.pitch * demand.torque.y).collect();
+            let spread = parts.iter().fold(f32::MIN, |a, b| a.max(*b)) - parts.iter().fold(f32::MAX, |a, b| a.min(*b));
+            prop_assert!(spread > 0.999 * (max - min) || mixed.unmet[0] < 1e-3, "given up without need");
         }
 
         #[test]

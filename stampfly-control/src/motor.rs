@@ -31,6 +31,10 @@ pub struct MotorConfig {
     pub voltage_rate: f32,
     /// How fast it goes to nominal without a plausible reading, V/s.
     pub voltage_drift: f32,
+    /// Least duty of an armed motor. Zero, the default: it may stop. Above zero it idles, for controllers of brushless motors that do not
+    /// start again in the air; give the mixer [`Self::idle_thrust`]. Below zero, to −1, it reverses: a thrust below zero is as many
+    /// volts the other way, as for a wheel or a propeller that is symmetric.
+    pub duty_min: f32,
     /// Largest duty.
     pub duty_max: f32,
     /// Largest change of duty, 1/s.
@@ -60,9 +64,23 @@ impl MotorConfig {
             voltage_rate: 0.4 * cells,
             // A cell under load falls by 0.6 V in four minutes.
             voltage_drift: 0.003 * cells,
+            duty_min: 0.0,
             duty_max: 0.95,
             slew_max: 40.0,
         }
+    }
+
+    /// Thrust of a motor at the least duty on a nominal battery, N, as
+    /// [`MultirotorMixer::with_thrust_min`](crate::MultirotorMixer::with_thrust_min) takes it; negative where it reverses.
+    #[must_use]
+    pub fn idle_thrust(&self) -> f32 {
+        let thrust = self.curve.thrust(self.duty_min.abs() * self.nominal_voltage);
+        if self.duty_min < 0.0 { -thrust } else { thrust }
+    }
+
+    /// The voltage for a thrust, negative for one below zero where the motor reverses.
+    fn voltage(&self, thrust: f32) -> f32 {
+        if thrust < 0.0 && self.duty_min < 0.0 { -self.curve.voltage(-thrust) } else { self.curve.voltage(thrust) }
     }
 }
 
@@ -107,10 +125,13 @@ impl MotorStage {
         }
         let step = self.config.slew_max * dt;
         let per_volt = 1.0 / battery;
+        // A motor that begins to idle starts from rest, no quicker than any other change.
+        let lowest = if self.config.duty_min < 0.0 { self.config.duty_min } else { 0.0 };
         for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(usize::from(mixed.count)) {
-            let wanted = (self.config.curve.voltage(thrust) * per_volt).min(self.config.duty_max);
+            let wanted = (self.config.voltage(thrust) * per_volt).min(self.config.duty_max);
+            let wanted = if wanted < self.config.duty_min { self.config.duty_min } else { wanted };
             // The last clamp is for the rounding of the sum.
-            *duty = within(*duty + symmetric(wanted - *duty, step), 0.0, self.config.duty_max);
+            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, self.config.duty_max);
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
     }
@@ -159,6 +180,37 @@ mod tests {
             motors.step(Instant::ZERO, &mixed(1.2), reading, true);
             assert_eq!(motors.battery_voltage(), 7.4, "{reading:?}");
         }
+    }
+
+    /// The last duty of a motor that has been asked for this thrust for half a second.
+    fn settled(duty_min: f32, thrust: f32) -> f32 {
+        let config = MotorConfig { duty_min, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
+        let mut motors = MotorStage::new(&config);
+        let step = |n: u64| motors.step(Instant::from_micros(n * 2_500), &mixed(thrust), None, true).duty[0];
+        (0..200).map(step).last().unwrap_or_default()
+    }
+
+    #[test]
+    fn an_armed_motor_idles_and_starts_gently() {
+        assert_eq!([0.0, -1.0, f32::NAN].map(|thrust| settled(0.08, thrust)), [0.08; 3]);
+        assert_eq!(settled(0.0, 0.0), 0.0, "and stops where it may");
+        let config = MotorConfig { duty_min: 0.3, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
+        let mut motors = MotorStage::new(&config);
+        let first = motors.step(Instant::ZERO, &mixed(0.0), None, true).duty[0];
+        assert!((first - 0.1).abs() < 1e-6, "40 1/s for 2.5 ms: {first}");
+        assert_eq!(motors.step(Instant::from_micros(2_500), &mixed(0.0), None, false).duty, [0.0; 8]);
+        // What idling pushes is what the mixer may ask for.
+        let idle = settled(0.08, MotorConfig { duty_min: 0.08, ..config }.idle_thrust());
+        assert!((idle - 0.08).abs() < 1e-4, "{idle}");
+    }
+
+    #[test]
+    fn a_motor_that_reverses_is_as_strong_the_other_way() {
+        let (ahead, back) = (settled(-1.0, 1.2), settled(-1.0, -1.2));
+        assert!(ahead > 0.5 && ahead == -back, "{ahead} {back}");
+        assert_eq!(settled(-0.3, -1.2), -0.3, "no further than it may");
+        let config = MotorConfig { duty_min: -0.5, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
+        assert!(config.idle_thrust() < 0.0);
     }
 
     #[test]

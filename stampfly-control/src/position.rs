@@ -6,6 +6,8 @@
 
 use stampfly_types::{GRAVITY, Vec3, math};
 
+use crate::airframe::Airframe;
+use crate::attitude::AttitudeConfig;
 use crate::pid::{Integration, Pid, PidGains};
 
 /// Gains and limits of the horizontal loops.
@@ -22,7 +24,27 @@ pub struct PositionConfig {
     pub tilt_max: f32,
 }
 
+/// Largest gain of the velocity loop over that of the attitude loop, which has to lean the vehicle for it: 0.28 in PX4's defaults
+/// (`MPC_XY_VEL_P_ACC` 1.8 over `MC_ROLL_P` 6.5).
+const ATTITUDE_SHARE: f32 = 0.3;
+
+impl PositionConfig {
+    /// The default gains; all of them slower where the airframe's motors, and so its attitude loop, are too slow for them.
+    #[must_use]
+    pub fn for_airframe(airframe: &Airframe) -> Self {
+        let full = Self::default();
+        let reach = ATTITUDE_SHARE * AttitudeConfig::for_airframe(airframe).tilt_gain;
+        let share = (reach / full.velocity.kp).min(1.0);
+        Self {
+            position_gain: share * full.position_gain,
+            velocity: PidGains { kp: share * full.velocity.kp, ti: full.velocity.ti / share, ..full.velocity },
+            ..full
+        }
+    }
+}
+
 impl Default for PositionConfig {
+    /// For an attitude loop of 10 1/s or more, whatever the vehicle weighs.
     fn default() -> Self {
         Self {
             position_gain: 1.5,

@@ -6,6 +6,7 @@ mod body;
 
 use body::{AIRFRAME, Flight, Spread, Vehicle, gust};
 use stampfly_control::autotune::{Autotune, AutotuneAxis, AutotuneInput, AutotuneReport, AutotuneStage};
+use stampfly_control::intent::Intent;
 use stampfly_control::rate::RateConfig;
 use stampfly_control::{CascadeConfig, CascadeController, ControlInput, Controller};
 use stampfly_types::messages::{Alerts, ControlOutput};
@@ -19,8 +20,8 @@ struct Tuned {
 }
 
 impl Controller for Tuned {
-    fn step(&mut self, now: Instant, input: &ControlInput<'_>) -> ControlOutput {
-        let output = self.inner.step(now, input);
+    fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
+        let output = self.inner.follow(now, intent, input);
         let conditions = AutotuneInput::of(input, Alerts::default());
         if let Some(axis) = self.begin.take() {
             let gains = axis.gains(&RateConfig::for_airframe(&AIRFRAME));

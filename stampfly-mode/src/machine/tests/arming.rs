@@ -146,3 +146,19 @@ fn the_arm_switch_of_a_new_transmitter_must_be_seen_off_though_there_was_no_sile
     world.sends(&mut machine, off);
     assert!(world.sends(&mut machine, on).armed);
 }
+
+/// The heights of standing and lifted are the airframe's: a range finder may stand higher than a hand lifts a small vehicle.
+#[test]
+fn a_vehicle_whose_range_finder_stands_high_arms_with_its_own_heights() {
+    for (config, arms) in [
+        (ModeConfig::default(), false),
+        (ModeConfig { standing_height: 0.2, held_height: 0.3, ..ModeConfig::default() }, true),
+    ] {
+        let (mut machine, mut world) = (ModeMachine::new(config), World::ready());
+        world.estimate.height = 0.16;
+        world.pass(&mut machine, 100);
+        assert_eq!(world.step(&mut machine, &[Command::Arm]).flight_status.armed, arms, "{config:?}");
+        let held = machine.refusals().any(|refusal| refusal.check == ArmBlocks::NOT_ON_GROUND);
+        assert!(arms || held, "and it says why");
+    }
+}
