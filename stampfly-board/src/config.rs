@@ -77,16 +77,7 @@ impl Default for VehicleConfig {
         Self {
             estimator: EstimatorKind::default(),
             controller: ControllerKind::default(),
-            eskf: EskfConfig {
-                ground_clearance,
-                drag: (DRAG / MASS) as f32,
-                // A room, and sensors so fast that two in a lock-out are many.
-                max_position: 100.0,
-                max_velocity: 50.0,
-                external_lockout: 0.2,
-                lockout_samples: 1,
-                ..EskfConfig::default()
-            },
+            eskf: EskfConfig { ground_clearance, drag: (DRAG / MASS) as f32, ..EskfConfig::indoors() },
             complementary: ComplementaryConfig { ground_clearance, ..ComplementaryConfig::default() },
             cascade: CascadeConfig::for_airframe(&AIRFRAME),
             geometric: GeometricConfig::for_airframe(&AIRFRAME),

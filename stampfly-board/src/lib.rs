@@ -1,6 +1,4 @@
 #![doc = include_str!("../README.md")]
-//!
-//! # The parts
 //! The StampFly assembled.
 //!
 //! Two tables say it all: [`topics`], who publishes what for whom, and [`schedule`], what runs when. The rest is
@@ -26,9 +24,5 @@ pub mod simulation;
 pub mod topics;
 
 pub use config::{ControllerKind, EstimatorKind, VehicleConfig};
-/// The tables' ends.
-pub use stampfly_bus as bus;
-/// What runs the tables.
-pub use stampfly_flight as flight;
-/// Messages, time, vectors: the words that signatures here are written in.
-pub use stampfly_types as types;
+/// The crates that signatures here are written in.
+pub use {stampfly_bus as bus, stampfly_flight as flight, stampfly_types as types};

@@ -145,6 +145,18 @@ pub struct EskfConfig {
 }
 
 impl EskfConfig {
+    /// For a small multirotor in a room: position or pose from cameras, if any, comes so often that two rejected ones are many, and
+    /// what is 100 m away or flies at 50 m/s is lost.
+    ///
+    /// ```
+    /// use stampfly_eskf::EskfConfig;
+    /// assert!(EskfConfig::indoors().max_position < EskfConfig::outdoors().max_position);
+    /// ```
+    #[must_use]
+    pub fn indoors() -> Self {
+        Self { max_position: 100.0, max_velocity: 50.0, external_lockout: 0.2, lockout_samples: 1, ..Self::default() }
+    }
+
     /// For a vehicle under the open sky: satellite receiver up to half a second late, barometer, perhaps a magnetometer, its own
     /// inertial sensor at any rate. Set noise densities, `mag_enable` and what the start knows of the heading to yours.
     ///

@@ -34,6 +34,14 @@ pub struct Library {
     pub features: Vec<String>,
 }
 
+impl Library {
+    /// Is this the name of a version of it, as archives are called?
+    pub fn is_called(&self, name: &str) -> bool {
+        let version = name.strip_prefix(&self.name).and_then(|rest| rest.strip_prefix('-'));
+        version.is_some_and(|version| version.starts_with(|first: char| first.is_ascii_digit()))
+    }
+}
+
 impl Repository {
     /// The one this program was built from.
     pub fn find() -> Self {

@@ -184,8 +184,7 @@ impl<'b> Pilot<'b> {
     /// mode in which it only holds its height.
     fn mistrust(&mut self, place: Vec3, seen: &Seen, now: Instant) {
         let error = (place - seen.position).horizontal();
-        let lost =
-            self.flown() == FlightMode::PosHold && error.norm() > LOST && error.dot(&seen.velocity.horizontal()) < 0.0;
+        let lost = self.flown() == FlightMode::PosHold && error.norm() > LOST && error.dot(&seen.velocity) < 0.0;
         let since = if lost { *self.lost.get_or_insert(now) } else { now };
         self.lost = self.lost.filter(|_| lost);
         if now.since(since) >= LOST_FOR {

@@ -98,12 +98,13 @@ impl Gates {
     }
 
     /// Has one of its measurements been accepted within this time?
+    #[inline]
     pub(super) fn is_recent_within(&self, sensor: Sensor, now: Instant, within: Duration) -> bool {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < within)
     }
 
     /// Tests a measurement's ratio against its gate, with a lock-out time in seconds and how many rejected ones it takes.
-    #[inline]
+    #[inline(always)]
     pub(super) fn test(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32, samples: u16) -> GateResult {
         let record = self.record(sensor);
         if ratio <= 1.0 {

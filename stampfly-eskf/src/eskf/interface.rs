@@ -188,17 +188,17 @@ impl Estimator for Eskf {
         self.tallied(Aiding::Attitude, fusion)
     }
 
-    #[inline(never)]
     fn estimate(&self) -> StateEstimate {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
         let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let external = self.is_aided_outside(Sensor::Level);
+        let [level, down] = [Sensor::Level, Sensor::Down].map(|sensor| self.is_aided_outside(sensor));
+        let [range, air] = [self.is_range_aided(), recent(Sensor::Baro)];
         let north = self.is_north_known();
         let horizontal = sound && north && self.is_velocity_aided();
         let drifts = horizontal || (sound && self.feels_drag() && self.is_velocity_certain() && self.height() > LEVEL);
-        let baro = recent(Sensor::Baro) && !self.vertical.knows_nothing();
-        let vertical = sound && (self.is_range_aided() || baro || self.is_aided_outside(Sensor::Down) || stationary);
+        let baro = air && !self.vertical.knows_nothing();
+        let vertical = sound && (range || baro || down || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
             .set(Validity::HEADING, self.initialized && north && self.is_heading_certain())
@@ -208,13 +208,13 @@ impl Estimator for Eskf {
             .set(Validity::HEIGHT, sound && self.surface.is_some() && vertical);
         let sensors = SensorMask::NONE
             .set(SensorMask::IMU, self.initialized)
-            .set(SensorMask::TOF, self.is_range_aided())
+            .set(SensorMask::TOF, range)
             .set(SensorMask::FLOW, recent(Sensor::Flow) && !self.flow_monitor.is_implausible())
-            .set(SensorMask::BARO, recent(Sensor::Baro))
+            .set(SensorMask::BARO, air)
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
             .set(SensorMask::STATIONARY, stationary)
-            .set(SensorMask::EXTERNAL, external || self.is_aided_outside(Sensor::Down) || recent(Sensor::Attitude));
+            .set(SensorMask::EXTERNAL, level || down || recent(Sensor::Attitude));
         let p = &self.covariance;
         StateEstimate {
             attitude: self.state.quat(),

@@ -278,8 +278,9 @@ impl Eskf {
         let here = baro.altitude + delayed.state.position.z;
         let since = core::mem::replace(&mut self.baro_updated, self.now);
         let height = self.covariance.get(POSITION + 2, POSITION + 2);
-        let first = if height > VAGUE_HEIGHT { noise + height } else { noise };
-        let offset = self.baro_offset.get_or_insert(Offset::new(here, first));
+        let offset = self
+            .baro_offset
+            .get_or_insert_with(|| Offset::new(here, if height > VAGUE_HEIGHT { noise + height } else { noise }));
         offset.propagate(self.now.since(since).seconds(), self.config.baro_walk);
         let offset = *offset;
         let row = aid::baro::altitude(&delayed.state, offset.value());

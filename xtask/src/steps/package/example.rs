@@ -30,8 +30,8 @@ fn registry(repository: &Repository, archives: &Path, place: &Path, libraries: &
     write(&everything.join("src/lib.rs"), "")?;
     let mut manifest = String::from("[package]\nname = \"everything\"\nedition = \"2024\"\n\n[workspace]\n\n");
     let (mut dependencies, mut patches) = (String::from("[dependencies]\n"), String::from("\n[patch.crates-io]\n"));
-    for Library { name, .. } in libraries {
-        let archive = archive(archives, name)?;
+    for library in libraries {
+        let (name, archive) = (&library.name, archive(archives, library)?);
         fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         run_program(repository.command("tar").arg("-xzf").arg(&archive.path).arg("-C").arg(&folder))?;
         let unpacked = folder.join(&archive.name);
@@ -58,14 +58,14 @@ struct Archive {
     name: String,
 }
 
-fn archive(archives: &Path, library: &str) -> Result<Archive, Failure> {
+fn archive(archives: &Path, library: &Library) -> Result<Archive, Failure> {
     let entries = fs::read_dir(archives).map_err(|e| format!("{}: {e}", archives.display()))?;
     let mut archives = entries.flatten().filter_map(|entry| {
         let path = entry.path();
         let name = path.file_name()?.to_str()?.strip_suffix(".crate")?.to_owned();
-        super::is_of(library, &name).then_some(Archive { path, name })
+        library.is_called(&name).then_some(Archive { path, name })
     });
-    archives.next().ok_or_else(|| format!("`{library}` has no archive"))
+    archives.next().ok_or_else(|| format!("`{}` has no archive", library.name))
 }
 
 fn program(repository: &Repository, library: &Library, registry: &Path, place: &Path) -> Result<(), Failure> {

@@ -44,7 +44,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let without: Vec<String> = libraries
         .iter()
         .flat_map(|library| LICENCES.map(|licence| (library, licence)))
-        .filter(|(library, licence)| !has_licence(repository, &folder.join("package"), &library.name, licence))
+        .filter(|(library, licence)| !has_licence(repository, &folder.join("package"), library, licence))
         .map(|(library, licence)| format!("the archive of {} has no {licence} as in the top folder", library.name))
         .collect();
     if !without.is_empty() {
@@ -54,17 +54,11 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
 }
 
 /// Is this text in what cargo has unpacked of a library's archive, as it is in the top folder?
-fn has_licence(repository: &Repository, archives: &Path, library: &str, licence: &str) -> bool {
+fn has_licence(repository: &Repository, archives: &Path, library: &Library, licence: &str) -> bool {
     let Ok(wanted) = fs::read(repository.root.join(licence)) else { return false };
     let entries = fs::read_dir(archives).into_iter().flatten().flatten();
-    let mut unpacked = entries.filter(|entry| entry.file_name().to_str().is_some_and(|name| is_of(library, name)));
+    let mut unpacked = entries.filter(|entry| entry.file_name().to_str().is_some_and(|name| library.is_called(name)));
     unpacked.any(|entry| fs::read(entry.path().join(licence)).is_ok_and(|text| text == wanted))
-}
-
-/// Is this the name of a version of a library?
-fn is_of(library: &str, name: &str) -> bool {
-    let version = name.strip_prefix(library).and_then(|rest| rest.strip_prefix('-'));
-    version.is_some_and(|version| version.starts_with(|first: char| first.is_ascii_digit()))
 }
 
 /// Removes what cargo's home keeps unpacked of these libraries: it is of an older commit and has the same version.
@@ -74,7 +68,7 @@ fn forget_unpacked(libraries: &[Library]) {
     let entries = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten();
     for unpacked in entries(home.join("registry/src")).flat_map(|registry| entries(registry.path())) {
         let name = unpacked.file_name();
-        let is_ours = |library: &Library| name.to_str().is_some_and(|name| is_of(&library.name, name));
+        let is_ours = |library: &Library| name.to_str().is_some_and(|name| library.is_called(name));
         if libraries.iter().any(is_ours) {
             let _ = fs::remove_dir_all(unpacked.path());
         }
