@@ -68,6 +68,7 @@ fn is_given(values: &Vec3, sigma: &Vec3) -> [f32; 3] {
 }
 
 impl Eskf {
+    #[inline(never)]
     pub(super) fn update_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: &Vec3) -> Result<Fusion, Refusal> {
         let age = self.admit(Sensor::Velocity, at, &is_given(velocity, sigma))?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
@@ -102,6 +103,7 @@ impl Eskf {
         }
     }
 
+    #[inline(never)]
     pub(super) fn update_position(&mut self, at: Instant, position: &Vec3, sigma: &Vec3) -> Result<Fusion, Refusal> {
         let age = self.admit(Sensor::Position, at, &is_given(position, sigma))?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
@@ -205,6 +207,7 @@ impl Eskf {
         }
     }
 
+    #[inline(never)]
     pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
         let [w, x, y, z] = attitude.wxyz();
         let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
