@@ -11,7 +11,7 @@ use stampfly_types::Duration;
 
 /// Register addresses.
 pub mod register {
-    /// Resets the chip: [`HOLD`](super::HOLD), a pause, [`LET_GO`](super::LET_GO), as ST's drivers of the VL53L1 do.
+    /// Resets the chip: [`HOLD`](super::HOLD), a pause, [`LET_GO`](super::LET_GO), as public drivers of the VL53L1X do.
     pub const SOFT_RESET: u16 = 0x0000;
     /// The address the chip answers at, 7 bits.
     pub const I2C_SLAVE_DEVICE_ADDRESS: u16 = 0x0001;

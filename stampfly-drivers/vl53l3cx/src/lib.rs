@@ -28,7 +28,7 @@ pub use xshut::{NoXshut, Xshut};
 
 /// In reset. The data sheet gives no shortest time.
 const RESET: Duration = Duration::from_millis(1);
-/// In reset by the register: 100 µs in ST's drivers.
+/// In reset by the register: 100 µs in public drivers of the VL53L1X.
 const SOFT_RESET: Duration = Duration::from_micros(100);
 /// From reset to the first access; 1.2 ms at most (§ "Power sequence").
 const BOOT: Duration = Duration::from_millis(4);
