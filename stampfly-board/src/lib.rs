@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+//!
 //! Two tables say it all: [`topics`], who publishes what for whom, and [`schedule`], what runs when. The rest is
 //! [runnables], one a component. What the vehicle is, in numbers, is its [airframe]. `stampfly-flight` runs them: on the hardware, in simulation, in a replay.
 #![no_std]
