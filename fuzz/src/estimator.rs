@@ -29,7 +29,8 @@ pub fn estimator_stream(data: &[u8]) {
                 .predict(now, &ImuData { gyro: input.vector(35.0), accel: input.vector(80.0), ..Default::default() }),
             1 => {
                 let [distance, sigma] = [input.number(3.0), input.number(0.1)];
-                _ = eskf.fuse_tof(now, &TofData { distance, sigma, valid: input.byte() & 1 == 1, ..Default::default() });
+                _ = eskf
+                    .fuse_tof(now, &TofData { distance, sigma, valid: input.byte() & 1 == 1, ..Default::default() });
             }
             2 => {
                 let [delta_x, delta_y, interval] = [input.number(1.0), input.number(1.0), input.number(0.05)];
