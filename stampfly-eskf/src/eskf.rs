@@ -54,7 +54,7 @@ use crate::tally::{Tallies, Tally};
 use alignment::Alignment;
 use bridge::Bridge;
 use flow_monitor::{FlowMonitor, GyroShift};
-use gate::{Gates, Sensor};
+use gate::{GateResult, Gates, Sensor};
 use gyro_monitor::{GyroJump, GyroMonitor, Near};
 use influence::Influence;
 use innovation_bias::InnovationBiasMonitor;
@@ -360,6 +360,12 @@ impl Eskf {
     fn tallied(&mut self, sensor: Aiding, fusion: Fusion) -> Fusion {
         self.tallies.add(sensor, fusion);
         fusion
+    }
+
+    /// Tests a measurement of a sensor on board against its gate.
+    #[inline(always)]
+    fn test(&mut self, sensor: Sensor, ratio: f32) -> GateResult {
+        self.gates.test(sensor, self.now, ratio, self.config.lockout, self.config.lockout_samples)
     }
 
     /// Is north where this filter has it? The nose's north always is.

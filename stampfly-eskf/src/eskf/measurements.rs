@@ -78,7 +78,7 @@ impl Eskf {
         self.status.tof_innovation = tof.distance - row.predicted;
         self.status.tof_ratio = ratio;
         let gated = if use_as == Use::Reject { ratio.max(REJECTED) } else { ratio };
-        match self.gates.test(Sensor::Tof, self.now, gated, self.config.lockout, self.config.lockout_samples) {
+        match self.test(Sensor::Tof, gated) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => {
                 self.vertical.rejected(self.now);
@@ -197,37 +197,36 @@ impl Eskf {
         self.acceleration.update(middle, world);
         let (raw, bias) = (self.force + self.state.accel_bias, self.state.gyro_bias);
         let before = rotate(&self.state.rotation(), &self.force);
-        let fusion =
-            match self.gates.test(Sensor::Flow, self.now, ratio, self.config.lockout, self.config.lockout_samples) {
-                GateResult::Fuse => {
-                    let mut correction = self.covariance.update(&innovation);
-                    if self.command.flying {
-                        self.covariance.consider(&innovation, VERTICAL, &mut correction);
-                    }
-                    self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
-                    self.state.correct(&correction);
-                    // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
-                    // nothing.
-                    if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
-                        self.inflate_on_innovation_bias();
-                    }
-                    Fusion::Fused { ratio }
+        let fusion = match self.test(Sensor::Flow, ratio) {
+            GateResult::Fuse => {
+                let mut correction = self.covariance.update(&innovation);
+                if self.command.flying {
+                    self.covariance.consider(&innovation, VERTICAL, &mut correction);
                 }
-                GateResult::Reject => return Ok(Fusion::Gated { ratio }),
-                GateResult::Reset => {
-                    let mut correction = [0.0; N];
-                    correction[VELOCITY] = world.x - delayed.state.velocity.x;
-                    correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
-                    self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
-                    self.state.correct(&correction);
-                    for (axis, variance) in variances.into_iter().enumerate() {
-                        self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
-                    }
-                    // A wrong velocity comes from a wrong tilt or bias.
-                    self.inflate_tilt();
-                    self.finish_reset(Sensor::Flow)
+                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                self.state.correct(&correction);
+                // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
+                // nothing.
+                if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
+                    self.inflate_on_innovation_bias();
                 }
-            };
+                Fusion::Fused { ratio }
+            }
+            GateResult::Reject => return Ok(Fusion::Gated { ratio }),
+            GateResult::Reset => {
+                let mut correction = [0.0; N];
+                correction[VELOCITY] = world.x - delayed.state.velocity.x;
+                correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
+                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                self.state.correct(&correction);
+                for (axis, variance) in variances.into_iter().enumerate() {
+                    self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
+                }
+                // A wrong velocity comes from a wrong tilt or bias.
+                self.inflate_tilt();
+                self.finish_reset(Sensor::Flow)
+            }
+        };
         let rotation = self.state.rotation();
         let after = rotate(&rotation, &(raw - self.state.accel_bias));
         self.flow_monitor.corrected(&(after - before), &rotate(&rotation, &(self.state.gyro_bias - bias)));
@@ -290,7 +289,7 @@ impl Eskf {
         let ratio = self.test_ratio(&innovation);
         self.status.baro_innovation = residual;
         self.status.baro_ratio = ratio;
-        match self.gates.test(Sensor::Baro, self.now, ratio, self.config.lockout, self.config.lockout_samples) {
+        match self.test(Sensor::Baro, ratio) {
             GateResult::Fuse => {
                 if let Some(offset) = &mut self.baro_offset {
                     offset.update(residual, noise + self.covariance.get(POSITION + 2, POSITION + 2));
@@ -357,7 +356,7 @@ impl Eskf {
 
     fn gate_mag<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32) -> Fusion {
         self.status.mag_ratio = ratio;
-        let verdict = self.gates.test(Sensor::Mag, self.now, ratio, self.config.lockout, self.config.lockout_samples);
+        let verdict = self.test(Sensor::Mag, ratio);
         if verdict == GateResult::Fuse {
             return self.update(innovation, ratio);
         }
