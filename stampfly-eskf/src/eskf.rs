@@ -306,17 +306,17 @@ impl Eskf {
         measured: [f32; M],
         variances: [f32; M],
     ) -> Innovation<M> {
-        let propagated = |row: &Row| {
-            if delayed.age == 0.0 {
-                row.jacobian
-            } else {
-                delayed.step.propagate_jacobian(&delayed.rotation, &row.jacobian)
-            }
-        };
-        let jacobians = rows.each_ref().map(propagated);
         let mut innovations = measured;
-        for (innovation, row) in innovations.iter_mut().zip(&rows) {
+        let mut jacobians = [[0.0; N]; M];
+        for ((innovation, jacobian), row) in innovations.iter_mut().zip(&mut jacobians).zip(&rows) {
             *innovation -= row.predicted;
+            *jacobian = row.jacobian;
+        }
+        if delayed.age != 0.0 {
+            let turn = rotation_matrix(delayed.step.delta_rotation);
+            for jacobian in &mut jacobians {
+                *jacobian = delayed.step.propagate_jacobian_by(&turn, &delayed.rotation, jacobian);
+            }
         }
         self.covariance.innovation(&jacobians, innovations, variances)
     }

@@ -115,7 +115,8 @@ impl Estimator for Eskf {
         }
         self.pending_step.extend(&motion);
         if self.pending_step.duration > COVARIANCE_STEP {
-            let [force, rate] = self.vibration.map(|vibration| vibration.mean_square() * motion.dt);
+            let [force, rate] = &self.vibration;
+            let [force, rate] = [force.mean_square() * motion.dt, rate.mean_square() * motion.dt];
             let noise = ProcessNoise {
                 velocity: self.noise.velocity + self.config.accel_vibration * force,
                 attitude: self.noise.attitude + self.config.gyro_vibration * rate,
@@ -192,7 +193,7 @@ impl Estimator for Eskf {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
         let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let [level, down] = [Sensor::Level, Sensor::Down].map(|sensor| self.is_aided_outside(sensor));
+        let [level, down] = [self.is_aided_outside(Sensor::Level), self.is_aided_outside(Sensor::Down)];
         let [range, air] = [self.is_range_aided(), recent(Sensor::Baro)];
         let north = self.is_north_known();
         let horizontal = sound && north && self.is_velocity_aided();

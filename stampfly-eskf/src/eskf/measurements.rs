@@ -149,7 +149,8 @@ impl Eskf {
             return Err(Refusal::Range);
         }
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
-        let rows = rows.map(|row| without_heading(row, &delayed.rotation[2]));
+        let [x, y] = rows;
+        let rows = [without_heading(x, &delayed.rotation[2]), without_heading(y, &delayed.rotation[2])];
         // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
         // by itself makes large readings count less and the velocity too small.
         let variance = |row: &Row, turning: f32| {
@@ -377,6 +378,7 @@ impl Eskf {
 /// body sees it. In theory flow shows the heading while the vehicle accelerates; in practice a degree of mounting error
 /// and the beat of pictures and reads turn the estimated heading by degrees a minute, where a calibrated gyro alone
 /// keeps it within one.
+#[inline(always)]
 fn without_heading(mut row: Row, vertical: &[f32; 3]) -> Row {
     let [.., x, y, z, _, _, _, _, _, _] = &mut row.jacobian;
     let along = *x * vertical[0] + *y * vertical[1] + *z * vertical[2];

@@ -1,28 +1,29 @@
 //! The covariance of the error state: storage, propagation and update, shaped for speed.
 //!
-//! Rows are sixteen wide (the last column stays zero), so every operation runs over whole rows and the compiler
-//! turns them into vector instructions on a host and into tight loops on a microcontroller. Propagation uses the
-//! block structure of F: of the fifteen rows nine change, and of those the last six columns change only by the row
+//! Five by five blocks of three by three. Where a vector register holds four numbers a row of a block is one, whose last lane
+//! stays zero; elsewhere it has three. All operations go block by block, so that the compiler turns each into a
+//! few vector instructions on a host and into tight loops on a microcontroller. Propagation uses the
+//! block structure of F: of the five block rows three change, and of those the last two block columns change only by the row
 //! operation; the other triangle is a mirror of the first. An update of several axes is sequential and scalar, so no
 //! matrix is inverted, but it whitens the innovations first and then passes over the matrix
 //! once. The matrix stays exactly symmetric by construction: the update subtracts w·wᵀ, the propagation mirrors.
 
 pub use super::layout::N;
-use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY};
+use super::lanes::{Lanes, VECTORS, transposed};
 use super::propagation::PropagationStep;
 use super::state::{Rotation, rotation_matrix};
 use stampfly_types::math;
 
-/// Width of a stored row.
-const WIDTH: usize = 16;
+/// Blocks in a row: position, velocity, attitude, gyro bias, accelerometer bias.
+const BLOCKS: usize = 5;
 
-type Row = [f32; WIDTH];
+type Row = [Lanes; BLOCKS];
 
 /// A symmetric 15 × 15 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Covariance {
-    rows: [Row; N],
+    rows: [[Row; 3]; BLOCKS],
 }
 
 /// White noise driving the error state, as variances a second.
@@ -71,37 +72,30 @@ impl<const M: usize> Innovation<M> {
 }
 
 /// Smallest variance a state may claim, so that rounding never makes one zero or negative.
-const FLOOR: [f32; N] = [
-    1e-8, 1e-8, 1e-8, // position, (0.1 mm)²
-    1e-8, 1e-8, 1e-8, // velocity, (0.1 mm/s)²
-    1e-9, 1e-9, 1e-9, // attitude, (0.03 mrad)²
-    1e-12, 1e-12, 1e-12, // gyro bias, (1 µrad/s)²
-    1e-9, 1e-9, 1e-9, // accelerometer bias, (0.03 mm/s²)²
+const FLOOR: [f32; BLOCKS] = [
+    1e-8,  // position, (0.1 mm)²
+    1e-8,  // velocity, (0.1 mm/s)²
+    1e-9,  // attitude, (0.03 mrad)²
+    1e-12, // gyro bias, (1 µrad/s)²
+    1e-9,  // accelerometer bias, (0.03 mm/s²)²
 ];
 
-/// Does a row fit a few vector registers? Then whole rows cost less than the half of them that is needed. The sums are
-/// the same, term by term and bit by bit.
-const WHOLE_ROWS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
-
-/// Adds multiples of rows to columns `FIRST` to `N` of a row, one after the other. By `WHOLE` rows, the columns before
-/// `FIRST` are written as well.
-#[inline]
-fn add_multiples<const FIRST: usize, const K: usize, const WHOLE: bool>(to: &mut Row, parts: [(f32, &Row); K]) {
-    if WHOLE {
-        for (factor, row) in parts {
-            for (cell, value) in to.iter_mut().zip(row) {
-                *cell += factor * value;
-            }
+/// Adds multiples of rows to a row, one after the other, from block `FIRST` on.
+#[inline(always)]
+fn add_rows<const FIRST: usize, const K: usize>(to: &mut Row, factors: [f32; K], rows: [&Row; K]) {
+    for (block, to) in to.iter_mut().enumerate().skip(FIRST) {
+        let mut sum = *to;
+        for (factor, row) in factors.into_iter().zip(rows) {
+            sum = sum + row[block].times(factor);
         }
-    } else {
-        // In one pass.
-        let parts = parts.map(|(factor, row)| (factor, &row[FIRST..N]));
-        for (column, cell) in to[FIRST..N].iter_mut().enumerate() {
-            for (factor, row) in parts {
-                *cell += factor * row[column];
-            }
-        }
+        *to = sum;
     }
+}
+
+/// Block and place in it of a state.
+#[inline(always)]
+const fn place(state: usize) -> (usize, usize) {
+    (state / 3, state % 3)
 }
 
 impl Covariance {
@@ -109,43 +103,49 @@ impl Covariance {
     /// accelerometer bias.
     #[must_use]
     pub fn from_sigmas(sigmas: [f32; 5]) -> Self {
-        let mut rows = [[0.0; WIDTH]; N];
-        for (i, row) in rows.iter_mut().enumerate() {
-            row[i] = sigmas[i / 3] * sigmas[i / 3];
+        let mut all = Self { rows: [[[Lanes::zero(); BLOCKS]; 3]; BLOCKS] };
+        for state in 0..N {
+            all.inflate(state, sigmas[state / 3] * sigmas[state / 3]);
         }
-        Self { rows }
+        all
     }
 
     /// One element. Out of range is zero.
+    #[inline]
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> f32 {
-        self.rows.get(row).and_then(|r| r.get(column)).copied().unwrap_or(0.0)
+        let ((i, k), (j, l)) = (place(row), place(column));
+        self.rows.get(i).and_then(|rows| rows[k].get(j)).map_or(0.0, |lanes| lanes.get(l))
+    }
+
+    /// Changes one element. Out of range there is none.
+    #[inline(always)]
+    fn change(&mut self, row: usize, column: usize, change: impl FnOnce(f32) -> f32) {
+        let ((i, k), (j, l)) = (place(row), place(column));
+        if let Some(lanes) = self.rows.get_mut(i).and_then(|rows| rows[k].get_mut(j)) {
+            lanes.set(l, change(lanes.get(l)));
+        }
     }
 
     /// Replaces the variance of one state and sets its covariances to zero.
     pub fn reset(&mut self, state: usize, variance: f32) {
-        for (i, row) in self.rows.iter_mut().enumerate() {
-            if i == state {
-                *row = [0.0; WIDTH];
-            }
-            if let Some(cell) = row.get_mut(state) {
-                *cell = if i == state { variance } else { 0.0 };
-            }
+        for other in 0..N {
+            let value = if other == state { variance } else { 0.0 };
+            self.change(state, other, |_| value);
+            self.change(other, state, |_| value);
         }
     }
 
     /// Inflates the variance of one state by `variance`.
     pub fn inflate(&mut self, state: usize, variance: f32) {
-        if let Some(cell) = self.rows.get_mut(state).and_then(|row| row.get_mut(state)) {
-            *cell += variance;
-        }
+        self.change(state, state, |before| before + variance);
     }
 
     /// Is every element finite and every variance positive?
     #[must_use]
     pub fn is_healthy(&self) -> bool {
-        let sum: f32 = self.rows.iter().flatten().sum();
-        sum.is_finite() && self.rows.iter().enumerate().all(|(i, row)| row[i] > 0.0)
+        let sum: f32 = self.rows.iter().flatten().flatten().flat_map(|lanes| lanes.to_array()).sum();
+        sum.is_finite() && (0..N).all(|state| self.get(state, state) > 0.0)
     }
 
     /// P ← F·P·Fᵀ + Q over a short step that begins in the attitude `rotation`.
@@ -155,11 +155,6 @@ impl Covariance {
     /// of second order in τ are left out of the position.
     #[inline]
     pub fn propagate(&mut self, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) {
-        self.propagate_with::<WHOLE_ROWS>(rotation, step, noise);
-    }
-
-    #[inline]
-    fn propagate_with<const WHOLE: bool>(&mut self, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) {
         let PropagationStep { duration: dt, delta_velocity, .. } = *step;
         let [north, east, down] = rotation;
         let cross = |a: f32, x: &[f32; 3], b: f32, y: &[f32; 3]| {
@@ -170,50 +165,61 @@ impl Covariance {
             cross(delta_velocity.x, down, delta_velocity.z, north),
             cross(delta_velocity.y, north, delta_velocity.x, east),
         ];
-        let by_bias = rotation.map(|row| row.map(|v| -dt * v));
-        let [a, b, c] = rotation_matrix(step.delta_rotation);
-        let turn = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
-
-        let driving = [0.0, noise.velocity, noise.attitude, noise.gyro_bias, noise.accel_bias];
+        let scaled = |[x, y, z]: [f32; 3]| [-dt * x, -dt * y, -dt * z];
+        let by_bias = [scaled(*north), scaled(*east), scaled(*down)];
+        let turn_back = rotation_matrix(step.delta_rotation);
+        let turn = columns(&turn_back);
 
         // Rows: T = F·P for the nine that change, from the diagonal block on. Each block needs only those after it as they
         // were, so it takes their place.
-        let [position, velocity, attitude, gyro_bias, accel_bias] = self.rows.as_chunks_mut::<3>().0 else { return };
+        let [position, velocity, attitude, gyro_bias, accel_bias] = &mut self.rows;
         for (row, velocity) in position.iter_mut().zip(&*velocity) {
-            add_multiples::<POSITION, 1, WHOLE>(row, [(dt, velocity)]);
+            add_rows::<0, 1>(row, [dt], [velocity]);
         }
-        let before = *attitude;
-        let [x, y, z] = &before;
+        let [x, y, z] = &*attitude;
         let [bias_x, bias_y, bias_z] = &*accel_bias;
         for ((row, a), b) in velocity.iter_mut().zip(&by_attitude).zip(&by_bias) {
-            add_multiples::<VELOCITY, 3, WHOLE>(row, [(a[0], x), (a[1], y), (a[2], z)]);
-            add_multiples::<VELOCITY, 3, WHOLE>(row, [(b[0], bias_x), (b[1], bias_y), (b[2], bias_z)]);
+            add_rows::<1, 6>(row, [a[0], a[1], a[2], b[0], b[1], b[2]], [x, y, z, bias_x, bias_y, bias_z]);
         }
+        let [x, y, z] = *attitude;
         for ((row, c), gyro_bias) in attitude.iter_mut().zip(&turn).zip(&*gyro_bias) {
-            *row = [0.0; WIDTH];
-            add_multiples::<ATTITUDE, 3, WHOLE>(row, [(c[0], x), (c[1], y), (c[2], z)]);
-            add_multiples::<ATTITUDE, 1, WHOLE>(row, [(-dt, gyro_bias)]);
+            *row = [Lanes::zero(); BLOCKS];
+            add_rows::<2, 4>(row, [c[0], c[1], c[2], -dt], [&x, &y, &z, gyro_bias]);
         }
 
-        // Columns: the first nine of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
-        for (r, row) in self.rows.iter_mut().enumerate().take(9) {
-            let [x, y, z] = [row[6], row[7], row[8]];
-            for i in 0..3 {
-                let (a, b, c) = (by_attitude[i], by_bias[i], turn[i]);
-                if r < VELOCITY {
-                    row[i] += dt * row[3 + i];
-                }
-                if r < ATTITUDE {
-                    row[3 + i] =
-                        row[3 + i] + a[0] * x + a[1] * y + a[2] * z + b[0] * row[12] + b[1] * row[13] + b[2] * row[14];
-                }
-                row[6 + i] = c[0] * x + c[1] * y + c[2] * z - dt * row[9 + i];
-            }
+        // Columns: the first three blocks of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
+        let as_lanes = |[x, y, z]: Rotation| (Lanes::new(x), Lanes::new(y), Lanes::new(z));
+        let (a_x, a_y, a_z) = as_lanes(columns(&by_attitude));
+        let (b_x, b_y, b_z) = as_lanes(columns(&by_bias));
+        let (c_x, c_y, c_z) = as_lanes(turn_back);
+        let pushed = |v: Lanes, a: Lanes, b: Lanes| {
+            let ([x, y, z], [bias_x, bias_y, bias_z]) = (a.to_array(), b.to_array());
+            v.plus([x, y, z, bias_x, bias_y, bias_z], [&a_x, &a_y, &a_z, &b_x, &b_y, &b_z])
+        };
+        let turned = |a: Lanes, gyro_bias: Lanes| {
+            let [x, y, z] = a.to_array();
+            c_x.times(x).plus([y, z, -dt], [&c_y, &c_z, &gyro_bias])
+        };
+        for [p, v, a, gyro_bias, accel_bias] in position {
+            *p = p.plus([dt], [v]);
+            *v = pushed(*v, *a, *accel_bias);
+            *a = turned(*a, *gyro_bias);
         }
-        self.mirror(|_| 9);
-        for (i, row) in self.rows.iter_mut().enumerate() {
-            let grown = row[i] + driving[i / 3] * dt;
-            row[i] = if grown > FLOOR[i] { grown } else { FLOOR[i] };
+        for [_, v, a, gyro_bias, accel_bias] in velocity {
+            *v = pushed(*v, *a, *accel_bias);
+            *a = turned(*a, *gyro_bias);
+        }
+        for [_, _, a, gyro_bias, _] in attitude {
+            *a = turned(*a, *gyro_bias);
+        }
+        self.mirror::<3>();
+
+        let driving = [0.0, noise.velocity, noise.attitude, noise.gyro_bias, noise.accel_bias];
+        for (block, (rows, driving)) in self.rows.iter_mut().zip(driving).enumerate() {
+            for (axis, row) in rows.iter_mut().enumerate() {
+                let (grown, floor) = (row[block].get(axis) + driving * dt, FLOOR[block]);
+                row[block].set(axis, if grown > floor { grown } else { floor });
+            }
         }
     }
 
@@ -228,23 +234,24 @@ impl Covariance {
         innovations: [f32; M],
         variances: [f32; M],
     ) -> Innovation<M> {
-        let mut result = Innovation { gain: [[0.0; WIDTH]; M], whitened: innovations };
+        let mut result = Innovation { gain: [[Lanes::zero(); BLOCKS]; M], whitened: innovations };
         for (axis, (jacobian, noise)) in jacobians.iter().zip(variances).enumerate() {
             // Models touch few blocks of three states: the others are skipped whole.
             let blocks = jacobian.as_chunks::<3>().0;
             let dot = |row: &Row| {
                 let mut sum = 0.0;
-                for ([a, b, c], [x, y, z]) in blocks.iter().zip(row.as_chunks::<3>().0) {
+                for ([a, b, c], lanes) in blocks.iter().zip(row) {
                     if *a != 0.0 || *b != 0.0 || *c != 0.0 {
+                        let [x, y, z] = lanes.to_array();
                         sum += a * x + b * y + c * z;
                     }
                 }
                 sum
             };
-            let mut column = [0.0; WIDTH];
-            for ([a, b, c], [x, y, z]) in blocks.iter().zip(self.rows.as_chunks::<3>().0) {
+            let mut column = [Lanes::zero(); BLOCKS];
+            for ([a, b, c], [x, y, z]) in blocks.iter().zip(&self.rows) {
                 if *a != 0.0 || *b != 0.0 || *c != 0.0 {
-                    add_multiples::<0, 3, WHOLE_ROWS>(&mut column, [(*a, x), (*b, y), (*c, z)]);
+                    add_rows::<0, 3>(&mut column, [*a, *b, *c], [x, y, z]);
                 }
             }
             // Decorrelate from the axes before it.
@@ -252,12 +259,14 @@ impl Covariance {
             for before in 0..axis {
                 let earlier = &result.gain[before];
                 let shared = dot(earlier);
-                add_multiples::<0, 1, WHOLE_ROWS>(&mut column, [(-shared, earlier)]);
+                add_rows::<0, 1>(&mut column, [-shared], [earlier]);
                 innovation -= shared * result.whitened[before];
             }
             let variance = dot(&column) + noise;
             let scale = 1.0 / math::sqrt(variance.max(noise));
-            result.gain[axis] = column.map(|v| v * scale);
+            for (gain, lanes) in result.gain[axis].iter_mut().zip(&column) {
+                *gain = lanes.times(scale);
+            }
             result.whitened[axis] = innovation * scale;
         }
         result
@@ -270,7 +279,7 @@ impl Covariance {
     /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
     #[inline]
     pub fn update<const M: usize>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
-        self.update_with::<M, WHOLE_ROWS>(innovation)
+        self.update_with::<M, VECTORS>(innovation)
     }
 
     /// Takes an update back for states that are only considered (Schmidt, "Application of State-Space Methods to Navigation Problems",
@@ -286,13 +295,15 @@ impl Covariance {
         correction: &mut [f32; N],
     ) {
         // Checked, and free where the states are constants: they are inlined.
+        let part = |column: &Row, state: usize| {
+            let (block, axis) = place(state);
+            column.get(block).map_or(0.0, |lanes| lanes.get(axis))
+        };
         for i in states {
             for column in &innovation.gain {
-                let Some((row, of)) = self.rows.get_mut(i).zip(column.get(i)) else { continue };
+                let of = part(column, i);
                 for j in states {
-                    if let Some((cell, value)) = row.get_mut(j).zip(column.get(j)) {
-                        *cell += of * value;
-                    }
+                    self.change(i, j, |before| before + of * part(column, j));
                 }
             }
             // What is no number stays to be seen.
@@ -306,60 +317,67 @@ impl Covariance {
     fn update_with<const M: usize, const WHOLE: bool>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
         let Innovation { gain, whitened } = innovation;
         // A NaN must not spread into the covariance: any NaN makes the sum one.
-        if gain.iter().flatten().sum::<f32>().is_nan() {
+        let sum = gain.iter().flatten().fold(Lanes::zero(), |sum, lanes| sum + *lanes);
+        if sum.to_array().iter().sum::<f32>().is_nan() {
             return [f32::NAN; N];
         }
+        // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
+        let [position, velocity, attitude, gyro_bias, accel_bias] = &mut self.rows;
         if WHOLE {
-            for (i, place) in self.rows.iter_mut().enumerate() {
-                let mut row = *place;
-                for column in gain {
-                    // Never; it keeps the compiler from working down the columns.
-                    if column[i].is_nan() {
-                        return [f32::NAN; N];
-                    }
-                    add_multiples::<0, 1, WHOLE>(&mut row, [(-column[i], column)]);
-                }
-                *place = row;
-            }
+            subtract_outer_products::<0, 0, M>(position, gain);
+            subtract_outer_products::<1, 0, M>(velocity, gain);
+            subtract_outer_products::<2, 0, M>(attitude, gain);
+            subtract_outer_products::<3, 0, M>(gyro_bias, gain);
+            subtract_outer_products::<4, 0, M>(accel_bias, gain);
         } else {
-            // The blocks on the diagonal and above, then their mirror: the products are the same on both sides.
-            self.subtract_outer_products::<POSITION, M>(gain);
-            self.subtract_outer_products::<VELOCITY, M>(gain);
-            self.subtract_outer_products::<ATTITUDE, M>(gain);
-            self.subtract_outer_products::<GYRO_BIAS, M>(gain);
-            self.subtract_outer_products::<ACCEL_BIAS, M>(gain);
-            self.mirror(|i| i / 3 * 3);
+            subtract_outer_products::<0, 0, M>(position, gain);
+            subtract_outer_products::<1, 1, M>(velocity, gain);
+            subtract_outer_products::<2, 2, M>(attitude, gain);
+            subtract_outer_products::<3, 3, M>(gyro_bias, gain);
+            subtract_outer_products::<4, 4, M>(accel_bias, gain);
+            self.mirror::<5>();
         }
-        let mut correction = [0.0; N];
+        let mut correction = [Lanes::zero(); BLOCKS];
         for (column, innovation) in gain.iter().zip(whitened) {
-            for (cell, value) in correction.iter_mut().zip(column) {
-                *cell += innovation * value;
-            }
+            add_rows::<0, 1>(&mut correction, [*innovation], [column]);
         }
-        correction
+        let [[a, b, c], [d, e, f], [g, h, i], [j, k, l], [m, n, o]] = correction.map(Lanes::to_array);
+        [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o]
+    }
+
+    /// Copies the upper triangle, which was computed, to the lower one, of the first `COLUMNS` block columns.
+    #[inline(always)]
+    fn mirror<const COLUMNS: usize>(&mut self) {
+        for i in 0..COLUMNS {
+            let (above, below) = self.rows.split_at_mut(i + 1);
+            let Some([x, y, z]) = above.last_mut() else { return };
+            for (rows, ((x, y), z)) in below.iter_mut().zip(x.iter().zip(&*y).zip(&*z).skip(i + 1)) {
+                for (row, lanes) in rows.iter_mut().zip(transposed([*x, *y, *z])) {
+                    row[i] = lanes;
+                }
+            }
+            let ([_, xy, xz], [_, _, yz]) = (x[i].to_array(), y[i].to_array());
+            y[i].set(0, xy);
+            z[i].set(0, xz);
+            z[i].set(1, yz);
+        }
     }
 }
 
-impl Covariance {
-    /// Copies the upper triangle, which was computed, to the lower one: of each row so many columns.
-    #[inline]
-    fn mirror(&mut self, columns: impl Fn(usize) -> usize) {
-        for i in 1..N {
-            let (above, rest) = self.rows.split_at_mut(i);
-            let Some(row) = rest.first_mut() else { return };
-            for (cell, above) in row.iter_mut().zip(above).take(columns(i)) {
-                *cell = above[i];
-            }
-        }
-    }
+/// The columns of a matrix in row order.
+#[inline(always)]
+fn columns([x, y, z]: &Rotation) -> Rotation {
+    [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]]
+}
 
-    /// Subtracts w·wᵀ of each column w of the gain from the three rows from `FIRST` on, on the diagonal block and to
-    /// its right.
-    #[inline]
-    fn subtract_outer_products<const FIRST: usize, const M: usize>(&mut self, gain: &[Row; M]) {
-        for (i, row) in self.rows.iter_mut().enumerate().skip(FIRST).take(3) {
-            add_multiples::<FIRST, M, false>(row, gain.each_ref().map(|column| (-column[i], column)));
-        }
+/// Subtracts w·wᵀ of each column w of the gain from the rows of this block, from block `FIRST` on.
+#[inline(always)]
+fn subtract_outer_products<const BLOCK: usize, const FIRST: usize, const M: usize>(
+    rows: &mut [Row; 3],
+    gain: &[Row; M],
+) {
+    for (axis, row) in rows.iter_mut().enumerate() {
+        add_rows::<FIRST, M>(row, gain.each_ref().map(|column| -column[BLOCK].get(axis)), gain.each_ref());
     }
 }
 
@@ -440,8 +458,8 @@ mod tests {
                     step.extend(&state.propagate(&Vec3::new(a, -a, -9.8 + z), &Vec3::new(x, y, z), 0.0025));
                 }
                 exact = reference(&exact, &rotation, &step, &NOISE);
-                p.propagate_with::<true>(&rotation, &step, &NOISE);
-                other.propagate_with::<false>(&rotation, &step, &NOISE);
+                p.propagate(&rotation, &step, &NOISE);
+                other.propagate(&rotation, &step, &NOISE);
                 if n % 4 == 0 {
                     let h = [
                         jacobian(&[(0, 0.2), (4, 0.9), (6, a), (7, x), (10, 0.3)]),

@@ -16,7 +16,8 @@
 
 pub mod covariance;
 pub mod history;
-pub mod layout;
+pub mod lanes;
+mod layout;
 pub mod propagation;
 pub mod state;
 pub mod vibration;

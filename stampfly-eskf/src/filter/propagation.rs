@@ -57,7 +57,12 @@ impl PropagationStep {
     pub fn extend(&mut self, motion: &Motion) {
         self.delta_position += (self.delta_velocity + motion.delta_velocity * 0.5) * motion.dt;
         self.delta_velocity += motion.delta_velocity;
-        self.delta_rotation = multiply(self.delta_rotation, motion.delta_rotation);
+        // The first turn is the whole.
+        self.delta_rotation = if self.duration == 0.0 {
+            motion.delta_rotation
+        } else {
+            multiply(self.delta_rotation, motion.delta_rotation)
+        };
         self.duration += motion.dt;
     }
 
@@ -67,7 +72,8 @@ impl PropagationStep {
     pub(crate) fn prepend(&mut self, length: f32, delta_rotation: [f32; 4], delta_velocity: Vec3) {
         self.delta_position += delta_velocity * (self.duration + 0.5 * length);
         self.delta_velocity += delta_velocity;
-        self.delta_rotation = multiply(delta_rotation, self.delta_rotation);
+        self.delta_rotation =
+            if self.duration == 0.0 { delta_rotation } else { multiply(delta_rotation, self.delta_rotation) };
         self.duration += length;
     }
 
@@ -92,13 +98,19 @@ impl PropagationStep {
     #[inline]
     #[must_use]
     pub fn propagate_jacobian(&self, rotation: &Rotation, jacobian: &[f32; N]) -> [f32; N] {
+        self.propagate_jacobian_by(&rotation_matrix(self.delta_rotation), rotation, jacobian)
+    }
+
+    /// The same with the matrix of `delta_rotation`, for several Jacobians.
+    #[inline(always)]
+    pub(crate) fn propagate_jacobian_by(&self, turn: &Rotation, rotation: &Rotation, jacobian: &[f32; N]) -> [f32; N] {
         let block = |first: usize| Vec3::new(jacobian[first], jacobian[first + 1], jacobian[first + 2]);
         let tau = self.duration;
         let position = block(POSITION);
         let velocity = block(VELOCITY) - position * tau;
         let by_turn = position.cross(&self.delta_position) + velocity.cross(&self.delta_velocity);
         let attitude =
-            rotate_back(&rotation_matrix(self.delta_rotation), &(block(ATTITUDE) + rotate_back(rotation, &by_turn)));
+            rotate_back(turn, &(block(ATTITUDE) + rotate_back(rotation, &by_turn)));
         let gyro_bias = block(GYRO_BIAS) + attitude * tau;
         let pushed = velocity * tau + position * (0.5 * tau * tau);
         let accel_bias = block(ACCEL_BIAS) + rotate_back(rotation, &pushed);
