@@ -99,10 +99,10 @@ impl Mean {
         self.count += 1.0;
     }
 
-    fn take(&mut self) -> Option<Vec3> {
-        let mean = (self.count > 0.0).then(|| self.sum / self.count);
-        *self = Self::default();
-        mean
+    /// The mean, and of how many.
+    fn take(&mut self) -> Option<(Vec3, f32)> {
+        let Self { sum, count } = core::mem::take(self);
+        (count > 0.0).then(|| (sum / count, count))
     }
 }
 
@@ -161,6 +161,8 @@ pub struct Eskf {
     pending_rotation: Rotation,
     acceleration: Acceleration,
     accels: Mean,
+    /// The same with [`GravityUse::Always`].
+    felt: Mean,
     /// Of the specific force and of the rate.
     vibration: [Vibration; 2],
     standing: Standing,
@@ -227,6 +229,7 @@ impl Eskf {
             rate: Vec3::zeros(),
             force: Vec3::zeros(),
             accels: Mean::default(),
+            felt: Mean::default(),
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
             flow_monitor: FlowMonitor::airborne(),

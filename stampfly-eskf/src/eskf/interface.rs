@@ -114,7 +114,8 @@ impl Estimator for Eskf {
             self.correct_gyro(&jump);
         }
         self.pending_step.extend(&motion);
-        if self.pending_step.duration > COVARIANCE_STEP {
+        let due = self.pending_step.duration > COVARIANCE_STEP;
+        if due {
             let [force, rate] = &self.vibration;
             let [force, rate] = [force.mean_square() * motion.dt, rate.mean_square() * motion.dt];
             let noise = ProcessNoise {
@@ -137,7 +138,7 @@ impl Estimator for Eskf {
             self.constrain_stationary(anchor);
         }
         if self.steps.is_multiple_of(PSEUDO_MEASUREMENT_DIVIDER)
-            && let Some(accel) = self.accels.take()
+            && let Some((accel, _)) = self.accels.take()
         {
             if self.anchor.is_none() {
                 self.judge_range();
@@ -145,7 +146,12 @@ impl Estimator for Eskf {
             self.apply_pseudo_measurements(accel, dt * PSEUDO_MEASUREMENT_DIVIDER as f32);
         }
         if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() {
-            self.update_gravity(imu.accel, &self.acceleration.at(at), self.config.gravity_sigma);
+            self.felt.add(&imu.accel);
+            // The mean of the samples since the covariance was last propagated says what each of them does.
+            if due && let Some((accel, count)) = self.felt.take() {
+                let sigma = self.config.gravity_sigma / math::sqrt(count);
+                self.update_gravity(accel, &self.acceleration.at(at), sigma);
+            }
         }
         self.check_health();
     }

@@ -3,7 +3,7 @@
 //! | pseudo-measurement | active while | stops | gated |
 //! |---|---|---|---|
 //! | [`constrain_stationary`](Eskf::constrain_stationary): velocity zero, position where it stood | commanded `on_ground`, every fourth sample | take-off; an origin reset moves the position to zero | no |
-//! | [`update_gravity`](Eskf::update_gravity): gravity as the vertical | stationary; with [`GravityUse::WhenUnaided`] while nothing holds the velocity, drag included; with [`GravityUse::Always`] at every sample in flight | the other cases | yes, reset in `aid/gravity.rs` |
+//! | [`update_gravity`](Eskf::update_gravity): gravity as the vertical | stationary; with [`GravityUse::WhenUnaided`] while nothing holds the velocity, drag included; with [`GravityUse::Always`] all samples in flight, by their mean over a step of the covariance | the other cases | yes, reset in `aid/gravity.rs` |
 //! | [`update_drag`](Eskf::update_drag): the velocity that the body's drag shows | flying with a known `drag` and nothing that holds the velocity, instead of gravity | the other cases | no |
 //! | [`constrain_heading`](Eskf::constrain_heading): heading zero | once, at initialisation | | no |
 //! | [`reset_unobserved_motion`](Eskf::reset_unobserved_motion): velocity to zero at the largest deviation | nothing holds the velocity | flow, velocity or position within the last second, or on the ground | no |

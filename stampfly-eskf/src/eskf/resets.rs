@@ -202,6 +202,7 @@ impl Eskf {
         self.baro_updated = self.now;
         self.acceleration = Acceleration::default();
         self.accels = Mean::default();
+        self.felt = Mean::default();
         self.gates = Gates::default();
         self.flow_innovation_bias = InnovationBiasMonitor::default();
         self.flow_monitor = FlowMonitor::airborne();
