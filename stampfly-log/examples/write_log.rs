@@ -17,10 +17,13 @@ const TOPICS: &[Topic] = &[
     Topic { name: "sensor_imu", fields: ImuData::FIELDS },
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
     Topic { name: "flight_status", fields: FlightStatus::FIELDS },
+    // A second battery: of one name, and so the second instance of one topic.
+    Topic { name: "sensor_power", fields: PowerData::FIELDS },
 ];
 const IMU: usize = 0;
 const POWER: usize = 1;
 const MODE: usize = 2;
+const SECOND_POWER: usize = 3;
 const ACTIVATIONS: &[ActivationTopic] = &[ActivationTopic { name: "estimation", index: 0, inputs: 1 }];
 
 /// On a vehicle this is a radio link or a ring of memory; here it is a file.
@@ -65,6 +68,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if step % 40 == 0 {
             let power = PowerData { voltage: 4.1 - 0.1 * at.since(Instant::ZERO).seconds(), current: 2.0, power: 8.0 };
             publish(&mut log, POWER, Sample { at, generation: step / 40 + 1, words: &power.to_words() })?;
+            let power = PowerData { voltage: 3.9, ..power };
+            publish(&mut log, SECOND_POWER, Sample { at, generation: step / 40 + 1, words: &power.to_words() })?;
         }
         if step % 400 == 0 {
             log.sync()?;

@@ -6,7 +6,7 @@ use common::{ACTIVATIONS, Bytes, Odd, TOPICS, small_log, start};
 use proptest::prelude::*;
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Full, Message, Ram, Reader, Sample, Sink, Stamp, Topic, WriteError};
-use stampfly_types::messages::FlightStatus;
+use stampfly_types::messages::{FlightStatus, PowerData, TofData};
 use stampfly_types::{ActivationRecord, InputRecord};
 use stampfly_types::{FieldKind, Instant, Message as _, leaves};
 
@@ -46,6 +46,36 @@ fn samples(log: &[u8]) -> Vec<(usize, u64, u32, Vec<u32>)> {
         }
     }
     samples
+}
+
+/// Numbers, instances and names of the topics that a log subscribes.
+fn subscriptions(log: &[u8]) -> Vec<(u16, u8, String)> {
+    let of = |message| match message {
+        Message::Subscription { id, instance, topic } => Some((id, instance, topic.to_owned())),
+        _ => None,
+    };
+    Reader::new(log).unwrap().filter_map(|message| of(message.unwrap())).collect()
+}
+
+#[test]
+fn topics_of_one_name_are_instances() {
+    const RANGE: Topic = Topic { name: "range", fields: TofData::FIELDS };
+    const POWER: Topic = Topic { name: "power", fields: PowerData::FIELDS };
+    const INSTANCES: &[Topic] = &[RANGE, POWER, RANGE];
+    let mut log = Definitions::start(Bytes(Vec::new()), Instant::ZERO).unwrap().data(INSTANCES).unwrap();
+    for (topic, distance) in [(0, 0.5), (2, 1.5)] {
+        let words = TofData { distance, ..TofData::default() }.to_words();
+        log.sample(topic, &Sample { at: Instant::ZERO, generation: 1, words: &words }).unwrap();
+    }
+    let log = log.into_sink().0;
+    let named = [(0, 0, "range"), (1, 0, "power"), (2, 1, "range")].map(|(id, n, name)| (id, n, name.to_owned()));
+    assert_eq!(subscriptions(&log), named);
+    let formats = Reader::new(&log).unwrap().filter(|message| matches!(message, Ok(Message::Format(_)))).count();
+    assert_eq!(formats, 2, "one description a name");
+
+    const OTHER: &[Topic] = &[RANGE, Topic { name: "range", fields: PowerData::FIELDS }];
+    let refused = Definitions::start(Bytes(Vec::new()), Instant::ZERO).unwrap().data(OTHER).err();
+    assert!(matches!(refused, Some(WriteError::TwoFormats("range"))), "two things of one name are not instances");
 }
 
 proptest! {

@@ -85,6 +85,8 @@ pub enum WriteError<E> {
     WordCount,
     /// A word does not fit into the field of this name.
     OutOfRange(&'static str),
+    /// Two topics of this name have different fields, and so are not instances of one.
+    TwoFormats(&'static str),
 }
 
 impl<E: fmt::Display> fmt::Display for WriteError<E> {
@@ -96,6 +98,7 @@ impl<E: fmt::Display> fmt::Display for WriteError<E> {
             Self::UnknownTopic => f.write_str("the topic was not declared"),
             Self::WordCount => f.write_str("the sample has not the size of its topic"),
             Self::OutOfRange(field) => write!(f, "a word does not fit into field `{field}`"),
+            Self::TwoFormats(topic) => write!(f, "two topics `{topic}` have different fields"),
         }
     }
 }

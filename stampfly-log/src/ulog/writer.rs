@@ -148,18 +148,28 @@ impl<S: Sink> Definitions<S> {
 
     /// Writes what explains these topics and starts the data.
     ///
-    /// A topic's number, for [`Writer::sample`], is its place in the schema.
+    /// A topic's number, for [`Writer::sample`], is its place in the schema. Topics of one name are its instances, as two range
+    /// finders are: the first is instance 0, and viewers show them beside each other.
     ///
     /// # Errors
-    /// When the sink refuses, a topic has a sample or a description longer than [`MAX_MESSAGE`], or there are more
-    /// than 65 536 topics.
+    /// When the sink refuses, a topic has a sample or a description longer than [`MAX_MESSAGE`], two of one name have
+    /// different fields, or there are more than 65 536 topics or 256 of one name.
     pub fn data<T: Schema>(mut self, schema: T) -> Result<Writer<S, T>, WriteError<S::Error>> {
         let output = &mut self.0;
         let topics = || (0..).map_while(|index| schema.topic(index));
         let activations = || (0..).map_while(|index| schema.activation(index));
-        for topic in topics() {
+        // Those of one name before this one.
+        let before = |index: usize, name: &str| topics().take(index).filter(move |earlier| earlier.name == name).count();
+        for (index, topic) in topics().enumerate() {
             if topic.size() + MESSAGE_HEAD + 2 > MAX_MESSAGE {
                 return Err(WriteError::TooLong);
+            }
+            if let Some(first) = topics().take(index).find(|first| first.name == topic.name) {
+                // Another instance: what explains the first explains it.
+                if first.fields != topic.fields {
+                    return Err(WriteError::TwoFormats(topic.name));
+                }
+                continue;
             }
             output.message(b'F', |out| {
                 let _ = write!(out, "{}:", topic.name);
@@ -185,10 +195,12 @@ impl<S: Sink> Definitions<S> {
         }
         let names = topics().map(|topic| ("", topic.name));
         let names = names.chain(activations().map(|activation| (TOPIC_PREFIX, activation.name)));
-        for (id, (prefix, name)) in names.enumerate() {
-            let id = u16::try_from(id).map_err(|_| WriteError::TooManyTopics)?;
+        for (index, (prefix, name)) in names.enumerate() {
+            let id = u16::try_from(index).map_err(|_| WriteError::TooManyTopics)?;
+            let instance = if prefix.is_empty() { before(index, name) } else { 0 };
+            let instance = u8::try_from(instance).map_err(|_| WriteError::TooManyTopics)?;
             output.message(b'A', |out| {
-                out.put(&[0]);
+                out.put(&[instance]);
                 out.put(&id.to_le_bytes());
                 let _ = write!(out, "{prefix}{name}");
             })?;

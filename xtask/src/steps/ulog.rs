@@ -35,5 +35,19 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         rows += table.lines().count().saturating_sub(1);
     }
     println!("{rows} samples in {topics} tables");
-    if rows == 0 { Err("the tools found no sample".to_owned()) } else { Ok(()) }
+    if rows == 0 {
+        return Err("the tools found no sample".to_owned());
+    }
+    two_instances(repository)
+}
+
+/// The example's two batteries are two instances of one topic, to the authors' tools as well.
+fn two_instances(repository: &Repository) -> Result<(), Failure> {
+    let log = repository.target("ulog").join("example.ulg");
+    let mut write = repository.cargo();
+    run_program(write.args(["run", "--quiet", "-p", "stampfly-log", "--example", "write_log", "--"]).arg(&log))?;
+    let (info, _) = capture(python_tool(repository, PYULOG, "ulog_info")?.arg(&log))?;
+    let batteries = info.lines().filter(|line| line.trim_start().starts_with("sensor_power (")).count();
+    println!("{batteries} instances of the example's sensor_power");
+    if batteries == 2 { Ok(()) } else { Err(format!("the tools found {batteries} instances, not 2:\n{info}")) }
 }
