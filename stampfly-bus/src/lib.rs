@@ -12,7 +12,7 @@
 //! | newest value, never wait | policy `latest` → [`Latest`] |
 //! | every sample, losses counted per reader | policy `ring(N)` → [`Every`] |
 //! | nothing lost, publisher may be refused | policy `queue(N)` → [`Lossless`] |
-//! | wake a task on publish | [`Hook`], given to `Bus::split` |
+//! | wake a task on publish | [`Hook`], given to `Bus::split`; `Bell` with the feature `async` |
 //! | code for any vehicle's tables | [`TopicTable`], [`Schedule`] |
 //! | know while compiling that everything is in time | [`schedule!`], [`response_time`] |
 //! | repeat a flight bit for bit | [`Activation`] |
@@ -20,8 +20,7 @@
 //! No `unsafe`, no critical section, no allocation, no `static`: a bus is a value and a test can fly a thousand of
 //! them. Publishing and reading work from interrupts and across cores, on targets without 64-bit atomics.
 //!
-//! Not for: several publishers of one topic (arbitrate first), messages of varying size, or waiting: a reader that
-//! wants to sleep is woken by its executor.
+//! Not for: several publishers of one topic (arbitrate first), or messages of varying size.
 #![no_std]
 
 #[cfg(any(test, loom))]
@@ -31,6 +30,8 @@ extern crate std;
 extern crate self as stampfly_bus;
 
 mod activation;
+#[cfg(feature = "async")]
+pub mod bell;
 mod input;
 mod line;
 mod macros;
@@ -43,6 +44,8 @@ mod table;
 mod topic;
 
 pub use activation::{Activation, ReadInputs, Runnable};
+#[cfg(feature = "async")]
+pub use bell::Bell;
 /// Its vectors are in signatures here.
 pub use heapless;
 pub use input::{NewestInput, SamplesInput};
