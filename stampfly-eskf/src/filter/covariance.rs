@@ -8,8 +8,8 @@
 //! matrix is inverted, but it whitens the innovations first and then passes over the matrix
 //! once. The matrix stays exactly symmetric by construction: the update subtracts w·wᵀ, the propagation mirrors.
 
-pub use super::layout::N;
 use super::lanes::{Lanes, VECTORS, transposed};
+pub use super::layout::N;
 use super::propagation::PropagationStep;
 use super::state::{Rotation, rotation_matrix};
 use stampfly_types::math;

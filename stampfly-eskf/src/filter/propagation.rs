@@ -109,8 +109,7 @@ impl PropagationStep {
         let position = block(POSITION);
         let velocity = block(VELOCITY) - position * tau;
         let by_turn = position.cross(&self.delta_position) + velocity.cross(&self.delta_velocity);
-        let attitude =
-            rotate_back(turn, &(block(ATTITUDE) + rotate_back(rotation, &by_turn)));
+        let attitude = rotate_back(turn, &(block(ATTITUDE) + rotate_back(rotation, &by_turn)));
         let gyro_bias = block(GYRO_BIAS) + attitude * tau;
         let pushed = velocity * tau + position * (0.5 * tau * tau);
         let accel_bias = block(ACCEL_BIAS) + rotate_back(rotation, &pushed);

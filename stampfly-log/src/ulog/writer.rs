@@ -159,7 +159,8 @@ impl<S: Sink> Definitions<S> {
         let topics = || (0..).map_while(|index| schema.topic(index));
         let activations = || (0..).map_while(|index| schema.activation(index));
         // Those of one name before this one.
-        let before = |index: usize, name: &str| topics().take(index).filter(move |earlier| earlier.name == name).count();
+        let before =
+            |index: usize, name: &str| topics().take(index).filter(move |earlier| earlier.name == name).count();
         for (index, topic) in topics().enumerate() {
             if topic.size() + MESSAGE_HEAD + 2 > MAX_MESSAGE {
                 return Err(WriteError::TooLong);
