@@ -8,11 +8,13 @@
 //! | paths in the columns `home` and `test` of the table of requirements | they exist |
 //! | the guide to tuning | it names every public field of the filter's configuration |
 //! | generated pages | they are what the program prints; `--fix` writes them |
+//! | changelogs | each published crate has an entry for its version, under one for what comes next |
 //! | the tables of re-inserted bugs and of mutants | they are what `xtask/bugs.toml` and `xtask/mutants.toml` say; `--fix` writes them |
 //!
 //! Every document is checked that git tracks or would add.
 
 use crate::arguments::Arguments;
+use crate::changelog;
 use crate::mutation::list::List as Mutants;
 use crate::mutation::page as mutants;
 use crate::page::Page;
@@ -89,6 +91,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     failures.extend(missing_pictures(root, &shown)?);
     failures.extend(missing_paths(root, &read(root, REQUIREMENTS.0)?));
     failures.extend(missing_fields(root)?);
+    failures.extend(changelog::failures(repository)?);
     for (name, command, introduction) in GENERATED {
         let mut list = repository.cargo();
         let (table, _) =
