@@ -1,12 +1,12 @@
 //! `book-chapters`: mdBook's preprocessor for the pages of `docs`, which are written to be read in the repository as well.
 //!
 //! A link to a source file leads from there to the file, but not from a page of the book: it becomes the file's address. Formulas between
-//! dollar signs, which forges show, become MathML, which browsers show without any script.
+//! dollar signs and in blocks of the kind `math`, which forges show, become MathML, which browsers show without any script.
 
 use super::{PAGES, page_folder};
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository};
-use pulldown_cmark::{Event, Options, Parser, Tag};
+use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 use pulldown_latex::config::{DisplayMode, RenderConfig};
 use pulldown_latex::{Parser as Formula, Storage, push_mathml};
 use serde_json::Value;
@@ -55,6 +55,8 @@ fn adapt_all(value: &mut Value, chapters: &mut usize) -> Result<(), Failure> {
 /// One page of this folder.
 fn adapt(text: &str, folder: &Path) -> Result<String, Failure> {
     let mut changes: Vec<(Range<usize>, String)> = Vec::new();
+    // A block of code that a forge shows as a formula, while we are in it.
+    let mut formula: Option<String> = None;
     let options = Options::ENABLE_TABLES | Options::ENABLE_MATH;
     for (event, range) in Parser::new_ext(text, options).into_offset_iter() {
         match event {
@@ -63,6 +65,15 @@ fn adapt(text: &str, folder: &Path) -> Result<String, Failure> {
                 // The target stands behind the text, which may hold the same words.
                 let found = text[range.clone()].rfind(&*dest_url).map(|at| range.start + at);
                 changes.extend(found.map(|at| (at..at + dest_url.len(), address)));
+            }
+            Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(kind))) if &*kind == "math" => {
+                formula = Some(String::new())
+            }
+            Event::Text(text) => formula.iter_mut().for_each(|formula| *formula += &text),
+            Event::End(TagEnd::CodeBlock) => {
+                if let Some(formula) = formula.take() {
+                    changes.push((range, format!("{}\n", mathml(&formula, DisplayMode::Block)?)));
+                }
             }
             Event::InlineMath(formula) => changes.push((range, mathml(&formula, DisplayMode::Inline)?)),
             Event::DisplayMath(formula) => changes.push((range, mathml(&formula, DisplayMode::Block)?)),
@@ -104,6 +115,8 @@ fn mathml(formula: &str, display_mode: DisplayMode) -> Result<String, Failure> {
     let storage = Storage::new();
     let (mut html, config) = (String::new(), RenderConfig { display_mode, ..RenderConfig::default() });
     push_mathml(&mut html, Formula::new(formula, &storage), config).map_err(|e| e.to_string())?;
+    // It writes two attributes without a blank between them.
+    let html = html.replace("\"minsize", "\" minsize");
     let signs =
         [("\n", " "), ("|", "&#124;"), ("*", "&#42;"), ("_", "&#95;"), ("[", "&#91;"), ("]", "&#93;"), ("`", "&#96;")];
     Ok(signs.iter().fold(html, |html, (sign, entity)| html.replace(sign, entity)))
@@ -134,6 +147,10 @@ mod tests {
         assert!(page.contains("<math"), "{page}");
         assert!(!page.contains("$v") && !page.contains("_b"), "{page}");
         assert!(page.ends_with("`$x$`\n"), "{page}");
+        let block =
+            adapt("Before:\n\n```math\na = \\big(b\\big)\n```\n\nAfter.\n", Path::new("docs")).expect("a formula");
+        assert!(block.starts_with("Before:\n\n<math") && block.ends_with("</math>\n\nAfter.\n"), "{block}");
+        assert!(!block.contains("\"minsize"), "{block}");
         assert!(adapt("$\\nonsense$", Path::new("docs")).is_err());
     }
 
