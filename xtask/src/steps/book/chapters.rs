@@ -72,7 +72,7 @@ fn adapt(text: &str, folder: &Path) -> Result<String, Failure> {
             Event::Text(text) => formula.iter_mut().for_each(|formula| *formula += &text),
             Event::End(TagEnd::CodeBlock) => {
                 if let Some(formula) = formula.take() {
-                    changes.push((range, format!("{}\n", mathml(&formula, DisplayMode::Block)?)));
+                    changes.push((range, mathml(&formula, DisplayMode::Block)?));
                 }
             }
             Event::InlineMath(formula) => changes.push((range, mathml(&formula, DisplayMode::Inline)?)),
