@@ -9,6 +9,7 @@ mod changelog;
 mod ci;
 mod copy;
 mod elf;
+mod front_page;
 mod machine;
 mod modules;
 mod mutation;

@@ -102,7 +102,7 @@ impl Repository {
     }
 
     /// What cargo is told about a folder.
-    fn manifest(&self, folder: &Path) -> Result<DocumentMut, Failure> {
+    pub fn manifest(&self, folder: &Path) -> Result<DocumentMut, Failure> {
         let path = self.root.join(folder).join("Cargo.toml");
         let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         text.parse().map_err(|e| format!("{}: {e}", path.display()))
