@@ -3,7 +3,6 @@
 //! A link to a source file leads from there to the file, but not from a page of the book: it becomes the file's address. Formulas between
 //! dollar signs and in blocks of the kind `math`, which forges show, become MathML, which browsers show without any script.
 
-use super::{PAGES, page_folder};
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository};
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
@@ -16,6 +15,8 @@ use std::path::{Component, Path, PathBuf};
 
 /// As mdBook and `book.toml` call it.
 pub const NAME: &str = "book-chapters";
+/// Folder of the pages.
+pub const PAGES: &str = "docs";
 /// Where the repository's files are for readers of the book.
 const ADDRESS: &str = "https://github.com/stampfly/stampfly/blob/main/";
 
@@ -120,6 +121,11 @@ fn mathml(formula: &str, display_mode: DisplayMode) -> Result<String, Failure> {
     let signs =
         [("\n", " "), ("|", "&#124;"), ("*", "&#42;"), ("_", "&#95;"), ("[", "&#91;"), ("]", "&#93;"), ("`", "&#96;")];
     Ok(signs.iter().fold(html, |html, (sign, entity)| html.replace(sign, entity)))
+}
+
+/// A folder of the book's pages seen from the top of the repository.
+fn page_folder(page: &str) -> PathBuf {
+    Path::new(PAGES).join(page).parent().unwrap_or(Path::new(PAGES)).to_owned()
 }
 
 #[cfg(test)]

@@ -11,13 +11,12 @@ use crate::arguments::Arguments;
 use crate::cargo_tool::cargo_tool;
 use crate::page::Page;
 use crate::repository::{Failure, Repository, capture, run as run_program};
+use chapters::PAGES;
 use std::fs;
-use std::path::Path;
 
 const MDBOOK: (&str, &str) = ("mdbook", "0.5.4");
 const HYPERLINK: (&str, &str) = ("hyperlink", "0.3.2");
-/// Folder of the pages, and the table of contents in it.
-const PAGES: &str = "docs";
+/// The table of contents in the folder of the pages.
 const CONTENTS: &str = "SUMMARY.md";
 /// The page whose commands are run.
 const TUTORIAL: &str = "docs/tutorial.md";
@@ -95,11 +94,6 @@ fn sessions(page: &str) -> Vec<Session> {
         }
     }
     sessions
-}
-
-/// A folder of the book's pages seen from the top of the repository.
-fn page_folder(page: &str) -> std::path::PathBuf {
-    Path::new(PAGES).join(page).parent().unwrap_or(Path::new(PAGES)).to_owned()
 }
 
 #[cfg(test)]
