@@ -4,9 +4,12 @@
 //! sentence. Exit code: 0 passed, 1 failed, 2 wrong command line.
 
 mod arguments;
+mod cargo_tool;
+mod changelog;
 mod ci;
 mod copy;
 mod elf;
+mod front_page;
 mod machine;
 mod modules;
 mod mutation;
@@ -64,6 +67,8 @@ const STEPS: &[Step] = &[
         steps::package::run,
     )
     .beside(),
+    Step::new("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run).beside(),
+    Step::new("semver", "Compare each library's interface with the last release's", steps::semver::run).beside(),
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
     Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).alone(),
@@ -74,6 +79,10 @@ const STEPS: &[Step] = &[
         .accepting(&[Fix]),
     Step::new("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
         .accepting(&[Fix]),
+    Step::new("book", "Build the book, check its links, run its tutorial's commands", steps::book::run),
+    Step::new("book-chapters", "Adapt the book's pages: mdBook calls it", steps::book::chapters)
+        .accepting(&[Rest])
+        .manual(),
     Step::new(
         "campaign",
         "Fly two thousand flights with faults: no invariant violated, no new wrong end",

@@ -84,8 +84,25 @@ impl Repository {
         if libraries.is_empty() { Err(format!("no library in {}", self.root.display())) } else { Ok(libraries) }
     }
 
+    /// The version that all packages of the workspace have.
+    pub fn version(&self) -> Result<String, Failure> {
+        self.of_all_packages("version")
+    }
+
+    /// The oldest Rust that they promise to build with.
+    pub fn rust_version(&self) -> Result<String, Failure> {
+        self.of_all_packages("rust-version")
+    }
+
+    fn of_all_packages(&self, key: &str) -> Result<String, Failure> {
+        let workspace = self.manifest(Path::new(""))?;
+        let package = workspace.get("workspace").and_then(|table| table.get("package"));
+        let value = package.and_then(|package| package.get(key)).and_then(Item::as_str);
+        value.map(str::to_owned).ok_or_else(|| format!("Cargo.toml: no {key} of the workspace"))
+    }
+
     /// What cargo is told about a folder.
-    fn manifest(&self, folder: &Path) -> Result<DocumentMut, Failure> {
+    pub fn manifest(&self, folder: &Path) -> Result<DocumentMut, Failure> {
         let path = self.root.join(folder).join("Cargo.toml");
         let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         text.parse().map_err(|e| format!("{}: {e}", path.display()))

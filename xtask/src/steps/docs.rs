@@ -8,11 +8,15 @@
 //! | paths in the columns `home` and `test` of the table of requirements | they exist |
 //! | the guide to tuning | it names every public field of the filter's configuration |
 //! | generated pages | they are what the program prints; `--fix` writes them |
+//! | front pages of crates | description, keywords, categories, all features documented on sites and named in the README |
+//! | changelogs | each published crate has an entry for its version, under one for what comes next |
 //! | the tables of re-inserted bugs and of mutants | they are what `xtask/bugs.toml` and `xtask/mutants.toml` say; `--fix` writes them |
 //!
 //! Every document is checked that git tracks or would add.
 
 use crate::arguments::Arguments;
+use crate::changelog;
+use crate::front_page;
 use crate::mutation::list::List as Mutants;
 use crate::mutation::page as mutants;
 use crate::page::Page;
@@ -89,6 +93,8 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     failures.extend(missing_pictures(root, &shown)?);
     failures.extend(missing_paths(root, &read(root, REQUIREMENTS.0)?));
     failures.extend(missing_fields(root)?);
+    failures.extend(changelog::failures(repository)?);
+    failures.extend(front_page::failures(repository)?);
     for (name, command, introduction) in GENERATED {
         let mut list = repository.cargo();
         let (table, _) =

@@ -1,6 +1,7 @@
 //! One file a step.
 
 pub mod bars;
+pub mod book;
 pub mod budget;
 pub mod bugs;
 pub mod campaign;
@@ -23,6 +24,7 @@ pub mod lines;
 pub mod loom;
 pub mod machine;
 pub mod memory;
+pub mod msrv;
 pub mod mutants;
 pub mod no_std;
 pub mod package;
@@ -31,6 +33,7 @@ pub mod panic_proof;
 pub mod peers;
 pub mod python;
 pub mod qemu;
+pub mod semver;
 pub mod shards;
 pub mod test;
 pub mod ulog;

@@ -7,9 +7,10 @@
 mod example;
 
 use crate::arguments::Arguments;
+use crate::cargo_tool::cargo_home;
 use crate::repository::{Failure, Library, Repository, capture, run as run_program};
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::{env, fs};
 
 /// Texts that go with every copy.
 const LICENCES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
@@ -63,8 +64,7 @@ fn has_licence(repository: &Repository, archives: &Path, library: &Library, lice
 
 /// Removes what cargo's home keeps unpacked of these libraries: it is of an older commit and has the same version.
 fn forget_unpacked(libraries: &[Library]) {
-    let default = || env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo"));
-    let Some(home) = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(default) else { return };
+    let Ok(home) = cargo_home() else { return };
     let entries = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten();
     for unpacked in entries(home.join("registry/src")).flat_map(|registry| entries(registry.path())) {
         let name = unpacked.file_name();
