@@ -143,8 +143,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
 
     /// Takes the driver apart: the bus, the pin and the clock. The chip goes on measuring at its address.
     pub fn release(self) -> (I, X, T) {
-        let (registers, clock) = self.port.release();
-        (registers.release(), self.xshut, clock)
+        let (bus, clock) = self.port.release();
+        (bus, self.xshut, clock)
     }
 
     /// The newest measurement, all of it; `None` before the first.

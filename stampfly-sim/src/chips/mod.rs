@@ -13,10 +13,10 @@
 //!
 //! | emulator | bus | address or clock | data sheet |
 //! |---|---|---|---|
-//! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
+//! | [`Bmp280`] | [`I2cBus`], or [`SpiBus`] | 0x76, or up to 10 MHz | BST-BMP280-DS001 |
 //! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
 //! | [`Bmi270`] | [`SpiBus`], or [`I2cBus`] | up to 10 MHz, or 0x68 | BST-BMI270-DS000 |
-//! | [`Bmm150`] | [`I2cBus`] | 0x10 | BST-BMM150-DS001 |
+//! | [`Bmm150`] | [`I2cBus`], or [`SpiBus`] | 0x10, or up to 10 MHz | BST-BMM150-DS001 |
 //! | [`Pmw3901`] | [`SpiBus`] | up to 2 MHz | PixArt PMW3901MB |
 //! | [`Vl53l3cx`] | [`I2cBus`] | 0x29, can be moved | ST DS13204 |
 //!
