@@ -352,6 +352,9 @@ impl<S: SpiDevice, T: Timebase> OpticalFlow for Pmw3901<S, T> {
         self.emptied = None;
         let motion = self.burst().await?;
         let at = self.clock.now();
+        if at <= emptied {
+            return Err(ChipError::ClockStopped);
+        }
         self.emptied = Some(at);
         if motion.quality > 0 {
             self.saw = at;

@@ -228,6 +228,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
                 return Err(ChipError::AddressTaken);
             }
             port.wait(RESET).await;
+            port.check_clock()?;
         }
         let mut waking = boot.take(xshut).ok_or(ChipError::AddressTaken)?;
         // Where the chip may be when it has started.
@@ -255,6 +256,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             match port.read(register::FIRMWARE_SYSTEM_STATUS).await {
                 Ok([status]) if status & 1 != 0 => break,
                 Ok([status]) if looks > deadline => return Err(ChipError::Configuration { status }),
+                Err(error @ ChipError::ClockStopped) => return Err(error),
                 Err(error) if looks > deadline => return Err(error),
                 Ok(_) => {}
                 Err(_) => places = [other, place],

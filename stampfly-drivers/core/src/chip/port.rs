@@ -2,7 +2,7 @@
 
 use super::{ChipError, TransferLimit};
 use crate::Timebase;
-use crate::time::{sleep_until, within};
+use crate::time::{Standstill, sleep_until, within};
 use core::fmt::Debug;
 use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
@@ -167,12 +167,13 @@ pub struct Port<R, T> {
     registers: R,
     clock: T,
     limit: TransferLimit,
+    standstill: Standstill,
 }
 
 impl<R, T> Port<R, T> {
     /// Registers, the clock that bounds their transfers, and how long one may take.
     pub const fn new(registers: R, clock: T, limit: TransferLimit) -> Self {
-        Self { registers, clock, limit }
+        Self { registers, clock, limit, standstill: Standstill::new() }
     }
 
     /// Gives a transfer up after another time from now on.
@@ -193,11 +194,13 @@ impl<R, T: Timebase> Port<R, T> {
     /// Reads `N` bytes from a register on.
     ///
     /// # Errors
-    /// [`ChipError::Bus`] when the bus refuses, [`ChipError::BusTimeout`] when it takes longer than the limit.
+    /// [`ChipError::Bus`] when the bus refuses, [`ChipError::BusTimeout`] when it takes longer than the limit, [`ChipError::ClockStopped`]
+    /// when the clock took no notice of the waits before: so everything that polls ends.
     pub async fn read<A, const N: usize>(&mut self, register: A) -> Result<[u8; N], ChipError<R::Error>>
     where
         R: Registers<A>,
     {
+        self.check_clock()?;
         let mut bytes = [0; N];
         bounded(&mut self.clock, self.limit.of(N), self.registers.read(register, &mut bytes)).await?;
         Ok(bytes)
@@ -223,7 +226,16 @@ impl<R, T: Timebase> Port<R, T> {
     where
         R: Registers<A>,
     {
+        self.check_clock()?;
         bounded(&mut self.clock, self.limit.of(data.len()), self.registers.write(register, data)).await
+    }
+
+    /// For whoever waits again and again without a transfer in between.
+    ///
+    /// # Errors
+    /// [`ChipError::ClockStopped`] when the clock took no notice of waits of 100 ms in all.
+    pub fn check_clock<E>(&mut self) -> Result<(), ChipError<E>> {
+        if self.standstill.take() { Err(ChipError::ClockStopped) } else { Ok(()) }
     }
 
     /// Time since power-on.
@@ -245,7 +257,11 @@ impl<R, T: Timebase> Port<R, T> {
 
     /// Leaves the chip alone until then; returns at once when that has passed.
     pub async fn wait_until(&mut self, instant: Instant) {
-        sleep_until(&mut self.clock, instant).await;
+        let left = instant.since(self.clock.now());
+        if left > Duration::ZERO {
+            sleep_until(&mut self.clock, instant).await;
+            self.standstill.note(left, self.clock.now());
+        }
     }
 }
 
