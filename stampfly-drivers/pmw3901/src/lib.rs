@@ -27,8 +27,8 @@ const ADDRESS_TO_DATA: u32 = 35_000;
 const AFTER_WRITE: Duration = Duration::from_micros(45);
 /// From the end of a read to the next access (tSRW, tSRR).
 const AFTER_READ: Duration = Duration::from_micros(20);
-/// From the last clock of a write to the end of the chip select (tSCLK-NCS), ns.
-const WRITE_HOLD: u32 = 20_000;
+/// From the last clock of a write to the end of the chip select (tSCLK-NCS, table 5 of data sheet R1.10), ns. That of a read is 120 ns.
+const WRITE_HOLD: u32 = 35_000;
 /// How often a chip that runs is asked whether it still holds what it was told.
 const WITNESS_INTERVAL: Duration = Duration::from_secs(1);
 /// How often the chip's calibration is asked for before it counts as broken.

@@ -278,6 +278,12 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         for (register, values) in codec::FIXED {
             self.port.write(register, values).await?;
         }
+        let offset = codec::range_offset(self.port.read_twice(register::MM_CONFIG_OUTER_OFFSET_MM).await?);
+        self.port.write(register::ALGO_PART_TO_PART_RANGE_OFFSET_MM, &offset).await?;
+        let kept: [u8; 2] = self.port.read(register::ALGO_PART_TO_PART_RANGE_OFFSET_MM).await?;
+        if !codec::is_offset_kept(offset, kept) {
+            return Err(ChipError::Configuration { status: kept[1] });
+        }
         let mode = self.config.mode;
         self.port.write(register::PHASECAL_CONFIG_TIMEOUT_MACROP, &[codec::phase_calibration(mode)]).await?;
         let ranging = codec::ranging(&self.config);
