@@ -63,6 +63,9 @@ const ADVANCES: usize = 2;
 /// and moves it. When both are back at 0x29 the first one to call waits in reset ([`ChipError::AddressTaken`]) until
 /// the other has moved.
 ///
+/// XSHUT rises only when nothing is on the bus, as the chip wants it: right after a transfer of the driver's own. That holds where all who share
+/// the bus are tasks of one executor. Where they are not, give it an [`Xshut`] of your own that keeps the others off the bus meanwhile.
+///
 /// A lone chip may stay: [`BOOT_ADDRESS`](Vl53l3cx::BOOT_ADDRESS) as its address.
 ///
 /// # Without a pin
@@ -239,6 +242,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             if answers(port).await? {
                 return Err(ChipError::AddressTaken);
             }
+            // Not while anything is on the bus (DS13204, "Power sequence"). A transfer of ours has just ended, and before this task waits
+            // again nobody else of its executor begins one: so nothing may come in between.
             waking.release().map_err(|_| ChipError::Pin)?;
         } else {
             // It may have its power since just now.

@@ -51,10 +51,12 @@ pub use pmw3901::Pmw3901;
 pub use spi::{SpiBus, SpiPort};
 pub use vl53l3cx::{ShutdownPin, Vl53l3cx};
 
+use core::cell::Cell;
 use core::fmt;
 use embedded_hal::i2c::NoAcknowledgeSource;
 use embedded_hal::{i2c as hal_i2c, spi as hal_spi};
 use stampfly_types::{Duration, Instant};
+use std::rc::Rc;
 
 /// A chip as its registers. Time is an argument and does not go back.
 ///
@@ -80,6 +82,8 @@ pub trait I2cChip: Chip {
     fn address(&self, soldered: u8) -> Option<u8> {
         Some(soldered)
     }
+    /// Soldered to a bus that is busy until this instant: for chips that mind what goes on there when they start.
+    fn wire(&mut self, _busy_until: &Rc<Cell<Instant>>) {}
     /// Takes byte number `index` after a (repeated) start in write direction. `false` is no acknowledge.
     fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool;
     /// Gives byte number `index` after a (repeated) start in read direction.

@@ -34,7 +34,8 @@
 //! the next register. 1.2 ms from the release of XSHUT or from power to the first answer (DS 2.8); until then nobody
 //! acknowledges. A measurement takes the two time-outs and 14 ms more, *unverified*; the next one does not begin before
 //! the interrupt of the one before has been cleared, and not before the period is over. What is set during a
-//! measurement acts on the next one. The chip has no other memory than these registers: an edge of XSHUT or a dip of
+//! measurement acts on the next one. XSHUT must not rise while a transfer is on the bus (DS, "Power sequence"); a chip whose XSHUT does stays
+//! mute until the next time, *unverified*. The chip has no other memory than these registers: an edge of XSHUT or a dip of
 //! the supply brings it back to 0x29. A dead detector is one for which no bias voltage is found, so it counts nothing.
 //!
 //! A specimen measures too short by what is in 0x0022, until a driver puts that into 0x001E, as ST's core does where no measurement of the
@@ -48,7 +49,7 @@ use crate::sensors::schedule::Schedule;
 use crate::sensors::tof::{Mount, RATE, RangePhysics, STATUS_OUT_OF_BOUNDS, STATUS_SIGMA, STATUS_SIGNAL, STATUS_VALID};
 use crate::time::Clock;
 use crate::world::World;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use stampfly_types::{Duration, Instant};
@@ -82,6 +83,8 @@ const BOOT: Duration = Duration::from_micros(1_200);
 /// Stream of the specimens' offsets; no sensor has this number. Their standard deviation, mm.
 const STREAM: u64 = 104;
 const OFFSETS: f64 = 8.0;
+/// When a chip answers that came out of its reset in the middle of a transfer.
+const NEVER: Instant = Instant::from_secs(u64::MAX / 2_000_000);
 /// Slow oscillator of this specimen.
 const SLOW_OSCILLATOR: u16 = 0x03C0;
 /// Duration of a macro period per pixel clock of the laser's period: 2304 clocks of the fast oscillator, 11.8 MHz, in
@@ -148,6 +151,8 @@ struct State {
     short: i16,
     /// When the chip answers; never while XSHUT is low.
     ready: Option<Instant>,
+    /// Its bus is busy until then.
+    busy_until: Option<Rc<Cell<Instant>>>,
     registers: Box<[u8; SIZE]>,
     /// Beginning of the running or coming measurement.
     begin: Option<Instant>,
@@ -276,6 +281,7 @@ impl Vl53l3cx {
             id: 0xEA,
             short: specimen_offset(seed, mount),
             ready: None,
+            busy_until: None,
             registers: Box::new([0; SIZE]),
             begin: None,
             pending: false,
@@ -300,8 +306,10 @@ impl OutputPin for ShutdownPin {
 
     fn set_high(&mut self) -> Result<(), Infallible> {
         let mut state = self.state.borrow_mut();
+        let now = self.clock.now();
         if state.ready.is_none() {
-            state.ready = Some(self.clock.now() + BOOT);
+            let in_traffic = state.busy_until.as_ref().is_some_and(|busy_until| busy_until.get() > now);
+            state.ready = Some(if in_traffic { NEVER } else { now + BOOT });
         }
         Ok(())
     }
@@ -372,6 +380,10 @@ impl Chip for Vl53l3cx {
 }
 
 impl I2cChip for Vl53l3cx {
+    fn wire(&mut self, busy_until: &Rc<Cell<Instant>>) {
+        self.0.borrow_mut().busy_until = Some(busy_until.clone());
+    }
+
     fn address(&self, _: u8) -> Option<u8> {
         let state = self.0.borrow();
         state.answers(state.clock.now()).then(|| state.byte(ADDRESS))

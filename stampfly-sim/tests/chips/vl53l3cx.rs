@@ -189,3 +189,22 @@ fn a_specimen_measures_short_by_what_its_factory_register_says_until_that_is_add
     let before = distance(&mut bench);
     assert!((after - before - missing).abs() <= 5, "{before} + {missing} is not {after}");
 }
+
+#[test]
+fn an_xshut_that_rises_in_the_middle_of_a_transfer_leaves_the_chip_mute_until_it_rises_again() {
+    let mut bench = Bench::new();
+    bench.shutdown.set_low().unwrap();
+    let (mut bus, mut byte) = (bench.bus.clone(), [0]);
+    {
+        let mut transfer = std::pin::pin!(embedded_hal_async::i2c::I2c::read(&mut bus, 0x50, &mut byte));
+        let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+        assert!(transfer.as_mut().poll(&mut context).is_pending());
+        bench.shutdown.set_high().unwrap();
+    }
+    wait(&bench.simulation, 1_000_000);
+    assert!(bench.try_read::<1>(FIRST, 0x010F).is_err());
+    bench.shutdown.set_low().unwrap();
+    bench.shutdown.set_high().unwrap();
+    wait(&bench.simulation, 1_200);
+    assert_eq!(bench.read(0x010F), [0xEA]);
+}
