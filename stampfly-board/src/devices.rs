@@ -40,10 +40,9 @@ pub const RHYTHM: Rhythm = Rhythm::HZ_400;
 /// The flow sensor's longest transfer: twelve bytes at 2 MHz after 35 µs for the address, with a margin.
 pub const LONGEST_FLOW: Duration = Duration::from_micros(200);
 
-/// The inertial sensor. `configuration_file` is Bosch's, 8 kB.
-pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, configuration_file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
-    Bmi270::spi(spi, clock, configuration_file, IMU_AXES, bmi270::Config::default())
-        .with_transfer_limit(TransferLimit::SPI_SENSORS)
+/// The inertial sensor. `file` is Bosch's configuration of it, 8 kB.
+pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
+    Bmi270::spi(spi, clock, file, IMU_AXES, bmi270::Config::default()).with_transfer_limit(TransferLimit::SPI_SENSORS)
 }
 
 /// The flow sensor.

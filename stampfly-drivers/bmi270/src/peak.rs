@@ -66,6 +66,7 @@ fn common_square(run: &[[i16; 3]; AGREE]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_types::math;
 
     fn peaks(groups: [[[i16; 3]; 4]; 2]) -> [f32; 2] {
         let mut peak = Peak::default();
@@ -84,7 +85,7 @@ mod tests {
     fn what_changes_its_side_is_no_peak() {
         let [there, back] = [[i16::MAX; 3], [i16::MIN; 3]];
         assert_eq!(peaks([[there, back, there, back], [there, back, there, back]]), [0.0; 2]);
-        assert_eq!(peaks([[back; 4]; 2]), [32_768.0 * 3f32.sqrt(); 2], "full scale overflows nothing");
+        assert_eq!(peaks([[back; 4]; 2]), [32_768.0 * math::sqrt(3.0); 2], "full scale overflows nothing");
     }
 
     #[test]
@@ -93,12 +94,12 @@ mod tests {
     }
 
     #[test]
-    fn roots_are_those_of_the_processor_to_the_last_bit() {
+    fn roots_are_those_of_floating_point_to_the_last_bit() {
         let largest = 3 * (1u64 << 30);
         let some =
             (0..100_000).chain((0..100_000).map(|n| n * 32_212)).chain((0..56_000).map(|n| n * n)).chain([largest]);
         for square in some.chain((0..100_000).map(|n| largest - n)) {
-            assert_eq!(root(square).to_bits(), (square as f32).sqrt().to_bits(), "{square}");
+            assert_eq!(root(square).to_bits(), math::sqrt(square as f32).to_bits(), "{square}");
         }
     }
 }

@@ -178,7 +178,7 @@ fn a_specimen_measures_short_by_what_its_factory_register_says_until_that_is_add
     let missing = i16::from_be_bytes(bench.read(0x0022));
     assert_ne!(missing, 0);
     bench.start();
-    let mut distance = |bench: &mut Bench| {
+    let distance = |bench: &mut Bench| {
         bench.write(0x0086, &[1]);
         wait(&bench.simulation, 90_000);
         i16::from_be_bytes(bench.read(0x0096))
