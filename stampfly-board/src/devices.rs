@@ -40,25 +40,25 @@ pub const RHYTHM: Rhythm = Rhythm::HZ_400;
 /// The flow sensor's longest transfer: twelve bytes at 2 MHz after 35 µs for the address, with a margin.
 pub const LONGEST_FLOW: Duration = Duration::from_micros(200);
 
-/// The inertial sensor. `configuration_file` is Bosch's, 8 kB.
-pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, configuration_file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
-    Bmi270::spi(spi, clock, configuration_file, IMU_AXES, bmi270::Config::default())
+/// The inertial sensor. `file` is Bosch's configuration of it, 8 kB.
+pub fn imu<S: SpiDevice, T: Timebase>(spi: S, clock: T, file: &[u8]) -> Bmi270<'_, SpiRegisters<S>, T> {
+    Bmi270::spi(spi, clock, file, IMU_AXES, bmi270::Config::default()).with_transfer_limit(TransferLimit::SPI_SENSORS)
 }
 
 /// The flow sensor.
 pub fn flow<S: SpiDevice, T: Timebase>(spi: S, clock: T) -> Pmw3901<S, T> {
-    Pmw3901::new(spi, clock, FLOW_AXES, pmw3901::Config::default())
+    Pmw3901::new(spi, clock, FLOW_AXES, pmw3901::Config::default()).with_transfer_limit(TransferLimit::SPI_GUEST)
 }
 
 /// The magnetometer.
 pub fn magnetometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmm150<I2cRegisters<I>, T> {
-    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, MAGNETOMETER_AXES, bmm150::Config::default())
+    Bmm150::i2c(i2c, Bmm150::ALL_LOW, clock, MAGNETOMETER_AXES, bmm150::Config::default())
         .with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 /// The barometer.
 pub fn barometer<I: I2c, T: Timebase>(i2c: I, clock: T) -> Bmp280<I2cRegisters<I>, T> {
-    Bmp280::new(i2c, Bmp280::SDO_LOW, clock, bmp280::Config::default()).with_transfer_limit(TransferLimit::I2C_SENSORS)
+    Bmp280::i2c(i2c, Bmp280::SDO_LOW, clock, bmp280::Config::default()).with_transfer_limit(TransferLimit::I2C_SENSORS)
 }
 
 /// The battery monitor.

@@ -4,9 +4,9 @@
 //! |---|---|---|---|---|
 //! | [`bmi270`] | Bosch BMI270 | acceleration and angular rate | SPI, I2C | [`Imu`](crate::Imu) |
 //! | [`pmw3901`] | PixArt PMW3901 | optical flow | SPI | [`OpticalFlow`](crate::OpticalFlow) |
-//! | [`bmp280`] | Bosch BMP280 | air pressure | I2C | [`Barometer`](crate::Barometer) |
+//! | [`bmp280`] | Bosch BMP280 | air pressure | SPI, I2C | [`Barometer`](crate::Barometer) |
 //! | [`ina3221`] | TI INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
-//! | [`bmm150`] | Bosch BMM150 | magnetic field | I2C | [`Magnetometer`](crate::Magnetometer) |
+//! | [`bmm150`] | Bosch BMM150 | magnetic field | SPI, I2C | [`Magnetometer`](crate::Magnetometer) |
 //! | [`vl53l3cx`] | ST VL53L3CX | distance | I2C | [`RangeFinder`](crate::RangeFinder) |
 //!
 //! # How every one of them is built
@@ -19,7 +19,7 @@
 //!   (Creating a [`vl53l3cx`] driver pulls the chip's XSHUT low, so that it is not in its neighbour's way.)
 //! * A transfer that takes longer than its length allows ([`TransferLimit`]) is given up ([`ChipError::BusTimeout`]),
 //!   and so is a chip that makes no new sample in time ([`ChipError::NoSample`]): by the last look at it that began after that time, so that
-//!   waiting for a shared bus is not the chip's. But a [`bmi270`] on I2C fills two thirds of a bus by itself: its samples do not wait.
+//!   waiting for a shared bus is not the chip's.
 //! * A chip that lost its configuration (brown-out, ESD) is [`ChipError::Restarted`] once, and the next call sets it up
 //!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s do not, and it is asked once a second.
 //! * No conversion is delivered twice, also not when a command to the chip is garbled on its way.
@@ -43,7 +43,7 @@
 //! bus recovers the bus.
 
 pub use stampfly_driver_core::chip::{
-    Axis, AxisMap, ChipError, I2cRegisters, Port, Registers, SpiRegisters, TransferLimit, bounded,
+    Axis, AxisMap, ChipError, I2cRegisters, Port, Registers, SpiRegisters, TransferLimit, Wires, bounded,
 };
 pub use {
     stampfly_bmi270 as bmi270, stampfly_bmm150 as bmm150, stampfly_bmp280 as bmp280, stampfly_ina3221 as ina3221,

@@ -11,7 +11,7 @@ use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
-use stampfly_drivers::chip::{AxisMap, ChipError, Registers, SpiRegisters, TransferLimit};
+use stampfly_drivers::chip::{AxisMap, ChipError, TransferLimit};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
 use stampfly_types::Duration;
 
@@ -72,7 +72,7 @@ fn a_transfer_is_given_up_at_its_limit_and_not_before() {
     assert_eq!(clock.now().since(begun), TransferLimit::SPI.of(1));
 
     let bus = I2cBus { address: 0x76, clock: clock.clone(), chip: silent };
-    let mut baro = Bmp280::new(bus, 0x76, clock.clone(), bmp280::Config::default());
+    let mut baro = Bmp280::i2c(bus, 0x76, clock.clone(), bmp280::Config::default());
     let begun = clock.now();
     assert_eq!(block_on(baro.start()), Err(ChipError::BusTimeout));
     assert_eq!(clock.now().since(begun), TransferLimit::I2C.of(1));
@@ -80,8 +80,7 @@ fn a_transfer_is_given_up_at_its_limit_and_not_before() {
 
 #[test]
 fn what_the_flight_band_reads_ends_well_within_its_period() {
-    type Spi = SpiRegisters<SpiBus<fn(Access<'_>) -> Result<(), Fault>>>;
-    let [spi, i2c] = [<Spi as Registers>::LIMIT, TransferLimit::I2C_SENSORS];
+    let [spi, i2c] = [TransferLimit::SPI_SENSORS, TransferLimit::I2C_SENSORS];
     // Both sensors once, and four frames of the FIFO.
     assert!(spi.of(12) <= Duration::from_micros(350) && spi.of(52) <= Duration::from_micros(450), "{:?}", spi.of(52));
     assert!((1..=256).all(|bytes| spi.of(bytes) <= Duration::from_millis(1)), "everything a driver sends at once");
@@ -113,15 +112,20 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
         let clock = Clock::default();
         let bus = || Broken { clock: clock.clone(), fault };
         let (imu, sensors) = (bmi270::Config::default(), TransferLimit::I2C_SENSORS);
+        let alone = TransferLimit::SPI_SENSORS;
         let worst = [
-            worst!(clock, Bmi270::spi(bus(), clock.clone(), &[0; 2], AxisMap::IDENTITY, imu)),
+            worst!(
+                clock,
+                Bmi270::spi(bus(), clock.clone(), &[0; 2], AxisMap::IDENTITY, imu).with_transfer_limit(alone)
+            ),
+            worst!(clock, Bmp280::spi(bus(), clock.clone(), bmp280::Config::default()).with_transfer_limit(alone)),
             worst!(
                 clock,
                 Bmi270::i2c(bus(), 0x68, clock.clone(), &[0; 2], AxisMap::IDENTITY, imu).with_transfer_limit(sensors)
             ),
             worst!(
                 clock,
-                Bmp280::new(bus(), 0x76, clock.clone(), bmp280::Config::default()).with_transfer_limit(sensors)
+                Bmp280::i2c(bus(), 0x76, clock.clone(), bmp280::Config::default()).with_transfer_limit(sensors)
             ),
             worst!(
                 clock,
@@ -129,10 +133,19 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
             ),
             worst!(
                 clock,
-                Bmm150::new(bus(), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())
+                Bmm150::i2c(bus(), 0x10, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())
                     .with_transfer_limit(sensors)
             ),
-            worst!(clock, Pmw3901::new(bus(), clock.clone(), AxisMap::IDENTITY, pmw3901::Config::default())),
+            worst!(
+                clock,
+                Bmm150::spi(bus(), clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())
+                    .with_transfer_limit(alone)
+            ),
+            worst!(
+                clock,
+                Pmw3901::new(bus(), clock.clone(), AxisMap::IDENTITY, pmw3901::Config::default())
+                    .with_transfer_limit(TransferLimit::SPI_GUEST)
+            ),
             worst!(
                 clock,
                 Vl53l3cx::new(bus(), Pin, &boot, 0x30, clock.clone(), vl53l3cx::Config::default())
@@ -140,7 +153,7 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
             ),
         ];
         // The last two first leave their chips the time to start up.
-        let milliseconds = [1, 11, 11, 11, 15, 60, 125];
+        let milliseconds = [1, 1, 11, 11, 11, 15, 4, 60, 125];
         let limits = milliseconds.map(Duration::from_millis);
         for (worst, limit) in worst.into_iter().zip(limits) {
             assert!(worst > Duration::ZERO && worst < limit, "{worst} with {fault:?}");

@@ -70,8 +70,11 @@ fn futures_of_every_driver_may_be_sent() {
     let bus = || Blocking(Board);
     let (axes, file) = (AxisMap::IDENTITY, [0; 8_192]);
     let mut battery = Ina3221::new(bus(), Ina3221::A0_GROUND, clock(), ina3221::Config::default());
-    let mut barometer = Bmp280::new(bus(), Bmp280::SDO_LOW, clock(), bmp280::Config::default());
-    let mut compass = Bmm150::new(bus(), Bmm150::ALL_LOW, clock(), axes, bmm150::Config::default());
+    let mut barometer = Bmp280::i2c(bus(), Bmp280::SDO_LOW, clock(), bmp280::Config::default());
+    let mut compass = Bmm150::i2c(bus(), Bmm150::ALL_LOW, clock(), axes, bmm150::Config::default());
+    let mut barometer_on_spi = Bmp280::spi(bus(), clock(), bmp280::Config::default());
+    let mut compass_on_spi = Bmm150::spi(bus(), clock(), axes, bmm150::Config::default());
+    drop((sendable(barometer_on_spi.next()), sendable(compass_on_spi.next())));
     let mut flow = Pmw3901::new(bus(), clock(), axes, pmw3901::Config::default());
     let mut on_spi = Bmi270::spi(bus(), clock(), &file, axes, bmi270::Config::default());
     let mut on_i2c = Bmi270::i2c(bus(), 0x68, clock(), &file, axes, bmi270::Config::default());
@@ -90,7 +93,7 @@ fn a_task_of_a_sensor_runs_on_another_thread() {
     assert_eq!(first.expect("no panic"), Err(ChipError::Bus(i2c::ErrorKind::Bus)));
 
     static HEALTH: SensorHealth = SensorHealth::new();
-    let mut barometer = Bmp280::new(Blocking(Board), Bmp280::SDO_LOW, clock(), bmp280::Config::default());
+    let mut barometer = Bmp280::i2c(Blocking(Board), Bmp280::SDO_LOW, clock(), bmp280::Config::default());
     let task = run_sensor(async move || barometer.next().await, |_, _| {}, clock(), Backoff::SHARED, &HEALTH);
     drop(sendable(task));
 }

@@ -37,6 +37,9 @@ const STEPS: &[Step] = &[
     Step::new("examples", "Run every example to its end", steps::examples::run),
     Step::new("doc", "Build the documentation; a warning fails", steps::doc::run),
     Step::new("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
+    Step::new("hals", "Build the drivers' examples for Linux, RP2350, STM32 and ESP32", steps::hals::run)
+        .beside()
+        .accepting(&[Debian]),
     Step::new("features", "Check each library with each of its features alone", steps::features::run).beside(),
     Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),

@@ -46,7 +46,7 @@ pub async fn self_test<I: I2c, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<(), Failure<ChipError<I::Error>>> {
-    Bmm150::new(i2c, Bmm150::ALL_LOW, clock, AXES, Config::default()).self_test().await?;
+    Bmm150::i2c(i2c, Bmm150::ALL_LOW, clock, AXES, Config::default()).self_test().await?;
     Ok(writeln!(out, "self test: passed")?)
 }
 
@@ -59,7 +59,7 @@ pub async fn run<I: I2c, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<Found, Failure<ChipError<I::Error>>> {
-    let mut compass = Bmm150::new(i2c, Bmm150::ALL_LOW, clock, AXES, Config::default());
+    let mut compass = Bmm150::i2c(i2c, Bmm150::ALL_LOW, clock, AXES, Config::default());
     compass.start().await?;
     writeln!(out, "BMM150 runs. Turn the level vehicle around once, within {:.0} s.", TURN.seconds())?;
     writeln!(out, "   time    forward      right       down")?;

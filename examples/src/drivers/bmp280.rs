@@ -38,7 +38,7 @@ pub async fn self_test<I: I2c, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<(), Failure<ChipError<I::Error>>> {
-    Bmp280::new(i2c, Bmp280::SDO_LOW, clock, Config::default()).self_test().await?;
+    Bmp280::i2c(i2c, Bmp280::SDO_LOW, clock, Config::default()).self_test().await?;
     Ok(writeln!(out, "self test: passed")?)
 }
 
@@ -51,7 +51,7 @@ pub async fn run<I: I2c, T: Timebase>(
     clock: T,
     out: &mut impl Write,
 ) -> Result<Found, Failure<ChipError<I::Error>>> {
-    let mut baro = Bmp280::new(i2c, Bmp280::SDO_LOW, clock, Config::default());
+    let mut baro = Bmp280::i2c(i2c, Bmp280::SDO_LOW, clock, Config::default());
     baro.start().await?;
     writeln!(out, "BMP280 runs. Leave it for a second, then lift it.")?;
     writeln!(out, "   time     pressure   temperature   height")?;

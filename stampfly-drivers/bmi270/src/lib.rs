@@ -18,7 +18,9 @@ use stampfly_driver_core::Decimator;
 #[cfg(feature = "embassy-time")]
 pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::Port;
-pub use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit};
+pub use stampfly_driver_core::chip::{
+    Axis, AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit, Wires,
+};
 pub use stampfly_driver_core::{Imu, Sample, Timebase};
 pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_hal, embedded_hal_async};
 pub use stampfly_types::messages::ImuData;
@@ -46,6 +48,8 @@ const AIM: u64 = 3;
 const EARLIEST: u64 = 2;
 /// The FIFO of 2 kB holds 157 frames; from here on it may have lost some before the driver could look.
 const OVERRUN: u64 = 150;
+/// How often in a row a look may come when it tells nothing, because the bus was somebody else's meanwhile.
+const DOUBTS: u32 = 32;
 /// Samples may be missing for this many output periods.
 const PATIENCE: u64 = 4;
 
@@ -116,21 +120,13 @@ impl<'b, I: I2c, T: Timebase> Bmi270<'b, I2cRegisters<I>, T> {
     }
 }
 
-impl<S: SpiDevice, T: Timebase, P> Bmi270<'_, SpiRegisters<S>, T, P> {
-    /// Takes the driver apart: the device, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
-    pub fn release(self) -> (S, T, Option<P>) {
-        let (SpiRegisters(device), clock) = self.port.release();
-        (device, clock, self.interrupt.release())
-    }
-}
-
-impl<I: I2c, T: Timebase, P> Bmi270<'_, I2cRegisters<I>, T, P> {
+impl<R: Wires, T, P> Bmi270<'_, R, T, P> {
     stampfly_driver_core::transfer_limit!();
 
-    /// Takes the driver apart: the bus, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
-    pub fn release(self) -> (I, T, Option<P>) {
-        let (registers, clock) = self.port.release();
-        (registers.release(), clock, self.interrupt.release())
+    /// Takes the driver apart: the bus or device, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
+    pub fn release(self) -> (R::Bus, T, Option<P>) {
+        let (wires, clock) = self.port.release();
+        (wires, clock, self.interrupt.release())
     }
 }
 
@@ -348,12 +344,10 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
 
     /// The next group of four with the instant of its first sample; `None` when there is a gap before it.
     async fn group(&mut self, deadline: Instant) -> Result<Option<(Instant, [[i16; 6]; 4])>, ChipError<R::Error>> {
+        let mut doubts = 0;
         loop {
             self.interrupt.wait(&mut self.port, self.due, ticks_to_micros(AIM)).await;
-            if self.port.now() > deadline {
-                self.running = false;
-                return Err(ChipError::NoSample);
-            }
+            let looks = self.port.now();
             let mut asked = self.status().await?;
             if !is_believable(&asked.0) {
                 // A wrong bit on the bus is a hundred times as likely as a chip that restarted, and setting it up again
@@ -374,6 +368,12 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let ambiguous = age < EARLIEST || ticks_to_micros(age) + after >= ticks_to_micros(period);
             self.interrupt.judge(frames >= 4);
             if frames < 4 || ambiguous {
+                doubts += u32::from(ambiguous);
+                // By a look that began after that time: waiting for the bus is not the chip's.
+                if frames < 4 && looks > deadline || doubts > DOUBTS {
+                    self.running = false;
+                    return Err(ChipError::NoSample);
+                }
                 let missing = 4u64.saturating_sub(frames).max(u64::from(age >= EARLIEST));
                 self.due = newest + ticks_to_micros(missing * period + AIM);
                 continue;

@@ -5,8 +5,6 @@
 //! samples running have to agree: of each axis counts what all three have on the same side of zero. For whoever has to see a blow in the
 //! sample in which it begins. Not a measurement of its size, and no input for an estimator.
 
-use stampfly_types::math;
-
 /// Samples running that have to agree: at 1600 Hz a wall at 1 m/s pushes for 8 of them, and the force of a rotor at hover (478 Hz)
 /// changes its side within two.
 const AGREE: usize = 3;
@@ -36,8 +34,22 @@ impl Peak {
         let [older, old] = core::mem::replace(&mut self.before, [third, fourth]);
         let runs = [[older, old, first], [old, first, second], [first, second, third], [second, third, fourth]];
         let largest = runs.iter().map(common_square).max().unwrap_or_default();
-        math::sqrt(largest as f32)
+        root(largest.unsigned_abs())
     }
+}
+
+/// The square root of an integer below 2³² that an `f32` holds, to the last bit; of another one, of the `f32` nearest to it.
+///
+/// In integers, so that the driver needs no library of mathematics.
+fn root(square: u64) -> f32 {
+    let square = square as f32 as u64;
+    // As many bits as there is room for, and an even number of them.
+    let shift = square.leading_zeros() & !1;
+    let shifted = square << shift.min(62);
+    let whole = shifted.isqrt();
+    // 32 bits are eight more than an `f32` has. The lowest also stands for what is behind it, and so rounding is right.
+    let sticky = whole | u64::from(whole * whole != shifted);
+    sticky as f32 * f32::from_bits((127 - shift.min(62) / 2) << 23)
 }
 
 /// The square of what three samples have in common: of each axis what is nearest to zero, if all are on one side of it.
@@ -54,6 +66,7 @@ fn common_square(run: &[[i16; 3]; AGREE]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_types::math;
 
     fn peaks(groups: [[[i16; 3]; 4]; 2]) -> [f32; 2] {
         let mut peak = Peak::default();
@@ -78,5 +91,15 @@ mod tests {
     #[test]
     fn the_first_group_agrees_with_nothing_before_it() {
         assert_eq!(peaks([[[7, 0, 0], [1, 0, 0], [1, 0, 0], [0; 3]], [[0; 3]; 4]]), [1.0, 0.0]);
+    }
+
+    #[test]
+    fn roots_are_those_of_floating_point_to_the_last_bit() {
+        let largest = 3 * (1u64 << 30);
+        let some =
+            (0..100_000).chain((0..100_000).map(|n| n * 32_212)).chain((0..56_000).map(|n| n * n)).chain([largest]);
+        for square in some.chain((0..100_000).map(|n| largest - n)) {
+            assert_eq!(root(square).to_bits(), math::sqrt(square as f32).to_bits(), "{square}");
+        }
     }
 }

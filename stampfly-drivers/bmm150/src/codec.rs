@@ -28,7 +28,7 @@ pub mod register {
 
 /// What [`register::CHIP_ID`] reads.
 pub const CHIP_ID_VALUE: u8 = 0x32;
-/// Power on, in [`register::POWER`].
+/// Power on, and SPI of four wires, in [`register::POWER`].
 pub const POWER_ON: u8 = 0x01;
 /// Reset with the power left on, in [`register::POWER`].
 pub const SOFT_RESET: u8 = 0x83;

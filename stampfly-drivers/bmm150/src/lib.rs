@@ -7,10 +7,13 @@ mod config;
 use codec::{Reading, Trim, register};
 pub use config::{Config, Preset, Rate};
 use embedded_hal_async::i2c::I2c;
+use embedded_hal_async::spi::SpiDevice;
 #[cfg(feature = "embassy-time")]
 pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::Port;
-pub use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, I2cRegisters, TransferLimit};
+pub use stampfly_driver_core::chip::{
+    Axis, AxisMap, ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit, Wires,
+};
 pub use stampfly_driver_core::{Magnetometer, Sample, Timebase};
 pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_hal, embedded_hal_async};
 pub use stampfly_types::messages::MagData;
@@ -38,7 +41,7 @@ const POLL: Duration = Duration::from_millis(2);
 /// # ]), Clock::default());
 /// use stampfly_bmm150::{AxisMap, Bmm150, Config, Magnetometer, blocking::block_on};
 ///
-/// let mut compass = Bmm150::new(bus, Bmm150::ALL_LOW, clock, AxisMap::IDENTITY, Config::default());
+/// let mut compass = Bmm150::i2c(bus, Bmm150::ALL_LOW, clock, AxisMap::IDENTITY, Config::default());
 /// let sample = block_on(compass.next()).expect("a measurement");
 /// assert!(sample.data.field.norm() > 20.0, "microtesla");
 /// ```
@@ -59,10 +62,22 @@ impl Bmm150<(), ()> {
 }
 
 impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
-    /// A driver of the chip with this address.
-    pub const fn new(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
-        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
-        Self { port, axes, config, trim: None, due: Instant::ZERO }
+    /// The chip with this address, its pin PS at the supply.
+    pub const fn i2c(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
+        Self::new(I2cRegisters::new(bus, address), clock, axes, config)
+    }
+}
+
+impl<S: SpiDevice, T: Timebase> Bmm150<SpiRegisters<S, 0>, T> {
+    /// The chip on SPI of four wires, mode 0 or 3, up to 10 MHz, its pin PS at ground.
+    pub const fn spi(device: S, clock: T, axes: AxisMap, config: Config) -> Self {
+        Self::new(SpiRegisters(device), clock, axes, config)
+    }
+}
+
+impl<R: Registers, T: Timebase> Bmm150<R, T> {
+    const fn new(registers: R, clock: T, axes: AxisMap, config: Config) -> Self {
+        Self { port: Port::new(registers, clock, R::LIMIT), axes, config, trim: None, due: Instant::ZERO }
     }
 
     stampfly_driver_core::transfer_limit!();
@@ -73,7 +88,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     ///
     /// # Errors
     /// Another chip, one without trim, an impossible configuration, the bus.
-    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+    pub async fn start(&mut self) -> Result<(), ChipError<R::Error>> {
         self.set_up().await.map(|_| ())
     }
 
@@ -81,7 +96,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     ///
     /// # Errors
     /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
-    pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
+    pub async fn self_test(&mut self) -> Result<(), ChipError<R::Error>> {
         self.wake().await?;
         self.port.write(register::MODE, &[codec::SELF_TEST]).await?;
         let deadline = self.port.now() + SELF_TEST_LIMIT;
@@ -101,7 +116,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     }
 
     /// From whatever state to sleep, with the identification checked.
-    async fn wake(&mut self) -> Result<(), ChipError<I::Error>> {
+    async fn wake(&mut self) -> Result<(), ChipError<R::Error>> {
         self.trim = None;
         // Without power nothing but this register answers.
         self.port.write(register::POWER, &[codec::POWER_ON]).await?;
@@ -112,7 +127,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
         if found == codec::CHIP_ID_VALUE { Ok(()) } else { Err(ChipError::Identification { found: u16::from(found) }) }
     }
 
-    async fn set_up(&mut self) -> Result<Trim, ChipError<I::Error>> {
+    async fn set_up(&mut self) -> Result<Trim, ChipError<R::Error>> {
         if self.config.preset.duration() > self.config.rate.period() {
             return Err(ChipError::InvalidConfiguration);
         }
@@ -128,7 +143,7 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     }
 
     /// Waits for new data, and gives it with the instant it was seen.
-    async fn reading(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
+    async fn reading(&mut self) -> Result<(Instant, Reading), ChipError<R::Error>> {
         let period = self.config.rate.period();
         let asked = self.port.now();
         let deadline = asked + period + period;
@@ -157,8 +172,8 @@ impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
     }
 }
 
-impl<I: I2c, T: Timebase> Magnetometer for Bmm150<I2cRegisters<I>, T> {
-    type Error = ChipError<I::Error>;
+impl<R: Registers, T: Timebase> Magnetometer for Bmm150<R, T> {
+    type Error = ChipError<R::Error>;
 
     async fn next(&mut self) -> Result<Sample<MagData>, Self::Error> {
         let trim = match self.trim {

@@ -4,7 +4,7 @@ use stampfly_bmm150::{Bmm150, Config, Preset, Rate};
 use stampfly_driver_core::blocking::block_on;
 use stampfly_driver_core::chip::{ChipError, I2cRegisters};
 use stampfly_driver_core::{Magnetometer, Timebase};
-use stampfly_driver_fakes::closure::{AXES, Access, AnyChip, Clock, Fault, I2cBus};
+use stampfly_driver_fakes::closure::{AXES, Access, AnyChip, Clock, Fault, I2cBus, SpiBus};
 use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -96,7 +96,7 @@ fn bench(config: Config) -> (Clock, Shared, Bmm150<I2cRegisters<I2cBus<AnyChip>>
     let shared = chip.clone();
     let access: AnyChip = Box::new(move |access| shared.borrow_mut().access(access));
     let bus = I2cBus { address: 0x10, clock: clock.clone(), chip: access };
-    let driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock.clone(), AXES, config);
+    let driver = Bmm150::i2c(bus, Bmm150::ALL_LOW, clock.clone(), AXES, config);
     (clock, chip, driver)
 }
 
@@ -186,4 +186,16 @@ fn a_dead_axis_fails_the_self_test_which_leaves_a_working_chip() {
         assert_eq!(block_on(compass.self_test()), Err(ChipError::SelfTest));
         block_on(compass.next()).expect("a sample");
     }
+}
+
+#[test]
+fn it_works_on_spi_too() {
+    let clock = Clock::default();
+    let chip = Rc::new(RefCell::new(Chip::new(&clock)));
+    let shared = chip.clone();
+    let access = move |access: Access<'_>| shared.borrow_mut().access(access);
+    let mut compass = Bmm150::spi(SpiBus { clock: clock.clone(), chip: access }, clock, AXES, Config::default());
+    assert_eq!(block_on(compass.self_test()), Ok(()));
+    assert!((block_on(compass.next()).expect("a sample").data.field.x - 168.157).abs() < 0.02);
+    assert_eq!(chip.borrow().registers[0x4B], 1, "four wires");
 }

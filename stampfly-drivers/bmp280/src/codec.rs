@@ -50,7 +50,7 @@ pub const fn oversampling_bits(config: &Config) -> u8 {
     config.temperature.code() << 5 | config.pressure.code() << 2
 }
 
-/// CONFIG: the filter; the standby time plays no role, and I2C needs nothing.
+/// CONFIG: the filter; the standby time plays no role, and without bit 0 SPI has four wires.
 #[must_use]
 pub const fn filter_bits(config: &Config) -> u8 {
     (config.filter as u8) << 2

@@ -7,10 +7,11 @@ mod config;
 use codec::{Calibration, Reading, register};
 pub use config::{Config, Filter, Oversampling};
 use embedded_hal_async::i2c::I2c;
+use embedded_hal_async::spi::SpiDevice;
 #[cfg(feature = "embassy-time")]
 pub use stampfly_driver_core::EmbassyClock;
 use stampfly_driver_core::chip::Port;
-pub use stampfly_driver_core::chip::{ChipError, I2cRegisters, TransferLimit};
+pub use stampfly_driver_core::chip::{ChipError, I2cRegisters, Registers, SpiRegisters, TransferLimit, Wires};
 pub use stampfly_driver_core::{Barometer, Sample, Timebase};
 pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_hal, embedded_hal_async};
 pub use stampfly_types::messages::BaroData;
@@ -47,7 +48,7 @@ const WORKS_AT: core::ops::RangeInclusive<i32> = -4_000..=8_500;
 /// # ]), Clock::default());
 /// use stampfly_bmp280::{Barometer, Bmp280, Config, blocking::block_on};
 ///
-/// let mut baro = Bmp280::new(bus, Bmp280::SDO_LOW, clock, Config::default());
+/// let mut baro = Bmp280::i2c(bus, Bmp280::SDO_LOW, clock, Config::default());
 /// let sample = block_on(baro.next()).expect("a conversion");
 /// assert_eq!(sample.data.pressure.round(), 100_653.0);
 /// ```
@@ -69,10 +70,24 @@ impl Bmp280<(), ()> {
 }
 
 impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
-    /// A driver of the chip with this address.
-    pub const fn new(bus: I, address: u8, clock: T, config: Config) -> Self {
-        let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
-        Self { port, config, calibration: None, due: Instant::ZERO }
+    /// The chip with this address, its CSB at the supply.
+    pub const fn i2c(bus: I, address: u8, clock: T, config: Config) -> Self {
+        Self::new(I2cRegisters::new(bus, address), clock, config)
+    }
+}
+
+impl<S: SpiDevice, T: Timebase> Bmp280<SpiRegisters<S, 0>, T> {
+    /// The chip on SPI of four wires, mode 0 or 3, up to 10 MHz.
+    ///
+    /// From the first time that its CSB is low the chip is deaf on I2C, until it loses its power (§5.1).
+    pub const fn spi(device: S, clock: T, config: Config) -> Self {
+        Self::new(SpiRegisters(device), clock, config)
+    }
+}
+
+impl<R: Registers, T: Timebase> Bmp280<R, T> {
+    const fn new(registers: R, clock: T, config: Config) -> Self {
+        Self { port: Port::new(registers, clock, R::LIMIT), config, calibration: None, due: Instant::ZERO }
     }
 
     stampfly_driver_core::transfer_limit!();
@@ -83,7 +98,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     ///
     /// # Errors
     /// Another chip, one without calibration, the bus.
-    pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
+    pub async fn start(&mut self) -> Result<(), ChipError<R::Error>> {
         self.set_up().await.map(|_| ())
     }
 
@@ -98,7 +113,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     /// [`ChipError::Configuration`] for a setting that was not kept, with what is there instead;
     /// [`ChipError::NoSample`] without a conversion; [`ChipError::SelfTest`] for one that measured nothing, or something
     /// outside of 300 to 1100 hPa and −40 to 85 °C (§1).
-    pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
+    pub async fn self_test(&mut self) -> Result<(), ChipError<R::Error>> {
         let calibration = self.set_up().await?;
         let wanted = [codec::oversampling_bits(&self.config), codec::filter_bits(&self.config)];
         let [oversampling, _] = wanted;
@@ -122,7 +137,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
         }
     }
 
-    async fn set_up(&mut self) -> Result<Calibration, ChipError<I::Error>> {
+    async fn set_up(&mut self) -> Result<Calibration, ChipError<R::Error>> {
         self.calibration = None;
         let [found]: [u8; 1] = self.port.read(register::ID).await?;
         if !codec::IDENTIFICATIONS.contains(&found) {
@@ -153,7 +168,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     /// Starts a conversion, and gives the instant.
     ///
     /// Without one the data registers hold the conversion before, and nothing tells the two apart.
-    async fn begin(&mut self) -> Result<Instant, ChipError<I::Error>> {
+    async fn begin(&mut self) -> Result<Instant, ChipError<R::Error>> {
         let limit = codec::conversion_limit(&self.config);
         let mut failed = 0;
         for _ in 0..STARTS {
@@ -176,7 +191,7 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     }
 
     /// The raw result of the conversion that began at this instant.
-    async fn finish(&mut self, begun: Instant) -> Result<Reading, ChipError<I::Error>> {
+    async fn finish(&mut self, begun: Instant) -> Result<Reading, ChipError<R::Error>> {
         let wanted = (codec::oversampling_bits(&self.config), codec::filter_bits(&self.config));
         let limit = codec::conversion_limit(&self.config);
         self.port.wait_until(begun + limit).await;
@@ -199,8 +214,8 @@ impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
     }
 }
 
-impl<I: I2c, T: Timebase> Barometer for Bmp280<I2cRegisters<I>, T> {
-    type Error = ChipError<I::Error>;
+impl<R: Registers, T: Timebase> Barometer for Bmp280<R, T> {
+    type Error = ChipError<R::Error>;
 
     async fn next(&mut self) -> Result<Sample<BaroData>, Self::Error> {
         let calibration = match self.calibration {

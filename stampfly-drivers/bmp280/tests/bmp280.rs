@@ -4,7 +4,7 @@ use stampfly_bmp280::{Bmp280, Config};
 use stampfly_driver_core::blocking::block_on;
 use stampfly_driver_core::chip::{ChipError, I2cRegisters};
 use stampfly_driver_core::{Barometer, Timebase};
-use stampfly_driver_fakes::closure::{Access, AnyChip, Clock, Fault, I2cBus, cancel};
+use stampfly_driver_fakes::closure::{Access, AnyChip, Clock, Fault, I2cBus, SpiBus, cancel};
 use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -80,7 +80,7 @@ fn bench() -> (Clock, Shared, Bmp280<Bus, Clock>) {
     let shared = chip.clone();
     let access: AnyChip = Box::new(move |access| shared.borrow_mut().access(access));
     let bus = I2cBus { address: 0x76, clock: clock.clone(), chip: access };
-    let driver = Bmp280::new(bus, Bmp280::SDO_LOW, clock.clone(), Config::default());
+    let driver = Bmp280::i2c(bus, Bmp280::SDO_LOW, clock.clone(), Config::default());
     (clock, chip, driver)
 }
 
@@ -184,4 +184,21 @@ fn after_a_cancelled_call_the_next_one_waits_for_the_conversion_it_left_behind()
     let sample = block_on(baro.next()).expect("a sample");
     assert_eq!(chip.borrow().conversions, 3);
     assert!(clock.now().since(sample.at) < Duration::from_millis(8));
+}
+
+#[test]
+fn it_works_on_spi_too() {
+    let clock = Clock::default();
+    let chip = Rc::new(RefCell::new(Chip::new(&clock)));
+    let shared = chip.clone();
+    // Seven bits of the address.
+    let access = move |access: Access<'_>| {
+        shared.borrow_mut().access(match access {
+            Access::Read(register, into) => Access::Read(register | 0x80, into),
+            Access::Write(register, data) => Access::Write(register | 0x80, data),
+        })
+    };
+    let mut baro = Bmp280::spi(SpiBus { clock: clock.clone(), chip: access }, clock, Config::default());
+    assert_eq!(block_on(baro.next()).expect("a sample").data.pressure, 100_653.25);
+    assert_eq!(chip.borrow().registers[0xF5], 0x08, "four wires");
 }

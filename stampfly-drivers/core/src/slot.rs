@@ -46,7 +46,7 @@
 //! ```
 
 use crate::Timebase;
-use crate::time::{sleep_until, within};
+use crate::time::{Standstill, sleep_until, within};
 use core::cell::Cell;
 use core::fmt::{self, Debug, Display};
 use core::future::poll_fn;
@@ -208,10 +208,16 @@ impl<T: Timebase + Clone> Slots<T> {
     /// Waits for the guest's turn and takes it.
     async fn open(&self, longest: Duration) -> Turn<'_> {
         let mut clock = self.clock.clone();
+        let (mut standstill, mut stands) = (Standstill::new(), false);
         loop {
+            let now = clock.now();
             match self.opening(longest) {
                 Opening::Now => return Turn::take(&self.guest, &self.waiting_lead),
-                Opening::At(instant) => sleep_until(&mut clock, instant).await,
+                Opening::At(_) if stands => return Turn::take(&self.guest, &self.waiting_lead),
+                Opening::At(instant) => {
+                    sleep_until(&mut clock, instant).await;
+                    standstill.note(instant.since(now), clock.now());
+                }
                 Opening::AfterLead(latest) => {
                     let before = self.transfers.get();
                     let ended = poll_fn(|context| {
@@ -221,11 +227,19 @@ impl<T: Timebase + Clone> Slots<T> {
                         self.waiting_guest.set(Some(context.waker().clone()));
                         Poll::Pending
                     });
+                    if stands {
+                        // Without a clock only the lead's end is sure.
+                        ended.await;
+                        continue;
+                    }
                     // Whichever comes first.
-                    let left = latest.since(clock.now());
-                    let _ = within(&mut clock, left, ended).await;
+                    let left = latest.since(now);
+                    if within(&mut clock, left, ended).await.is_none() {
+                        standstill.note(left, clock.now());
+                    }
                 }
             }
+            stands |= standstill.take();
         }
     }
 

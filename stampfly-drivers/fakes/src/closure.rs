@@ -113,7 +113,7 @@ impl<F: FnMut(Access<'_>) -> Result<(), Fault>> i2c::I2c for I2cBus<F> {
     }
 }
 
-/// An SPI device of Bosch's inertial kind.
+/// An SPI device of Bosch's, with a dummy byte before the data of a read, as the inertial sensors have it, or without.
 pub struct SpiBus<F> {
     /// Moves on with every transfer.
     pub clock: Clock,
@@ -129,7 +129,7 @@ impl<F: FnMut(Access<'_>) -> Result<(), Fault>> spi::SpiDevice for SpiBus<F> {
     async fn transaction(&mut self, operations: &mut [spi::Operation<'_, u8>]) -> Result<(), Fault> {
         let outcome = match operations {
             // Address with the read bit, one dummy byte, data.
-            [spi::Operation::Write([register, 0]), spi::Operation::Read(into)] if register & 0x80 != 0 => {
+            [spi::Operation::Write([register, 0] | [register]), spi::Operation::Read(into)] if register & 0x80 != 0 => {
                 (self.chip)(Access::Read(register & 0x7F, into))
             }
             [spi::Operation::Write([register]), spi::Operation::Write(data)] if register & 0x80 == 0 => {

@@ -142,7 +142,10 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
 
     stampfly_driver_core::transfer_limit!();
 
-    stampfly_driver_core::release!();
+    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+    pub fn release(self) -> (I, T) {
+        self.port.release()
+    }
 
     /// What the registers of a channel hold.
     async fn measured(&mut self, channel: Channel, shunt_ohms: f32) -> Result<PowerData, ChipError<I::Error>> {

@@ -16,8 +16,8 @@ use stampfly_types::Vec3;
 pub use stampfly_types::messages::FlowData;
 pub use stampfly_types::{Duration, Instant};
 
-/// The longest transfer, a burst.
-const LIMIT: Duration = TransferLimit::SPI_GUEST.of(12);
+/// Bytes of the longest transfer, a burst.
+const BURST: usize = 12;
 /// From power-on to the first access ("Power-up sequence").
 const POWER_UP: Duration = Duration::from_millis(45);
 const AFTER_RESET: Duration = Duration::from_millis(5);
@@ -27,8 +27,8 @@ const ADDRESS_TO_DATA: u32 = 35_000;
 const AFTER_WRITE: Duration = Duration::from_micros(45);
 /// From the end of a read to the next access (tSRW, tSRR).
 const AFTER_READ: Duration = Duration::from_micros(20);
-/// From the last clock of a write to the end of the chip select (tSCLK-NCS), ns.
-const WRITE_HOLD: u32 = 20_000;
+/// From the last clock of a write to the end of the chip select (tSCLK-NCS, table 5 of data sheet R1.10), ns. That of a read is 120 ns.
+const WRITE_HOLD: u32 = 35_000;
 /// How often a chip that runs is asked whether it still holds what it was told.
 const WITNESS_INTERVAL: Duration = Duration::from_secs(1);
 /// How often the chip's calibration is asked for before it counts as broken.
@@ -89,6 +89,7 @@ impl Default for Config {
 pub struct Pmw3901<S, T> {
     device: S,
     clock: T,
+    limit: TransferLimit,
     axes: AxisMap,
     config: Config,
     running: bool,
@@ -108,6 +109,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Self {
             device,
             clock,
+            limit: TransferLimit::SPI,
             axes,
             config,
             running: false,
@@ -116,6 +118,13 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             kept: None,
             saw: Instant::ZERO,
         }
+    }
+
+    /// Gives up a transfer after this time instead of [`TransferLimit::SPI`].
+    #[must_use]
+    pub const fn with_transfer_limit(mut self, limit: TransferLimit) -> Self {
+        self.limit = limit;
+        self
     }
 
     /// Takes the driver apart: the device and the clock. The chip goes on counting.
@@ -283,7 +292,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             Operation::DelayNs(ADDRESS_TO_DATA),
             Operation::Read(&mut bytes),
         ];
-        bounded(&mut self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, self.limit.of(BURST), self.device.transaction(&mut operations)).await?;
         if let Some(motion) = Motion::decode(&bytes) {
             return Ok(motion);
         }
@@ -296,7 +305,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         let mut bytes = [0];
         let mut operations =
             [Operation::Write(&[register]), Operation::DelayNs(ADDRESS_TO_DATA), Operation::Read(&mut bytes)];
-        bounded(&mut self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, self.limit.of(BURST), self.device.transaction(&mut operations)).await?;
         self.wait(AFTER_READ).await;
         let [value] = bytes;
         Ok(value)
@@ -310,7 +319,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
 
     async fn write(&mut self, register: u8, value: u8) -> Result<(), ChipError<S::Error>> {
         let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(WRITE_HOLD)];
-        bounded(&mut self.clock, LIMIT, self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, self.limit.of(BURST), self.device.transaction(&mut operations)).await?;
         self.wait(AFTER_WRITE).await;
         Ok(())
     }
@@ -343,6 +352,9 @@ impl<S: SpiDevice, T: Timebase> OpticalFlow for Pmw3901<S, T> {
         self.emptied = None;
         let motion = self.burst().await?;
         let at = self.clock.now();
+        if at <= emptied {
+            return Err(ChipError::ClockStopped);
+        }
         self.emptied = Some(at);
         if motion.quality > 0 {
             self.saw = at;

@@ -2,7 +2,7 @@
 
 use embedded_hal_async::spi::{self, Operation};
 use stampfly_driver_core::blocking::block_on;
-use stampfly_driver_core::chip::{Axis, AxisMap, ChipError};
+use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, TransferLimit};
 use stampfly_driver_core::{OpticalFlow, Timebase};
 use stampfly_driver_fakes::closure::{Clock, Fault, TRANSFER, cancel, finish};
 use stampfly_pmw3901::{Config, Pmw3901, codec};
@@ -128,7 +128,8 @@ type Shared = Rc<RefCell<Chip>>;
 fn bench() -> (Clock, Shared, Pmw3901<Device, Clock>) {
     let (clock, chip) = (Clock::default(), Rc::new(RefCell::new(Chip::new())));
     let device = Device(clock.clone(), chip.clone());
-    let driver = Pmw3901::new(device, clock.clone(), AXES, Config::default());
+    let driver =
+        Pmw3901::new(device, clock.clone(), AXES, Config::default()).with_transfer_limit(TransferLimit::SPI_GUEST);
     (clock, chip, driver)
 }
 

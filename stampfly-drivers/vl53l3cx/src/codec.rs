@@ -19,6 +19,10 @@ pub mod register {
     pub const VHV_CONFIG_TIMEOUT_MACROP_LOOP_BOUND: u16 = 0x0008;
     /// Where that search begins.
     pub const VHV_CONFIG_INIT: u16 = 0x000B;
+    /// Added to every distance, quarters of a millimetre, 2 bytes: [`range_offset`](super::range_offset).
+    pub const ALGO_PART_TO_PART_RANGE_OFFSET_MM: u16 = 0x001E;
+    /// What the factory found to be missing from this chip's distances, mm, 2 bytes.
+    pub const MM_CONFIG_OUTER_OFFSET_MM: u16 = 0x0022;
     /// Polarity of the interrupt, [`ACTIVE_HIGH`](super::ACTIVE_HIGH); its status follows, in bit 0.
     pub const GPIO_HV_MUX_CTRL: u16 = 0x0030;
     /// How long the phase calibration takes, macro periods.
@@ -194,6 +198,20 @@ pub const fn ranging(config: &Config) -> [u8; 12] {
 pub const fn inter_measurement(period: Duration, oscillator: u16) -> [u8; 4] {
     let ticks = (oscillator as u64 & 0x3FF).saturating_mul(period.as_micros()).saturating_mul(43) / 40_000;
     (if ticks > u32::MAX as u64 { u32::MAX } else { ticks as u32 }).to_be_bytes()
+}
+
+/// [`register::ALGO_PART_TO_PART_RANGE_OFFSET_MM`] of a chip whose factory found this to be missing, as its register
+/// [`MM_CONFIG_OUTER_OFFSET_MM`](register::MM_CONFIG_OUTER_OFFSET_MM) says. The chip adds it only when it corrects the mode of a measurement, which
+/// [`FIXED`] leaves out; ST's core (`vl53lx_api_core.c`) then moves it here, and so do public drivers of the VL53L1X.
+#[must_use]
+pub const fn range_offset(outer: [u8; 2]) -> [u8; 2] {
+    i16::from_be_bytes(outer).wrapping_mul(4).to_be_bytes()
+}
+
+/// Do the 13 bits that the chip has for [`range_offset`] agree?
+#[must_use]
+pub const fn is_offset_kept(wanted: [u8; 2], kept: [u8; 2]) -> bool {
+    (u16::from_be_bytes(wanted) ^ u16::from_be_bytes(kept)) & 0x1FFF == 0
 }
 
 /// What the chip says about a measurement.

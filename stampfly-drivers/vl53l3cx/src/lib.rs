@@ -63,6 +63,9 @@ const ADVANCES: usize = 2;
 /// and moves it. When both are back at 0x29 the first one to call waits in reset ([`ChipError::AddressTaken`]) until
 /// the other has moved.
 ///
+/// XSHUT rises only when nothing is on the bus, as the chip wants it: right after a transfer of the driver's own. That holds where all who share
+/// the bus are tasks of one executor. Where they are not, give it an [`Xshut`] of your own that keeps the others off the bus meanwhile.
+///
 /// A lone chip may stay: [`BOOT_ADDRESS`](Vl53l3cx::BOOT_ADDRESS) as its address.
 ///
 /// # Without a pin
@@ -143,8 +146,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
 
     /// Takes the driver apart: the bus, the pin and the clock. The chip goes on measuring at its address.
     pub fn release(self) -> (I, X, T) {
-        let (registers, clock) = self.port.release();
-        (registers.release(), self.xshut, clock)
+        let (bus, clock) = self.port.release();
+        (bus, self.xshut, clock)
     }
 
     /// The newest measurement, all of it; `None` before the first.
@@ -228,6 +231,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
                 return Err(ChipError::AddressTaken);
             }
             port.wait(RESET).await;
+            port.check_clock()?;
         }
         let mut waking = boot.take(xshut).ok_or(ChipError::AddressTaken)?;
         // Where the chip may be when it has started.
@@ -238,6 +242,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             if answers(port).await? {
                 return Err(ChipError::AddressTaken);
             }
+            // Not while anything is on the bus (DS13204, "Power sequence"). A transfer of ours has just ended, and before this task waits
+            // again nobody else of its executor begins one: so nothing may come in between.
             waking.release().map_err(|_| ChipError::Pin)?;
         } else {
             // It may have its power since just now.
@@ -255,6 +261,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             match port.read(register::FIRMWARE_SYSTEM_STATUS).await {
                 Ok([status]) if status & 1 != 0 => break,
                 Ok([status]) if looks > deadline => return Err(ChipError::Configuration { status }),
+                Err(error @ ChipError::ClockStopped) => return Err(error),
                 Err(error) if looks > deadline => return Err(error),
                 Ok(_) => {}
                 Err(_) => places = [other, place],
@@ -275,6 +282,12 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
     async fn configure(&mut self) -> Result<(), ChipError<I::Error>> {
         for (register, values) in codec::FIXED {
             self.port.write(register, values).await?;
+        }
+        let offset = codec::range_offset(self.port.read_twice(register::MM_CONFIG_OUTER_OFFSET_MM).await?);
+        self.port.write(register::ALGO_PART_TO_PART_RANGE_OFFSET_MM, &offset).await?;
+        let kept: [u8; 2] = self.port.read(register::ALGO_PART_TO_PART_RANGE_OFFSET_MM).await?;
+        if !codec::is_offset_kept(offset, kept) {
+            return Err(ChipError::Configuration { status: kept[1] });
         }
         let mode = self.config.mode;
         self.port.write(register::PHASECAL_CONFIG_TIMEOUT_MACROP, &[codec::phase_calibration(mode)]).await?;

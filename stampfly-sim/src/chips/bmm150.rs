@@ -5,7 +5,7 @@
 //! | 0x40 | identity 0x32 | 5.3.1 |
 //! | 0x42–0x47 | x, y (13 bits from bit 3), z (15 bits from bit 1), low byte first; bit 0 of each: passed the self test | 5.3.2 |
 //! | 0x48–0x49 | Hall resistance (14 bits from bit 2); bit 0: data ready | 5.3.2 |
-//! | 0x4B | bit 0 power; bits 7 and 1 together reset | 5.3.4 |
+//! | 0x4B | bit 0 power; bit 2 SPI of three wires; bits 7 and 1 together reset | 5.3.4 |
 //! | 0x4C | current of the advanced self test (7:6): 3 positive, 2 negative; rate (5:3), mode (2:1): 0 normal, 1 forced, 3 sleep; self test (0); 0x06 after reset | 5.3.4 |
 //! | 0x4E | axes that are not measured: x (3), y (4), z (5) | 5.3.5 |
 //! | 0x51, 0x52 | repetitions: xy 1 + 2n, z 1 + n | 5.3.6 |
@@ -15,6 +15,10 @@
 //! conversion takes 145 µs per xy repetition, 500 µs per z repetition and 980 µs (DS 4.2.4). Data ready is cleared by
 //! reading data (DS 4.4); a read that begins in the data sees one conversion (DS 4.4).
 //!
+//! On SPI bit 7 of the address says read, and data follow at once; a write is one register and one value. With bit 2 of 0x4B, which can be set
+//! once the power is on, SPI has three wires and SDO is silent (DS, "Serial peripheral interface"). The pin PS, not the traffic, chooses the
+//! kind of bus.
+//!
 //! The values are made by solving the public compensation formula of the Sensor API for the raw count.
 //!
 //! The self test (DS 4.7) runs in sleep mode when its bit is set, and clears it; the current of the advanced one moves z
@@ -23,10 +27,10 @@
 //! *Unverified*: a self test of a millisecond (the Sensor API waits two), that it is not begun in another mode, and that
 //! its marks are zero before and stay until the next; 210 µT between the two currents; the old value of an axis that is
 //! not measured; that other registers read zero in suspend and while waking; writing as pairs of register and value;
-//! noise that does not depend on the repetitions; a Hall resistance that hardly changes. Not modelled: interrupts,
+//! noise that does not depend on the repetitions; a Hall resistance that hardly changes; that a line that nobody drives reads as ones. Not modelled: interrupts,
 //! thresholds.
 
-use super::{Chip, I2cChip};
+use super::{Chip, I2cChip, SpiChip};
 use crate::noise::{Noise, Stream};
 use crate::sensors::mag::{MagPhysics, RATE};
 use crate::sensors::schedule::Schedule;
@@ -142,6 +146,10 @@ pub struct Bmm150 {
     /// What a running read sees.
     shadow: [u8; 8],
     pointer: u16,
+    /// First byte of a transfer on SPI.
+    command: u8,
+    /// SPI of three wires.
+    three_wires: bool,
 }
 
 impl Bmm150 {
@@ -164,6 +172,8 @@ impl Bmm150 {
             broken: false,
             shadow: [0; 8],
             pointer: 0,
+            command: 0,
+            three_wires: false,
         }
     }
 
@@ -244,7 +254,7 @@ impl Chip for Bmm150 {
     fn read(&mut self, register: u16, now: Instant) -> u16 {
         self.update(now);
         if register == POWER {
-            return u16::from(self.awake.is_some());
+            return u16::from(self.three_wires) << 2 | u16::from(self.awake.is_some());
         }
         if !self.is_awake(now) {
             return 0;
@@ -267,7 +277,10 @@ impl Chip for Bmm150 {
                 self.awake = Some(now + WAKE);
             }
             POWER if value & 1 == 0 => self.reset(now),
-            POWER => self.awake = Some(self.awake.unwrap_or(now + WAKE)),
+            POWER => {
+                self.three_wires = self.is_awake(now) && value & 4 != 0;
+                self.awake = Some(self.awake.unwrap_or(now + WAKE));
+            }
             _ if !self.is_awake(now) => {}
             MODE => {
                 self.settings[0] = value as u8;
@@ -285,6 +298,7 @@ impl Chip for Bmm150 {
 
     fn reset(&mut self, _: Instant) {
         self.awake = None;
+        self.three_wires = false;
         self.settings = SETTINGS;
         self.until = None;
         self.self_test = None;
@@ -323,4 +337,28 @@ impl I2cChip for Bmm150 {
         self.pointer = (self.pointer + 1) & 0xFF;
         byte
     }
+}
+
+impl SpiChip for Bmm150 {
+    /// DS, "Serial peripheral interface".
+    const HIGHEST_CLOCK: u32 = 10_000_000;
+
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+        let silent = 0xFF;
+        if index == 0 {
+            self.command = byte;
+            self.pointer = u16::from(byte & 0x7F);
+            return silent;
+        }
+        if self.command & 0x80 == 0 {
+            if index == 1 {
+                self.write(self.pointer, u16::from(byte), now);
+            }
+            return silent;
+        }
+        let sent = self.send(index - 1, now);
+        if self.three_wires { silent } else { sent }
+    }
+
+    fn release(&mut self, _: Instant) {}
 }

@@ -10,16 +10,18 @@
 //! | 0xF5 | standby (7:5), filter (4:2) | 4.3.5 |
 //! | 0xF7–0xFC | pressure, temperature, 20 bits each, high byte first | 4.3.6, 4.3.7 |
 //!
-//! Reads go on to the next register; writes are pairs of register and value (DS 5.2.1, 5.2.2). A read that begins in
+//! Reads go on to the next register; writes are pairs of register and value (DS 5.2.1, 5.2.2). So it is on SPI, where bit 7 of the address says
+//! read and data follow at once (DS 5.3); a one in bit 0 of 0xF5 makes it SPI of three wires, whose SDO is silent (DS 4.3.5, 5.3). A read that begins in
 //! the data registers sees one conversion, whatever ends meanwhile (DS 3.10). A mode written during a conversion acts
 //! at its end (DS 3.6). A write to 0xF5 in normal mode is ignored, which the data sheet only says may happen (4.3.5).
 //!
 //! *Unverified*: that the chip acknowledges, ignores writes and shows a zero calibration in the two milliseconds of
 //! its start-up (DS table 2 gives only the time); the noise per oversampling, which is scaled from this project's
 //! static records at ×4 and filter 4 by the root of the number of samples; that a dead sensing element leaves the data
-//! registers at their reset value, while conversions go on.
+//! registers at their reset value, while conversions go on; that a line that nobody drives reads as ones. Not modelled: that I2C is deaf after
+//! the first low CSB (DS 5.1); here a chip is soldered to one kind of bus.
 
-use super::{Chip, I2cChip};
+use super::{Chip, I2cChip, SpiChip};
 use crate::noise::{Noise, Stream};
 use crate::sensors::baro::{BaroPhysics, DEVIATION, RATE};
 use crate::sensors::schedule::Schedule;
@@ -121,6 +123,8 @@ pub struct Bmp280 {
     /// Memory of the filter: none before the first conversion.
     filtered: Option<[f64; 2]>,
     pointer: u16,
+    /// First byte of a transfer on SPI.
+    command: u8,
 }
 
 impl Bmp280 {
@@ -146,6 +150,7 @@ impl Bmp280 {
             shadow: [SKIPPED; 2],
             filtered: None,
             pointer: 0,
+            command: 0,
         };
         chip.reset(now);
         chip
@@ -260,7 +265,7 @@ impl Chip for Bmp280 {
                 self.control = value as u8;
                 self.enter_mode(now);
             }
-            // Bit 1 does not exist.
+            // Bit 1 does not exist. Bit 0 is the number of wires.
             CONFIG if self.control & 3 != 3 => self.config = value as u8 & !2,
             _ => {}
         }
@@ -306,4 +311,28 @@ impl I2cChip for Bmp280 {
         self.pointer = (self.pointer + 1) & 0xFF;
         byte
     }
+}
+
+impl SpiChip for Bmp280 {
+    /// DS table 28.
+    const HIGHEST_CLOCK: u32 = 10_000_000;
+
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+        let silent = 0xFF;
+        if index == 0 {
+            self.command = byte;
+            self.pointer = 0x80 | u16::from(byte);
+            return silent;
+        }
+        if self.command & 0x80 == 0 {
+            // Another address, or its value: the same as on I2C, but for bit 7.
+            self.receive(index, if index.is_multiple_of(2) { byte | 0x80 } else { byte }, now);
+            return silent;
+        }
+        let sent = self.send(index - 1, now);
+        self.pointer |= 0x80;
+        if self.config & 1 == 0 { sent } else { silent }
+    }
+
+    fn release(&mut self, _: Instant) {}
 }

@@ -38,7 +38,7 @@ impl Device {
 struct State {
     clock: Clock,
     devices: RefCell<Vec<Device>>,
-    busy_until: Cell<Instant>,
+    busy_until: Rc<Cell<Instant>>,
     /// Clock pulses until the data line is free.
     held: Cell<u8>,
     noise: RefCell<Noise>,
@@ -80,7 +80,7 @@ impl I2cBus {
         Self(Rc::new(State {
             clock: clock.clone(),
             devices: RefCell::default(),
-            busy_until: Cell::new(clock.now()),
+            busy_until: Rc::new(Cell::new(clock.now())),
             held: Cell::new(0),
             noise: RefCell::new(Noise::new(seed, STREAM)),
             restarts: Cell::new(false),
@@ -95,7 +95,8 @@ impl I2cBus {
 
     /// Solders a chip to the bus at a 7-bit address. Where several have the same, all of them take what is written, and
     /// what is read is zero wherever one of them sends a zero: the line is pulled low.
-    pub fn attach(&self, address: u8, chip: impl I2cChip + 'static) -> Attached {
+    pub fn attach(&self, address: u8, mut chip: impl I2cChip + 'static) -> Attached {
+        chip.wire(&self.0.busy_until);
         let chip = Rc::new(RefCell::new(chip));
         let attached = Attached::new(&self.0.clock, chip.clone());
         self.0.devices.borrow_mut().push(Device { soldered: address, chip, attached: attached.clone() });

@@ -13,10 +13,10 @@
 //!
 //! | emulator | bus | address or clock | data sheet |
 //! |---|---|---|---|
-//! | [`Bmp280`] | [`I2cBus`] | 0x76 | BST-BMP280-DS001 |
+//! | [`Bmp280`] | [`I2cBus`], or [`SpiBus`] | 0x76, or up to 10 MHz | BST-BMP280-DS001 |
 //! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
 //! | [`Bmi270`] | [`SpiBus`], or [`I2cBus`] | up to 10 MHz, or 0x68 | BST-BMI270-DS000 |
-//! | [`Bmm150`] | [`I2cBus`] | 0x10 | BST-BMM150-DS001 |
+//! | [`Bmm150`] | [`I2cBus`], or [`SpiBus`] | 0x10, or up to 10 MHz | BST-BMM150-DS001 |
 //! | [`Pmw3901`] | [`SpiBus`] | up to 2 MHz | PixArt PMW3901MB |
 //! | [`Vl53l3cx`] | [`I2cBus`] | 0x29, can be moved | ST DS13204 |
 //!
@@ -51,10 +51,12 @@ pub use pmw3901::Pmw3901;
 pub use spi::{SpiBus, SpiPort};
 pub use vl53l3cx::{ShutdownPin, Vl53l3cx};
 
+use core::cell::Cell;
 use core::fmt;
 use embedded_hal::i2c::NoAcknowledgeSource;
 use embedded_hal::{i2c as hal_i2c, spi as hal_spi};
 use stampfly_types::{Duration, Instant};
+use std::rc::Rc;
 
 /// A chip as its registers. Time is an argument and does not go back.
 ///
@@ -80,6 +82,8 @@ pub trait I2cChip: Chip {
     fn address(&self, soldered: u8) -> Option<u8> {
         Some(soldered)
     }
+    /// Soldered to a bus that is busy until this instant: for chips that mind what goes on there when they start.
+    fn wire(&mut self, _busy_until: &Rc<Cell<Instant>>) {}
     /// Takes byte number `index` after a (repeated) start in write direction. `false` is no acknowledge.
     fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool;
     /// Gives byte number `index` after a (repeated) start in read direction.

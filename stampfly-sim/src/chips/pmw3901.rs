@@ -12,11 +12,12 @@
 //! | 0x7F | bank of the registers for the performance settings | performance list |
 //!
 //! Bit 7 of the address is set for a write. Between address and data of a read 35 µs have to pass, after a write 45 µs,
-//! after a read 20 µs (DS, timing). After power-on it needs 45 ms. The data sheet's list of performance settings has
+//! after a read 20 µs; at the end of a write the chip select stays low for 35 µs after the last clock, tSCLK-NCS (DS, timing). After power-on it needs 45 ms. The data sheet's list of performance settings has
 //! to be written.
 //!
 //! *Unverified*: that data clocked out too early is zero and commands that come too early are lost (the burst without
-//! its pause is reported to work in practice); zero motion and quality without the performance settings; 0x08 at 0x47
+//! its pause is reported to work in practice); that a write whose chip select rises too early is lost (drivers that
+//! do not wait are reported to work as well); zero motion and quality without the performance settings; 0x08 at 0x47
 //! of bank 0x0E, and what 0x67, 0x70, 0x71 and 0x73 say; which of the list's entries matter (those in which its
 //! public copies agree are wanted, in their order and with their pause); that the list can be read back; 5 ms for a reset; observation 0xBF; the picture's sum, maximum and
 //! minimum, which only follow the quality, also in the dark; that a dead array gives pictures without light and without
@@ -32,6 +33,7 @@ use stampfly_types::{Duration, Instant};
 const START_UP: Duration = Duration::from_micros(45_000);
 const RESET_TIME: Duration = Duration::from_micros(5_000);
 const READ_PAUSE: Duration = Duration::from_micros(35);
+const WRITE_HOLD: Duration = Duration::from_micros(35);
 const AFTER_WRITE: Duration = Duration::from_micros(45);
 const AFTER_READ: Duration = Duration::from_micros(20);
 const MOTION: u16 = 0x02;
@@ -105,6 +107,8 @@ pub struct Pmw3901 {
     command: u8,
     commanded: Instant,
     accepts: bool,
+    /// The value of a write that is not over, and when it came.
+    written: Option<(u8, Instant)>,
     /// What a running burst sends.
     burst: [u8; 12],
 }
@@ -129,6 +133,7 @@ impl Pmw3901 {
             command: 0,
             commanded: now,
             accepts: false,
+            written: None,
             burst: [0; 12],
         };
         chip.reset(now);
@@ -287,6 +292,7 @@ impl SpiChip for Pmw3901 {
             self.command = byte;
             self.commanded = now;
             self.accepts = now >= self.idle_until;
+            self.written = None;
             return 0;
         }
         if !self.accepts {
@@ -294,7 +300,7 @@ impl SpiChip for Pmw3901 {
         }
         if self.command & 0x80 != 0 {
             if index == 1 {
-                self.write(u16::from(self.command), u16::from(byte), now);
+                self.written = Some((byte, now));
             }
             return 0;
         }
@@ -311,6 +317,9 @@ impl SpiChip for Pmw3901 {
     }
 
     fn release(&mut self, now: Instant) {
+        if let Some((value, at)) = self.written.take_if(|(_, at)| now >= *at + WRITE_HOLD) {
+            self.write(u16::from(self.command), u16::from(value), at);
+        }
         if self.accepts {
             self.idle_until = now + if self.command & 0x80 != 0 { AFTER_WRITE } else { AFTER_READ };
         }

@@ -113,11 +113,11 @@ fn compare(seed: u64) {
     watch!(tasks, driver, flow_driver, flow_channels);
     watch!(tasks, flow, flow_model, flow_channels);
     let axes = mounting::MAGNETOMETER;
-    let driver = Bmm150::new(board.i2c.clone(), Bmm150::ALL_LOW, time(), axes, bmm150::Config::default());
+    let driver = Bmm150::i2c(board.i2c.clone(), Bmm150::ALL_LOW, time(), axes, bmm150::Config::default());
     let mag_channels = |data: stampfly_types::messages::MagData| Some([data.field.x, data.field.y, data.field.z]);
     watch!(tasks, driver, mag_driver, mag_channels);
     watch!(tasks, mag, mag_model, mag_channels);
-    let driver = Bmp280::new(board.i2c.clone(), Bmp280::SDO_LOW, time(), bmp280::Config::default());
+    let driver = Bmp280::i2c(board.i2c.clone(), Bmp280::SDO_LOW, time(), bmp280::Config::default());
     let baro_channels = |data: stampfly_types::messages::BaroData| Some([data.pressure]);
     watch!(tasks, driver, baro_driver, baro_channels);
     watch!(tasks, baro, baro_model, baro_channels);

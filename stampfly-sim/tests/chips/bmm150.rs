@@ -3,8 +3,9 @@
 use crate::compensation::bmm150 as compensate;
 use crate::{standing, wait};
 use embedded_hal::i2c::I2c;
+use embedded_hal::spi::{Operation, SpiDevice};
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{Attached, Bmm150, I2cBus};
+use stampfly_sim::chips::{Attached, Bmm150, I2cBus, SpiBus, SpiPort};
 
 const ADDRESS: u8 = 0x10;
 
@@ -174,4 +175,33 @@ fn a_read_during_a_conversion_gives_the_one_before() {
     wait(&simulation, 6_000);
     let second: [u8; 8] = read(&mut bus, 0x42);
     assert!(second[6] & 1 == 1 && second[..6] != first[..6]);
+}
+
+/// A transfer on SPI: these bytes out, then so many in.
+fn transfer<const N: usize>(port: &mut SpiPort<Bmm150>, out: &[u8]) -> [u8; N] {
+    let mut bytes = [0; N];
+    port.transaction(&mut [Operation::Write(out), Operation::Read(&mut bytes)]).unwrap();
+    bytes
+}
+
+#[test]
+fn on_spi_it_starts_suspended_too_and_takes_one_register_a_write() {
+    let simulation = standing();
+    let chip = Bmm150::new(&simulation.world, &simulation.clock, 1);
+    let (mut port, _) = SpiBus::new(&simulation.clock, 1).attach(10_000_000, chip);
+    wait(&simulation, 10_000);
+    assert_eq!((transfer(&mut port, &[0xC0]), transfer(&mut port, &[0xCB])), ([0], [0]), "suspended");
+    port.transaction(&mut [Operation::Write(&[0x4B, 1])]).unwrap();
+    wait(&simulation, 3_000);
+    assert_eq!(
+        (transfer(&mut port, &[0xC0]), transfer(&mut port, &[0xCB, 0])),
+        ([0x32], [6]),
+        "0x4C after one more clocked byte"
+    );
+    port.transaction(&mut [Operation::Write(&[0x51, 4, 14])]).unwrap();
+    assert_eq!(transfer(&mut port, &[0xD1]), [4, 0], "the second value is no one's");
+    port.transaction(&mut [Operation::Write(&[0x4B, 5])]).unwrap();
+    assert_eq!(transfer(&mut port, &[0xC0]), [0xFF], "three wires: SDO is silent");
+    port.transaction(&mut [Operation::Write(&[0x4B, 1])]).unwrap();
+    assert_eq!(transfer(&mut port, &[0xC0]), [0x32]);
 }

@@ -4,8 +4,9 @@
 use crate::compensation::bmp280 as compensate;
 use crate::{standing, wait};
 use embedded_hal::i2c::I2c;
+use embedded_hal::spi::{Operation, SpiDevice};
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{Bmp280, I2cBus};
+use stampfly_sim::chips::{Bmp280, I2cBus, SpiBus, SpiPort};
 
 const ADDRESS: u8 = 0x76;
 /// Normal mode, pressure ×4, temperature ×2; 62.5 ms of standby, filter 4.
@@ -149,4 +150,30 @@ fn a_quantity_that_is_not_measured_keeps_its_mark() {
     let data: [u8; 6] = read(&mut bus, 0xF7);
     assert_eq!(data[..3], [0x80, 0, 0]);
     assert_ne!(data[3..], [0x80, 0, 0]);
+}
+
+/// A transfer on SPI: these bytes out, then so many in.
+fn transfer<const N: usize>(port: &mut SpiPort<Bmp280>, out: &[u8]) -> [u8; N] {
+    let mut bytes = [0; N];
+    port.transaction(&mut [Operation::Write(out), Operation::Read(&mut bytes)]).unwrap();
+    bytes
+}
+
+#[test]
+fn on_spi_seven_bits_are_the_address_and_data_follow_at_once() {
+    let simulation = standing();
+    let chip = Bmp280::new(&simulation.world, &simulation.clock, 1);
+    let (mut port, _) = SpiBus::new(&simulation.clock, 1).attach(10_000_000, chip);
+    wait(&simulation, 2_000);
+    assert_eq!(transfer(&mut port, &[0xD0]), [0x58]);
+    assert_eq!(transfer(&mut port, &[0x50]), [0xFF], "a write of nothing");
+    let calibration = transfer(&mut port, &[0x88]);
+    // 5.3.1: pairs of address and value without raising CSB.
+    port.transaction(&mut [Operation::Write(&[0x75, 0b000_010_00, 0x74, 0b001_001_01])]).unwrap();
+    assert_eq!(transfer(&mut port, &[0xF3]), [8, 0b001_001_01, 0b000_010_00], "converting");
+    wait(&simulation, 6_500);
+    let (temperature, pressure) = compensate(&calibration, &transfer(&mut port, &[0xF7]));
+    assert!((90_000.0..110_000.0).contains(&pressure) && (0.0..50.0).contains(&temperature));
+    port.transaction(&mut [Operation::Write(&[0x75, 1])]).unwrap();
+    assert_eq!(transfer(&mut port, &[0xD0]), [0xFF], "three wires: SDO is silent");
 }

@@ -61,8 +61,14 @@ impl Chip {
 
     /// Writes register and value, and waits as long as prescribed.
     fn write(&mut self, entry: u16) {
+        self.write_holding(entry, 35_000);
+    }
+
+    /// The chip select stays low for so long after the last clock, ns.
+    fn write_holding(&mut self, entry: u16, hold: u32) {
         let [register, value] = entry.to_be_bytes();
-        self.port.write(&[register | 0x80, value]).unwrap();
+        let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(hold)];
+        self.port.transaction(&mut operations).unwrap();
         wait(&self.simulation, 45);
     }
 
@@ -100,11 +106,22 @@ fn identity_after_the_start_up_with_the_pause() {
 }
 
 #[test]
+fn a_write_whose_chip_select_rises_before_35_us_is_lost() {
+    let mut chip = Chip::cold(1.0, [0.0; 3]);
+    wait(&chip.simulation, 45_000);
+    for (hold, kept) in [(0, 0xEE), (20_000, 0xEE), (35_000, 0x07)] {
+        chip.write_holding(0x5007, hold);
+        assert_eq!(chip.read(0x50), kept, "{hold} ns");
+    }
+}
+
+#[test]
 fn a_write_too_soon_after_another_is_lost() {
     let mut chip = Chip::cold(1.0, [0.0; 3]);
     wait(&chip.simulation, 45_000);
-    chip.port.write(&[0xD5, 0x01]).unwrap();
-    chip.port.write(&[0xD0, 0x07]).unwrap();
+    for bytes in [[0xD5, 0x01], [0xD0, 0x07]] {
+        chip.port.transaction(&mut [Operation::Write(&bytes), Operation::DelayNs(35_000)]).unwrap();
+    }
     wait(&chip.simulation, 45);
     assert_eq!(chip.read(0x55), 0x01);
     assert_ne!(chip.read(0x50), 0x07);

@@ -14,7 +14,7 @@ fn bench(config: Config) -> (Simulation, Attached, Bmm150<I2cRegisters<I2cBus>, 
     let clock = simulation.clock.clone();
     let bus = I2cBus::new(&clock, 1);
     let attached = bus.attach(Bmm150::ALL_LOW, chips::Bmm150::new(&simulation.world, &clock, 1));
-    let driver = Bmm150::new(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config);
+    let driver = Bmm150::i2c(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config);
     (simulation, attached, driver)
 }
 

@@ -15,7 +15,7 @@ fn bench(config: Config) -> (Simulation, Attached, Bmp280<I2cRegisters<I2cBus>, 
     let bus = I2cBus::new(&clock, 1);
     let attached = bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &clock, 1));
     clock.advance_to(clock.now() + Duration::from_millis(2));
-    (simulation, attached, Bmp280::new(bus, Bmp280::SDO_LOW, clock, config))
+    (simulation, attached, Bmp280::i2c(bus, Bmp280::SDO_LOW, clock, config))
 }
 
 #[test]

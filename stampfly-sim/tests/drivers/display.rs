@@ -1,18 +1,20 @@
 //! Drivers for I2C on a bus that it shares with a display: a kilobyte every few milliseconds, at 400 kHz or at 100.
 //!
 //! Waiting for the bus is no fault of the chip, so no driver may give up because of it. An SSD1306 of 128 by 64 pixels gets 1025 bytes a
-//! frame: 23 ms at 400 kHz, 92 ms at 100 kHz. Without the BMI270, whose samples alone fill two thirds of the bus.
+//! frame: 23 ms at 400 kHz, 92 ms at 100 kHz. A BMI270 alone fills two thirds of the bus at 400 kHz, so it has a display that is drawn four times
+//! a second.
 
 use crate::{mounting, standing};
 use core::cell::RefCell;
 use embedded_hal_async::i2c::{I2c, Operation};
+use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
-use stampfly_drivers::{Barometer, Magnetometer, PowerMonitor, RangeFinder, SensorError, SensorErrorKind};
+use stampfly_drivers::{Barometer, Imu, Magnetometer, PowerMonitor, RangeFinder, SensorError, SensorErrorKind};
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{self, Chip, I2cBus, I2cChip};
+use stampfly_sim::chips::{self, Chip, I2cBus, I2cChip, stand_in_image};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_types::{Duration, Instant};
@@ -49,7 +51,7 @@ impl I2cChip for Display {
 /// What `call` makes of the bus beside a display, for three seconds: samples, and the kinds of errors.
 fn beside_a_display(
     attach: impl Fn(&Simulation, &I2cBus),
-    frames: usize,
+    (frames, pause): (usize, Duration),
     driver: impl AsyncFn(I2cBus, Clock, &RefCell<Vec<Result<(), SensorErrorKind>>>),
 ) -> Vec<Result<(), SensorErrorKind>> {
     let simulation = standing();
@@ -64,7 +66,7 @@ fn beside_a_display(
         loop {
             let mut operations: Vec<_> = (0..frames).map(|_| Operation::Write(&FRAME)).collect();
             display.transaction(ADDRESS, &mut operations).await.expect("it takes everything");
-            timer.sleep_until(timer.now() + PAUSE).await;
+            timer.sleep_until(timer.now() + pause).await;
         }
     });
     tasks.spawn(driver(bus, clock.clone(), &seen));
@@ -99,8 +101,8 @@ fn a_barometer_waits() {
         let attach = |simulation: &Simulation, bus: &I2cBus| {
             bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &simulation.clock, 1));
         };
-        let driver = asked!(|bus, clock| Bmp280::new(bus, Bmp280::SDO_LOW, clock, bmp280::Config::default()));
-        all_samples("barometer", speed, &beside_a_display(attach, frames, driver), 5);
+        let driver = asked!(|bus, clock| Bmp280::i2c(bus, Bmp280::SDO_LOW, clock, bmp280::Config::default()));
+        all_samples("barometer", speed, &beside_a_display(attach, (frames, PAUSE), driver), 5);
     }
 }
 
@@ -111,8 +113,8 @@ fn a_magnetometer_waits() {
             bus.attach(Bmm150::ALL_LOW, chips::Bmm150::new(&simulation.world, &simulation.clock, 1));
         };
         let config = bmm150::Config::default();
-        let driver = asked!(|bus, clock| Bmm150::new(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config));
-        all_samples("magnetometer", speed, &beside_a_display(attach, frames, driver), 5);
+        let driver = asked!(|bus, clock| Bmm150::i2c(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config));
+        all_samples("magnetometer", speed, &beside_a_display(attach, (frames, PAUSE), driver), 5);
     }
 }
 
@@ -123,7 +125,7 @@ fn a_battery_monitor_waits() {
             bus.attach(Ina3221::A0_GROUND, chips::Ina3221::new(&simulation.world, &simulation.clock, 1));
         };
         let driver = asked!(|bus, clock| Ina3221::new(bus, Ina3221::A0_GROUND, clock, ina3221::Config::default()));
-        all_samples("battery monitor", speed, &beside_a_display(attach, frames, driver), 5);
+        all_samples("battery monitor", speed, &beside_a_display(attach, (frames, PAUSE), driver), 5);
     }
 }
 
@@ -138,6 +140,19 @@ fn a_range_finder_waits() {
         };
         let config = vl53l3cx::Config::default();
         let driver = asked!(|bus, clock| Vl53l3cx::new(bus, pin.take().expect("attached"), &boot, 0x30, clock, config));
-        all_samples("range finder", speed, &beside_a_display(attach, frames, driver), 5);
+        all_samples("range finder", speed, &beside_a_display(attach, (frames, PAUSE), driver), 5);
     }
+}
+
+#[test]
+fn an_inertial_sensor_waits_and_catches_up() {
+    let image = stand_in_image();
+    let attach = |simulation: &Simulation, bus: &I2cBus| {
+        bus.attach(0x68, chips::Bmi270::new(&simulation.world, &simulation.clock, 1, 1.0, &image));
+    };
+    let config = bmi270::Config::default();
+    let driver = asked!(|bus, clock| Bmi270::i2c(bus, 0x68, clock, &image, mounting::IMU, config));
+    let seen = beside_a_display(attach, (1, Duration::from_millis(227)), driver);
+    // 400 a second, but for half a second to start.
+    all_samples("inertial sensor", "400 kHz", &seen, 950);
 }

@@ -19,7 +19,7 @@ use stampfly_sim::sensors::Mount;
 use stampfly_types::{Duration, Instant};
 
 /// A delay like `linux_embedded_hal::Delay`, on virtual time.
-struct Delay(stampfly_sim::time::Clock);
+pub struct Delay(stampfly_sim::time::Clock);
 
 impl DelayNs for Delay {
     fn delay_ns(&mut self, ns: u32) {
@@ -34,9 +34,16 @@ fn bench() -> (Simulation, I2cBus) {
     (simulation, bus)
 }
 
-fn clock(simulation: &Simulation) -> BlockingClock<Delay, impl Fn() -> Instant + use<>> {
+pub fn clock(simulation: &Simulation) -> BlockingClock<Delay, impl Fn() -> Instant + use<>> {
     let now = simulation.clock.clone();
     BlockingClock::new(Delay(simulation.clock.clone()), move || now.now())
+}
+
+/// So many samples, and each as it should be.
+pub fn delivers<E: core::fmt::Debug>(samples: usize, mut next: impl FnMut() -> Result<bool, E>) {
+    for number in 0..samples {
+        assert!(next().expect("a sample"), "sample {number}");
+    }
 }
 
 #[test]
@@ -61,12 +68,12 @@ fn an_inertial_sensor_is_configured_and_measures() {
 fn a_barometer_is_configured_and_measures() {
     let (simulation, bus) = bench();
     bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &simulation.clock, 1));
-    let mut baro = Bmp280::new(Blocking(bus), Bmp280::SDO_LOW, clock(&simulation), bmp280::Config::default());
+    let mut baro = Bmp280::i2c(Blocking(bus), Bmp280::SDO_LOW, clock(&simulation), bmp280::Config::default());
     assert_eq!(block_on(baro.self_test()), Ok(()));
     let samples = (0..20).map(|_| block_on(baro.next()).expect("a sample"));
     assert!(samples.into_iter().all(|sample| (90_000.0..110_000.0).contains(&sample.data.pressure)));
     let (bus, clock) = baro.release();
-    assert!(block_on(Bmp280::new(bus, Bmp280::SDO_LOW, clock, bmp280::Config::default()).next()).is_ok());
+    assert!(block_on(Bmp280::i2c(bus, Bmp280::SDO_LOW, clock, bmp280::Config::default()).next()).is_ok());
 }
 
 #[test]
@@ -74,14 +81,14 @@ fn a_magnetometer_is_configured_and_measures() {
     let (simulation, bus) = bench();
     bus.attach(Bmm150::ALL_LOW, chips::Bmm150::new(&simulation.world, &simulation.clock, 1));
     let config = bmm150::Config::default();
-    let mut mag = Bmm150::new(Blocking(bus), Bmm150::ALL_LOW, clock(&simulation), mounting::MAGNETOMETER, config);
+    let mut mag = Bmm150::i2c(Blocking(bus), Bmm150::ALL_LOW, clock(&simulation), mounting::MAGNETOMETER, config);
     assert_eq!(block_on(mag.self_test()), Ok(()));
     for _ in 0..20 {
         let field = block_on(mag.next()).expect("a sample").data.field.norm();
         assert!((10.0..100.0).contains(&field), "{field} uT");
     }
     let (bus, clock) = mag.release();
-    assert!(block_on(Bmm150::new(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config).next()).is_ok());
+    assert!(block_on(Bmm150::i2c(bus, Bmm150::ALL_LOW, clock, mounting::MAGNETOMETER, config).next()).is_ok());
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod pilot;
 mod pmw3901;
 mod self_tests;
 mod slots;
+mod spi;
 mod spoilt;
 mod starts;
 mod vl53l3cx;

@@ -27,7 +27,7 @@ fn bench() -> Bench {
     let monitor = bus.attach(Ina3221::A0_GROUND, chips::Ina3221::new(&simulation.world, &clock, 1));
     // Both start up within two milliseconds.
     clock.advance_to(clock.now() + Duration::from_millis(5));
-    let baro = Bmp280::new(bus.clone(), Bmp280::SDO_LOW, clock.clone(), bmp280::Config::default());
+    let baro = Bmp280::i2c(bus.clone(), Bmp280::SDO_LOW, clock.clone(), bmp280::Config::default());
     let power = Ina3221::new(bus, Ina3221::A0_GROUND, clock.clone(), ina3221::Config::default());
     Bench { simulation, clock, barometer, monitor, baro, power }
 }

@@ -149,7 +149,7 @@ recovers!(
     230,
     |board, clock, trouble| {
         let bus = Unreliable(board.i2c, trouble.clone());
-        Bmm150::new(bus, Bmm150::ALL_LOW, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())
+        Bmm150::i2c(bus, Bmm150::ALL_LOW, clock.clone(), AxisMap::IDENTITY, bmm150::Config::default())
     },
     |data| (20.0..80.0).contains(&data.field.norm())
 );
@@ -157,7 +157,7 @@ recovers!(
     barometer,
     230,
     |board, clock, trouble| {
-        Bmp280::new(Unreliable(board.i2c, trouble.clone()), 0x76, clock.clone(), bmp280::Config::default())
+        Bmp280::i2c(Unreliable(board.i2c, trouble.clone()), 0x76, clock.clone(), bmp280::Config::default())
     },
     |data| (90_000.0..110_000.0).contains(&data.pressure)
 );

@@ -2,9 +2,12 @@
 
 use crate::{hover, registers, standing};
 use core::cell::RefCell;
+use embedded_hal::digital::OutputPin;
+use embedded_hal_async::i2c::I2c;
 use stampfly_drivers::RangeFinder;
 use stampfly_drivers::chip::ChipError;
 use stampfly_drivers::chip::vl53l3cx::{BootAddress, Config, DistanceMode, NoXshut, Vl53l3cx};
+use stampfly_drivers::shared::SharedI2c;
 use stampfly_sim::chips::{self, Attached, I2cBus, ShutdownPin};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, Tasks, block_on};
@@ -167,4 +170,32 @@ fn a_chip_without_a_pin_starts_before_its_neighbour_and_again_after_a_dip_of_the
     assert_eq!(block_on(clock, below.next()), Err(ChipError::Restarted));
     assert!(block_on(clock, below.next()).is_ok());
     assert_eq!(registers(&attached[0], 0x0001), [BELOW]);
+}
+
+#[test]
+fn a_chip_wakes_between_the_transfers_of_a_bus_that_is_never_quiet() {
+    for phase in 0..20 {
+        let simulation = standing();
+        let Bench { bus, pins: [pin, mut asleep], .. } = bench(&simulation);
+        asleep.set_low().expect("a pin");
+        bus.attach(0x76, chips::Bmp280::new(&simulation.world, &simulation.clock, 1));
+        let mut shared = SharedI2c::<_, 2>::new(bus);
+        let ([mut greedy, range], _) = shared.split();
+        let (boot, clock) = (BootAddress::new(), simulation.clock.clone());
+        let mut below = Vl53l3cx::new(range, pin, &boot, BELOW, clock.clone(), Config::default());
+        let outcome = RefCell::new(None);
+        let mut tasks = Tasks::new(clock.clone());
+        let timer = clock.clone();
+        tasks.spawn(async move {
+            timer.sleep_until(timer.now() + Duration::from_micros(2_000 + 7 * phase)).await;
+            loop {
+                let mut bytes = [0; 10];
+                greedy.write_read(0x76, &[0xF3], &mut bytes).await.expect("it has started");
+            }
+        });
+        tasks.spawn(async { *outcome.borrow_mut() = Some(below.start().await) });
+        tasks.run_until(clock.now() + Duration::from_secs(1));
+        drop(tasks);
+        assert_eq!(outcome.into_inner(), Some(Ok(())), "phase {phase}");
+    }
 }

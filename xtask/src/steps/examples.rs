@@ -1,8 +1,11 @@
-//! `examples`: every example of the examples package still runs to its end.
+//! `examples`: every example of the examples package, and of every driver over its emulated chip, still runs to its end.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::fs;
+
+/// A driver's example for this PC.
+const EMULATED: &str = "examples/emulated.rs";
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let folder = repository.root.join("examples/examples");
@@ -10,6 +13,9 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     // What is no file is what examples share.
     let programs = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file());
     let mut names: Vec<String> = programs.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned())).collect();
+    let libraries = repository.libraries()?;
+    let emulated = libraries.iter().filter(|library| repository.root.join(&library.folder).join(EMULATED).exists());
+    names.extend(emulated.map(|library| library.name.replace("stampfly-", "emulated-")));
     names.sort();
     // All of the workspace's at once, as `cargo test` has built them: for one package alone, features and with them all
     // dependencies would be others.

@@ -20,6 +20,7 @@ pub mod files;
 pub mod fmt;
 pub mod fuzz;
 pub mod golden;
+pub mod hals;
 pub mod lines;
 pub mod loom;
 pub mod machine;

@@ -2,6 +2,7 @@
 
 use stampfly_bmi270::{Bmi270, Config};
 use stampfly_driver_core::Timebase;
+use stampfly_driver_core::chip::TransferLimit;
 use stampfly_driver_fakes::closure::{AXES, Access, Clock, Fault, SpiBus};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -123,5 +124,5 @@ pub fn driver(
 ) -> Bmi270<'static, impl stampfly_driver_core::chip::Registers<Error = Fault>, Clock> {
     let chip = chip.clone();
     let bus = SpiBus { clock: clock.clone(), chip: move |access: Access<'_>| chip.borrow_mut().access(access) };
-    Bmi270::spi(bus, clock.clone(), &BLOB, AXES, config)
+    Bmi270::spi(bus, clock.clone(), &BLOB, AXES, config).with_transfer_limit(TransferLimit::SPI_SENSORS)
 }

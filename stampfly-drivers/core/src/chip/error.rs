@@ -37,6 +37,8 @@ pub enum ChipError<E> {
     SelfTest,
     /// The chip answered with data that cannot be.
     Data,
+    /// The clock of the [`Timebase`](crate::Timebase) stands still while its delays end, so no deadline would ever come.
+    ClockStopped,
 }
 
 impl<E: Debug> SensorError for ChipError<E> {
@@ -49,7 +51,7 @@ impl<E: Debug> SensorError for ChipError<E> {
                 SensorErrorKind::Configuration
             }
             Self::Restarted => SensorErrorKind::Restarted,
-            Self::Pin => SensorErrorKind::Other,
+            Self::Pin | Self::ClockStopped => SensorErrorKind::Other,
             Self::SelfTest => SensorErrorKind::SelfTest,
             Self::Data => SensorErrorKind::Data,
         }
@@ -72,6 +74,7 @@ impl<E: Debug> Display for ChipError<E> {
             Self::Restarted => "the chip lost its settings",
             Self::SelfTest => "the self test failed",
             Self::Data => "the chip answered with data that cannot be",
+            Self::ClockStopped => "the clock stands still: what does the time base's `now` return?",
         };
         f.write_str(said)
     }

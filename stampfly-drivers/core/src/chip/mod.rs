@@ -15,4 +15,4 @@ mod port;
 pub use axis::{Axis, AxisMap};
 pub use error::ChipError;
 pub use limit::TransferLimit;
-pub use port::{I2cRegisters, Port, Registers, SpiRegisters, bounded};
+pub use port::{I2cRegisters, Port, Registers, SpiRegisters, Wires, bounded};

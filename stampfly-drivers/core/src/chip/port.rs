@@ -2,7 +2,7 @@
 
 use super::{ChipError, TransferLimit};
 use crate::Timebase;
-use crate::time::{sleep_until, within};
+use crate::time::{Standstill, sleep_until, within};
 use core::fmt::Debug;
 use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
@@ -30,6 +30,15 @@ pub trait Registers<A = u8> {
     async fn write(&mut self, register: A, data: &[u8]) -> Result<(), Self::Error>;
 }
 
+/// Registers that give back the wires they were made of.
+pub trait Wires {
+    /// The bus or device.
+    type Bus;
+
+    /// Gives it back.
+    fn release(self) -> Self::Bus;
+}
+
 /// Bytes of data in an I2C write: as many as Linux's SMBus calls and the buffers of small controllers hold.
 const I2C_WRITE: usize = 32;
 /// The same with a register of two bytes.
@@ -46,11 +55,6 @@ impl<I: I2c> I2cRegisters<I> {
     /// The chip with this 7-bit address.
     pub const fn new(bus: I, address: u8) -> Self {
         Self { bus, address }
-    }
-
-    /// Gives the bus back.
-    pub fn release(self) -> I {
-        self.bus
     }
 
     async fn read_after(&mut self, register: &[u8], into: &mut [u8]) -> Result<(), I::Error> {
@@ -70,6 +74,14 @@ impl<I: I2c> I2cRegisters<I> {
             *place = *byte;
         }
         self.bus.write(self.address, joined).await
+    }
+}
+
+impl<I> Wires for I2cRegisters<I> {
+    type Bus = I;
+
+    fn release(self) -> I {
+        self.bus
     }
 }
 
@@ -101,24 +113,36 @@ impl<I: I2c> Registers<u16> for I2cRegisters<I> {
     }
 }
 
-/// Registers behind an SPI chip select, as Bosch's inertial sensors do it: bit 7 of the address says read, and one
-/// dummy byte comes before the data (BMI270 data sheet §6, "SPI interface").
+/// Registers behind an SPI chip select, as Bosch's sensors do it: bit 7 of the address says read, and the other seven are the register's.
+///
+/// `DUMMY` bytes pass between the address of a read and its data: one with an inertial sensor (BMI270 data sheet §6, "SPI interface"), none
+/// with a barometer or a magnetometer (BMP280 data sheet §5.3, BMM150 data sheet, "SPI interface"). Other numbers do not compile.
 #[derive(Debug)]
-pub struct SpiRegisters<S>(pub S);
+pub struct SpiRegisters<S, const DUMMY: usize = 1>(pub S);
 
-impl<S: SpiDevice> Registers for SpiRegisters<S> {
+impl<S: SpiDevice, const DUMMY: usize> Registers for SpiRegisters<S, DUMMY> {
     type Error = S::Error;
     const LIMIT: TransferLimit = TransferLimit::SPI;
     /// Small enough for the DMA buffers of small parts.
     const LONGEST_WRITE: usize = 256;
 
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), S::Error> {
-        // The dummy byte is clocked in while a second byte is clocked out.
-        self.0.transaction(&mut [spi::Operation::Write(&[register | 0x80, 0]), spi::Operation::Read(into)]).await
+        const { assert!(DUMMY < 2, "no chip has more than one") };
+        // A dummy byte is clocked in while a second byte is clocked out.
+        let command: &[u8] = if DUMMY == 0 { &[register | 0x80] } else { &[register | 0x80, 0] };
+        self.0.transaction(&mut [spi::Operation::Write(command), spi::Operation::Read(into)]).await
     }
 
     async fn write(&mut self, register: u8, data: &[u8]) -> Result<(), S::Error> {
         self.0.transaction(&mut [spi::Operation::Write(&[register & 0x7F]), spi::Operation::Write(data)]).await
+    }
+}
+
+impl<S, const DUMMY: usize> Wires for SpiRegisters<S, DUMMY> {
+    type Bus = S;
+
+    fn release(self) -> S {
+        self.0
     }
 }
 
@@ -143,12 +167,13 @@ pub struct Port<R, T> {
     registers: R,
     clock: T,
     limit: TransferLimit,
+    standstill: Standstill,
 }
 
 impl<R, T> Port<R, T> {
     /// Registers, the clock that bounds their transfers, and how long one may take.
     pub const fn new(registers: R, clock: T, limit: TransferLimit) -> Self {
-        Self { registers, clock, limit }
+        Self { registers, clock, limit, standstill: Standstill::new() }
     }
 
     /// Gives a transfer up after another time from now on.
@@ -156,9 +181,12 @@ impl<R, T> Port<R, T> {
         self.limit = limit;
     }
 
-    /// Gives registers and clock back.
-    pub fn release(self) -> (R, T) {
-        (self.registers, self.clock)
+    /// Gives the bus, or the device, and the clock back.
+    pub fn release(self) -> (R::Bus, T)
+    where
+        R: Wires,
+    {
+        (self.registers.release(), self.clock)
     }
 }
 
@@ -166,11 +194,13 @@ impl<R, T: Timebase> Port<R, T> {
     /// Reads `N` bytes from a register on.
     ///
     /// # Errors
-    /// [`ChipError::Bus`] when the bus refuses, [`ChipError::BusTimeout`] when it takes longer than the limit.
+    /// [`ChipError::Bus`] when the bus refuses, [`ChipError::BusTimeout`] when it takes longer than the limit, [`ChipError::ClockStopped`]
+    /// when the clock took no notice of the waits before: so everything that polls ends.
     pub async fn read<A, const N: usize>(&mut self, register: A) -> Result<[u8; N], ChipError<R::Error>>
     where
         R: Registers<A>,
     {
+        self.check_clock()?;
         let mut bytes = [0; N];
         bounded(&mut self.clock, self.limit.of(N), self.registers.read(register, &mut bytes)).await?;
         Ok(bytes)
@@ -196,7 +226,16 @@ impl<R, T: Timebase> Port<R, T> {
     where
         R: Registers<A>,
     {
+        self.check_clock()?;
         bounded(&mut self.clock, self.limit.of(data.len()), self.registers.write(register, data)).await
+    }
+
+    /// For whoever waits again and again without a transfer in between.
+    ///
+    /// # Errors
+    /// [`ChipError::ClockStopped`] when the clock took no notice of waits of 100 ms in all.
+    pub fn check_clock<E>(&mut self) -> Result<(), ChipError<E>> {
+        if self.standstill.take() { Err(ChipError::ClockStopped) } else { Ok(()) }
     }
 
     /// Time since power-on.
@@ -218,7 +257,11 @@ impl<R, T: Timebase> Port<R, T> {
 
     /// Leaves the chip alone until then; returns at once when that has passed.
     pub async fn wait_until(&mut self, instant: Instant) {
-        sleep_until(&mut self.clock, instant).await;
+        let left = instant.since(self.clock.now());
+        if left > Duration::ZERO {
+            sleep_until(&mut self.clock, instant).await;
+            self.standstill.note(left, self.clock.now());
+        }
     }
 }
 
@@ -241,11 +284,11 @@ pub async fn bounded<T: Timebase, V, E>(
     within(clock, limit, transfer).await.ok_or(ChipError::BusTimeout)?.map_err(ChipError::Bus)
 }
 
-/// The method of every driver on I2C that changes how long a transfer may take; its port is in a field `port`.
+/// The method of every driver on a port that changes how long a transfer may take; its port is in a field `port`.
 #[macro_export]
 macro_rules! transfer_limit {
     () => {
-        /// Gives up a transfer after this time instead of [`TransferLimit::I2C`].
+        /// Gives up a transfer after this time instead of [`TransferLimit::I2C`] or [`TransferLimit::SPI`].
         #[must_use]
         pub fn with_transfer_limit(mut self, limit: $crate::chip::TransferLimit) -> Self {
             self.port.limit_transfers(limit);
@@ -259,9 +302,11 @@ macro_rules! transfer_limit {
 macro_rules! release {
     () => {
         /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
-        pub fn release(self) -> (I, T) {
-            let (registers, clock) = self.port.release();
-            (registers.release(), clock)
+        pub fn release(self) -> (R::Bus, T)
+        where
+            R: $crate::chip::Wires,
+        {
+            self.port.release()
         }
     };
 }

@@ -30,6 +30,8 @@ pub struct Chip {
     /// Measurements that have been read.
     pub read: Vec<u64>,
     pub identification: [u8; 2],
+    /// What the factory found to be missing, mm.
+    pub factory: i16,
     /// Status code, distance in mm.
     pub target: (u8, i16),
     pub blind: bool,
@@ -64,6 +66,7 @@ impl Chip {
             cleared: 0,
             read: Vec::new(),
             identification: [0xEA, 0xAA],
+            factory: 0,
             target: (9, 1_234),
             blind: false,
             boots: true,
@@ -154,6 +157,7 @@ impl Chip {
         self.registers[0x31] = u8::from(measured > self.cleared);
         self.registers[0xE5] = u8::from(self.boots);
         self.registers[0xDE..0xE0].copy_from_slice(&1_000u16.to_be_bytes());
+        self.registers[0x22..0x24].copy_from_slice(&self.factory.to_be_bytes());
         self.registers[0x10F..0x111].copy_from_slice(&self.identification);
         self.looks += u32::from(register == 0x30);
         if register == 0x89 {

@@ -235,3 +235,16 @@ fn a_configuration_that_arrives_garbled_is_told_and_sent_again() {
     assert_eq!(block_on(below.next()), Err(ChipError::Configuration { status: 0x07 }));
     assert!(block_on(below.next()).is_ok());
 }
+
+#[test]
+fn what_the_factory_found_missing_is_added_by_the_chip() {
+    for missing in [0i16, 5, -12] {
+        let bench = Bench::new();
+        bench.chips[0].borrow_mut().factory = missing;
+        let [mut below, _] = bench.drivers();
+        block_on(below.next()).expect("a sample");
+        let chip = bench.chips[0].borrow();
+        let added = i16::from_be_bytes([chip.registers[0x1E], chip.registers[0x1F]]);
+        assert_eq!(added, 4 * missing, "in quarters of a millimetre");
+    }
+}

@@ -18,7 +18,7 @@ fn barometer(spoil: Spoil) -> Bench<Bmp280<I2cRegisters<Spoilt<I2cBus>>, Clock>>
     clock.advance_to(clock.now() + Duration::from_millis(2));
     let bus = Spoilt { bus, clock: clock.clone(), spoil };
     let driver =
-        Bmp280::new(bus, Bmp280::SDO_LOW, clock.clone(), config).with_transfer_limit(TransferLimit::I2C_SENSORS);
+        Bmp280::i2c(bus, Bmp280::SDO_LOW, clock.clone(), config).with_transfer_limit(TransferLimit::I2C_SENSORS);
     (clock, attached, driver)
 }
 

@@ -1,0 +1,38 @@
+//! A BMP280 on an ESP32-C6, without an executor: SDA at GPIO6, SCL at GPIO7. Shows pressure, temperature and height
+//! on the serial port.
+//!
+//! `stampfly-drivers/boards/esp32` has the versions of the crates and the linker's settings: `cargo run --release --example bmp280` there. On
+//! another ESP32 only the pins' names change.
+
+#![no_std]
+#![no_main]
+
+use esp_backtrace as _;
+use esp_hal::delay::Delay;
+use esp_hal::i2c::master::{Config as I2cConfig, I2c};
+use esp_println::println;
+use stampfly_bmp280::blocking::{Blocking, BlockingClock, block_on};
+use stampfly_bmp280::{Barometer, Bmp280, Config, Instant};
+
+esp_bootloader_esp_idf::esp_app_desc!();
+
+#[esp_hal::main]
+fn main() -> ! {
+    let board = esp_hal::init(esp_hal::Config::default());
+    let now = || Instant::from_micros(esp_hal::time::Instant::now().duration_since_epoch().as_micros());
+    let clock = BlockingClock::new(Delay::new(), now);
+    let bus = I2c::new(board.I2C0, I2cConfig::default()).expect("a frequency it can do");
+    let bus = bus.with_sda(board.GPIO6).with_scl(board.GPIO7);
+    let mut barometer = Bmp280::i2c(Blocking(bus), Bmp280::SDO_LOW, clock, Config::default());
+    loop {
+        match block_on(barometer.next()) {
+            Ok(sample) => {
+                println!("{} Pa, {} °C, {:.2} m", sample.data.pressure, sample.data.temperature, sample.data.altitude)
+            }
+            Err(error) => {
+                println!("{}", error);
+                Delay::new().delay_millis(100);
+            }
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! A BMP280 on a computer with Linux, such as a Raspberry Pi: on I2C at `/dev/i2c-1`, or with the argument `spi` on SPI at `/dev/spidev0.0`. Shows
+//! pressure, temperature and height.
+//!
+//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example bmp280` there, or `cargo run --example bmp280 spi`.
+
+use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
+use linux_embedded_hal::{Delay, I2cdev, SpidevDevice};
+use stampfly_bmp280::blocking::{Blocking, BlockingClock, block_on};
+use stampfly_bmp280::{Barometer, Bmp280, Config, Instant};
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let start = std::time::Instant::now();
+    let clock = BlockingClock::new(Delay, move || Instant::from_micros(start.elapsed().as_micros() as u64));
+    if std::env::args().any(|argument| argument == "spi") {
+        let mut device = SpidevDevice::open("/dev/spidev0.0")?;
+        device.configure(&SpidevOptions::new().max_speed_hz(10_000_000).mode(SpiModeFlags::SPI_MODE_3).build())?;
+        show(Bmp280::spi(Blocking(device), clock, Config::default()))
+    } else {
+        let bus = I2cdev::new("/dev/i2c-1")?;
+        show(Bmp280::i2c(Blocking(bus), Bmp280::SDO_LOW, clock, Config::default()))
+    }
+}
+
+/// Whichever wires it hangs on.
+fn show<E: Error + 'static>(mut barometer: impl Barometer<Error = E>) -> Result<(), Box<dyn Error>> {
+    loop {
+        let sample = block_on(barometer.next())?;
+        println!("{} Pa, {} °C, {:.2} m", sample.data.pressure, sample.data.temperature, sample.data.altitude);
+    }
+}

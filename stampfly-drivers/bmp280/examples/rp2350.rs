@@ -1,0 +1,39 @@
+//! A BMP280 on a Raspberry Pi Pico 2: SDA at GP4, SCL at GP5. Shows pressure, temperature and height
+//! through the debug probe.
+//!
+//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example bmp280` there.
+
+#![no_std]
+#![no_main]
+
+use defmt::{info, warn};
+use defmt_rtt as _;
+use embassy_executor::Spawner;
+use embassy_rp::bind_interrupts;
+use embassy_rp::i2c;
+use embassy_rp::peripherals::I2C0;
+use embassy_time::Timer;
+use panic_probe as _;
+use stampfly_bmp280::{Barometer, Bmp280, Config, EmbassyClock};
+
+bind_interrupts!(struct Interrupts {
+    I2C0_IRQ => i2c::InterruptHandler<I2C0>;
+});
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let board = embassy_rp::init(Default::default());
+    let bus = i2c::I2c::new_async(board.I2C0, board.PIN_5, board.PIN_4, Interrupts, i2c::Config::default());
+    let mut barometer = Bmp280::i2c(bus, Bmp280::SDO_LOW, EmbassyClock, Config::default());
+    loop {
+        match barometer.next().await {
+            Ok(sample) => {
+                info!("{} Pa, {} °C, {} m", sample.data.pressure, sample.data.temperature, sample.data.altitude)
+            }
+            Err(error) => {
+                warn!("{}", error);
+                Timer::after_millis(100).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Nothing: the programs are in the folder `examples` of each chip's crate, and `Cargo.toml` lists them.
