@@ -6,7 +6,7 @@
 //! | StampFly flight capture | inertial, range | – |
 //! | NanoBench | inertial, velocity from motion capture | motion capture, above 0.3 m after three seconds |
 //! | BROAD | inertial, magnetic field: the attitude filter | motion capture, while moving |
-//! | PX4 replay | inertial, barometer | – |
+//! | PX4 replay | inertial, satellite receiver, magnetic field, barometer | the receiver, the magnetometer, EKF2's own states |
 //!
 //! The same filter with the same code as in flight; where nothing measures a position, the attitude filter. Its tuning differs between sensor suites (see [`suite`]), never
 //! between files of one. It is never told that the vehicle stands: that would be half the answer.
@@ -17,18 +17,21 @@ mod accuracy;
 mod dead_reckoning;
 mod drive;
 mod figures;
+mod receiver;
 mod start;
 
 pub use accuracy::Accuracy;
 pub use dead_reckoning::{Reach, path, reach};
 pub use drive::{Drive, Instance, Tally, drive};
 pub use figures::Figures;
+pub use receiver::{AgainstReceiver, Receiver};
 pub use start::Start;
 
 use crate::dataset::{Kind, Recording};
 use crate::flight::Flight;
 use stampfly_board::VehicleConfig;
 use stampfly_eskf::attitude::AttitudeConfig;
+use stampfly_eskf::{EskfConfig, StartHeading};
 use stampfly_types::Vec3;
 
 /// Which estimator runs over a recording.
@@ -48,6 +51,8 @@ pub struct Suite {
     pub method: Method,
     /// Tuning of the estimators that fly. The attitude filter has [its own](attitude_suite).
     pub vehicle: VehicleConfig,
+    /// How good the recording's satellite receiver is, where it has one.
+    pub receiver: Receiver,
 }
 
 /// An estimate over one recording, with its figures.
@@ -101,7 +106,12 @@ pub fn suite(kind: Kind) -> Suite {
             config.eskf.unobserved_velocity = 0.06;
             config.eskf.gate = 6.7;
         }
-        Kind::StampFlyFlight | Kind::Px4Replay => {}
+        // Under the open sky, with a magnetometer that tells the heading at the start. Nothing else is known of these vehicles.
+        Kind::Px4Replay => {
+            config.eskf =
+                EskfConfig { mag_enable: true, start_heading: StartHeading::Magnetic, ..EskfConfig::outdoors() };
+        }
+        Kind::StampFlyFlight => {}
     }
     suite
 }
@@ -135,7 +145,7 @@ pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
 pub fn run(recording: &Recording, suite: &Suite) -> Estimated {
     let start = Start::of(recording);
     let drive = drive(recording, &start, suite);
-    let figures = Figures::of(recording, &start, &drive);
+    let figures = Figures::of(recording, &start, &drive, &suite.receiver);
     Estimated { start, drive, figures }
 }
 
