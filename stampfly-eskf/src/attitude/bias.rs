@@ -23,6 +23,26 @@ const VERTICAL_WEIGHT: f32 = 1e-4;
 /// The heading's drift updates the bias when it comes from clean fields by more than this share.
 const CLEAN: f32 = 0.8;
 
+/// A bias and how well it is known, to go back to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct KnownBias {
+    value: Vec3,
+    covariance: Matrix3<f32>,
+}
+
+impl KnownBias {
+    /// The bias, body, rad/s.
+    pub fn value(&self) -> Vec3 {
+        self.value
+    }
+
+    /// One standard deviation of the worst axis, rad/s.
+    pub fn sigma(&self) -> f32 {
+        stampfly_types::math::sqrt(self.covariance.diagonal().max())
+    }
+}
+
 /// Estimates the gyro's bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -58,6 +78,16 @@ impl GyroBias {
         self.value
     }
 
+    /// What is known now.
+    pub fn known(&self) -> KnownBias {
+        KnownBias { value: self.value, covariance: self.covariance }
+    }
+
+    /// Goes back to what was known.
+    pub fn restore(&mut self, known: &KnownBias) {
+        (self.value, self.covariance) = (known.value, known.covariance);
+    }
+
     /// What the start knew, body, rad/s.
     pub fn calibrated(&self) -> &Vec3 {
         &self.calibrated
@@ -65,7 +95,7 @@ impl GyroBias {
 
     /// One standard deviation of the worst axis, rad/s.
     pub fn sigma(&self) -> f32 {
-        stampfly_types::math::sqrt(self.covariance.diagonal().max())
+        self.known().sigma()
     }
 
     /// One standard deviation along an axis of the body, rad/s.

@@ -29,6 +29,7 @@ use super::low_pass::LowPass;
 use super::magnetic::Magnetic;
 use super::rotation::{from_vector, product, upwards, within};
 use super::stationary::StationaryDetector;
+use super::witness::Witness;
 use crate::level::attitude_from_specific_force;
 use nalgebra::Matrix3;
 use stampfly_types::messages::CalibrationResult;
@@ -73,6 +74,7 @@ pub struct AttitudeFilter {
     force: LowPass<3>,
     bias: GyroBias,
     stationary: StationaryDetector,
+    witness: Witness,
     magnetic: Magnetic,
     heading: Heading,
     hard_iron: HardIron,
@@ -96,6 +98,7 @@ impl AttitudeFilter {
             force: LowPass::new(config.accel_time),
             bias: GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma),
             stationary: StationaryDetector::new(&config),
+            witness: Witness::new(),
             magnetic: Magnetic::new(None),
             heading: Heading::unknown(),
             hard_iron: HardIron::new(&config),
@@ -165,6 +168,12 @@ impl AttitudeFilter {
         let vertical = turn.row(2).transpose().into();
         self.heading.predict(self.bias.sigma_along(&vertical), self.rate.norm(), dt);
         self.stationary.step(config, accel, gyro, self.bias.calibrated(), dt);
+        if self.stationary.is_quiet() {
+            self.witness.is_quiet(self.stationary.is_stationary(config), &self.bias, dt);
+        } else if let Some(contradiction) = self.witness.moves(&self.bias) {
+            self.undo_rest(contradiction);
+        }
+        let config = &self.config;
         if self.stationary.is_stationary(config) {
             self.bias.update_stationary(config, &self.stationary.rate(), dt);
         } else if self.force.is_settled() {

@@ -19,6 +19,7 @@ mod magnetic;
 mod mahony;
 mod rotation;
 mod stationary;
+mod witness;
 
 pub use config::AttitudeConfig;
 pub use filter::AttitudeFilter;
