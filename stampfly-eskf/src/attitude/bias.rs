@@ -28,7 +28,8 @@ const CLEAN: f32 = 0.8;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct KnownBias {
     value: Vec3,
-    covariance: Matrix3<f32>,
+    /// The covariance's upper triangle: row by row.
+    upper: [f32; 6],
 }
 
 impl KnownBias {
@@ -39,7 +40,8 @@ impl KnownBias {
 
     /// One standard deviation of the worst axis, rad/s.
     pub fn sigma(&self) -> f32 {
-        stampfly_types::math::sqrt(self.covariance.diagonal().max())
+        let [x, _, _, y, _, z] = self.upper;
+        stampfly_types::math::sqrt(x.max(y).max(z))
     }
 }
 
@@ -80,12 +82,15 @@ impl GyroBias {
 
     /// What is known now.
     pub fn known(&self) -> KnownBias {
-        KnownBias { value: self.value, covariance: self.covariance }
+        let [[xx, _, _], [xy, yy, _], [xz, yz, zz]] = self.covariance.data.0;
+        KnownBias { value: self.value, upper: [xx, xy, xz, yy, yz, zz] }
     }
 
     /// Goes back to what was known.
     pub fn restore(&mut self, known: &KnownBias) {
-        (self.value, self.covariance) = (known.value, known.covariance);
+        let [xx, xy, xz, yy, yz, zz] = known.upper;
+        self.value = known.value;
+        self.covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     }
 
     /// What the start knew, body, rad/s.
@@ -95,7 +100,7 @@ impl GyroBias {
 
     /// One standard deviation of the worst axis, rad/s.
     pub fn sigma(&self) -> f32 {
-        self.known().sigma()
+        stampfly_types::math::sqrt(self.covariance.diagonal().max())
     }
 
     /// One standard deviation along an axis of the body, rad/s.

@@ -23,6 +23,7 @@ mod field;
 use super::bias::GyroBias;
 use super::bookkeeping::Bookkeeping;
 use super::config::AttitudeConfig;
+use super::delay::MagDelay;
 use super::hard_iron::HardIron;
 use super::heading::Heading;
 use super::low_pass::LowPass;
@@ -78,6 +79,7 @@ pub struct AttitudeFilter {
     magnetic: Magnetic,
     heading: Heading,
     hard_iron: HardIron,
+    mag_delay: MagDelay,
     /// Hard iron that samples are freed of.
     offset: Vec3,
     rate: Vec3,
@@ -102,6 +104,7 @@ impl AttitudeFilter {
             magnetic: Magnetic::new(None),
             heading: Heading::unknown(),
             hard_iron: HardIron::new(&config),
+            mag_delay: MagDelay::default(),
             offset: Vec3::zeros(),
             rate: Vec3::zeros(),
             accel: Vec3::zeros(),
@@ -218,6 +221,12 @@ impl AttitudeFilter {
     #[must_use]
     pub fn hard_iron(&self) -> Vec3 {
         self.offset
+    }
+
+    /// By how much the magnetometer's samples are older than their stamps, s, as far as it is known.
+    #[must_use]
+    pub fn mag_delay(&self) -> f32 {
+        self.config.mag_delay + self.mag_delay.value(&self.config)
     }
 
     /// Is the body at rest?

@@ -10,6 +10,7 @@
 mod bias;
 mod bookkeeping;
 mod config;
+mod delay;
 mod estimator;
 mod filter;
 mod hard_iron;

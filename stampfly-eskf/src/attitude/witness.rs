@@ -67,9 +67,8 @@ impl Rest {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Witness {
-    /// Mean of the last moment, and over what time, s.
+    /// Mean of the last moment; zero before the first.
     field: Vec3,
-    averaged: f32,
     /// The field when the body became quiet.
     first: Option<Vec3>,
     /// For how long it has been quiet since, s.
@@ -79,12 +78,12 @@ pub(super) struct Witness {
 
 impl Witness {
     pub const fn new() -> Self {
-        Self { field: Vec3::zeros(), averaged: 0.0, first: None, quiet_for: 0.0, rest: None }
+        Self { field: Vec3::zeros(), first: None, quiet_for: 0.0, rest: None }
     }
 
     /// Another hard iron is taken out of the field from now on.
     pub fn start_over(&mut self) {
-        (self.averaged, self.first) = (0.0, None);
+        (self.field, self.first) = (Vec3::zeros(), None);
     }
 
     /// The body is not quiet. A rest that ends before it was confirmed is one if the field fits it better than a turn; where no
@@ -132,8 +131,8 @@ impl Witness {
         bias: &GyroBias,
         dt: f32,
     ) -> Option<Contradiction> {
-        self.averaged = (self.averaged + dt).min(config.rest_filter_time.max(dt));
-        self.field += (field - self.field) * (dt / self.averaged);
+        let share = if self.field == Vec3::zeros() { 1.0 } else { (dt / config.rest_filter_time).min(1.0) };
+        self.field += (field - self.field) * share;
         let now = self.field;
         if self.quiet_for <= 0.0 {
             return None;

@@ -2,7 +2,7 @@
 
 use super::receiver::Receiver;
 use super::start::Start;
-use super::{Method, Suite, attitude_suite};
+use super::{Method, Suite};
 use crate::dataset::Recording;
 use stampfly_board::EstimatorKind;
 use stampfly_drivers::Sample;
@@ -97,7 +97,7 @@ fn velocities(recording: &Recording, start: &Start) -> Vec<Sample<Vec3>> {
 pub fn drive(recording: &Recording, start: &Start, suite: &Suite) -> Drive {
     match (suite.method, suite.vehicle.estimator) {
         (Method::Attitude, _) => {
-            let drive = through(recording, start, suite, AttitudeFilter::new(attitude_suite(recording.kind)));
+            let drive = through(recording, start, suite, AttitudeFilter::new(suite.attitude));
             Drive { holds_position: false, ..drive }
         }
         (Method::Vehicle, EstimatorKind::Complementary) => {

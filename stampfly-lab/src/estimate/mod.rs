@@ -49,8 +49,10 @@ pub enum Method {
 pub struct Suite {
     /// Which estimator.
     pub method: Method,
-    /// Tuning of the estimators that fly. The attitude filter has [its own](attitude_suite).
+    /// Tuning of the estimators that fly.
     pub vehicle: VehicleConfig,
+    /// That of the attitude filter.
+    pub attitude: AttitudeConfig,
     /// How good the recording's satellite receiver is, where it has one.
     pub receiver: Receiver,
 }
@@ -69,7 +71,7 @@ pub struct Estimated {
 /// The tuning for recordings of this kind: the vehicle's, but for what its sensors do differently.
 #[must_use]
 pub fn suite(kind: Kind) -> Suite {
-    let mut suite = Suite::default();
+    let mut suite = Suite { attitude: attitude_suite(kind), ..Suite::default() };
     let config = &mut suite.vehicle;
     match kind {
         Kind::Broad => {
@@ -118,11 +120,16 @@ pub fn suite(kind: Kind) -> Suite {
 
 /// The attitude filter's tuning for recordings of this kind: its own defaults, but for how late the sensors are.
 #[must_use]
-pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
+fn attitude_suite(kind: Kind) -> AttitudeConfig {
     match kind {
         // Against the cameras' clock, the same within a millisecond in every trial: the gyro's rotation is complete 2.3 ms
         // after the cameras', and the field fits the earth's best when it is taken for 15 ms old.
-        Kind::Broad => AttitudeConfig { inertial_delay: 0.0023, mag_delay: 0.015, ..AttitudeConfig::default() },
+        Kind::Broad => AttitudeConfig {
+            inertial_delay: 0.0023,
+            mag_delay: 0.015,
+            mag_delay_sigma: 0.0,
+            ..AttitudeConfig::default()
+        },
         _ => AttitudeConfig::default(),
     }
 }

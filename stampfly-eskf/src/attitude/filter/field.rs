@@ -43,13 +43,16 @@ impl AttitudeFilter {
         let dt = dt.min(LONGEST_STEP);
         self.ask_witness(field, dt);
         // Where the body was when the field was what this sample says.
-        let late = age + self.config.mag_delay - self.config.inertial_delay;
+        let late = age + self.mag_delay() - self.config.inertial_delay;
         let then = product(&self.strapdown, &from_vector(&(self.rate * -late)));
         let turn = Matrix3::from(self.level * then);
         self.remove_hard_iron(&turn, field, dt);
         let config = &self.config;
         let stationary = self.stationary.is_stationary(config);
         let level = turn * (field - self.offset);
+        if config.mag_delay_sigma > 0.0 && self.force.is_settled() {
+            self.mag_delay.step(config, &level, &(turn * self.rate), dt);
+        }
         let vertical = turn.row(2).transpose().into();
         let status = self.magnetic.step(config, &level, self.rate.norm(), dt);
         match status {
