@@ -15,4 +15,5 @@ mod lockout;
 mod own;
 mod reference;
 mod run;
+mod wander;
 mod world;
