@@ -12,6 +12,7 @@
 //! | `eskf/bridge.rs` | inertial samples that are garbage |
 //! | `eskf/measurements.rs` | one update a sensor |
 //! | `eskf/external.rs` | position, velocity, attitude from outside; measurements with a model of one's own |
+//! | `eskf/airspeed.rs` | airspeeds and the wind |
 //! | `eskf/alignment.rs` | north, from how a measured velocity changes |
 //! | `eskf/wander.rs` | how much of a receiver's error stays the same |
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, drag, initial heading, unobserved velocity |
@@ -24,6 +25,7 @@
 //! | `eskf/influence.rs` | what flow did lately, to be undone |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
+mod airspeed;
 mod alignment;
 mod bridge;
 mod external;

@@ -199,7 +199,7 @@ impl Eskf {
     }
 
     /// Position or velocity along these axes has been measured from outside.
-    fn aided(&mut self, [north, east, down]: &[bool; 3]) {
+    pub(super) fn aided(&mut self, [north, east, down]: &[bool; 3]) {
         if *north || *east {
             self.gates.accept(Sensor::Level, self.now);
         }
@@ -273,7 +273,7 @@ impl Eskf {
     /// is no check for repeated stamps, because many sensors may share this door. While the heading is not known, all that
     /// hangs on it is refused as [`Refusal::Missing`]: any horizontal position or velocity.
     ///
-    /// Airspeed along the nose of a plane in still air, wheel speed, and the range to a beacon:
+    /// Wheel speed, and the range to a beacon; for an airspeed see [`fuse_airspeed`](Self::fuse_airspeed):
     ///
     /// ```
     /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, StartHeading, aid::{Row, velocity}, filter::{NominalState, POSITION}};
@@ -290,7 +290,7 @@ impl Eskf {
     ///     if k % 10 != 0 {
     ///         continue;
     ///     }
-    ///     // Airspeed, m/s: the first component of the velocity in the body. A wheel: the same, and the side does not slip.
+    ///     // A wheel, m/s: the first component of the velocity in the body, and the side does not slip.
     ///     let speed = |state: &NominalState| { let [x, y, _] = velocity::body(state); [x, y] };
     ///     assert!(eskf.fuse(at, speed, [0.0, 0.0], [0.04, 0.01], 5.0).is_fused());
     ///     // A range to a beacon, m, a fifth of a second late.
