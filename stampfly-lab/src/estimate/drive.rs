@@ -1,8 +1,7 @@
 //! Takes an estimator through a recording, sample by sample, in the order a vehicle would have seen them.
 
-use super::receiver::Receiver;
 use super::start::Start;
-use super::{Method, Suite};
+use super::{Method, Receiver, Suite};
 use crate::dataset::Recording;
 use stampfly_board::EstimatorKind;
 use stampfly_drivers::Sample;

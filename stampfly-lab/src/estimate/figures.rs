@@ -1,9 +1,10 @@
 //! What is printed about an estimate.
 
+use super::Receiver;
 use super::accuracy::Accuracy;
 use super::dead_reckoning::{Reach, path, reach};
 use super::drive::{Drive, Instance};
-use super::receiver::{AgainstReceiver, Receiver};
+use super::receiver::AgainstReceiver;
 use super::start::Start;
 use crate::dataset::{Kind, Recording, TruthPoint};
 use serde::Serialize;

@@ -24,7 +24,7 @@ pub use accuracy::Accuracy;
 pub use dead_reckoning::{Reach, path, reach};
 pub use drive::{Drive, Instance, Tally, drive};
 pub use figures::Figures;
-pub use receiver::{AgainstReceiver, Receiver};
+pub use receiver::AgainstReceiver;
 pub use start::Start;
 
 use crate::dataset::{Kind, Recording};
@@ -32,7 +32,7 @@ use crate::flight::Flight;
 use stampfly_board::VehicleConfig;
 use stampfly_eskf::attitude::AttitudeConfig;
 use stampfly_eskf::{EskfConfig, StartHeading};
-use stampfly_types::Vec3;
+use stampfly_types::{Duration, Vec3};
 
 /// Which estimator runs over a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,6 +55,28 @@ pub struct Suite {
     pub attitude: AttitudeConfig,
     /// How good the recording's satellite receiver is, where it has one.
     pub receiver: Receiver,
+}
+
+/// What is known of a receiver. The default is what EKF2 takes for one that says nothing about itself: 110 ms late
+/// (`EKF2_GPS_DELAY`), and the accuracies of the fixes of PX4's sensor simulator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// How long before it arrived a fix was valid.
+    pub delay: Duration,
+    /// Standard deviation of a position along each axis, NED, m.
+    pub position_sigma: Vec3,
+    /// Standard deviation of a velocity along each axis, NED, m/s.
+    pub velocity_sigma: Vec3,
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self {
+            delay: Duration::from_millis(110),
+            position_sigma: Vec3::new(0.5, 0.5, 0.8),
+            velocity_sigma: Vec3::new(0.2, 0.2, 0.2),
+        }
+    }
 }
 
 /// An estimate over one recording, with its figures.

@@ -1,4 +1,4 @@
-//! A satellite receiver in a recording: what is known of it, and how far from it estimates are.
+//! How far from a recording's satellite receiver estimates are.
 //!
 //! The receiver is no reference: the filter uses it. Its difference to the estimate says whether the estimate follows it as
 //! closely as another filter does that had the same samples. So each figure is there for the estimate and for the recording
@@ -7,6 +7,7 @@
 //! The device's states are taken to be as late as the receiver: EKF2 writes those of its fusion horizon. An estimate is the
 //! one that a vehicle had at that time, before the fix came.
 
+use super::Receiver;
 use super::accuracy::{Accuracy, Rms};
 use super::drive::{Drive, Instance};
 use super::start::Start;
@@ -20,28 +21,6 @@ use stampfly_types::{Duration, Instant, Quat, Vec3, math};
 const SETTLED: Duration = Duration::from_secs(10);
 /// An estimate, or a state of the device, older than this is not compared: EKF2 writes ten a second.
 const STALE: Duration = Duration::from_millis(150);
-
-/// What is known of a receiver. The default is what EKF2 takes for one that says nothing about itself: 110 ms late
-/// (`EKF2_GPS_DELAY`), and the accuracies of the fixes of PX4's sensor simulator.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Receiver {
-    /// How long before it arrived a fix was valid.
-    pub delay: Duration,
-    /// Standard deviation of a position along each axis, NED, m.
-    pub position_sigma: Vec3,
-    /// Standard deviation of a velocity along each axis, NED, m/s.
-    pub velocity_sigma: Vec3,
-}
-
-impl Default for Receiver {
-    fn default() -> Self {
-        Self {
-            delay: Duration::from_millis(110),
-            position_sigma: Vec3::new(0.5, 0.5, 0.8),
-            velocity_sigma: Vec3::new(0.2, 0.2, 0.2),
-        }
-    }
-}
 
 /// Root mean square differences, at least ten seconds after the start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
