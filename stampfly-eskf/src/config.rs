@@ -123,6 +123,9 @@ pub struct EskfConfig {
     /// Oldest measurement that is placed in time, s: the delay of the slowest sensor, and what its clock may be wrong by. The
     /// memory has the same size for any; beyond 0.11 s it becomes coarser, see [`History`](crate::filter::History).
     pub horizon: f32,
+    /// Positions from outside may be wrong by the same for minutes, as those of satellite receivers are: a position is then not
+    /// claimed better than the part of its stated deviation that does not show from fix to fix.
+    pub position_wander: bool,
     /// For how long position and velocity from outside, and measurements of one's own, hold the outputs valid, s. Meanwhile the
     /// inertial sensor carries them and the covariance says how far.
     pub aiding_timeout: f32,
@@ -167,6 +170,8 @@ impl EskfConfig {
     /// | `aiding_timeout` 10 s | receivers pause under trees and bridges |
     /// | `unaided_velocity`, `unaided_position` | a vehicle that nothing measures is not standing |
     /// | `initial_position` 10 km | the first fix says where it is; a barometer has nothing to be compared with until then |
+    /// | `gravity_sigma` 10 m/s² | without fixes a vehicle that circles or speeds up is not upright because it feels so |
+    /// | `position_wander` | a receiver's error stays the same for a minute |
     /// | `baro_backup` | a receiver's height beside a barometer's |
     /// | `start_heading` unknown | the receiver knows north, the nose does not |
     /// | `accel_noise`, `initial_accel_bias` | vibration is told by `accel_vibration`; start-up bias of any MEMS part |
@@ -199,6 +204,8 @@ impl EskfConfig {
             aiding_timeout: 10.0,
             unaided_velocity: 50.0,
             unaided_position: 5e3,
+            gravity_sigma: 10.0,
+            position_wander: true,
             start_heading: StartHeading::Unknown,
             ..Self::default()
         }
@@ -329,6 +336,7 @@ impl Default for EskfConfig {
             external_lockout: 2.0,
             lockout_samples: 5,
             horizon: 0.1,
+            position_wander: false,
             aiding_timeout: 1.0,
             unaided_velocity: 3.0,
             unaided_position: 10.0,

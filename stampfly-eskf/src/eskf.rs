@@ -12,7 +12,9 @@
 //! | `eskf/bridge.rs` | inertial samples that are garbage |
 //! | `eskf/measurements.rs` | one update a sensor |
 //! | `eskf/external.rs` | position, velocity, attitude from outside; measurements with a model of one's own |
+//! | `eskf/airspeed.rs` | airspeeds and the wind |
 //! | `eskf/alignment.rs` | north, from how a measured velocity changes |
+//! | `eskf/wander.rs` | how much of a receiver's error stays the same |
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, drag, initial heading, unobserved velocity |
 //! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
@@ -23,6 +25,7 @@
 //! | `eskf/influence.rs` | what flow did lately, to be undone |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
+mod airspeed;
 mod alignment;
 mod bridge;
 mod external;
@@ -37,6 +40,7 @@ mod pseudo_measurements;
 mod resets;
 mod standing;
 mod vertical;
+mod wander;
 
 use crate::aid::baro::Offset;
 use crate::aid::gravity::Acceleration;
@@ -65,6 +69,7 @@ use stampfly_types::messages::{
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 use standing::{Standing, StandingShift};
 use vertical::{Correction, VerticalMonitor};
+use wander::Wander;
 
 /// Measurements from farther ahead than this are refused, s.
 const MAX_AHEAD: f32 = 0.02;
@@ -176,6 +181,7 @@ pub struct Eskf {
     history: History,
     calibration: CalibrationResult,
     tallies: Tallies,
+    wander: Wander,
 }
 
 /// The state at the time of a measurement: EKF2's delayed time horizon, computed back for each measurement.
@@ -241,6 +247,7 @@ impl Eskf {
             alignment: Alignment::KNOWN,
             aiding_timeout: Duration::from_seconds(config.aiding_timeout),
             tallies: Tallies::default(),
+            wander: Wander::default(),
         }
     }
 

@@ -202,6 +202,31 @@ fn delays_of_the_sensors_are_made_up_for() {
 }
 
 #[test]
+fn a_magnetometer_that_is_late_by_an_unknown_time_is_found_out() {
+    for (delay, magnet) in
+        [(0.0, Vec3::zeros()), (0.015, Vec3::zeros()), (0.03, Vec3::zeros()), (0.015, Vec3::new(6.0, -4.0, 5.0))]
+    {
+        let mut hand = Hand::new();
+        let mut filter = AttitudeFilter::new(AttitudeConfig::default());
+        let mut seen = std::collections::VecDeque::new();
+        for step in 0..(90.0 / DT) as u32 {
+            let (rate, force) = hand.step(true);
+            filter.step(&force, &rate, DT);
+            seen.push_back(hand.field(EARTH) + magnet);
+            if seen.len() as f32 > delay / DT + 0.5 {
+                let field = seen.pop_front().unwrap();
+                if step % 2 == 0 {
+                    _ = filter.field(&field, 0.0, 2.0 * DT);
+                }
+            }
+        }
+        let found = filter.mag_delay();
+        println!("{delay} s: found {found}");
+        assert!((found - delay).abs() < 0.003, "{found} s, not {delay}");
+    }
+}
+
+#[test]
 fn as_an_estimator_it_reports_validity_and_refusals() {
     let mut filter = AttitudeFilter::new(AttitudeConfig::default());
     let imu = ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), ..Default::default() };

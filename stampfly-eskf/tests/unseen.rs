@@ -1,7 +1,7 @@
 //! What the filter does with what it cannot see, or sees late: cases that recorded data brought up.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
-use stampfly_types::messages::{CalibrationResult, FlowData, ImuData, MagData, TofData};
+use stampfly_types::messages::{CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData, Validity};
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 
 /// Time between inertial samples, and the same in seconds.
@@ -46,6 +46,29 @@ fn without_any_aid_a_biased_accelerometer_is_not_integrated_for_ever() {
     let estimate = eskf.estimate();
     assert!(estimate.velocity.amax() < 1.0, "{:?}", estimate.velocity);
     assert!(!eskf.status().diverged && estimate.attitude.angle() < 0.03);
+}
+
+#[test]
+fn a_height_that_nothing_measures_is_no_divergence_and_one_that_something_measured_is() {
+    // Motors shake the vertical zero away.
+    let run = |ranges: u64, flying: bool| {
+        let mut eskf = started(EskfConfig::indoors());
+        eskf.command(Instant::ZERO, &EstimatorCommand { flying, ..EstimatorCommand::default() });
+        for step in 1..=400 * 30u64 {
+            let at = Instant::ZERO + STEP * step;
+            let shaken = if step > 400 { 3.0 } else { 0.0 };
+            eskf.predict(at, &ImuData { accel: Vec3::new(0.0, 0.0, shaken - GRAVITY), ..Default::default() });
+            if step <= ranges && step % 13 == 0 {
+                _ = eskf.fuse_tof(at, &range(at, 0.5));
+            }
+        }
+        eskf
+    };
+    let unmeasured = run(0, false);
+    let height = unmeasured.estimate().position.z;
+    assert!(!unmeasured.status().diverged && height > 100.0, "nobody claimed {height} m");
+    assert!(!unmeasured.estimate().valid.contains(Validity::POSITION_Z));
+    assert!(run(400, false).status().diverged && run(0, true).status().diverged);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! must be finite, newer than the sensor's last, at most [`horizon`](crate::EskfConfig::horizon) old and at most 0.02 s ahead of the last inertial
 //! sample.
 
+pub mod airspeed;
 pub mod attitude;
 pub mod baro;
 pub mod drag;

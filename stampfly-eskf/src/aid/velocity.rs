@@ -24,7 +24,7 @@ pub fn world(state: &NominalState) -> [Row; 3] {
     [axis(0), axis(1), axis(2)]
 }
 
-/// Predicted velocity in the body, m/s: what wheels and an airspeed sensor in still air measure along x, and what neither a wheel
+/// Predicted velocity in the body, m/s: what wheels measure along x, and what neither a wheel
 /// nor a plane has along y. For [`Eskf::fuse`](crate::Eskf::fuse).
 ///
 /// v_b = Rᵀ·v; a small rotation θ of the body gives v_b + \[v_b\]×·θ.

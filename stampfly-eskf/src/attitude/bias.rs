@@ -23,6 +23,28 @@ const VERTICAL_WEIGHT: f32 = 1e-4;
 /// The heading's drift updates the bias when it comes from clean fields by more than this share.
 const CLEAN: f32 = 0.8;
 
+/// A bias and how well it is known, to go back to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct KnownBias {
+    value: Vec3,
+    /// The covariance's upper triangle: row by row.
+    upper: [f32; 6],
+}
+
+impl KnownBias {
+    /// The bias, body, rad/s.
+    pub fn value(&self) -> Vec3 {
+        self.value
+    }
+
+    /// One standard deviation of the worst axis, rad/s.
+    pub fn sigma(&self) -> f32 {
+        let [x, _, _, y, _, z] = self.upper;
+        stampfly_types::math::sqrt(x.max(y).max(z))
+    }
+}
+
 /// Estimates the gyro's bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -56,6 +78,19 @@ impl GyroBias {
     /// The bias, body, rad/s.
     pub fn value(&self) -> Vec3 {
         self.value
+    }
+
+    /// What is known now.
+    pub fn known(&self) -> KnownBias {
+        let [[xx, _, _], [xy, yy, _], [xz, yz, zz]] = self.covariance.data.0;
+        KnownBias { value: self.value, upper: [xx, xy, xz, yy, yz, zz] }
+    }
+
+    /// Goes back to what was known.
+    pub fn restore(&mut self, known: &KnownBias) {
+        let [xx, xy, xz, yy, yz, zz] = known.upper;
+        self.value = known.value;
+        self.covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     }
 
     /// What the start knew, body, rad/s.

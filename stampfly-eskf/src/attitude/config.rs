@@ -15,6 +15,8 @@ pub struct AttitudeConfig {
     pub inertial_delay: f32,
     /// The same of a magnetometer sample, s: conversion time and averaging.
     pub mag_delay: f32,
+    /// How well `mag_delay` is known, s: the rest is estimated from what the field does in fast turns. Zero: it is known.
+    pub mag_delay_sigma: f32,
 
     /// Standard deviation of the gyro's bias without a calibration, rad/s. Half a degree a second: what sensors have
     /// after they have been calibrated once, some day, at some temperature.
@@ -90,6 +92,7 @@ impl Default for AttitudeConfig {
             accel_time: 3.0,
             inertial_delay: 0.0,
             mag_delay: 0.0,
+            mag_delay_sigma: 0.01,
             initial_bias_sigma: 0.5 * degree,
             bias_walk: 0.02 * degree,
             motion_bias_sigma: 0.1 * degree,

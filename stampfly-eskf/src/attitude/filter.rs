@@ -23,12 +23,14 @@ mod field;
 use super::bias::GyroBias;
 use super::bookkeeping::Bookkeeping;
 use super::config::AttitudeConfig;
+use super::delay::MagDelay;
 use super::hard_iron::HardIron;
 use super::heading::Heading;
 use super::low_pass::LowPass;
 use super::magnetic::Magnetic;
 use super::rotation::{from_vector, product, upwards, within};
 use super::stationary::StationaryDetector;
+use super::witness::Witness;
 use crate::level::attitude_from_specific_force;
 use nalgebra::Matrix3;
 use stampfly_types::messages::CalibrationResult;
@@ -73,9 +75,11 @@ pub struct AttitudeFilter {
     force: LowPass<3>,
     bias: GyroBias,
     stationary: StationaryDetector,
+    witness: Witness,
     magnetic: Magnetic,
     heading: Heading,
     hard_iron: HardIron,
+    mag_delay: MagDelay,
     /// Hard iron that samples are freed of.
     offset: Vec3,
     rate: Vec3,
@@ -96,9 +100,11 @@ impl AttitudeFilter {
             force: LowPass::new(config.accel_time),
             bias: GyroBias::new(&config, Vec3::zeros(), config.initial_bias_sigma),
             stationary: StationaryDetector::new(&config),
+            witness: Witness::new(),
             magnetic: Magnetic::new(None),
             heading: Heading::unknown(),
             hard_iron: HardIron::new(&config),
+            mag_delay: MagDelay::default(),
             offset: Vec3::zeros(),
             rate: Vec3::zeros(),
             accel: Vec3::zeros(),
@@ -165,6 +171,12 @@ impl AttitudeFilter {
         let vertical = turn.row(2).transpose().into();
         self.heading.predict(self.bias.sigma_along(&vertical), self.rate.norm(), dt);
         self.stationary.step(config, accel, gyro, self.bias.calibrated(), dt);
+        if self.stationary.is_quiet() {
+            self.witness.is_quiet(self.stationary.is_stationary(config), &self.bias, dt);
+        } else if let Some(contradiction) = self.witness.moves(&self.bias) {
+            self.undo_rest(contradiction);
+        }
+        let config = &self.config;
         if self.stationary.is_stationary(config) {
             self.bias.update_stationary(config, &self.stationary.rate(), dt);
         } else if self.force.is_settled() {
@@ -209,6 +221,12 @@ impl AttitudeFilter {
     #[must_use]
     pub fn hard_iron(&self) -> Vec3 {
         self.offset
+    }
+
+    /// By how much the magnetometer's samples are older than their stamps, s, as far as it is known.
+    #[must_use]
+    pub fn mag_delay(&self) -> f32 {
+        self.config.mag_delay + self.mag_delay.value(&self.config)
     }
 
     /// Is the body at rest?

@@ -10,6 +10,7 @@
 mod bias;
 mod bookkeeping;
 mod config;
+mod delay;
 mod estimator;
 mod filter;
 mod hard_iron;
@@ -19,6 +20,7 @@ mod magnetic;
 mod mahony;
 mod rotation;
 mod stationary;
+mod witness;
 
 pub use config::AttitudeConfig;
 pub use filter::AttitudeFilter;

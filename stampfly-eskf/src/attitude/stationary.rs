@@ -2,13 +2,16 @@
 //!
 //! Gyro and accelerometer stay close to their own low-passed selves for a while, and the gyro's mean is small enough to be
 //! a bias. A turn that is slower than the largest bias, and perfectly smooth, is taken for rest: no inertial sensor can
-//! tell them apart. A vehicle whose motors run is never at rest for this detector.
+//! tell them apart, a field can ([`witness`](super::witness)). A vehicle whose motors run is never at rest for this detector.
 //!
 //! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.4.
 
 use super::config::AttitudeConfig;
 use super::low_pass::LowPass;
 use stampfly_types::Vec3;
+
+/// By so much the mean rate may change in the time that it takes to be at rest, rad/s: 0.3°/s. Noise of a small gyro, averaged alike, is a tenth of it.
+const EVEN: f32 = 0.3 * core::f32::consts::PI / 180.0;
 
 /// Detects a stationary body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,12 +20,14 @@ pub(super) struct StationaryDetector {
     gyro: LowPass<3>,
     accel: LowPass<3>,
     quiet_for: f32,
+    /// Mean rate when it became quiet.
+    first: Vec3,
 }
 
 impl StationaryDetector {
     pub fn new(config: &AttitudeConfig) -> Self {
         let low_pass = LowPass::new(config.rest_filter_time);
-        Self { gyro: low_pass, accel: low_pass, quiet_for: 0.0 }
+        Self { gyro: low_pass, accel: low_pass, quiet_for: 0.0, first: Vec3::zeros() }
     }
 
     /// Takes an inertial sample; `calibrated` is the gyro bias of the start.
@@ -32,7 +37,22 @@ impl StationaryDetector {
         let quiet = (gyro - self.rate()).norm() < config.rest_rate
             && (accel - Vec3::from(*self.accel.value())).norm() < config.rest_force
             && (self.rate() - calibrated).amax() < config.bias_limit;
-        self.quiet_for = if quiet { (self.quiet_for + dt).min(config.rest_time) } else { 0.0 };
+        if self.quiet_for <= 0.0 {
+            self.first = self.rate();
+        }
+        // A bias stays the same for a while; a rate that changes is motion.
+        let even = self.quiet_for >= config.rest_time || (self.rate() - self.first).norm() < EVEN;
+        self.quiet_for = if quiet && even { (self.quiet_for + dt).min(config.rest_time) } else { 0.0 };
+    }
+
+    /// It was no rest, whatever it looked like.
+    pub fn end(&mut self) {
+        self.quiet_for = 0.0;
+    }
+
+    /// Is it quiet, perhaps not yet for long enough?
+    pub fn is_quiet(&self) -> bool {
+        self.quiet_for > 0.0
     }
 
     /// Has it been quiet for long enough?

@@ -5,6 +5,7 @@
 
 use super::alignment::Step;
 use super::gate::{GateResult, Sensor};
+use super::wander::limited;
 use super::*;
 use crate::measurements::Aiding;
 
@@ -13,6 +14,9 @@ const LEAST_VELOCITY: f32 = 1e-6;
 const LEAST_POSITION: f32 = 1e-8;
 /// Variance of a position that says nothing yet, m²: a kilometre. The first fix is the position then.
 const NOWHERE: f32 = 1e6;
+
+/// Share of a claim that is taken back with each fix when the receiver's error turns out to wander.
+const TAKEN_BACK: f32 = 0.1;
 
 /// A vector of the world with axes that may be missing, beside what was predicted.
 struct Axes {
@@ -129,6 +133,10 @@ impl Eskf {
         let innovation = self.innovation(delayed, axes.rows, axes.measured, axes.variances);
         let ratio = innovation.nis() / self.config.gate_distance(axes.count());
         match self.test_external(Sensor::Position, ratio) {
+            GateResult::Fuse if self.config.position_wander => {
+                self.aided(&axes.given);
+                Ok(self.update_wandering(at, delayed, &axes, ratio))
+            }
             GateResult::Fuse => {
                 self.aided(&axes.given);
                 Ok(self.update(&innovation, ratio))
@@ -146,6 +154,24 @@ impl Eskf {
                 Ok(self.finish_reset(Sensor::Position))
             }
         }
+    }
+
+    /// Updates with a position whose error may stay the same from fix to fix.
+    fn update_wandering(&mut self, at: Instant, delayed: &DelayedState, axes: &Axes, ratio: f32) -> Fusion {
+        let follows =
+            self.wander.fix(at, core::array::from_fn(|axis| axes.measured[axis] - delayed.state.position[axis]));
+        let mut variances = axes.variances;
+        for (axis, variance) in variances.iter_mut().enumerate() {
+            let floor = if follows { self.wander.floor(axis, *variance) } else { 0.0 };
+            let prior = self.covariance.get(POSITION + axis, POSITION + axis);
+            *variance = limited(prior, *variance, floor);
+            // It was taken for white before enough fixes had shown that it is not.
+            self.covariance.inflate(POSITION + axis, TAKEN_BACK * (floor - prior).max(0.0));
+        }
+        let before = self.state.position;
+        let fusion = self.update(&self.innovation(delayed, axes.rows, axes.measured, variances), ratio);
+        self.wander.moved((self.state.position - before).into());
+        fusion
     }
 
     /// May the position along this axis be anywhere?
@@ -173,7 +199,7 @@ impl Eskf {
     }
 
     /// Position or velocity along these axes has been measured from outside.
-    fn aided(&mut self, [north, east, down]: &[bool; 3]) {
+    pub(super) fn aided(&mut self, [north, east, down]: &[bool; 3]) {
         if *north || *east {
             self.gates.accept(Sensor::Level, self.now);
         }
@@ -247,7 +273,7 @@ impl Eskf {
     /// is no check for repeated stamps, because many sensors may share this door. While the heading is not known, all that
     /// hangs on it is refused as [`Refusal::Missing`]: any horizontal position or velocity.
     ///
-    /// Airspeed along the nose of a plane in still air, wheel speed, and the range to a beacon:
+    /// Wheel speed, and the range to a beacon; for an airspeed see [`fuse_airspeed`](Self::fuse_airspeed):
     ///
     /// ```
     /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, StartHeading, aid::{Row, velocity}, filter::{NominalState, POSITION}};
@@ -264,7 +290,7 @@ impl Eskf {
     ///     if k % 10 != 0 {
     ///         continue;
     ///     }
-    ///     // Airspeed, m/s: the first component of the velocity in the body. A wheel: the same, and the side does not slip.
+    ///     // A wheel, m/s: the first component of the velocity in the body, and the side does not slip.
     ///     let speed = |state: &NominalState| { let [x, y, _] = velocity::body(state); [x, y] };
     ///     assert!(eskf.fuse(at, speed, [0.0, 0.0], [0.04, 0.01], 5.0).is_fused());
     ///     // A range to a beacon, m, a fifth of a second late.

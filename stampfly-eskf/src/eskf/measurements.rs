@@ -4,6 +4,7 @@
 use super::flow_monitor::Verdict;
 use super::gate::{GateResult, Sensor};
 use super::vertical::Use;
+use super::wander::limited;
 use super::*;
 use crate::config::MagModel;
 
@@ -286,17 +287,29 @@ impl Eskf {
         let row = aid::baro::altitude(&delayed.state, offset.value());
         let residual = baro.altitude - row.predicted;
         let backup = self.config.baro_backup && self.gates.is_recent_within(Sensor::Down, self.now, FIX_SILENT);
-        let innovation = self.innovation(delayed, [row], [baro.altitude], [noise + offset.variance()]);
+        let variance = noise + offset.variance();
+        let innovation = self.innovation(delayed, [row], [baro.altitude], [variance]);
         let ratio = self.test_ratio(&innovation);
         self.status.baro_innovation = residual;
         self.status.baro_ratio = ratio;
         match self.test(Sensor::Baro, ratio) {
             GateResult::Fuse => {
-                if let Some(offset) = &mut self.baro_offset {
-                    offset.update(residual, noise + self.covariance.get(POSITION + 2, POSITION + 2));
+                // Where the receiver is silent, the zero that it has shown holds the height, and not the other way round.
+                if let Some(offset) = self.baro_offset.as_mut().filter(|_| backup || !self.config.baro_backup) {
+                    offset.update(residual, noise + height);
+                    if backup {
+                        // The same error of the height is in every difference.
+                        offset.inflate((height - offset.variance()).max(0.0));
+                    }
                 }
                 if backup {
                     return Ok(Fusion::Fused { ratio });
+                }
+                if self.config.baro_backup {
+                    // However many altitudes tell the height, it is not known better than the zero.
+                    let variance = limited(height, variance, offset.variance());
+                    let innovation = self.innovation(delayed, [row], [baro.altitude], [variance]);
+                    return Ok(self.update(&innovation, ratio));
                 }
                 Ok(self.update(&innovation, ratio))
             }

@@ -226,17 +226,25 @@ impl Eskf {
     }
 
     /// Restarts a filter that is not finite or whose covariance is not sound; a position or velocity beyond any flight
-    /// means divergence, whatever holds it. Where nothing measures the horizontal position it is nobody's claim.
+    /// means divergence. Where nothing measures the horizontal position it is nobody's claim. Nor are, of a vehicle that is not
+    /// told to fly, a horizontal velocity that nothing measures and a height that nothing has ever measured.
     pub(super) fn check_health(&mut self) {
         let NominalState { position, velocity, .. } = &self.state;
+        let EskfConfig { max_velocity, max_position, .. } = self.config;
         if !self.state.is_finite() || (self.steps.is_multiple_of(128) && !self.covariance.is_healthy()) {
             self.restart();
-        } else if velocity.amax() > self.config.max_velocity
-            || position.z.abs() > self.config.max_position
-            || (position.horizontal().amax() > self.config.max_position && self.is_velocity_aided())
+        } else if (velocity.horizontal().amax() > max_velocity && (self.command.flying || self.is_velocity_aided()))
+            || ((velocity.z.abs() > max_velocity || position.z.abs() > max_position) && self.claims_height())
+            || (position.horizontal().amax() > max_position && self.is_velocity_aided())
         {
             self.status.diverged = true;
         }
+    }
+
+    /// Is the vertical position more than the sum of what the inertial sensor felt?
+    fn claims_height(&self) -> bool {
+        let measured = self.surface.is_some() || self.baro_offset.is_some() || self.is_aided_outside(Sensor::Down);
+        self.command.flying || measured
     }
 
     /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.

@@ -8,6 +8,7 @@
 //! | `reference.rs` | what the receiver's noise allows: a Kalman filter in `f64` that knows attitude and biases |
 //! | the others | one concern each |
 
+mod airspeed;
 mod extent;
 mod heading;
 mod horizon;
@@ -15,4 +16,5 @@ mod lockout;
 mod own;
 mod reference;
 mod run;
+mod wander;
 mod world;

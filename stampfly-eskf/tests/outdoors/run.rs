@@ -95,7 +95,9 @@ pub fn run(setting: Setting, plan: Plan, config: EskfConfig) -> Outcome {
         while pending.front().is_some_and(|fix| fix.arrives <= time) {
             let Some(fix) = pending.pop_front() else { break };
             let at = World::instant(fix.at);
-            let [h, v] = setting.position_sigma.map(|sigma| sigma.hypot(setting.wander_sigma) as f32);
+            let [h, v] = setting.position_sigma;
+            // The vertical error wanders by half as much again.
+            let [h, v] = [h.hypot(setting.wander_sigma), v.hypot(1.5 * setting.wander_sigma)].map(|sigma| sigma as f32);
             let [vh, vv] = setting.velocity_sigma.map(|sigma| sigma as f32);
             let told = [
                 eskf.fuse_position(at, &vector(fix.position), &Vec3::new(h, h, v)),

@@ -9,6 +9,7 @@
 //! recordings give the same bytes.
 
 mod flown;
+mod receiver;
 mod recorded;
 mod simulated;
 
@@ -21,7 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     simulated::late()?;
     recorded::innovations()?;
     recorded::paths()?;
-    recorded::attitude()
+    recorded::attitude()?;
+    receiver::table()
 }
 
 /// Writes a picture.

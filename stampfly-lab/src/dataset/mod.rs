@@ -6,7 +6,7 @@
 //! | [`Kind::StampFlyFlight`] | CSV of 7, 11 or 29 columns, `gyro_x` … | 29 columns: the device's own estimate |
 //! | [`Kind::NanoBench`] | NPZ with `t`, `data`, `cols` | motion capture, 100 Hz |
 //! | [`Kind::Broad`] | NPZ with `gyr`, `acc`, `mag`, `quat`, … | motion capture, with gaps |
-//! | [`Kind::Px4Replay`] | CSV lines `time_us,sensor,values…` | none |
+//! | [`Kind::Px4Replay`] | CSV lines `time_us,sensor,values…` | EKF2's own states, when their file lies beside it ([`load`]) |
 //!
 //! Which one a file is is found out from its content, never from its name. Everything comes out in SI units, body
 //! FRD, world NED, accelerometer as specific force, whatever the file has. Time stamps are put in order (see
@@ -14,7 +14,9 @@
 
 mod broad;
 mod csv;
+mod ekf2;
 mod error;
+mod geodetic;
 mod nanobench;
 mod npz;
 mod px4;
@@ -23,12 +25,16 @@ mod stampfly;
 mod timing;
 
 pub use error::{DatasetError, DatasetErrorKind};
-pub use recording::{DevicePoint, Kind, Recording, TruthPoint};
+pub use recording::{DevicePoint, GnssFix, Kind, Recording, TruthPoint};
 pub use timing::Timing;
 
 use std::path::Path;
 
 /// Reads a recording of any known kind.
+///
+/// PX4's replay test keeps EKF2's own states in a second file. When it lies beside this one, under PX4's name
+/// (`../change_indication/NAME.csv`) or under `change_indication__NAME.csv` for `replay_data__NAME.csv`, its states become the
+/// recording's [`device`](Recording::device).
 ///
 /// # Errors
 /// When the file cannot be read, is of no known kind, or is broken; the error says where.
@@ -37,7 +43,15 @@ pub fn load(path: impl AsRef<Path>) -> Result<Recording, DatasetError> {
     let failed = |kind| DatasetError { file: path.to_owned(), kind };
     let bytes = std::fs::read(path).map_err(DatasetErrorKind::Io).map_err(failed)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    parse(&name, &bytes).map_err(failed)
+    let mut recording = parse(&name, &bytes).map_err(failed)?;
+    if recording.kind == Kind::Px4Replay
+        && let Some(file) = ekf2::beside(path)
+    {
+        let failed = |kind| DatasetError { file: file.clone(), kind };
+        let bytes = std::fs::read(&file).map_err(DatasetErrorKind::Io).map_err(failed)?;
+        recording.device = Some(ekf2::read(&bytes).map_err(failed)?);
+    }
+    Ok(recording)
 }
 
 /// Reads a recording of any known kind from memory.

@@ -106,7 +106,7 @@ pub(super) fn read(name: &str, arrays: &Arrays) -> Result<Recording, DatasetErro
     let place = place.zip(speed);
     let own = stamps.iter().zip(turn.zip(place)).filter_map(|(at, ([w, x, y, z], (position, velocity)))| {
         let attitude = attitude(w, x, -y, -z)?;
-        Some(DevicePoint { at: *at, attitude, position: seen(position)?, velocity: seen(velocity)? })
+        Some(DevicePoint { at: *at, attitude, position: Some(seen(position)?), velocity: seen(velocity)? })
     });
     recording.device = Some(own.collect());
     Ok(recording)

@@ -60,9 +60,18 @@ pub struct DevicePoint {
     pub at: Instant,
     /// Body FRD → world NED.
     pub attitude: Quat,
-    /// World NED, metres.
-    pub position: Vec3,
+    /// World NED, metres; `None` where the log holds none.
+    pub position: Option<Vec3>,
     /// World NED, m/s.
+    pub velocity: Vec3,
+}
+
+/// What a satellite receiver said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GnssFix {
+    /// From the recording's first fix, NED, metres.
+    pub position: Vec3,
+    /// NED, m/s.
     pub velocity: Vec3,
 }
 
@@ -83,6 +92,8 @@ pub struct Recording {
     pub mag: Vec<Sample<MagData>>,
     /// Barometric altitude.
     pub baro: Vec<Sample<BaroData>>,
+    /// Fixes of a satellite receiver, stamped when they arrived: they are valid for a moment before.
+    pub gnss: Vec<Sample<GnssFix>>,
     /// The reference; empty when there is none.
     pub truth: Vec<TruthPoint>,
     /// Stretches of the reference without an attitude.
@@ -107,6 +118,7 @@ impl Recording {
             flow: Vec::new(),
             mag: Vec::new(),
             baro: Vec::new(),
+            gnss: Vec::new(),
             truth: Vec::new(),
             truth_gaps: 0,
             device: None,
@@ -154,8 +166,13 @@ impl Recording {
             });
             flight.push_words("truth", point.at, Pose::FIELDS, &words);
         }
+        for Sample { at, data } in &self.gnss {
+            flight.push("gnss", *at, &Fix { position: data.position, velocity: data.velocity });
+        }
         for DevicePoint { at, attitude, position, velocity } in self.device.iter().flatten() {
-            let pose = Pose { attitude: *attitude, position: *position, velocity: *velocity };
+            // What the log does not hold is not a number, so that plots show a gap.
+            let position = position.unwrap_or(Vec3::new(f32::NAN, f32::NAN, f32::NAN));
+            let pose = Pose { attitude: *attitude, position, velocity: *velocity };
             flight.push("device", *at, &pose);
         }
         flight
@@ -170,6 +187,16 @@ message! {
         /// World NED.
         position: Vec3 ["m"],
         /// World NED.
+        velocity: Vec3 ["m/s"],
+    }
+}
+
+message! {
+    /// How [`GnssFix`] looks as a topic.
+    struct Fix {
+        /// From the first fix, NED.
+        position: Vec3 ["m"],
+        /// NED.
         velocity: Vec3 ["m/s"],
     }
 }

@@ -65,7 +65,7 @@ fn device(at: Instant, values: [f64; 9]) -> DevicePoint {
     DevicePoint {
         at,
         attitude: Quat::from_euler_angles(roll, pitch, yaw),
-        position: vector([px, py, pz]),
+        position: Some(vector([px, py, pz])),
         velocity: vector([vx, vy, vz]),
     }
 }

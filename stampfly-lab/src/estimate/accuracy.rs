@@ -12,18 +12,18 @@ use stampfly_types::{Quat, Vec3};
 
 /// Root mean square of what was added.
 #[derive(Clone, Copy, Debug, Default)]
-struct Rms {
+pub(super) struct Rms {
     sum: f64,
     count: usize,
 }
 
 impl Rms {
-    fn add(&mut self, square: f64) {
+    pub(super) fn add(&mut self, square: f64) {
         self.sum += square;
         self.count += 1;
     }
 
-    fn get(self) -> Option<f64> {
+    pub(super) fn get(self) -> Option<f64> {
         (self.count > 0).then(|| (self.sum / self.count as f64).sqrt())
     }
 }

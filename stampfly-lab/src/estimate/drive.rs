@@ -1,7 +1,7 @@
 //! Takes an estimator through a recording, sample by sample, in the order a vehicle would have seen them.
 
 use super::start::Start;
-use super::{Method, Suite, attitude_suite};
+use super::{Method, Receiver, Suite};
 use crate::dataset::Recording;
 use stampfly_board::EstimatorKind;
 use stampfly_drivers::Sample;
@@ -67,7 +67,7 @@ pub struct Drive {
     pub instances: Vec<Instance>,
     /// Does this estimator hold a position? Otherwise its positions are nothing to compare.
     pub holds_position: bool,
-    /// By sensor: `tof`, `flow`, `mag`, `baro`, `velocity`, `gravity`.
+    /// By sensor: `tof`, `flow`, `mag`, `baro`, `velocity` of the reference, `gnss position`, `gnss velocity`, `gravity`.
     pub tallies: BTreeMap<&'static str, Tally>,
     /// Calls of the estimator a second of wall time.
     pub updates_per_s: f64,
@@ -96,22 +96,24 @@ fn velocities(recording: &Recording, start: &Start) -> Vec<Sample<Vec3>> {
 pub fn drive(recording: &Recording, start: &Start, suite: &Suite) -> Drive {
     match (suite.method, suite.vehicle.estimator) {
         (Method::Attitude, _) => {
-            let drive = through(recording, start, AttitudeFilter::new(attitude_suite(recording.kind)));
+            let drive = through(recording, start, suite, AttitudeFilter::new(suite.attitude));
             Drive { holds_position: false, ..drive }
         }
         (Method::Vehicle, EstimatorKind::Complementary) => {
-            through(recording, start, Complementary::new(suite.vehicle.complementary))
+            through(recording, start, suite, Complementary::new(suite.vehicle.complementary))
         }
-        (Method::Vehicle, EstimatorKind::Eskf) => through(recording, start, Eskf::new(suite.vehicle.eskf)),
+        (Method::Vehicle, EstimatorKind::Eskf) => through(recording, start, suite, Eskf::new(suite.vehicle.eskf)),
     }
 }
 
-fn through(recording: &Recording, start: &Start, mut estimator: impl Estimator) -> Drive {
+fn through(recording: &Recording, start: &Start, suite: &Suite, mut estimator: impl Estimator) -> Drive {
+    let Receiver { delay, position_sigma, velocity_sigma } = suite.receiver;
     let velocities = velocities(recording, start);
     let mut tof = recording.tof.iter().peekable();
     let mut flow = recording.flow.iter().peekable();
     let mut mag = recording.mag.iter().peekable();
     let mut baro = recording.baro.iter().peekable();
+    let mut gnss = recording.gnss.iter().peekable();
     let mut velocity = velocities.iter().peekable();
     let mut tallies: BTreeMap<&'static str, Tally> = BTreeMap::new();
     let mut tally = |sensor, fusion| tallies.entry(sensor).or_default().add(fusion);
@@ -133,6 +135,11 @@ fn through(recording: &Recording, start: &Start, mut estimator: impl Estimator) 
         }
         for (at, data) in up_to(&mut baro, sample.at) {
             tally("baro", estimator.fuse_baro(at, &data));
+        }
+        for (arrived, fix) in up_to(&mut gnss, sample.at) {
+            let at = arrived - delay;
+            tally("gnss position", estimator.fuse_position(at, &fix.position, &position_sigma));
+            tally("gnss velocity", estimator.fuse_velocity(at, &fix.velocity, &velocity_sigma));
         }
         for (at, data) in up_to(&mut velocity, sample.at) {
             tally(

@@ -1,8 +1,10 @@
 //! What is printed about an estimate.
 
+use super::Receiver;
 use super::accuracy::Accuracy;
 use super::dead_reckoning::{Reach, path, reach};
 use super::drive::{Drive, Instance};
+use super::receiver::AgainstReceiver;
 use super::start::Start;
 use crate::dataset::{Kind, Recording, TruthPoint};
 use serde::Serialize;
@@ -49,6 +51,8 @@ pub struct Figures {
     pub position_rmse_m: Option<f64>,
     /// Error of the velocity.
     pub velocity_rmse_mps: Option<f64>,
+    /// Beside a satellite receiver, where there is one.
+    pub receiver: Option<AgainstReceiver>,
     /// Stretches in which the reference was not seen. They are not compared.
     pub truth_gaps: usize,
     /// Instants that were compared with the reference.
@@ -79,7 +83,7 @@ fn kind_name(kind: Kind) -> &'static str {
 impl Figures {
     /// The figures of one way through a recording.
     #[must_use]
-    pub fn of(recording: &Recording, start: &Start, drive: &Drive) -> Self {
+    pub fn of(recording: &Recording, start: &Start, drive: &Drive, receiver: &Receiver) -> Self {
         let accuracy = accuracy(recording, start, drive);
         let reckoned = path(recording, start);
         let by_flow = reach(&reckoned);
@@ -108,6 +112,7 @@ impl Figures {
             total_rmse_deg: accuracy.total(),
             position_rmse_m: accuracy.position_rms(),
             velocity_rmse_mps: accuracy.velocity_rms(),
+            receiver: AgainstReceiver::of(recording, start, drive, receiver),
             truth_gaps: recording.truth_gaps,
             truth_samples: accuracy.samples(),
             rejected: share(|tally| tally.gated),

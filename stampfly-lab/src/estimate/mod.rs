@@ -6,7 +6,7 @@
 //! | StampFly flight capture | inertial, range | – |
 //! | NanoBench | inertial, velocity from motion capture | motion capture, above 0.3 m after three seconds |
 //! | BROAD | inertial, magnetic field: the attitude filter | motion capture, while moving |
-//! | PX4 replay | inertial, barometer | – |
+//! | PX4 replay | inertial, satellite receiver, magnetic field, barometer | the receiver, the magnetometer, EKF2's own states |
 //!
 //! The same filter with the same code as in flight; where nothing measures a position, the attitude filter. Its tuning differs between sensor suites (see [`suite`]), never
 //! between files of one. It is never told that the vehicle stands: that would be half the answer.
@@ -17,19 +17,22 @@ mod accuracy;
 mod dead_reckoning;
 mod drive;
 mod figures;
+mod receiver;
 mod start;
 
 pub use accuracy::Accuracy;
 pub use dead_reckoning::{Reach, path, reach};
 pub use drive::{Drive, Instance, Tally, drive};
 pub use figures::Figures;
+pub use receiver::AgainstReceiver;
 pub use start::Start;
 
 use crate::dataset::{Kind, Recording};
 use crate::flight::Flight;
 use stampfly_board::VehicleConfig;
 use stampfly_eskf::attitude::AttitudeConfig;
-use stampfly_types::Vec3;
+use stampfly_eskf::{EskfConfig, StartHeading};
+use stampfly_types::{Duration, Vec3};
 
 /// Which estimator runs over a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,8 +49,34 @@ pub enum Method {
 pub struct Suite {
     /// Which estimator.
     pub method: Method,
-    /// Tuning of the estimators that fly. The attitude filter has [its own](attitude_suite).
+    /// Tuning of the estimators that fly.
     pub vehicle: VehicleConfig,
+    /// That of the attitude filter.
+    pub attitude: AttitudeConfig,
+    /// How good the recording's satellite receiver is, where it has one.
+    pub receiver: Receiver,
+}
+
+/// What is known of a receiver. The default is what EKF2 takes for one that says nothing about itself: 110 ms late
+/// (`EKF2_GPS_DELAY`), and the accuracies of the fixes of PX4's sensor simulator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// How long before it arrived a fix was valid.
+    pub delay: Duration,
+    /// Standard deviation of a position along each axis, NED, m.
+    pub position_sigma: Vec3,
+    /// Standard deviation of a velocity along each axis, NED, m/s.
+    pub velocity_sigma: Vec3,
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self {
+            delay: Duration::from_millis(110),
+            position_sigma: Vec3::new(0.5, 0.5, 0.8),
+            velocity_sigma: Vec3::new(0.2, 0.2, 0.2),
+        }
+    }
 }
 
 /// An estimate over one recording, with its figures.
@@ -64,7 +93,7 @@ pub struct Estimated {
 /// The tuning for recordings of this kind: the vehicle's, but for what its sensors do differently.
 #[must_use]
 pub fn suite(kind: Kind) -> Suite {
-    let mut suite = Suite::default();
+    let mut suite = Suite { attitude: attitude_suite(kind), ..Suite::default() };
     let config = &mut suite.vehicle;
     match kind {
         Kind::Broad => {
@@ -101,18 +130,28 @@ pub fn suite(kind: Kind) -> Suite {
             config.eskf.unobserved_velocity = 0.06;
             config.eskf.gate = 6.7;
         }
-        Kind::StampFlyFlight | Kind::Px4Replay => {}
+        // Under the open sky, with a magnetometer that tells the heading at the start. Nothing else is known of these vehicles.
+        Kind::Px4Replay => {
+            config.eskf =
+                EskfConfig { mag_enable: true, start_heading: StartHeading::Magnetic, ..EskfConfig::outdoors() };
+        }
+        Kind::StampFlyFlight => {}
     }
     suite
 }
 
 /// The attitude filter's tuning for recordings of this kind: its own defaults, but for how late the sensors are.
 #[must_use]
-pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
+fn attitude_suite(kind: Kind) -> AttitudeConfig {
     match kind {
         // Against the cameras' clock, the same within a millisecond in every trial: the gyro's rotation is complete 2.3 ms
         // after the cameras', and the field fits the earth's best when it is taken for 15 ms old.
-        Kind::Broad => AttitudeConfig { inertial_delay: 0.0023, mag_delay: 0.015, ..AttitudeConfig::default() },
+        Kind::Broad => AttitudeConfig {
+            inertial_delay: 0.0023,
+            mag_delay: 0.015,
+            mag_delay_sigma: 0.0,
+            ..AttitudeConfig::default()
+        },
         _ => AttitudeConfig::default(),
     }
 }
@@ -135,7 +174,7 @@ pub fn attitude_suite(kind: Kind) -> AttitudeConfig {
 pub fn run(recording: &Recording, suite: &Suite) -> Estimated {
     let start = Start::of(recording);
     let drive = drive(recording, &start, suite);
-    let figures = Figures::of(recording, &start, &drive);
+    let figures = Figures::of(recording, &start, &drive, &suite.receiver);
     Estimated { start, drive, figures }
 }
 

@@ -4,8 +4,9 @@
 //! recordings here, what the same version made of the same change. Bars are ratios of means: a single trial hangs on
 //! how the field happened to be bent.
 
+use stampfly_eskf::attitude::AttitudeConfig;
 use stampfly_lab::dataset::{self, Recording};
-use stampfly_lab::estimate::{self, Figures};
+use stampfly_lab::estimate::{self, Figures, Suite};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
 /// Set by the build script.
@@ -58,6 +59,29 @@ fn tilt_and_attitude_are_better_than_vqf() {
     let total = mean(ours.iter().map(|f| f.total_rmse_deg.unwrap())) / mean(trials.iter().map(|t| t.1[1]));
     assert!(tilt <= 0.8, "tilt: {tilt} of VQF's");
     assert!(total <= 0.9, "total: {total} of VQF's");
+}
+
+#[test]
+#[cfg_attr(not(recorded_data), ignore = "set STAMPFLY_DATA to the recorded data")]
+fn nothing_hangs_on_delays_that_are_known_in_advance() {
+    let trials = trials();
+    let unknown = |recording: &Recording| {
+        let attitude = AttitudeConfig::default();
+        let suite = Suite { attitude, ..estimate::suite(recording.kind) };
+        let figures = estimate::run(recording, &suite).figures;
+        [figures.tilt_rmse_deg.unwrap(), figures.total_rmse_deg.unwrap()]
+    };
+    let ours: Vec<_> = trials.iter().map(|(recording, _)| unknown(recording)).collect();
+    for ((recording, vqf), ours) in trials.iter().zip(&ours) {
+        println!("{}: {ours:.3?}, VQF {vqf:.3?}", recording.name);
+        let share = |part: usize| ours[part] / vqf[part];
+        assert!(share(0) <= 1.05 && share(1) <= 1.05, "{}: {ours:?}, VQF {vqf:?}", recording.name);
+    }
+    for (part, name) in ["tilt", "total"].into_iter().enumerate() {
+        let share = mean(ours.iter().map(|f| f[part])) / mean(trials.iter().map(|t| t.1[part]));
+        println!("{name}: {share:.3} of VQF's");
+        assert!(share <= 0.9, "{name}: {share} of VQF's");
+    }
 }
 
 #[test]

@@ -57,6 +57,21 @@ fn a_carried_vehicle_goes_as_far_as_its_flow_says() {
     assert!(3 * as_good >= 2 * CARRIED.len(), "no worse than the best peer on {as_good} of {}", CARRIED.len());
 }
 
+#[test]
+#[cfg_attr(not(recorded_data), ignore = "set STAMPFLY_DATA to the recorded data")]
+fn a_flight_of_which_only_the_inertial_sensor_was_recorded_is_not_lost() {
+    let mut flights = 0;
+    for entry in std::fs::read_dir(format!("{FOLDER}/stampfly_flights")).unwrap() {
+        let path = entry.unwrap().path();
+        let Ok(recording) = dataset::load(&path) else { continue };
+        let figures = estimate::run(&recording, &estimate::suite(recording.kind)).figures;
+        // Nothing measured what its state claims, and it claims nothing.
+        assert!(!figures.diverged && figures.end_xy_m.is_none(), "{}: {figures:?}", recording.name);
+        flights += 1;
+    }
+    assert!(flights >= 5, "only {flights} flights");
+}
+
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])

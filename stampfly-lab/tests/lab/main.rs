@@ -7,4 +7,5 @@ mod consistency;
 mod estimate;
 mod flight_log;
 mod hostile_recordings;
+mod receiver;
 mod recorded;

@@ -208,7 +208,12 @@ fn px4_replays_are_read_and_their_outputs_are_not() {
     assert_eq!(replay.kind, Kind::Px4Replay);
     assert!((34.0..36.0).contains(&replay.duration().seconds()));
     assert!(replay.imu.len() > 5_000 && replay.mag.len() > 100 && replay.baro.len() > 100);
-    assert!(replay.skipped.contains_key("gps") && replay.skipped.contains_key("airspeed"), "{:?}", replay.skipped);
+    assert!(replay.skipped.contains_key("landed") && replay.skipped.contains_key("airspeed"), "{:?}", replay.skipped);
+    assert!(replay.gnss.len() > 150 && !replay.skipped.contains_key("gps"), "{:?}", replay.skipped);
+    let highest = replay.gnss.iter().map(|fix| -fix.data.position.z).fold(0.0, f32::max);
+    assert!((3.0..4.0).contains(&highest), "it climbs to {highest} m");
+    let own = replay.device.as_ref().expect("EKF2's states lie beside it");
+    assert!(own.len() > 300 && own.iter().all(|point| point.position.is_none()), "{}", own.len());
     let down = mean(replay.imu.iter().take(500).map(|s| s.data.accel)).z;
     assert!((-10.1..-9.6).contains(&down), "{down}");
     let strength = mean(replay.mag.iter().map(|s| s.data.field)).norm();

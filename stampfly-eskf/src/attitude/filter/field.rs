@@ -5,6 +5,7 @@
 
 use super::super::magnetic::{FieldStatus, Magnetic};
 use super::super::rotation::{from_vector, product, within};
+use super::super::witness::{Contradiction, Undo};
 use super::{AttitudeFilter, LARGEST_FIELD, LONGEST_STEP, MOVING_START_SIGMA};
 use crate::estimator::{Fusion, Refusal};
 use nalgebra::Matrix3;
@@ -40,14 +41,18 @@ impl AttitudeFilter {
             return Fusion::Refused(Refusal::Stale);
         }
         let dt = dt.min(LONGEST_STEP);
+        self.ask_witness(field, dt);
         // Where the body was when the field was what this sample says.
-        let late = age + self.config.mag_delay - self.config.inertial_delay;
+        let late = age + self.mag_delay() - self.config.inertial_delay;
         let then = product(&self.strapdown, &from_vector(&(self.rate * -late)));
         let turn = Matrix3::from(self.level * then);
         self.remove_hard_iron(&turn, field, dt);
         let config = &self.config;
         let stationary = self.stationary.is_stationary(config);
         let level = turn * (field - self.offset);
+        if config.mag_delay_sigma > 0.0 && self.force.is_settled() {
+            self.mag_delay.step(config, &level, &(turn * self.rate), dt);
+        }
         let vertical = turn.row(2).transpose().into();
         let status = self.magnetic.step(config, &level, self.rate.norm(), dt);
         match status {
@@ -88,6 +93,25 @@ impl AttitudeFilter {
         }
     }
 
+    /// Ends a rest that the field contradicts, and makes up for it.
+    fn ask_witness(&mut self, field: &Vec3, dt: f32) {
+        let field = field - self.offset;
+        let rate = self.stationary.rate();
+        if let Some(contradiction) = self.witness.field(&self.config, &field, &rate, &self.bias, dt) {
+            self.stationary.end();
+            self.undo_rest(contradiction);
+        }
+    }
+
+    /// Takes back what a rest that was none did to bias and attitude.
+    pub(super) fn undo_rest(&mut self, Contradiction { undo }: Contradiction) {
+        if let Some(Undo { bias, turned, sigma }) = undo {
+            self.bias.restore(&bias);
+            self.strapdown = product(&self.strapdown, &from_vector(&turned));
+            self.heading.inflate(sigma);
+        }
+    }
+
     /// Estimates hard iron, and takes a new estimate into use when it differs enough to matter.
     fn remove_hard_iron(&mut self, level: &Matrix3<f32>, field: &Vec3, dt: f32) {
         // A tilt that is still settling would pass for hard iron.
@@ -101,6 +125,7 @@ impl AttitudeFilter {
         let earth = self.hard_iron.field();
         if change > NEW_OFFSET * earth.norm() {
             self.offset = offset;
+            self.witness.start_over();
             self.magnetic = Magnetic::new(Some(&earth));
             self.heading.inflate(change / earth.horizontal().norm().max(1.0));
             self.heading.clear_declination();

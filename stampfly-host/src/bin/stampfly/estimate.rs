@@ -70,7 +70,7 @@ fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {
 type Value = fn(&Figures) -> Option<f64>;
 
 /// Name, unit, decimals and value of every figure that may be missing.
-const COLUMNS: [(&str, &str, usize, Value); 9] = [
+const COLUMNS: [(&str, &str, usize, Value); 11] = [
     ("end", "m", 4, |f| f.end_xy_m),
     ("max", "m", 3, |f| f.max_xy_m),
     ("flow end", "m", 3, |f| f.flow_dead_reckoning_end_xy_m),
@@ -80,6 +80,8 @@ const COLUMNS: [(&str, &str, usize, Value); 9] = [
     ("aligned", "deg", 2, |f| f.tilt_rmse_aligned_deg),
     ("heading", "deg", 2, |f| f.heading_rmse_deg),
     ("total", "deg", 2, |f| f.total_rmse_deg),
+    ("gnss pos", "m", 3, |f| f.receiver.as_ref()?.position_m),
+    ("gnss vel", "m/s", 3, |f| f.receiver.as_ref()?.velocity_mps),
 ];
 
 fn print_table(rows: &[Row]) {
@@ -110,7 +112,8 @@ fn print_table(rows: &[Row]) {
         println!("{}", if figures.diverged { "  DIVERGED" } else { "" });
     }
     println!(
-        "\nend, max: horizontal distance from the start; flow: the same by flow alone; RMS errors against the reference"
+        "\nend, max: horizontal distance from the start; flow: the same by flow alone; RMS errors against the reference; \
+         gnss: RMS difference to a satellite receiver"
     );
 }
 
