@@ -81,7 +81,9 @@ const FLOOR: [f32; BLOCKS] = [
 ];
 
 /// Adds multiples of rows to a row, one after the other, from block `FIRST` on.
-#[inline(always)]
+// A few vector instructions, or a hundred scalar ones that want to be there once.
+#[cfg_attr(target_arch = "x86_64", inline(always))]
+#[cfg_attr(not(target_arch = "x86_64"), inline)]
 fn add_rows<const FIRST: usize, const K: usize>(to: &mut Row, factors: [f32; K], rows: [&Row; K]) {
     for (block, to) in to.iter_mut().enumerate().skip(FIRST) {
         let mut sum = *to;
@@ -89,6 +91,35 @@ fn add_rows<const FIRST: usize, const K: usize>(to: &mut Row, factors: [f32; K],
             sum = sum + row[block].times(factor);
         }
         *to = sum;
+    }
+}
+
+/// Columns of the blocks of F that are neither zero nor a multiple of one.
+struct Columns {
+    /// Of velocity ← attitude.
+    by_attitude: [Lanes; 3],
+    /// Of velocity ← accelerometer bias.
+    by_bias: [Lanes; 3],
+    /// Of attitude ← attitude.
+    turn: [Lanes; 3],
+    dt: f32,
+}
+
+// One row of a block: short where it is a few vector instructions, and there once where it is not.
+impl Columns {
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(never))]
+    fn push(&self, velocity: &mut Lanes, attitude: &Lanes, accel_bias: &Lanes) {
+        let ([x, y, z], [bias_x, bias_y, bias_z]) = (attitude.to_array(), accel_bias.to_array());
+        let ([a_x, a_y, a_z], [b_x, b_y, b_z]) = (&self.by_attitude, &self.by_bias);
+        *velocity = velocity.plus([x, y, z, bias_x, bias_y, bias_z], [a_x, a_y, a_z, b_x, b_y, b_z]);
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(never))]
+    fn turn(&self, attitude: &mut Lanes, gyro_bias: &Lanes) {
+        let ([x, y, z], [turn_x, turn_y, turn_z]) = (attitude.to_array(), &self.turn);
+        *attitude = turn_x.times(x).plus([y, z, -self.dt], [turn_y, turn_z, gyro_bias]);
     }
 }
 
@@ -101,13 +132,16 @@ const fn place(state: usize) -> (usize, usize) {
 impl Covariance {
     /// A diagonal matrix from one standard deviation per block: position, velocity, attitude, gyro bias,
     /// accelerometer bias.
+    #[inline]
     #[must_use]
     pub fn from_sigmas(sigmas: [f32; 5]) -> Self {
-        let mut all = Self { rows: [[[Lanes::zero(); BLOCKS]; 3]; BLOCKS] };
-        for state in 0..N {
-            all.inflate(state, sigmas[state / 3] * sigmas[state / 3]);
+        let mut rows = [[[Lanes::zero(); BLOCKS]; 3]; BLOCKS];
+        for (block, (rows, sigma)) in rows.iter_mut().zip(sigmas).enumerate() {
+            for (axis, row) in rows.iter_mut().enumerate() {
+                row[block].set(axis, sigma * sigma);
+            }
         }
-        all
+        Self { rows }
     }
 
     /// One element. Out of range is zero.
@@ -188,29 +222,24 @@ impl Covariance {
         }
 
         // Columns: the first three blocks of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
-        let as_lanes = |[x, y, z]: Rotation| (Lanes::new(x), Lanes::new(y), Lanes::new(z));
-        let (a_x, a_y, a_z) = as_lanes(columns(&by_attitude));
-        let (b_x, b_y, b_z) = as_lanes(columns(&by_bias));
-        let (c_x, c_y, c_z) = as_lanes(turn_back);
-        let pushed = |v: Lanes, a: Lanes, b: Lanes| {
-            let ([x, y, z], [bias_x, bias_y, bias_z]) = (a.to_array(), b.to_array());
-            v.plus([x, y, z, bias_x, bias_y, bias_z], [&a_x, &a_y, &a_z, &b_x, &b_y, &b_z])
-        };
-        let turned = |a: Lanes, gyro_bias: Lanes| {
-            let [x, y, z] = a.to_array();
-            c_x.times(x).plus([y, z, -dt], [&c_y, &c_z, &gyro_bias])
+        let as_lanes = |[x, y, z]: Rotation| [Lanes::new(x), Lanes::new(y), Lanes::new(z)];
+        let columns = Columns {
+            by_attitude: as_lanes(columns(&by_attitude)),
+            by_bias: as_lanes(columns(&by_bias)),
+            turn: as_lanes(turn_back),
+            dt,
         };
         for [p, v, a, gyro_bias, accel_bias] in position {
             *p = p.plus([dt], [v]);
-            *v = pushed(*v, *a, *accel_bias);
-            *a = turned(*a, *gyro_bias);
+            columns.push(v, a, accel_bias);
+            columns.turn(a, gyro_bias);
         }
         for [_, v, a, gyro_bias, accel_bias] in velocity {
-            *v = pushed(*v, *a, *accel_bias);
-            *a = turned(*a, *gyro_bias);
+            columns.push(v, a, accel_bias);
+            columns.turn(a, gyro_bias);
         }
         for [_, _, a, gyro_bias, _] in attitude {
-            *a = turned(*a, *gyro_bias);
+            columns.turn(a, gyro_bias);
         }
         self.mirror::<3>();
 

@@ -54,6 +54,18 @@ impl Topic {
         self.fields.iter().map(|field| field.words).sum()
     }
 
+    /// Is a sample of this topic one of the other, byte by byte?
+    pub(super) fn is_stored_as(&self, other: &Self) -> bool {
+        // Compared as they are written: the schemas hold each other, and comparing them would be recursive.
+        let mut theirs = leaves(other.fields);
+        let same = leaves(self.fields).all(|leaf| {
+            theirs.next().is_some_and(|other| {
+                leaf.name == other.name && leaf.unit == other.unit && stored(&leaf) == stored(&other)
+            })
+        });
+        same && theirs.next().is_none()
+    }
+
     /// Number of bytes of a sample in the log.
     #[must_use]
     pub fn size(&self) -> usize {

@@ -167,7 +167,7 @@ impl<S: Sink> Definitions<S> {
             }
             if let Some(first) = topics().take(index).find(|first| first.name == topic.name) {
                 // Another instance: what explains the first explains it.
-                if first.fields != topic.fields {
+                if !first.is_stored_as(&topic) {
                     return Err(WriteError::TwoFormats(topic.name));
                 }
                 continue;
