@@ -15,7 +15,10 @@ const LONG: u64 = 8_000;
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&VALGRIND])?;
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "chain_steps"]))?;
+    // As it is built to be fast, and not to be built again.
+    let mut build = repository.cargo();
+    build.env("CARGO_INCREMENTAL", "0");
+    run_program(build.args(["build", "--quiet", "--release", "--bin", "chain_steps"]))?;
     let measured = (count(repository, LONG)? - count(repository, SHORT)?) as f64 / (LONG - SHORT) as f64;
 
     Budget::read(repository, "benches/budget.toml")?.hold(&["instructions_per_step"], measured, "instructions per step")
