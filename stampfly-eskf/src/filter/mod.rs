@@ -7,6 +7,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `lanes.rs` | three numbers in a vector register, where there is one |
 //! | [`layout`] | number and places of the error states |
 //! | [`state`] | nominal state, small rotations, injection of a correction |
 //! | [`covariance`] | storage, propagation, update |
@@ -16,8 +17,8 @@
 
 pub mod covariance;
 pub mod history;
-pub mod lanes;
-mod layout;
+mod lanes;
+pub mod layout;
 pub mod propagation;
 pub mod state;
 pub mod vibration;
