@@ -323,10 +323,7 @@ impl Eskf {
             *jacobian = row.jacobian;
         }
         if delayed.age != 0.0 {
-            let turn = rotation_matrix(delayed.step.delta_rotation);
-            for jacobian in &mut jacobians {
-                *jacobian = delayed.step.propagate_jacobian_by(&turn, &delayed.rotation, jacobian);
-            }
+            delayed.step.propagate_jacobians(&delayed.rotation, &mut jacobians);
         }
         self.covariance.innovation(&jacobians, innovations, variances)
     }

@@ -150,6 +150,7 @@ impl Eskf {
             return Err(Refusal::Range);
         }
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
+        // Written out: `map` would be a call.
         let [x, y] = rows;
         let rows = [without_heading(x, &delayed.rotation[2]), without_heading(y, &delayed.rotation[2])];
         // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
@@ -305,12 +306,13 @@ impl Eskf {
                 if backup {
                     return Ok(Fusion::Fused { ratio });
                 }
-                if self.config.baro_backup {
+                let innovation = if self.config.baro_backup {
                     // However many altitudes tell the height, it is not known better than the zero.
                     let variance = limited(height, variance, offset.variance());
-                    let innovation = self.innovation(delayed, [row], [baro.altitude], [variance]);
-                    return Ok(self.update(&innovation, ratio));
-                }
+                    self.innovation(delayed, [row], [baro.altitude], [variance])
+                } else {
+                    innovation
+                };
                 Ok(self.update(&innovation, ratio))
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),

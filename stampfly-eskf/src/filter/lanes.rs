@@ -1,15 +1,15 @@
 //! Three numbers side by side: a row of a 3 × 3 block, in a vector register where there is one.
 //!
-//! The covariance is made of them. On x86-64 they are an SSE register, whose fourth lane stays zero: compilers that find the
-//! vectors by themselves join two rows where registers are wider, read what was just written in halves, and wait for it
-//! (four times as slow with `target-cpu=native`). Elsewhere they are an array, of four numbers where the compiler has registers for it and of
-//! three on a microcontroller. All give the same bits: no sum changes its order, and nothing is fused.
+//! The covariance is made of them. On x86-64 and AArch64 they are a register of four, whose last lane stays zero: compilers that find
+//! the vectors by themselves join two rows where registers are wider, read what was just written in halves, and wait for it
+//! (four times as slow with `target-cpu=native`). Elsewhere they are an array of three. Both give the same bits: no sum changes
+//! its order, and nothing is fused.
 //!
 //! Not for vectors of the estimate: those are [`Vec3`](stampfly_types::Vec3).
 
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub use array::Lanes;
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub use register::Lanes;
 
 /// Are there vector registers? Then a whole row costs less than the half of it that is needed.
@@ -35,11 +35,7 @@ impl Lanes {
     /// Plus multiples of others, one after the other.
     #[inline(always)]
     pub fn plus<const K: usize>(self, factors: [f32; K], others: [&Self; K]) -> Self {
-        let mut sum = self;
-        for (factor, other) in factors.into_iter().zip(others) {
-            sum = sum + other.times(factor);
-        }
-        sum
+        factors.into_iter().zip(others).fold(self, |sum, (factor, other)| sum + other.times(factor))
     }
 }
 
@@ -74,7 +70,7 @@ impl core::fmt::Debug for Lanes {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod register {
     use wide::f32x4;
 
@@ -121,37 +117,31 @@ mod register {
     }
 }
 
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
 mod array {
-    const LANES: usize = if super::VECTORS { 4 } else { 3 };
-
     /// See the [module](super) documentation.
     #[derive(Clone, Copy)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "serde", serde(from = "[f32; 3]", into = "[f32; 3]"))]
-    pub struct Lanes([f32; LANES]);
+    pub struct Lanes([f32; 3]);
 
     impl Lanes {
         /// All zero.
         #[inline(always)]
         pub fn zero() -> Self {
-            Self([0.0; LANES])
+            Self([0.0; 3])
         }
 
         /// These three.
         #[inline(always)]
-        pub fn new([x, y, z]: [f32; 3]) -> Self {
-            let mut lanes = Self::zero();
-            let [a, b, c, ..] = &mut lanes.0;
-            (*a, *b, *c) = (x, y, z);
-            lanes
+        pub fn new(values: [f32; 3]) -> Self {
+            Self(values)
         }
 
         /// The three.
         #[inline(always)]
         pub fn to_array(self) -> [f32; 3] {
-            let [x, y, z, ..] = self.0;
-            [x, y, z]
+            self.0
         }
 
         /// A multiple.
@@ -173,6 +163,24 @@ mod array {
                 *lane += value;
             }
             self
+        }
+    }
+}
+
+#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
+mod tests {
+    use super::{array, register};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn array_and_register_give_the_same_bits(a in any::<[f32; 3]>(), b in any::<[f32; 3]>(), factor in any::<f32>()) {
+            let one = register::Lanes::new(a) + register::Lanes::new(b).times(factor);
+            let other = array::Lanes::new(a) + array::Lanes::new(b).times(factor);
+            // What is no number has many forms.
+            let bits = |lanes: [f32; 3]| lanes.map(|v| if v.is_nan() { u32::MAX } else { v.to_bits() });
+            prop_assert_eq!(bits(one.to_array()), bits(other.to_array()));
+            prop_assert_eq!(bits(register::Lanes::zero().to_array()), bits(array::Lanes::zero().to_array()));
         }
     }
 }

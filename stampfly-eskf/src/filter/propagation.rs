@@ -5,7 +5,7 @@
 //! position. Two things need it. The covariance is propagated over a few inertial samples at once. And a measurement
 //! that is late is compared with the state of its own time: the present state and the step since give the state of
 //! that time ([`PropagationStep::state_at_start`]) and the Jacobian by the present errors
-//! ([`PropagationStep::propagate_jacobian`]).
+//! ([`PropagationStep::propagate_jacobians`]).
 //!
 //! With τ the duration, s `delta_velocity`, r `delta_position`, ΔR `delta_rotation` and R the attitude at the
 //! beginning:
@@ -93,17 +93,18 @@ impl PropagationStep {
         }
     }
 
-    /// A Jacobian by the errors at the beginning, as a Jacobian by the errors at the end. `rotation` is the attitude
+    /// Jacobians by the errors at the beginning become Jacobians by the errors at the end. `rotation` is the attitude
     /// at the beginning.
-    #[inline]
-    #[must_use]
-    pub fn propagate_jacobian(&self, rotation: &Rotation, jacobian: &[f32; N]) -> [f32; N] {
-        self.propagate_jacobian_by(&rotation_matrix(self.delta_rotation), rotation, jacobian)
+    #[inline(always)]
+    pub fn propagate_jacobians(&self, rotation: &Rotation, jacobians: &mut [[f32; N]]) {
+        let turn = rotation_matrix(self.delta_rotation);
+        for jacobian in jacobians {
+            *jacobian = self.propagated(&turn, rotation, jacobian);
+        }
     }
 
-    /// The same with the matrix of `delta_rotation`, for several Jacobians.
     #[inline(always)]
-    pub(crate) fn propagate_jacobian_by(&self, turn: &Rotation, rotation: &Rotation, jacobian: &[f32; N]) -> [f32; N] {
+    fn propagated(&self, turn: &Rotation, rotation: &Rotation, jacobian: &[f32; N]) -> [f32; N] {
         let block = |first: usize| Vec3::new(jacobian[first], jacobian[first + 1], jacobian[first + 2]);
         let tau = self.duration;
         let position = block(POSITION);
@@ -157,7 +158,9 @@ mod tests {
             let (_, last, step) = propagated(&samples);
             let measure = |state: &NominalState| aid::tof::range(state, &state.rotation(), 0.05);
             let start = step.state_at_start(&last);
-            let propagated = step.propagate_jacobian(&start.rotation(), &measure(&start).jacobian);
+            let mut propagated = [measure(&start).jacobian];
+            step.propagate_jacobians(&start.rotation(), &mut propagated);
+            let [propagated] = propagated;
             for (i, stated) in propagated.iter().enumerate().take(GYRO_BIAS) {
                 let delta = 1e-2;
                 let shifted = |sign: f32| {

@@ -1,0 +1,173 @@
+//! Innovation, gain and update with a measurement.
+//!
+//! An update of several axes is sequential and scalar, so no matrix is inverted, but it whitens the innovations first and then passes over the
+//! matrix once.
+
+use super::super::lanes::{Lanes, VECTORS};
+use super::{BLOCKS, Covariance, N, Row, add_rows, place};
+use stampfly_types::math;
+
+/// The innovation of a measurement of `M` axes, whitened, and the gain that goes with it.
+///
+/// The axes are made independent by a Cholesky factorisation of their innovation covariance S = L·Lᵀ: the innovations
+/// become L⁻¹·y, each of variance one, and P·Hᵀ becomes P·Hᵀ·L⁻ᵀ. This is the sequential update (Bierman,
+/// "Factorization Methods for Discrete Sequential Estimation", 1977, section V.3) without touching P before the
+/// measurement has passed its gate.
+#[derive(Clone, Copy, Debug)]
+pub struct Innovation<const M: usize> {
+    /// Square-root gain, the columns of P·Hᵀ·L⁻ᵀ.
+    gain: [Row; M],
+    /// L⁻¹·y.
+    whitened: [f32; M],
+}
+
+impl<const M: usize> Innovation<M> {
+    /// The whitened innovations: independent of each other and each of variance one when the filter is consistent.
+    #[inline]
+    #[must_use]
+    pub fn whitened(&self) -> &[f32; M] {
+        &self.whitened
+    }
+
+    /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with
+    /// `M` degrees of freedom when the filter is consistent.
+    #[inline]
+    #[must_use]
+    pub fn nis(&self) -> f32 {
+        self.whitened.iter().map(|v| v * v).sum()
+    }
+}
+
+impl Covariance {
+    /// The innovation of a measurement of `M` axes from its Jacobians by the error states, its innovations, and the
+    /// variance of each axis' noise, which must be positive. The covariance stays as it is. Entries of a Jacobian that
+    /// are zero cost next to nothing.
+    #[inline]
+    #[must_use]
+    pub fn innovation<const M: usize>(
+        &self,
+        jacobians: &[[f32; N]; M],
+        innovations: [f32; M],
+        variances: [f32; M],
+    ) -> Innovation<M> {
+        let mut result = Innovation { gain: [[Lanes::zero(); BLOCKS]; M], whitened: innovations };
+        for (axis, (jacobian, noise)) in jacobians.iter().zip(variances).enumerate() {
+            // Models touch few blocks of three states: the others are skipped whole.
+            let blocks = jacobian.as_chunks::<3>().0;
+            let dot = |row: &Row| {
+                let mut sum = 0.0;
+                for ([a, b, c], lanes) in blocks.iter().zip(row) {
+                    if *a != 0.0 || *b != 0.0 || *c != 0.0 {
+                        let [x, y, z] = lanes.to_array();
+                        sum += a * x + b * y + c * z;
+                    }
+                }
+                sum
+            };
+            let mut column = [Lanes::zero(); BLOCKS];
+            for ([a, b, c], [x, y, z]) in blocks.iter().zip(&self.rows) {
+                if *a != 0.0 || *b != 0.0 || *c != 0.0 {
+                    add_rows::<0, 3>(&mut column, [*a, *b, *c], [x, y, z]);
+                }
+            }
+            // Decorrelate from the axes before it.
+            let mut innovation = result.whitened[axis];
+            for before in 0..axis {
+                let earlier = &result.gain[before];
+                let shared = dot(earlier);
+                add_rows::<0, 1>(&mut column, [-shared], [earlier]);
+                innovation -= shared * result.whitened[before];
+            }
+            let variance = dot(&column) + noise;
+            let scale = 1.0 / math::sqrt(variance.max(noise));
+            for (gain, lanes) in result.gain[axis].iter_mut().zip(&column) {
+                *gain = lanes.times(scale);
+            }
+            result.whitened[axis] = innovation * scale;
+        }
+        result
+    }
+
+    /// Updates the covariance with a measurement: P ← P − P·Hᵀ·S⁻¹·H·P, in the square-root form P − D·Dᵀ with
+    /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
+    /// [`NominalState::correct`](super::NominalState::correct).
+    ///
+    /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
+    #[inline]
+    pub fn update<const M: usize>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
+        self.update_with::<M, VECTORS>(innovation)
+    }
+
+    /// Takes an update back for states that are only considered (Schmidt, "Application of State-Space Methods to Navigation Problems",
+    /// 1966): what they may be wrong by has counted in the innovation, and the measurement corrects neither them nor their
+    /// covariance.
+    ///
+    /// Must follow [`Self::update`] with this innovation, which returned this correction, directly.
+    #[inline]
+    pub fn consider<const M: usize, const K: usize>(
+        &mut self,
+        innovation: &Innovation<M>,
+        states: [usize; K],
+        correction: &mut [f32; N],
+    ) {
+        // Checked, and free where the states are constants: they are inlined.
+        let part = |column: &Row, state: usize| {
+            let (block, axis) = place(state);
+            column.get(block).map_or(0.0, |lanes| lanes.get(axis))
+        };
+        for i in states {
+            for column in &innovation.gain {
+                let of = part(column, i);
+                for j in states {
+                    self.change(i, j, |before| before + of * part(column, j));
+                }
+            }
+            // What is no number stays to be seen.
+            if let Some(cell) = correction.get_mut(i).filter(|cell| cell.is_finite()) {
+                *cell = 0.0;
+            }
+        }
+    }
+
+    #[inline]
+    pub(super) fn update_with<const M: usize, const WHOLE: bool>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
+        let Innovation { gain, whitened } = innovation;
+        // A NaN must not spread into the covariance: any NaN makes the sum one.
+        let sum = gain.iter().flatten().fold(Lanes::zero(), |sum, lanes| sum + *lanes);
+        if sum.to_array().iter().sum::<f32>().is_nan() {
+            return [f32::NAN; N];
+        }
+        let [position, velocity, attitude, gyro_bias, accel_bias] = &mut self.rows;
+        subtract_outer_products::<0, WHOLE, M>(position, gain);
+        subtract_outer_products::<1, WHOLE, M>(velocity, gain);
+        subtract_outer_products::<2, WHOLE, M>(attitude, gain);
+        subtract_outer_products::<3, WHOLE, M>(gyro_bias, gain);
+        subtract_outer_products::<4, WHOLE, M>(accel_bias, gain);
+        if !WHOLE {
+            self.mirror::<BLOCKS>();
+        }
+        let mut correction = [Lanes::zero(); BLOCKS];
+        for (column, innovation) in gain.iter().zip(whitened) {
+            add_rows::<0, 1>(&mut correction, [*innovation], [column]);
+        }
+        let [[a, b, c], [d, e, f], [g, h, i], [j, k, l], [m, n, o]] = correction.map(Lanes::to_array);
+        [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o]
+    }
+}
+
+/// Subtracts w·wᵀ of each column w of the gain from the rows of this block: from all of them, or from the diagonal on. The products
+/// are the same on both sides of it.
+#[inline(always)]
+fn subtract_outer_products<const BLOCK: usize, const WHOLE: bool, const M: usize>(
+    rows: &mut [Row; 3],
+    gain: &[Row; M],
+) {
+    for (axis, row) in rows.iter_mut().enumerate() {
+        let factors = gain.each_ref().map(|column| -column[BLOCK].get(axis));
+        if WHOLE {
+            add_rows::<0, M>(row, factors, gain.each_ref());
+        } else {
+            add_rows::<BLOCK, M>(row, factors, gain.each_ref());
+        }
+    }
+}
