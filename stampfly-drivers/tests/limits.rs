@@ -1,9 +1,8 @@
 //! A bus that never answers: every transfer ends within the limit of its length.
 
-use core::convert::Infallible;
-use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal_async::{i2c, spi};
 use stampfly_driver_fakes::closure::{Access, Clock, Fault, I2cBus, SpiBus, finish};
+use stampfly_driver_fakes::memory::Pin;
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
@@ -14,23 +13,6 @@ use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::chip::{AxisMap, ChipError, TransferLimit};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
 use stampfly_types::Duration;
-
-/// Goes nowhere.
-struct Pin;
-
-impl ErrorType for Pin {
-    type Error = Infallible;
-}
-
-impl OutputPin for Pin {
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-}
 
 /// A bus of either kind on which every transfer fails.
 struct Broken {
@@ -148,7 +130,7 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
             ),
             worst!(
                 clock,
-                Vl53l3cx::new(bus(), Pin, &boot, 0x30, clock.clone(), vl53l3cx::Config::default())
+                Vl53l3cx::new(bus(), Pin::default(), &boot, 0x30, clock.clone(), vl53l3cx::Config::default())
                     .with_transfer_limit(sensors)
             ),
         ];

@@ -3,10 +3,8 @@
 //! Nothing a driver could do with such a clock is right: a deadline never comes. What must not be is that it asks the chip for ever.
 
 use core::cell::Cell;
-use core::convert::Infallible;
-use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal_async::delay::DelayNs;
-use stampfly_driver_fakes::memory::{Chip, Clock};
+use stampfly_driver_fakes::memory::{Chip, Clock, Pin};
 use stampfly_drivers::blocking::block_on;
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
@@ -35,22 +33,6 @@ impl DelayNs for Stopped {
 impl Timebase for Stopped {
     fn now(&self) -> Instant {
         Instant::from_secs(1)
-    }
-}
-
-/// Goes nowhere.
-struct Pin;
-
-impl ErrorType for Pin {
-    type Error = Infallible;
-}
-
-impl OutputPin for Pin {
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        Ok(())
     }
 }
 
@@ -119,8 +101,8 @@ fn a_range_finder_that_does_not_start_or_measure_and_one_whose_neighbour_never_m
     let config = vl53l3cx::Config::default();
     let asleep = Clock::default();
     asleep.stop(true);
-    let mut first = Vl53l3cx::new(Chip::new(&content), Pin, &boot, 0x30, asleep, config);
-    let mut second = Vl53l3cx::new(Chip::new(&content), Pin, &boot, 0x31, Stopped::default(), config);
+    let mut first = Vl53l3cx::new(Chip::new(&content), Pin::default(), &boot, 0x30, asleep, config);
+    let mut second = Vl53l3cx::new(Chip::new(&content), Pin::default(), &boot, 0x31, Stopped::default(), config);
     let mut first = std::pin::pin!(first.start());
     let mut context = std::task::Context::from_waker(std::task::Waker::noop());
     assert!(first.as_mut().poll(&mut context).is_pending() && boot.is_taken());

@@ -99,6 +99,7 @@ impl SpiDevice for Chip {
 }
 
 /// A pin that keeps a chip in reset.
+#[derive(Default)]
 pub struct Pin(pub Rc<Cell<bool>>);
 
 impl embedded_hal::digital::ErrorType for Pin {

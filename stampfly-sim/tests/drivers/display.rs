@@ -4,7 +4,7 @@
 //! frame: 23 ms at 400 kHz, 92 ms at 100 kHz. A BMI270 alone fills two thirds of the bus at 400 kHz, so it has a display that is drawn four times
 //! a second.
 
-use crate::{mounting, standing};
+use crate::{Display, mounting, standing};
 use core::cell::RefCell;
 use embedded_hal_async::i2c::{I2c, Operation};
 use stampfly_drivers::chip::bmi270::{self, Bmi270};
@@ -14,7 +14,7 @@ use stampfly_drivers::chip::ina3221::{self, Ina3221};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, PowerMonitor, RangeFinder, SensorError, SensorErrorKind};
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{self, Chip, I2cBus, I2cChip, stand_in_image};
+use stampfly_sim::chips::{self, I2cBus, I2cChip, stand_in_image};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_types::{Duration, Instant};
@@ -25,19 +25,6 @@ const ADDRESS: u8 = 0x3C;
 const PAUSE: Duration = Duration::from_millis(10);
 /// At a quarter of the speed the display takes four times as many bytes' time.
 const SPEEDS: [(&str, usize); 2] = [("400 kHz", 1), ("100 kHz", 4)];
-
-/// Takes everything and shows nothing.
-#[derive(Debug)]
-struct Display;
-
-impl Chip for Display {
-    fn read(&mut self, _: u16, _: Instant) -> u16 {
-        0
-    }
-    fn write(&mut self, _: u16, _: u16, _: Instant) {}
-    fn reset(&mut self, _: Instant) {}
-    fn set_id(&mut self, _: u16) {}
-}
 
 impl I2cChip for Display {
     fn receive(&mut self, _: usize, _: u8, _: Instant) -> bool {

@@ -26,13 +26,26 @@ mod vl53l3cx;
 use core::cell::RefCell;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use stampfly_drivers::MotorOutputs;
-use stampfly_sim::chips::Attached;
+use stampfly_sim::chips::{Attached, Chip};
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::sensors::MotorModel;
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig, World};
-use stampfly_types::Duration;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
+
+/// Takes everything and shows nothing.
+#[derive(Debug)]
+struct Display;
+
+impl Chip for Display {
+    fn read(&mut self, _: u16, _: Instant) -> u16 {
+        0
+    }
+    fn write(&mut self, _: u16, _: u16, _: Instant) {}
+    fn reset(&mut self, _: Instant) {}
+    fn set_id(&mut self, _: u16) {}
+}
 
 /// A vehicle on the floor in still air.
 fn standing() -> Simulation {

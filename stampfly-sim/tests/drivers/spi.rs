@@ -4,7 +4,7 @@
 //! What I2C does is in `linux` and `display`. Waiting for the bus is no fault of the chip here either, so no driver gives up because of it.
 
 use crate::linux::{clock, delivers};
-use crate::{mounting, standing};
+use crate::{Display, mounting, standing};
 use core::cell::RefCell;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 use stampfly_drivers::blocking::{Blocking, block_on};
@@ -14,7 +14,7 @@ use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, SensorError, SensorErrorKind};
 use stampfly_sim::Simulation;
-use stampfly_sim::chips::{self, Chip, SpiBus, SpiChip, SpiPort, stand_in_image};
+use stampfly_sim::chips::{self, SpiBus, SpiChip, SpiPort, stand_in_image};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_types::{Duration, Instant};
 
@@ -26,19 +26,6 @@ const FRAME: [u8; 1_024] = [0x55; 1_024];
 const PAUSE: Duration = Duration::from_millis(10);
 /// A frame takes 1 ms, or 8.2 ms.
 const SPEEDS: [u32; 2] = [8_000_000, 1_000_000];
-
-/// Takes everything and shows nothing.
-#[derive(Debug)]
-struct Display;
-
-impl Chip for Display {
-    fn read(&mut self, _: u16, _: Instant) -> u16 {
-        0
-    }
-    fn write(&mut self, _: u16, _: u16, _: Instant) {}
-    fn reset(&mut self, _: Instant) {}
-    fn set_id(&mut self, _: u16) {}
-}
 
 impl SpiChip for Display {
     const HIGHEST_CLOCK: u32 = 10_000_000;
