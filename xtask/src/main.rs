@@ -7,6 +7,7 @@ mod arguments;
 mod cargo_tool;
 mod changelog;
 mod ci;
+mod commit;
 mod copy;
 mod elf;
 mod front_page;
@@ -71,6 +72,7 @@ const STEPS: &[Step] = &[
     )
     .beside(),
     Step::new("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run).beside(),
+    Step::new("msrv-build", "Build the libraries with the oldest Rust they promise", steps::msrv::build).manual(),
     Step::new("semver", "Compare each library's interface with the last release's", steps::semver::run).beside(),
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
@@ -100,6 +102,8 @@ const STEPS: &[Step] = &[
         .manual(),
     Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
     Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
+    Step::new("against", "Measure chain, control and simulation beside an earlier commit", steps::against::run)
+        .manual(),
     Step::new("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)
         .accepting(&[Fix])
         .manual(),

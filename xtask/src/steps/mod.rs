@@ -1,5 +1,6 @@
 //! One file a step.
 
+pub mod against;
 pub mod bars;
 pub mod book;
 pub mod budget;

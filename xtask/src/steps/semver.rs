@@ -6,9 +6,9 @@
 
 use crate::arguments::Arguments;
 use crate::cargo_tool::cargo_tool;
-use crate::repository::{Failure, Library, Repository, capture, run as run_program};
+use crate::commit::sources;
+use crate::repository::{Failure, Library, Repository, run as run_program};
 use std::fs;
-use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item};
 
 const RELEASE: &str = "xtask/release.toml";
@@ -20,7 +20,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let text = fs::read_to_string(repository.root.join(RELEASE)).map_err(|e| format!("{RELEASE}: {e}"))?;
     let commit = released(&text).map_err(|e| format!("{RELEASE}: {e}"))?;
     let mut check = cargo_tool(repository, TOOL.0, TOOL.1)?;
-    let baseline = baseline(repository, &commit)?;
+    let baseline = sources(repository, &commit)?;
     let mut libraries = repository.libraries()?;
     libraries.retain(|library| library.published && library.name != MACROS);
     let (known, new): (Vec<&Library>, Vec<&Library>) =
@@ -60,32 +60,6 @@ fn released(text: &str) -> Result<String, Failure> {
     let commit = document.get("commit").and_then(Item::as_str).ok_or("no `commit`")?;
     let is_whole = commit.len() == 40 && commit.chars().all(|digit| digit.is_ascii_hexdigit());
     if is_whole { Ok(commit.to_owned()) } else { Err(format!("`{commit}` is no commit's 40 digits")) }
-}
-
-/// The sources of a commit, in a folder of their own. A clone that does not reach back so far fetches it.
-fn baseline(repository: &Repository, commit: &str) -> Result<PathBuf, Failure> {
-    let folder = repository.target("semver").join(commit);
-    if folder.exists() {
-        return Ok(folder);
-    }
-    let git = |arguments: &[&str]| {
-        let mut git = repository.command("git");
-        git.args(arguments);
-        git
-    };
-    if capture(&mut git(&["cat-file", "-e", &format!("{commit}^{{commit}}")])).is_err() {
-        run_program(&mut git(&["fetch", "--quiet", "--depth", "1", "origin", commit]))?;
-    }
-    let io = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
-    // Unpacked beside it and then moved, so that half of it is never taken for all.
-    let (archive, half) = (folder.with_extension("tar"), folder.with_extension("half"));
-    let _ = fs::remove_dir_all(&half);
-    fs::create_dir_all(&half).map_err(|e| io(&half, e))?;
-    run_program(git(&["archive", "--output"]).arg(&archive).arg(commit))?;
-    run_program(repository.command("tar").arg("-xf").arg(&archive).arg("-C").arg(&half))?;
-    fs::rename(&half, &folder).map_err(|e| io(&folder, e))?;
-    fs::remove_file(&archive).map_err(|e| io(&archive, e))?;
-    Ok(folder)
 }
 
 #[cfg(test)]
