@@ -75,7 +75,7 @@ fn fly_prints_one_json_object_and_writes_log_and_report() {
     let log = std::fs::read(folder.join("deep/er/flight.ulg")).expect("a log");
     assert!(log.starts_with(b"ULog") && log.len() > 1_000_000);
     let page = std::fs::read_to_string(folder.join("deep/er/flight.html")).expect("a report");
-    assert!(page.contains(hash) && page.contains("pos_rms_m"));
+    assert!(page.contains(hash) && page.contains("pos rms"));
 
     let again = json(&run(&folder, &["fly", "--seed", "3", "--json"]));
     assert_eq!(again["log_hash"], value["log_hash"]);

@@ -100,6 +100,22 @@ pub struct Figure {
     pub value: Option<f64>,
 }
 
+impl Figure {
+    /// The name for people: words, and no unit, which stands beside it.
+    ///
+    /// ```
+    /// use stampfly_sim::vehicle::Figure;
+    /// assert_eq!(Figure { name: "touchdown_speed_mps", unit: "m/s", value: None }.title(), "touchdown speed");
+    /// assert_eq!(Figure { name: "laps", unit: "", value: None }.title(), "laps");
+    /// ```
+    #[must_use]
+    pub fn title(&self) -> String {
+        let without_unit =
+            self.name.rsplit_once('_').filter(|_| !self.unit.is_empty()).map_or(self.name, |(name, _)| name);
+        without_unit.replace('_', " ")
+    }
+}
+
 /// How a flight of a vehicle went, as programs report it.
 pub trait Verdict {
     /// Did the vehicle do what it was to do, without ever doing what it must not?

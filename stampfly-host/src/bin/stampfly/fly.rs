@@ -157,7 +157,7 @@ fn write_report<V: Vehicle>(
     let mut metrics = vec![Metric::new("verdict", outcome.sentence(), "").judged(outcome.succeeded())];
     let figures = outcome.figures();
     let figures = figures.iter().filter_map(|figure| Some((figure, figure.value?)));
-    metrics.extend(figures.map(|(figure, value)| Metric::new(figure.name, format!("{value:.3}"), figure.unit)));
+    metrics.extend(figures.map(|(figure, value)| Metric::new(figure.title(), format!("{value:.3}"), figure.unit)));
     metrics.push(Metric::new("log hash", format!("{:016x}", recorder.hash()), ""));
     let mission = mission.map(|mission| format!("mission {mission}, ")).unwrap_or_default();
     let report = Report {
