@@ -122,7 +122,7 @@ mod array {
     /// See the [module](super) documentation.
     #[derive(Clone, Copy)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-    #[cfg_attr(feature = "serde", serde(from = "[f32; 3]", into = "[f32; 3]"))]
+    #[cfg_attr(feature = "serde", serde(transparent))]
     pub struct Lanes([f32; 3]);
 
     impl Lanes {
