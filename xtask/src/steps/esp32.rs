@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | S3, types | types, features, pins and borrows of the real firmware | machine code, linking, timing |
 //! | S3, a wrong pin | that the check above refuses one | |
+//! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
 //! | C6, image | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
 //! | C6, memory | that the same statics leave the S3's first core its stack | to the byte: code differs |
 //!
@@ -11,6 +12,7 @@
 //! the S3's target name; nothing it makes is ever run. The third builds the same code for another chip. Debian's compiler
 //! comes with the sources of its own core library, which both need, and is installed when it is missing.
 
+use super::esp32_link;
 use super::no_std::debian_cargo;
 use crate::arguments::Arguments;
 use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
@@ -38,6 +40,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let target = stand_in(repository)?;
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
+    esp32_link::run(repository, s3(repository, &target, "-Dwarnings"))?;
     let program = c6(repository)?;
     memory(&program)?;
     image(repository, &program)
