@@ -123,17 +123,27 @@ impl MotorStage {
             self.duty = [0.0; MAX_MOTORS];
             return MotorOutput { duty: self.duty, count: mixed.count, armed: false, unmet: mixed.unmet };
         }
-        let step = self.config.slew_max * dt;
-        let per_volt = 1.0 / battery;
-        // A motor that begins to idle starts from rest, no quicker than any other change.
-        let lowest = if self.config.duty_min < 0.0 { self.config.duty_min } else { 0.0 };
-        for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(usize::from(mixed.count)) {
-            let wanted = (self.config.voltage(thrust) * per_volt).min(self.config.duty_max);
-            let wanted = if wanted < self.config.duty_min { self.config.duty_min } else { wanted };
-            // The last clamp is for the rounding of the sum.
-            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, self.config.duty_max);
+        let (step, per_volt) = (self.config.slew_max * dt, 1.0 / battery);
+        // The usual number of motors as a constant: no loop is left of it.
+        match mixed.count {
+            4 => self.turn(4, &mixed.thrust, step, per_volt),
+            count => self.turn(count.into(), &mixed.thrust, step, per_volt),
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
+    }
+
+    /// Moves the duties of `count` motors towards what their thrusts need, by `step` at most.
+    #[inline(always)]
+    fn turn(&mut self, count: usize, thrust: &[f32; MAX_MOTORS], step: f32, per_volt: f32) {
+        let MotorConfig { duty_min, duty_max, .. } = self.config;
+        // A motor that begins to idle starts from rest, no quicker than any other change.
+        let lowest = if duty_min < 0.0 { duty_min } else { 0.0 };
+        for (duty, thrust) in self.duty.iter_mut().zip(thrust).take(count) {
+            let wanted = (self.config.voltage(*thrust) * per_volt).min(duty_max);
+            let wanted = if wanted < duty_min { duty_min } else { wanted };
+            // The last clamp is for the rounding of the sum.
+            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, duty_max);
+        }
     }
 
     /// The battery voltage in use, V.
