@@ -78,9 +78,33 @@ impl MotorConfig {
         if self.duty_min < 0.0 { -thrust } else { thrust }
     }
 
-    /// The voltage for a thrust, negative for one below zero where the motor reverses.
-    fn voltage(&self, thrust: f32) -> f32 {
-        if thrust < 0.0 && self.duty_min < 0.0 { -self.curve.voltage(-thrust) } else { self.curve.voltage(thrust) }
+    /// The voltages for thrusts, negative for one below zero where the motor reverses.
+    #[inline(always)]
+    fn voltages<const N: usize>(&self, thrust: [f32; N]) -> [f32; N] {
+        if self.duty_min < 0.0 {
+            let voltage = self.curve.voltages(thrust.map(f32::abs));
+            let mut signed = thrust;
+            signed.iter_mut().zip(voltage).for_each(|(signed, voltage)| *signed = voltage.copysign(*signed));
+            signed
+        } else {
+            self.curve.voltages(thrust)
+        }
+    }
+
+    /// Duties moved towards what the thrusts need, by `step` at most.
+    #[inline(always)]
+    fn turned<const N: usize>(&self, mut duty: [f32; N], thrust: [f32; N], step: f32, per_volt: f32) -> [f32; N] {
+        let Self { duty_min, duty_max, .. } = *self;
+        // A motor that begins to idle starts from rest, no quicker than any other change.
+        let lowest = if duty_min < 0.0 { duty_min } else { 0.0 };
+        for (duty, voltage) in duty.iter_mut().zip(self.voltages(thrust)) {
+            let wanted = voltage * per_volt;
+            let wanted = if wanted > duty_max { duty_max } else { wanted };
+            let wanted = if wanted < duty_min { duty_min } else { wanted };
+            // The last clamp is for the rounding of the sum.
+            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, duty_max);
+        }
+        duty
     }
 }
 
@@ -124,26 +148,16 @@ impl MotorStage {
             return MotorOutput { duty: self.duty, count: mixed.count, armed: false, unmet: mixed.unmet };
         }
         let (step, per_volt) = (self.config.slew_max * dt, 1.0 / battery);
-        // The usual number of motors as a constant: no loop is left of it.
-        match mixed.count {
-            4 => self.turn(4, &mixed.thrust, step, per_volt),
-            count => self.turn(count.into(), &mixed.thrust, step, per_volt),
+        // A battery of no volts, which only a wrong configuration has, turns nothing.
+        let per_volt = if per_volt.is_finite() { per_volt } else { 0.0 };
+        // The usual number of motors is known when this is compiled: no loop is left of it.
+        if let (4, Some(duty), Some(thrust)) = (mixed.count, self.duty.first_chunk_mut(), mixed.thrust.first_chunk()) {
+            *duty = self.config.turned::<4>(*duty, *thrust, step, per_volt);
+        } else {
+            let duty = self.config.turned(self.duty, mixed.thrust, step, per_volt);
+            self.duty.iter_mut().zip(duty).take(mixed.count.into()).for_each(|(place, duty)| *place = duty);
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
-    }
-
-    /// Moves the duties of `count` motors towards what their thrusts need, by `step` at most.
-    #[inline(always)]
-    fn turn(&mut self, count: usize, thrust: &[f32; MAX_MOTORS], step: f32, per_volt: f32) {
-        let MotorConfig { duty_min, duty_max, .. } = self.config;
-        // A motor that begins to idle starts from rest, no quicker than any other change.
-        let lowest = if duty_min < 0.0 { duty_min } else { 0.0 };
-        for (duty, thrust) in self.duty.iter_mut().zip(thrust).take(count) {
-            let wanted = (self.config.voltage(*thrust) * per_volt).min(duty_max);
-            let wanted = if wanted < duty_min { duty_min } else { wanted };
-            // The last clamp is for the rounding of the sum.
-            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, duty_max);
-        }
     }
 
     /// The battery voltage in use, V.
@@ -221,6 +235,15 @@ mod tests {
         assert_eq!(settled(-0.3, -1.2), -0.3, "no further than it may");
         let config = MotorConfig { duty_min: -0.5, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
         assert!(config.idle_thrust() < 0.0);
+    }
+
+    #[test]
+    fn a_battery_of_no_volts_turns_nothing() {
+        for nominal_voltage in [0.0, -0.0, f32::NAN, 1e-45] {
+            let config = MotorConfig { nominal_voltage, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
+            let out = [0.0, 1.2].map(|thrust| MotorStage::new(&config).step(Instant::ZERO, &mixed(thrust), None, true));
+            assert_eq!(out.map(|out| out.duty), [[0.0; 8]; 2], "{nominal_voltage}");
+        }
     }
 
     #[test]

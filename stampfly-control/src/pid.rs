@@ -126,10 +126,13 @@ impl<T: FloatCore> Pid<T> {
     #[inline]
     pub fn step(&mut self, setpoint: T, measurement: T, dt: T, integration: Integration) -> T {
         let error = setpoint - measurement;
-        if !(error.is_finite() && dt.is_finite() && dt > T::zero()) {
+        if !(error.is_finite() && dt > T::zero()) {
             return self.output;
         }
         if dt != self.discrete.dt {
+            if !dt.is_finite() {
+                return self.output;
+            }
             self.discrete = Discrete::new(&self.gains, dt);
         }
 
@@ -192,13 +195,8 @@ impl<T: FloatCore> Pid<T> {
 
 /// Within ±`limit`. Comparisons, not `max` and `min`: those spend instructions on NaN, which does not get here.
 fn clamp<T: FloatCore>(value: T, limit: T) -> T {
-    if value > limit {
-        limit
-    } else if value < -limit {
-        -limit
-    } else {
-        value
-    }
+    let value = if value > limit { limit } else { value };
+    if value < -limit { -limit } else { value }
 }
 
 #[cfg(test)]
