@@ -146,7 +146,7 @@ impl MultirotorMixer {
     /// leaves such a thrust.
     #[cold]
     #[inline(never)]
-    fn compromise(&self, mut tilt: [f32; MAX_MOTORS], wanted: f32) -> (f32, f32) {
+    pub(super) fn compromise(&self, mut tilt: [f32; MAX_MOTORS], wanted: f32) -> (f32, f32) {
         let (mut low, mut high) = self.collective_range(&tilt);
         let mut tilt_scale = 1.0;
         if low > high {

@@ -231,6 +231,19 @@ proptest! {
         prop_assert!(spread > 0.999 * (max - min) || mixed.unmet[0] < 1e-3, "given up without need");
     }
 
+    /// What fits is asked first, and apart from the search for what to give up. The search, asked as well, gives up nothing then.
+    #[test]
+    fn the_search_agrees_with_what_fits(shares in demands(), low in -1f32..0.2, which in 0usize..3) {
+        let (rotors, max) = ([QUADROTOR.rotors.to_vec(), askew(), ring(8)][which].clone(), 2.3);
+        let mixer = MultirotorMixer::from_rotors(&rotors, max).and_then(|mixer| mixer.with_thrust_min(max * low)).expect("flies");
+        let demand = demand_on(&rotors, max, &shares);
+        let unmet = mixer.mix(&demand).unmet;
+        let mut tilt = [0.0; MAX_MOTORS];
+        tilt.iter_mut().zip(parts(&mixer, &demand)).for_each(|(part, asked)| *part = asked);
+        let found = mixer.compromise(tilt, demand.thrust);
+        prop_assert_eq!(found == (demand.thrust, 1.0), (unmet[0], unmet[3]) == (0.0, 0.0), "{:?} {:?}", found, unmet);
+    }
+
     #[test]
     fn any_bits_give_possible_thrusts(thrust: f32, x: f32, y: f32, z: f32) {
         let mixed = MIXER.mix(&ControlOutput { thrust, torque: Vec3::new(x, y, z) });
