@@ -195,8 +195,13 @@ impl<T: FloatCore> Pid<T> {
 
 /// Within ±`limit`. Comparisons, not `max` and `min`: those spend instructions on NaN, which does not get here.
 fn clamp<T: FloatCore>(value: T, limit: T) -> T {
-    let value = if value > limit { limit } else { value };
-    if value < -limit { -limit } else { value }
+    if value > limit {
+        limit
+    } else if value < -limit {
+        -limit
+    } else {
+        value
+    }
 }
 
 #[cfg(test)]
