@@ -78,33 +78,21 @@ impl MotorConfig {
         if self.duty_min < 0.0 { -thrust } else { thrust }
     }
 
-    /// The voltages for thrusts, negative for one below zero where the motor reverses.
-    #[inline(always)]
-    fn voltages<const N: usize>(&self, thrust: [f32; N]) -> [f32; N] {
-        if self.duty_min < 0.0 {
-            let voltage = self.curve.voltages(thrust.map(f32::abs));
-            let mut signed = thrust;
-            signed.iter_mut().zip(voltage).for_each(|(signed, voltage)| *signed = voltage.copysign(*signed));
-            signed
-        } else {
-            self.curve.voltages(thrust)
-        }
+    /// The voltage for a thrust, negative for one below zero where the motor reverses.
+    fn voltage(&self, thrust: f32) -> f32 {
+        if thrust < 0.0 && self.duty_min < 0.0 { -self.curve.voltage(-thrust) } else { self.curve.voltage(thrust) }
     }
 
-    /// Duties moved towards what the thrusts need, by `step` at most.
-    #[inline(always)]
-    fn turned<const N: usize>(&self, mut duty: [f32; N], thrust: [f32; N], step: f32, per_volt: f32) -> [f32; N] {
-        let Self { duty_min, duty_max, .. } = *self;
+    /// A duty moved towards what a voltage needs, by `step` at most.
+    #[inline]
+    fn moved(&self, duty: f32, voltage: f32, per_volt: f32, step: f32) -> f32 {
         // A motor that begins to idle starts from rest, no quicker than any other change.
-        let lowest = if duty_min < 0.0 { duty_min } else { 0.0 };
-        for (duty, voltage) in duty.iter_mut().zip(self.voltages(thrust)) {
-            let wanted = voltage * per_volt;
-            let wanted = if wanted > duty_max { duty_max } else { wanted };
-            let wanted = if wanted < duty_min { duty_min } else { wanted };
-            // The last clamp is for the rounding of the sum.
-            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, duty_max);
-        }
-        duty
+        let lowest = if self.duty_min < 0.0 { self.duty_min } else { 0.0 };
+        let wanted = voltage * per_volt;
+        let wanted = if wanted > self.duty_max { self.duty_max } else { wanted };
+        let wanted = if wanted < self.duty_min { self.duty_min } else { wanted };
+        // The last clamp is for the rounding of the sum.
+        within(duty + symmetric(wanted - duty, step), lowest, self.duty_max)
     }
 }
 
@@ -150,12 +138,16 @@ impl MotorStage {
         let (step, per_volt) = (self.config.slew_max * dt, 1.0 / battery);
         // A battery of no volts, which only a wrong configuration has, turns nothing.
         let per_volt = if per_volt.is_finite() { per_volt } else { 0.0 };
-        // The usual number of motors is known when this is compiled: no loop is left of it.
-        if let (4, Some(duty), Some(thrust)) = (mixed.count, self.duty.first_chunk_mut(), mixed.thrust.first_chunk()) {
-            *duty = self.config.turned::<4>(*duty, *thrust, step, per_volt);
+        let (config, count) = (self.config, usize::from(mixed.count));
+        // The usual vehicle side by side, any other motor by motor.
+        if let (4, true, Some(thrust)) = (count, config.duty_min >= 0.0, mixed.thrust.first_chunk::<4>()) {
+            for (duty, voltage) in self.duty.iter_mut().zip(config.curve.voltages(*thrust)) {
+                *duty = config.moved(*duty, voltage, per_volt, step);
+            }
         } else {
-            let duty = self.config.turned(self.duty, mixed.thrust, step, per_volt);
-            self.duty.iter_mut().zip(duty).take(mixed.count.into()).for_each(|(place, duty)| *place = duty);
+            for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(count) {
+                *duty = config.moved(*duty, config.voltage(thrust), per_volt, step);
+            }
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
     }

@@ -143,26 +143,28 @@ impl MultirotorMixer {
     }
 
     /// The collective thrust nearest to what is wanted for which every motor can deliver roll and pitch, and the share of these that
-    /// leaves such a thrust.
+    /// leaves such a thrust. `tilt` is each rotor's part of them.
+    ///
+    /// It goes on with slices: of an array of eight, compilers make eight copies of a loop that hardly ever runs.
     #[cold]
     #[inline(never)]
-    pub(super) fn compromise(&self, mut tilt: [f32; MAX_MOTORS], wanted: f32) -> (f32, f32) {
-        let (mut low, mut high) = self.collective_range(&tilt);
+    pub(super) fn compromise(&self, tilt: [f32; MAX_MOTORS], wanted: f32) -> (f32, f32) {
+        let (collectives, tilt) = (of(&self.shares.collective, self.count), of(&tilt, self.count));
         let mut tilt_scale = 1.0;
+        let (mut low, mut high) = self.collective_range(collectives, tilt, tilt_scale);
         if low > high {
-            tilt_scale = self.tilt_scale(&tilt);
-            tilt.iter_mut().for_each(|part| *part *= tilt_scale);
-            (low, high) = self.collective_range(&tilt);
+            tilt_scale = self.tilt_scale(collectives, tilt);
+            (low, high) = self.collective_range(collectives, tilt, tilt_scale);
         }
         // Rounding may leave the range inside out by one bit.
         (wanted.min(high).max(low), tilt_scale)
     }
 
-    /// Largest share of `tilt` (each rotor's part of roll and pitch) for which some collective thrust keeps every
-    /// motor within its limits.
-    fn tilt_scale(&self, tilt: &[f32; MAX_MOTORS]) -> f32 {
+    /// Largest share of `tilt` for which some collective thrust keeps every motor within its limits.
+    #[inline(never)]
+    fn tilt_scale(&self, collectives: &[f32], tilt: &[f32]) -> f32 {
         let mut scale = 1.0f32;
-        let rotors = || self.shares.collective.iter().zip(tilt).take(self.count);
+        let rotors = || collectives.iter().zip(tilt);
         // Collective u must satisfy min − s·p_i ≤ a_i·u and a_j·u ≤ max − s·p_j for all pairs.
         for (lower, p_lower) in rotors() {
             for (upper, p_upper) in rotors() {
@@ -176,11 +178,13 @@ impl MultirotorMixer {
         scale
     }
 
-    /// The collective thrusts for which every motor can deliver this much roll and pitch.
-    fn collective_range(&self, tilt: &[f32; MAX_MOTORS]) -> (f32, f32) {
+    /// The collective thrusts for which every motor can deliver this share of roll and pitch.
+    #[inline(never)]
+    fn collective_range(&self, collectives: &[f32], tilt: &[f32], tilt_scale: f32) -> (f32, f32) {
         // Roll and pitch add nothing to the sum of all thrusts.
-        let (mut low, mut high) = (self.thrust_min * self.count as f32, f32::MAX);
-        for (collective, part) in self.shares.collective.iter().zip(tilt).take(self.count) {
+        let (mut low, mut high) = (self.thrust_min * tilt.len() as f32, f32::MAX);
+        for (collective, part) in collectives.iter().zip(tilt) {
+            let part = part * tilt_scale;
             // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
             let (least, most) = ((self.thrust_min - part) * collective, (self.thrust_max - part) * collective);
             low = if least > low { least } else { low };
@@ -194,7 +198,7 @@ impl MultirotorMixer {
     #[inline(never)]
     fn yaw_scale(&self, thrust: [f32; MAX_MOTORS], twist: [f32; MAX_MOTORS]) -> f32 {
         let mut scale = 1.0f32;
-        for (thrust, twist) in thrust.iter().zip(twist).take(self.count) {
+        for (thrust, twist) in of(&thrust, self.count).iter().zip(twist) {
             let room = if twist > 0.0 { self.thrust_max - thrust } else { thrust - self.thrust_min };
             if scale * twist.abs() > room {
                 scale = room / twist.abs();
@@ -202,6 +206,12 @@ impl MultirotorMixer {
         }
         scale
     }
+}
+
+/// As many as there are motors.
+#[inline(always)]
+fn of(values: &[f32; MAX_MOTORS], count: usize) -> &[f32] {
+    values.get(..count).unwrap_or_default()
 }
 
 impl Mixer for MultirotorMixer {
