@@ -70,6 +70,8 @@ impl Normals {
 
 /// [`libm::log`] between 0 and 1, both excluded and not subnormal: the same operations in the same order, without the
 /// branches for other numbers, so that a compiler can take several numbers at a time.
+///
+/// Its polynomials are fdlibm's (Sun Microsystems, `e_log.c`, 1993), as libm's are.
 #[inline]
 fn log_below_one(x: f64) -> f64 {
     const LN2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];

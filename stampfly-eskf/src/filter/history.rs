@@ -132,12 +132,7 @@ impl History {
         let turned = normalize(multiply(self.turned(), motion.delta_rotation));
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.intervals.get_mut(self.newest) {
-            *place = Interval {
-                length: motion.dt,
-                rate: motion.rate,
-                turned,
-                delta_velocity: motion.delta_velocity,
-            };
+            *place = Interval { length: motion.dt, rate: motion.rate, turned, delta_velocity: motion.delta_velocity };
         }
     }
 
