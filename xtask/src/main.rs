@@ -82,6 +82,9 @@ const STEPS: &[Step] = &[
     Step::new("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
         .beside()
         .accepting(&[Fix]),
+    Step::new("cache", "Count what a pass of the flight band would fetch from flash", steps::cache::run)
+        .beside()
+        .accepting(&[Fix]),
     Step::new("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
         .accepting(&[Fix]),
     Step::new("book", "Build the book, check its links, run its tutorial's commands", steps::book::run),

@@ -20,6 +20,7 @@ macro_rules! outln {
     ($($text:tt)*) => { crate::machine::line(format_args!($($text)*)) };
 }
 
+mod marks;
 mod memory;
 mod profile;
 mod record;

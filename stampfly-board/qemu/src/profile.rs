@@ -4,6 +4,7 @@
 //! publishing. What is written into the flight record meanwhile is counted apart.
 
 use crate::machine::{self, Ticks};
+use crate::marks;
 use crate::record::Record;
 use core::fmt::Display;
 use stampfly_board::schedule::{COUNT, Id};
@@ -113,7 +114,9 @@ impl<'t> Profile<'t> {
     /// Writes into the flight record and counts that apart.
     fn write(&mut self, what: impl FnOnce(&mut Record<'t>)) {
         let before = machine::ticks();
+        marks::aside_begins();
         what(&mut self.record);
+        marks::aside_ends();
         self.recorded += before.until(machine::ticks()).saturating_sub(self.looking);
     }
 }
@@ -153,6 +156,9 @@ impl PlayObserver for Profile<'_> {
             self.recorded = 0;
         }
         (self.pass, self.ran, self.all_new) = (0, false, false);
+        if band == Band::Flight {
+            marks::pass_begins();
+        }
         self.since = machine::ticks();
     }
 
@@ -160,6 +166,11 @@ impl PlayObserver for Profile<'_> {
         // Finding out that nothing more is due is part of it.
         let looked = self.elapsed().saturating_sub(self.looking);
         if band == Band::Flight && self.ran {
+            if self.armed {
+                marks::pass_ends_armed()
+            } else {
+                marks::pass_ends_on_ground()
+            }
             self.chain.add(self.pass + looked, self.armed);
             if self.all_new {
                 self.everything.add(self.pass + looked, self.armed);

@@ -1,7 +1,10 @@
 //! The functions and objects of a linked program: size, owning crate, callees.
 
+mod names;
 mod riscv;
 pub mod stack;
+
+pub use names::Names;
 
 use crate::repository::Failure;
 use object::elf::SHF_ALLOC;

@@ -5,6 +5,7 @@ pub mod bars;
 pub mod book;
 pub mod budget;
 pub mod bugs;
+pub mod cache;
 pub mod campaign;
 pub mod clippy;
 pub mod constants;

@@ -11,9 +11,11 @@ use crate::ratchet::Budget;
 use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use crate::steps::no_std::debian_cargo;
 use std::fmt::Write;
+use std::path::PathBuf;
 use std::process::Command;
 
-const PACKAGE: &str = "stampfly-board/qemu";
+/// The program.
+pub const PACKAGE: &str = "stampfly-board/qemu";
 const BUDGET: &str = "stampfly-board/qemu/budget.toml";
 /// The document the table is written into, and where.
 const DOCUMENT: &str = "README.md";
@@ -31,17 +33,20 @@ const CHAIN: &str = "chain";
 const BAR: (&str, f64, f64) = ("Cortex-M4F", 18_000.0, 30_000.0);
 
 /// An emulated machine.
-struct Machine {
+pub struct Machine {
     /// As in the budget and in the table.
-    name: &'static str,
+    pub name: &'static str,
     /// As in the package's `.cargo/config.toml`.
-    target: &'static str,
+    pub target: &'static str,
+    /// Does its code stand for the ESP32-S3's, in `cargo xtask cache`?
+    pub stands_for_s3: bool,
 }
 
-const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf" };
-const MACHINES: [Machine; 3] = [
-    Machine { name: "Cortex-M4F", target: "thumbv7em-none-eabihf" },
-    Machine { name: "RV32IMAFC", target: "riscv32imafc-unknown-none-elf" },
+const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf", stands_for_s3: true };
+/// All of them.
+pub const MACHINES: [Machine; 3] = [
+    Machine { name: "Cortex-M4F", target: "thumbv7em-none-eabihf", stands_for_s3: false },
+    Machine { name: "RV32IMAFC", target: "riscv32imafc-unknown-none-elf", stands_for_s3: true },
     XTENSA,
 ];
 
@@ -83,11 +88,17 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     all.iter().flatten().try_for_each(within_budget)
 }
 
+/// Builds the program for a machine.
+pub fn program(repository: &Repository, machine: &Machine) -> Result<PathBuf, Failure> {
+    let (mut cargo, options) = toolchain(repository, machine)?;
+    run_program(cargo.arg("build").args(&options))?;
+    Ok(repository.target("qemu").join(machine.target).join("release/stampfly-qemu"))
+}
+
 /// Builds the program for a machine, runs it there and returns what it says.
 fn emulate(repository: &Repository, machine: &Machine) -> Result<String, Failure> {
-    let (mut cargo, options) = toolchain(repository, machine)?;
     // Apart from running it, which has little time.
-    run_program(cargo.arg("build").args(&options))?;
+    program(repository, machine)?;
     let (cargo, options) = toolchain(repository, machine)?;
     let mut limited = inside(repository, repository.command("timeout"));
     limited.envs(cargo.get_envs().filter_map(|(key, value)| Some((key, value?))));
@@ -124,7 +135,7 @@ fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec
 
 /// Runs in the package's folder: its own `.cargo/config.toml` says how it is run, and flags meant for the host would
 /// replace that.
-fn inside(repository: &Repository, mut command: Command) -> Command {
+pub fn inside(repository: &Repository, mut command: Command) -> Command {
     command.current_dir(repository.root.join(PACKAGE)).env_remove("RUSTFLAGS");
     command
 }

@@ -1,0 +1,238 @@
+//! What happens between the marks of the program: instructions and misses of every pass of the flight band.
+
+use crate::cache::{Cache, Shape};
+use std::collections::BTreeMap;
+use std::fmt::{self, Display};
+use std::ops::Range;
+
+/// Where the program's parts lie.
+#[derive(Clone, Debug, Default)]
+pub struct Layout {
+    /// Read through the cache of instructions: code in flash.
+    pub code: Range<u64>,
+    /// Read through the cache of data: constants in flash.
+    pub constants: Range<u64>,
+    /// In RAM whatever it is part of.
+    pub ram: Vec<Range<u64>>,
+    /// Marks: a pass begins; it has ended, on the ground or with motors that may turn.
+    pub begins: u64,
+    /// See there.
+    pub ends_on_ground: u64,
+    /// See there.
+    pub ends_armed: u64,
+    /// Marks: what is between them is neither counted nor cached.
+    pub aside_begins: u64,
+    /// See there.
+    pub aside_ends: u64,
+    /// Places of every set that something else has taken when a pass begins.
+    pub displaced: usize,
+}
+
+/// A pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pass {
+    /// May the motors turn?
+    pub armed: bool,
+    /// Instructions.
+    pub instructions: u64,
+    /// Lines of code that had to be fetched.
+    pub code: u64,
+    /// Lines of constants that had to be fetched.
+    pub constants: u64,
+}
+
+/// Follows a program.
+#[derive(Debug)]
+pub struct Passes {
+    layout: Layout,
+    instructions: Cache,
+    data: Cache,
+    current: Option<Pass>,
+    aside: bool,
+    done: Vec<Pass>,
+    /// Lines missed in the present pass.
+    missed: Vec<u64>,
+    /// How often each line was missed in armed passes.
+    by_line: BTreeMap<u64, u64>,
+}
+
+impl Layout {
+    fn is_in_ram(&self, address: u64) -> bool {
+        self.ram.iter().any(|range| range.contains(&address))
+    }
+}
+
+impl Passes {
+    /// Nothing has happened.
+    pub fn new(layout: Layout) -> Self {
+        Self {
+            layout,
+            instructions: Cache::new(Shape::INSTRUCTIONS),
+            data: Cache::new(Shape::DATA),
+            current: None,
+            aside: false,
+            done: Vec::new(),
+            missed: Vec::new(),
+            by_line: BTreeMap::new(),
+        }
+    }
+
+    /// An instruction at this address is executed.
+    pub fn executes(&mut self, address: u64) {
+        if address == self.layout.begins {
+            self.begin();
+        } else if address == self.layout.ends_on_ground {
+            self.end(false);
+        } else if address == self.layout.ends_armed {
+            self.end(true);
+        } else if address == self.layout.aside_begins {
+            self.aside = true;
+        } else if address == self.layout.aside_ends {
+            self.aside = false;
+        }
+        if self.aside {
+            return;
+        }
+        if let Some(pass) = &mut self.current {
+            pass.instructions += 1;
+        }
+        if self.layout.code.contains(&address) {
+            self.fetches(address);
+        }
+    }
+
+    /// Data at this address are read. Those of a function lie in its code: they come through that cache.
+    pub fn reads(&mut self, address: u64) {
+        if self.aside {
+            return;
+        }
+        if self.layout.code.contains(&address) {
+            self.fetches(address);
+        } else if self.layout.constants.contains(&address)
+            && !self.layout.is_in_ram(address)
+            && self.data.misses(address)
+            && let Some(pass) = &mut self.current
+        {
+            pass.constants += 1;
+            self.missed.push(self.data.line_of(address));
+        }
+    }
+
+    fn fetches(&mut self, address: u64) {
+        if !self.layout.is_in_ram(address)
+            && self.instructions.misses(address)
+            && let Some(pass) = &mut self.current
+        {
+            pass.code += 1;
+            self.missed.push(self.instructions.line_of(address));
+        }
+    }
+
+    fn begin(&mut self) {
+        self.instructions.displace(self.layout.displaced);
+        self.data.displace(self.layout.displaced);
+        self.current = Some(Pass::default());
+        self.missed.clear();
+    }
+
+    fn end(&mut self, armed: bool) {
+        let Some(pass) = self.current.take() else { return };
+        self.done.push(Pass { armed, ..pass });
+        if armed {
+            for line in self.missed.drain(..) {
+                *self.by_line.entry(line).or_default() += 1;
+            }
+        }
+    }
+}
+
+/// One line a pass, then one a line of memory: `pass ARMED INSTRUCTIONS CODE CONSTANTS`, `line ADDRESS MISSES`.
+impl Display for Passes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Pass { armed, instructions, code, constants } in &self.done {
+            writeln!(f, "pass {} {instructions} {code} {constants}", u8::from(*armed))?;
+        }
+        self.by_line.iter().try_for_each(|(line, misses)| writeln!(f, "line {line:x} {misses}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout() -> Layout {
+        Layout {
+            code: 0x1000..0x2000,
+            constants: 0x2000..0x3000,
+            ram: vec![0x1800..0x1900, 0x1a00..0x1a80],
+            begins: 0x1000,
+            ends_on_ground: 0x1100,
+            ends_armed: 0x1200,
+            aside_begins: 0x1300,
+            aside_ends: 0x1400,
+            displaced: 0,
+        }
+    }
+
+    #[test]
+    fn counts_what_lies_between_the_marks() {
+        let mut passes = Passes::new(layout());
+        passes.executes(0x1500);
+        passes.reads(0x2500);
+        for _ in 0..2 {
+            passes.executes(0x1000);
+            for address in [0x1500, 0x1504, 0x1600, 0x1800, 0x5000] {
+                passes.executes(address);
+            }
+            passes.reads(0x2500);
+            passes.reads(0x2600);
+            passes.reads(0x5000);
+            passes.executes(0x1200);
+        }
+        passes.executes(0x1700);
+        // The mark itself, 0x1600 and the second constant; 0x1800 is in RAM, 0x5000 no flash.
+        let first = Pass { armed: true, instructions: 6, code: 2, constants: 1 };
+        assert_eq!(passes.done, [first, Pass { code: 0, constants: 0, ..first }]);
+        assert_eq!(passes.to_string().lines().last(), Some("line 2600 1"));
+    }
+
+    #[test]
+    fn the_ground_counts_apart() {
+        let mut passes = Passes::new(layout());
+        passes.executes(0x1100);
+        passes.executes(0x1000);
+        passes.executes(0x1100);
+        assert_eq!(passes.to_string(), "pass 0 1 1 0\n");
+    }
+
+    #[test]
+    fn what_another_core_does_is_no_part_of_a_pass() {
+        let mut passes = Passes::new(layout());
+        for address in [0x1000, 0x1300, 0x1500, 0x1600, 0x1400, 0x1100] {
+            passes.executes(address);
+        }
+        passes.reads(0x2500);
+        assert_eq!(passes.to_string(), "pass 0 2 2 0\n");
+    }
+
+    #[test]
+    fn literals_come_through_the_cache_of_instructions() {
+        let mut passes = Passes::new(layout());
+        passes.executes(0x1000);
+        passes.reads(0x1500);
+        passes.executes(0x1500);
+        passes.executes(0x1100);
+        assert_eq!(passes.done[0].code, 2);
+    }
+
+    #[test]
+    fn what_else_runs_takes_the_cache_away() {
+        let mut passes = Passes::new(Layout { displaced: 8, ..layout() });
+        for _ in 0..2 {
+            passes.executes(0x1000);
+            passes.executes(0x1500);
+            passes.executes(0x1100);
+        }
+        assert!(passes.done.iter().all(|pass| pass.code == 2), "{:?}", passes.done);
+    }
+}

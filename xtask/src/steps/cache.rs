@@ -1,0 +1,213 @@
+//! `cache`: what a pass of the flight band waits for the flash, on a model of the ESP32-S3's caches.
+//!
+//! Code that is not in the cache is fetched from flash, a line at a time, and the core waits. A pass runs through more code than the cache
+//! holds, so that is most of its time; `cargo xtask qemu`, which counts instructions, does not see it. Here the golden flight is played
+//! once more, with a plug-in of QEMU (`stampfly-board/qemu/cache`) that follows every instruction through the caches. Its counts are
+//! exact for the model. The model is: caches as esp-hal sets them up, both of them this core's alone, and this replay in place of the
+//! firmware, without drivers, executor and interrupts.
+
+use super::qemu::{MACHINES, Machine, PACKAGE, inside, program};
+use crate::arguments::Arguments;
+use crate::elf::Names;
+use crate::machine::{EMULATED_OTHERS, provide};
+use crate::ratchet::Budget;
+use crate::repository::{Failure, Repository, capture, run as run_program};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const PLUGIN: &str = "stampfly-board/qemu/cache";
+const BUDGET: &str = "stampfly-board/qemu/cache.toml";
+/// What the emulator is given in `.cargo/config.toml`.
+const CONFIG: &str = ".cargo/config.toml";
+const SECONDS: &str = "300";
+/// Clock of the ESP32-S3, MHz.
+const CLOCK: f64 = 240.0;
+/// Clocks of the flash to read a line of 32 bytes over four wires: command 8, address 6, mode and waiting 6 (Winbond W25Q64JV, "Fast
+/// Read Quad I/O (EBh)"), data 64.
+const CLOCKS_A_LINE: f64 = 84.0;
+/// Clock of the flash, MHz: what the runner of `stampfly-board/esp32s3` sets.
+const FLASH_CLOCK: f64 = 80.0;
+/// Functions shown with what they miss.
+const SHOWN: usize = 12;
+
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    provide(repository, &[&EMULATED_OTHERS])?;
+    let plugin = plugin(repository)?;
+    let mut budget = Budget::read(repository, BUDGET)?;
+    let mut failures = Vec::new();
+    // An ARM core's code is another one's again; these two stand for the S3's.
+    for machine in MACHINES.iter().filter(|machine| machine.stands_for_s3) {
+        let program = program(repository, machine)?;
+        let names = Names::read(&program)?;
+        let said = follow(repository, machine, &plugin, &program, &names)?;
+        let found = Found::read(&said)?;
+        found.print(machine, &names);
+        for (figure, measured, unit) in found.figures() {
+            if arguments.fix {
+                budget.set(&[machine.name, figure], measured)?;
+            } else if let Err(failure) = budget.hold(&[machine.name, figure], measured, unit) {
+                failures.push(failure);
+            }
+        }
+    }
+    if arguments.fix {
+        return budget.write();
+    }
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
+}
+
+/// Checks and builds the plug-in.
+fn plugin(repository: &Repository) -> Result<PathBuf, Failure> {
+    let target = repository.target("qemu-cache");
+    let cargo = |words: &[&str]| {
+        let mut cargo = repository.cargo();
+        cargo.current_dir(repository.root.join(PLUGIN)).args(words);
+        cargo
+    };
+    run_program(&mut cargo(&["fmt", "--check"]))?;
+    let options = ["--quiet", "--release", "--locked", "--target-dir"];
+    run_program(cargo(&["clippy"]).args(options).arg(&target).args(["--all-targets", "--", "-D", "warnings"]))?;
+    run_program(cargo(&["test"]).args(options).arg(&target))?;
+    run_program(cargo(&["build"]).args(options).arg(&target))?;
+    Ok(target.join("release/libstampfly_qemu_cache.so"))
+}
+
+/// Plays the flight with the plug-in and returns what it writes.
+fn follow(
+    repository: &Repository,
+    machine: &Machine,
+    plugin: &Path,
+    program: &Path,
+    names: &Names,
+) -> Result<String, Failure> {
+    let out = repository.target("qemu-cache").join(format!("{}.txt", machine.name));
+    // Of an earlier run.
+    let _ = fs::remove_file(&out);
+    let mark = |name: &str| names.address(&format!("stampfly_qemu::marks::{name}"));
+    let mut words = format!("{},out={}", plugin.display(), out.display());
+    for (word, name) in [
+        ("begins", "pass_begins"),
+        ("ground", "pass_ends_on_ground"),
+        ("armed", "pass_ends_armed"),
+        ("aside", "aside_begins"),
+        ("back", "aside_ends"),
+    ] {
+        words += &format!(",{word}={:x}", mark(name)?);
+    }
+    for (word, section) in [("code", ".text"), ("constants", ".rodata")] {
+        let range = names.section(section)?;
+        words += &format!(",{word}={:x}:{:x}", range.start, range.end);
+    }
+    let runner = runner(repository, machine)?;
+    let (emulator, options) = runner.split_first().ok_or("no emulator")?;
+    let mut limited = inside(repository, repository.command("timeout"));
+    limited.args([SECONDS, emulator, "-plugin", &words]).args(options).arg(program);
+    capture(&mut limited)?;
+    fs::read_to_string(&out).map_err(|e| format!("{}: {e}", out.display()))
+}
+
+/// How the machine is run.
+fn runner(repository: &Repository, machine: &Machine) -> Result<Vec<String>, Failure> {
+    let path = repository.root.join(PACKAGE).join(CONFIG);
+    let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let config: toml_edit::DocumentMut = text.parse().map_err(|e| format!("{}: {e}", path.display()))?;
+    let words = config["target"][machine.target]["runner"].as_array().ok_or("no runner")?;
+    Ok(words.iter().filter_map(|word| word.as_str()).map(str::to_owned).collect())
+}
+
+/// A pass in which the motors may turn.
+struct Pass {
+    instructions: f64,
+    /// Lines fetched, of code and of constants.
+    lines: f64,
+}
+
+impl Pass {
+    /// Microseconds, at an instruction a clock.
+    fn time(&self) -> f64 {
+        self.instructions / CLOCK + self.lines * CLOCKS_A_LINE / FLASH_CLOCK
+    }
+}
+
+/// What the plug-in has found.
+struct Found {
+    passes: Vec<Pass>,
+    /// Misses in those passes, by the address of the line.
+    lines: BTreeMap<u64, f64>,
+}
+
+impl Found {
+    fn read(said: &str) -> Result<Self, Failure> {
+        let mut found = Self { passes: Vec::new(), lines: BTreeMap::new() };
+        for line in said.lines() {
+            let words: Vec<&str> = line.split(' ').collect();
+            let number = |text: &str| text.parse::<f64>().map_err(|e| format!("{line}: {e}"));
+            match words[..] {
+                ["pass", "1", instructions, code, constants] => found
+                    .passes
+                    .push(Pass { instructions: number(instructions)?, lines: number(code)? + number(constants)? }),
+                ["pass", "0", ..] => {}
+                ["line", address, misses] => {
+                    let address = u64::from_str_radix(address, 16).map_err(|e| format!("{line}: {e}"))?;
+                    found.lines.insert(address, number(misses)?);
+                }
+                _ => return Err(format!("not understood: {line}")),
+            }
+        }
+        // Nothing followed would be within every budget.
+        let plausible = found.passes.len() > 100 && found.passes.iter().all(|pass| pass.instructions > 1000.0);
+        if plausible { Ok(found) } else { Err(format!("{} passes of a whole flight", found.passes.len())) }
+    }
+
+    /// Name, figure and unit of what is held.
+    fn figures(&self) -> [(&'static str, f64, &'static str); 4] {
+        let mean = |of: fn(&Pass) -> f64| self.passes.iter().map(of).sum::<f64>() / self.passes.len() as f64;
+        let most = |of: fn(&Pass) -> f64| self.passes.iter().map(of).fold(0.0, f64::max);
+        [
+            ("lines_mean", mean(|pass| pass.lines), "lines fetched in an armed pass"),
+            ("lines_most", most(|pass| pass.lines), "lines fetched in an armed pass"),
+            ("us_mean", mean(Pass::time), "us an armed pass"),
+            ("us_most", most(Pass::time), "us an armed pass"),
+        ]
+    }
+
+    fn print(&self, machine: &Machine, names: &Names) {
+        let mut functions: BTreeMap<&str, f64> = BTreeMap::new();
+        for (line, misses) in &self.lines {
+            *functions.entry(names.of(*line)).or_default() += misses;
+        }
+        let mut functions: Vec<_> = functions.into_iter().collect();
+        functions.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        println!("{}: lines fetched in a mean armed pass, of the functions that miss most", machine.name);
+        for (name, misses) in functions.iter().take(SHOWN) {
+            println!("{:8.1}  {name}", misses / self.passes.len() as f64);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(passes: usize) -> String {
+        "pass 0 9000 9 9\n".to_owned() + &"pass 1 2400 10 0\n".repeat(passes) + "pass 1 4800 90 10\nline 80001000 7\n"
+    }
+
+    #[test]
+    fn armed_passes_are_what_is_held() {
+        let found = Found::read(&said(199)).expect("understood");
+        let [(_, mean, _), (_, most, _), (_, _, _), (_, longest, _)] = found.figures();
+        assert_eq!((mean, most), (10.45, 100.0));
+        assert_eq!(longest, 20.0 + 105.0);
+        assert_eq!(found.lines, BTreeMap::from([(0x8000_1000, 7.0)]));
+    }
+
+    #[test]
+    fn a_flight_that_was_not_followed_is_no_result() {
+        assert!(Found::read("").is_err());
+        assert!(Found::read(&said(50)).is_err());
+        assert!(Found::read(&said(199).replace("2400", "0")).is_err());
+        assert!(Found::read(&(said(199) + "what?\n")).is_err());
+    }
+}
