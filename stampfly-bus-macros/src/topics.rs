@@ -1,6 +1,6 @@
 //! The topic table: its lines, the checks on them, and the code that follows.
 
-use crate::input::{Attributes, Error, Input, Result, once, type_name, whole_micros};
+use crate::input::{Attributes, Error, Input, Result, once, read_method, type_name, whole_micros};
 use proc_macro2::{Delimiter, Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote, quote_spanned};
 
@@ -23,6 +23,8 @@ struct Topic {
     period: Option<u64>,
     publisher: Ident,
     readers: Vec<Ident>,
+    /// Is it the newest sample of a runnable for other runnables?
+    within: bool,
 }
 
 /// Somebody who publishes or reads.
@@ -39,7 +41,7 @@ pub fn expand(table: TokenStream) -> Result<TokenStream> {
     let outside = outside(&mut input)?;
     let mut topics = Vec::new();
     while !input.is_empty() {
-        topics.push(topic(&mut input)?);
+        topics.push(topic(&mut input, &outside)?);
     }
     if topics.is_empty() {
         return Err(input.error("a topic table has at least one topic"));
@@ -61,7 +63,7 @@ fn outside(input: &mut Input) -> Result<Vec<Ident>> {
 }
 
 /// `/// What it is.` `name: Message = policy @ rate from publisher => [readers];`
-fn topic(input: &mut Input) -> Result<Topic> {
+fn topic(input: &mut Input, outside: &[Ident]) -> Result<Topic> {
     let attributes = input.attributes()?;
     let name = input.name("a topic's name")?;
     input.mark(':')?;
@@ -81,7 +83,9 @@ fn topic(input: &mut Input) -> Result<Topic> {
     if let Some(reader) = readers.iter().find(|reader| **reader == publisher) {
         return Err(Error::new(reader.span(), format!("`{reader}` publishes this topic: it knows what it published")));
     }
-    Ok(Topic { attributes, name, message, policy, rate, period, publisher, readers })
+    let is_runnable = |name: &Ident| !outside.contains(name);
+    let within = matches!(policy, Policy::Latest) && is_runnable(&publisher) && readers.iter().any(is_runnable);
+    Ok(Topic { attributes, name, message, policy, rate, period, publisher, readers, within })
 }
 
 fn policy(input: &mut Input) -> Result<Policy> {
@@ -197,6 +201,9 @@ impl Topic {
     fn publisher_type(&self) -> TokenStream {
         let (message, policy, depth, words, required) =
             (&self.message, self.policy_type(), self.depth(), self.words(), self.required());
+        if self.within {
+            return quote!(::stampfly_bus::NewestOutput<'b, #message, { #depth }, #words>);
+        }
         quote!(::stampfly_bus::Publisher<'b, #message, #policy, { #depth }, #words, #required>)
     }
 
@@ -319,7 +326,11 @@ fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
             let (name, ends) = (participant.name, participant.ends());
             let publishes = participant.publishes.iter().map(|topic| {
                 let name = &topic.name;
-                quote!(#name: bus.#name.__publisher(hook, Id::#name as usize))
+                let publisher = quote!(bus.#name.__publisher(hook, Id::#name as usize));
+                match topic.within {
+                    true => quote!(#name: ::stampfly_bus::NewestOutput::__new(#publisher)),
+                    false => quote!(#name: #publisher),
+                }
             });
             let reads = participant.reads.iter().map(|(topic, number)| {
                 let name = &topic.name;
@@ -449,6 +460,7 @@ fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool)
         })
     });
     let (places, publishers): (Vec<_>, Vec<_>) = publishers.unzip();
+    let reads = (!outside).then(|| reads(&members));
     // A group may be empty; it has the bus's lifetime all the same.
     let nobody = members.is_empty().then(|| quote!(nobody: ::core::marker::PhantomData<&'b ()>));
     quote! {
@@ -457,6 +469,8 @@ fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool)
             #(#[doc = #docs] pub #names: #types<'b>,)*
             #nobody
         }
+
+        #reads
 
         impl ::stampfly_bus::PublishWords for #group<'_> {
             fn publish_words(&mut self, topic: usize, at: ::stampfly_bus::Instant, words: &[u32]) -> Option<u32> {
@@ -482,6 +496,33 @@ fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool)
             }
         }
     }
+}
+
+/// How each runnable reads: what others of them have published from where they keep it, in flight; what has been recorded, and what
+/// comes from outside, from the bus.
+fn reads(members: &[&Participant<'_>]) -> TokenStream {
+    let methods = members.iter().map(|participant| {
+        let (name, method) = (participant.name, read_method(participant.name));
+        let inputs = participant.reads.iter().map(|(topic, _)| {
+            let (topic_name, publisher) = (&topic.name, &topic.publisher);
+            match topic.within {
+                true => quote!(self.#name.#topic_name.__read_from(&self.#publisher.#topic_name)),
+                false => quote!(self.#name.#topic_name.__read_newest()),
+            }
+        });
+        quote! {
+            #[doc(hidden)]
+            #[inline]
+            pub fn #method(&mut self, activation: &mut ::stampfly_bus::Activation) {
+                if activation.is_replay() {
+                    return ::stampfly_bus::ReadInputs::read(&mut self.#name, activation);
+                }
+                let inputs = [#(#inputs),*];
+                activation.__have_read(inputs);
+            }
+        }
+    });
+    quote!(impl Ends<'_> { #(#methods)* })
 }
 
 /// Names for the types of a topic's ends, for those who store one.

@@ -61,6 +61,13 @@ impl Activation {
         Self { record, read: 0, offered: 0, is_replay: true, missing: false }
     }
 
+    /// Begins another activation in flight in the same memory.
+    #[inline]
+    pub const fn begin(&mut self, index: u8, now: Instant) {
+        self.record.begin(index, now);
+        (self.read, self.offered, self.is_replay, self.missing) = (0, 0, false, false);
+    }
+
     /// The instant to compute for: the trigger's, never a clock's.
     #[inline]
     #[must_use]
@@ -81,6 +88,13 @@ impl Activation {
         self.missing
     }
 
+    /// Does it repeat a recorded one?
+    #[inline]
+    #[must_use]
+    pub const fn is_replay(&self) -> bool {
+        self.is_replay
+    }
+
     /// In a replay: what the next input read in flight.
     #[inline]
     pub(crate) fn recorded(&mut self) -> Option<InputRecord> {
@@ -93,10 +107,17 @@ impl Activation {
         Some(input.unwrap_or_default())
     }
 
+    /// In flight: what all inputs have read.
+    #[doc(hidden)]
+    #[inline]
+    pub const fn __have_read<const N: usize>(&mut self, inputs: [InputRecord; N]) {
+        self.record.set_inputs(inputs);
+    }
+
     /// In flight: what an input has read.
     #[inline]
-    pub(crate) fn has_read(&mut self, generation: u32, taken: u16) {
-        let pushed = self.record.push(InputRecord { generation, taken });
+    pub(crate) fn has_read(&mut self, input: InputRecord) {
+        let pushed = self.record.push(input);
         debug_assert!(pushed.is_ok(), "the topic table refuses runnables with more than MAX_INPUTS inputs");
     }
 

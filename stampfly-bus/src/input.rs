@@ -10,10 +10,11 @@
 //! runnables, where nothing is activated, use a [`Subscriber`].
 
 use crate::activation::Activation;
+use crate::output::NewestOutput;
 use crate::topic::{Latest, Sequential, Subscriber};
 use core::ops::Deref;
 use heapless::Vec;
-use stampfly_types::{Duration, Instant, Message, Stamped};
+use stampfly_types::{Duration, InputRecord, Instant, Message, Stamped};
 
 /// The newest sample of a topic.
 pub struct NewestInput<'b, T, const N: usize, const W: usize> {
@@ -77,21 +78,45 @@ where
     /// Reads, as part of an activation.
     #[inline]
     pub fn read(&mut self, activation: &mut Activation) {
-        let recorded = activation.recorded();
-        let head = recorded.map_or_else(|| self.end.head(), |input| input.generation);
-        self.is_new = head != self.sample.generation;
+        let Some(input) = activation.recorded() else {
+            activation.has_read(self.__read_newest());
+            return;
+        };
+        self.is_new = input.generation != self.sample.generation;
+        if self.is_new && !self.end.generation_into(input.generation, &mut self.sample) {
+            activation.misses();
+        }
+    }
+
+    /// In flight: reads from the bus.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __read_newest(&mut self) -> InputRecord {
+        self.is_new = self.end.head() != self.sample.generation && self.take_newest();
+        self.record()
+    }
+
+    /// In flight: reads what another runnable has published.
+    #[doc(hidden)]
+    #[inline]
+    pub fn __read_from(&mut self, output: &NewestOutput<'_, T, N, W>) -> InputRecord {
+        let newest = output.newest();
+        self.is_new = newest.generation != self.sample.generation;
         if self.is_new {
-            let found = match recorded {
-                None => self.end.latest_into(&mut self.sample),
-                Some(input) => self.end.generation_into(input.generation, &mut self.sample),
-            };
-            if !found {
-                activation.misses();
-            }
+            self.sample = *newest;
         }
-        if recorded.is_none() {
-            activation.has_read(self.sample.generation, u16::from(self.is_new));
-        }
+        self.record()
+    }
+
+    // Apart from asking whether there is one, as in a ring.
+    #[inline(never)]
+    fn take_newest(&mut self) -> bool {
+        self.end.latest_into(&mut self.sample)
+    }
+
+    #[inline]
+    fn record(&self) -> InputRecord {
+        InputRecord { generation: self.sample.generation, taken: u16::from(self.is_new) }
     }
 }
 
@@ -121,16 +146,11 @@ where
     /// Reads, as part of an activation. More samples than the topic's depth stay for the next one.
     #[inline]
     pub fn read(&mut self, activation: &mut Activation) {
-        self.samples.clear();
         let Some(input) = activation.recorded() else {
-            while !self.samples.is_full() {
-                let Some(sample) = self.end.next() else { break };
-                // There is room.
-                let _ = self.samples.push(sample);
-            }
-            activation.has_read(self.end.generation(), self.samples.len() as u16);
+            activation.has_read(self.__read_newest());
             return;
         };
+        self.samples.clear();
         let mut generation = crate::ring::before(input.generation, input.taken);
         for _ in 0..input.taken {
             generation = crate::ring::next(generation);
@@ -138,6 +158,27 @@ where
                 Some(sample) if self.samples.push(sample).is_ok() => {}
                 _ => activation.misses(),
             }
+        }
+    }
+
+    /// In flight: reads from the bus.
+    // Inlined without what is seldom done: most topics are slower than the runnables that read them.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __read_newest(&mut self) -> InputRecord {
+        self.samples.clear();
+        if self.end.has_new() {
+            self.take_new();
+        }
+        InputRecord { generation: self.end.generation(), taken: self.samples.len() as u16 }
+    }
+
+    #[inline(never)]
+    fn take_new(&mut self) {
+        while !self.samples.is_full() {
+            let Some(sample) = self.end.next() else { break };
+            // There is room.
+            let _ = self.samples.push(sample);
         }
     }
 }

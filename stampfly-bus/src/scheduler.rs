@@ -66,11 +66,16 @@ impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
     #[must_use]
     pub fn due(&self, band: Band, first: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<(usize, Instant)> {
         let states = self.states.as_ref();
-        let lines = self.table.get(first..)?.iter().zip(states.get(first..)?);
-        (first..)
-            .zip(lines)
-            .filter(|(_, (info, _))| info.band == band)
-            .find_map(|(index, (info, state))| triggered(states, info, state, clock, heads).map(|now| (index, now)))
+        let mut index = first;
+        loop {
+            let (info, state) = (self.table.get(index)?, states.get(index)?);
+            if info.band == band
+                && let Some(now) = triggered(states, info, state, clock, heads)
+            {
+                return Some((index, now));
+            }
+            index += 1;
+        }
     }
 
     /// Notes that an activation is about to read its inputs, at `clock`.

@@ -145,7 +145,7 @@ pub struct Publisher<'b, T, P, const N: usize, const W: usize, const R: usize> {
 
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: usize> Publisher<'_, T, P, N, W, R> {
     #[inline]
-    fn write(&mut self, at: Instant, words: &[u32; W]) -> u32 {
+    pub(crate) fn write(&mut self, at: Instant, words: &[u32; W]) -> u32 {
         self.newest = self.topic.ring.write(self.newest, at, words);
         if let Some((hook, index)) = self.hook {
             hook(index);
@@ -155,7 +155,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
 
     /// Generation of the newest sample, zero before the first.
     #[must_use]
-    pub fn generation(&self) -> u32 {
+    pub const fn generation(&self) -> u32 {
         self.newest
     }
 
@@ -297,12 +297,14 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     }
 
     /// Has anything been published since the last read?
+    #[inline]
     #[must_use]
     pub fn has_new(&self) -> bool {
         self.ring.head() != self.cursor
     }
 
     /// Generation of the last sample read, zero before the first.
+    #[inline]
     #[must_use]
     pub fn generation(&self) -> u32 {
         self.cursor

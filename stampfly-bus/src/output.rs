@@ -1,0 +1,75 @@
+//! Output of a runnable to other runnables: a writing end that keeps its newest sample at hand for them.
+//!
+//! The runnables of a vehicle take turns: while one of them reads, none publishes. So what one has published another finds where the
+//! publisher keeps it, and copies a plain struct: no sequence number to check, no message to make from words. It is on the
+//! bus all the same, for a log, for a replay, and for everybody outside.
+//!
+//! [`topics!`](crate::topics!) makes one for each `latest` topic from a runnable to runnables; all other topics have a
+//! [`Publisher`].
+
+use crate::topic::{Latest, Publisher};
+use stampfly_types::{Instant, Message, Stamped};
+
+/// The writing end of a topic whose newest sample other runnables read.
+#[must_use = "a topic nobody publishes is a wiring mistake"]
+pub struct NewestOutput<'b, T, const N: usize, const W: usize> {
+    publisher: Publisher<'b, T, Latest, N, W, 0>,
+    newest: Stamped<T>,
+}
+
+impl<'b, T, const N: usize, const W: usize> NewestOutput<'b, T, N, W>
+where
+    T: Message<Words = [u32; W]> + Default,
+{
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __new(publisher: Publisher<'b, T, Latest, N, W, 0>) -> Self {
+        Self { publisher, newest: Stamped { at: Instant::ZERO, generation: 0, data: T::default() } }
+    }
+
+    /// Publishes `data`, valid for the instant `at`. Returns its generation. Never waits, never fails.
+    #[inline]
+    pub fn publish(&mut self, at: Instant, data: &T) -> u32 {
+        let words = data.to_words();
+        let generation = self.publisher.write(at, &words);
+        self.keep(at, generation, &words);
+        generation
+    }
+
+    /// Generation of the newest sample, zero before the first.
+    #[must_use]
+    pub const fn generation(&self) -> u32 {
+        self.publisher.generation()
+    }
+
+    /// As [`Publisher::publish_words`].
+    pub fn publish_words(&mut self, at: Instant, words: &[u32]) -> Option<u32> {
+        let words: &[u32; W] = words.try_into().ok()?;
+        let generation = self.publisher.publish_words(at, words)?;
+        self.keep(at, generation, words);
+        Some(generation)
+    }
+
+    /// As [`Publisher::restore_words`].
+    pub fn restore_words(&mut self, at: Instant, generation: u32, words: &[u32]) -> Option<()> {
+        let words: &[u32; W] = words.try_into().ok()?;
+        self.publisher.restore_words(at, generation, words)?;
+        self.keep(at, generation, words);
+        Some(())
+    }
+
+    /// The newest sample; the message's default with generation zero before the first.
+    #[inline]
+    pub(crate) const fn newest(&self) -> &Stamped<T> {
+        &self.newest
+    }
+
+    /// Keeps what a reader of the topic would make of these words: nothing, if they are no message. An attitude of another length
+    /// than one is none, and the readers go on with the sample before.
+    #[inline]
+    fn keep(&mut self, at: Instant, generation: u32, words: &[u32; W]) {
+        if let Some(data) = T::from_words(words) {
+            self.newest = Stamped { at, generation, data };
+        }
+    }
+}
