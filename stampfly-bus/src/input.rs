@@ -6,8 +6,9 @@
 //! | `ring(N)`, `queue(N)` | [`SamplesInput`] | every sample since its last activation, oldest first |
 //!
 //! Inputs read themselves when their runnable is activated, and keep the samples where the runnable looks at them: a
-//! sample is copied once, out of the ring, and not at all when it is the one that is there already. Outside the
-//! runnables, where nothing is activated, use a [`Subscriber`].
+//! sample is copied once, out of the ring or from the [output](NewestOutput) of another runnable, and not at all when it is the
+//! one that is there already. What is published before the runnable runs waits for its next activation. Outside the runnables,
+//! where nothing is activated, use a [`Subscriber`].
 
 use crate::activation::Activation;
 use crate::output::NewestOutput;

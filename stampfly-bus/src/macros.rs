@@ -24,8 +24,8 @@
 /// | `TOPICS`, `Id`, `COUNT` | the table as data |
 ///
 /// A runnable reads through inputs ([`NewestInput`](crate::NewestInput), [`SamplesInput`](crate::SamplesInput)), a
-/// participant outside through a [`Subscriber`](crate::Subscriber); all publish through a
-/// [`Publisher`](crate::Publisher).
+/// participant outside through a [`Subscriber`](crate::Subscriber). All publish through a [`Publisher`](crate::Publisher), or
+/// through a [`NewestOutput`](crate::NewestOutput) with the same methods, where runnables read the newest sample of a runnable.
 ///
 /// ```
 /// mod topics {
