@@ -4,7 +4,7 @@
 //!
 //! | function | part | bus | samples per second |
 //! |---|---|---|---|
-//! | [`imu`] | BMI270 | SPI, mode 0, 10 MHz | 400, from 1600 |
+//! | [`imu`] | BMI270 | SPI, mode 3, 10 MHz | 400, from 1600 |
 //! | [`flow`] | PMW3901 | SPI, mode 3, 2 MHz | 100 |
 //! | [`magnetometer`] | BMM150 | I2C, 0x10 | 25 |
 //! | [`barometer`] | BMP280 | I2C, 0x76 | 25 |

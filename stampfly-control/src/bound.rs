@@ -4,16 +4,11 @@
 //! somebody may have set wrongly. These keep the value instead: a wrong bound is then no bound. They are also a few
 //! instructions shorter, because they leave NaN as it is for the caller to catch.
 
-/// The value, at least `low` and at most `high`.
+/// The value, at least `low` and at most `high`. One comparison after the other, as vectors have them: of a value and a bound.
 #[inline]
 pub(crate) fn within(value: f32, low: f32, high: f32) -> f32 {
-    if value < low {
-        low
-    } else if value > high {
-        high
-    } else {
-        value
-    }
+    let value = if value > high { high } else { value };
+    if value < low { low } else { value }
 }
 
 /// The value, at most `limit` away from zero.

@@ -28,14 +28,23 @@ impl MotorCurve {
     #[must_use]
     #[inline]
     pub fn voltage(&self, thrust: f32) -> f32 {
-        // False for NaN as well.
-        if thrust > 0.0 {
-            let squared = thrust / self.ct;
-            let voltage = self.am * squared + self.bm * math::sqrt(squared) + self.cm;
-            if voltage.is_finite() { voltage } else { 0.0 }
-        } else {
-            0.0
+        let [voltage] = self.voltages([thrust]);
+        voltage
+    }
+
+    /// The same for motors side by side. Each step is taken for all of them before the next, and none of them branches: that is what
+    /// compilers make vectors of.
+    #[inline(always)]
+    pub(crate) fn voltages<const N: usize>(&self, thrust: [f32; N]) -> [f32; N] {
+        // No thrust for NaN as well.
+        let thrust = thrust.map(|thrust| if thrust > 0.0 { thrust } else { 0.0 });
+        let squared = thrust.map(|thrust| thrust / self.ct);
+        let mut voltage = squared.map(math::sqrt);
+        for ((voltage, squared), thrust) in voltage.iter_mut().zip(squared).zip(thrust) {
+            let wanted = self.am * squared + self.bm * *voltage + self.cm;
+            *voltage = if (thrust > 0.0) & wanted.is_finite() { wanted } else { 0.0 };
         }
+        voltage
     }
 
     /// Thrust, N, at a voltage: the inverse of [`Self::voltage`].

@@ -82,6 +82,18 @@ impl MotorConfig {
     fn voltage(&self, thrust: f32) -> f32 {
         if thrust < 0.0 && self.duty_min < 0.0 { -self.curve.voltage(-thrust) } else { self.curve.voltage(thrust) }
     }
+
+    /// A duty moved towards what a voltage needs, by `step` at most.
+    #[inline]
+    fn moved(&self, duty: f32, voltage: f32, per_volt: f32, step: f32) -> f32 {
+        // A motor that begins to idle starts from rest, no quicker than any other change.
+        let lowest = if self.duty_min < 0.0 { self.duty_min } else { 0.0 };
+        let wanted = voltage * per_volt;
+        let wanted = if wanted > self.duty_max { self.duty_max } else { wanted };
+        let wanted = if wanted < self.duty_min { self.duty_min } else { wanted };
+        // The last clamp is for the rounding of the sum.
+        within(duty + symmetric(wanted - duty, step), lowest, self.duty_max)
+    }
 }
 
 /// The motors' output stage.
@@ -123,15 +135,19 @@ impl MotorStage {
             self.duty = [0.0; MAX_MOTORS];
             return MotorOutput { duty: self.duty, count: mixed.count, armed: false, unmet: mixed.unmet };
         }
-        let step = self.config.slew_max * dt;
-        let per_volt = 1.0 / battery;
-        // A motor that begins to idle starts from rest, no quicker than any other change.
-        let lowest = if self.config.duty_min < 0.0 { self.config.duty_min } else { 0.0 };
-        for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(usize::from(mixed.count)) {
-            let wanted = (self.config.voltage(thrust) * per_volt).min(self.config.duty_max);
-            let wanted = if wanted < self.config.duty_min { self.config.duty_min } else { wanted };
-            // The last clamp is for the rounding of the sum.
-            *duty = within(*duty + symmetric(wanted - *duty, step), lowest, self.config.duty_max);
+        let (step, per_volt) = (self.config.slew_max * dt, 1.0 / battery);
+        // A battery of no volts, which only a wrong configuration has, turns nothing.
+        let per_volt = if per_volt.is_finite() { per_volt } else { 0.0 };
+        let (config, count) = (self.config, usize::from(mixed.count));
+        // The usual vehicle side by side, any other motor by motor.
+        if let (4, true, Some(thrust)) = (count, config.duty_min >= 0.0, mixed.thrust.first_chunk::<4>()) {
+            for (duty, voltage) in self.duty.iter_mut().zip(config.curve.voltages(*thrust)) {
+                *duty = config.moved(*duty, voltage, per_volt, step);
+            }
+        } else {
+            for (duty, thrust) in self.duty.iter_mut().zip(mixed.thrust).take(count) {
+                *duty = config.moved(*duty, config.voltage(thrust), per_volt, step);
+            }
         }
         MotorOutput { duty: self.duty, count: mixed.count, armed: true, unmet: mixed.unmet }
     }
@@ -211,6 +227,15 @@ mod tests {
         assert_eq!(settled(-0.3, -1.2), -0.3, "no further than it may");
         let config = MotorConfig { duty_min: -0.5, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
         assert!(config.idle_thrust() < 0.0);
+    }
+
+    #[test]
+    fn a_battery_of_no_volts_turns_nothing() {
+        for nominal_voltage in [0.0, -0.0, f32::NAN, 1e-45] {
+            let config = MotorConfig { nominal_voltage, ..MotorConfig::for_airframe(&Airframe::EXAMPLE) };
+            let out = [0.0, 1.2].map(|thrust| MotorStage::new(&config).step(Instant::ZERO, &mixed(thrust), None, true));
+            assert_eq!(out.map(|out| out.duty), [[0.0; 8]; 2], "{nominal_voltage}");
+        }
     }
 
     #[test]

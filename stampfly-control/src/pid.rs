@@ -126,10 +126,13 @@ impl<T: FloatCore> Pid<T> {
     #[inline]
     pub fn step(&mut self, setpoint: T, measurement: T, dt: T, integration: Integration) -> T {
         let error = setpoint - measurement;
-        if !(error.is_finite() && dt.is_finite() && dt > T::zero()) {
+        if !(error.is_finite() && dt > T::zero()) {
             return self.output;
         }
         if dt != self.discrete.dt {
+            if !dt.is_finite() {
+                return self.output;
+            }
             self.discrete = Discrete::new(&self.gains, dt);
         }
 

@@ -282,7 +282,7 @@ pub enum GravityUse {
     /// While nothing measures velocity: otherwise velocity shows the tilt, and better.
     #[default]
     WhenUnaided,
-    /// All inertial samples, by their mean over 4 ms, less the acceleration that measured velocities show: for a vehicle whose velocity is
+    /// All inertial samples, by their mean over 10 ms, less the acceleration that measured velocities show: for a vehicle whose velocity is
     /// measured badly and whose motors do not shake it.
     Always,
 }

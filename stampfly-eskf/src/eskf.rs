@@ -78,9 +78,9 @@ const SIMULTANEOUS: f32 = 0.5e-3;
 /// Longest inertial step that is integrated; a longer gap is a gap.
 const MAX_STEP: f32 = 0.5;
 /// The state is propagated with every inertial sample, the covariance with the first sample after this much time, s: at
-/// 400 Hz with every second one. A hundredth of the time in which the covariance changes, and half the work. (PX4's
-/// EKF2 takes 10 ms.)
-const COVARIANCE_STEP: f32 = 4e-3;
+/// 400 Hz with every fourth one, for a quarter of the work. The covariance changes in tenths of seconds. (PX4's EKF2 takes
+/// 10 ms, too: `EKF2_PREDICT_US`.)
+const COVARIANCE_STEP: f32 = 9e-3;
 /// A vehicle that is told to fly stands until it is this much higher, m.
 const LIFTED: f32 = 0.008;
 /// Largest standard deviation of a velocity that the vehicle brakes by, m/s.

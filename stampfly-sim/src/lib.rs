@@ -21,6 +21,7 @@
 pub mod chips;
 pub mod fault;
 mod noise;
+mod normals;
 pub mod plant;
 pub mod sensors;
 mod simulation;

@@ -79,23 +79,57 @@ impl Noise {
             return spare;
         }
         loop {
-            // One draw of 64 bits makes both coordinates; 32 bits each reach beyond six standard deviations.
-            let bits = self.generator.next_u64();
-            let x = f64::from(bits as u32 as i32) * (1.0 / 2_147_483_648.0);
-            let y = f64::from((bits >> 32) as u32 as i32) * (1.0 / 2_147_483_648.0);
-            let s = x * x + y * y;
-            if s > 0.0 && s < 1.0 {
-                let scale = libm::sqrt(-2.0 * libm::log(s) / s);
-                self.spare = Some(y * scale);
-                return x * scale;
+            let point = self.point();
+            if point.is_inside() {
+                let [first, second] = point.normals();
+                self.spare = Some(second);
+                return first;
             }
         }
+    }
+
+    /// A point of the square that the polar method draws from.
+    #[inline]
+    pub(crate) fn point(&mut self) -> Point {
+        // One draw of 64 bits makes both coordinates; 32 bits each reach beyond six standard deviations.
+        let bits = self.generator.next_u64();
+        let x = f64::from(bits as u32 as i32) * (1.0 / 2_147_483_648.0);
+        let y = f64::from((bits >> 32) as u32 as i32) * (1.0 / 2_147_483_648.0);
+        Point { x, y, square: x * x + y * y }
+    }
+
+    /// The second variate of the last pair, if it has not been given yet.
+    pub(crate) fn take_spare(&mut self) -> Option<f64> {
+        self.spare.take()
     }
 
     /// Three standard normal variates.
     pub fn normal3(&mut self) -> nalgebra::Vector3<f64> {
         let (x, y, z) = (self.normal(), self.normal(), self.normal());
         nalgebra::Vector3::new(x, y, z)
+    }
+}
+
+/// A point of the square from −1 to 1, and the square of its distance from the centre.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Point {
+    pub x: f64,
+    pub y: f64,
+    pub square: f64,
+}
+
+impl Point {
+    /// In the unit circle, where the polar method takes it?
+    #[inline]
+    pub(crate) fn is_inside(&self) -> bool {
+        // Both are asked, without a branch: one point in five is outside, and no processor foresees which.
+        (self.square > 0.0) & (self.square < 1.0)
+    }
+
+    /// The two normal variates that the polar method makes of a point in the circle.
+    fn normals(&self) -> [f64; 2] {
+        let scale = libm::sqrt(-2.0 * libm::log(self.square) / self.square);
+        [self.x * scale, self.y * scale]
     }
 }
 

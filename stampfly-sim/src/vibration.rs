@@ -10,6 +10,7 @@
 //! flights; `cargo run --release -p stampfly-host --example spectra` repeats the comparison.
 
 use crate::noise::Noise;
+use crate::normals::Normals;
 use crate::plant::ROTORS;
 
 /// Axes: accelerometer x, y, z, then gyroscope x, y, z.
@@ -37,35 +38,58 @@ const PROFILES: [Profile; AXES] = [
     Profile { broadband: 0.0165, resonance: (165.0, 80.0, 0.005), tones: [0.005, 0.008], rectification: 0.0 },
 ];
 
-/// A resonance: two poles, and zeros at zero and at half the sample rate, so that its skirts fall.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Resonator {
-    feedback: [f64; 2],
-    gain: f64,
-    inputs: [f64; 2],
-    outputs: [f64; 2],
+/// The strengths of [`PROFILES`], side by side.
+const BROADBAND: [f64; AXES] = of_axes(0);
+const RESONANT: [f64; AXES] = of_axes(1);
+const RECTIFICATION: [f64; AXES] = of_axes(2);
+
+const fn of_axes(part: usize) -> [f64; AXES] {
+    let (mut parts, mut axis) = ([0.0; AXES], 0);
+    while axis < AXES {
+        let profile = &PROFILES[axis];
+        parts[axis] = [profile.broadband, profile.resonance.2, profile.rectification][part];
+        axis += 1;
+    }
+    parts
 }
 
-impl Resonator {
-    /// Unit variance out for white noise of unit variance in.
-    fn new(frequency: f64, bandwidth: f64, dt: f64) -> Self {
+/// A resonance of every axis: two poles each, and zeros at zero and at half the sample rate, so that its skirts fall.
+///
+/// Everything that is per axis lies side by side here and below, so that the axes are computed side by side, too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Resonators {
+    feedback: [[f64; AXES]; 2],
+    gain: [f64; AXES],
+    inputs: [[f64; AXES]; 2],
+    outputs: [[f64; AXES]; 2],
+}
+
+impl Resonators {
+    /// Of these frequencies and bandwidths, Hz. Unit variance out for white noise of unit variance in.
+    fn new(resonances: [(f64, f64); AXES], dt: f64) -> Self {
         use core::f64::consts::{PI, TAU};
-        let radius = libm::exp(-PI * bandwidth * dt);
-        let (a1, a2) = (2.0 * radius * libm::cos(TAU * frequency * dt), -radius * radius);
-        // Variance and autocorrelation of the second-order autoregression w = a1·w₁ + a2·w₂ + x (Box and Jenkins),
-        // from which the output is the difference w − w₂.
-        let variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) * (1.0 - a2) - a1 * a1));
-        let lag_two = a1 * a1 / (1.0 - a2) + a2;
-        let gain = 1.0 / (2.0 * variance * (1.0 - lag_two)).sqrt();
-        Self { feedback: [a1, a2], gain, inputs: [0.0; 2], outputs: [0.0; 2] }
+        let (mut feedback, mut gain) = ([[0.0; AXES]; 2], [0.0; AXES]);
+        for (axis, (frequency, bandwidth)) in resonances.into_iter().enumerate() {
+            let radius = libm::exp(-PI * bandwidth * dt);
+            let (a1, a2) = (2.0 * radius * libm::cos(TAU * frequency * dt), -radius * radius);
+            // Variance and autocorrelation of the second-order autoregression w = a1·w₁ + a2·w₂ + x (Box and Jenkins),
+            // from which the output is the difference w − w₂.
+            let variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) * (1.0 - a2) - a1 * a1));
+            let lag_two = a1 * a1 / (1.0 - a2) + a2;
+            gain[axis] = 1.0 / (2.0 * variance * (1.0 - lag_two)).sqrt();
+            (feedback[0][axis], feedback[1][axis]) = (a1, a2);
+        }
+        Self { feedback, gain, inputs: [[0.0; AXES]; 2], outputs: [[0.0; AXES]; 2] }
     }
 
-    fn step(&mut self, input: f64) -> f64 {
-        let poles = self.feedback[0] * self.outputs[0] + self.feedback[1] * self.outputs[1];
-        let output = poles + input - self.inputs[1];
-        self.inputs = [input, self.inputs[0]];
+    fn step(&mut self, input: &[f64; AXES]) -> [f64; AXES] {
+        let output: [f64; AXES] = core::array::from_fn(|i| {
+            let poles = self.feedback[0][i] * self.outputs[0][i] + self.feedback[1][i] * self.outputs[1][i];
+            poles + input[i] - self.inputs[1][i]
+        });
+        self.inputs = [*input, self.inputs[0]];
         self.outputs = [output, self.outputs[0]];
-        output * self.gain
+        core::array::from_fn(|i| output[i] * self.gain[i])
     }
 }
 
@@ -76,25 +100,31 @@ struct Tone {
     sin: [f64; AXES],
 }
 
+/// Phase of each rotor as a point on the unit circle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Phases {
+    cos: [f64; ROTORS],
+    sin: [f64; ROTORS],
+}
+
 /// Vibration of one inertial sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Vibration {
-    noise: Noise,
+    noise: Normals,
     factor: f64,
     dt: f64,
     /// 1 / hover speed, s/rad.
     per_hover: f64,
-    /// Phase of each rotor as a point on the unit circle.
-    phase: [(f64, f64); ROTORS],
+    phases: Phases,
     /// Of each tone of each rotor.
     weights: [[Tone; 2]; ROTORS],
-    resonators: [Resonator; AXES],
+    resonators: Resonators,
 }
 
 impl Vibration {
     /// `factor` scales all of the recorded disturbance alike, its rectified part included; `dt` is the sample period in seconds.
     pub(crate) fn new(factor: f64, dt: f64, hover_speed: f64, mut noise: Noise) -> Self {
-        let phase = [(); ROTORS].map(|()| libm::sincos(noise.within(core::f64::consts::PI))).map(|(s, c)| (c, s));
+        let phase = [(); ROTORS].map(|()| libm::sincos(noise.within(core::f64::consts::PI)));
         let weights = [(); ROTORS].map(|()| {
             // No two propellers are balanced alike.
             let balance = 1.0 + noise.within(0.5);
@@ -109,24 +139,26 @@ impl Vibration {
                 tone
             })
         });
-        let resonators = PROFILES.map(|profile| Resonator::new(profile.resonance.0, profile.resonance.1, dt));
-        Self { noise, factor, dt, per_hover: 1.0 / hover_speed, phase, weights, resonators }
+        let phases = Phases { cos: phase.map(|(_, cos)| cos), sin: phase.map(|(sin, _)| sin) };
+        let resonators = Resonators::new(PROFILES.map(|profile| (profile.resonance.0, profile.resonance.1)), dt);
+        Self { noise: noise.into(), factor, dt, per_hover: 1.0 / hover_speed, phases, weights, resonators }
     }
 
     /// The next sample, accelerometer (m/s²) then gyroscope (rad/s), at these rotor speeds (rad/s).
     pub(crate) fn step(&mut self, rotor_speed: &[f64; ROTORS]) -> [f64; AXES] {
         let mut total = [0.0; AXES];
-        let mut power = 0.0;
         if self.factor <= 0.0 {
             return total;
         }
-        for (rotor, speed) in rotor_speed.iter().enumerate() {
-            let (cos, sin) = turned(self.phase[rotor], speed * self.dt);
-            self.phase[rotor] = (cos, sin);
-            let share = (speed * self.per_hover) * (speed * self.per_hover);
+        self.phases.turn(&rotor_speed.map(|speed| speed * self.dt));
+        let mut power = 0.0;
+        for (rotor, tones) in self.weights.iter().enumerate() {
+            let (cos, sin) = (self.phases.cos[rotor], self.phases.sin[rotor]);
+            let relative = rotor_speed[rotor] * self.per_hover;
+            let share = relative * relative;
             power += share / ROTORS as f64;
             let harmonics = [(cos, sin), (cos * cos - sin * sin, 2.0 * sin * cos)];
-            for ((cos, sin), tone) in harmonics.iter().zip(&self.weights[rotor]) {
+            for ((cos, sin), tone) in harmonics.into_iter().zip(tones) {
                 for ((sum, a), b) in total.iter_mut().zip(&tone.cos).zip(&tone.sin) {
                     *sum += share * (a * cos + b * sin);
                 }
@@ -135,31 +167,35 @@ impl Vibration {
         if power < 1e-4 {
             return [0.0; AXES];
         }
-        for ((sum, profile), resonator) in total.iter_mut().zip(&PROFILES).zip(&mut self.resonators) {
-            let white = self.noise.normal();
-            *sum += power * (profile.broadband * white + profile.resonance.2 * resonator.step(white));
-            *sum *= self.factor;
-            *sum += self.factor * power * profile.rectification;
-        }
-        total
+        let white = self.noise.next();
+        let resonant = self.resonators.step(&white);
+        core::array::from_fn(|axis| {
+            let noise = power * (BROADBAND[axis] * white[axis] + RESONANT[axis] * resonant[axis]);
+            (total[axis] + noise) * self.factor + self.factor * power * RECTIFICATION[axis]
+        })
     }
 }
 
-/// The point on the unit circle, turned by `angle` radians (0 to 8).
-///
-/// Sine and cosine of an eighth of the angle by series, then three doublings; the result is pulled back onto the
-/// circle, so errors do not add up. Some thirty multiplications, the same on every machine.
-fn turned((cos, sin): (f64, f64), angle: f64) -> (f64, f64) {
-    let x = angle * 0.125;
-    let xx = x * x;
-    let mut s = x * (1.0 - xx / 6.0 * (1.0 - xx / 20.0 * (1.0 - xx / 42.0)));
-    let mut c = 1.0 - xx / 2.0 * (1.0 - xx / 12.0 * (1.0 - xx / 30.0 * (1.0 - xx / 56.0)));
-    for _ in 0..3 {
-        (c, s) = (c * c - s * s, 2.0 * s * c);
+impl Phases {
+    /// Turns each point by its angle, radians (0 to 8).
+    ///
+    /// Sine and cosine of an eighth of the angle by series, then three doublings; the result is pulled back onto the
+    /// circle, so errors do not add up. Some thirty multiplications, the same on every machine.
+    fn turn(&mut self, angles: &[f64; ROTORS]) {
+        for (rotor, angle) in angles.iter().enumerate() {
+            let x = angle * 0.125;
+            let xx = x * x;
+            let mut s = x * (1.0 - xx / 6.0 * (1.0 - xx / 20.0 * (1.0 - xx / 42.0)));
+            let mut c = 1.0 - xx / 2.0 * (1.0 - xx / 12.0 * (1.0 - xx / 30.0 * (1.0 - xx / 56.0)));
+            (c, s) = (c * c - s * s, 2.0 * s * c);
+            (c, s) = (c * c - s * s, 2.0 * s * c);
+            (c, s) = (c * c - s * s, 2.0 * s * c);
+            let (cos, sin) = (self.cos[rotor], self.sin[rotor]);
+            let (c, s) = (cos * c - sin * s, sin * c + cos * s);
+            let pull = 1.5 - 0.5 * (c * c + s * s);
+            (self.cos[rotor], self.sin[rotor]) = (c * pull, s * pull);
+        }
     }
-    let (c, s) = (cos * c - sin * s, sin * c + cos * s);
-    let pull = 1.5 - 0.5 * (c * c + s * s);
-    (c * pull, s * pull)
 }
 
 #[cfg(test)]
@@ -198,9 +234,10 @@ mod tests {
 
     #[test]
     fn phasors_stay_on_the_circle_and_at_the_right_angle() {
-        let mut point = (1.0, 0.0);
+        let mut phases = Phases { cos: [1.0; ROTORS], sin: [0.0; ROTORS] };
         for step in 1..=100_000u32 {
-            point = turned(point, 2.345);
+            phases.turn(&[0.0, 1.0, 2.345, 4.0]);
+            let point = (phases.cos[2], phases.sin[2]);
             if step % 10_000 == 0 {
                 let (sin, cos) = libm::sincos(2.345 * f64::from(step));
                 assert!((point.0 - cos).abs() < 1e-3 && (point.1 - sin).abs() < 1e-3, "step {step}: {point:?}");
@@ -211,8 +248,13 @@ mod tests {
 
     #[test]
     fn resonators_keep_unit_variance() {
-        let (mut noise, mut resonator) = (Noise::new(2, 2), Resonator::new(140.0, 40.0, 1.0 / 1600.0));
-        let variance = (0..200_000).map(|_| resonator.step(noise.normal())).map(|y| y * y).sum::<f64>() / 2e5;
-        assert!((variance - 1.0).abs() < 0.05, "{variance}");
+        let mut noise = Noise::new(2, 2);
+        let mut resonators = Resonators::new(PROFILES.map(|profile| (profile.resonance.0, 40.0)), 1.0 / 1600.0);
+        let mut variances = [0.0; AXES];
+        for _ in 0..200_000 {
+            let outputs = resonators.step(&[(); AXES].map(|()| noise.normal()));
+            variances.iter_mut().zip(outputs).for_each(|(variance, y)| *variance += y * y / 2e5);
+        }
+        assert!(variances.iter().all(|variance| (variance - 1.0).abs() < 0.05), "{variances:?}");
     }
 }

@@ -45,7 +45,8 @@ struct State {
     start: Instant,
     /// Steps done since the start.
     steps: u64,
-    /// Motion after step k at index k modulo its length.
+    /// Motion after step k at index k modulo its length, for all but the last step, whose motion is the plant's: it is copied
+    /// when it has come to rest in memory.
     history: Box<[Motion; HISTORY]>,
 }
 
@@ -53,9 +54,9 @@ impl State {
     fn advance_to(&mut self, instant: Instant) {
         let wanted = instant.since(self.start).as_micros() / STEP.as_micros();
         while self.steps < wanted {
+            self.history[self.steps as usize % HISTORY] = *self.plant.motion();
             self.plant.step();
             self.steps += 1;
-            self.history[self.steps as usize % HISTORY] = *self.plant.motion();
         }
     }
 
@@ -66,9 +67,11 @@ impl State {
         let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
         let step = (since_start / STEP.as_micros()).max(oldest);
         let rest = since_start.saturating_sub(step * STEP.as_micros()) as f64 * 1e-6;
-        (&self.history[step as usize % HISTORY], rest.min(DT))
+        let motion = if step == self.steps { self.plant.motion() } else { &self.history[step as usize % HISTORY] };
+        (motion, rest.min(DT))
     }
 
+    #[inline]
     fn motion_at(&mut self, instant: Instant) -> Motion {
         let gravity = self.plant.parameters().gravity;
         let (motion, rest) = self.before(instant);

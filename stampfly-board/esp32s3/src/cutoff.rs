@@ -76,9 +76,21 @@ pub fn lock_out() {
     safe_state::cut();
 }
 
-/// Keeps the watchdog from restarting a vehicle that has stopped on purpose.
+/// The watchdog's registers take what is written while this is in one of them (ESP32-S3 technical reference manual, section 12.4.2.3).
+const WRITE_KEY: u32 = 0x50D8_3AA1;
+
+/// Keeps the watchdog from restarting a vehicle that has stopped on purpose. Writes registers and takes no lock: the driver's own
+/// function asks for the clock tree, which whoever panicked may have held.
 pub fn stand_down() {
-    Wdt::<TIMG1<'static>>::new().disable();
+    let registers = TIMG1::regs();
+    // SAFETY: `Watch` may be in the middle of feeding it, on the other core too; a watchdog that is off needs no feeding, and
+    // whichever of them writes the protection last leaves it on.
+    registers.wdtwprotect().write(|w| unsafe { w.wdt_wkey().bits(WRITE_KEY) });
+    registers.wdtconfig0().modify(|_, w| w.wdt_en().clear_bit());
+    #[cfg(feature = "esp32c6")]
+    registers.wdtconfig0().modify(|_, w| w.wdt_conf_update_en().set_bit());
+    // SAFETY: as above.
+    registers.wdtwprotect().write(|w| unsafe { w.wdt_wkey().bits(0) });
 }
 
 #[handler(priority = Priority::Priority3)]

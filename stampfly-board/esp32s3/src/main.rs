@@ -60,6 +60,7 @@ esp_bootloader_esp_idf::esp_app_desc!();
 #[esp_hal::main]
 fn main() -> ! {
     safe_state::hold_low();
+    safe_state::deselect();
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
     // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
     esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);

@@ -5,7 +5,7 @@ use crate::clock::Clock;
 use crate::pins::PeoplePins;
 use embassy_time::{Duration, Ticker};
 use esp_hal::Blocking;
-use esp_hal::gpio::{Input, InputConfig, Pull};
+use esp_hal::gpio::{Input, InputConfig, Level, Output, OutputConfig, Pull};
 use esp_hal::peripherals::RMT;
 use esp_hal::rmt::Rmt;
 use esp_hal::time::Rate;
@@ -34,6 +34,8 @@ pub struct Parts {
 pub async fn run(parts: Parts) {
     let Parts { pulses, pins, mut indicator, mut button } = parts;
     let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
+    // Stays on: what this returns can be dropped.
+    Output::new(pins.status_light_supply, Level::High, OutputConfig::default());
     let status: Chain<{ buffer_size::<RGB8>(1) }> =
         Chain::new(WS2812B_TIMING, pulses.channel0, pins.status_light, PULSE_CLOCK).expect("possible pulses");
     // Two of the unit's memories, so that the pulses of both lights fit at once and nobody has to refill them in time.

@@ -40,6 +40,8 @@ esp_hal::assign_resources! {
         /// What people see, hear and press.
         people: PeoplePins<'d> {
             status_light: GPIO21,
+            /// Switches the supply of the status light on boards with a Stamp-S3A (StampFly v1.1); not connected on v1.0.
+            status_light_supply: GPIO38,
             body_lights: GPIO39,
             buzzer: GPIO40,
             button: GPIO0,
@@ -75,6 +77,7 @@ esp_hal::assign_resources! {
         },
         people: PeoplePins<'d> {
             status_light: GPIO19,
+            status_light_supply: GPIO23,
             body_lights: GPIO20,
             buzzer: GPIO21,
             button: GPIO9,

@@ -1,10 +1,11 @@
-//! Motors off at the pin, from any context. Depends on nothing but the pins.
+//! Motors off at the pin, from any context, and chips that nobody talks to. Depends on nothing but the pins.
 //!
-//! [`hold_low`], the first thing the program does, makes the pins outputs that are low. [`cut`] takes them away from the
+//! [`hold_low`], the first thing the program does, makes the motors' pins outputs that are low, and [`deselect`], the second, the chip
+//! selects ones that are high. [`cut`] takes them away from the
 //! PWM unit and pulls them low again: it needs no lock and no peripheral driver. The panic handler, the cut-off and a
 //! restart call it. Only a disarmed vehicle gets its pins back.
 
-use crate::pins::MotorPins;
+use crate::pins::{MotorPins, SpiPins};
 use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig, OutputSignal, Pin};
 use esp_hal::peripherals::GPIO;
 
@@ -16,6 +17,17 @@ pub fn hold_low() {
     for pin in pins {
         // What this returns can be dropped: the pin stays as it is.
         Output::new(pin, Level::Low, OutputConfig::default());
+    }
+}
+
+/// Deselects both chips on SPI. A resistor pulls the inertial sensor's select low, so that it is selected from power-on, and
+/// after a warm start drives the line on which the boot loader speaks.
+pub fn deselect() {
+    // SAFETY: nothing uses the pins yet, and what is made of them here is dropped.
+    let SpiPins { imu_select, flow_select, .. } = unsafe { SpiPins::steal() };
+    let pins: [AnyPin<'_>; 2] = [imu_select.into(), flow_select.into()];
+    for pin in pins {
+        Output::new(pin, Level::High, OutputConfig::default());
     }
 }
 

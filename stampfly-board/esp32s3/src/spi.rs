@@ -1,4 +1,9 @@
-//! The SPI bus: the inertial sensor and the flow sensor, each with its own speed, mode and chip select.
+//! The SPI bus: the inertial sensor and the flow sensor, each with its own speed and chip select.
+//!
+//! Both are in mode 3, for the unit changes the clock's idle level only when a transfer begins. After a transfer in mode 0 the clock would
+//! rise with the flow sensor already selected, which would take that for a bit (the S3's SPI with a chip select of the program's:
+//! esp-idf issue 12543). The inertial sensor takes either mode, by the clock's level when it is selected (BMI270 data sheet,
+//! section 7.1).
 //!
 //! Transfers go by DMA. A transfer that is dropped half-way releases its chip, so that the next one finds the bus in
 //! order. Both chips are deselected before the first transfer, or the one nobody talks to would talk, too. Who transfers
@@ -11,6 +16,7 @@ use embassy_sync::mutex::Mutex;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 use esp_hal::Async;
+use esp_hal::delay::Delay;
 use esp_hal::gpio::{AnyPin, Input, InputConfig, Io, Level, Output, OutputConfig};
 use esp_hal::interrupt::Priority;
 use esp_hal::peripherals::{DMA_CH0, IO_MUX, SPI2};
@@ -21,8 +27,11 @@ use esp_hal::{dma_rx_buffer, dma_tx_buffer};
 
 /// The longest transfer is a chunk of the inertial sensor's configuration with its address.
 const LONGEST: usize = 512;
-/// Transfers up to this are done by the processor: setting the DMA up would take longer.
-const SHORT: usize = 8;
+/// Transfers up to this are done by the processor: setting the DMA up would take longer, and what waits for its interrupt has a deadline.
+/// A flow sensor's burst is twelve bytes.
+const SHORT: usize = 16;
+/// A pause up to this is spun away, ns: an alarm of the executor's comes later than these are long.
+const SPUN: u32 = 50_000;
 
 /// What the bus is made of. It is started where it is used, so that its interrupts come there.
 pub struct Parts {
@@ -56,11 +65,14 @@ impl Bus {
         let deselected = |pin: AnyPin<'static>| Output::new(pin, Level::High, OutputConfig::default());
         let pins = parts.pins;
         let (imu, flow) = (deselected(pins.imu_select.into()), deselected(pins.flow_select.into()));
-        let unit = Spi::new(parts.unit, imu_config())
+        let mut unit = Spi::new(parts.unit, imu_config())
             .expect("10 MHz is possible")
             .with_sck(pins.clock)
             .with_mosi(pins.to_chips)
-            .with_miso(pins.from_chips)
+            .with_miso(pins.from_chips);
+        // To nobody: from here on the clock idles at its level, before anybody is selected. An error shows again with the first chip.
+        _ = unit.write(&[0]);
+        let unit = unit
             .with_dma(parts.dma)
             .with_buffers(
                 dma_rx_buffer!(LONGEST).expect("descriptors for the whole buffer"),
@@ -81,18 +93,18 @@ impl Bus {
     }
 }
 
-/// BMI270: 10 MHz, mode 0.
+/// BMI270: 10 MHz.
 fn imu_config() -> Config {
-    config(Rate::from_mhz(10), Mode::_0)
+    config(Rate::from_mhz(10))
 }
 
-/// PMW3901: 2 MHz, mode 3.
+/// PMW3901: 2 MHz.
 fn flow_config() -> Config {
-    config(Rate::from_mhz(2), Mode::_3)
+    config(Rate::from_mhz(2))
 }
 
-fn config(frequency: Rate, mode: Mode) -> Config {
-    Config::default().with_frequency(frequency).with_mode(mode).with_min_async_transfer_size(SHORT)
+fn config(frequency: Rate) -> Config {
+    Config::default().with_frequency(frequency).with_mode(Mode::_3).with_min_async_transfer_size(SHORT)
 }
 
 /// A chip that listens until this is dropped.
@@ -127,6 +139,7 @@ impl SpiDevice for Device<'_> {
                 Operation::Write(from) => SpiBus::write(&mut *unit, from).await?,
                 Operation::Transfer(into, from) => SpiBus::transfer(&mut *unit, into, from).await?,
                 Operation::TransferInPlace(both) => SpiBus::transfer_in_place(&mut *unit, both).await?,
+                Operation::DelayNs(ns) if *ns <= SPUN => Delay::new().delay_nanos(*ns),
                 Operation::DelayNs(ns) => Clock.delay_ns(*ns).await,
             }
         }

@@ -49,12 +49,20 @@ impl Watch {
     pub fn note(&mut self, id: Id, at: Instant, words: &[u32]) {
         match id {
             Id::setpoint => {
-                self.setpoint = message(words).unwrap_or(self.setpoint);
+                if let Some(setpoint) = message(words) {
+                    self.setpoint = setpoint;
+                }
                 self.due = Some(at);
             }
-            Id::estimate_state => self.estimate = message(words).unwrap_or(self.estimate),
+            Id::estimate_state => {
+                if let Some(estimate) = message(words) {
+                    self.estimate = estimate;
+                }
+            }
             Id::flight_status => {
-                self.mode = message(words).unwrap_or(self.mode);
+                if let Some(mode) = message(words) {
+                    self.mode = mode;
+                }
                 let (phase, mode) = (self.mode.phase, self.mode.mode);
                 if self.phases.last().is_none_or(|last| (last.phase, last.mode) != (phase, mode)) {
                     self.phases.push(PhaseChange { since: at, phase, mode });

@@ -9,7 +9,7 @@
 //!
 //! | in [`Eskf`](crate::Eskf) | condition |
 //! |---|---|
-//! | start | stationary, or nothing holds the velocity ([`WhenUnaided`](crate::GravityUse::WhenUnaided)), both with every fourth sample; or all samples in flight, by their mean over 4 ms ([`Always`](crate::GravityUse::Always)) |
+//! | start | stationary, or nothing holds the velocity ([`WhenUnaided`](crate::GravityUse::WhenUnaided)), both with every fourth sample; or all samples in flight, by their mean over 10 ms ([`Always`](crate::GravityUse::Always)) |
 //! | continue | the same, and a joint test ratio of the three axes of at most one |
 //! | stop | in flight with `WhenUnaided`: flow, velocity or position was accepted within the last second |
 //! | reset | rejected for longer than four times `lockout`: attitude inflated, velocity to zero with a large variance, accelerometer bias reset; once per lock-out |

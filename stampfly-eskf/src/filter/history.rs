@@ -16,7 +16,7 @@
 //! | 0.5 s | 2.1 kB | 11 ms | any receiver; flow loses the turn within a picture |
 
 use super::PropagationStep;
-use super::state::{Motion, Rotation, multiply, rotate, small_rotation};
+use super::state::{Motion, Rotation, conjugate, multiply, normalize, rotate, small_rotation};
 use stampfly_types::Vec3;
 
 /// Largest age of a measurement that can be placed in time by a memory of the usual reach, s.
@@ -35,7 +35,9 @@ struct Interval {
     length: f32,
     /// Mean rate without bias, body.
     rate: Vec3,
-    delta_rotation: [f32; 4],
+    /// How the body has turned from the first sample to the end of this interval. Of two of these comes the turn in between: no
+    /// product over the intervals.
+    turned: [f32; 4],
     /// World.
     delta_velocity: Vec3,
 }
@@ -43,7 +45,7 @@ struct Interval {
 const EMPTY: Interval = Interval {
     length: 0.0,
     rate: Vec3::new(0.0, 0.0, 0.0),
-    delta_rotation: [1.0, 0.0, 0.0, 0.0],
+    turned: [1.0, 0.0, 0.0, 0.0],
     delta_velocity: Vec3::new(0.0, 0.0, 0.0),
 };
 
@@ -122,19 +124,15 @@ impl History {
         {
             let length = newest.length + motion.dt;
             newest.rate = (newest.rate * newest.length + motion.rate * motion.dt) / length;
-            newest.delta_rotation = multiply(newest.delta_rotation, motion.delta_rotation);
+            newest.turned = multiply(newest.turned, motion.delta_rotation);
             newest.delta_velocity += motion.delta_velocity;
             newest.length = length;
             return;
         }
+        let turned = normalize(multiply(self.turned(), motion.delta_rotation));
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.intervals.get_mut(self.newest) {
-            *place = Interval {
-                length: motion.dt,
-                rate: motion.rate,
-                delta_rotation: motion.delta_rotation,
-                delta_velocity: motion.delta_velocity,
-            };
+            *place = Interval { length: motion.dt, rate: motion.rate, turned, delta_velocity: motion.delta_velocity };
         }
     }
 
@@ -154,21 +152,22 @@ impl History {
         let mut step = PropagationStep::default();
         for interval in self.backwards() {
             let left = age - step.duration;
-            if left >= interval.length {
-                step.prepend(interval.length, interval.delta_rotation, interval.delta_velocity);
-                if step.duration >= age {
-                    return Some(step);
-                }
-            } else {
-                step.prepend(
-                    left,
-                    small_rotation(interval.rate * left),
-                    interval.delta_velocity * (left / interval.length),
-                );
-                return Some(step);
+            if left > interval.length {
+                step.prepend(interval.length, interval.delta_velocity);
+                continue;
             }
+            step.prepend(left, interval.delta_velocity * (left / interval.length));
+            let to_end = multiply(conjugate(interval.turned), self.turned());
+            step.delta_rotation = multiply(small_rotation(interval.rate * left), to_end);
+            return Some(step);
         }
         None
+    }
+
+    /// How the body has turned since the first sample.
+    #[inline]
+    fn turned(&self) -> [f32; 4] {
+        self.intervals.get(self.newest).unwrap_or(&EMPTY).turned
     }
 
     /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as the history covers

@@ -23,7 +23,7 @@
 //! step itself. Within a tenth of a second both are far below any sensor's noise.
 
 use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
-use super::state::{Motion, NominalState, Rotation, multiply, rotate_back, rotation_matrix};
+use super::state::{Motion, NominalState, Rotation, conjugate, multiply, rotate_back, rotation_matrix};
 use stampfly_types::{GRAVITY, Vec3};
 
 /// The inertial samples between two instants, pre-integrated. See the [module](self) documentation.
@@ -66,14 +66,12 @@ impl PropagationStep {
         self.duration += motion.dt;
     }
 
-    /// Prepends an interval of constant rate and force: `length` seconds in which the body turned by `delta_rotation`
-    /// and gained `delta_velocity`.
+    /// Prepends an interval of constant force: `length` seconds in which the body gained `delta_velocity`. How it turned is
+    /// the caller's to say.
     #[inline]
-    pub(crate) fn prepend(&mut self, length: f32, delta_rotation: [f32; 4], delta_velocity: Vec3) {
+    pub(crate) fn prepend(&mut self, length: f32, delta_velocity: Vec3) {
         self.delta_position += delta_velocity * (self.duration + 0.5 * length);
         self.delta_velocity += delta_velocity;
-        self.delta_rotation =
-            if self.duration == 0.0 { delta_rotation } else { multiply(delta_rotation, self.delta_rotation) };
         self.duration += length;
     }
 
@@ -81,12 +79,11 @@ impl PropagationStep {
     #[inline]
     #[must_use]
     pub fn state_at_start(&self, now: &NominalState) -> NominalState {
-        let [w, x, y, z] = self.delta_rotation;
         let tau = self.duration;
         let gravity = Vec3::new(0.0, 0.0, GRAVITY * tau);
         let velocity = now.velocity - self.delta_velocity - gravity;
         NominalState {
-            attitude: multiply(now.attitude, [w, -x, -y, -z]),
+            attitude: multiply(now.attitude, conjugate(self.delta_rotation)),
             velocity,
             position: now.position - velocity * tau - self.delta_position - gravity * (0.5 * tau),
             ..*now
@@ -200,9 +197,5 @@ mod tests {
                 prop_assert!((numeric - propagated[i]).abs() < 6e-3, "state {i}: numeric {numeric}, stated {}", propagated[i]);
             }
         }
-    }
-
-    fn conjugate([w, x, y, z]: [f32; 4]) -> [f32; 4] {
-        [w, -x, -y, -z]
     }
 }

@@ -53,16 +53,23 @@ pub struct Motion {
 
 impl Motion {
     /// The motion `dt` seconds later, for times shorter than a step: rotors and forces as they are.
+    #[inline]
     #[must_use]
     pub(crate) fn after(&self, dt: f64, gravity: f64) -> Self {
+        let mut later = *self;
+        later.advance(dt, gravity);
+        later
+    }
+
+    /// As [`after`](Self::after), in place. Inlined, so that what a step has just computed need not go through memory.
+    #[inline(always)]
+    fn advance(&mut self, dt: f64, gravity: f64) {
         let mean_rate = self.rate + self.angular_acceleration * (0.5 * dt);
-        Self {
-            position: self.position_after(dt, gravity),
-            velocity: self.velocity + self.acceleration(gravity) * dt,
-            attitude: turn(&self.attitude, &(mean_rate * dt)),
-            rate: self.rate_after(dt),
-            ..*self
-        }
+        let acceleration = self.acceleration(gravity);
+        self.position = self.position + self.velocity * dt + acceleration * (0.5 * dt * dt);
+        self.velocity += acceleration * dt;
+        self.attitude = turn(&self.attitude, &(mean_rate * dt));
+        self.rate = self.rate_after(dt);
     }
 
     /// The position alone, as in [`after`](Self::after).
@@ -213,8 +220,11 @@ impl Plant {
         };
         let angular_acceleration = acceleration(&(m.rate + acceleration(&m.rate) * (0.5 * DT)));
 
-        let with_forces = Motion { specific_force, angular_acceleration, ..*m };
-        self.motion = Motion { rotor_speed: self.rotors.speed(), current, ..with_forces.after(DT, p.gravity) };
+        self.motion.specific_force = specific_force;
+        self.motion.angular_acceleration = angular_acceleration;
+        self.motion.advance(DT, p.gravity);
+        self.motion.rotor_speed = self.rotors.speed();
+        self.motion.current = current;
     }
 
     /// Where the vehicle is and how it moves.

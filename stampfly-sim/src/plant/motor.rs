@@ -58,6 +58,7 @@ impl RotorFault {
 pub struct Rotors {
     duty: [f64; ROTORS],
     speed: [f64; ROTORS],
+    /// Of healthy propellers.
     thrust_coefficient: [f64; ROTORS],
     torque_coefficient: f64,
     resistance: f64,
@@ -134,23 +135,29 @@ impl Rotors {
 
     /// One step of `dt` seconds on `voltage`, with the thrust multiplied by `lift`.
     pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64) -> RotorLoads {
+        // Each line for all rotors, so that they are computed side by side.
+        let duty: [f64; ROTORS] = core::array::from_fn(|i| self.faults[i].duty.unwrap_or(self.duty[i]));
+        let speed = self.speed;
+        let current: [f64; ROTORS] =
+            core::array::from_fn(|i| ((duty[i] * voltage - self.motor_constant * speed[i]) / self.resistance).max(0.0));
+        let drag = speed.map(|speed| self.torque_coefficient * speed * speed);
+        self.speed = core::array::from_fn(|i| {
+            let net = self.motor_constant * current[i] - drag[i] - self.viscous * speed[i] - self.friction;
+            (speed[i] + net / self.inertia * dt).max(0.0)
+        });
+        let reaction: [f64; ROTORS] = core::array::from_fn(|i| {
+            let acceleration = (self.speed[i] - speed[i]) / dt;
+            -SPINS[i] * (drag[i] + self.inertia * acceleration)
+        });
+        let thrust: [f64; ROTORS] =
+            core::array::from_fn(|i| self.thrust_coefficient[i] * self.faults[i].thrust * speed[i] * speed[i] * lift);
         let mut loads = RotorLoads::default();
-        for (i, spin) in SPINS.into_iter().enumerate() {
-            let fault = self.faults[i];
-            let (speed, duty) = (self.speed[i], fault.duty.unwrap_or(self.duty[i]));
-            let current = ((duty * voltage - self.motor_constant * speed) / self.resistance).max(0.0);
-            let drag = self.torque_coefficient * speed * speed;
-            let net = self.motor_constant * current - drag - self.viscous * speed - self.friction;
-            let next = (speed + net / self.inertia * dt).max(0.0);
-            let acceleration = (next - speed) / dt;
-            self.speed[i] = next;
-
-            let thrust = self.thrust_coefficient[i] * fault.thrust * speed * speed * lift;
+        for i in 0..ROTORS {
             let (x, y) = self.places[i];
-            loads.thrust += thrust;
-            loads.torque += Vector3::new(-y * thrust, x * thrust, -spin * (drag + self.inertia * acceleration));
-            loads.momentum_z += spin * self.inertia * speed;
-            loads.current += duty * current;
+            loads.thrust += thrust[i];
+            loads.torque += Vector3::new(-y * thrust[i], x * thrust[i], reaction[i]);
+            loads.momentum_z += SPINS[i] * self.inertia * speed[i];
+            loads.current += duty[i] * current[i];
         }
         loads
     }

@@ -4,6 +4,7 @@
 //! strength and duration, wrong in the finer shape of the spectrum, which a vehicle of this size cannot tell.
 
 use crate::noise::Noise;
+use crate::normals::Normals;
 use nalgebra::Vector3;
 use stampfly_types::Vec3;
 
@@ -39,7 +40,7 @@ const BOUNDARY_LAYER: f64 = 0.3;
 /// The air at the vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wind {
-    noise: Noise,
+    noise: Normals,
     mean: Vector3<f64>,
     gust: Vector3<f64>,
     keep: f64,
@@ -55,7 +56,7 @@ impl Wind {
         let gust = deviation.component_mul(&noise.normal3());
         // This drive keeps the variance where it starts.
         let drive = deviation * (1.0 - keep * keep).sqrt();
-        Self { noise, mean: Vector3::from(config.mean).cast(), gust, keep, drive, countdown: DECIMATION }
+        Self { noise: noise.into(), mean: Vector3::from(config.mean).cast(), gust, keep, drive, countdown: DECIMATION }
     }
 
     pub(crate) fn step(&mut self) {
@@ -63,7 +64,7 @@ impl Wind {
         if self.countdown == 0 {
             self.countdown = DECIMATION;
             if self.drive.x > 0.0 {
-                self.gust = self.gust * self.keep + self.drive.component_mul(&self.noise.normal3());
+                self.gust = self.gust * self.keep + self.drive.component_mul(&Vector3::from(self.noise.next()));
             }
         }
     }

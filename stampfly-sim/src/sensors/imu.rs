@@ -3,6 +3,7 @@
 
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
+use crate::normals::Normals;
 use crate::time::Clock;
 use crate::vibration::Vibration;
 use crate::world::World;
@@ -40,7 +41,7 @@ const GYRO_WALK: f64 = 2e-5;
 #[derive(Debug)]
 pub(crate) struct ImuPhysics {
     world: World,
-    noise: Noise,
+    noise: Normals,
     vibration: Vibration,
     /// Samples made so far.
     samples: u64,
@@ -74,7 +75,7 @@ impl ImuPhysics {
             gyro_bias: Vector3::from_fn(|_, _| noise.within(GYRO_BIAS)),
             accel_matrix,
             gyro_matrix,
-            noise,
+            noise: noise.into(),
             world: world.clone(),
         };
         (physics, schedule)
@@ -87,19 +88,20 @@ impl ImuPhysics {
         let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
         let gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
         let per_sample = (RATE / 2.0).sqrt();
+        let noise: [f64; 6] = self.noise.next();
         let sample = core::array::from_fn(|channel| {
             let (value, density) = if channel < 3 {
                 (accel[channel], ACCEL_DENSITY[channel])
             } else {
                 (gyro[channel - 3], GYRO_DENSITY[channel - 3])
             };
-            value + shake[channel] + density * per_sample * self.noise.normal()
+            value + shake[channel] + density * per_sample * noise[channel]
         });
         self.samples += 1;
         if self.samples.is_multiple_of(GROUP as u64) {
             let wander = (GROUP as f64 / RATE).sqrt();
-            self.accel_bias += self.noise.normal3() * (ACCEL_WALK * wander);
-            self.gyro_bias += self.noise.normal3() * (GYRO_WALK * wander);
+            self.accel_bias += Vector3::from(self.noise.next()) * (ACCEL_WALK * wander);
+            self.gyro_bias += Vector3::from(self.noise.next()) * (GYRO_WALK * wander);
         }
         sample
     }

@@ -34,7 +34,6 @@ impl Wake for Bell {
 
 struct Task<'a> {
     future: Pin<Box<dyn Future<Output = ()> + 'a>>,
-    deadline: Option<Instant>,
     bell: Arc<Bell>,
     waker: Waker,
 }
@@ -66,14 +65,22 @@ struct Task<'a> {
 pub struct Tasks<'a> {
     clock: Clock,
     tasks: Vec<Option<Task<'a>>>,
+    /// When each task is to be polled; [`NEVER`] when it does not wait for time.
+    deadlines: Vec<Instant>,
+    /// The smallest (deadline, spawn order), looked for after each poll only: asked for several times as often.
+    first: (Instant, usize),
     any_rung: Arc<AtomicBool>,
 }
+
+/// No deadline.
+const NEVER: Instant = Instant::from_micros(u64::MAX);
 
 impl<'a> Tasks<'a> {
     /// No tasks yet.
     #[must_use]
     pub fn new(clock: Clock) -> Self {
-        Self { clock, tasks: Vec::new(), any_rung: Arc::new(AtomicBool::new(false)) }
+        let (tasks, deadlines) = (Vec::new(), Vec::new());
+        Self { clock, tasks, deadlines, first: (NEVER, 0), any_rung: Arc::new(AtomicBool::new(false)) }
     }
 
     /// Adds a task. It is polled for the first time at the next step, at the instant the clock shows then.
@@ -81,7 +88,8 @@ impl<'a> Tasks<'a> {
         let bell = Arc::new(Bell { rung: AtomicBool::new(true), any_rung: self.any_rung.clone() });
         self.any_rung.store(true, Ordering::Relaxed);
         let waker = Waker::from(bell.clone());
-        self.tasks.push(Some(Task { future: Box::pin(future), deadline: None, bell, waker }));
+        self.tasks.push(Some(Task { future: Box::pin(future), bell, waker }));
+        self.deadlines.push(NEVER);
     }
 
     /// How many tasks have not finished.
@@ -99,7 +107,11 @@ impl<'a> Tasks<'a> {
     /// The instant of the next step; `None` when no task waits for time.
     #[must_use]
     pub fn next_deadline(&self) -> Option<Instant> {
-        if self.any_rung.load(Ordering::Relaxed) { Some(self.clock.now()) } else { self.earliest() }
+        let (deadline, _) = self.first;
+        if self.any_rung.load(Ordering::Relaxed) {
+            return Some(self.clock.now());
+        }
+        (deadline != NEVER).then_some(deadline)
     }
 
     /// Runs everything that is due at the next deadline, and returns that instant.
@@ -108,7 +120,9 @@ impl<'a> Tasks<'a> {
     pub fn step(&mut self) -> Option<Instant> {
         self.clock.advance_to(self.next_deadline()?);
         self.answer_bells();
-        while let Some((_, index)) = self.first_due() {
+        while let (deadline, index) = self.first
+            && deadline <= self.clock.now()
+        {
             self.poll(index);
             self.answer_bells();
         }
@@ -123,21 +137,10 @@ impl<'a> Tasks<'a> {
         self.clock.advance_to(instant);
     }
 
-    fn earliest(&self) -> Option<Instant> {
-        self.tasks.iter().flatten().filter_map(|task| task.deadline).min()
-    }
-
-    /// The task with the smallest (deadline, spawn order) whose deadline has passed.
-    fn first_due(&self) -> Option<(Instant, usize)> {
-        let now = self.clock.now();
-        let deadlines =
-            self.tasks.iter().enumerate().filter_map(|(index, task)| Some((task.as_ref()?.deadline?, index)));
-        deadlines.filter(|(deadline, _)| *deadline <= now).min()
-    }
-
     /// Polls the tasks that were woken by something else than time, in spawn order, until none is left.
     fn answer_bells(&mut self) {
-        while self.any_rung.swap(false, Ordering::Relaxed) {
+        // Loads, which cost nothing, before swaps: hardly ever has a bell rung.
+        while self.any_rung.load(Ordering::Relaxed) && self.any_rung.swap(false, Ordering::Relaxed) {
             for index in 0..self.tasks.len() {
                 if self.tasks[index].as_ref().is_some_and(|task| task.bell.rung.swap(false, Ordering::Relaxed)) {
                     self.poll(index);
@@ -150,8 +153,17 @@ impl<'a> Tasks<'a> {
         let Some(task) = &mut self.tasks[index] else { return };
         self.clock.take_wanted();
         match task.future.as_mut().poll(&mut Context::from_waker(&task.waker)) {
-            Poll::Ready(()) => self.tasks[index] = None,
-            Poll::Pending => task.deadline = self.clock.take_wanted(),
+            Poll::Ready(()) => {
+                self.tasks[index] = None;
+                self.deadlines[index] = NEVER;
+            }
+            Poll::Pending => self.deadlines[index] = self.clock.take_wanted().unwrap_or(NEVER),
+        }
+        self.first = (NEVER, 0);
+        for (index, deadline) in self.deadlines.iter().enumerate() {
+            if *deadline < self.first.0 {
+                self.first = (*deadline, index);
+            }
         }
     }
 }

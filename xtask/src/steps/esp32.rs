@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | S3, types | types, features, pins and borrows of the real firmware | machine code, linking, timing |
 //! | S3, a wrong pin | that the check above refuses one | |
+//! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
 //! | C6, image | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
 //! | C6, memory | that the same statics leave the S3's first core its stack | to the byte: code differs |
 //!
@@ -11,6 +12,7 @@
 //! the S3's target name; nothing it makes is ever run. The third builds the same code for another chip. Debian's compiler
 //! comes with the sources of its own core library, which both need, and is installed when it is missing.
 
+use super::esp32_link;
 use super::no_std::debian_cargo;
 use crate::arguments::Arguments;
 use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
@@ -38,6 +40,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let target = stand_in(repository)?;
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
+    esp32_link::run(repository, s3(repository, &target, "-Dwarnings"))?;
     let program = c6(repository)?;
     memory(&program)?;
     image(repository, &program)
@@ -63,7 +66,6 @@ fn firmware(repository: &Repository, subcommand: &str) -> Command {
     let mut cargo = debian_cargo(repository);
     // What is measured is what is flashed: without its debug information other functions are inlined, 4 % of a crate.
     cargo.env_remove("CARGO_PROFILE_RELEASE_DEBUG");
-    cargo.current_dir(repository.root.join(PACKAGE));
     cargo.args([subcommand, "--quiet", "--locked", "--target-dir"]).arg(repository.target("esp32"));
     cargo
 }
@@ -71,6 +73,7 @@ fn firmware(repository: &Repository, subcommand: &str) -> Command {
 /// Clippy for the S3, with these arguments for the firmware alone.
 fn s3(repository: &Repository, target: &Path, arguments: &str) -> Command {
     let mut cargo = firmware(repository, "check");
+    cargo.current_dir(repository.root.join(PACKAGE));
     cargo.env("RUSTFLAGS", "-A explicit_builtin_cfgs_in_flags --cfg target_arch=\"xtensa\"");
     // What `cargo clippy` is; spelled so, rustup's would be taken. Its arguments are separated by this word.
     cargo.env("RUSTC_WORKSPACE_WRAPPER", "/usr/bin/clippy-driver");
@@ -105,6 +108,9 @@ fn is_about_the_pin(said: &str) -> Result<(), Failure> {
 pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     provide(repository, &[&COMPILER, &LINKER])?;
     let mut cargo = firmware(repository, "build");
+    // Not in the package's folder: its settings of cargo are the S3's, and the C6's layer of hardware refuses that of the data cache.
+    cargo.current_dir(&repository.root).arg("--manifest-path").arg(repository.root.join(PACKAGE).join("Cargo.toml"));
+    cargo.args(["-Zbuild-std=core,alloc"]);
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
     // One example is enough to see that they link.

@@ -14,6 +14,7 @@ pub mod determinism;
 pub mod doc;
 pub mod docs;
 pub mod esp32;
+mod esp32_link;
 pub mod examples;
 pub mod features;
 pub mod figures;

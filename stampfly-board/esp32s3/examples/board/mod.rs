@@ -60,6 +60,7 @@ impl Board {
     /// Stops the motors, then starts the processor, the clock and the cut-off. The first thing a program does.
     pub fn start() -> Self {
         safe_state::hold_low();
+        safe_state::deselect();
         let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
         // Memory the boot loader has done with.
         esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);

@@ -61,10 +61,16 @@ impl Invariants {
         }
     }
 
+    #[inline]
     pub(super) fn require(&mut self, name: &'static str, holds: bool) {
         if !holds {
-            self.violations.insert(name);
+            self.violated(name);
         }
+    }
+
+    #[cold]
+    fn violated(&mut self, name: &'static str) {
+        self.violations.insert(name);
     }
 
     /// Names of the invariants that did not hold.
@@ -105,8 +111,8 @@ impl Invariants {
 
     fn status_changes(&mut self, status: &FlightStatus) {
         let (from, to) = (self.status.phase, status.phase);
-        let exists = transitions::TABLE.iter().any(|row| row.from == from && row.to == to);
-        self.require("I5", from == to || exists);
+        let exists = || transitions::TABLE.iter().any(|row| row.from == from && row.to == to);
+        self.require("I5", from == to || exists());
         self.require("I3", self.status.armed || !status.armed || status.blocks.is_empty());
         self.status = *status;
     }
@@ -149,16 +155,27 @@ impl Invariants {
 
 /// Finite numbers, and a rotation.
 fn is_sound(estimate: &StateEstimate, words: &[u32]) -> bool {
-    let fields = StateEstimate::FIELDS.iter().scan(0, |next, field| {
-        let start = *next;
-        *next += field.words;
-        Some((start, field))
-    });
-    let mut numbers = fields
-        .filter(|(_, field)| field.kind == FieldKind::F32)
-        .flat_map(|(start, field)| words.get(start..start + field.words).unwrap_or_default());
-    numbers.all(|word| f32::from_bits(*word).is_finite()) && (estimate.attitude.norm_squared() - 1.0).abs() <= 2e-4
+    let finite = words
+        .iter()
+        .zip(&NUMBERS)
+        .fold(true, |finite, (word, is_number)| finite & (!is_number | f32::from_bits(*word).is_finite()));
+    finite && (estimate.attitude.norm_squared() - 1.0).abs() <= 2e-4
 }
+
+/// Which words of an estimate are numbers.
+const NUMBERS: [bool; StateEstimate::WORDS] = {
+    let (mut numbers, mut start, mut place) = ([false; StateEstimate::WORDS], 0, 0);
+    while place < StateEstimate::FIELDS.len() {
+        let field = &StateEstimate::FIELDS[place];
+        let mut word = 0;
+        while word < field.words {
+            numbers[start + word] = matches!(field.kind, FieldKind::F32);
+            word += 1;
+        }
+        (start, place) = (start + field.words, place + 1);
+    }
+    numbers
+};
 
 #[cfg(test)]
 mod tests;

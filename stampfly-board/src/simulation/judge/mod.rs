@@ -220,6 +220,9 @@ impl Judge {
     }
 
     fn alerts_change(&mut self, at: Instant, active: Alerts) {
+        if active == self.alerts {
+            return;
+        }
         let seconds = at.seconds_f64();
         let after_fault = self.has_begun(at);
         for (name, bit) in names() {
