@@ -88,9 +88,7 @@ impl MotorConfig {
     fn moved(&self, duty: f32, voltage: f32, per_volt: f32, step: f32) -> f32 {
         // A motor that begins to idle starts from rest, no quicker than any other change.
         let lowest = if self.duty_min < 0.0 { self.duty_min } else { 0.0 };
-        let wanted = voltage * per_volt;
-        let wanted = if wanted > self.duty_max { self.duty_max } else { wanted };
-        let wanted = if wanted < self.duty_min { self.duty_min } else { wanted };
+        let wanted = within(voltage * per_volt, self.duty_min, self.duty_max);
         // The last clamp is for the rounding of the sum.
         within(duty + symmetric(wanted - duty, step), lowest, self.duty_max)
     }

@@ -130,6 +130,7 @@ impl<T: FloatCore> Pid<T> {
             return self.output;
         }
         if dt != self.discrete.dt {
+            // Asked here only: the one before it was finite.
             if !dt.is_finite() {
                 return self.output;
             }

@@ -1,6 +1,6 @@
 //! The covariance of the error state, stored for speed.
 //!
-//! Five by five blocks of three by three, whose rows are [`Lanes`]. All operations go block by block, so that the compiler turns each into a
+//! Five by five blocks of three by three, whose rows are `Lanes`. All operations go block by block, so that the compiler turns each into a
 //! few vector instructions on a host and into tight loops on a microcontroller. The matrix stays exactly symmetric by
 //! construction: the update subtracts w·wᵀ, the propagation mirrors.
 //!

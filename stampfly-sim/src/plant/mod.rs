@@ -65,9 +65,8 @@ impl Motion {
     #[inline(always)]
     fn advance(&mut self, dt: f64, gravity: f64) {
         let mean_rate = self.rate + self.angular_acceleration * (0.5 * dt);
-        let acceleration = self.acceleration(gravity);
-        self.position = self.position + self.velocity * dt + acceleration * (0.5 * dt * dt);
-        self.velocity += acceleration * dt;
+        self.position = self.position_after(dt, gravity);
+        self.velocity += self.acceleration(gravity) * dt;
         self.attitude = turn(&self.attitude, &(mean_rate * dt));
         self.rate = self.rate_after(dt);
     }

@@ -90,7 +90,7 @@ impl Covariance {
 
     /// Updates the covariance with a measurement: P ← P − P·Hᵀ·S⁻¹·H·P, in the square-root form P − D·Dᵀ with
     /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
-    /// [`NominalState::correct`](super::NominalState::correct).
+    /// [`NominalState::correct`](crate::filter::NominalState::correct).
     ///
     /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
     #[inline]
