@@ -1,7 +1,7 @@
 //! A cursor over the tokens of a table. Every failure knows the token it is about.
 
 use proc_macro2::{Delimiter, Group, Ident, Literal, Punct, Span, TokenStream, TokenTree};
-use quote::{format_ident, quote_spanned};
+use quote::quote_spanned;
 
 /// What is wrong with a table, and where.
 pub struct Error {
@@ -243,11 +243,6 @@ pub fn type_name(name: &Ident, ending: &str) -> Ident {
         letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
     });
     Ident::new(&(parts.collect::<String>() + ending), name.span())
-}
-
-/// The method of all ends that reads the inputs of one runnable.
-pub fn read_method(runnable: &Ident) -> Ident {
-    format_ident!("__read_{}", runnable)
 }
 
 /// Refuses a name that stands twice.

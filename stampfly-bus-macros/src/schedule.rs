@@ -1,6 +1,6 @@
 //! The activation table: its lines, the checks on them, and the code that follows.
 
-use crate::input::{Attributes, Error, Input, Result, located, once, read_method};
+use crate::input::{Attributes, Error, Input, Result, located, once};
 use proc_macro2::{Ident, Span, TokenStream, TokenTree};
 use quote::{quote, quote_spanned};
 
@@ -204,14 +204,19 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
     });
     let places: Vec<_> = names.iter().map(|name| quote!(index if index == Id::#name as usize)).collect();
     let reads = names.iter().map(|name| {
-        let method = read_method(name);
-        quote_spanned!(located(name) => ends.#method(activation))
+        quote_spanned!(located(name) => {
+            if activation.__looks() {
+                ends.#name().__look(activation);
+            } else {
+                ::stampfly_bus::ReadInputs::read(&mut ends.#name(), activation);
+            }
+        })
     });
     let runs = rows.iter().map(|row| {
         let (name, runnable) = (&row.name, &row.runnable);
         // At the line's own name, so that a runnable with the ends of another is reported there.
         quote_spanned!(located(name) =>
-            <#runnable as ::stampfly_bus::Runnable>::run(&mut self.#name, activation, &mut ends.#name))
+            <#runnable as ::stampfly_bus::Runnable>::run(&mut self.#name, activation, &mut ends.#name()))
     });
     let inputs = rows.iter().map(|row| {
         let runnable = &row.runnable;

@@ -1,6 +1,6 @@
 //! The topic table: its lines, the checks on them, and the code that follows.
 
-use crate::input::{Attributes, Error, Input, Result, once, read_method, type_name, whole_micros};
+use crate::input::{Attributes, Error, Input, Result, once, type_name, whole_micros};
 use proc_macro2::{Delimiter, Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote, quote_spanned};
 
@@ -228,17 +228,23 @@ impl Participant<'_> {
     fn ends(&self) -> Ident {
         type_name(self.name, "Ends")
     }
+
+    /// What its ends know from one activation to the next; whoever is outside keeps its ends.
+    fn ports(&self) -> Ident {
+        type_name(self.name, "Ports")
+    }
 }
 
 fn generate(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
     let table = table(topics, participants);
     let bus = bus(topics, participants);
     let ends = participants.iter().map(|participant| ends(participant));
+    let ports = participants.iter().filter(|participant| !participant.outside).map(ports);
     let aliases = topics.iter().map(aliases);
     let depths = topics.iter().filter_map(depth_limits);
     let runnables = group("Ends", "The ends of every runnable.", participants, false);
     let outside = group("Outside", "The ends of everybody outside: drivers, links, motors.", participants, true);
-    quote!(#table #bus #(#ends)* #runnables #outside #(#aliases)* #(#depths)*)
+    quote!(#table #bus #(#ends)* #(#ports)* #runnables #outside #(#aliases)* #(#depths)*)
 }
 
 /// Fails to compile, at the depth, when a ring cannot have it.
@@ -308,6 +314,44 @@ fn table(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
     }
 }
 
+/// The fields of a group, which may be empty.
+fn members(made: impl Iterator<Item = TokenStream>) -> TokenStream {
+    let made: Vec<_> = made.collect();
+    if made.is_empty() { quote!(nobody: ::core::marker::PhantomData) } else { quote!(#(#made,)*) }
+}
+
+/// The ends of somebody outside, made once.
+fn new_ends(participant: &Participant<'_>) -> TokenStream {
+    let (name, ends) = (participant.name, participant.ends());
+    let publishes = participant.publishes.iter().map(|topic| {
+        let name = &topic.name;
+        quote!(#name: bus.#name.__publisher(hook, Id::#name as usize))
+    });
+    let reads = participant.reads.iter().map(|(topic, number)| {
+        let name = &topic.name;
+        quote!(#name: bus.#name.__subscriber(#number))
+    });
+    quote!(#name: #ends { #(#publishes,)* #(#reads,)* })
+}
+
+/// What a runnable's ends know before the first activation.
+fn new_ports(participant: &Participant<'_>) -> TokenStream {
+    let (name, ports) = (participant.name, participant.ports());
+    let hook = (!participant.publishes.is_empty()).then(|| quote!(hook,));
+    let kept = participant.publishes.iter().filter(|topic| topic.within).map(|topic| {
+        let name = &topic.name;
+        quote!(#name: ::stampfly_bus::NewestOutput::__place(&bus.#name))
+    });
+    let reads = participant.reads.iter().map(|(topic, number)| {
+        let name = &topic.name;
+        match &topic.policy {
+            Policy::Latest => quote!(#name: ::stampfly_bus::NewestPort::__new()),
+            _ => quote!(#name: ::stampfly_bus::SamplesPort::__new(&bus.#name, #number)),
+        }
+    });
+    quote!(#name: #ports { bus, #hook #(#kept,)* #(#reads,)* })
+}
+
 /// The storage, and how it is split.
 fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
     let names: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
@@ -320,33 +364,9 @@ fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
         let (message, depth, words) = (&topic.message, topic.depth(), topic.words());
         quote!(::stampfly_bus::Tap<'b, #message, { #depth }, #words>)
     });
-    let new_ends = |outside: bool| {
-        let of = participants.iter().filter(move |participant| participant.outside == outside);
-        let made = of.map(|participant| {
-            let (name, ends) = (participant.name, participant.ends());
-            let publishes = participant.publishes.iter().map(|topic| {
-                let name = &topic.name;
-                let publisher = quote!(bus.#name.__publisher(hook, Id::#name as usize));
-                match topic.within {
-                    true => quote!(#name: ::stampfly_bus::NewestOutput::__new(#publisher)),
-                    false => quote!(#name: #publisher),
-                }
-            });
-            let reads = participant.reads.iter().map(|(topic, number)| {
-                let name = &topic.name;
-                let subscriber = quote!(bus.#name.__subscriber(#number));
-                match (outside, &topic.policy) {
-                    (true, _) => quote!(#name: #subscriber),
-                    (false, Policy::Latest) => quote!(#name: ::stampfly_bus::NewestInput::__new(#subscriber)),
-                    (false, _) => quote!(#name: ::stampfly_bus::SamplesInput::__new(#subscriber)),
-                }
-            });
-            quote!(#name: #ends { #(#publishes,)* #(#reads,)* })
-        });
-        let made: Vec<_> = made.collect();
-        if made.is_empty() { quote!(nobody: ::core::marker::PhantomData) } else { quote!(#(#made,)*) }
-    };
-    let (runnables, outside) = (new_ends(false), new_ends(true));
+    let (runnables, outside): (Vec<_>, Vec<_>) = participants.iter().partition(|participant| !participant.outside);
+    let runnables = members(runnables.iter().map(|participant| new_ports(participant)));
+    let outside = members(outside.iter().map(|participant| new_ends(participant)));
     quote! {
         /// Storage of every topic of one vehicle.
         pub struct Bus { #(#names: #storage),* }
@@ -426,13 +446,22 @@ fn ends(participant: &Participant<'_>) -> TokenStream {
     if *outside {
         return definition;
     }
-    let inputs = reads.iter().map(|(topic, _)| &topic.name);
+    let inputs: Vec<_> = reads.iter().map(|(topic, _)| &topic.name).collect();
     let (count, message) = (reads.len(), format!("`{name}` reads too many topics"));
     let at = name.span();
     let limit = quote_spanned!(at => const _: () = assert!(#count <= ::stampfly_bus::MAX_INPUTS, #message););
     quote! {
         #definition
         #limit
+
+        impl #ends<'_> {
+            #[doc(hidden)]
+            #[inline(always)]
+            #[allow(dead_code, reason = "a program may run some of its runnables only")]
+            pub fn __look(&mut self, activation: &mut ::stampfly_bus::Activation) {
+                activation.__have_read([#(self.#inputs.__look()),*]);
+            }
+        }
 
         impl ::stampfly_bus::ReadInputs for #ends<'_> {
             const INPUTS: usize = #count;
@@ -446,21 +475,88 @@ fn ends(participant: &Participant<'_>) -> TokenStream {
     }
 }
 
+/// What the ends of a runnable know from one activation to the next.
+fn ports(participant: &Participant<'_>) -> TokenStream {
+    let (name, ports) = (participant.name, participant.ports());
+    let doc = format!("What the ends of `{name}` know from one activation to the next.");
+    let hook = (!participant.publishes.is_empty()).then(|| quote!(hook: Option<::stampfly_bus::Hook>,));
+    let kept = participant.publishes.iter().filter(|topic| topic.within).map(|topic| {
+        let (name, message) = (&topic.name, &topic.message);
+        quote!(#name: ::stampfly_bus::Stamped<#message>)
+    });
+    let reads = participant.reads.iter().map(|(topic, _)| {
+        let (name, message, depth) = (&topic.name, &topic.message, topic.depth());
+        match topic.policy {
+            Policy::Latest => quote!(#name: ::stampfly_bus::NewestPort<#message>),
+            _ => quote!(#name: ::stampfly_bus::SamplesPort<#message, { #depth }>),
+        }
+    });
+    quote! {
+        #[doc = #doc]
+        pub struct #ports<'b> { bus: &'b Bus, #hook #(#kept,)* #(#reads,)* }
+    }
+}
+
+/// How the ends of a runnable are made for an activation.
+fn lent_ends(participant: &Participant<'_>) -> TokenStream {
+    let (name, ends) = (participant.name, participant.ends());
+    let doc = format!("The ends of `{name}`, for one activation.");
+    let publishes = participant.publishes.iter().map(|topic| {
+        let name = &topic.name;
+        let publisher = quote!(ports.bus.#name.__publisher(ports.hook, Id::#name as usize));
+        match topic.within {
+            true => quote!(#name: ::stampfly_bus::NewestOutput::__new(#publisher, &mut ports.#name)),
+            false => quote!(#name: #publisher),
+        }
+    });
+    let reads = participant.reads.iter().map(|(topic, number)| {
+        let (name, publisher) = (&topic.name, &topic.publisher);
+        let topic_and_port = quote!(&ports.bus.#name);
+        match (&topic.policy, topic.within) {
+            (Policy::Latest, true) => quote!(#name: ::stampfly_bus::NewestInput::__new(
+                #topic_and_port, &mut ports.#name, Some(&self.#publisher.#name))),
+            (Policy::Latest, false) => {
+                quote!(#name: ::stampfly_bus::NewestInput::__new(#topic_and_port, &mut ports.#name, None))
+            }
+            _ => quote!(#name: ::stampfly_bus::SamplesInput::__new(#topic_and_port, #number, &mut ports.#name)),
+        }
+    });
+    quote! {
+        #[doc = #doc]
+        #[inline(always)]
+        pub fn #name(&mut self) -> #ends<'_> {
+            let ports = &mut self.#name;
+            #ends { #(#publishes,)* #(#reads,)* }
+        }
+    }
+}
+
 /// The ends of several participants.
 fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool) -> TokenStream {
     let group = format_ident!("{name}");
     let members: Vec<_> = participants.iter().filter(|participant| participant.outside == outside).collect();
     let names: Vec<_> = members.iter().map(|participant| participant.name).collect();
-    let types = members.iter().map(|participant| participant.ends());
-    let docs = names.iter().map(|name| format!("The ends of `{name}`."));
+    let types =
+        members.iter().map(|participant| if outside { participant.ends() } else { participant.ports() });
+    let docs = names.iter().map(|name| match outside {
+        true => format!("The ends of `{name}`."),
+        false => format!("What the ends of `{name}` know."),
+    });
     let publishers = members.iter().flat_map(|participant| {
         participant.publishes.iter().map(|topic| {
             let (participant, topic) = (participant.name, &topic.name);
-            (quote!(topic if topic == Id::#topic as usize), quote!(self.#participant.#topic))
+            let ends = if outside { quote!(self.#participant) } else { quote!(self.#participant()) };
+            (quote!(topic if topic == Id::#topic as usize), quote!(#ends.#topic))
         })
     });
     let (places, publishers): (Vec<_>, Vec<_>) = publishers.unzip();
-    let reads = (!outside).then(|| reads(&members));
+    let lent = (!outside).then(|| {
+        let ends = members.iter().map(|participant| lent_ends(participant));
+        quote! {
+            #[allow(dead_code, reason = "a program may run some of its runnables only")]
+            impl #group<'_> { #(#ends)* }
+        }
+    });
     // A group may be empty; it has the bus's lifetime all the same.
     let nobody = members.is_empty().then(|| quote!(nobody: ::core::marker::PhantomData<&'b ()>));
     quote! {
@@ -470,7 +566,7 @@ fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool)
             #nobody
         }
 
-        #reads
+        #lent
 
         impl ::stampfly_bus::PublishWords for #group<'_> {
             fn publish_words(&mut self, topic: usize, at: ::stampfly_bus::Instant, words: &[u32]) -> Option<u32> {
@@ -496,33 +592,6 @@ fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool)
             }
         }
     }
-}
-
-/// How each runnable reads: what others of them have published from where they keep it, in flight; what has been recorded, and what
-/// comes from outside, from the bus.
-fn reads(members: &[&Participant<'_>]) -> TokenStream {
-    let methods = members.iter().map(|participant| {
-        let (name, method) = (participant.name, read_method(participant.name));
-        let inputs = participant.reads.iter().map(|(topic, _)| {
-            let (topic_name, publisher) = (&topic.name, &topic.publisher);
-            match topic.within {
-                true => quote!(self.#name.#topic_name.__read_from(&self.#publisher.#topic_name)),
-                false => quote!(self.#name.#topic_name.__read_newest()),
-            }
-        });
-        quote! {
-            #[doc(hidden)]
-            #[inline]
-            pub fn #method(&mut self, activation: &mut ::stampfly_bus::Activation) {
-                if activation.is_replay() {
-                    return ::stampfly_bus::ReadInputs::read(&mut self.#name, activation);
-                }
-                let inputs = [#(#inputs),*];
-                activation.__have_read(inputs);
-            }
-        }
-    });
-    quote!(impl Ends<'_> { #(#methods)* })
 }
 
 /// Names for the types of a topic's ends, for those who store one.

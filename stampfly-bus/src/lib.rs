@@ -50,6 +50,8 @@ pub use bell::Bell;
 /// Its vectors are in signatures here.
 pub use heapless;
 pub use input::{NewestInput, SamplesInput};
+#[doc(hidden)]
+pub use input::{NewestPort, SamplesPort};
 pub use line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 pub use output::NewestOutput;
 pub use response::{JITTER, Unbounded, response_time};

@@ -1,20 +1,20 @@
-//! Output of a runnable to other runnables: a writing end that keeps its newest sample at hand for them.
+//! Output of a runnable to other runnables: a writing end that keeps its newest sample where they can look at it.
 //!
-//! The runnables of a vehicle take turns: while one of them reads, none publishes. So what one has published another finds where the
-//! publisher keeps it, and copies a plain struct: no sequence number to check, no message to make from words. It is on the
-//! bus all the same, for a log, for a replay, and for everybody outside.
+//! The runnables of a vehicle take turns: while one of them runs, no other publishes. So what one has published another reads
+//! where the publisher keeps it, a plain struct: no sequence number to check, no message to make from words, nothing to copy. It is
+//! on the bus all the same, for a log, for a replay, and for everybody outside.
 //!
 //! [`topics!`](crate::topics!) makes one for each `latest` topic from a runnable to runnables; all other topics have a
 //! [`Publisher`].
 
-use crate::topic::{Latest, Publisher};
+use crate::topic::{Latest, Publisher, Topic};
 use stampfly_types::{Instant, Message, Stamped};
 
 /// The writing end of a topic whose newest sample other runnables read.
 #[must_use = "a topic nobody publishes is a wiring mistake"]
 pub struct NewestOutput<'b, T, const N: usize, const W: usize> {
     publisher: Publisher<'b, T, Latest, N, W, 0>,
-    newest: Stamped<T>,
+    newest: &'b mut Stamped<T>,
 }
 
 impl<'b, T, const N: usize, const W: usize> NewestOutput<'b, T, N, W>
@@ -23,8 +23,16 @@ where
 {
     #[doc(hidden)]
     #[inline(always)]
-    pub fn __new(publisher: Publisher<'b, T, Latest, N, W, 0>) -> Self {
-        Self { publisher, newest: Stamped { at: Instant::ZERO, generation: 0, data: T::default() } }
+    pub fn __new(publisher: Publisher<'b, T, Latest, N, W, 0>, newest: &'b mut Stamped<T>) -> Self {
+        Self { publisher, newest }
+    }
+
+    /// Where the newest sample is kept.
+    #[doc(hidden)]
+    #[inline(always)]
+    #[must_use]
+    pub fn __place(_: &Topic<T, Latest, N, W, 0>) -> Stamped<T> {
+        Stamped { at: Instant::ZERO, generation: 0, data: T::default() }
     }
 
     /// Publishes `data`, valid for the instant `at`. Returns its generation. Never waits, never fails.
@@ -34,7 +42,7 @@ where
         let generation = self.publisher.write(at, &words);
         // What a reader would make of these words is this, or nothing.
         if T::from_words(&words).is_some() {
-            self.newest = Stamped { at, generation, data: *data };
+            *self.newest = Stamped { at, generation, data: *data };
         }
         generation
     }
@@ -61,18 +69,12 @@ where
         Some(())
     }
 
-    /// The newest sample; the message's default with generation zero before the first.
-    #[inline]
-    pub(crate) const fn newest(&self) -> &Stamped<T> {
-        &self.newest
-    }
-
     /// Keeps what a reader of the topic would make of these words: nothing, if they are no message. An attitude of another length
     /// than one is none, and the readers go on with the sample before.
     #[inline]
     fn keep(&mut self, at: Instant, generation: u32, words: &[u32; W]) {
         if let Some(data) = T::from_words(words) {
-            self.newest = Stamped { at, generation, data };
+            *self.newest = Stamped { at, generation, data };
         }
     }
 }

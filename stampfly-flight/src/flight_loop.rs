@@ -156,15 +156,33 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
 
     /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
     pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
-        let Self { lines, activation } = self;
         let mut next = 0;
-        while let Some((index, now)) = lines.due(band, next, clock) {
-            activation.begin(index as u8, now);
-            lines.start(index, activation, clock, observer);
-            lines.complete(index, activation, observer);
+        while let Some(index) = self.run_from(band, next, clock, observer) {
             next = index + 1;
         }
         next > 0
+    }
+
+    /// Runs the first line of this band that is due. Returns whether there was one.
+    pub fn run_next(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
+        self.run_from(band, 0, clock, observer).is_some()
+    }
+
+    /// Runs the first line that is due from this one on.
+    #[inline(always)]
+    fn run_from(
+        &mut self,
+        band: Band,
+        first: usize,
+        clock: Instant,
+        observer: &mut (impl Observer + ?Sized),
+    ) -> Option<usize> {
+        let Self { lines, activation } = self;
+        let (index, now) = lines.due(band, first, clock)?;
+        activation.begin(index as u8, now);
+        lines.start(index, activation, clock, observer);
+        lines.complete(index, activation, observer);
+        Some(index)
     }
 
     /// Lets the next due activation of this band read its inputs. What is published before [`finish`](Self::finish)
