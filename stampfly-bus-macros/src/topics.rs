@@ -536,8 +536,7 @@ fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool)
     let group = format_ident!("{name}");
     let members: Vec<_> = participants.iter().filter(|participant| participant.outside == outside).collect();
     let names: Vec<_> = members.iter().map(|participant| participant.name).collect();
-    let types =
-        members.iter().map(|participant| if outside { participant.ends() } else { participant.ports() });
+    let types = members.iter().map(|participant| if outside { participant.ends() } else { participant.ports() });
     let docs = names.iter().map(|name| match outside {
         true => format!("The ends of `{name}`."),
         false => format!("What the ends of `{name}` know."),

@@ -33,11 +33,7 @@ pub struct NewestPort<T> {
 impl<T: Message + Default> NewestPort<T> {
     #[inline(always)]
     pub fn __new() -> Self {
-        Self {
-            sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() },
-            is_new: false,
-            is_lent: false,
-        }
+        Self { sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() }, is_new: false, is_lent: false }
     }
 }
 

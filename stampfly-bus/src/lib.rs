@@ -44,6 +44,8 @@ mod sync;
 mod table;
 mod topic;
 
+#[doc(hidden)]
+pub use activation::__run;
 pub use activation::{Activation, ReadInputs, Runnable};
 #[cfg(feature = "async")]
 pub use bell::Bell;

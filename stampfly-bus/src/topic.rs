@@ -255,11 +255,7 @@ fn retry_at_head<const N: usize, const W: usize, V>(
 impl<'b, T, P, const N: usize, const W: usize> Subscriber<'b, T, P, N, W> {
     /// One that goes on where another was: that one's [`position`](Self::position).
     #[inline(always)]
-    pub(crate) const fn at(
-        ring: &'b Ring<N, W>,
-        shared: Option<&'b AtomicU32>,
-        (cursor, lost): (u32, u32),
-    ) -> Self {
+    pub(crate) const fn at(ring: &'b Ring<N, W>, shared: Option<&'b AtomicU32>, (cursor, lost): (u32, u32)) -> Self {
         Self { ring, shared, cursor, lost, kind: PhantomData }
     }
 
