@@ -216,7 +216,7 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
         let (name, runnable) = (&row.name, &row.runnable);
         // At the line's own name, so that a runnable with the ends of another is reported there.
         quote_spanned!(located(name) =>
-            ::stampfly_bus::__run::<#runnable>(&mut self.#name, activation, &mut ends.#name()))
+            ::stampfly_bus::__run::<#runnable, _>(&mut self.#name, activation, ends, |ends| ends.#name()))
     });
     let inputs = rows.iter().map(|row| {
         let runnable = &row.runnable;
