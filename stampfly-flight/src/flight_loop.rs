@@ -178,9 +178,9 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         observer: &mut (impl Observer + ?Sized),
     ) -> Option<usize> {
         let Self { lines, activation } = self;
-        let (index, now) = lines.due(band, first, clock)?;
+        let (index, now) = lines.start(band, first, clock)?;
         activation.begin(index as u8, now);
-        lines.start(index, activation, clock, observer);
+        lines.read(index, activation, observer);
         lines.complete(index, activation, observer);
         Some(index)
     }
@@ -193,9 +193,9 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         clock: Instant,
         observer: &mut (impl Observer + ?Sized),
     ) -> Option<Pending> {
-        let (index, now) = self.lines.due(band, 0, clock)?;
+        let (index, now) = self.lines.start(band, 0, clock)?;
         let mut activation = Activation::live(index as u8, now);
-        self.lines.start(index, &mut activation, clock, observer);
+        self.lines.read(index, &mut activation, observer);
         Some(Pending(activation))
     }
 
@@ -242,16 +242,15 @@ impl<R: Schedule> Lines<'_, R> {
         self.scheduler.due(band, first, clock, self.heads.as_ref())
     }
 
+    /// The first line from this one on that is due, which starts.
     #[inline]
-    fn start(
-        &mut self,
-        index: usize,
-        activation: &mut Activation,
-        clock: Instant,
-        observer: &mut (impl Observer + ?Sized),
-    ) {
+    fn start(&mut self, band: Band, first: usize, clock: Instant) -> Option<(usize, Instant)> {
+        self.scheduler.start(band, first, clock, self.heads.as_ref())
+    }
+
+    #[inline]
+    fn read(&mut self, index: usize, activation: &mut Activation, observer: &mut (impl Observer + ?Sized)) {
         observer.starts(index);
-        self.scheduler.started(index, activation.now(), clock, self.heads.as_ref());
         R::read(&mut self.ends, index, activation);
         observer.has_read(activation);
     }
