@@ -30,7 +30,7 @@ pub struct NewestPort<T> {
     is_lent: bool,
 }
 
-impl<T: Message + Default> NewestPort<T> {
+impl<T: Default> NewestPort<T> {
     #[inline(always)]
     pub fn __new() -> Self {
         Self { sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() }, is_new: false, is_lent: false }
@@ -45,10 +45,7 @@ pub struct NewestInput<'b, T, const N: usize, const W: usize> {
     lender: Option<&'b Stamped<T>>,
 }
 
-impl<'b, T, const N: usize, const W: usize> NewestInput<'b, T, N, W>
-where
-    T: Message<Words = [u32; W]> + Default,
-{
+impl<'b, T, const N: usize, const W: usize> NewestInput<'b, T, N, W> {
     #[doc(hidden)]
     #[inline(always)]
     pub fn __new(
@@ -58,7 +55,12 @@ where
     ) -> Self {
         Self { ring: topic.ring(), port, lender }
     }
+}
 
+impl<T, const N: usize, const W: usize> NewestInput<'_, T, N, W>
+where
+    T: Message<Words = [u32; W]> + Default,
+{
     #[inline(always)]
     const fn newest(&self) -> &Stamped<T> {
         match self.lender {
@@ -218,11 +220,7 @@ pub struct SamplesInput<'b, T, P, const N: usize, const W: usize> {
     kind: core::marker::PhantomData<fn() -> P>,
 }
 
-impl<'b, T, P, const N: usize, const W: usize> SamplesInput<'b, T, P, N, W>
-where
-    T: Message<Words = [u32; W]>,
-    P: Sequential,
-{
+impl<'b, T, P, const N: usize, const W: usize> SamplesInput<'b, T, P, N, W> {
     #[doc(hidden)]
     #[inline(always)]
     pub fn __new<const R: usize>(
@@ -232,7 +230,13 @@ where
     ) -> Self {
         Self { ring: topic.ring(), shared: topic.cursor(number), port, kind: core::marker::PhantomData }
     }
+}
 
+impl<T, P, const N: usize, const W: usize> SamplesInput<'_, T, P, N, W>
+where
+    T: Message<Words = [u32; W]>,
+    P: Sequential,
+{
     /// Samples this runnable has missed because they were overwritten before it was activated.
     #[must_use]
     pub fn lost(&self) -> u32 {

@@ -17,10 +17,7 @@ pub struct NewestOutput<'b, T, const N: usize, const W: usize> {
     newest: &'b mut Stamped<T>,
 }
 
-impl<'b, T, const N: usize, const W: usize> NewestOutput<'b, T, N, W>
-where
-    T: Message<Words = [u32; W]> + Default,
-{
+impl<'b, T, const N: usize, const W: usize> NewestOutput<'b, T, N, W> {
     #[doc(hidden)]
     #[inline(always)]
     pub fn __new(publisher: Publisher<'b, T, Latest, N, W, 0>, newest: &'b mut Stamped<T>) -> Self {
@@ -31,10 +28,18 @@ where
     #[doc(hidden)]
     #[inline(always)]
     #[must_use]
-    pub fn __place(_: &Topic<T, Latest, N, W, 0>) -> Stamped<T> {
+    pub fn __place(_: &Topic<T, Latest, N, W, 0>) -> Stamped<T>
+    where
+        T: Default,
+    {
         Stamped { at: Instant::ZERO, generation: 0, data: T::default() }
     }
+}
 
+impl<T, const N: usize, const W: usize> NewestOutput<'_, T, N, W>
+where
+    T: Message<Words = [u32; W]> + Default,
+{
     /// Publishes `data`, valid for the instant `at`. Returns its generation. Never waits, never fails.
     #[inline]
     pub fn publish(&mut self, at: Instant, data: &T) -> u32 {

@@ -61,17 +61,6 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     }
 
     #[inline(always)]
-    pub(crate) const fn ring(&self) -> &Ring<N, W> {
-        &self.ring
-    }
-
-    /// The cursor of this reader, if the writer must respect it.
-    #[inline(always)]
-    pub(crate) fn cursor(&self, reader: usize) -> Option<&AtomicU32> {
-        self.cursors.get(reader)
-    }
-
-    #[inline(always)]
     fn subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
         // A bus may have been in use before it was split: a reader starts with what is published from now on, or, where
         // nothing may be lost, with what was never taken.
@@ -100,6 +89,19 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     #[inline(always)]
     pub fn __subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
         self.subscriber(index)
+    }
+}
+
+impl<T, P, const N: usize, const W: usize, const R: usize> Topic<T, P, N, W, R> {
+    #[inline(always)]
+    pub(crate) const fn ring(&self) -> &Ring<N, W> {
+        &self.ring
+    }
+
+    /// The cursor of this reader, if the writer must respect it.
+    #[inline(always)]
+    pub(crate) fn cursor(&self, reader: usize) -> Option<&AtomicU32> {
+        self.cursors.get(reader)
     }
 }
 
