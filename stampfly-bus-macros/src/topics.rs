@@ -459,7 +459,9 @@ fn ends(participant: &Participant<'_>) -> TokenStream {
             #[inline(always)]
             #[allow(dead_code, reason = "a program may run some of its runnables only")]
             pub fn __look(&mut self, activation: &mut ::stampfly_bus::Activation) {
-                activation.__have_read([#(self.#inputs.__look()),*]);
+                if let Some([#(#inputs),*]) = activation.__places() {
+                    #(*#inputs = self.#inputs.__look();)*
+                }
             }
         }
 

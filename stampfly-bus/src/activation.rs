@@ -141,11 +141,11 @@ impl Activation {
         Some(input.unwrap_or_default())
     }
 
-    /// In flight: what all inputs have read.
+    /// In flight: where all inputs write down what they read.
     #[doc(hidden)]
     #[inline]
-    pub const fn __have_read<const N: usize>(&mut self, inputs: [InputRecord; N]) {
-        self.record.set_inputs(inputs);
+    pub const fn __places<const N: usize>(&mut self) -> Option<&mut [InputRecord; N]> {
+        self.record.places()
     }
 
     /// In flight: what an input has read.

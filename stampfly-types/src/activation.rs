@@ -104,14 +104,13 @@ impl ActivationRecord {
         Ok(())
     }
 
-    /// Sets all inputs at once, in the order of the topic table: what is known while compiling to fit needs no check.
+    /// Places for all inputs at once, in the order of the topic table, in place of what is there: what is known while compiling to fit
+    /// needs no check. They hold what an earlier activation has read until they are written. Always `Some`.
     #[inline]
-    pub const fn set_inputs<const N: usize>(&mut self, inputs: [InputRecord; N]) {
+    pub const fn places<const N: usize>(&mut self) -> Option<&mut [InputRecord; N]> {
         const { assert!(N <= MAX_INPUTS, "an activation has at most MAX_INPUTS inputs") };
-        if let Some(place) = self.inputs.first_chunk_mut() {
-            *place = inputs;
-            self.count = N as u8;
-        }
+        self.count = N as u8;
+        self.inputs.first_chunk_mut()
     }
 
     /// The inputs, in the order they were added.
@@ -146,7 +145,7 @@ mod tests {
         }
         let mut at_once = ActivationRecord::new(1, Instant::ZERO);
         at_once.push(InputRecord { generation: 7, taken: 7 }).expect("there is room");
-        at_once.set_inputs(inputs);
+        *at_once.places().expect("few enough") = inputs;
         assert_eq!(at_once, one_by_one);
     }
 
