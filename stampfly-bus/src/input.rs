@@ -17,6 +17,7 @@ use crate::ring::Ring;
 use crate::sync::AtomicU32;
 use crate::topic::{Latest, Sequential, Subscriber, Topic};
 use core::ops::Deref;
+use core::panic::UnwindSafe;
 use heapless::Vec;
 use stampfly_types::{Duration, InputRecord, Instant, Message, Stamped};
 
@@ -44,6 +45,9 @@ pub struct NewestInput<'b, T, const N: usize, const W: usize> {
     /// The newest sample of another runnable, where that one keeps it.
     lender: Option<&'b Stamped<T>>,
 }
+
+// The port is nobody else's, and after a panic as good as any: numbers, and a sample that was written as a whole.
+impl<T: UnwindSafe, const N: usize, const W: usize> UnwindSafe for NewestInput<'_, T, N, W> {}
 
 impl<'b, T, const N: usize, const W: usize> NewestInput<'b, T, N, W> {
     #[doc(hidden)]
@@ -219,6 +223,9 @@ pub struct SamplesInput<'b, T, P, const N: usize, const W: usize> {
     port: &'b mut SamplesPort<T, N>,
     kind: core::marker::PhantomData<fn() -> P>,
 }
+
+// As of the newest sample.
+impl<T: UnwindSafe, P, const N: usize, const W: usize> UnwindSafe for SamplesInput<'_, T, P, N, W> {}
 
 impl<'b, T, P, const N: usize, const W: usize> SamplesInput<'b, T, P, N, W> {
     #[doc(hidden)]

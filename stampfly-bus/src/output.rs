@@ -8,6 +8,7 @@
 //! [`Publisher`].
 
 use crate::topic::{Latest, Publisher, Topic};
+use core::panic::UnwindSafe;
 use stampfly_types::{Instant, Message, Stamped};
 
 /// The writing end of a topic whose newest sample other runnables read.
@@ -16,6 +17,9 @@ pub struct NewestOutput<'b, T, const N: usize, const W: usize> {
     publisher: Publisher<'b, T, Latest, N, W, 0>,
     newest: &'b mut Stamped<T>,
 }
+
+// The place is nobody else's while this end is there, and after a panic holds one sample or the other.
+impl<T: UnwindSafe, const N: usize, const W: usize> UnwindSafe for NewestOutput<'_, T, N, W> {}
 
 impl<'b, T, const N: usize, const W: usize> NewestOutput<'b, T, N, W> {
     #[doc(hidden)]
