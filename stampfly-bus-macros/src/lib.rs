@@ -11,9 +11,11 @@
 //! | `schedule` | the activation table: the same |
 //! | `root` | where the generated code finds the bus |
 
+mod ends;
 mod input;
 mod root;
 mod schedule;
+mod topic;
 mod topics;
 
 use proc_macro::TokenStream;

@@ -203,13 +203,20 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
         quote_spanned!(located(name) => #name: <#runnable>::new(config))
     });
     let places: Vec<_> = names.iter().map(|name| quote!(index if index == Id::#name as usize)).collect();
-    let reads =
-        // At the line's own name, so that a runnable with the ends of another is reported there.
-        names.iter().map(|name| quote_spanned!(located(name) => ::stampfly_bus::ReadInputs::read(&mut ends.#name, activation)));
+    let reads = names.iter().map(|name| {
+        quote_spanned!(located(name) => {
+            if activation.__looks() {
+                ends.#name().__look(activation);
+            } else {
+                ::stampfly_bus::ReadInputs::read(&mut ends.#name(), activation);
+            }
+        })
+    });
     let runs = rows.iter().map(|row| {
         let (name, runnable) = (&row.name, &row.runnable);
+        // At the line's own name, so that a runnable with the ends of another is reported there.
         quote_spanned!(located(name) =>
-            <#runnable as ::stampfly_bus::Runnable>::run(&mut self.#name, activation, &mut ends.#name))
+            ::stampfly_bus::__run::<#runnable, _>(&mut self.#name, activation, ends, |ends| ends.#name()))
     });
     let inputs = rows.iter().map(|row| {
         let runnable = &row.runnable;

@@ -1,45 +1,17 @@
 //! The topic table: its lines, the checks on them, and the code that follows.
 
-use crate::input::{Attributes, Error, Input, Result, once, type_name, whole_micros};
-use proc_macro2::{Delimiter, Ident, Literal, Span, TokenStream};
-use quote::{format_ident, quote, quote_spanned};
-
-/// How a topic keeps its samples.
-enum Policy {
-    Latest,
-    Ring(TokenStream),
-    Queue(TokenStream),
-}
-
-/// One line of the table.
-struct Topic {
-    attributes: Attributes,
-    name: Ident,
-    message: TokenStream,
-    policy: Policy,
-    /// As written, for people.
-    rate: String,
-    /// Microseconds between two samples; `None` when they come on events.
-    period: Option<u64>,
-    publisher: Ident,
-    readers: Vec<Ident>,
-}
-
-/// Somebody who publishes or reads.
-struct Participant<'t> {
-    name: &'t Ident,
-    outside: bool,
-    publishes: Vec<&'t Topic>,
-    /// The topic, and which of its readers this one is.
-    reads: Vec<(&'t Topic, usize)>,
-}
+use crate::ends::{aliases, ends, group, members, new_ends, new_ports, ports};
+use crate::input::{Error, Input, Result, once, whole_micros};
+use crate::topic::{Participant, Policy, Topic, doc_or};
+use proc_macro2::{Delimiter, Ident, TokenStream};
+use quote::{quote, quote_spanned};
 
 pub fn expand(table: TokenStream) -> Result<TokenStream> {
     let mut input = Input::new(table);
     let outside = outside(&mut input)?;
     let mut topics = Vec::new();
     while !input.is_empty() {
-        topics.push(topic(&mut input)?);
+        topics.push(topic(&mut input, &outside)?);
     }
     if topics.is_empty() {
         return Err(input.error("a topic table has at least one topic"));
@@ -61,7 +33,7 @@ fn outside(input: &mut Input) -> Result<Vec<Ident>> {
 }
 
 /// `/// What it is.` `name: Message = policy @ rate from publisher => [readers];`
-fn topic(input: &mut Input) -> Result<Topic> {
+fn topic(input: &mut Input, outside: &[Ident]) -> Result<Topic> {
     let attributes = input.attributes()?;
     let name = input.name("a topic's name")?;
     input.mark(':')?;
@@ -81,7 +53,9 @@ fn topic(input: &mut Input) -> Result<Topic> {
     if let Some(reader) = readers.iter().find(|reader| **reader == publisher) {
         return Err(Error::new(reader.span(), format!("`{reader}` publishes this topic: it knows what it published")));
     }
-    Ok(Topic { attributes, name, message, policy, rate, period, publisher, readers })
+    let is_runnable = |name: &Ident| !outside.contains(name);
+    let within = matches!(policy, Policy::Latest) && is_runnable(&publisher) && readers.iter().any(is_runnable);
+    Ok(Topic { attributes, name, message, policy, rate, period, publisher, readers, within })
 }
 
 fn policy(input: &mut Input) -> Result<Policy> {
@@ -154,84 +128,16 @@ fn participants<'t>(topics: &'t [Topic], outside: &'t [Ident]) -> Result<Vec<Par
     }
 }
 
-fn doc_or(doc: &[Literal], otherwise: &str) -> TokenStream {
-    if doc.is_empty() { quote!(#[doc = #otherwise]) } else { quote!(#(#[doc = #doc])*) }
-}
-
-impl Topic {
-    fn policy_type(&self) -> TokenStream {
-        match self.policy {
-            Policy::Latest => quote!(::stampfly_bus::Latest),
-            Policy::Ring(_) => quote!(::stampfly_bus::Every),
-            Policy::Queue(_) => quote!(::stampfly_bus::Lossless),
-        }
-    }
-
-    fn policy_name(&self) -> &'static str {
-        match self.policy {
-            Policy::Latest => "latest",
-            Policy::Ring(_) => "ring",
-            Policy::Queue(_) => "queue",
-        }
-    }
-
-    fn depth(&self) -> TokenStream {
-        match &self.policy {
-            Policy::Latest => quote!(::stampfly_bus::LATEST_DEPTH),
-            Policy::Ring(depth) | Policy::Queue(depth) => depth.clone(),
-        }
-    }
-
-    /// Readers whose cursors the publisher must respect.
-    fn required(&self) -> usize {
-        if matches!(self.policy, Policy::Queue(_)) { self.readers.len() } else { 0 }
-    }
-
-    /// The message, at its own place in the source: what is wrong with it is reported there.
-    fn words(&self) -> TokenStream {
-        let message = &self.message;
-        let at = message.clone().into_iter().next().map_or_else(Span::call_site, |token| token.span());
-        quote_spanned!(at => { <#message as ::stampfly_bus::Message>::WORDS })
-    }
-
-    fn publisher_type(&self) -> TokenStream {
-        let (message, policy, depth, words, required) =
-            (&self.message, self.policy_type(), self.depth(), self.words(), self.required());
-        quote!(::stampfly_bus::Publisher<'b, #message, #policy, { #depth }, #words, #required>)
-    }
-
-    fn subscriber_type(&self) -> TokenStream {
-        let (message, policy, depth, words) = (&self.message, self.policy_type(), self.depth(), self.words());
-        quote!(::stampfly_bus::Subscriber<'b, #message, #policy, { #depth }, #words>)
-    }
-
-    /// What a runnable reads from: the newest sample, or every one since its last activation.
-    fn input_type(&self) -> TokenStream {
-        let (message, policy, depth, words) = (&self.message, self.policy_type(), self.depth(), self.words());
-        match self.policy {
-            Policy::Latest => quote!(::stampfly_bus::NewestInput<'b, #message, { #depth }, #words>),
-            Policy::Ring(_) | Policy::Queue(_) => {
-                quote!(::stampfly_bus::SamplesInput<'b, #message, #policy, { #depth }, #words>)
-            }
-        }
-    }
-}
-
-impl Participant<'_> {
-    fn ends(&self) -> Ident {
-        type_name(self.name, "Ends")
-    }
-}
-
 fn generate(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
     let table = table(topics, participants);
     let bus = bus(topics, participants);
     let ends = participants.iter().map(|participant| ends(participant));
+    let ports = participants.iter().filter(|participant| !participant.outside).map(ports);
     let aliases = topics.iter().map(aliases);
     let depths = topics.iter().filter_map(depth_limits);
     let runnables = group("Ends", "The ends of every runnable.", participants, false);
     let outside = group("Outside", "The ends of everybody outside: drivers, links, motors.", participants, true);
-    quote!(#table #bus #(#ends)* #runnables #outside #(#aliases)* #(#depths)*)
+    quote!(#table #bus #(#ends)* #(#ports)* #runnables #outside #(#aliases)* #(#depths)*)
 }
 
 /// Fails to compile, at the depth, when a ring cannot have it.
@@ -313,29 +219,9 @@ fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
         let (message, depth, words) = (&topic.message, topic.depth(), topic.words());
         quote!(::stampfly_bus::Tap<'b, #message, { #depth }, #words>)
     });
-    let new_ends = |outside: bool| {
-        let of = participants.iter().filter(move |participant| participant.outside == outside);
-        let made = of.map(|participant| {
-            let (name, ends) = (participant.name, participant.ends());
-            let publishes = participant.publishes.iter().map(|topic| {
-                let name = &topic.name;
-                quote!(#name: bus.#name.__publisher(hook, Id::#name as usize))
-            });
-            let reads = participant.reads.iter().map(|(topic, number)| {
-                let name = &topic.name;
-                let subscriber = quote!(bus.#name.__subscriber(#number));
-                match (outside, &topic.policy) {
-                    (true, _) => quote!(#name: #subscriber),
-                    (false, Policy::Latest) => quote!(#name: ::stampfly_bus::NewestInput::__new(#subscriber)),
-                    (false, _) => quote!(#name: ::stampfly_bus::SamplesInput::__new(#subscriber)),
-                }
-            });
-            quote!(#name: #ends { #(#publishes,)* #(#reads,)* })
-        });
-        let made: Vec<_> = made.collect();
-        if made.is_empty() { quote!(nobody: ::core::marker::PhantomData) } else { quote!(#(#made,)*) }
-    };
-    let (runnables, outside) = (new_ends(false), new_ends(true));
+    let (runnables, outside): (Vec<_>, Vec<_>) = participants.iter().partition(|participant| !participant.outside);
+    let runnables = members(runnables.iter().map(|participant| new_ports(participant)));
+    let outside = members(outside.iter().map(|participant| new_ends(participant)));
     quote! {
         /// Storage of every topic of one vehicle.
         pub struct Bus { #(#names: #storage),* }
@@ -390,111 +276,5 @@ fn bus(topics: &[Topic], participants: &[Participant<'_>]) -> TokenStream {
                 0 #(+ self.#names.lost())*
             }
         }
-    }
-}
-
-/// The ends of one participant.
-fn ends(participant: &Participant<'_>) -> TokenStream {
-    let Participant { name, outside, publishes, reads } = participant;
-    let ends = participant.ends();
-    let doc = format!("The ends of `{name}`.");
-    let publishers = publishes.iter().map(|topic| {
-        let (name, publisher) = (&topic.name, topic.publisher_type());
-        let doc = doc_or(&topic.attributes.doc, "A topic.");
-        quote!(#doc pub #name: #publisher)
-    });
-    let readers = reads.iter().map(|(topic, _)| {
-        let (name, reader) = (&topic.name, if *outside { topic.subscriber_type() } else { topic.input_type() });
-        let doc = doc_or(&topic.attributes.doc, "A topic.");
-        quote!(#doc pub #name: #reader)
-    });
-    let definition = quote! {
-        #[doc = #doc]
-        pub struct #ends<'b> { #(#publishers,)* #(#readers,)* }
-    };
-    if *outside {
-        return definition;
-    }
-    let inputs = reads.iter().map(|(topic, _)| &topic.name);
-    let (count, message) = (reads.len(), format!("`{name}` reads too many topics"));
-    let at = name.span();
-    let limit = quote_spanned!(at => const _: () = assert!(#count <= ::stampfly_bus::MAX_INPUTS, #message););
-    quote! {
-        #definition
-        #limit
-
-        impl ::stampfly_bus::ReadInputs for #ends<'_> {
-            const INPUTS: usize = #count;
-
-            #[inline]
-            fn read(&mut self, activation: &mut ::stampfly_bus::Activation) {
-                let _ = &activation;
-                #(self.#inputs.read(activation);)*
-            }
-        }
-    }
-}
-
-/// The ends of several participants.
-fn group(name: &str, doc: &str, participants: &[Participant<'_>], outside: bool) -> TokenStream {
-    let group = format_ident!("{name}");
-    let members: Vec<_> = participants.iter().filter(|participant| participant.outside == outside).collect();
-    let names: Vec<_> = members.iter().map(|participant| participant.name).collect();
-    let types = members.iter().map(|participant| participant.ends());
-    let docs = names.iter().map(|name| format!("The ends of `{name}`."));
-    let publishers = members.iter().flat_map(|participant| {
-        participant.publishes.iter().map(|topic| {
-            let (participant, topic) = (participant.name, &topic.name);
-            (quote!(topic if topic == Id::#topic as usize), quote!(self.#participant.#topic))
-        })
-    });
-    let (places, publishers): (Vec<_>, Vec<_>) = publishers.unzip();
-    // A group may be empty; it has the bus's lifetime all the same.
-    let nobody = members.is_empty().then(|| quote!(nobody: ::core::marker::PhantomData<&'b ()>));
-    quote! {
-        #[doc = #doc]
-        pub struct #group<'b> {
-            #(#[doc = #docs] pub #names: #types<'b>,)*
-            #nobody
-        }
-
-        impl ::stampfly_bus::PublishWords for #group<'_> {
-            fn publish_words(&mut self, topic: usize, at: ::stampfly_bus::Instant, words: &[u32]) -> Option<u32> {
-                let _ = (at, words);
-                match topic {
-                    #(#places => #publishers.publish_words(at, words),)*
-                    _ => None,
-                }
-            }
-
-            fn restore_words(
-                &mut self,
-                topic: usize,
-                at: ::stampfly_bus::Instant,
-                generation: u32,
-                words: &[u32],
-            ) -> Option<()> {
-                let _ = (at, generation, words);
-                match topic {
-                    #(#places => #publishers.restore_words(at, generation, words),)*
-                    _ => None,
-                }
-            }
-        }
-    }
-}
-
-/// Names for the types of a topic's ends, for those who store one.
-fn aliases(topic: &Topic) -> TokenStream {
-    let (tx, rx) = (type_name(&topic.name, "Tx"), type_name(&topic.name, "Rx"));
-    let (publisher, subscriber) = (topic.publisher_type(), topic.subscriber_type());
-    let name = &topic.name;
-    let docs = [format!("The writing end of `{name}`."), format!("A reading end of `{name}`, outside the runnables.")];
-    let [of_tx, of_rx] = docs;
-    quote! {
-        #[doc = #of_tx]
-        pub type #tx<'b> = #publisher;
-        #[doc = #of_rx]
-        pub type #rx<'b> = #subscriber;
     }
 }

@@ -5,52 +5,93 @@
 //! | `latest` | [`NewestInput`] | the newest sample, also when it is not new |
 //! | `ring(N)`, `queue(N)` | [`SamplesInput`] | every sample since its last activation, oldest first |
 //!
-//! Inputs read themselves when their runnable is activated, and keep the samples where the runnable looks at them: a
-//! sample is copied once, out of the ring, and not at all when it is the one that is there already. Outside the
-//! runnables, where nothing is activated, use a [`Subscriber`].
+//! Inputs read themselves when their runnable is activated. What comes from outside is copied once, out of the ring, and not at all
+//! when it is the sample that is there already. The newest sample of another runnable is not copied: it is looked at where
+//! its [output](crate::NewestOutput) keeps it, unless something may be published before the runnable runs. Such a sample waits
+//! for the next activation. Outside the runnables, where nothing is activated, use a [`Subscriber`].
+//!
+//! An input is made for an activation; what it has to know at the next one is in a port.
 
 use crate::activation::Activation;
-use crate::topic::{Latest, Sequential, Subscriber};
+use crate::ring::Ring;
+use crate::sync::AtomicU32;
+use crate::topic::{Latest, Sequential, Subscriber, Topic};
 use core::ops::Deref;
+use core::panic::UnwindSafe;
 use heapless::Vec;
-use stampfly_types::{Duration, Instant, Message, Stamped};
+use stampfly_types::{Duration, InputRecord, Instant, Message, Stamped};
+
+/// What a [`NewestInput`] knows from one activation to the next.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct NewestPort<T> {
+    /// The newest sample read. Of one that is lent, the generation alone.
+    sample: Stamped<T>,
+    is_new: bool,
+    is_lent: bool,
+}
+
+impl<T: Default> NewestPort<T> {
+    #[inline(always)]
+    pub fn __new() -> Self {
+        Self { sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() }, is_new: false, is_lent: false }
+    }
+}
 
 /// The newest sample of a topic.
 pub struct NewestInput<'b, T, const N: usize, const W: usize> {
-    end: Subscriber<'b, T, Latest, N, W>,
-    sample: Stamped<T>,
-    is_new: bool,
+    ring: &'b Ring<N, W>,
+    port: &'b mut NewestPort<T>,
+    /// The newest sample of another runnable, where that one keeps it.
+    lender: Option<&'b Stamped<T>>,
 }
 
-impl<'b, T, const N: usize, const W: usize> NewestInput<'b, T, N, W>
+// The port is nobody else's, and after a panic as good as any: numbers, and a sample that was written as a whole.
+impl<T: UnwindSafe, const N: usize, const W: usize> UnwindSafe for NewestInput<'_, T, N, W> {}
+
+impl<'b, T, const N: usize, const W: usize> NewestInput<'b, T, N, W> {
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __new(
+        topic: &'b Topic<T, Latest, N, W, 0>,
+        port: &'b mut NewestPort<T>,
+        lender: Option<&'b Stamped<T>>,
+    ) -> Self {
+        Self { ring: topic.ring(), port, lender }
+    }
+}
+
+impl<T, const N: usize, const W: usize> NewestInput<'_, T, N, W>
 where
     T: Message<Words = [u32; W]> + Default,
 {
-    #[doc(hidden)]
     #[inline(always)]
-    pub fn __new(end: Subscriber<'b, T, Latest, N, W>) -> Self {
-        Self { end, sample: Stamped { at: Instant::ZERO, generation: 0, data: T::default() }, is_new: false }
+    const fn newest(&self) -> &Stamped<T> {
+        match self.lender {
+            Some(newest) if self.port.is_lent => newest,
+            _ => &self.port.sample,
+        }
     }
 
     /// The newest message; the message's default before the first.
     #[inline]
     #[must_use]
     pub const fn get(&self) -> &T {
-        &self.sample.data
+        &self.newest().data
     }
 
     /// The newest sample; `None` before the first.
     #[inline]
     #[must_use]
     pub fn sample(&self) -> Option<&Stamped<T>> {
-        (self.sample.generation != 0).then_some(&self.sample)
+        (self.generation() != 0).then_some(self.newest())
     }
 
     /// Generation of the newest sample; zero before the first.
     #[inline]
     #[must_use]
     pub const fn generation(&self) -> u32 {
-        self.sample.generation
+        self.port.sample.generation
     }
 
     /// How old the newest sample is at `now`; `None` before the first.
@@ -71,75 +112,192 @@ where
     #[inline]
     #[must_use]
     pub const fn is_new(&self) -> bool {
-        self.is_new
+        self.port.is_new
     }
 
-    /// Reads, as part of an activation.
+    /// Reads, as part of an activation, what stays as it is until the next one.
     #[inline]
     pub fn read(&mut self, activation: &mut Activation) {
-        let recorded = activation.recorded();
-        let head = recorded.map_or_else(|| self.end.head(), |input| input.generation);
-        self.is_new = head != self.sample.generation;
-        if self.is_new {
-            let found = match recorded {
-                None => self.end.latest_into(&mut self.sample),
-                Some(input) => self.end.generation_into(input.generation, &mut self.sample),
-            };
-            if !found {
-                activation.misses();
+        let Some(input) = activation.recorded() else {
+            match self.lender {
+                Some(newest) => self.port.copy(newest),
+                None => self.port.read_bus(self.ring),
             }
+            activation.has_read(self.port.record());
+            return;
+        };
+        let is_held = !core::mem::take(&mut self.port.is_lent) || input.generation == 0;
+        self.port.is_new = input.generation != self.port.sample.generation;
+        if (self.port.is_new || !is_held)
+            && !end::<T, N, W>(self.ring).generation_into(input.generation, &mut self.port.sample)
+        {
+            activation.misses();
         }
-        if recorded.is_none() {
-            activation.has_read(self.sample.generation, u16::from(self.is_new));
+    }
+
+    /// In flight: looks at what another runnable has published, which that one may publish again; copies what comes from outside.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __look(&mut self) -> InputRecord {
+        match self.lender {
+            Some(newest) => self.port.borrow(newest),
+            None => self.port.read_bus(self.ring),
         }
+        self.port.record()
+    }
+}
+
+#[inline(always)]
+fn end<T, const N: usize, const W: usize>(ring: &Ring<N, W>) -> Subscriber<'_, T, Latest, N, W> {
+    Subscriber::at(ring, None, (0, 0))
+}
+
+impl<T> NewestPort<T> {
+    #[inline(always)]
+    fn read_bus<const N: usize, const W: usize>(&mut self, ring: &Ring<N, W>)
+    where
+        T: Message<Words = [u32; W]>,
+    {
+        self.is_new = ring.head() != self.sample.generation && self.take_newest(ring);
+    }
+
+    // Apart from asking whether there is one, as in a ring.
+    #[inline(never)]
+    fn take_newest<const N: usize, const W: usize>(&mut self, ring: &Ring<N, W>) -> bool
+    where
+        T: Message<Words = [u32; W]>,
+    {
+        end::<T, N, W>(ring).latest_into(&mut self.sample)
+    }
+
+    #[inline(always)]
+    fn borrow(&mut self, newest: &Stamped<T>) {
+        self.is_new = newest.generation != self.sample.generation;
+        self.sample.generation = newest.generation;
+        self.is_lent = true;
+    }
+
+    #[inline]
+    fn copy(&mut self, newest: &Stamped<T>)
+    where
+        T: Copy,
+    {
+        let was_lent = self.is_lent;
+        self.borrow(newest);
+        self.is_lent = false;
+        if self.is_new || was_lent {
+            self.sample = *newest;
+        }
+    }
+
+    #[inline(always)]
+    fn record(&self) -> InputRecord {
+        InputRecord { generation: self.sample.generation, taken: u16::from(self.is_new) }
+    }
+}
+
+/// What a [`SamplesInput`] knows from one activation to the next.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct SamplesPort<T, const N: usize> {
+    /// The reading end's cursor, and what it has lost.
+    position: (u32, u32),
+    samples: Vec<Stamped<T>, N>,
+}
+
+impl<T, const N: usize> SamplesPort<T, N> {
+    /// For the topic's reader of this number.
+    #[inline(always)]
+    pub fn __new<P, const W: usize, const R: usize>(topic: &Topic<T, P, N, W, R>, number: usize) -> Self
+    where
+        T: Message<Words = [u32; W]>,
+    {
+        Self { position: topic.__subscriber(number).position(), samples: Vec::new() }
     }
 }
 
 /// Every sample of a topic since the last activation, oldest first. A slice of [`Stamped`].
 pub struct SamplesInput<'b, T, P, const N: usize, const W: usize> {
-    end: Subscriber<'b, T, P, N, W>,
-    samples: Vec<Stamped<T>, N>,
+    ring: &'b Ring<N, W>,
+    shared: Option<&'b AtomicU32>,
+    port: &'b mut SamplesPort<T, N>,
+    kind: core::marker::PhantomData<fn() -> P>,
 }
 
-impl<'b, T, P, const N: usize, const W: usize> SamplesInput<'b, T, P, N, W>
+// As of the newest sample.
+impl<T: UnwindSafe, P, const N: usize, const W: usize> UnwindSafe for SamplesInput<'_, T, P, N, W> {}
+
+impl<'b, T, P, const N: usize, const W: usize> SamplesInput<'b, T, P, N, W> {
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __new<const R: usize>(
+        topic: &'b Topic<T, P, N, W, R>,
+        number: usize,
+        port: &'b mut SamplesPort<T, N>,
+    ) -> Self {
+        Self { ring: topic.ring(), shared: topic.cursor(number), port, kind: core::marker::PhantomData }
+    }
+}
+
+impl<T, P, const N: usize, const W: usize> SamplesInput<'_, T, P, N, W>
 where
     T: Message<Words = [u32; W]>,
     P: Sequential,
 {
-    #[doc(hidden)]
-    #[inline(always)]
-    pub fn __new(end: Subscriber<'b, T, P, N, W>) -> Self {
-        Self { end, samples: Vec::new() }
-    }
-
     /// Samples this runnable has missed because they were overwritten before it was activated.
     #[must_use]
     pub fn lost(&self) -> u32 {
-        self.end.lost()
+        self.port.position.1
     }
 
     /// Reads, as part of an activation. More samples than the topic's depth stay for the next one.
     #[inline]
     pub fn read(&mut self, activation: &mut Activation) {
-        self.samples.clear();
         let Some(input) = activation.recorded() else {
-            while !self.samples.is_full() {
-                let Some(sample) = self.end.next() else { break };
-                // There is room.
-                let _ = self.samples.push(sample);
-            }
-            activation.has_read(self.end.generation(), self.samples.len() as u16);
+            activation.has_read(self.__look());
             return;
         };
+        let port = &mut *self.port;
+        port.samples.clear();
+        let mut end = Subscriber::<T, P, N, W>::at(self.ring, self.shared, port.position);
         let mut generation = crate::ring::before(input.generation, input.taken);
         for _ in 0..input.taken {
             generation = crate::ring::next(generation);
-            match self.end.at_generation(generation) {
-                Some(sample) if self.samples.push(sample).is_ok() => {}
+            match end.at_generation(generation) {
+                Some(sample) if port.samples.push(sample).is_ok() => {}
                 _ => activation.misses(),
             }
         }
+        port.position = end.position();
     }
+
+    /// In flight: reads from the bus.
+    // Inlined without what is seldom done: most topics are slower than the runnables that read them.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn __look(&mut self) -> InputRecord {
+        let port = &mut *self.port;
+        port.samples.clear();
+        if self.ring.head() != port.position.0 {
+            take_new::<T, P, N, W>(self.ring, self.shared, port);
+        }
+        InputRecord { generation: port.position.0, taken: port.samples.len() as u16 }
+    }
+}
+
+#[inline(never)]
+fn take_new<T: Message<Words = [u32; W]>, P: Sequential, const N: usize, const W: usize>(
+    ring: &Ring<N, W>,
+    shared: Option<&AtomicU32>,
+    port: &mut SamplesPort<T, N>,
+) {
+    let mut end = Subscriber::<T, P, N, W>::at(ring, shared, port.position);
+    while !port.samples.is_full() {
+        let Some(sample) = end.next() else { break };
+        // There is room.
+        let _ = port.samples.push(sample);
+    }
+    port.position = end.position();
 }
 
 impl<T, P, const N: usize, const W: usize> Deref for SamplesInput<'_, T, P, N, W> {
@@ -147,6 +305,6 @@ impl<T, P, const N: usize, const W: usize> Deref for SamplesInput<'_, T, P, N, W
 
     #[inline]
     fn deref(&self) -> &[Stamped<T>] {
-        &self.samples
+        &self.port.samples
     }
 }

@@ -35,6 +35,7 @@ pub mod bell;
 mod input;
 mod line;
 mod macros;
+mod output;
 mod response;
 mod ring;
 mod schedule;
@@ -43,13 +44,18 @@ mod sync;
 mod table;
 mod topic;
 
+#[doc(hidden)]
+pub use activation::__run;
 pub use activation::{Activation, ReadInputs, Runnable};
 #[cfg(feature = "async")]
 pub use bell::Bell;
 /// Its vectors are in signatures here.
 pub use heapless;
 pub use input::{NewestInput, SamplesInput};
+#[doc(hidden)]
+pub use input::{NewestPort, SamplesPort};
 pub use line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
+pub use output::NewestOutput;
 pub use response::{JITTER, Unbounded, response_time};
 pub use schedule::Schedule;
 pub use scheduler::{ActivationState, Scheduler};

@@ -20,6 +20,14 @@ pub enum Trigger {
     After(usize),
 }
 
+impl Trigger {
+    /// The line that it follows.
+    #[inline]
+    pub(crate) const fn before(self) -> Option<usize> {
+        if let Self::After(before) = self { Some(before) } else { None }
+    }
+}
+
 /// Where a runnable runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]

@@ -19,13 +19,13 @@
 /// | `Bus` | the storage of every topic: a value; implements [`TopicTable`](crate::TopicTable) |
 /// | `Bus::split` | hands out every end once: `runnables`, `outside`, the log's `taps` |
 /// | `EstimationEnds<'b>` | the ends of participant `estimation`, one field per topic, named by topic |
-/// | `Ends<'b>`, `Outside<'b>` | the ends of all runnables, and of everybody outside |
+/// | `Ends<'b>`, `Outside<'b>` | the ends of all runnables, and of everybody outside; `Ends::estimation` makes those of a runnable for an activation |
 /// | `SensorImuTx<'b>`, `SensorImuRx<'b>` | names for the types of a topic's ends |
 /// | `TOPICS`, `Id`, `COUNT` | the table as data |
 ///
 /// A runnable reads through inputs ([`NewestInput`](crate::NewestInput), [`SamplesInput`](crate::SamplesInput)), a
-/// participant outside through a [`Subscriber`](crate::Subscriber); all publish through a
-/// [`Publisher`](crate::Publisher).
+/// participant outside through a [`Subscriber`](crate::Subscriber). All publish through a [`Publisher`](crate::Publisher), or
+/// through a [`NewestOutput`](crate::NewestOutput) with the same methods, where runnables read the newest sample of a runnable.
 ///
 /// ```
 /// mod topics {
@@ -52,7 +52,7 @@
 /// tof.sensor_tof.publish(Instant::from_micros(2_000), &TofData { distance: 0.4, valid: true, ..Default::default() });
 /// assert_eq!(display.sensor_tof.latest().unwrap().data.distance, 0.4);
 ///
-/// let ends = &mut runnables.estimation;
+/// let mut ends = runnables.estimation();
 /// ends.read(&mut Activation::live(0, Instant::from_micros(2_500)));
 /// assert_eq!(ends.sensor_imu.len(), 1);
 /// assert_eq!(ends.sensor_tof.get().distance, 0.4);

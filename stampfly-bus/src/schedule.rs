@@ -30,7 +30,7 @@ pub trait Schedule: Sized + 'static {
     /// What the scheduler keeps, at power-on.
     fn states(start: Instant) -> Self::States;
 
-    /// Copies the inputs of one runnable. A line that does not exist reads nothing.
+    /// Reads the inputs of one runnable. A line that does not exist reads nothing.
     fn read(ends: &mut <Self::Topics as TopicTable>::Ends<'_>, index: usize, activation: &mut Activation);
 
     /// Steps one runnable on the inputs it has read.

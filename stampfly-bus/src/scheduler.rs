@@ -34,6 +34,59 @@ impl ActivationState {
             _ => Some(self.ran + info.at_latest?),
         }
     }
+
+    /// How often it has finished, and with which `now`: what those that run after it have to know.
+    #[inline]
+    const fn ended(&self) -> (u32, Instant) {
+        (self.runs, self.last)
+    }
+
+    /// Its `now`, if it is due at `clock`. `before`: of the line that it runs after.
+    #[inline]
+    fn due(
+        &self,
+        info: &ActivationInfo,
+        before: Option<(u32, Instant)>,
+        clock: Instant,
+        heads: &[&dyn AnyTopic],
+    ) -> Option<Instant> {
+        let by_trigger = match info.trigger {
+            Trigger::On(topics) => {
+                let new = topics.iter().zip(&self.seen).filter_map(|(topic, seen)| {
+                    let topic = heads.get(*topic)?;
+                    (topic.head() != *seen).then(|| topic.newest_at()).flatten()
+                });
+                new.max()
+            }
+            Trigger::After(_) => before.filter(|(runs, _)| *runs != self.followed).map(|(_, last)| last),
+            Trigger::Every(_) => None,
+        };
+        // A deadline that has passed may have been later than the stamp that comes after it.
+        by_trigger
+            .map(|now| now.max(self.last))
+            .or_else(|| self.tick(info).filter(|tick| clock >= *tick).map(|tick| tick.max(self.last)))
+    }
+
+    /// It is about to read its inputs.
+    #[inline]
+    fn start(
+        &mut self,
+        info: &ActivationInfo,
+        before: Option<(u32, Instant)>,
+        now: Instant,
+        clock: Instant,
+        heads: &[&dyn AnyTopic],
+    ) {
+        if let Trigger::On(topics) = info.trigger {
+            for (topic, seen) in topics.iter().zip(&mut self.seen) {
+                *seen = heads.get(*topic).map_or(0, |topic| topic.head());
+            }
+        }
+        self.followed = before.map_or(self.followed, |(runs, _)| runs);
+        // A tick is on time by definition, so that ticks do not drift with an executor that is late.
+        self.ran = if self.tick(info) == Some(now) { now } else { clock };
+        self.last = now;
+    }
 }
 
 /// Decides which activation is due. Holds no clock and runs nothing: executors on a microcontroller, on a host and in a
@@ -66,11 +119,42 @@ impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
     #[must_use]
     pub fn due(&self, band: Band, first: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<(usize, Instant)> {
         let states = self.states.as_ref();
-        let lines = self.table.get(first..)?.iter().zip(states.get(first..)?);
-        (first..)
-            .zip(lines)
-            .filter(|(_, (info, _))| info.band == band)
-            .find_map(|(index, (info, state))| triggered(states, info, state, clock, heads).map(|now| (index, now)))
+        let mut index = first;
+        loop {
+            let (info, state) = (self.table.get(index)?, states.get(index)?);
+            if info.band == band {
+                let before = info.trigger.before().and_then(|before| states.get(before)).map(ActivationState::ended);
+                if let Some(now) = state.due(info, before, clock, heads) {
+                    return Some((index, now));
+                }
+            }
+            index += 1;
+        }
+    }
+
+    /// As [`due`](Self::due), and notes that this activation is about to read its inputs, as [`started`](Self::started) does.
+    #[inline]
+    pub fn start(
+        &mut self,
+        band: Band,
+        first: usize,
+        clock: Instant,
+        heads: &[&dyn AnyTopic],
+    ) -> Option<(usize, Instant)> {
+        let states = self.states.as_mut();
+        let mut index = first;
+        loop {
+            let info = self.table.get(index)?;
+            if info.band == band {
+                let before = info.trigger.before().and_then(|before| states.get(before)).map(ActivationState::ended);
+                let state = states.get_mut(index)?;
+                if let Some(now) = state.due(info, before, clock, heads) {
+                    state.start(info, before, now, clock, heads);
+                    return Some((index, now));
+                }
+            }
+            index += 1;
+        }
     }
 
     /// Notes that an activation is about to read its inputs, at `clock`.
@@ -78,20 +162,10 @@ impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
     pub fn started(&mut self, index: usize, now: Instant, clock: Instant, heads: &[&dyn AnyTopic]) {
         let states = self.states.as_mut();
         let Some(info) = self.table.get(index) else { return };
-        let runs_before = match info.trigger {
-            Trigger::After(before) => states.get(before).map(|state| state.runs),
-            _ => None,
-        };
-        let Some(state) = states.get_mut(index) else { return };
-        if let Trigger::On(topics) = info.trigger {
-            for (topic, seen) in topics.iter().zip(&mut state.seen) {
-                *seen = heads.get(*topic).map_or(0, |topic| topic.head());
-            }
+        let before = info.trigger.before().and_then(|before| states.get(before)).map(ActivationState::ended);
+        if let Some(state) = states.get_mut(index) {
+            state.start(info, before, now, clock, heads);
         }
-        state.followed = runs_before.unwrap_or(state.followed);
-        // A tick is on time by definition, so that ticks do not drift with an executor that is late.
-        state.ran = if state.tick(info) == Some(now) { now } else { clock };
-        state.last = now;
     }
 
     /// Notes that an activation has published: releases the ones that run after it.
@@ -107,30 +181,4 @@ impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
     pub fn next_tick(&self) -> Option<Instant> {
         self.table.iter().zip(self.states.as_ref()).filter_map(|(info, state)| state.tick(info)).min()
     }
-}
-
-/// The `now` of a line that is due at `clock`.
-#[inline]
-fn triggered(
-    states: &[ActivationState],
-    info: &ActivationInfo,
-    state: &ActivationState,
-    clock: Instant,
-    heads: &[&dyn AnyTopic],
-) -> Option<Instant> {
-    let by_trigger = match info.trigger {
-        Trigger::On(topics) => {
-            let new = topics.iter().zip(&state.seen).filter_map(|(topic, seen)| {
-                let topic = heads.get(*topic)?;
-                (topic.head() != *seen).then(|| topic.newest_at()).flatten()
-            });
-            new.max()
-        }
-        Trigger::After(before) => states.get(before).filter(|before| before.runs != state.followed).map(|b| b.last),
-        Trigger::Every(_) => None,
-    };
-    // A deadline that has passed may have been later than the stamp that comes after it.
-    by_trigger
-        .map(|now| now.max(state.last))
-        .or_else(|| state.tick(info).filter(|tick| clock >= *tick).map(|tick| tick.max(state.last)))
 }

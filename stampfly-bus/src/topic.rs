@@ -64,7 +64,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     fn subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
         // A bus may have been in use before it was split: a reader starts with what is published from now on, or, where
         // nothing may be lost, with what was never taken.
-        let shared = self.cursors.get(index);
+        let shared = self.cursor(index);
         let cursor = shared.map_or_else(|| self.ring.head(), |cursor| cursor.load(Ordering::Relaxed));
         Subscriber { ring: &self.ring, shared, cursor, lost: 0, kind: PhantomData }
     }
@@ -89,6 +89,19 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
     #[inline(always)]
     pub fn __subscriber(&self, index: usize) -> Subscriber<'_, T, P, N, W> {
         self.subscriber(index)
+    }
+}
+
+impl<T, P, const N: usize, const W: usize, const R: usize> Topic<T, P, N, W, R> {
+    #[inline(always)]
+    pub(crate) const fn ring(&self) -> &Ring<N, W> {
+        &self.ring
+    }
+
+    /// The cursor of this reader, if the writer must respect it.
+    #[inline(always)]
+    pub(crate) fn cursor(&self, reader: usize) -> Option<&AtomicU32> {
+        self.cursors.get(reader)
     }
 }
 
@@ -145,7 +158,7 @@ pub struct Publisher<'b, T, P, const N: usize, const W: usize, const R: usize> {
 
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: usize> Publisher<'_, T, P, N, W, R> {
     #[inline]
-    fn write(&mut self, at: Instant, words: &[u32; W]) -> u32 {
+    pub(crate) fn write(&mut self, at: Instant, words: &[u32; W]) -> u32 {
         self.newest = self.topic.ring.write(self.newest, at, words);
         if let Some((hook, index)) = self.hook {
             hook(index);
@@ -155,7 +168,7 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize, const R: u
 
     /// Generation of the newest sample, zero before the first.
     #[must_use]
-    pub fn generation(&self) -> u32 {
+    pub const fn generation(&self) -> u32 {
         self.newest
     }
 
@@ -241,6 +254,20 @@ fn retry_at_head<const N: usize, const W: usize, V>(
     }
 }
 
+impl<'b, T, P, const N: usize, const W: usize> Subscriber<'b, T, P, N, W> {
+    /// One that goes on where another was: that one's [`position`](Self::position).
+    #[inline(always)]
+    pub(crate) const fn at(ring: &'b Ring<N, W>, shared: Option<&'b AtomicU32>, (cursor, lost): (u32, u32)) -> Self {
+        Self { ring, shared, cursor, lost, kind: PhantomData }
+    }
+
+    /// Its cursor, and how much it has lost.
+    #[inline(always)]
+    pub(crate) const fn position(&self) -> (u32, u32) {
+        (self.cursor, self.lost)
+    }
+}
+
 impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber<'_, T, P, N, W> {
     /// The newest sample, read or not; `None` before the first.
     #[inline]
@@ -252,12 +279,6 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     pub fn at_generation(&mut self, generation: u32) -> Option<Stamped<T>> {
         let copied = self.copied_at(generation)?;
         stamped((generation, copied))
-    }
-
-    /// Newest generation of the topic, read or not; zero before the first.
-    #[inline]
-    pub(crate) fn head(&self) -> u32 {
-        self.ring.head()
     }
 
     /// Copies the newest sample to where it is looked at. `false` before the first.
@@ -297,12 +318,14 @@ impl<T: Message<Words = [u32; W]>, P, const N: usize, const W: usize> Subscriber
     }
 
     /// Has anything been published since the last read?
+    #[inline]
     #[must_use]
     pub fn has_new(&self) -> bool {
         self.ring.head() != self.cursor
     }
 
     /// Generation of the last sample read, zero before the first.
+    #[inline]
     #[must_use]
     pub fn generation(&self) -> u32 {
         self.cursor

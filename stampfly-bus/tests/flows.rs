@@ -4,10 +4,11 @@
 
 use proptest::prelude::*;
 use stampfly_bus::{
-    Activation, AnyTopic, Band, PublishWords, Runnable, Schedule, Scheduler, Split, Stamped, Taps, TopicTable, schedule,
+    Activation, AnyTopic, Band, Message, PublishWords, ReadInputs, Runnable, Schedule, Scheduler, Split, Stamped, Taps,
+    TopicTable, schedule,
 };
 use stampfly_types::messages::{ControlOutput, GuidedCommand, GuidedKind, ImuData, StateEstimate};
-use stampfly_types::{Duration, Instant};
+use stampfly_types::{ActivationRecord, Duration, InputRecord, Instant, Quat};
 
 /// A vehicle small enough to reason about.
 mod topics {
@@ -200,7 +201,7 @@ fn a_slow_reader_counts_what_it_missed() {
         rig.imu.publish(Instant::from_micros(k), &ImuData::default());
     }
     rig.run_due(Instant::from_micros(21));
-    assert_eq!(rig.ends.estimation.sensor_imu.lost(), 12);
+    assert_eq!(rig.ends.estimation().sensor_imu.lost(), 12);
     assert_eq!(rig.trace[0].record().inputs()[0].taken, 8);
     assert_eq!(rig.taps.lost(), 12);
 }
@@ -246,6 +247,79 @@ fn what_has_been_read_is_not_copied_again() {
     assert_eq!((inputs[1].generation, inputs[1].taken), (1, 0), "held, not taken again");
 }
 
+/// What control holds of the estimate after it has read in flight, and what it wrote down.
+fn control_reads(ends: &mut topics::Ends<'_>) -> (Option<Stamped<StateEstimate>>, bool, InputRecord) {
+    let mut activation = Activation::live(Id::control as u8, Instant::ZERO);
+    Runnables::read(ends, Id::control as usize, &mut activation);
+    let estimate = ends.control().estimate;
+    (estimate.sample().copied(), estimate.is_new(), activation.record().inputs()[1])
+}
+
+#[test]
+fn what_a_runnable_hands_over_is_what_the_bus_holds() {
+    let mut bus = topics::Bus::new();
+    let mut ends = bus.split(None).runnables;
+    assert_eq!(control_reads(&mut ends), (None, false, InputRecord { generation: 0, taken: 0 }));
+    for generation in 1..=20 {
+        let estimate = StateEstimate { height: generation as f32, ..Default::default() };
+        ends.estimation().estimate.publish(Instant::from_millis(generation), &estimate);
+        let (handed_over, is_new, record) = control_reads(&mut ends);
+        let mut replayed = ActivationRecord::new(Id::telemetry as u8, Instant::ZERO);
+        replayed.push(record).expect("room");
+        let mut telemetry = ends.telemetry();
+        telemetry.read(&mut Activation::replay(replayed));
+        assert_eq!(handed_over.as_ref(), telemetry.estimate.sample());
+        assert_eq!(handed_over.map(|sample| sample.data), Some(estimate));
+        assert!(is_new);
+        assert_eq!(record, InputRecord { generation: generation as u32, taken: 1 });
+    }
+    assert_eq!(control_reads(&mut ends).2, InputRecord { generation: 20, taken: 0 }, "nothing new");
+}
+
+#[test]
+fn what_is_published_after_reading_belongs_to_the_next_activation() {
+    let mut bus = topics::Bus::new();
+    let mut ends = bus.split(None).runnables;
+    ends.estimation().estimate.publish(Instant::ZERO, &StateEstimate { height: 1.0, ..Default::default() });
+    control_reads(&mut ends);
+    ends.estimation().estimate.publish(Instant::ZERO, &StateEstimate { height: 2.0, ..Default::default() });
+    assert_eq!(ends.control().estimate.get().height, 1.0);
+}
+
+#[test]
+fn a_restored_topic_is_handed_over_and_so_is_one_published_as_words() {
+    let mut bus = topics::Bus::new();
+    let mut ends = bus.split(None).runnables;
+    let (place, at) = (topics::Id::estimate as usize, Instant::from_micros(7));
+    let words = |height| StateEstimate { height, ..Default::default() }.to_words();
+    assert_eq!(ends.restore_words(place, at, 41, &[1, 2]), None, "no such words");
+    ends.restore_words(place, at, 41, &words(1.5)).expect("restored");
+    let (restored, _, record) = control_reads(&mut ends);
+    assert_eq!(restored, Some(stamped(at, 41, StateEstimate { height: 1.5, ..Default::default() })));
+    assert_eq!(record, InputRecord { generation: 41, taken: 1 });
+    assert_eq!(ends.publish_words(place, at, &words(2.5)), Some(42));
+    assert_eq!(control_reads(&mut ends).0.map(|sample| (sample.generation, sample.data.height)), Some((42, 2.5)));
+}
+
+/// An attitude whose length is not one is refused by whoever reads it, and the sample before stays. The record says so, so that a
+/// replay sees the same.
+#[test]
+fn what_cannot_be_read_is_as_if_it_had_not_come() {
+    let mut bus = topics::Bus::new();
+    let mut ends = bus.split(None).runnables;
+    ends.estimation().estimate.publish(Instant::ZERO, &StateEstimate::default());
+    let (before, ..) = control_reads(&mut ends);
+    ends.telemetry().read(&mut Activation::live(Id::telemetry as u8, Instant::ZERO));
+    let broken = StateEstimate { attitude: Quat::new_unchecked(3.0, 0.0, 0.0, 0.0), ..Default::default() };
+    ends.estimation().estimate.publish(Instant::ZERO, &broken);
+    assert_eq!(control_reads(&mut ends), (before, false, InputRecord { generation: 1, taken: 0 }));
+    let mut alone = Activation::live(Id::telemetry as u8, Instant::ZERO);
+    let mut telemetry = ends.telemetry();
+    telemetry.read(&mut alone);
+    assert_eq!((telemetry.estimate.sample(), telemetry.estimate.is_new()), (before.as_ref(), false));
+    assert_eq!(alone.record().inputs(), [InputRecord { generation: 1, taken: 0 }]);
+}
+
 /// A sample as a reader gets it, for a topic's own type.
 fn stamped<T>(at: Instant, generation: u32, data: T) -> Stamped<T> {
     Stamped { at, generation, data }
@@ -253,7 +327,6 @@ fn stamped<T>(at: Instant, generation: u32, data: T) -> Stamped<T> {
 
 #[test]
 fn a_restored_topic_goes_on_where_it_was() {
-    use stampfly_types::Message;
     let mut bus = topics::Bus::new();
     let Split { mut outside, mut taps, .. } = bus.split(None);
     let sample = ImuData { temperature: 21.0, ..Default::default() };
@@ -276,6 +349,43 @@ fn a_restored_topic_goes_on_where_it_was() {
 }
 
 proptest! {
+    /// An input that looks at a sample where it is, one that copies it and one in a replay see the same, and write down the same.
+    #[test]
+    fn every_way_of_reading_sees_the_same(steps in prop::collection::vec((any::<bool>(), 0u8..3), 1..60)) {
+        let mut bus = topics::Bus::new();
+        let mut ends = bus.split(None).runnables;
+        let (mut published, mut seen) = (0, 0);
+        for (publishes, way) in steps {
+            if publishes {
+                published += 1;
+                let estimate = StateEstimate { height: published as f32, ..Default::default() };
+                ends.estimation().estimate.publish(Instant::from_micros(published.into()), &estimate);
+            }
+            let expected = InputRecord { generation: published, taken: u16::from(published != seen) };
+            seen = published;
+            let mut activation = Activation::live(Id::control as u8, Instant::ZERO);
+            match way {
+                0 => {}
+                1 => activation.begin(Id::control as u8, Instant::ZERO),
+                _ => {
+                    let mut record = *activation.record();
+                    record.push(InputRecord::default()).expect("room");
+                    record.push(expected).expect("room");
+                    activation = Activation::replay(record);
+                }
+            }
+            Runnables::read(&mut ends, Id::control as usize, &mut activation);
+            prop_assert!(!activation.is_missing_input());
+            prop_assert_eq!(activation.record().inputs()[1], expected);
+            let estimate = ends.control().estimate;
+            let sample = estimate.sample().map(|sample| (sample.at, sample.generation, sample.data.height));
+            let newest = (Instant::from_micros(published.into()), published, published as f32);
+            prop_assert_eq!(sample, (published != 0).then_some(newest));
+            prop_assert_eq!(estimate.is_new(), expected.taken == 1);
+            prop_assert_eq!(estimate.get().height, published as f32);
+        }
+    }
+
     /// Record a run with random traffic and random slowness, then repeat it from inputs and trace alone.
     #[test]
     fn a_trace_replays_bit_for_bit(steps in prop::collection::vec((0u8..4, 0u64..30_000, any::<f32>()), 1..200)) {

@@ -6,6 +6,7 @@
 //! lets the next take-off start with the right thrust.
 
 use stampfly_types::GRAVITY;
+use stampfly_types::math::larger;
 
 use crate::airframe::Airframe;
 use crate::bound::{possible_thrust, symmetric, within};
@@ -138,10 +139,10 @@ impl AltitudeController {
             self.learn(dt);
         }
         let wanted = self.hover_thrust * (1.0 - (climb.acceleration + feedback) * (1.0 / GRAVITY))
-            / climb.cos_tilt.max(Self::COS_TILT_MIN);
+            / larger(climb.cos_tilt, Self::COS_TILT_MIN);
         // Upside down, thrust only pushes into the ground.
         let wanted = if climb.cos_tilt > 0.0 { wanted } else { 0.0 };
-        self.limit(wanted.max(self.config.thrust_min_share * self.hover_thrust), limits)
+        self.limit(larger(wanted, self.config.thrust_min_share * self.hover_thrust), limits)
     }
 
     /// Collective thrust, N, to come down slowly without knowing height or speed.

@@ -8,6 +8,7 @@
 
 use crate::intent::{Heading, Horizontal, Intent};
 use stampfly_types::Vec3;
+use stampfly_types::math::smaller;
 
 /// A rate that a stick asks for, rad/s; below this it is as well noise.
 const ASKED: f32 = 0.3;
@@ -30,7 +31,7 @@ impl Answer {
     #[inline]
     pub(crate) fn step(&mut self, intent: &Intent, target: &Vec3, rate: &Vec3, trim: f32, dt: f32) -> [bool; 3] {
         // A division for each step would be dearer than the rest.
-        self.rate += (rate - self.rate) * (dt * (1.0 / SMOOTHING)).min(1.0);
+        self.rate += (rate - self.rate) * smaller(dt * (1.0 / SMOOTHING), 1.0);
         let tilt = if matches!(intent.horizontal, Horizontal::Rates { .. }) { ASKED } else { trim };
         let yaw = if matches!(intent.heading, Heading::Stick(_)) { ASKED } else { f32::MAX };
         [(target.x, self.rate.x, tilt), (target.y, self.rate.y, tilt), (target.z, self.rate.z, yaw)]

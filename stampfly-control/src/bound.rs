@@ -4,6 +4,8 @@
 //! somebody may have set wrongly. These keep the value instead: a wrong bound is then no bound. They are also a few
 //! instructions shorter, because they leave NaN as it is for the caller to catch.
 
+use stampfly_types::math::{larger, smaller};
+
 /// The value, at least `low` and at most `high`. One comparison after the other, as vectors have them: of a value and a bound.
 #[inline]
 pub(crate) fn within(value: f32, low: f32, high: f32) -> f32 {
@@ -21,7 +23,7 @@ pub(crate) fn symmetric(value: f32, limit: f32) -> f32 {
 /// number limits nothing, because `min` takes the other one.
 #[inline]
 pub(crate) fn possible_thrust(thrust: f32, max: f32, ceiling: f32, hover: f32) -> f32 {
-    let limit = max.min(ceiling * hover).max(0.0);
+    let limit = larger(smaller(max, ceiling * hover), 0.0);
     if thrust.is_finite() { within(thrust, 0.0, limit) } else { 0.0 }
 }
 

@@ -208,11 +208,11 @@ impl<R> CascadeController<R> {
         let ahead = path.acceleration;
         let demand = self.position.step(&error, &path.velocity, &ahead, &estimate.velocity, dt, intent.grounded);
         // Thrust has to carry the weight as well: the axis is the direction of g − a.
-        let carried = (GRAVITY - ahead.z).max(0.5 * GRAVITY);
+        let carried = math::larger(GRAVITY - ahead.z, 0.5 * GRAVITY);
         let per_weight = 1.0 / carried;
         let (mut x, mut y) = (demand.x * per_weight, demand.y * per_weight);
         let slope_squared = x * x + y * y;
-        let tan_max = self.tan_tilt_max.min(intent.tan_tilt_max);
+        let tan_max = math::smaller(self.tan_tilt_max, intent.tan_tilt_max);
         if slope_squared > tan_max * tan_max {
             let shorten = tan_max / math::sqrt(slope_squared);
             (x, y) = (x * shorten, y * shorten);

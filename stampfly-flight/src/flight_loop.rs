@@ -64,6 +64,13 @@ pub struct Pending(Activation);
 ///
 /// Large: borrow it where the stack is small.
 pub struct FlightLoop<'b, R: Schedule> {
+    lines: Lines<'b, R>,
+    /// Of the band that runs: to make a new one takes longer than many a runnable.
+    activation: Activation,
+}
+
+/// The lines of the activation table: what runs, on what, when.
+struct Lines<'b, R: Schedule> {
     runnables: R,
     ends: <R::Topics as TopicTable>::Ends<'b>,
     scheduler: Scheduler<R::States>,
@@ -99,7 +106,8 @@ impl<'b, R: Schedule> Assembled<'b, R> {
     pub fn new(bus: &'b mut R::Topics, hook: Option<Hook>, config: &R::Config, start: Instant) -> Self {
         let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
         let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
-        Self { flight_loop: FlightLoop { runnables: R::new(config), ends, scheduler, heads }, outside, taps }
+        let lines = Lines { runnables: R::new(config), ends, scheduler, heads };
+        Self { flight_loop: FlightLoop { lines, activation: Activation::live(0, start) }, outside, taps }
     }
 
     /// As [`new`](Self::new), for a stack that has no room for a copy of the flight loop: it is made in `slot`.
@@ -114,7 +122,10 @@ impl<'b, R: Schedule> Assembled<'b, R> {
     ) -> InPlace<'b, R> {
         let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
         let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
-        let flight_loop = slot.write(FlightLoop { runnables: R::new(config), ends, scheduler, heads });
+        let flight_loop = slot.write(FlightLoop {
+            lines: Lines { runnables: R::new(config), ends, scheduler, heads },
+            activation: Activation::live(0, start),
+        });
         InPlace { flight_loop, outside, taps }
     }
 }
@@ -123,48 +134,123 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     /// The runnables: the state of the vehicle.
     #[must_use]
     pub const fn runnables(&self) -> &R {
-        &self.runnables
+        &self.lines.runnables
     }
 
     /// Puts another state in the place of the present one, as a key frame does.
     pub fn set_runnables(&mut self, runnables: R) {
-        self.runnables = runnables;
+        self.lines.runnables = runnables;
     }
 
     /// Every topic without its type, in the table's order.
     #[must_use]
     pub fn heads(&self) -> &[&'b dyn AnyTopic] {
-        self.heads.as_ref()
+        self.lines.heads.as_ref()
     }
 
     /// Is anything due in this band?
     #[must_use]
     pub fn is_due(&self, band: Band, clock: Instant) -> bool {
-        self.scheduler.due(band, 0, clock, self.heads.as_ref()).is_some()
+        self.lines.due(band, 0, clock).is_some()
     }
 
     /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
     pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
         let mut next = 0;
-        while let Some((index, now)) = self.scheduler.due(band, next, clock, self.heads.as_ref()) {
-            let mut activation = Activation::live(index as u8, now);
-            self.start(index, &mut activation, clock, observer);
-            self.complete(index, &mut activation, observer);
+        while let Some(index) = self.run_from(band, next, clock, observer) {
             next = index + 1;
         }
         next > 0
     }
 
-    #[inline]
-    fn start(
+    /// Runs the first line of this band that is due. Returns whether there was one.
+    pub fn run_next(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
+        self.run_from(band, 0, clock, observer).is_some()
+    }
+
+    /// Runs the first line that is due from this one on.
+    #[inline(always)]
+    fn run_from(
         &mut self,
-        index: usize,
-        activation: &mut Activation,
+        band: Band,
+        first: usize,
         clock: Instant,
         observer: &mut (impl Observer + ?Sized),
-    ) {
+    ) -> Option<usize> {
+        let Self { lines, activation } = self;
+        let (index, now) = lines.start(band, first, clock)?;
+        activation.begin(index as u8, now);
+        lines.read(index, activation, observer);
+        lines.complete(index, activation, observer);
+        Some(index)
+    }
+
+    /// Lets the next due activation of this band read its inputs. What is published before [`finish`](Self::finish)
+    /// belongs to its next activation, as if it had been interrupted.
+    pub fn start_next(
+        &mut self,
+        band: Band,
+        clock: Instant,
+        observer: &mut (impl Observer + ?Sized),
+    ) -> Option<Pending> {
+        let (index, now) = self.lines.start(band, 0, clock)?;
+        let mut activation = Activation::live(index as u8, now);
+        self.lines.read(index, &mut activation, observer);
+        Some(Pending(activation))
+    }
+
+    /// Runs what has read its inputs.
+    pub fn finish(&mut self, Pending(mut activation): Pending, observer: &mut (impl Observer + ?Sized)) {
+        self.lines.complete(usize::from(activation.record().index), &mut activation, observer);
+    }
+
+    /// Runs one line, due or not.
+    pub(crate) fn activate(&mut self, index: usize, now: Instant) -> ActivationRecord {
+        let mut activation = Activation::live(index as u8, now);
+        self.lines.activate(index, &mut activation);
+        *activation.record()
+    }
+
+    pub(crate) fn ends_mut(&mut self) -> &mut <R::Topics as TopicTable>::Ends<'b> {
+        &mut self.lines.ends
+    }
+
+    /// Repeats a recorded activation. Returns it as it went this time.
+    pub fn replay(&mut self, record: ActivationRecord) -> Activation {
+        let index = usize::from(record.index);
+        let mut activation = Activation::replay(record);
+        self.lines.activate(index, &mut activation);
+        activation
+    }
+
+    /// Puts a sample that a runnable published back on the bus, as
+    /// [`restore_words`](PublishWords::restore_words) does.
+    pub fn restore_words(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) -> Option<()> {
+        self.lines.ends.restore_words(topic, at, generation, words)
+    }
+
+    /// The next instant at which a period or a deadline makes something due.
+    #[must_use]
+    pub fn next_tick(&self) -> Option<Instant> {
+        self.lines.scheduler.next_tick()
+    }
+}
+
+impl<R: Schedule> Lines<'_, R> {
+    #[inline]
+    fn due(&self, band: Band, first: usize, clock: Instant) -> Option<(usize, Instant)> {
+        self.scheduler.due(band, first, clock, self.heads.as_ref())
+    }
+
+    /// The first line from this one on that is due, which starts.
+    #[inline]
+    fn start(&mut self, band: Band, first: usize, clock: Instant) -> Option<(usize, Instant)> {
+        self.scheduler.start(band, first, clock, self.heads.as_ref())
+    }
+
+    #[inline]
+    fn read(&mut self, index: usize, activation: &mut Activation, observer: &mut (impl Observer + ?Sized)) {
         observer.starts(index);
-        self.scheduler.started(index, activation.now(), clock, self.heads.as_ref());
         R::read(&mut self.ends, index, activation);
         observer.has_read(activation);
     }
@@ -176,55 +262,9 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         observer.finished(activation);
     }
 
-    /// Lets the next due activation of this band read its inputs. What is published before [`finish`](Self::finish)
-    /// belongs to its next activation, as if it had been interrupted.
-    pub fn start_next(
-        &mut self,
-        band: Band,
-        clock: Instant,
-        observer: &mut (impl Observer + ?Sized),
-    ) -> Option<Pending> {
-        let (index, now) = self.scheduler.due(band, 0, clock, self.heads.as_ref())?;
-        let mut activation = Activation::live(index as u8, now);
-        self.start(index, &mut activation, clock, observer);
-        Some(Pending(activation))
-    }
-
-    /// Runs what has read its inputs.
-    pub fn finish(&mut self, Pending(mut activation): Pending, observer: &mut (impl Observer + ?Sized)) {
-        self.complete(usize::from(activation.record().index), &mut activation, observer);
-    }
-
-    /// Runs one line, due or not.
-    pub(crate) fn activate(&mut self, index: usize, now: Instant) -> ActivationRecord {
-        let mut activation = Activation::live(index as u8, now);
-        R::read(&mut self.ends, index, &mut activation);
-        self.runnables.run(&mut self.ends, index, &mut activation);
-        *activation.record()
-    }
-
-    pub(crate) fn ends_mut(&mut self) -> &mut <R::Topics as TopicTable>::Ends<'b> {
-        &mut self.ends
-    }
-
-    /// Repeats a recorded activation. Returns it as it went this time.
-    pub fn replay(&mut self, record: ActivationRecord) -> Activation {
-        let index = usize::from(record.index);
-        let mut activation = Activation::replay(record);
-        R::read(&mut self.ends, index, &mut activation);
-        self.runnables.run(&mut self.ends, index, &mut activation);
-        activation
-    }
-
-    /// Puts a sample that a runnable published back on the bus, as
-    /// [`restore_words`](PublishWords::restore_words) does.
-    pub fn restore_words(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) -> Option<()> {
-        self.ends.restore_words(topic, at, generation, words)
-    }
-
-    /// The next instant at which a period or a deadline makes something due.
-    #[must_use]
-    pub fn next_tick(&self) -> Option<Instant> {
-        self.scheduler.next_tick()
+    /// Runs one line whether it is due or not, and tells nobody.
+    fn activate(&mut self, index: usize, activation: &mut Activation) {
+        R::read(&mut self.ends, index, activation);
+        self.runnables.run(&mut self.ends, index, activation);
     }
 }

@@ -95,8 +95,7 @@ pub async fn fly<R: Schedule>(
         let now = clock();
         if flight_loop.run_band(Band::Flight, now, &mut observer) {
             after_flight_band(now);
-        } else if let Some(pending) = flight_loop.start_next(Band::Background, now, &mut observer) {
-            flight_loop.finish(pending, &mut observer);
+        } else if flight_loop.run_next(Band::Background, now, &mut observer) {
             yield_now().await;
         }
     }

@@ -104,6 +104,15 @@ impl ActivationRecord {
         Ok(())
     }
 
+    /// Places for all inputs at once, in the order of the topic table, in place of what is there: what is known while compiling to fit
+    /// needs no check. They hold what an earlier activation has read until they are written. Always `Some`.
+    #[inline]
+    pub const fn places<const N: usize>(&mut self) -> Option<&mut [InputRecord; N]> {
+        const { assert!(N <= MAX_INPUTS, "an activation has at most MAX_INPUTS inputs") };
+        self.count = N as u8;
+        self.inputs.first_chunk_mut()
+    }
+
     /// The inputs, in the order they were added.
     #[inline]
     #[must_use]
@@ -125,6 +134,19 @@ mod tests {
         let one_more = InputRecord { generation: 99, taken: 1 };
         assert_eq!(record.push(one_more), Err(TooManyInputs(one_more)));
         assert_eq!(record.inputs().len(), MAX_INPUTS);
+    }
+
+    #[test]
+    fn inputs_set_at_once_are_those_added_one_by_one() {
+        let inputs = [3, 0, 9].map(|generation| InputRecord { generation, taken: 1 });
+        let mut one_by_one = ActivationRecord::new(1, Instant::ZERO);
+        for input in inputs {
+            one_by_one.push(input).expect("there is room");
+        }
+        let mut at_once = ActivationRecord::new(1, Instant::ZERO);
+        at_once.push(InputRecord { generation: 7, taken: 7 }).expect("there is room");
+        *at_once.places().expect("few enough") = inputs;
+        assert_eq!(at_once, one_by_one);
     }
 
     #[test]

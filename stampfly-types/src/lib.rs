@@ -36,6 +36,7 @@ extern crate std;
 pub mod activation;
 #[cfg(feature = "math")]
 mod atmosphere;
+mod comparison;
 pub mod field;
 #[doc(hidden)]
 pub mod formatted;

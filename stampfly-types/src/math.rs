@@ -7,6 +7,7 @@
 //!
 //! Cost on x86-64: 2–10 ns each. Not for the inner loop of a filter that can use a rotation instead.
 
+pub use crate::comparison::{larger, smaller};
 pub use core::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Sine of an angle in radians.

@@ -118,11 +118,11 @@ impl Axis {
         let sign = if left < 0.0 { -1.0 } else { 1.0 };
         let (v, a) = (sign * self.velocity, sign * self.acceleration);
         // Peak deceleration: v + a²/2j = p²/j, unless bounded; then some time is spent at the bound.
-        let peak = math::sqrt(jerk * v + 0.5 * a * a).min(most).max(-a);
+        let peak = math::larger(math::smaller(math::sqrt(jerk * v + 0.5 * a * a), most), -a);
         let ramp = (a + peak) / jerk;
         let v_peak = v + ramp * (a - 0.5 * jerk * ramp);
         // With no peak to hold there is no time spent at it either.
-        let hold = if peak > 1e-6 { (v_peak / peak - 0.5 * peak / jerk).max(0.0) } else { 0.0 };
+        let hold = if peak > 1e-6 { math::larger(v_peak / peak - 0.5 * peak / jerk, 0.0) } else { 0.0 };
         let ramp_way = ramp * (v + ramp * (0.5 * a - jerk * ramp / 6.0));
         let hold_way = hold * (v_peak - 0.5 * peak * hold);
         let last_way = peak * peak * peak / (6.0 * jerk * jerk);

@@ -17,6 +17,7 @@
 //!
 //! Not for a zero that drifts, which the filter estimates, nor for the yaw rate, which a picture in its middle does not show.
 
+use stampfly_types::math::larger;
 use stampfly_types::messages::{CalibrationResult, ImuData};
 use stampfly_types::{Duration, Instant, Vec3};
 
@@ -120,7 +121,7 @@ impl GyroMonitor {
         self.rates = [[imu.gyro.x, imu.gyro.y], self.rates[0], self.rates[1], self.rates[2]];
         let blow = (imu.accel - self.accel).norm_squared();
         self.accel = imu.accel;
-        self.blow = blow.max(self.blow * BLOW_FADES);
+        self.blow = larger(blow, self.blow * BLOW_FADES);
         let [a, b, c, d] = self.rates;
         // Of the last two to the two before.
         let jump = [0.5 * (a[0] + b[0] - c[0] - d[0]), 0.5 * (a[1] + b[1] - c[1] - d[1])];

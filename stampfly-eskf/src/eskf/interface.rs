@@ -102,7 +102,7 @@ impl Estimator for Eskf {
             self.reset_history();
         }
         let before = self.state.velocity;
-        let motion = self.state.propagate(&imu.accel, &imu.gyro, dt.min(MAX_STEP));
+        let motion = self.state.propagate(&imu.accel, &imu.gyro, math::smaller(dt, MAX_STEP));
         self.history.add(&motion);
         let change = self.state.velocity - before;
         self.watch(&change, motion.dt);

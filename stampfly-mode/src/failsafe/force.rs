@@ -10,6 +10,7 @@
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use core::ops::Range;
+use stampfly_types::math::{larger, smaller};
 use stampfly_types::messages::{FlightPhase, ImuData};
 use stampfly_types::{GRAVITY, Instant, Vec3};
 
@@ -58,14 +59,14 @@ impl ForceMonitor {
         input: &FailsafeInput<'_>,
         weak: bool,
     ) -> bool {
-        let dt = self.last.replace(at).map_or(0.0, |last| at.since(last).seconds().min(LONGEST_STEP));
+        let dt = self.last.replace(at).map_or(0.0, |last| smaller(at.since(last).seconds(), LONGEST_STEP));
         let (force, thrust) = self.mean.get_or_insert((imu.accel, input.output.thrust));
         let off = imu.accel - *force;
         self.shaken += (off.norm_squared() - self.shaken) * SHAKEN_WEIGHT;
         *force += off * config.force_weight;
         *thrust += (input.output.thrust - *thrust) * config.force_weight;
         let (size, thrust) = (force.norm(), *thrust);
-        let beyond = |range: &Range<f32>| (range.start * GRAVITY - size).max(size - range.end * GRAVITY);
+        let beyond = |range: &Range<f32>| larger(range.start * GRAVITY - size, size - range.end * GRAVITY);
         let (excess, limit) = match input.flight_status.phase {
             FlightPhase::IdleGround => (beyond(&STANDING), HANDLED * config.force_speed),
             FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => {
@@ -73,7 +74,7 @@ impl ForceMonitor {
                 let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
                 let unlike_thrust = if known {
                     let carried = thrust * (GRAVITY / config.hover_thrust);
-                    let range = CARRIED * carried.max(GRAVITY) + RECTIFIED * self.shaken;
+                    let range = CARRIED * larger(carried, GRAVITY) + RECTIFIED * self.shaken;
                     (size - carried).abs() - range
                 } else if input.flight_status.mode.is_manual() && input.flight_status.phase != FlightPhase::Landing {
                     // It may be falling with its motors at rest. What lands by itself has none at rest.
@@ -81,11 +82,11 @@ impl ForceMonitor {
                 } else {
                     GRAVITY
                 };
-                (beyond(range).min(unlike_thrust), config.force_speed)
+                (smaller(beyond(range), unlike_thrust), config.force_speed)
             }
             FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => (-GRAVITY, config.force_speed),
         };
-        self.unexplained = (self.unexplained + excess.min(limit / LEAST_TIME) * dt).max(0.0);
+        self.unexplained = larger(self.unexplained + smaller(excess, limit / LEAST_TIME) * dt, 0.0);
         self.unexplained > limit
     }
 }

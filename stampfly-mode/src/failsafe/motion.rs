@@ -69,11 +69,11 @@ impl Contact {
             return *force;
         }
         // What carries the weight pushes nothing aside.
-        let up = (-force.z - GRAVITY).max(0.0);
+        let up = math::larger(-force.z - GRAVITY, 0.0);
         if force.x * force.x + force.y * force.y <= up * up {
-            Vec3::new(0.0, 0.0, force.z.max(0.0))
+            Vec3::new(0.0, 0.0, math::larger(force.z, 0.0))
         } else {
-            Vec3::new(force.x, force.y, force.z.max(0.0))
+            Vec3::new(force.x, force.y, math::larger(force.z, 0.0))
         }
     }
 }

@@ -8,6 +8,7 @@
 //! The test costs height: with 40 % of the thrust missing, a vehicle in the air has gained 0.2 m/s after 60 ms.
 
 use stampfly_types::Instant;
+use stampfly_types::math::smaller;
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,7 +136,7 @@ impl WeightTest {
             (self.delivered, self.quick, self.steady, self.before) = (thrust, first, first, first);
             return unknown;
         };
-        let dt = now.since(last).seconds().min(LONGEST_STEP);
+        let dt = smaller(now.since(last).seconds(), LONGEST_STEP);
         self.delivered += dt / (LAG + dt) * (thrust - self.delivered);
         let input = Pair { force, thrust: self.delivered };
         self.quick.filter(input, QUICK, dt);

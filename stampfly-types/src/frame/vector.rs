@@ -4,6 +4,7 @@
 //! with the names nalgebra gives them. It is no linear algebra: for matrices take nalgebra's types, into which it converts
 //! with the feature `nalgebra`.
 
+use crate::comparison::{larger, smaller};
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -137,21 +138,21 @@ impl Vec3 {
     #[inline]
     #[must_use]
     pub const fn max(&self) -> f32 {
-        self.x.max(self.y).max(self.z)
+        larger(larger(self.x, self.y), self.z)
     }
 
     /// The smallest of the numbers. One that is no number is passed over.
     #[inline]
     #[must_use]
     pub const fn min(&self) -> f32 {
-        self.x.min(self.y).min(self.z)
+        smaller(smaller(self.x, self.y), self.z)
     }
 
     /// The largest of the numbers without their signs. One that is no number is passed over.
     #[inline]
     #[must_use]
     pub const fn amax(&self) -> f32 {
-        self.x.abs().max(self.y.abs()).max(self.z.abs())
+        larger(larger(self.x.abs(), self.y.abs()), self.z.abs())
     }
 
     /// The larger of each two numbers.
