@@ -1,6 +1,6 @@
 //! Memory that is set aside for good, bytes. Apart from what uses it, because `cargo xtask memory` reads it, too.
 
 /// The flight core's stack.
-pub const FLIGHT_STACK: usize = 32 * 1024;
+pub const FLIGHT_STACK: usize = 16 * 1024;
 /// The part of the heap that lies beside the S3's data cache.
 pub const SECOND_HEAP: usize = 32 * 1024;

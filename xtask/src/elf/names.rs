@@ -6,9 +6,17 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
+/// A function.
+struct Function {
+    size: u64,
+    /// As the compiler mangles it.
+    mangled: String,
+    name: String,
+}
+
 /// Names by address, and the program's sections.
 pub struct Names {
-    functions: BTreeMap<u64, (u64, String)>,
+    functions: BTreeMap<u64, Function>,
     sections: BTreeMap<String, Range<u64>>,
 }
 
@@ -20,8 +28,9 @@ impl Names {
         let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
         let functions = file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0);
         let named = functions.map(|symbol| {
-            let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or_default()));
-            (symbol.address(), (symbol.size(), name))
+            let mangled = symbol.name().unwrap_or_default().to_owned();
+            let name = format!("{:#}", rustc_demangle::demangle(&mangled));
+            (symbol.address(), Function { size: symbol.size(), mangled, name })
         });
         let sections = file.sections().filter_map(|section| {
             let range = section.address()..section.address() + section.size();
@@ -32,7 +41,7 @@ impl Names {
 
     /// Where the one function of this name begins.
     pub fn address(&self, name: &str) -> Result<u64, Failure> {
-        let mut found = self.functions.iter().filter(|(_, (_, is))| is == name);
+        let mut found = self.functions.iter().filter(|(_, function)| function.name == name);
         match (found.next(), found.next()) {
             (Some((address, _)), None) => Ok(*address),
             (None, _) => Err(format!("no function {name}")),
@@ -48,6 +57,32 @@ impl Names {
     /// The function that this line of 32 bytes, or its end, belongs to.
     pub fn of(&self, line: u64) -> &str {
         let nearest = self.functions.range(..line + 32).next_back();
-        nearest.filter(|(start, (size, _))| *start + size > line).map_or("no function", |(_, (_, name))| name)
+        nearest.filter(|(start, function)| *start + function.size > line).map_or("no function", |(_, it)| &it.name)
+    }
+
+    /// The functions whose mangled names fit one of these patterns, as a linker script has them: `*` stands for anything.
+    pub fn fitting(&self, patterns: &[&str]) -> Vec<Range<u64>> {
+        let fits = |function: &Function| patterns.iter().any(|pattern| fits(pattern, &function.mangled));
+        self.functions.iter().filter(|(_, function)| fits(function)).map(|(at, it)| *at..at + it.size).collect()
+    }
+}
+
+/// Does a name fit a pattern?
+fn fits(pattern: &str, name: &str) -> bool {
+    let Some((start, rest)) = pattern.split_once('*') else { return pattern == name };
+    let Some(name) = name.strip_prefix(start) else { return false };
+    // Whatever the star stands for, the rest has to fit what is behind it.
+    (0..=name.len()).filter_map(|skipped| name.get(skipped..)).any(|behind| fits(rest, behind))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fits;
+
+    #[test]
+    fn a_star_stands_for_anything() {
+        assert!(fits("*eskf*step*", "_ZN4eskf6filter4stepE"));
+        assert!(fits("*", "") && fits("step", "step") && fits("*step", "a_step"));
+        assert!(!fits("*step", "steps") && !fits("step", "a_step") && !fits("*step*eskf*", "_ZN4eskf4stepE"));
     }
 }

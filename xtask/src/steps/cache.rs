@@ -14,10 +14,13 @@ use crate::ratchet::Budget;
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 const PLUGIN: &str = "stampfly-board/qemu/cache";
 const BUDGET: &str = "stampfly-board/qemu/cache.toml";
+/// Which code is kept in RAM.
+const IN_RAM: &str = "stampfly-board/esp32s3/in_ram.txt";
 /// What the emulator is given in `.cargo/config.toml`.
 const CONFIG: &str = ".cargo/config.toml";
 const SECONDS: &str = "300";
@@ -34,13 +37,17 @@ const SHOWN: usize = 12;
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&EMULATED_OTHERS])?;
     let plugin = plugin(repository)?;
+    let in_ram = fs::read_to_string(repository.root.join(IN_RAM)).map_err(|e| format!("{IN_RAM}: {e}"))?;
+    let in_ram: Vec<&str> = in_ram.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
     let mut budget = Budget::read(repository, BUDGET)?;
     let mut failures = Vec::new();
     // An ARM core's code is another one's again; these two stand for the S3's.
     for machine in MACHINES.iter().filter(|machine| machine.stands_for_s3) {
         let program = program(repository, machine)?;
         let names = Names::read(&program)?;
-        let said = follow(repository, machine, &plugin, &program, &names)?;
+        let ram = names.fitting(&in_ram);
+        println!("{}: {} bytes of code in RAM", machine.name, ram.iter().map(|it| it.end - it.start).sum::<u64>());
+        let said = follow(repository, machine, &plugin, &program, &names, &ram)?;
         let found = Found::read(&said)?;
         found.print(machine, &names);
         for (figure, measured, unit) in found.figures() {
@@ -80,6 +87,7 @@ fn follow(
     plugin: &Path,
     program: &Path,
     names: &Names,
+    ram: &[Range<u64>],
 ) -> Result<String, Failure> {
     let out = repository.target("qemu-cache").join(format!("{}.txt", machine.name));
     // Of an earlier run.
@@ -98,6 +106,9 @@ fn follow(
     for (word, section) in [("code", ".text"), ("constants", ".rodata")] {
         let range = names.section(section)?;
         words += &format!(",{word}={:x}:{:x}", range.start, range.end);
+    }
+    for range in ram {
+        words += &format!(",ram={:x}:{:x}", range.start, range.end);
     }
     let runner = runner(repository, machine)?;
     let (emulator, options) = runner.split_first().ok_or("no emulator")?;

@@ -110,9 +110,9 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     let mut cargo = firmware(repository, "build");
     // Not in the package's folder: its settings of cargo are the S3's, and the C6's layer of hardware refuses that of the data cache.
     cargo.current_dir(&repository.root).arg("--manifest-path").arg(repository.root.join(PACKAGE).join("Cargo.toml"));
-    cargo.args(["-Zbuild-std=core,alloc"]);
+    cargo.args(["-Zbuild-std=core,alloc"]).env("ESP_HAL_CONFIG_USE_RWTEXT_LD_HOOK", "true");
     cargo.env("CARGO_TARGET_RISCV32IMAC_UNKNOWN_NONE_ELF_LINKER", "ld.lld-22");
-    cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers");
+    cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers -Csymbol-mangling-version=v0");
     // One example is enough to see that they link.
     cargo.args(["--bins", "--example", "bmi270"]);
     cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
