@@ -24,7 +24,8 @@ fn vehicle(armed: Option<bool>) -> Newest {
 
 fn ask(newest: &Newest, line: &str) -> (String, Request<Command>) {
     let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
-    let mut console = Console { version: "stampfly 9.9", newest, sensors: &[], profile: &profile, config: &mut config };
+    let mut console =
+        Console { version: "stampfly 9.9", newest, sensors: &[], profile: &profile, facts: &[], config: &mut config };
     let mut reply = String::new();
     let request = answer(line, Instant::from_secs(5), &mut console, &mut reply).expect("a String takes everything");
     (reply, request)
@@ -130,7 +131,8 @@ fn gains_that_were_found_are_taken_as_parameters_on_the_ground() {
     assert!(ask(&newest, "status").0.contains("autotune Pitch: margins"));
     let taken = |newest: &Newest| {
         let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
-        let mut console = Console { version: "1", newest, sensors: &[], profile: &profile, config: &mut config };
+        let mut console =
+            Console { version: "1", newest, sensors: &[], profile: &profile, facts: &[], config: &mut config };
         let mut reply = String::new();
         let request = answer("autotune accept", Instant::from_secs(5), &mut console, &mut reply);
         assert_eq!(request, Ok(Request::Nothing), "{reply}");
