@@ -114,7 +114,7 @@ mod tests {
         newcomer.please(Act::NoseUp);
         assert_eq!(newcomer.question(Question::Motor), 2, "rear right");
         assert_eq!(newcomer.question(Question::Light), 1);
-        assert_eq!(newcomer.question(Question::Tune), 0, "nothing more is typed");
+        assert_eq!(newcomer.question(Question::Notes), 0, "nothing more is typed");
         assert_eq!(newcomer.ask("status").ok().as_deref(), Some("here\r\n"));
         for part in ["nose straight up", "< left", "Please type the number", "> status\nhere\n"] {
             assert!(newcomer.transcript.contains(part), "{part} is missing:\n{}", newcomer.transcript);

@@ -126,8 +126,8 @@ impl fmt::Display for Act {
 pub enum Question {
     /// Is the status light lit?
     Light,
-    /// Were there rising notes?
-    Tune,
+    /// Has it sounded?
+    Notes,
     /// Which motor turns?
     Motor,
     /// Which way round does this motor turn? From 1.
@@ -139,7 +139,7 @@ impl Question {
     #[must_use]
     pub const fn choices(self) -> &'static [&'static str] {
         match self {
-            Self::Light | Self::Tune => &["no", "yes"],
+            Self::Light | Self::Notes => &["no", "yes"],
             Self::Motor => &["none", "front right", "rear right", "rear left", "front left"],
             Self::Direction(_) => &["clockwise", "counter-clockwise"],
         }
@@ -152,7 +152,7 @@ impl fmt::Display for Question {
             Self::Light => f.write_str(
                 "Is the status light lit or blinking? It is the one on the small board with the USB socket.",
             ),
-            Self::Tune => f.write_str("Did you hear three rising notes when it started?"),
+            Self::Notes => f.write_str("Did you hear notes when it started?"),
             Self::Motor => f.write_str("Which motor turns?"),
             Self::Direction(_) => f.write_str(
                 "Which way does it turn, seen from above? A strip of paper that touches its shaft shows it.",

@@ -8,11 +8,13 @@ use std::time::Duration;
 
 /// Share of the duty at which a motor is tried, per cent.
 const PERCENT: u32 = 15;
-/// From the command until it turns, and until it has stopped again.
+/// From the command until it turns, and from its stop until it is still.
 const SPINS_UP: Duration = Duration::from_millis(700);
-const STOPS: Duration = Duration::from_millis(2_300);
+const STOPS: Duration = Duration::from_millis(600);
 /// Which way each motor turns, as in [`Question::Direction`].
 const DIRECTIONS: [usize; 4] = [1, 0, 1, 0];
+/// From the release of the button to the decision what it meant, with a margin.
+const CLICKED: Duration = Duration::from_secs(2);
 /// From switching the transmitter on until it is heard.
 const HEARD: Duration = Duration::from_secs(2);
 /// Frames come fifty times a second; older than this there are none, ms.
@@ -30,8 +32,8 @@ impl<V: Visit> Examination<'_, V> {
                 "v1.1 needs GPIO38 high, which this firmware sets; v1.0 needs nothing: its solder, or the light";
             self.chart.note("light-dark", Verdict::Fail, "dark", advice);
         }
-        if self.visit.question(Question::Tune) == 1 {
-            self.chart.pass("buzzer", "three rising notes");
+        if self.visit.question(Question::Notes) == 1 {
+            self.chart.pass("buzzer", "notes");
         } else {
             self.chart.note("buzzer-silent", Verdict::Fail, "no notes", "its solder, or the buzzer");
         }
@@ -48,6 +50,7 @@ impl<V: Visit> Examination<'_, V> {
                 let advice = "turn its plug round: with its propeller it would push down";
                 self.chart.note(&format!("motor-{turned}-reversed"), Verdict::Fail, "it turns the other way", advice);
             }
+            self.visit.ask("motor stop")?;
             self.visit.wait(STOPS);
         }
         for (place, turned_then) in turned.iter().enumerate() {
@@ -83,6 +86,8 @@ impl<V: Visit> Examination<'_, V> {
         self.visit.please(Act::HoldButton);
         let held = pressed(self.visit)?;
         self.visit.please(Act::ReleaseButton);
+        // Only then is it known that this was one click. It arms a vehicle that hears a transmitter by then.
+        self.visit.wait(CLICKED);
         match (held, pressed(self.visit)?) {
             (true, false) => self.chart.pass("button", "pressed and let go"),
             (true, true) => {
@@ -100,6 +105,11 @@ impl<V: Visit> Examination<'_, V> {
     pub(super) fn transmitter(&mut self) -> Result<(), Lost> {
         self.visit.please(Act::SwitchOn);
         self.visit.wait(HEARD);
+        if newest(self.visit, "flight_status")?.is("armed") {
+            let advice = "nobody asked for it: switch the transmitter off and unplug the battery";
+            self.chart.note("armed", Verdict::Fail, "it has armed", advice);
+            return Ok(());
+        }
         let frame = newest(self.visit, "command_pilot")?;
         if frame.age.is_none_or(|age| age > SILENT) {
             let advice = "is it the ecosystem's firmware, and paired? Type pair at the console, or hold the button for \
