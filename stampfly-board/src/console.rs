@@ -1,7 +1,6 @@
 //! The StampFly at a console: its status, and its commands beside those of every vehicle.
 //!
-//! `pair` looks for a transmitter, `motor test` turns one motor for [`TEST_TIME`], to see which one it is and which way it turns,
-//! `autotune accept` takes the gains that were found as parameters; `param save` keeps them.
+//! `help` lists them. A motor test lasts [`TEST_TIME`]; gains that `autotune accept` takes are parameters, to be saved.
 //!
 //! [`stampfly_flight::console::answer`] does the rest, and [`Command::publish`] carries them out.
 

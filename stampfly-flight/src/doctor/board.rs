@@ -2,7 +2,7 @@
 //!
 //! Firmware fills these from registers; they are here so that a board that is emulated says the same in the same words.
 
-use super::Verdict;
+use super::finding::Verdict;
 use core::fmt;
 
 /// Why the processor started.
@@ -23,6 +23,20 @@ pub enum Restart {
 }
 
 impl Restart {
+    /// From the number in an Espressif chip's register (ESP32-S3 technical reference manual, "Reset and Clock", table of reset
+    /// sources; other chips of the family have the same numbers for these).
+    #[must_use]
+    pub const fn from_register(code: u32) -> Self {
+        match code {
+            0x01 => Self::PowerOn,
+            // Software, and the USB unit, by which the chip is flashed.
+            0x03 | 0x0C | 0x15 | 0x16 => Self::Asked,
+            0x0F => Self::BrownOut,
+            0x07..=0x09 | 0x0B | 0x0D | 0x10..=0x12 => Self::Watchdog,
+            _ => Self::Other,
+        }
+    }
+
     /// Is that how a vehicle should start, and what to do if not?
     #[must_use]
     pub const fn judge(self) -> (Verdict, &'static str) {
@@ -96,5 +110,32 @@ impl FlashAccess {
 impl fmt::Display for FlashAccess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} at {} MHz", self.mode, self.megahertz)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_four_wires_at_full_speed_are_fast_enough() {
+        let read = |control: u32, clock: u32| FlashAccess::from_registers(control, clock);
+        for (access, shown, verdict) in [
+            (read(1 << 24 | 1 << 13, 1 << 31), "QIO at 80 MHz", Verdict::Pass),
+            (read(1 << 24, 0x0001_0001), "QIO at 40 MHz", Verdict::Fail),
+            (read(1 << 23, 1 << 31), "DIO at 80 MHz", Verdict::Fail),
+            (read(1 << 14, 0x0003_0003), "DOUT at 20 MHz", Verdict::Fail),
+            (read(0, 1 << 31), "SPI at 80 MHz", Verdict::Fail),
+        ] {
+            assert_eq!((std::format!("{access}").as_str(), access.judge().0), (shown, verdict));
+        }
+    }
+
+    #[test]
+    fn a_vehicle_starts_because_power_came_or_somebody_asked() {
+        let judged = |code| Restart::from_register(code).judge().0;
+        assert_eq!([1, 3, 0x15].map(judged), [Verdict::Pass; 3]);
+        assert_eq!([0x0F, 7, 0x12].map(judged), [Verdict::Fail; 3]);
+        assert_eq!(judged(0x13), Verdict::Look);
     }
 }
