@@ -1,7 +1,9 @@
 //! The doctor names what is wrong with an emulated vehicle, and finds nothing on a sound one.
 
-use stampfly_board::simulation::bench::{Fault, fault};
+use stampfly_board::simulation::bench::{Fault, fault, with_vehicle};
+use stampfly_board::topics::Id;
 use stampfly_host::doctor::{Chart, emulated};
+use stampfly_types::{Duration, Instant};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -41,6 +43,10 @@ fn every_fault_is_named_and_nothing_else() {
         .filter(|(fault, chart)| names(chart) != [fault.name.as_str()])
         .map(|(fault, chart)| format!("{}: {:?}\n{chart}", fault.name, names(chart)))
         .collect();
+    // The firmware sends an answer as one piece up to this length; a longer one is made twice, and counts go on in between.
+    let longest = charts.iter().flat_map(|chart| chart.transcript.split("> doctor\n").skip(1));
+    let longest = longest.map(|rest| rest.split("\n> ").next().unwrap_or(rest).len()).max();
+    assert!(longest.is_some_and(|length| length < 2_048), "{longest:?}");
     assert!(wrong.is_empty(), "{} of {} faults:\n{}", wrong.len(), faults.len(), wrong.join("\n"));
 }
 
@@ -58,4 +64,19 @@ fn nothing_is_found_on_a_sound_vehicle() {
 fn the_same_vehicle_gives_the_same_file() {
     let [one, other] = [1, 1].map(|seed| emulated::examine(None, seed).file());
     assert_eq!(one, other);
+}
+
+/// The silences that `docs/first-flight.md` tells.
+#[test]
+fn every_sensor_measures_within_a_second_and_it_is_ready_within_four() {
+    with_vehicle(None, 1, |bench| {
+        bench.pass(Duration::from_secs(1));
+        let sensors = Id::ALL.iter().filter(|topic| topic.info().name.starts_with("sensor_"));
+        for topic in sensors {
+            assert!(bench.published(*topic).is_some(), "{}", topic.info().name);
+        }
+        bench.pass(Duration::from_secs(3));
+        let notes: Vec<_> = bench.heard().iter().filter(|(at, _)| *at > Instant::from_secs(1)).collect();
+        assert!(notes.len() == 3 && notes.iter().all(|(_, hertz)| *hertz == notes[0].1), "{:?}", bench.heard());
+    });
 }
