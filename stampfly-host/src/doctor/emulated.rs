@@ -17,8 +17,8 @@ use std::time::Duration;
 /// How long an answer takes to come over USB.
 const LATENCY: Span = Span::from_millis(4);
 /// How long a hand takes from one pose to the next, and how long the vehicle is held still before anybody says so.
-const MOVES: Span = Span::from_millis(1_200);
-const STEADY: Span = Span::from_millis(400);
+const MOVES: Span = Span::from_millis(800);
+const STEADY: Span = Span::from_millis(300);
 /// Height of the hand above the floor, m, and how far it slides.
 const LOW: f64 = 0.3;
 const SLIDE: f64 = 0.4;
@@ -135,8 +135,8 @@ impl Visit for Emulated<'_, '_> {
                 self.bench.transmitter(Some(sticks));
             }
         }
-        if act.moving().is_none() {
-            self.bench.pass(Span::from_millis(300));
+        if matches!(act, Act::HoldButton | Act::ReleaseButton | Act::SwitchOn | Act::Centre | Act::Push(_)) {
+            self.bench.pass(STEADY);
         }
     }
 

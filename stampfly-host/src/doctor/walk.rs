@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// From power-on to the first answer: the self test's silence, and a margin.
-const STARTS: Duration = Duration::from_secs(5);
+const STARTS: Duration = Duration::from_secs(4);
 /// Tries to reach a vehicle that has just been switched on.
 const TRIES: usize = 5;
 

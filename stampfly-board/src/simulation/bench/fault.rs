@@ -82,7 +82,7 @@ const CHIPS: [&str; 7] = crate::simulation::sensing::NAMES;
 /// On SPI, where a chip's start is some hundred transfers, and a bad joint has to let them pass now and then.
 const ON_SPI: [&str; 2] = [CHIPS[0], CHIPS[3]];
 /// Share of the transfers that fail.
-const RARELY: f64 = 0.01;
+const RARELY: f64 = 0.015;
 const OFTEN: f64 = 0.1;
 /// Those whose sensing element can be told to feel nothing.
 const NUMB: [&str; 4] = ["imu", "flow", "mag", "tof"];
