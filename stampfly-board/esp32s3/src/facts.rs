@@ -19,10 +19,7 @@ impl Facts {
     /// Reads the registers. `unusable` stored values were left out at power-on.
     pub fn read(unusable: usize) -> Self {
         let controller = SPI0::regs();
-        #[cfg(feature = "esp32s3")]
         let (control, clock) = (controller.ctrl().read().bits(), controller.clock().read().bits());
-        #[cfg(feature = "esp32c6")]
-        let (control, clock) = (controller.spi_mem_ctrl().read().bits(), controller.spi_mem_clock().read().bits());
         let code = esp_hal::system::reset_reason().map_or(0, |reason| reason as u32);
         Self {
             restart: Restart::from_register(code),
