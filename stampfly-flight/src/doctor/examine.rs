@@ -3,7 +3,7 @@
 use super::finding::{Finding, Verdict};
 use crate::console::{SensorLine, Vehicle};
 use crate::newest::message;
-use crate::profile::CLASSES;
+use crate::profile::{CLASSES, Rows};
 use core::fmt;
 use stampfly_types::Instant;
 use stampfly_types::messages::{FlightStatus, SelfTest, SelfTestVerdict};
@@ -26,8 +26,8 @@ pub fn examine<V: Vehicle>(vehicle: &V, now: Instant, reply: &mut dyn fmt::Write
         let place = V::TOPICS.iter().position(|info| info.name == name)?;
         vehicle.newest(place)
     };
-    say(reply, "version", Verdict::Pass, vehicle.version(), "")?;
-    say(reply, "awake", Verdict::Pass, format_args!("{} us", now.as_micros()), "")?;
+    say(reply, "version", Verdict::Pass, &vehicle.version(), "")?;
+    say(reply, "awake", Verdict::Pass, &format_args!("{} us", now.as_micros()), "")?;
     for line in vehicle.sensors() {
         let info = V::TOPICS.iter().position(|info| info.name.strip_prefix("sensor_") == Some(line.name));
         let newest = info.and_then(|place| Some((V::TOPICS.get(place)?, vehicle.newest(place)?.0)));
@@ -41,27 +41,31 @@ pub fn examine<V: Vehicle>(vehicle: &V, now: Instant, reply: &mut dyn fmt::Write
             SelfTestVerdict::WithinTolerance => (Verdict::Look, "this chip computes other bits: please report it"),
             _ => (Verdict::Fail, "it must not fly: please report it"),
         };
-        let value = format_args!("{}, worst deviation {}", test.verdict.name(), test.worst);
+        let value = &format_args!("{}, worst deviation {}", test.verdict.name(), test.worst);
         say(reply, "self_test", verdict, value, advice)?;
     }
-    passes(vehicle, reply)?;
+    passes(vehicle.profile(), reply)?;
     if let Some(status) = topic("flight_status").and_then(|(_, words)| message::<FlightStatus>(words)) {
         let verdict = if status.blocks.is_empty() { Verdict::Pass } else { Verdict::Look };
-        say(reply, "arming", verdict, Names(|| status.blocks.names()), "")?;
+        say(reply, "arming", verdict, &Names(|| status.blocks.names()), "")?;
     }
-    vehicle.facts().iter().try_for_each(|fact| write!(reply, "{fact}\r\n"))
+    let facts = vehicle.facts().iter();
+    facts.copied().try_for_each(|Finding { name, verdict, value, advice }| say(reply, name, verdict, value, advice))
 }
 
+/// Not inlined, nor for each kind of value: flash is scarce, and nobody waits for this.
+#[inline(never)]
 fn say(
     reply: &mut dyn fmt::Write,
     name: &str,
     verdict: Verdict,
-    value: impl fmt::Display,
+    value: &dyn fmt::Display,
     advice: &str,
 ) -> fmt::Result {
     write!(reply, "{}\r\n", Finding { name, verdict, value, advice })
 }
 
+#[inline(never)]
 fn sensor(line: &SensorLine<'_>, age: Option<u64>, silent: bool, reply: &mut dyn fmt::Write) -> fmt::Result {
     let SensorLine { name, samples, errors, last_error } = *line;
     let (verdict, advice) = match () {
@@ -74,12 +78,13 @@ fn sensor(line: &SensorLine<'_>, age: Option<u64>, silent: bool, reply: &mut dyn
     };
     let last: &dyn fmt::Display = last_error.unwrap_or(&"none");
     let age = age.unwrap_or(u64::MAX);
-    say(reply, name, verdict, format_args!("samples {samples} errors {errors} age_ms {age} last_error {last}"), advice)
+    say(reply, name, verdict, &format_args!("samples {samples} errors {errors} age_ms {age} last_error {last}"), advice)
 }
 
-fn passes(vehicle: &impl Vehicle, reply: &mut dyn fmt::Write) -> fmt::Result {
+#[inline(never)]
+fn passes(rows: Rows<'_>, reply: &mut dyn fmt::Write) -> fmt::Result {
     let (mut all, mut twice, mut longer, mut worst) = (0u64, 0u64, 0u64, None);
-    for row in vehicle.profile() {
+    for row in rows {
         let [first @ .., double, more]: [u32; CLASSES] = row.classes;
         all += first.iter().map(|count| u64::from(*count)).sum::<u64>() + u64::from(double) + u64::from(more);
         (twice, longer) = (twice + u64::from(double), longer + u64::from(more));
@@ -94,7 +99,7 @@ fn passes(vehicle: &impl Vehicle, reply: &mut dyn fmt::Write) -> fmt::Result {
         () if longer + twice > 0 => (Verdict::Look, "some were late: please report it"),
         () => (Verdict::Pass, ""),
     };
-    let value = format_args!("all {all} twice {twice} longer {longer} worst {name} {share} per cent of its budget");
+    let value = &format_args!("all {all} twice {twice} longer {longer} worst {name} {share} per cent of its budget");
     say(reply, "passes", verdict, value, advice)
 }
 
