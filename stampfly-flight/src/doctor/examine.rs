@@ -41,8 +41,8 @@ pub fn examine<V: Vehicle>(vehicle: &V, now: Instant, reply: &mut dyn fmt::Write
             SelfTestVerdict::WithinTolerance => (Verdict::Look, "this chip computes other bits: please report it"),
             _ => (Verdict::Fail, "it must not fly: please report it"),
         };
-        let value = &format_args!("{}, worst deviation {}", test.verdict.name(), test.worst);
-        say(reply, "self_test", verdict, value, advice)?;
+        let (name, worst) = (test.verdict.name(), test.worst);
+        say(reply, "self_test", verdict, &format_args!("{name}, worst deviation {worst}"), advice)?;
     }
     passes(vehicle.profile(), reply)?;
     if let Some(status) = topic("flight_status").and_then(|(_, words)| message::<FlightStatus>(words)) {
@@ -99,8 +99,13 @@ fn passes(rows: Rows<'_>, reply: &mut dyn fmt::Write) -> fmt::Result {
         () if longer + twice > 0 => (Verdict::Look, "some were late: please report it"),
         () => (Verdict::Pass, ""),
     };
-    let value = &format_args!("all {all} twice {twice} longer {longer} worst {name} {share} per cent of its budget");
-    say(reply, "passes", verdict, value, advice)
+    say(
+        reply,
+        "passes",
+        verdict,
+        &format_args!("all {all} twice {twice} longer {longer} worst {name} {share} per cent of its budget"),
+        advice,
+    )
 }
 
 /// Names with spaces between them, or none.
