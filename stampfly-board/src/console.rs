@@ -1,11 +1,6 @@
 //! The StampFly at a console: its status, and its commands beside those of every vehicle.
 //!
-//! | command | does |
-//! |---|---|
-//! | `pair`, `pair stop` | looks for a transmitter, stops looking |
-//! | `motor test N PERCENT` | turns one motor for [`TEST_TIME`], to see which one it is and which way it turns |
-//! | `motor stop` | stops it |
-//! | `autotune accept` | takes the gains that were found as parameters; `param save` keeps them |
+//! `help` lists them. A motor test lasts [`TEST_TIME`]; gains that `autotune accept` takes are parameters, to be saved.
 //!
 //! [`stampfly_flight::console::answer`] does the rest, and [`Command::publish`] carries them out.
 
@@ -16,6 +11,7 @@ use core::fmt;
 use stampfly_bus::TopicInfo;
 use stampfly_control::autotune::AutotuneStatus;
 use stampfly_flight::console::{CommandError, SensorLine, Vehicle, list, refused};
+use stampfly_flight::doctor::Fact;
 use stampfly_flight::newest::longest_message;
 use stampfly_flight::parameters::Parameters;
 use stampfly_flight::profile::Rows;
@@ -26,8 +22,6 @@ use stampfly_types::{Duration, Instant};
 pub const TEST_TIME: Duration = Duration::from_secs(2);
 /// Largest duty in a test, share: enough to turn without propellers, too little to lift with them.
 pub const TEST_DUTY: f32 = 0.3;
-/// Motors that can be tested.
-const MOTORS: u8 = 4;
 
 /// The newest sample of every topic of this vehicle.
 pub type Newest = stampfly_flight::NewestSamples<COUNT, { longest_message(&TOPICS) }>;
@@ -83,7 +77,7 @@ impl Command {
 /// let (newest, profile) = (Newest::new(), Profile::new(&schedule::ACTIVATIONS));
 /// let mut config = VehicleConfig::default();
 /// let mut console =
-///     Console { version: "1.0", newest: &newest, sensors: &[], profile: &profile, config: &mut config };
+///     Console { version: "1.0", newest: &newest, sensors: &[], profile: &profile, facts: &[], config: &mut config };
 /// let mut reply = String::new();
 /// assert_eq!(answer("param set eskf.gate 3.5", Instant::ZERO, &mut console, &mut reply), Ok(Request::Nothing));
 /// assert_eq!(config.eskf.gate, 3.5);
@@ -97,6 +91,8 @@ pub struct Console<'c> {
     pub sensors: &'c [SensorLine<'c>],
     /// Execution times.
     pub profile: &'c Profile,
+    /// What only the board knows.
+    pub facts: &'c [Fact<'c>],
     /// The configuration of the next start. `param set` changes it.
     pub config: &'c mut VehicleConfig,
 }
@@ -167,6 +163,10 @@ impl Vehicle for Console<'_> {
         self.profile.rows()
     }
 
+    fn facts(&self) -> &[Fact<'_>] {
+        self.facts
+    }
+
     fn parameters(&mut self) -> &mut dyn Parameters {
         self.config
     }
@@ -197,7 +197,7 @@ impl Vehicle for Console<'_> {
         reply: &mut dyn fmt::Write,
     ) -> Result<Option<Command>, fmt::Error> {
         if let Command::TestMotor { motor, duty } = command {
-            if !(1..=MOTORS).contains(&motor) {
+            if !(1..=4).contains(&motor) {
                 return write!(reply, "there is no such motor\r\n").map(|()| None);
             }
             if !(0.0..=TEST_DUTY).contains(&duty) {

@@ -10,6 +10,7 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`console`] | a command line over a serial port |
+//! | [`doctor`] | a vehicle examines itself, one line a check |
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
 //! | [`recorder`] | writes a flight as a log that can be flown again |
 //! | [`key_frame`] | the whole state of a vehicle as bytes (feature `key-frame`) |
@@ -31,6 +32,7 @@ extern crate std;
 
 pub mod black_box;
 pub mod console;
+pub mod doctor;
 pub mod flight_loop;
 pub mod golden;
 #[cfg(feature = "key-frame")]

@@ -7,12 +7,14 @@
 //! | [`recorder`] | the log of a flight |
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
+//! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
 //! The executor is `stampfly-sim`'s, replay and golden flight are `stampfly-flight`'s; everything here is generic over
 //! [`Vehicle`](stampfly_sim::vehicle::Vehicle).
 
 pub mod campaign;
+pub mod doctor;
 pub mod flown;
 pub mod golden;
 mod inputs;

@@ -2,6 +2,7 @@
 //! here or by the radio.
 
 use crate::clock::Clock;
+use crate::facts::Facts;
 use crate::memory::{Memory, restart};
 use crate::sensors::Healths;
 use crate::storage::{Storage, StorageError};
@@ -45,12 +46,14 @@ pub struct Parts {
     pub config: VehicleConfig,
     /// How the self test went.
     pub tested: Outcome,
+    /// What the board says of itself.
+    pub facts: Facts,
 }
 
 /// Answers until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Parts) {
-    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested } = parts;
+    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested, facts } = parts;
     let (mut keys, screen) = UsbSerialJtag::new(usb).into_async().split();
     let mut version = String::new();
     // A version that is too long ends early.
@@ -67,6 +70,7 @@ pub async fn run(parts: Parts) {
         config,
         flown,
         version,
+        facts,
         unstored: None,
     };
     let mut editor = LineEditor::<80>::new();
@@ -113,6 +117,7 @@ struct Console {
     flown: VehicleConfig,
     /// Which firmware this is, and how its self test went.
     version: String<128>,
+    facts: Facts,
     /// A transmitter that was paired and is still to be stored.
     unstored: Option<Address>,
 }
@@ -175,6 +180,7 @@ impl Console {
             newest: &memory.newest,
             sensors: &lines,
             profile: self.profile,
+            facts: &self.facts.all(),
             config: &mut self.config,
         };
         answer(line, Clock.now(), &mut vehicle, reply)

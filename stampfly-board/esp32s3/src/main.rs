@@ -16,6 +16,7 @@ mod buzzer;
 mod clock;
 mod console;
 mod cutoff;
+mod facts;
 mod flash;
 mod flight;
 mod i2c;
@@ -146,6 +147,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             storage_ends: outside.storage,
             config,
             tested,
+            facts: facts::Facts::read(unusable),
         };
         let supervisor = outside.supervisor;
         let ground = move |spawner: Spawner| {

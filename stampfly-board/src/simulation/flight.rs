@@ -84,7 +84,7 @@ impl vehicle::Surroundings for Surroundings {
         let wrong = wrong.take().expect("surroundings are started once");
         let cameras = setup.cameras;
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
-        let Others { motors, indicator, button, link, cutoff } = match setup.sensing {
+        let Others { motors, indicator, button, link, cutoff, .. } = match setup.sensing {
             Sensing::Models => sensing::start_models(tasks, clock, (sensors, &wrong), outside, cameras, health),
             Sensing::Chips => {
                 sensing::start_drivers(tasks, clock, (board, shared), (sensors, &wrong), outside, cameras, health)

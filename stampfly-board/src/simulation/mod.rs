@@ -7,12 +7,14 @@
 //! | [`mission`], [`ground_station`] | what to fly, and the program that asks the vehicle for it |
 //! | [`pilot`], [`radio`] | a person with a transmitter instead; what carries commands and telemetry |
 //! | [`faults`], [`judge`] | what can go wrong, and what came of it |
+//! | [`bench`](mod@bench) | a vehicle on a bench, with somebody who holds it, looks, listens and presses its button |
 //! | [`metrics`] | how good a flight was |
 //! | [`flight`] | one flight: what is started, what is watched |
 //! | [`Setup`], [`Outcome`] | what decides a flight, and how it went |
 //!
 //! For programs on a PC (feature `simulation`); nothing of it is in the firmware.
 
+pub mod bench;
 pub mod faults;
 pub mod flight;
 pub mod ground_station;

@@ -30,6 +30,9 @@ pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
 /// How the sensors do, in the order in which they were started.
 pub type Healths = [SensorHealth; 8];
 
+/// What each measures, in the same order: the topics' names without `sensor_`.
+pub const NAMES: [&str; 7] = ["imu", "tof", "tof_front", "flow", "mag", "baro", "power"];
+
 /// A task that publishes a sensor's samples, as far as they come through its line, for as long as the vehicle is on.
 macro_rules! spawn {
     ($tasks:ident, $clock:ident, $health:ident, $wrong:ident, $backoff:ident, $sensor:expr => $ends:ident.$owner:ident.$topic:ident) => {{
@@ -53,6 +56,8 @@ pub(super) struct Others<'b> {
     pub button: (ButtonModel, topics::ButtonPinEnds<'b>),
     pub link: topics::LinkEnds<'b>,
     pub cutoff: topics::CutoffEnds<'b>,
+    pub self_test: topics::SelfTestEnds<'b>,
+    pub console: topics::ConsoleEnds<'b>,
 }
 
 /// What the drivers of one vehicle share; to be made before the tasks.
@@ -99,6 +104,8 @@ pub(super) fn start_models<'a>(
         button: (models.button, ends.button_pin),
         link: ends.link,
         cutoff: ends.cutoff,
+        self_test: ends.self_test,
+        console: ends.console,
     }
 }
 
@@ -137,5 +144,7 @@ pub(super) fn start_drivers<'a>(
         button: (models.button, ends.button_pin),
         link: ends.link,
         cutoff: ends.cutoff,
+        self_test: ends.self_test,
+        console: ends.console,
     }
 }

@@ -4,9 +4,10 @@ use stampfly_board::console::{Command, Console, Newest, Profile};
 use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_control::autotune::{AutotuneAxis, AutotuneStage, AutotuneStatus};
-use stampfly_flight::console::{Request, answer};
+use stampfly_flight::console::{Request, SensorLine, answer};
+use stampfly_flight::doctor::{Fact, Finding, Verdict};
 use stampfly_types::messages::{
-    Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert,
+    Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert, TofData,
 };
 use stampfly_types::{Instant, Message};
 
@@ -24,7 +25,8 @@ fn vehicle(armed: Option<bool>) -> Newest {
 
 fn ask(newest: &Newest, line: &str) -> (String, Request<Command>) {
     let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
-    let mut console = Console { version: "stampfly 9.9", newest, sensors: &[], profile: &profile, config: &mut config };
+    let mut console =
+        Console { version: "stampfly 9.9", newest, sensors: &[], profile: &profile, facts: &[], config: &mut config };
     let mut reply = String::new();
     let request = answer(line, Instant::from_secs(5), &mut console, &mut reply).expect("a String takes everything");
     (reply, request)
@@ -96,6 +98,36 @@ fn only_motors_that_exist_turn_and_only_slowly() {
 }
 
 #[test]
+fn doctor_says_what_is_silent_and_what_only_the_board_knows() {
+    let mut newest = vehicle(Some(false));
+    newest.note(Id::sensor_power as usize, Instant::from_millis(4_900), &PowerData::default().to_words());
+    newest.note(Id::sensor_tof as usize, Instant::from_millis(2_000), &TofData::default().to_words());
+    let line = |name, samples| SensorLine { name, samples, errors: 1, last_error: None };
+    let sensors = [line("power", 60), line("tof", 50), line("flow", 0)];
+    let facts = [Fact { name: "flash", verdict: Verdict::Fail, value: &"DIO at 40 MHz", advice: "flash it again" }];
+    let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
+    let mut console = Console {
+        version: "stampfly 9.9",
+        newest: &newest,
+        sensors: &sensors,
+        profile: &profile,
+        facts: &facts,
+        config: &mut config,
+    };
+    let mut reply = String::new();
+    assert_eq!(answer("doctor", Instant::from_secs(5), &mut console, &mut reply), Ok(Request::Nothing));
+    let found = |name: &str| reply.lines().filter_map(Finding::parse).find(|line| line.name == name);
+    let verdict = |name| found(name).map(|line| line.verdict);
+    assert_eq!(
+        ["power", "tof", "flow", "passes", "arming", "flash"].map(verdict),
+        [Verdict::Pass, Verdict::Fail, Verdict::Fail, Verdict::Pass, Verdict::Look, Verdict::Fail].map(Some),
+        "{reply}"
+    );
+    assert!(found("arming").is_some_and(|line| line.value == "LOW_BATTERY THROTTLE"), "{reply}");
+    assert!(found("flash").is_some_and(|line| line.advice == "flash it again"), "{reply}");
+}
+
+#[test]
 fn the_list_of_parameters_is_straight() {
     let (list, _) = ask(&vehicle(Some(false)), "param list");
     let first_column = |line: &str| line.split(' ').next().map_or(0, str::len);
@@ -130,7 +162,8 @@ fn gains_that_were_found_are_taken_as_parameters_on_the_ground() {
     assert!(ask(&newest, "status").0.contains("autotune Pitch: margins"));
     let taken = |newest: &Newest| {
         let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
-        let mut console = Console { version: "1", newest, sensors: &[], profile: &profile, config: &mut config };
+        let mut console =
+            Console { version: "1", newest, sensors: &[], profile: &profile, facts: &[], config: &mut config };
         let mut reply = String::new();
         let request = answer("autotune accept", Instant::from_secs(5), &mut console, &mut reply);
         assert_eq!(request, Ok(Request::Nothing), "{reply}");

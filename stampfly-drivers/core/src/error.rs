@@ -16,7 +16,7 @@ pub enum SensorErrorKind {
     Bus,
     /// No new sample within the time the sensor promises.
     Timeout,
-    /// Another chip, or none, answered.
+    /// Another chip answered.
     Identification,
     /// The chip did not accept its configuration.
     Configuration,
@@ -26,6 +26,8 @@ pub enum SensorErrorKind {
     Data,
     /// The chip lost its settings; the next call sets it up again.
     Restarted,
+    /// No chip answered: the data line was as one that nobody drives, all ones or all zeros.
+    Absent,
     /// None of the above.
     Other,
 }
@@ -35,11 +37,12 @@ impl Display for SensorErrorKind {
         f.write_str(match self {
             Self::Bus => "the bus refused or garbled a transfer",
             Self::Timeout => "no new sample in time",
-            Self::Identification => "another chip, or none, answered",
+            Self::Identification => "another chip answered",
             Self::Configuration => "the chip did not accept its configuration",
             Self::SelfTest => "the self test failed",
             Self::Data => "the chip answered with data that cannot be",
             Self::Restarted => "the chip lost its settings",
+            Self::Absent => "no chip answered",
             Self::Other => "another error of the sensor",
         })
     }

@@ -20,7 +20,7 @@ pub struct SensorHealth {
 }
 
 /// Every kind of error, so that one fits into a word.
-const KINDS: [SensorErrorKind; 8] = [
+const KINDS: [SensorErrorKind; 9] = [
     SensorErrorKind::Bus,
     SensorErrorKind::Timeout,
     SensorErrorKind::Identification,
@@ -28,6 +28,7 @@ const KINDS: [SensorErrorKind; 8] = [
     SensorErrorKind::SelfTest,
     SensorErrorKind::Data,
     SensorErrorKind::Restarted,
+    SensorErrorKind::Absent,
     SensorErrorKind::Other,
 ];
 

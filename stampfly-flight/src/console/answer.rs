@@ -2,6 +2,7 @@
 
 use super::command::{COMMANDS, Command};
 use super::vehicle::{SensorLine, Vehicle};
+use crate::doctor;
 use crate::newest::ShownSample;
 use crate::parameters::{self, ParameterInfo, Parameters};
 use crate::profile::HEADING;
@@ -150,6 +151,10 @@ pub fn answer<V: Vehicle>(
             write!(reply, "{HEADING}\r\n")?;
             vehicle.profile().try_for_each(|row| write!(reply, "{row}\r\n"))?;
             return say(reply, &"microseconds; columns count activations by their share of the budget");
+        }
+        Command::Doctor => {
+            doctor::examine(vehicle, now, reply)?;
+            return Ok(Request::Nothing);
         }
         Command::Version => return say(reply, &vehicle.version()),
         Command::ParameterSave => Request::SaveParameters,

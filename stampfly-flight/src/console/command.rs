@@ -30,6 +30,8 @@ pub enum Command<'l, C> {
     ParameterReset,
     /// Execution times.
     Profile,
+    /// Every check that needs nobody.
+    Doctor,
     /// Send the log.
     LogDump,
     /// Restart.
@@ -52,6 +54,7 @@ pub const COMMANDS: &[(&str, &str)] = &[
     ("param save", "save all parameters"),
     ("param reset", "erase the saved ones"),
     ("profile", "execution times against their budgets"),
+    ("doctor", "examine everything that needs nobody to look, one line a check"),
     (LOG, "send the log of the last flight"),
     ("reboot", "restart"),
     ("version", "version of the firmware"),
@@ -92,6 +95,7 @@ impl<'l, C> Command<'l, C> {
             ["param", "reset"] => Self::ParameterReset,
             ["param", ..] => return Err(CommandError::Usage(PARAM)),
             ["profile"] => Self::Profile,
+            ["doctor"] => Self::Doctor,
             ["log", "dump"] => Self::LogDump,
             ["log", ..] => return Err(CommandError::Usage(LOG)),
             ["reboot"] => Self::Reboot,

@@ -1,6 +1,7 @@
 //! What the console asks of a vehicle.
 
 use super::error::CommandError;
+use crate::doctor::Fact;
 use crate::parameters::Parameters;
 use crate::profile::Rows;
 use core::fmt;
@@ -54,6 +55,11 @@ pub trait Vehicle {
 
     /// Execution times, as [`Profile::rows`](crate::Profile::rows) returns them.
     fn profile(&self) -> Rows<'_>;
+
+    /// What only the board knows, for `doctor`. Nothing by default.
+    fn facts(&self) -> &[Fact<'_>] {
+        &[]
+    }
 
     /// The configuration of the next start.
     fn parameters(&mut self) -> &mut dyn Parameters;

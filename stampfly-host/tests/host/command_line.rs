@@ -365,3 +365,24 @@ fn a_reader_that_has_gone_is_no_panic() {
         assert_eq!(ran.err, "", "{arguments:?}");
     }
 }
+
+#[test]
+fn the_doctor_says_what_it_found_by_its_exit_code_and_in_a_file() {
+    let folder = folder("doctor");
+    let sound = run(&folder, &["doctor", "--emulated"]);
+    assert_eq!(sound.code, 0, "{}", sound.out);
+    assert!(sound.out.contains("All passed."), "{}", sound.out);
+    let broken = run(&folder, &["doctor", "--emulated=motor-1-dead", "--seed", "2", "--out", "broken.txt"]);
+    assert_eq!(broken.code, 1, "{}", broken.out);
+    let file = std::fs::read_to_string(folder.join("broken.txt")).expect("written");
+    for part in ["FAIL motor-1-dead", "One thing is not", "> motor test 1 15", "Which motor turns?\n< none"] {
+        assert!(file.contains(part), "{part} is missing:\n{file}");
+    }
+    assert!(folder.join("doctor.txt").exists());
+    let faults = run(&folder, &["doctor", "--list-faults"]);
+    assert!(faults.code == 0 && faults.out.lines().any(|line| line == "flow-axes-swapped"), "{}", faults.out);
+    assert_eq!(run(&folder, &["doctor", "--emulated=gremlins"]).code, 2);
+    assert_eq!(run(&folder, &["doctor", "--yes", "--port", "/nowhere", "--emulated"]).code, 2);
+    // Nobody says that the propellers are off.
+    assert_eq!(run(&folder, &["doctor", "--port", "/nowhere"]).code, 2);
+}

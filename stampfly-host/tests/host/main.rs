@@ -7,6 +7,7 @@ mod chips;
 mod command_line;
 mod controllers;
 mod determinism;
+mod doctor;
 mod estimate;
 mod fault_campaign;
 mod faults;

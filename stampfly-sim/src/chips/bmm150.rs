@@ -30,7 +30,7 @@
 //! noise that does not depend on the repetitions; a Hall resistance that hardly changes; that a line that nobody drives reads as ones. Not modelled: interrupts,
 //! thresholds.
 
-use super::{Chip, I2cChip, SpiChip};
+use super::{Chip, Flaw, I2cChip, SpiChip};
 use crate::noise::{Noise, Stream};
 use crate::sensors::mag::{MagPhysics, RATE};
 use crate::sensors::schedule::Schedule;
@@ -143,6 +143,7 @@ pub struct Bmm150 {
     self_test: Option<Instant>,
     /// The sensing elements feel nothing.
     broken: bool,
+    flaw: Option<Flaw>,
     /// What a running read sees.
     shadow: [u8; 8],
     pointer: u16,
@@ -170,6 +171,7 @@ impl Bmm150 {
             data: [0; 8],
             self_test: None,
             broken: false,
+            flaw: None,
             shadow: [0; 8],
             pointer: 0,
             command: 0,
@@ -229,6 +231,11 @@ impl Bmm150 {
 
     fn convert(&mut self, at: Instant) {
         let body = self.physics.field(at);
+        if self.flaw == Some(Flaw::Stuck) && self.data != [0; 8] {
+            self.data[6] |= 1;
+            return;
+        }
+        let [ahead, right, down] = Flaw::turn(self.flaw, body.into());
         let hall = (HALL + self.noise.normal()).round();
         // Body is (−y, x, z) of the chip as it is soldered.
         let current = match self.setting(MODE) >> 6 {
@@ -236,7 +243,7 @@ impl Bmm150 {
             2 => -SELF_TEST_FIELD,
             _ => 0.0,
         };
-        let field = if self.broken { [0.0; 3] } else { [body.y, -body.x, body.z + current] };
+        let field = if self.broken { [0.0; 3] } else { [right, -ahead, down + current] };
         let [x, y, z] = counts(field, hall);
         let words = [(x as u16) << 3, (y as u16) << 3, (z as u16) << 1, (hall as u16) << 2 | 1];
         let [measures_x, measures_y, measures_z] = self.measures();
@@ -308,6 +315,10 @@ impl Chip for Bmm150 {
 
     fn set_broken(&mut self, broken: bool) {
         self.broken = broken;
+    }
+
+    fn set_flaw(&mut self, flaw: Option<Flaw>) {
+        self.flaw = flaw;
     }
 
     fn set_id(&mut self, id: u16) {

@@ -21,7 +21,7 @@
 //! registers at their reset value, while conversions go on; that a line that nobody drives reads as ones. Not modelled: that I2C is deaf after
 //! the first low CSB (DS 5.1); here a chip is soldered to one kind of bus.
 
-use super::{Chip, I2cChip, SpiChip};
+use super::{Chip, Flaw, I2cChip, SpiChip};
 use crate::noise::{Noise, Stream};
 use crate::sensors::baro::{BaroPhysics, DEVIATION, RATE};
 use crate::sensors::schedule::Schedule;
@@ -115,6 +115,7 @@ pub struct Bmp280 {
     pending: Option<u8>,
     /// The sensing element feels nothing.
     broken: bool,
+    flaw: Option<Flaw>,
     last_conversion: Instant,
     /// Pressure and temperature as the converter gives them.
     data: [u32; 2],
@@ -145,6 +146,7 @@ impl Bmp280 {
             config: 0,
             pending: None,
             broken: false,
+            flaw: None,
             last_conversion: now,
             data: [SKIPPED; 2],
             shadow: [SKIPPED; 2],
@@ -195,6 +197,9 @@ impl Bmp280 {
         let filtered: [f64; 2] =
             core::array::from_fn(|i| (before[i] * (coefficient - 1.0) + f64::from(fresh[i])) / coefficient);
         self.filtered = Some(filtered);
+        if self.flaw == Some(Flaw::Stuck) && self.data != [SKIPPED; 2] {
+            return;
+        }
         let counts = [samples, temperature_samples];
         self.data = core::array::from_fn(|i| match counts[i] {
             0 => SKIPPED,
@@ -281,6 +286,10 @@ impl Chip for Bmp280 {
         self.shadow = self.data;
         self.filtered = None;
         self.pointer = 0;
+    }
+
+    fn set_flaw(&mut self, flaw: Option<Flaw>) {
+        self.flaw = flaw;
     }
 
     fn set_id(&mut self, id: u16) {

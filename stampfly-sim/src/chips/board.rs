@@ -63,6 +63,29 @@ pub struct AttachedChips {
     pub tof_front: Attached,
 }
 
+impl AttachedChips {
+    /// Each with the name of what it measures, those on SPI first.
+    #[must_use]
+    pub const fn all(&self) -> [(&'static str, &Attached); 7] {
+        let Self { imu, flow, mag, baro, power, tof, tof_front } = self;
+        [
+            ("imu", imu),
+            ("flow", flow),
+            ("mag", mag),
+            ("baro", baro),
+            ("power", power),
+            ("tof", tof),
+            ("tof_front", tof_front),
+        ]
+    }
+
+    /// The chip that measures this.
+    #[must_use]
+    pub fn named(&self, name: &str) -> Option<&Attached> {
+        self.all().into_iter().find_map(|(known, chip)| (known == name).then_some(chip))
+    }
+}
+
 impl Board {
     /// Both range finders' address after power-on.
     const RANGE: u8 = 0x29;

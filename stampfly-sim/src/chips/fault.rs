@@ -20,6 +20,34 @@ pub struct Faults {
     pub stretch: Duration,
 }
 
+/// What is wrong with how a chip was soldered or made, or with what is in front of it: it answers and measures, but not what
+/// its driver takes it for. Each emulator knows those that can happen to its part and takes no notice of the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Flaw {
+    /// Soldered otherwise, or another variant of the part: where each axis that it reports points, as rows of the body's
+    /// axes where the board's layout has the identity. BMI270, BMM150, PMW3901.
+    Mounting([[i8; 3]; 3]),
+    /// Its conversions repeat the last. BMP280, BMM150.
+    Stuck,
+    /// It measures longer by this, m: a cover glass, a sensor that was pressed in. VL53L3CX.
+    Offset(f64),
+    /// Something lies this far in front of it, m. VL53L3CX.
+    Covered(f64),
+    /// It sees so many times the voltage, as behind another divider. INA3221.
+    Voltage(f64),
+    /// It sees so many times the current, as across another shunt. INA3221.
+    Current(f64),
+}
+
+impl Flaw {
+    /// A vector of the body as a chip with this flaw is exposed to it.
+    pub(super) fn turn(flaw: Option<Self>, body: [f64; 3]) -> [f64; 3] {
+        let Some(Self::Mounting(rows)) = flaw else { return body };
+        rows.map(|row| row.iter().zip(body).map(|(factor, part)| f64::from(*factor) * part).sum())
+    }
+}
+
 /// A handle to a chip on a bus: its faults, and what somebody else may do to it. Clones mean the same chip.
 ///
 /// ```
@@ -75,6 +103,11 @@ impl Attached {
     /// Breaks or mends the sensing element: see [`Chip::set_broken`].
     pub fn set_broken(&self, broken: bool) {
         self.chip.borrow_mut().set_broken(broken);
+    }
+
+    /// Gives the chip a flaw, or mends it: see [`Flaw`].
+    pub fn set_flaw(&self, flaw: Option<Flaw>) {
+        self.chip.borrow_mut().set_flaw(flaw);
     }
 
     /// Another part has been soldered: this is what its identity register says from now on.

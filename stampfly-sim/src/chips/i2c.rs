@@ -41,6 +41,8 @@ struct State {
     busy_until: Rc<Cell<Instant>>,
     /// Clock pulses until the data line is free.
     held: Cell<u8>,
+    /// The data line is shorted to ground.
+    shorted: Cell<bool>,
     noise: RefCell<Noise>,
     /// Every operation begins with a start.
     restarts: Cell<bool>,
@@ -82,6 +84,7 @@ impl I2cBus {
             devices: RefCell::default(),
             busy_until: Rc::new(Cell::new(clock.now())),
             held: Cell::new(0),
+            shorted: Cell::new(false),
             noise: RefCell::new(Noise::new(seed, STREAM)),
             restarts: Cell::new(false),
         }))
@@ -108,10 +111,15 @@ impl I2cBus {
         self.0.held.set(RECOVERY);
     }
 
+    /// The data line is shorted to ground, which no clock pulse helps, or is not any more.
+    pub fn short_sda(&self, shorted: bool) {
+        self.0.shorted.set(shorted);
+    }
+
     /// Is the data line free?
     #[must_use]
     pub fn sda_is_high(&self) -> bool {
-        self.0.held.get() == 0
+        self.0.held.get() == 0 && !self.0.shorted.get()
     }
 
     /// One pulse of the clock line, made by hand. Takes no time of its own; the caller waits between edges.

@@ -19,7 +19,7 @@
 //! that a read goes on with the same register after two bytes; that half a word written is ignored; that a dead converter
 //! reads zero and is ready all the same.
 
-use super::{Chip, I2cChip};
+use super::{Chip, Flaw, I2cChip};
 use crate::noise::{Noise, Stream};
 use crate::sensors::power::{PowerPhysics, RATE};
 use crate::sensors::schedule::Schedule;
@@ -75,6 +75,7 @@ pub struct Ina3221 {
     begun: Option<Instant>,
     /// The converter feels nothing.
     broken: bool,
+    flaw: Option<Flaw>,
     pointer: u16,
     /// First byte of a word that is being written.
     half: u8,
@@ -95,6 +96,7 @@ impl Ina3221 {
             registers: AFTER_RESET,
             begun: Some(now),
             broken: false,
+            flaw: None,
             pointer: 0,
             half: 0,
         }
@@ -139,6 +141,11 @@ impl Ina3221 {
         }
         let means = self.physics.mean(first, first + length);
         let [volts, amperes] = if self.broken { [0.0; 2] } else { means };
+        let [volts, amperes] = match self.flaw {
+            Some(Flaw::Voltage(factor)) => [volts * factor, amperes],
+            Some(Flaw::Current(factor)) => [volts, amperes * factor],
+            _ => [volts, amperes],
+        };
         let word = |value: f64| ((value.round().clamp(-4_096.0, 4_095.0) as i16) << 3) as u16;
         let [shunt, bus] = self.measures();
         if shunt {
@@ -192,6 +199,10 @@ impl Chip for Ina3221 {
 
     fn set_id(&mut self, id: u16) {
         self.part = id;
+    }
+
+    fn set_flaw(&mut self, flaw: Option<Flaw>) {
+        self.flaw = flaw;
     }
 
     fn set_broken(&mut self, broken: bool) {

@@ -24,7 +24,9 @@
 //! |---|---|
 //! | dead chip, refused transfers, bit errors, clock stretching | [`Faults`] |
 //! | reset in flight, another part, a sensing element that is broken | [`Attached`] |
-//! | data line held low | [`I2cBus::hold_sda`] |
+//! | soldered otherwise, covered, another shunt | [`Flaw`] |
+//! | data line held low by a chip, or shorted to ground | [`I2cBus::hold_sda`], [`I2cBus::short_sda`] |
+//! | data line from the chips stuck | [`SpiBus::hold_miso`] |
 //! | chip select that nobody drives yet | [`SpiBus::attach_floating`] |
 
 mod bmi270;
@@ -43,7 +45,7 @@ pub use bmi270::{Bmi270, InterruptPin};
 pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
 pub use board::{AttachedChips, Board, stand_in_image};
-pub use fault::{Attached, Faults};
+pub use fault::{Attached, Faults, Flaw};
 pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
 pub use lines::{ClockLine, DataLine};
@@ -73,6 +75,8 @@ pub trait Chip: fmt::Debug {
     /// Breaks or mends the sensing element: the chip answers as before but feels nothing, and its self tests, or those of
     /// its driver, fail. Every emulator says what that looks like; a chip that feels nothing anyway takes no notice.
     fn set_broken(&mut self, _broken: bool) {}
+    /// Gives it a flaw, or mends it. A chip to which it cannot happen takes no notice.
+    fn set_flaw(&mut self, _flaw: Option<Flaw>) {}
 }
 
 /// A chip that can sit on an [`I2cBus`]: how it maps bytes to registers.

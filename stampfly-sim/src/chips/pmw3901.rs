@@ -24,7 +24,7 @@
 //! an exposure. Section numbers differ between the public revisions and are not given.
 //! Not modelled: shutdown, frame capture, the motion pin.
 
-use super::{Chip, SpiChip};
+use super::{Chip, Flaw, SpiChip};
 use crate::sensors::flow::FlowPhysics;
 use crate::time::Clock;
 use crate::world::World;
@@ -101,6 +101,7 @@ pub struct Pmw3901 {
     moved: bool,
     /// The array sees nothing.
     broken: bool,
+    flaw: Option<Flaw>,
     /// The next command may begin from here on.
     idle_until: Instant,
     /// The address byte of this transfer, when it came, and whether it came late enough.
@@ -129,6 +130,7 @@ impl Pmw3901 {
             latched: [0; 2],
             moved: false,
             broken: false,
+            flaw: None,
             idle_until: now,
             command: 0,
             commanded: now,
@@ -181,9 +183,10 @@ impl Pmw3901 {
     }
 
     fn latch(&mut self, now: Instant) {
-        let counts = self.physics.read(now);
+        let [x, y] = self.physics.read(now);
+        let [x, y, _] = Flaw::turn(self.flaw, [x, y, 0.0]);
         // Flow along body x is −y of the chip as it is soldered, along body y it is x.
-        self.latched = if self.is_tuned() && !self.broken { [counts[1] as i16, -counts[0] as i16] } else { [0; 2] };
+        self.latched = if self.is_tuned() && !self.broken { [y as i16, -x as i16] } else { [0; 2] };
         self.moved = self.latched != [0; 2];
     }
 
@@ -277,6 +280,10 @@ impl Chip for Pmw3901 {
 
     fn set_id(&mut self, id: u16) {
         self.id = id as u8;
+    }
+
+    fn set_flaw(&mut self, flaw: Option<Flaw>) {
+        self.flaw = flaw;
     }
 
     fn set_broken(&mut self, broken: bool) {

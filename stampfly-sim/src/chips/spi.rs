@@ -26,6 +26,8 @@ struct State {
     noise: RefCell<Noise>,
     /// How many chip selects nobody drives.
     floating: Cell<u32>,
+    /// The byte that every transfer reads, when the line from the chips is stuck.
+    stuck: Cell<Option<u8>>,
 }
 
 /// The wires that all chips share.
@@ -43,7 +45,13 @@ impl SpiBus {
     #[must_use]
     pub fn new(clock: &Clock, seed: u64) -> Self {
         let noise = RefCell::new(Noise::new(seed, STREAM));
-        Self(Rc::new(State { clock: clock.clone(), busy_until: Cell::new(clock.now()), noise, floating: Cell::new(0) }))
+        Self(Rc::new(State {
+            clock: clock.clone(),
+            busy_until: Cell::new(clock.now()),
+            noise,
+            floating: Cell::new(0),
+            stuck: Cell::new(None),
+        }))
     }
 
     /// Solders a chip to the bus and to a chip select of its own, which is driven high. `frequency` is the clock for
@@ -57,6 +65,11 @@ impl SpiBus {
     /// the inertial sensor is asked.
     pub fn attach_floating<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
         self.solder(frequency, chip, true)
+    }
+
+    /// The line from the chips is stuck: high, low, or free again with `None`. What is sent still arrives.
+    pub fn hold_miso(&self, level: Option<bool>) {
+        self.0.stuck.set(level.map(|high| if high { 0xFF } else { 0 }));
     }
 
     fn solder<C: SpiChip + 'static>(&self, frequency: u32, chip: C, floating: bool) -> (SpiPort<C>, Attached) {
@@ -105,6 +118,12 @@ impl<C> SpiPort<C> {
         self.bus.0.floating.set(others);
     }
 
+    /// The wires that it shares with others.
+    #[must_use]
+    pub fn bus(&self) -> SpiBus {
+        self.bus.clone()
+    }
+
     /// The clock of the bus and the chip, for pins that the chip has beside it.
     pub(super) fn chip(&self) -> (Clock, Rc<RefCell<C>>) {
         (self.bus.0.clock.clone(), self.chip.clone())
@@ -141,15 +160,16 @@ impl<C: SpiChip> SpiPort<C> {
         let mut chip = self.chip.borrow_mut();
         let mut noise = self.bus.0.noise.borrow_mut();
         let (mut index, mut nanoseconds) = (0, 0);
+        let stuck = self.bus.0.stuck.get();
         let mut byte = |out: u8, nanoseconds: u64| {
             if faults.dead {
-                return 0xFF;
+                return stuck.unwrap_or(0xFF);
             }
             let errors = faults.bit_errors.max(self.garbled);
             let out = carry(out, errors, &mut noise);
             let answer = chip.exchange(index, out, after(start, nanoseconds));
             index += 1;
-            carry(answer, errors.max(disturbance), &mut noise)
+            stuck.unwrap_or(carry(answer, errors.max(disturbance), &mut noise))
         };
         for operation in operations {
             match operation {

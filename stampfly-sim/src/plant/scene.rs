@@ -5,7 +5,7 @@
 //! the vehicle, whose range finder looks down.
 
 use super::Motion;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// A vertical half space: everything beyond a line on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,34 @@ pub struct Hand {
     pub position: Vector3<f64>,
     /// Body FRD → world NED.
     pub attitude: UnitQuaternion<f64>,
+}
+
+impl Hand {
+    /// A hand that holds the vehicle at a place, world NED, m, turned by roll, pitch and yaw, rad.
+    #[must_use]
+    pub fn new(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Self {
+        // Not by nalgebra's function, whose sine is the machine's.
+        let about = |axis: Vector3<f64>, angle: f64| {
+            let (sin, cos) = libm::sincos(0.5 * angle);
+            UnitQuaternion::new_normalize(Quaternion::from_parts(cos, axis * sin))
+        };
+        let attitude = about(Vector3::z(), yaw) * about(Vector3::y(), pitch) * about(Vector3::x(), roll);
+        Self { position: position.into(), attitude }
+    }
+
+    /// The hand on its way from here to there, at this share of it, 0 to 1: it starts and ends gently.
+    #[must_use]
+    pub fn toward(&self, there: &Self, share: f64) -> Self {
+        let share = share.clamp(0.0, 1.0);
+        let share = share * share * (3.0 - 2.0 * share);
+        let turn = (self.attitude.inverse() * there.attitude).scaled_axis() * share;
+        let angle = turn.norm();
+        let (sin, cos) = libm::sincos(0.5 * angle);
+        let part = if angle > 1e-9 { turn * (sin / angle) } else { turn * 0.5 };
+        let turned = UnitQuaternion::new_normalize(Quaternion::from_parts(cos, part));
+        let position = self.position + (there.position - self.position) * share;
+        Self { position, attitude: self.attitude * turned }
+    }
 }
 
 /// Spring and damper of an arm's muscles: 60 N/m for some tens of grams lets it give way by some millimetres.
@@ -184,6 +212,20 @@ mod tests {
         (0..3200).for_each(|_| plant.step());
         assert!((plant.motion().position.z - 0.5).abs() < 0.1 && plant.ground().contact(), "{:?}", plant.motion());
         assert_eq!(plant.scene().floor(&Vector3::new(-1.1, 0.0, 0.0)), 0.0);
+    }
+
+    #[test]
+    fn a_hand_carries_and_turns() {
+        let mut carried = plant(0.5);
+        let from = Hand::new([0.0, 0.0, -0.5], [0.0; 3]);
+        let to = Hand::new([0.2, 0.0, -1.0], [0.0, core::f64::consts::FRAC_PI_2, 0.0]);
+        for step in 0..3200 {
+            carried.scene_mut().hand = Some(from.toward(&to, f64::from(step) / 1600.0));
+            carried.step();
+        }
+        let nose = carried.motion().attitude * Vector3::x();
+        assert!(nose.z < -0.99 && (carried.motion().position - to.position).norm() < 0.02, "{:?}", carried.motion());
+        assert_eq!((from.toward(&to, 0.0), from.toward(&from, 0.7)), (from, from));
     }
 
     #[test]

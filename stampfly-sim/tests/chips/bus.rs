@@ -88,6 +88,35 @@ fn a_held_data_line_blocks_everybody_until_nine_pulses() {
 }
 
 #[test]
+fn a_shorted_data_line_stays_low_whatever_is_clocked() {
+    let (_, mut bus, _) = bus(1);
+    bus.short_sda(true);
+    (0..20).for_each(|_| bus.pulse_scl());
+    assert!(!bus.sda_is_high() && id(&mut bus) == Err(BusError::ArbitrationLost));
+    bus.short_sda(false);
+    assert_eq!(id(&mut bus), Ok(0x58));
+}
+
+#[test]
+fn a_stuck_line_from_the_chips_reads_the_same_of_all() {
+    let simulation = standing();
+    let (mut port, _) =
+        SpiBus::new(&simulation.clock, 1).attach(2_000_000, Bmp280::new(&simulation.world, &simulation.clock, 1));
+    simulation.clock.advance_to(Instant::from_millis(2));
+    let mut read = || {
+        let mut id = [0x11; 2];
+        embedded_hal::spi::SpiDevice::transfer(&mut port, &mut id, &[0xD0]).unwrap();
+        port.bus().hold_miso(Some(false));
+        id[1]
+    };
+    assert_eq!([read(), read()], [0x58, 0]);
+    port.bus().hold_miso(None);
+    let mut id = [0; 2];
+    embedded_hal::spi::SpiDevice::transfer(&mut port, &mut id, &[0xD0]).unwrap();
+    assert_eq!(id[1], 0x58);
+}
+
+#[test]
 fn refusals_and_bit_errors_come_at_their_rate_and_repeat_with_the_seed() {
     let run = |seed| {
         let (_, mut bus, chip) = bus(seed);

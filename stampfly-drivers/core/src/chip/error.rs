@@ -46,6 +46,8 @@ impl<E: Debug> SensorError for ChipError<E> {
         match self {
             Self::Bus(_) => SensorErrorKind::Bus,
             Self::BusTimeout | Self::NoSample => SensorErrorKind::Timeout,
+            // A line that nobody drives; no chip calls itself so.
+            Self::Identification { found: 0 | 0xFF | 0xFFFF } => SensorErrorKind::Absent,
             Self::Identification { .. } => SensorErrorKind::Identification,
             Self::InvalidConfiguration | Self::Configuration { .. } | Self::AddressTaken => {
                 SensorErrorKind::Configuration
@@ -91,6 +93,9 @@ mod tests {
     fn what_the_chip_said_is_in_the_words() {
         let error: std::boxed::Box<dyn Error> = std::boxed::Box::new(ChipError::<()>::Identification { found: 0xD1 });
         assert_eq!(error.to_string(), "another chip answered: it calls itself 0xd1");
+        let kind = |found| ChipError::<()>::Identification { found }.kind();
+        assert_eq!([0, 0xFF, 0xFFFF].map(kind), [SensorErrorKind::Absent; 3]);
+        assert_eq!([0x24, 0xFF00].map(kind), [SensorErrorKind::Identification; 2]);
         assert!(ChipError::Bus("no acknowledge").to_string().ends_with("\"no acknowledge\""));
         assert!(ChipError::<()>::Configuration { status: 2 }.to_string().ends_with("0x02"));
     }

@@ -41,6 +41,8 @@ pub enum Command {
     Schedule(TopicsOptions),
     /// List what can go wrong in a flight: value, the worst end that is acceptable, meaning.
     Faults(TopicsOptions),
+    /// Examine a vehicle before its first flight, step by step, and name what is wrong with it.
+    Doctor(DoctorOptions),
     /// Print the mode machine: phases, transitions, guards, checks before arming.
     Modes(ModesOptions),
     /// Fly many missions with different seeds and summarise them.
@@ -77,6 +79,29 @@ pub struct ModesOptions {
     /// As Markdown, which is the only form there is.
     #[arg(long)]
     pub markdown: bool,
+}
+
+/// Options of `doctor`.
+#[derive(Clone, Debug, Args)]
+pub struct DoctorOptions {
+    /// The vehicle's serial port. Without this: the only one that looks like a vehicle's.
+    #[arg(long, value_name = "PORT", conflicts_with = "emulated")]
+    pub port: Option<String>,
+    /// Examine a vehicle that is emulated on this computer instead, with this fault if one is named (see `--list-faults`).
+    #[arg(long, value_name = "FAULT", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    pub emulated: Option<String>,
+    /// Seed of the emulated vehicle: another specimen.
+    #[arg(long, default_value_t = 1, requires = "emulated")]
+    pub seed: u64,
+    /// Where everything that was found and said is written, to be sent with a report.
+    #[arg(long, value_name = "FILE", default_value = "doctor.txt")]
+    pub out: PathBuf,
+    /// Do not ask whether the propellers are off: they are.
+    #[arg(long)]
+    pub yes: bool,
+    /// List the faults of emulated vehicles.
+    #[arg(long)]
+    pub list_faults: bool,
 }
 
 /// What decides a simulated flight.

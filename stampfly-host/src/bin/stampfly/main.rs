@@ -7,6 +7,7 @@ macro_rules! outln {
 
 mod arguments;
 mod campaign;
+mod doctor;
 mod engine;
 mod estimate;
 mod failure;
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),
         Command::Faults(options) => faults::run(&options),
+        Command::Doctor(options) => doctor::run(&options),
         Command::Modes(_) => modes::run(),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),

@@ -129,11 +129,11 @@ fn without_a_fault_nobody_says_an_error() {
 
 #[test]
 fn a_dead_chip() {
-    // All ones on SPI is data, of a wrong identity or of sensors that do not run.
+    // All ones on SPI are an identity that no chip has, or data of sensors that do not run.
     use SensorErrorKind::*;
     let dead = Faults { dead: true, ..Faults::default() };
     each(&ALL, "death", set(dead), heal, |index, said| {
-        assert_failed(index, said, &FAULT, &[Bus, Timeout, Identification, Configuration, Data, Restarted], "death");
+        assert_failed(index, said, &FAULT, &[Bus, Timeout, Absent, Configuration, Data, Restarted], "death");
     });
 }
 

@@ -63,7 +63,7 @@ mod registers;
 mod sampling;
 mod self_test;
 
-use super::Chip;
+use super::{Chip, Flaw};
 use crate::sensors::imu::ImuPhysics;
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
@@ -201,6 +201,7 @@ pub struct Bmi270 {
     test_status: u8,
     /// The sensing elements do not move.
     broken: bool,
+    flaw: Option<Flaw>,
     /// The address byte of this transfer.
     command: u8,
     pointer: u16,
@@ -239,6 +240,7 @@ impl Bmi270 {
             test_word: [0; 2],
             test_status: 0,
             broken: false,
+            flaw: None,
             command: 0,
             pointer: 0,
             shadow: [0; 12],

@@ -7,7 +7,7 @@ use super::{
     TEST_WORD_LOW, TIME, UPLOAD_ADDRESS_HIGH, UPLOAD_ADDRESS_LOW, UPLOAD_CHECK, UPLOAD_CONTROL, UPLOAD_DATA,
     UPLOAD_SIZE,
 };
-use crate::chips::Chip;
+use crate::chips::{Chip, Flaw};
 use stampfly_types::Instant;
 
 impl Chip for Bmi270 {
@@ -154,6 +154,10 @@ impl Chip for Bmi270 {
 
     fn set_broken(&mut self, broken: bool) {
         self.broken = broken;
+    }
+
+    fn set_flaw(&mut self, flaw: Option<Flaw>) {
+        self.flaw = flaw;
     }
 
     fn set_id(&mut self, id: u16) {

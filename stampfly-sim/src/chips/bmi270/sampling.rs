@@ -5,6 +5,7 @@ use super::{
     FIFO_CONTENT, FIFO_MODE, GYRO, GYRO_RANGE, GYRO_SETTINGS, GYRO_START, INTERNAL_STATUS, INTERRUPTS, POWER,
     READY_ACCEL, READY_GYRO, STATUS, TEMPERATURE,
 };
+use crate::chips::Flaw;
 use crate::sensors::imu::to_counts;
 use stampfly_types::{GRAVITY, Instant};
 
@@ -29,6 +30,7 @@ impl Bmi270 {
     /// One tick of the sensors.
     pub(super) fn sample(&mut self, at: Instant) {
         let [ax, ay, az, gx, gy, gz] = self.physics.sample(at);
+        let [[ax, ay, az], [gx, gy, gz]] = [[ax, ay, az], [gx, gy, gz]].map(|body| Flaw::turn(self.flaw, body));
         let force = self.self_test.deflect(self.register(ACCEL_SELF_TEST));
         // Body is (y, x, −z) of the chip as it is soldered.
         let axes = [[ay + force[0], ax + force[1], -az + force[2]], [gy, gx, -gz]];

@@ -1,0 +1,75 @@
+//! `stampfly doctor`: a newcomer and his vehicle, or an emulated one.
+
+use crate::arguments::DoctorOptions;
+use crate::failure::Failure;
+use stampfly_board::simulation::bench::fault;
+use stampfly_host::doctor::console::Serial;
+use stampfly_host::doctor::newcomer::Newcomer;
+use stampfly_host::doctor::{Chart, emulated, examine};
+use std::io::{BufRead, stdin, stdout};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// A vehicle that was plugged in has its port by then.
+const PLUGGED_IN: Duration = Duration::from_secs(15);
+/// Exit code of a wrong command line.
+const USAGE: u8 = 2;
+
+pub fn run(options: &DoctorOptions) -> Result<ExitCode, Failure> {
+    if options.list_faults {
+        fault::all().iter().for_each(|fault| outln!("{}", fault.name));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let chart = match &options.emulated {
+        Some(name) => {
+            let all = fault::all();
+            let fault = all.iter().find(|fault| fault.name == *name);
+            if fault.is_none() && !name.is_empty() {
+                eprintln!("stampfly: there is no fault '{name}'; --list-faults lists them");
+                return Ok(ExitCode::from(USAGE));
+            }
+            emulated::examine(fault.map(|fault| &fault.defect), options.seed)
+        }
+        None => match vehicle(options)? {
+            Some(chart) => chart,
+            None => return Ok(ExitCode::from(USAGE)),
+        },
+    };
+    std::fs::write(&options.out, chart.file()).map_err(|error| format!("{}: {error}", options.out.display()))?;
+    outln!("\n{chart}Everything is in {}; send it with a report.", options.out.display());
+    Ok(if chart.findings().next().is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Examines the vehicle at a serial port. `None` when the propellers are on, or nobody can tell which port it is.
+fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
+    if !options.yes {
+        outln!("Take all four propellers off. Type off when they are.");
+        let mut typed = String::new();
+        stdin().lock().read_line(&mut typed)?;
+        if typed.trim() != "off" {
+            eprintln!("stampfly: with propellers on it is not examined");
+            return Ok(None);
+        }
+    }
+    let path = match (&options.port, Serial::candidates().as_slice()) {
+        (Some(path), _) => path.clone(),
+        (None, [only]) => only.clone(),
+        (None, found) => {
+            let found = if found.is_empty() { "none is there".into() } else { found.join(", ") };
+            eprintln!("stampfly: which port is the vehicle's? --port PORT; {found}");
+            return Ok(None);
+        }
+    };
+    let mut newcomer = Newcomer {
+        connect: |path| Serial::open(path, PLUGGED_IN),
+        path,
+        port: None,
+        keys: stdin().lock(),
+        screen: stdout().lock(),
+        begun: Instant::now(),
+        transcript: String::new(),
+    };
+    let mut chart = examine(&mut newcomer);
+    chart.transcript = newcomer.transcript;
+    Ok(Some(chart))
+}
