@@ -129,7 +129,10 @@ fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec
     eprintln!("no rustup target {}: using Debian's compiler instead", machine.target);
     provide(repository, &[&COMPILER, &LINKER])?;
     add(&["-Zbuild-std=core", "--config", &format!("target.{}.linker=\"ld.lld-22\"", machine.target)]);
-    add(&["--config", &format!("target.{}.rustflags=[\"-Clinker-flavor=ld.lld\",\"-Csymbol-mangling-version=v0\"]", machine.target)]);
+    add(&[
+        "--config",
+        &format!("target.{}.rustflags=[\"-Clinker-flavor=ld.lld\",\"-Csymbol-mangling-version=v0\"]", machine.target),
+    ]);
     Ok((inside(repository, debian_cargo(repository)), options))
 }
 
