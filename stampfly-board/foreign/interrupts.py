@@ -5,7 +5,7 @@ high-performance CPU, section "Interrupt Controller"); labwired routes sources t
 firmware writes. And the state of the sources, INTMTX_CORE0_INT_STATUS, is never anything but zero there, so that a handler finds
 nothing to handle.
 
-So every few cycles this looks at the sources, writes their state where the firmware reads it, and lets the line that PLIC_MX would take
+So every few cycles, and at every instruction while a software interrupt asks, this looks at the sources, writes their state where the firmware reads it, and lets the line that PLIC_MX would take
 interrupt the core: by a software interrupt that the firmware does not use, and by labwired's own route, for as long as one instruction
 takes. A core whose interrupts are off is not interrupted by that.
 """
@@ -32,6 +32,7 @@ QUICK = (22, 23)
 # The firmware uses software interrupts 0 and 1; this one is number 3.
 SPARE, SPARE_REGISTER = 25, FROM_CPU + 12
 CHUNK = 64
+SOON = 400
 # Sources other than the software interrupts are looked at every so many chunks.
 PATIENCE = 16
 
@@ -47,9 +48,17 @@ class Interrupts:
         for _ in range(cycles // CHUNK):
             self.sim.run_for(f"{CHUNK * 6250 // 1000}ns")
             self.chunks += 1
-            if self.chunks % PATIENCE == 0:
+            # What asked a moment ago may have been answered since: a handler that is called for nothing clears what comes next.
+            if self.slow or self.chunks % PATIENCE == 0:
                 self.slow = self._asking(number for number in SOURCES if number not in QUICK)
             self._interrupt(self.slow | self._asking(QUICK))
+            # A thread that has asked to be exchanged counts on not running on: until it is, every instruction may be interrupted.
+            for _ in range(SOON):
+                asking = self._asking(QUICK)
+                if not asking:
+                    break
+                self._interrupt(self.slow | asking)
+                self.sim.run_for("6ns")
 
     def _asking(self, numbers):
         asking = 0
