@@ -26,7 +26,8 @@ use repository::Repository;
 use std::process::ExitCode;
 use step::Step;
 
-/// In the order of `ci`: fast and frequent failures first. `panic-calls` and `memory` look at what `esp32` has built.
+/// In the order of `ci`: fast and frequent failures first. `foreign`, `panic-calls` and `memory` look at what
+/// `esp32` has built.
 const STEPS: &[Step] = &[
     Step::new("machine", "List the missing programs that the steps need", steps::machine::run),
     Step::new("fmt", "Check the formatting", steps::fmt::run),
@@ -55,6 +56,7 @@ const STEPS: &[Step] = &[
     ),
     Step::new("panic-proof", "Link the flight code without a panic handler", steps::panic_proof::run).beside(),
     Step::new("esp32", "Type-check the ESP32-S3 firmware, build it for the ESP32-C6", steps::esp32::run).beside(),
+    Step::new("foreign", "Run the ESP32-C6 firmware on an emulator that is not ours", steps::foreign::run).beside(),
     Step::new("memory", "Hold the firmware's (or FILE's) flash, memory and stack to their budgets", steps::memory::run)
         .beside()
         .accepting(&[Fix, File]),

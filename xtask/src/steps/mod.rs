@@ -21,6 +21,7 @@ pub mod features;
 pub mod figures;
 pub mod files;
 pub mod fmt;
+pub mod foreign;
 pub mod fuzz;
 pub mod golden;
 pub mod hals;
