@@ -8,6 +8,8 @@ use crate::VehicleConfig;
 use crate::schedule::Runnables;
 use crate::topics::{self, Id};
 use core::fmt;
+use core::mem::MaybeUninit;
+use stampfly_flight::FlightLoop;
 use stampfly_flight::golden::{self, GoldenError, PlayObserver, Report, Verdict};
 use stampfly_types::messages::{SelfTest, SelfTestVerdict};
 
@@ -35,19 +37,20 @@ pub fn play(bus: &mut topics::Bus, observer: &mut impl PlayObserver) -> Result<R
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome(pub Result<Report, GoldenError>);
 
-/// Plays the golden flight on a fresh bus, before anything can turn. Not inlined: it needs a whole vehicle of stack, and
-/// returns it.
+/// Plays the golden flight on a fresh bus, before anything can turn. The vehicle that flies it is made in `place`, because 25 kB
+/// are more than the stack should hold.
 ///
 /// ```
+/// use core::mem::MaybeUninit;
 /// use stampfly_board::{golden::self_test, topics::Bus};
-/// let outcome = self_test(&mut Bus::new());
+/// let outcome = self_test(&mut MaybeUninit::uninit(), &mut Bus::new());
 /// assert!(outcome.may_fly());
 /// assert_eq!(outcome.to_string(), "self test: every bit as recorded");
 /// ```
 #[inline(never)]
 #[must_use]
-pub fn self_test(bus: &mut topics::Bus) -> Outcome {
-    Outcome(play(bus, &mut ()))
+pub fn self_test<'b>(place: &'b mut MaybeUninit<FlightLoop<'b, Runnables>>, bus: &'b mut topics::Bus) -> Outcome {
+    Outcome(golden::play_in(place, bus, FLIGHT, &VehicleConfig::default(), TOLERANCE, &mut ()))
 }
 
 impl Outcome {

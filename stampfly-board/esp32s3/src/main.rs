@@ -69,7 +69,8 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
     #[cfg(feature = "esp32c6")]
     esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
-    let tested = self_test(&mut fresh_bus());
+    // On the heap, which the radio does not need yet: the stack would hold little else.
+    let tested = self_test(&mut Box::new_uninit(), &mut fresh_bus());
     esp_println::println!("{tested}");
     if !tested.may_fly() {
         cutoff::lock_out();
@@ -77,8 +78,7 @@ fn main() -> ! {
     start(chip, tested)
 }
 
-/// A bus for the self test, on the heap that the radio does not need yet: the stack has to hold a vehicle then. Not inlined,
-/// because it is made on the stack.
+/// A bus for the self test. Not inlined, because it is made on the stack.
 #[inline(never)]
 fn fresh_bus() -> Box<topics::Bus> {
     Box::new(topics::Bus::new())

@@ -13,6 +13,7 @@
 #![no_main]
 
 use core::hint::black_box;
+use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use stampfly_board::black_box::{BlackBox, RETENTION};
 use stampfly_board::link::Link;
@@ -44,7 +45,7 @@ extern "C" fn flight() {
     }
     vehicle();
     chips();
-    let _ = black_box(golden::self_test(&mut topics::Bus::new()));
+    let _ = black_box(golden::self_test(&mut MaybeUninit::uninit(), &mut topics::Bus::new()));
 }
 
 /// Everything between the sensors' topics and the motors', and the radio's end of the bus.

@@ -4,10 +4,11 @@ use stampfly_board::golden::{FLIGHT, Outcome, TOLERANCE, self_test};
 use stampfly_board::{VehicleConfig, schedule::Runnables, topics::Bus};
 use stampfly_flight::golden::{GoldenError, Report, Verdict, play};
 use stampfly_types::messages::SelfTestVerdict;
+use std::mem::MaybeUninit;
 
 #[test]
 fn this_machine_publishes_the_recorded_bits() {
-    let outcome = self_test(&mut Bus::new());
+    let outcome = self_test(&mut MaybeUninit::uninit(), &mut Bus::new());
     let report = outcome.0.expect("plays");
     assert_eq!((report.verdict, report.hash), (Verdict::Identical, 0x1b51_ccd3_4431_224a));
     assert!(outcome.may_fly());

@@ -16,7 +16,8 @@ pub use error::GoldenError;
 pub use format::{Writer, tables};
 
 use crate::newest::MAX_MESSAGE;
-use crate::{Assembled, Observer};
+use crate::{Assembled, FlightLoop, InPlace, Observer};
+use core::mem::MaybeUninit;
 use format::Entry;
 use heapless::Vec;
 use stampfly_bus::{Band, PublishWords, Schedule, Taps, TopicTable};
@@ -118,10 +119,23 @@ pub fn play<R: Schedule>(
     tolerance: f32,
     observer: &mut impl PlayObserver,
 ) -> Result<Report, GoldenError> {
+    play_in::<R>(&mut MaybeUninit::uninit(), bus, record, config, tolerance, observer)
+}
+
+/// As [`play`], for a stack that has no room for a vehicle: it is made in `place`.
+///
+/// # Errors
+/// As [`play`].
+pub fn play_in<'b, R: Schedule>(
+    place: &'b mut MaybeUninit<FlightLoop<'b, R>>,
+    bus: &'b mut R::Topics,
+    record: &[u8],
+    config: &R::Config,
+    tolerance: f32,
+    observer: &mut impl PlayObserver,
+) -> Result<Report, GoldenError> {
     let (header, entries) = format::open::<R>(record)?;
-    // Not taken apart by value: a second copy of a vehicle is more than some stacks have room for.
-    let mut assembled = Assembled::<R>::new(bus, None, config, header.start);
-    let Assembled { flight_loop, outside, taps } = &mut assembled;
+    let InPlace { flight_loop, mut outside, mut taps } = Assembled::in_place(place, bus, None, config, header.start);
     let (mut hash, mut output) = (FlightHash::new(), Vec::<u32, MAX_MESSAGE>::new());
     let mut drain = |observer: &mut _, hash: &mut FlightHash, output: &mut Vec<u32, MAX_MESSAGE>| {
         taps.drain(&mut |topic, at, generation, words| {
