@@ -8,9 +8,7 @@ use crate::VehicleConfig;
 use crate::schedule::Runnables;
 use crate::topics::{self, Id};
 use core::fmt;
-use core::mem::MaybeUninit;
-use stampfly_flight::FlightLoop;
-use stampfly_flight::golden::{self, GoldenError, PlayObserver, Report, Verdict};
+use stampfly_flight::golden::{self, GoldenError, Place, PlayObserver, Report, Verdict};
 use stampfly_types::messages::{SelfTest, SelfTestVerdict};
 
 /// The golden flight of this version.
@@ -37,8 +35,7 @@ pub fn play(bus: &mut topics::Bus, observer: &mut impl PlayObserver) -> Result<R
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome(pub Result<Report, GoldenError>);
 
-/// Plays the golden flight on a fresh bus, before anything can turn. The vehicle that flies it is made in `place`, because 25 kB
-/// are more than the stack should hold.
+/// Plays the golden flight on a fresh bus, before anything can turn, with a vehicle made in `place`: the stack should not hold it.
 ///
 /// ```
 /// use core::mem::MaybeUninit;
@@ -49,7 +46,7 @@ pub struct Outcome(pub Result<Report, GoldenError>);
 /// ```
 #[inline(never)]
 #[must_use]
-pub fn self_test<'b>(place: &'b mut MaybeUninit<FlightLoop<'b, Runnables>>, bus: &'b mut topics::Bus) -> Outcome {
+pub fn self_test<'b>(place: &'b mut Place<'b, Runnables>, bus: &'b mut topics::Bus) -> Outcome {
     Outcome(golden::play_in(place, bus, FLIGHT, &VehicleConfig::default(), TOLERANCE, &mut ()))
 }
 

@@ -122,12 +122,15 @@ pub fn play<R: Schedule>(
     play_in::<R>(&mut MaybeUninit::uninit(), bus, record, config, tolerance, observer)
 }
 
+/// Where [`play_in`] makes a vehicle.
+pub type Place<'b, R> = MaybeUninit<FlightLoop<'b, R>>;
+
 /// As [`play`], for a stack that has no room for a vehicle: it is made in `place`.
 ///
 /// # Errors
 /// As [`play`].
 pub fn play_in<'b, R: Schedule>(
-    place: &'b mut MaybeUninit<FlightLoop<'b, R>>,
+    place: &'b mut Place<'b, R>,
     bus: &'b mut R::Topics,
     record: &[u8],
     config: &R::Config,

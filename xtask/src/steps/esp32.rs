@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | S3, types | types, features, pins and borrows of the real firmware | machine code, linking, timing |
 //! | S3, a wrong pin | that the check above refuses one | |
+//! | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
 //! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
 //! | C6, image | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
 //! | C6, memory | that the same statics leave the S3's first core its stack | to the byte: code differs |
@@ -37,6 +38,8 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let format = repository.root.join(PACKAGE).join("Cargo.toml");
     run_program(repository.cargo().args(["fmt", "--check", "--manifest-path"]).arg(format))?;
     provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
+    let config = repository.root.join(PACKAGE).join(".cargo/config.toml");
+    flashes_fast(&fs::read_to_string(&config).map_err(|e| format!("{}: {e}", config.display()))?)?;
     let target = stand_in(repository)?;
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
@@ -44,6 +47,20 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let program = c6(repository)?;
     memory(&program)?;
     image(repository, &program)
+}
+
+/// What `cargo run` hands to espflash, whose own defaults are two wires at 40 MHz: a pass of the flight band would then take longer than
+/// its period (`cargo xtask cache`, with four times the time for a line).
+fn flashes_fast(config: &str) -> Result<(), Failure> {
+    let config: toml_edit::DocumentMut = config.parse().map_err(|e| format!("settings of cargo: {e}"))?;
+    let runner = config.get("target").and_then(|all| all.get("xtensa-esp32s3-none-elf")?.get("runner")?.as_str());
+    let runner = runner.ok_or("no runner for the S3")?;
+    let words: Vec<&str> = runner.split(' ').collect();
+    let lacking = |setting: &&[&str; 2]| !words.windows(2).any(|pair| pair == *setting);
+    match [["--flash-mode", "qio"], ["--flash-freq", "80mhz"]].iter().find(lacking) {
+        Some([option, value]) => Err(format!("the runner has no `{option} {value}`: {runner}")),
+        None => Ok(()),
+    }
 }
 
 /// The description of a target that says it is an S3.
@@ -163,7 +180,20 @@ fn image(repository: &Repository, program: &Path) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::is_about_the_pin;
+    use super::{flashes_fast, is_about_the_pin};
+
+    #[test]
+    fn slow_flash_is_refused() {
+        let runner =
+            |options: &str| format!("[target.xtensa-esp32s3-none-elf]\nrunner = \"espflash flash{options}\"\n");
+        assert!(flashes_fast(&runner(" --flash-mode qio --flash-freq 80mhz")).is_ok());
+        for options in
+            ["", " --flash-mode qio", " --flash-mode dio --flash-freq 80mhz", " --flash-mode qio --flash-freq 40mhz"]
+        {
+            assert!(flashes_fast(&runner(options)).is_err(), "{options}");
+        }
+        assert!(flashes_fast("").is_err());
+    }
 
     #[test]
     fn only_the_right_refusal_counts() {
