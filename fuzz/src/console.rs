@@ -33,6 +33,7 @@ pub fn console_line(data: &[u8]) {
             sensors: &sensors,
             profile: &profile,
             config: &mut config,
+            facts: &[],
         };
         let request = answer(line, Instant::from_secs(5), &mut console, &mut reply).expect("a String takes everything");
         assert!(reply.len() <= REPLY, "{line:?} is answered with {} bytes", reply.len());

@@ -88,14 +88,12 @@ impl<V: Visit> Examination<'_, V> {
             .map_or("unknown", |finding| finding.value)
             .to_owned();
         if self.chart.findings().next().is_none() {
-            let verdict = if blocks == "none" { Verdict::Pass } else { Verdict::Look };
-            let name = if blocks == "none" { "ready to arm" } else { "not-ready" };
-            self.chart.note(
-                name,
-                verdict,
-                format!("refused by: {blocks}"),
-                "the page about modes says what each means",
-            );
+            let seen = format!("refused by: {blocks}");
+            if blocks == "none" {
+                self.chart.pass("ready to arm", seen);
+            } else {
+                self.chart.note("not-ready", Verdict::Look, seen, "the page about modes says what each means");
+            }
         }
         Ok(())
     }
