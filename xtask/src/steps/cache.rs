@@ -6,7 +6,7 @@
 //! exact for the model. The model is: caches as esp-hal sets them up, both of them this core's alone, and this replay in place of the
 //! firmware, without drivers, executor and interrupts.
 
-use super::qemu::{MACHINES, Machine, PACKAGE, inside, program};
+use super::qemu::{CLOCK, MACHINES, Machine, PACKAGE, inside, program};
 use crate::arguments::Arguments;
 use crate::elf::Names;
 use crate::machine::{EMULATED_OTHERS, provide};
@@ -24,8 +24,6 @@ const IN_RAM: &str = "stampfly-board/esp32s3/in_ram.txt";
 /// What the emulator is given in `.cargo/config.toml`.
 const CONFIG: &str = ".cargo/config.toml";
 const SECONDS: &str = "300";
-/// Clock of the ESP32-S3, MHz.
-const CLOCK: f64 = 240.0;
 /// Clocks of the flash to read a line of 32 bytes over four wires: command 8, address 6, mode and waiting 6 (Winbond W25Q64JV, "Fast
 /// Read Quad I/O (EBh)"), data 64.
 const CLOCKS_A_LINE: f64 = 84.0;

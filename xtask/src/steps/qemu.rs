@@ -24,7 +24,7 @@ const END: &str = "<!-- end of instructions -->";
 /// A run takes some seconds. One that faulted would never end.
 const SECONDS: &str = "120";
 /// Clock of the ESP32-S3, MHz.
-const CLOCK: f64 = 240.0;
+pub const CLOCK: f64 = 240.0;
 /// An activation may use this part of its budget, because instructions are not cycles.
 const SHARE: f64 = 0.5;
 /// The flight band.

@@ -60,14 +60,6 @@ impl Cache {
     pub fn line_of(&self, address: u64) -> u64 {
         address >> self.line_bits << self.line_bits
     }
-
-    /// Gives up this many of every set's places, those unused for longest: what another core's program took meanwhile.
-    pub fn displace(&mut self, places: usize) {
-        let kept = self.ways.saturating_sub(places);
-        for set in self.places.chunks_mut(self.ways) {
-            set[kept..].fill(None);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -106,15 +98,5 @@ mod tests {
         assert_eq!((run(32 * 1024), run(32 * 1024)), (1024, 0));
         // An eighth more than it holds, and each line is gone by the time it is wanted again.
         assert_eq!((run(36 * 1024), run(36 * 1024)), (128, 1152));
-    }
-
-    #[test]
-    fn another_program_takes_places() {
-        let mut cache = Cache::new(SMALL);
-        let [a, b] = [0x100, 0x120];
-        assert!(cache.misses(a) && cache.misses(b));
-        cache.displace(1);
-        assert!(!cache.misses(b));
-        assert!(cache.misses(a));
     }
 }

@@ -5,7 +5,7 @@
 //! models of the two caches ([`cache`]) and writes what it has found ([`passes`]) into a file when the emulation ends. It is
 //! loaded by `cargo xtask cache`, which knows the program's addresses:
 //!
-//! `-plugin FILE,out=FILE,begins=ADDRESS,ground=ADDRESS,armed=ADDRESS,aside=ADDRESS,back=ADDRESS,code=START:END,constants=START:END,ram=START:END,displaced=PLACES`
+//! `-plugin FILE,out=FILE,begins=ADDRESS,ground=ADDRESS,armed=ADDRESS,aside=ADDRESS,back=ADDRESS,code=START:END,constants=START:END,ram=START:END`
 //!
 //! Addresses are hexadecimal; `ram` may be given many times. For QEMU 7.2 to 8.2, whose interface has version 1.
 
@@ -129,7 +129,6 @@ fn arguments<'a>(words: impl Iterator<Item = &'a str>) -> Option<(Layout, String
             "code" => layout.code = range(value)?,
             "constants" => layout.constants = range(value)?,
             "ram" => layout.ram.push(range(value)?),
-            "displaced" => layout.displaced = value.parse().ok()?,
             _ => return None,
         }
     }

@@ -24,8 +24,6 @@ pub struct Layout {
     pub aside_begins: u64,
     /// See there.
     pub aside_ends: u64,
-    /// Places of every set that something else has taken when a pass begins.
-    pub displaced: usize,
 }
 
 /// A pass.
@@ -129,8 +127,6 @@ impl Passes {
     }
 
     fn begin(&mut self) {
-        self.instructions.displace(self.layout.displaced);
-        self.data.displace(self.layout.displaced);
         self.current = Some(Pass::default());
         self.missed.clear();
     }
@@ -170,7 +166,6 @@ mod tests {
             ends_armed: 0x1200,
             aside_begins: 0x1300,
             aside_ends: 0x1400,
-            displaced: 0,
         }
     }
 
@@ -223,16 +218,5 @@ mod tests {
         passes.executes(0x1500);
         passes.executes(0x1100);
         assert_eq!(passes.done[0].code, 2);
-    }
-
-    #[test]
-    fn what_else_runs_takes_the_cache_away() {
-        let mut passes = Passes::new(Layout { displaced: 8, ..layout() });
-        for _ in 0..2 {
-            passes.executes(0x1000);
-            passes.executes(0x1500);
-            passes.executes(0x1100);
-        }
-        assert!(passes.done.iter().all(|pass| pass.code == 2), "{:?}", passes.done);
     }
 }
