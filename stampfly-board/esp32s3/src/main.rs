@@ -37,11 +37,10 @@ mod storage;
 use alloc::boxed::Box;
 use clock::Clock;
 use core::cell::RefCell;
-use core::convert::Infallible;
 use embassy_executor::Spawner;
 use embassy_futures::block_on;
 use esp_hal::clock::CpuClock;
-use esp_hal::peripherals::Peripherals;
+use esp_hal::peripherals::{FLASH, Peripherals};
 use esp_hal::ram;
 use esp_hal::timer::timg::TimerGroup;
 use memory::Memory;
@@ -53,6 +52,7 @@ use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_board::{VehicleConfig, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::{Assembled, FlightLoop, InPlace};
+use stampfly_link::Address;
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -63,12 +63,17 @@ fn main() -> ! {
     safe_state::hold_low();
     safe_state::deselect();
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
-    // For the radio, which wants 96 kB: memory the boot loader has done with, and what the S3's data cache leaves over.
-    esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
+    // For the radio, which wants 96 kB, and the log: memory the boot loader has done with, and what the S3's data cache leaves over.
     #[cfg(feature = "esp32s3")]
-    esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
+    {
+        esp_alloc::heap_allocator!(#[ram(reclaimed)] size: sizes::FIRST_HEAP);
+        esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
+    }
     #[cfg(feature = "esp32c6")]
-    esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
+    {
+        esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
+        esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
+    }
     // On the heap, which the radio does not need yet: the stack would hold little else.
     let tested = self_test(&mut Box::new_uninit(), &mut fresh_bus());
     esp_println::println!("{tested}");
@@ -84,27 +89,40 @@ fn fresh_bus() -> Box<topics::Bus> {
     Box::new(topics::Bus::new())
 }
 
-/// Assembles the vehicle and runs it. Apart from [`main`], so that the self test and this have the stack one after the
-/// other.
+/// What is stored, and what uses it.
+struct Stored {
+    storage: Storage,
+    config: VehicleConfig,
+    /// Parameters that cannot be used.
+    unusable: usize,
+    peer: Option<Address>,
+}
+
+/// What the tasks of the first core are given.
+struct Ground {
+    sensors: sensors::Parts,
+    people: people::Parts,
+    memory: (&'static RefCell<Memory>, topics::SupervisorEnds<'static>),
+    console: console::Parts,
+    radio: radio::Parts,
+}
+
+/// Assembles the vehicle and runs it. Apart from [`main`], so that the self test and this have the stack one after the other.
+///
+/// Executors never return, so what lies in a frame below them is never free again. Everything large is therefore made in a frame that
+/// is gone by then, and waits on the heap until its task has it.
 #[inline(never)]
 fn start(chip: Peripherals, tested: Outcome) -> ! {
     motors::start_unit(chip.LEDC);
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
-
-    let mut storage = Storage::open(chip.FLASH);
-    let mut config = VehicleConfig::default();
-    let unusable = block_on(storage.load(&mut config));
-    if unusable > 0 {
-        esp_println::println!("{unusable} stored parameters cannot be used; their defaults apply");
-    }
-    let peer = block_on(storage.load_peer());
-    let InPlace { flight_loop, mut outside, taps } = assemble(&config);
-    // Assembling takes the most stack of all. What only the tasks need lies in a frame that does not exist until it is over.
-    in_a_frame_of_its_own(move || {
+    let stored = stored(chip.FLASH);
+    let vehicle = assemble(&stored.config);
+    let (flight, ground) = in_a_frame_of_its_own(move || {
+        let Stored { storage, config, unusable, peer } = *stored;
+        let InPlace { flight_loop, mut outside, taps } = *vehicle;
         let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
         outside.self_test.self_test.publish(Clock.now(), &tested.message());
-        static MEMORY: StaticCell<RefCell<Memory>> = StaticCell::new();
-        let memory: &'static _ = MEMORY.init_with(|| RefCell::new(Memory::new(taps)));
+        let memory: &'static _ = Box::leak(Box::new(RefCell::new(Memory::new(taps))));
         static HEALTH: Healths = Healths::new();
         static PROFILE: Profile = Profile::new(&ACTIVATIONS);
         let pins: Pins<'static> = split_resources!(chip);
@@ -149,42 +167,60 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             tested,
             facts: facts::Facts::read(unusable),
         };
-        let supervisor = outside.supervisor;
-        let ground = move |spawner: Spawner| {
-            spawner.spawn(sensors::run(sensors).expect("spawned once"));
-            spawner.spawn(people::run(people).expect("spawned once"));
-            spawner.spawn(memory::run(memory, supervisor).expect("spawned once"));
-            spawner.spawn(console::run(console).expect("spawned once"));
-            spawner.spawn(radio::run(radio).expect("spawned once"));
-        };
-        let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
+        let ground = Ground { sensors, people, memory: (memory, outside.supervisor), console, radio };
+        (Box::new(flight), Box::new(ground))
+    });
+    let fly = move |spawner: Spawner| spawner.spawn(flight::run(*flight).expect("spawned once"));
 
-        #[cfg(feature = "esp32s3")]
-        {
-            cores::start_second(chip.CPU_CTRL, chip.FROM_CPU_INTR1, fly);
-            cores::run(ground)
-        }
-        #[cfg(feature = "esp32c6")]
-        cores::run(move |spawner| {
-            fly(spawner);
-            ground(spawner);
-        })
+    #[cfg(feature = "esp32s3")]
+    {
+        cores::start_second(chip.CPU_CTRL, chip.FROM_CPU_INTR1, fly);
+        cores::run(move |spawner| spawn(spawner, ground))
+    }
+    #[cfg(feature = "esp32c6")]
+    cores::run(move |spawner| {
+        fly(spawner);
+        spawn(spawner, ground);
     })
 }
 
-/// Runs the rest, apart from the caller's stack frame.
+/// Does it apart from the caller's stack frame.
 #[inline(never)]
-fn in_a_frame_of_its_own(rest: impl FnOnce() -> Infallible) -> ! {
-    match rest() {}
+fn in_a_frame_of_its_own<T>(what: impl FnOnce() -> T) -> T {
+    what()
 }
 
-/// Makes the bus and the vehicle on it. Apart from [`start`], whose stack the tasks' is on top of.
+/// Starts the tasks of the first core.
 #[inline(never)]
-fn assemble(config: &VehicleConfig) -> InPlace<'static, Runnables> {
+fn spawn(spawner: Spawner, ground: Box<Ground>) {
+    let Ground { sensors, people, memory, console, radio } = *ground;
+    spawner.spawn(sensors::run(sensors).expect("spawned once"));
+    spawner.spawn(people::run(people).expect("spawned once"));
+    spawner.spawn(memory::run(memory.0, memory.1).expect("spawned once"));
+    spawner.spawn(console::run(console).expect("spawned once"));
+    spawner.spawn(radio::run(radio).expect("spawned once"));
+}
+
+/// Reads what is stored.
+#[inline(never)]
+fn stored(flash: FLASH<'static>) -> Box<Stored> {
+    let mut storage = Storage::open(flash);
+    let mut config = VehicleConfig::default();
+    let unusable = block_on(storage.load(&mut config));
+    if unusable > 0 {
+        esp_println::println!("{unusable} stored parameters cannot be used; their defaults apply");
+    }
+    let peer = block_on(storage.load_peer());
+    Box::new(Stored { storage, config, unusable, peer })
+}
+
+/// Makes the bus and the vehicle on it.
+#[inline(never)]
+fn assemble(config: &VehicleConfig) -> Box<InPlace<'static, Runnables>> {
     static BUS: StaticCell<topics::Bus> = StaticCell::new();
     static FLIGHT_LOOP: StaticCell<FlightLoop<'static, Runnables>> = StaticCell::new();
     let bus = BUS.init_with(topics::Bus::new);
-    Assembled::in_place(FLIGHT_LOOP.uninit(), bus, None, config, Clock.now())
+    Box::new(Assembled::in_place(FLIGHT_LOOP.uninit(), bus, None, config, Clock.now()))
 }
 
 /// Executors, one a core.

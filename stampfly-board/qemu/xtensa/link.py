@@ -138,7 +138,7 @@ def main(arguments):
                 program.append(path)
     linked, optimised = f"{folder}/linked.bc", f"{folder}/program.bc"
     run("llvm-link-22", *program, "-o", linked)
-    run("opt-22", "-passes=internalize,globaldce,default<O3>", "--internalize-public-api-list=main,abort", linked,
+    run("opt-22", "-passes=internalize,globaldce,default<O2>", "--internalize-public-api-list=main,abort", linked,
         "-o", optimised)
     code = compile_module(optimised, f"{folder}/program")
     place_functions(f"{folder}/program.s", f"{folder}/functions.ld")

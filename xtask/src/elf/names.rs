@@ -8,7 +8,10 @@ use std::path::Path;
 
 /// A function.
 struct Function {
-    size: u64,
+    /// Where it is entered.
+    entry: u64,
+    /// What lies between it and the one before is its own, too: an Xtensa core has its constants there.
+    range: Range<u64>,
     /// As the compiler mangles it.
     mangled: String,
     name: String,
@@ -16,6 +19,7 @@ struct Function {
 
 /// Names by address, and the program's sections.
 pub struct Names {
+    /// By their ends.
     functions: BTreeMap<u64, Function>,
     sections: BTreeMap<String, Range<u64>>,
 }
@@ -26,24 +30,30 @@ impl Names {
         let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
         let bytes = std::fs::read(path).map_err(|e| fail(&e))?;
         let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
-        let functions = file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0);
-        let named = functions.map(|symbol| {
+        let mut symbols: Vec<_> =
+            file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0).collect();
+        symbols.sort_by_key(ObjectSymbol::address);
+        let mut functions = BTreeMap::new();
+        let mut before = symbols.first().map_or(0, ObjectSymbol::address);
+        for symbol in symbols {
+            let (entry, end) = (symbol.address(), symbol.address() + symbol.size());
             let mangled = symbol.name().unwrap_or_default().to_owned();
             let name = format!("{:#}", rustc_demangle::demangle(&mangled));
-            (symbol.address(), Function { size: symbol.size(), mangled, name })
-        });
+            functions.insert(end, Function { entry, range: before.min(entry)..end, mangled, name });
+            before = end;
+        }
         let sections = file.sections().filter_map(|section| {
             let range = section.address()..section.address() + section.size();
             Some((section.name().ok()?.to_owned(), range))
         });
-        Ok(Self { functions: named.collect(), sections: sections.collect() })
+        Ok(Self { functions, sections: sections.collect() })
     }
 
     /// Where the one function of this name begins.
     pub fn address(&self, name: &str) -> Result<u64, Failure> {
-        let mut found = self.functions.iter().filter(|(_, function)| function.name == name);
+        let mut found = self.functions.values().filter(|function| function.name == name);
         match (found.next(), found.next()) {
-            (Some((address, _)), None) => Ok(*address),
+            (Some(function), None) => Ok(function.entry),
             (None, _) => Err(format!("no function {name}")),
             (Some(_), Some(_)) => Err(format!("more than one function {name}")),
         }
@@ -54,16 +64,16 @@ impl Names {
         self.sections.get(name).cloned().ok_or_else(|| format!("no section {name}"))
     }
 
-    /// The function that this line of 32 bytes, or its end, belongs to.
+    /// The function that this line of 32 bytes, or its start, belongs to.
     pub fn of(&self, line: u64) -> &str {
-        let nearest = self.functions.range(..line + 32).next_back();
-        nearest.filter(|(start, function)| *start + function.size > line).map_or("no function", |(_, it)| &it.name)
+        let next = self.functions.range(line + 1..).next();
+        next.filter(|(_, function)| function.range.start < line + 32).map_or("no function", |(_, it)| &it.name)
     }
 
     /// The functions whose mangled names fit one of these patterns, as a linker script has them: `*` stands for anything.
     pub fn fitting(&self, patterns: &[&str]) -> Vec<Range<u64>> {
-        let fits = |function: &Function| patterns.iter().any(|pattern| fits(pattern, &function.mangled));
-        self.functions.iter().filter(|(_, function)| fits(function)).map(|(at, it)| *at..at + it.size).collect()
+        let fits = |function: &&Function| patterns.iter().any(|pattern| fits(pattern, &function.mangled));
+        self.functions.values().filter(fits).map(|it| it.range.clone()).collect()
     }
 }
 

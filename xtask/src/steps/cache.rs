@@ -35,8 +35,8 @@ const SHOWN: usize = 12;
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&EMULATED_OTHERS])?;
     let plugin = plugin(repository)?;
-    let in_ram = fs::read_to_string(repository.root.join(IN_RAM)).map_err(|e| format!("{IN_RAM}: {e}"))?;
-    let in_ram: Vec<&str> = in_ram.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+    let in_ram = in_ram(repository)?;
+    let in_ram: Vec<&str> = in_ram.iter().map(String::as_str).collect();
     let mut budget = Budget::read(repository, BUDGET)?;
     let mut failures = Vec::new();
     // An ARM core's code is another one's again; these two stand for the S3's.
@@ -60,6 +60,12 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         return budget.write();
     }
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
+}
+
+/// Patterns of the functions that the firmware keeps in RAM.
+pub fn in_ram(repository: &Repository) -> Result<Vec<String>, Failure> {
+    let list = fs::read_to_string(repository.root.join(IN_RAM)).map_err(|e| format!("{IN_RAM}: {e}"))?;
+    Ok(list.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned).collect())
 }
 
 /// Checks and builds the plug-in.

@@ -7,18 +7,18 @@
 //! | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
 //! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
 //! | C6, image | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
-//! | C6, memory | that the same statics leave the S3's first core its stack | to the byte: code differs |
+//! | S3, memory ([`s3_memory`](super::s3_memory)) | that the S3's first core is left a stack | to the byte: code differs |
 //!
 //! No stock compiler has inline assembly for Xtensa yet, so the first two present a 32-bit architecture that has it under
 //! the S3's target name; nothing it makes is ever run. The third builds the same code for another chip. Debian's compiler
 //! comes with the sources of its own core library, which both need, and is installed when it is missing.
 
-use super::esp32_link;
+use super::esp32_link::S3Scripts;
 use super::no_std::debian_cargo;
+use super::{esp32_link, s3_memory};
 use crate::arguments::Arguments;
 use crate::machine::{CLIPPY, COMPILER, LINKER, provide};
 use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
-use object::{Object, ObjectSection};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -43,9 +43,10 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let target = stand_in(repository)?;
     run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
-    esp32_link::run(repository, s3(repository, &target, "-Dwarnings"))?;
+    let scripts = s3_scripts(repository)?;
+    esp32_link::heap(repository, &scripts)?;
     let program = c6(repository)?;
-    memory(&program)?;
+    s3_memory::stack(repository, &program, &scripts)?;
     image(repository, &program)
 }
 
@@ -101,6 +102,14 @@ fn s3(repository: &Repository, target: &Path, arguments: &str) -> Command {
     cargo
 }
 
+/// What build scripts have made for the S3's linker.
+pub fn s3_scripts(repository: &Repository) -> Result<S3Scripts, Failure> {
+    provide(repository, &[&COMPILER, &CLIPPY])?;
+    let target = stand_in(repository)?;
+    let (messages, _) = capture(s3(repository, &target, "-Dwarnings").args(["--bins", "--message-format", "json"]))?;
+    S3Scripts::read(&messages)
+}
+
 /// A check that accepts everything would look just like one that found nothing.
 fn refuses_a_wrong_pin(mut cargo: Command) -> Result<(), Failure> {
     match capture(&mut cargo) {
@@ -135,30 +144,6 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
     run_program(&mut cargo)?;
     Ok(repository.target("esp32").join(C6).join("release/stampfly-esp32s3"))
-}
-
-/// The S3's data memory, which code in RAM shares (esp-hal's `ld/esp32s3/memory.x`: from 0x3FC88000 to 0x3FCDB700).
-const S3_MEMORY: u64 = 0x3FCD_B700 - 0x3FC8_8000;
-/// What the firmware sets aside: on the S3 the flight core's stack comes on top, and a part of the heap lies elsewhere.
-#[path = "../../../stampfly-board/esp32s3/src/sizes.rs"]
-pub mod sizes;
-/// The C6's memory, as its program's sections see it.
-const C6_MEMORY: std::ops::Range<u64> = 0x4080_0000..0x4088_0000;
-
-/// If what the C6 keeps in memory were in the S3's: how much would be left, for the first core's stack? What that has to
-/// suffice for is asked by the step `memory`.
-pub fn memory(program: &Path) -> Result<u64, Failure> {
-    let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", program.display());
-    let bytes = fs::read(program).map_err(|e| fail(&e))?;
-    let file = object::File::parse(&*bytes).map_err(|e| fail(&e))?;
-    // What is left over is the stack's, and the boot loader's memory is another region on the S3, too.
-    let kept = file.sections().filter(|section| !matches!(section.name(), Ok(".stack" | ".dram2_uninit")));
-    let kept: u64 = kept.filter(|section| C6_MEMORY.contains(&section.address())).map(|section| section.size()).sum();
-    let used = kept + sizes::FLIGHT_STACK as u64;
-    let left = (S3_MEMORY + sizes::SECOND_HEAP as u64).checked_sub(used);
-    let left = left.ok_or_else(|| format!("{used} bytes are more than the S3 has"))?;
-    println!("esp32c6: {kept} bytes of memory in use; on the S3 that would leave {left} bytes of stack");
-    Ok(left)
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.

@@ -7,14 +7,13 @@
 //! Stack is a bound, not a measurement: frames and calls come from the machine code. Interrupts come on top of it, which is
 //! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
-use super::esp32;
+use super::{esp32, s3_memory};
 use crate::arguments::Arguments;
 use crate::elf::stack::{Behind, Stack};
 use crate::elf::{C, CONSTANTS, Program, Sizes};
 use crate::ratchet::Budget;
 use crate::repository::{Failure, Repository};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
 /// What is called through pointers, by whom: estimation reaches the estimator that the parameters chose, the scheduler
@@ -40,10 +39,12 @@ const SHARE: f64 = 0.5;
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
     let program = Program::read(&path)?;
+    // What this program leaves of the S3's memory, not of the larger one it was built for.
+    let ground = s3_memory::stack(repository, &path, &esp32::s3_scripts(repository)?)?;
     let budget = Budget::read(repository, BUDGET)?;
     let mut ledger = Ledger { budget, fix: arguments.fix, held: BTreeSet::new(), failures: Vec::new() };
     sizes(&program, &mut ledger)?;
-    stacks(&path, &program, &mut ledger)?;
+    stacks(ground, &program, &mut ledger)?;
     ledger.close()
 }
 
@@ -125,9 +126,7 @@ fn rows_held<'a>(owners: &BTreeMap<&'a str, Sizes>) -> BTreeMap<&'a str, Sizes> 
     rows
 }
 
-fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failure> {
-    // What this program leaves of the S3's memory, not of the larger one it was built for.
-    let ground = esp32::memory(path)?;
+fn stacks(ground: u64, program: &Program, held: &mut Ledger) -> Result<(), Failure> {
     let mut stack = Stack::new(program, POINTERS, ROM)?;
     let mut elsewhere = BTreeSet::new();
     for (task, parts, core) in TASKS {
@@ -147,7 +146,7 @@ fn stacks(path: &Path, program: &Program, held: &mut Ledger) -> Result<(), Failu
             println!("    {frame:>6}  {:.100}", name);
         }
         let available = match core {
-            Core::Flight => esp32::sizes::FLIGHT_STACK as u64,
+            Core::Flight => s3_memory::sizes::FLIGHT_STACK as u64,
             Core::Ground => ground,
             Core::OnTopOfAssembly => continue,
         };

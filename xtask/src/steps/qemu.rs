@@ -11,11 +11,14 @@ use crate::ratchet::Budget;
 use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
 use crate::steps::no_std::debian_cargo;
 use std::fmt::Write;
+use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
 /// The program.
 pub const PACKAGE: &str = "stampfly-board/qemu";
+/// The firmware's manifest.
+const FIRMWARE: &str = "stampfly-board/esp32s3/Cargo.toml";
 const BUDGET: &str = "stampfly-board/qemu/budget.toml";
 /// The document the table is written into, and where.
 const DOCUMENT: &str = "README.md";
@@ -38,11 +41,12 @@ pub struct Machine {
     pub name: &'static str,
     /// As in the package's `.cargo/config.toml`.
     pub target: &'static str,
-    /// Does its code stand for the ESP32-S3's, in `cargo xtask cache`?
+    /// Does its code stand for the ESP32-S3's? Then it is optimised as the firmware, and `cargo xtask cache` follows it.
     pub stands_for_s3: bool,
 }
 
-const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf", stands_for_s3: true };
+/// The one whose code is most like the ESP32-S3's.
+pub const XTENSA: Machine = Machine { name: "Xtensa", target: "xtensa-none-elf", stands_for_s3: true };
 /// All of them.
 pub const MACHINES: [Machine; 3] = [
     Machine { name: "Cortex-M4F", target: "thumbv7em-none-eabihf", stands_for_s3: false },
@@ -112,6 +116,9 @@ fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec
     let mut options: Vec<String> =
         ["--quiet", "--release", "--locked", "--target-dir", &target_folder].map(str::to_owned).into();
     let mut add = |more: &[&str]| options.extend(more.iter().map(|option| (*option).to_owned()));
+    if machine.stands_for_s3 {
+        add(&["--config", &format!("profile.release.opt-level={}", optimisation(repository)?)]);
+    }
     if machine.target == XTENSA.target {
         provide(repository, &[&COMPILER, &LINKER, &XTENSA_BACK_END])?;
         let mut cargo = inside(repository, debian_cargo(repository));
@@ -134,6 +141,14 @@ fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec
         &format!("target.{}.rustflags=[\"-Clinker-flavor=ld.lld\",\"-Csymbol-mangling-version=v0\"]", machine.target),
     ]);
     Ok((inside(repository, debian_cargo(repository)), options))
+}
+
+/// How far the firmware is optimised: what stands for it is, too.
+fn optimisation(repository: &Repository) -> Result<i64, Failure> {
+    let path = repository.root.join(FIRMWARE);
+    let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let manifest: toml_edit::DocumentMut = text.parse().map_err(|e| format!("{}: {e}", path.display()))?;
+    manifest["profile"]["release"]["opt-level"].as_integer().ok_or(format!("{}: no opt-level", path.display()))
 }
 
 /// Runs in the package's folder: its own `.cargo/config.toml` says how it is run, and flags meant for the host would
