@@ -6,6 +6,7 @@ use crate::facts::Facts;
 use crate::memory::{Memory, restart};
 use crate::sensors::Healths;
 use crate::storage::{Storage, StorageError};
+use alloc::boxed::Box;
 use core::cell::RefCell;
 use core::fmt::{Display, Write as _};
 use embassy_futures::select::{Either, select};
@@ -52,8 +53,8 @@ pub struct Parts {
 
 /// Answers until power-off.
 #[embassy_executor::task]
-pub async fn run(parts: Parts) {
-    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested, facts } = parts;
+pub async fn run(parts: Box<Parts>) {
+    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested, facts } = *parts;
     let (mut keys, screen) = UsbSerialJtag::new(usb).into_async().split();
     let mut version = String::new();
     // A version that is too long ends early.

@@ -5,6 +5,7 @@ use crate::motors::Motors;
 use crate::pins::MotorPins;
 use crate::sensors::Healths;
 use crate::{imu_config, spi};
+use alloc::boxed::Box;
 use embassy_futures::join::join;
 use stampfly_board::console::Profile;
 use stampfly_board::schedule::Runnables;
@@ -30,8 +31,8 @@ pub struct Parts {
 
 /// Flies until power-off.
 #[embassy_executor::task]
-pub async fn run(parts: Parts) {
-    let Parts { flight_loop, mut imu, mut flow, mut duties, motors, spi, watchdog, health, profile } = parts;
+pub async fn run(parts: Box<Parts>) {
+    let Parts { flight_loop, mut imu, mut flow, mut duties, motors, spi, watchdog, health, profile } = *parts;
     let mut motors = Motors::new(motors, watchdog);
     let mut bus = spi::Bus::start(spi);
     let mut slots = Slots::new(Clock, devices::RHYTHM);

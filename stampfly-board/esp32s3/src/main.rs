@@ -98,13 +98,13 @@ struct Stored {
     peer: Option<Address>,
 }
 
-/// What the tasks of the first core are given.
+/// What the tasks of the first core are given. Boxed, because a task keeps its arguments as long as what it makes of them.
 struct Ground {
-    sensors: sensors::Parts,
-    people: people::Parts,
+    sensors: Box<sensors::Parts>,
+    people: Box<people::Parts>,
     memory: (&'static RefCell<Memory>, topics::SupervisorEnds<'static>),
-    console: console::Parts,
-    radio: radio::Parts,
+    console: Box<console::Parts>,
+    radio: Box<radio::Parts>,
 }
 
 /// Assembles the vehicle and runs it. Apart from [`main`], so that the self test and this have the stack one after the other.
@@ -126,7 +126,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         static HEALTH: Healths = Healths::new();
         static PROFILE: Profile = Profile::new(&ACTIVATIONS);
         let pins: Pins<'static> = split_resources!(chip);
-        let flight = flight::Parts {
+        let flight = Box::new(flight::Parts {
             flight_loop,
             imu: outside.imu,
             flow: outside.flow,
@@ -136,8 +136,8 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             watchdog,
             health: &HEALTH,
             profile: &PROFILE,
-        };
-        let sensors = sensors::Parts {
+        });
+        let sensors = Box::new(sensors::Parts {
             unit: chip.I2C0,
             pins: pins.i2c,
             range: pins.range,
@@ -147,15 +147,15 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             baro: outside.baro,
             power: outside.power,
             health: &HEALTH,
-        };
-        let people = people::Parts {
+        });
+        let people = Box::new(people::Parts {
             pulses: chip.RMT,
             pins: pins.people,
             indicator: outside.indicator,
             button: outside.button_pin,
-        };
-        let radio = radio::Parts { unit: chip.WIFI, peer, ends: outside.link };
-        let console = console::Parts {
+        });
+        let radio = Box::new(radio::Parts { unit: chip.WIFI, peer, ends: outside.link });
+        let console = Box::new(console::Parts {
             usb: chip.USB_DEVICE,
             memory,
             health: &HEALTH,
@@ -166,11 +166,11 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             config,
             tested,
             facts: facts::Facts::read(unusable),
-        };
+        });
         let ground = Ground { sensors, people, memory: (memory, outside.supervisor), console, radio };
-        (Box::new(flight), Box::new(ground))
+        (flight, ground)
     });
-    let fly = move |spawner: Spawner| spawner.spawn(flight::run(*flight).expect("spawned once"));
+    let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
 
     #[cfg(feature = "esp32s3")]
     {
@@ -192,8 +192,8 @@ fn in_a_frame_of_its_own<T>(what: impl FnOnce() -> T) -> T {
 
 /// Starts the tasks of the first core.
 #[inline(never)]
-fn spawn(spawner: Spawner, ground: Box<Ground>) {
-    let Ground { sensors, people, memory, console, radio } = *ground;
+fn spawn(spawner: Spawner, ground: Ground) {
+    let Ground { sensors, people, memory, console, radio } = ground;
     spawner.spawn(sensors::run(sensors).expect("spawned once"));
     spawner.spawn(people::run(people).expect("spawned once"));
     spawner.spawn(memory::run(memory.0, memory.1).expect("spawned once"));

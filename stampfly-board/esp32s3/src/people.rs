@@ -3,6 +3,7 @@
 use crate::buzzer::Channel;
 use crate::clock::Clock;
 use crate::pins::PeoplePins;
+use alloc::boxed::Box;
 use embassy_time::{Duration, Ticker};
 use esp_hal::Blocking;
 use esp_hal::gpio::{Input, InputConfig, Level, Output, OutputConfig, Pull};
@@ -31,8 +32,8 @@ pub struct Parts {
 
 /// Shows, sounds and listens for ever.
 #[embassy_executor::task]
-pub async fn run(parts: Parts) {
-    let Parts { pulses, pins, mut indicator, mut button } = parts;
+pub async fn run(parts: Box<Parts>) {
+    let Parts { pulses, pins, mut indicator, mut button } = *parts;
     let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
     // Stays on: what this returns can be dropped.
     Output::new(pins.status_light_supply, Level::High, OutputConfig::default());

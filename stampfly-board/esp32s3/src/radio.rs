@@ -4,6 +4,7 @@
 //! one from being received.
 
 use crate::clock::Clock;
+use alloc::boxed::Box;
 use core::cell::RefCell;
 use embassy_futures::join::join;
 use embassy_time::{Duration, Ticker};
@@ -29,8 +30,8 @@ pub struct Parts {
 
 /// Receives and sends until power-off.
 #[embassy_executor::task]
-pub async fn run(parts: Parts) {
-    let Parts { unit, peer, ends } = parts;
+pub async fn run(parts: Box<Parts>) {
+    let Parts { unit, peer, ends } = *parts;
     // A station without an access point would sleep between packets and miss the pilot's.
     let config = ControllerConfig::default().with_sta_disconnected_pm(false);
     let controller = WifiController::new(unit, config).expect("the radio starts");

@@ -6,6 +6,7 @@
 use crate::clock::Clock;
 use crate::i2c;
 use crate::pins::{I2cPins, RangePins};
+use alloc::boxed::Box;
 use embassy_futures::join::join5;
 use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
 use esp_hal::peripherals::I2C0;
@@ -71,8 +72,8 @@ pub struct Parts {
 
 /// Reads them until power-off.
 #[embassy_executor::task]
-pub async fn run(parts: Parts) {
-    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power, health } = parts;
+pub async fn run(parts: Box<Parts>) {
+    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power, health } = *parts;
     let mut bus = SharedI2c::new(i2c::Bus::start(unit, pins).await);
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = bus.split();
     let asleep = |pin: AnyPin<'static>| Output::new(pin, Level::Low, OutputConfig::default());
