@@ -50,6 +50,7 @@ use crate::time::{Standstill, sleep_until, within};
 use core::cell::Cell;
 use core::fmt::{self, Debug, Display};
 use core::future::poll_fn;
+use core::pin::pin;
 use core::task::{Poll, Waker};
 use embedded_hal_async::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use stampfly_types::{Duration, Instant};
@@ -319,7 +320,8 @@ impl<D: ErrorType, T> ErrorType for Guest<'_, D, T> {
 impl<D: SpiDevice, T: Timebase + Clone> SpiDevice for Guest<'_, D, T> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
         let _turn = self.slots.open(self.longest).await;
-        let outcome = within(&mut self.slots.clock.clone(), self.longest, self.device.transaction(operations)).await;
+        let outcome =
+            within(&mut self.slots.clock.clone(), self.longest, pin!(self.device.transaction(operations))).await;
         outcome.ok_or(SlotError::TooLong)?.map_err(SlotError::Device)
     }
 }

@@ -4,6 +4,7 @@
 pub mod codec;
 
 use codec::{Motion, Step, register};
+use core::pin::pin;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 #[cfg(feature = "embassy-time")]
 pub use stampfly_driver_core::EmbassyClock;
@@ -292,7 +293,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             Operation::DelayNs(ADDRESS_TO_DATA),
             Operation::Read(&mut bytes),
         ];
-        bounded(&mut self.clock, self.limit.of(BURST), self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, self.limit.of(BURST), pin!(self.device.transaction(&mut operations))).await?;
         if let Some(motion) = Motion::decode(&bytes) {
             return Ok(motion);
         }
@@ -305,7 +306,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         let mut bytes = [0];
         let mut operations =
             [Operation::Write(&[register]), Operation::DelayNs(ADDRESS_TO_DATA), Operation::Read(&mut bytes)];
-        bounded(&mut self.clock, self.limit.of(BURST), self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, self.limit.of(BURST), pin!(self.device.transaction(&mut operations))).await?;
         self.wait(AFTER_READ).await;
         let [value] = bytes;
         Ok(value)
@@ -319,7 +320,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
 
     async fn write(&mut self, register: u8, value: u8) -> Result<(), ChipError<S::Error>> {
         let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(WRITE_HOLD)];
-        bounded(&mut self.clock, self.limit.of(BURST), self.device.transaction(&mut operations)).await?;
+        bounded(&mut self.clock, self.limit.of(BURST), pin!(self.device.transaction(&mut operations))).await?;
         self.wait(AFTER_WRITE).await;
         Ok(())
     }

@@ -4,6 +4,7 @@ use super::{ChipError, TransferLimit};
 use crate::Timebase;
 use crate::time::{Standstill, sleep_until, within};
 use core::fmt::Debug;
+use core::pin::pin;
 use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
 use stampfly_types::{Duration, Instant};
@@ -202,7 +203,7 @@ impl<R, T: Timebase> Port<R, T> {
     {
         self.check_clock()?;
         let mut bytes = [0; N];
-        bounded(&mut self.clock, self.limit.of(N), self.registers.read(register, &mut bytes)).await?;
+        bounded(&mut self.clock, self.limit.of(N), pin!(self.registers.read(register, &mut bytes))).await?;
         Ok(bytes)
     }
 
@@ -227,7 +228,7 @@ impl<R, T: Timebase> Port<R, T> {
         R: Registers<A>,
     {
         self.check_clock()?;
-        bounded(&mut self.clock, self.limit.of(data.len()), self.registers.write(register, data)).await
+        bounded(&mut self.clock, self.limit.of(data.len()), pin!(self.registers.write(register, data))).await
     }
 
     /// For whoever waits again and again without a transfer in between.
@@ -252,7 +253,7 @@ impl<R, T: Timebase> Port<R, T> {
     /// The outcome of a future, or `None` when it is not there at `instant`; it is dropped then.
     pub async fn until<F: Future>(&mut self, instant: Instant, future: F) -> Option<F::Output> {
         let left = instant.since(self.now());
-        within(&mut self.clock, left, future).await
+        within(&mut self.clock, left, pin!(future)).await
     }
 
     /// Leaves the chip alone until then; returns at once when that has passed.
@@ -273,6 +274,9 @@ impl<I, T> Port<I2cRegisters<I>, T> {
 }
 
 /// A transfer, given up after `limit`: for a driver whose chip has no registers that fit [`Registers`].
+///
+/// Hand it over pinned where memory is scarce: an `async fn` keeps room for what it is given beside what it makes of it, so each layer
+/// that passes a transfer on by value doubles its size.
 ///
 /// # Errors
 /// [`ChipError::BusTimeout`] then, and [`ChipError::Bus`] when the transfer itself fails.
