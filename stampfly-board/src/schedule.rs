@@ -14,28 +14,28 @@ stampfly_bus::schedule! {
     pub struct Runnables on crate::topics from VehicleConfig;
 
     /// State estimation.
-    estimation = Estimation: on sensor_imu, flight, 320 us;
+    estimation = Estimation: on sensor_imu, flight, 580 us;
     /// Anomaly detection.
-    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 45 us;
+    failsafe = Failsafe: after estimation or at latest 5 ms, flight, 86 us;
     /// Take-off and landing manager.
-    landing = Landing: after failsafe, flight, 30 us;
+    landing = Landing: after failsafe, flight, 48 us;
     /// State management: the only place where the vehicle changes state.
-    mode = Mode: after landing, flight, 60 us;
+    mode = Mode: after landing, flight, 130 us;
     /// Navigator: every set-point there is.
-    navigation = Navigation: after mode, flight, 240 us;
+    navigation = Navigation: after mode, flight, 230 us;
     /// Control.
-    control = Control: after navigation or at latest 10 ms, flight, 100 us;
+    control = Control: after navigation or at latest 10 ms, flight, 190 us;
     /// Mixer, motor curve, motor output.
     actuation = Actuation: after control, flight, 40 us;
 
     /// Still-calibration.
-    calibration = Calibration: every 20 ms, background, 100 us;
+    calibration = Calibration: every 20 ms, background, 142 us;
     /// Command arbitration.
-    command = Command: every 20 ms, background, 30 us;
+    command = Command: every 20 ms, background, 42 us;
     /// Button gestures.
-    button = Button: every 20 ms, background, 10 us;
+    button = Button: every 20 ms, background, 22 us;
     /// Lights and sound.
-    notification = Notification: every 33 ms, background, 20 us;
+    notification = Notification: every 33 ms, background, 84 us;
     /// Downlink.
-    telemetry = Telemetry: every 20 ms, background, 30 us;
+    telemetry = Telemetry: every 20 ms, background, 85 us;
 }

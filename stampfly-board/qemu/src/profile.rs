@@ -144,7 +144,12 @@ impl Observer for Profile<'_> {
         self.pass += self.runnable;
         self.ran = true;
         self.runnable = 0;
-        self.write(|record| record.finished(activation));
+        self.write(|record| {
+            for _ in 0..=activation.record().index {
+                marks::counts();
+            }
+            record.finished(activation);
+        });
         self.since = machine::ticks();
     }
 }

@@ -3,10 +3,11 @@
 //! Code that is not in the cache is fetched from flash, a line at a time, and the core waits. A pass runs through more code than the cache
 //! holds, so that is most of its time; `cargo xtask qemu`, which counts instructions, does not see it. Here the golden flight is played
 //! once more, with a plug-in of QEMU (`stampfly-board/qemu/cache`) that follows every instruction through the caches. Its counts are
-//! exact for the model. The model is: caches as esp-hal sets them up, both of them this core's alone, and this replay in place of the
+//! exact for the model. Each runnable's longest activation is held to its budget, which the analysis of the schedule takes for granted. The
+//! model is: caches as esp-hal sets them up, both of them this core's alone, and this replay in place of the
 //! firmware, without drivers, executor and interrupts.
 
-use super::qemu::{CLOCK, MACHINES, Machine, PACKAGE, inside, program};
+use super::qemu::{CLOCK, Count, MACHINES, Machine, PACKAGE, counts, inside, program};
 use crate::arguments::Arguments;
 use crate::elf::Names;
 use crate::machine::{EMULATED_OTHERS, provide};
@@ -48,9 +49,10 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         let ram = names.fitting(&in_ram);
         unmatched.retain(|pattern| names.fitting(&[pattern]).is_empty());
         println!("{}: {} bytes of code in RAM", machine.name, ram.iter().map(|it| it.end - it.start).sum::<u64>());
-        let said = follow(repository, machine, &plugin, &program, &names, &ram)?;
+        let (said, counted) = follow(repository, machine, &plugin, &program, &names, &ram)?;
         let found = Found::read(&said)?;
         found.print(machine, &names);
+        failures.extend(found.beyond_budget(machine, &counts(&counted)?)?);
         for (figure, measured, unit) in found.figures() {
             if arguments.fix {
                 budget.set(&[machine.name, figure], measured)?;
@@ -88,7 +90,7 @@ fn plugin(repository: &Repository) -> Result<PathBuf, Failure> {
     Ok(target.join("release/libstampfly_qemu_cache.so"))
 }
 
-/// Plays the flight with the plug-in and returns what it writes.
+/// Plays the flight with the plug-in. Returns what that writes, and what the program says.
 fn follow(
     repository: &Repository,
     machine: &Machine,
@@ -96,7 +98,7 @@ fn follow(
     program: &Path,
     names: &Names,
     ram: &[Range<u64>],
-) -> Result<String, Failure> {
+) -> Result<(String, String), Failure> {
     let out = repository.target("qemu-cache").join(format!("{}.txt", machine.name));
     // Of an earlier run.
     let _ = fs::remove_file(&out);
@@ -108,6 +110,7 @@ fn follow(
         ("armed", "pass_ends_armed"),
         ("aside", "aside_begins"),
         ("back", "aside_ends"),
+        ("counts", "counts"),
     ] {
         words += &format!(",{word}={:x}", mark(name)?);
     }
@@ -122,8 +125,9 @@ fn follow(
     let (emulator, options) = runner.split_first().ok_or("no emulator")?;
     let mut limited = inside(repository, repository.command("timeout"));
     limited.args([SECONDS, emulator, "-plugin", &words]).args(options).arg(program);
-    capture(&mut limited)?;
-    fs::read_to_string(&out).map_err(|e| format!("{}: {e}", out.display()))
+    let (said, _) = capture(&mut limited)?;
+    let found = fs::read_to_string(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    Ok((found, said))
 }
 
 /// How the machine is run.
@@ -135,14 +139,14 @@ fn runner(repository: &Repository, machine: &Machine) -> Result<Vec<String>, Fai
     Ok(words.iter().filter_map(|word| word.as_str()).map(str::to_owned).collect())
 }
 
-/// A pass in which the motors may turn.
-struct Pass {
+/// What a pass or an activation takes.
+struct Cost {
     instructions: f64,
     /// Lines fetched, of code and of constants.
     lines: f64,
 }
 
-impl Pass {
+impl Cost {
     /// Microseconds, at an instruction a clock.
     fn time(&self) -> f64 {
         self.instructions / CLOCK + self.lines * CLOCKS_A_LINE / FLASH_CLOCK
@@ -151,22 +155,31 @@ impl Pass {
 
 /// What the plug-in has found.
 struct Found {
-    passes: Vec<Pass>,
+    /// Passes in which the motors may turn.
+    passes: Vec<Cost>,
+    /// The longest activation of each runnable, us, by its place in the schedule.
+    activations: BTreeMap<usize, f64>,
     /// Misses in those passes, by the address of the line.
     lines: BTreeMap<u64, f64>,
 }
 
 impl Found {
     fn read(said: &str) -> Result<Self, Failure> {
-        let mut found = Self { passes: Vec::new(), lines: BTreeMap::new() };
+        let mut found = Self { passes: Vec::new(), activations: BTreeMap::new(), lines: BTreeMap::new() };
         for line in said.lines() {
             let words: Vec<&str> = line.split(' ').collect();
             let number = |text: &str| text.parse::<f64>().map_err(|e| format!("{line}: {e}"));
+            let cost = |instructions: &str, code: &str, constants: &str| -> Result<Cost, Failure> {
+                Ok(Cost { instructions: number(instructions)?, lines: number(code)? + number(constants)? })
+            };
             match words[..] {
-                ["pass", "1", instructions, code, constants] => found
-                    .passes
-                    .push(Pass { instructions: number(instructions)?, lines: number(code)? + number(constants)? }),
+                ["pass", "1", instructions, code, constants] => found.passes.push(cost(instructions, code, constants)?),
                 ["pass", "0", ..] => {}
+                ["activation", place, instructions, code, constants] => {
+                    let place = place.parse().map_err(|e| format!("{line}: {e}"))?;
+                    let most: &mut f64 = found.activations.entry(place).or_default();
+                    *most = most.max(cost(instructions, code, constants)?.time());
+                }
                 ["line", address, misses] => {
                     let address = u64::from_str_radix(address, 16).map_err(|e| format!("{line}: {e}"))?;
                     found.lines.insert(address, number(misses)?);
@@ -179,15 +192,36 @@ impl Found {
         if plausible { Ok(found) } else { Err(format!("{} passes of a whole flight", found.passes.len())) }
     }
 
+    /// Compares each runnable's longest activation with its budget, which the analysis of the schedule takes for granted. `counted` is in the
+    /// schedule's order.
+    fn beyond_budget(&self, machine: &Machine, counted: &[Count]) -> Result<Vec<Failure>, Failure> {
+        let runnables: Vec<(&str, f64)> =
+            counted.iter().filter_map(|count| Some((count.name.as_str(), count.budget?))).collect();
+        // Before the flight the program watches an activation of nobody, to know what watching takes.
+        let activations = self.activations.range(..runnables.len());
+        if activations.clone().count() != runnables.len() {
+            return Err(format!("{} of {} runnables ran", activations.count(), runnables.len()));
+        }
+        let mut failures = Vec::new();
+        println!("{}: longest activation and budget, us", machine.name);
+        for ((name, budget), longest) in runnables.into_iter().zip(activations.map(|(_, longest)| longest)) {
+            println!("{name:<14} {longest:6.0} {budget:6.0}");
+            if *longest > budget {
+                failures.push(format!("{}: {name} may take {longest:.0} us of its {budget}", machine.name));
+            }
+        }
+        Ok(failures)
+    }
+
     /// Name, figure and unit of what is held.
     fn figures(&self) -> [(&'static str, f64, &'static str); 4] {
-        let mean = |of: fn(&Pass) -> f64| self.passes.iter().map(of).sum::<f64>() / self.passes.len() as f64;
-        let most = |of: fn(&Pass) -> f64| self.passes.iter().map(of).fold(0.0, f64::max);
+        let mean = |of: fn(&Cost) -> f64| self.passes.iter().map(of).sum::<f64>() / self.passes.len() as f64;
+        let most = |of: fn(&Cost) -> f64| self.passes.iter().map(of).fold(0.0, f64::max);
         [
-            ("lines_mean", mean(|pass| pass.lines), "lines fetched in an armed pass"),
-            ("lines_most", most(|pass| pass.lines), "lines fetched in an armed pass"),
-            ("us_mean", mean(Pass::time), "us an armed pass"),
-            ("us_most", most(Pass::time), "us an armed pass"),
+            ("lines_mean", mean(|cost| cost.lines), "lines fetched in an armed pass"),
+            ("lines_most", most(|cost| cost.lines), "lines fetched in an armed pass"),
+            ("us_mean", mean(Cost::time), "us an armed pass"),
+            ("us_most", most(Cost::time), "us an armed pass"),
         ]
     }
 
@@ -210,7 +244,9 @@ mod tests {
     use super::*;
 
     fn said(passes: usize) -> String {
-        "pass 0 9000 9 9\n".to_owned() + &"pass 1 2400 10 0\n".repeat(passes) + "pass 1 4800 90 10\nline 80001000 7\n"
+        "pass 0 9000 9 9\n".to_owned()
+            + &"pass 1 2400 10 0\n".repeat(passes)
+            + "pass 1 4800 90 10\nactivation 0 240 0 0\nactivation 1 240 0 0\nactivation 0 2400 90 10\nline 80001000 7\n"
     }
 
     #[test]
@@ -220,6 +256,20 @@ mod tests {
         assert_eq!((mean, most), (10.45, 100.0));
         assert_eq!(longest, 20.0 + 105.0);
         assert_eq!(found.lines, BTreeMap::from([(0x8000_1000, 7.0)]));
+    }
+
+    #[test]
+    fn an_activation_has_its_budget() {
+        let found = Found::read(&said(199)).expect("understood");
+        let count = |name: &str, budget| Count { name: name.to_owned(), budget, mean: 1.0, most: 1.0 };
+        // 10 us of instructions and 105 of lines.
+        let enough = [count("a", Some(115.1)), count("b", Some(1.1)), count("chain", None)];
+        assert_eq!(found.beyond_budget(&MACHINES[1], &enough), Ok(vec![]));
+        let short = [count("a", Some(114.0)), count("b", Some(1.1))];
+        assert_eq!(found.beyond_budget(&MACHINES[1], &short).expect("all ran").len(), 1);
+        // A third one never ran.
+        let three = [count("a", Some(200.0)), count("b", Some(9.0)), count("c", Some(9.0))];
+        assert!(found.beyond_budget(&MACHINES[1], &three).is_err());
     }
 
     #[test]

@@ -166,13 +166,13 @@ fn bits(said: &str) -> Vec<&str> {
 
 /// What something took on a machine.
 #[derive(Clone, Debug, PartialEq)]
-struct Count {
-    name: String,
+pub struct Count {
+    pub name: String,
     /// Of its activation, us; `None` when it is no runnable.
-    budget: Option<f64>,
+    pub budget: Option<f64>,
     /// Instructions.
-    mean: f64,
-    most: f64,
+    pub mean: f64,
+    pub most: f64,
 }
 
 impl Count {
@@ -190,7 +190,7 @@ impl Count {
 }
 
 /// Everything that was counted.
-fn counts(said: &str) -> Result<Vec<Count>, Failure> {
+pub fn counts(said: &str) -> Result<Vec<Count>, Failure> {
     let counts: Vec<Count> = said.lines().filter_map(Count::read).collect();
     // Nothing counted would be within every budget.
     let complete = counts.iter().any(|count| count.name == CHAIN) && counts.iter().any(|count| count.budget.is_some());

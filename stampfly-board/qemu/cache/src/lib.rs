@@ -5,7 +5,7 @@
 //! models of the two caches ([`cache`]) and writes what it has found ([`passes`]) into a file when the emulation ends. It is
 //! loaded by `cargo xtask cache`, which knows the program's addresses:
 //!
-//! `-plugin FILE,out=FILE,begins=ADDRESS,ground=ADDRESS,armed=ADDRESS,aside=ADDRESS,back=ADDRESS,code=START:END,constants=START:END,ram=START:END`
+//! `-plugin FILE,out=FILE,begins=ADDRESS,ground=ADDRESS,armed=ADDRESS,aside=ADDRESS,back=ADDRESS,counts=ADDRESS,code=START:END,constants=START:END,ram=START:END`
 //!
 //! Addresses are hexadecimal; `ram` may be given many times. For QEMU 7.2 to 8.2, whose interface has version 1.
 
@@ -126,6 +126,7 @@ fn arguments<'a>(words: impl Iterator<Item = &'a str>) -> Option<(Layout, String
             "armed" => layout.ends_armed = address(value)?,
             "aside" => layout.aside_begins = address(value)?,
             "back" => layout.aside_ends = address(value)?,
+            "counts" => layout.counts = address(value)?,
             "code" => layout.code = range(value)?,
             "constants" => layout.constants = range(value)?,
             "ram" => layout.ram.push(range(value)?),

@@ -24,13 +24,13 @@ pub struct Layout {
     pub aside_begins: u64,
     /// See there.
     pub aside_ends: u64,
+    /// Mark: an activation is over. Executed while aside, once more often than its place in the schedule says.
+    pub counts: u64,
 }
 
-/// A pass.
+/// What something took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Pass {
-    /// May the motors turn?
-    pub armed: bool,
+pub struct Cost {
     /// Instructions.
     pub instructions: u64,
     /// Lines of code that had to be fetched.
@@ -39,15 +39,43 @@ pub struct Pass {
     pub constants: u64,
 }
 
+impl Cost {
+    /// What was added since `earlier`.
+    fn since(self, earlier: Self) -> Self {
+        Self {
+            instructions: self.instructions - earlier.instructions,
+            code: self.code - earlier.code,
+            constants: self.constants - earlier.constants,
+        }
+    }
+}
+
+/// Instructions, lines of code, lines of constants.
+impl Display for Cost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} {}", self.instructions, self.code, self.constants)
+    }
+}
+
 /// Follows a program.
 #[derive(Debug)]
 pub struct Passes {
     layout: Layout,
     instructions: Cache,
     data: Cache,
-    current: Option<Pass>,
+    /// Of everything so far.
+    total: Cost,
+    /// The total when the present pass began.
+    pass: Option<Cost>,
     aside: bool,
-    done: Vec<Pass>,
+    /// Passes that are over. May the motors turn?
+    passes: Vec<(bool, Cost)>,
+    /// The total when the last activation was over, or the pass began.
+    activation: Cost,
+    /// How often its mark was seen.
+    counted: usize,
+    /// Activations that are over, with their places in the schedule.
+    activations: Vec<(usize, Cost)>,
     /// Lines missed in the present pass.
     missed: Vec<u64>,
     /// How often each line was missed in armed passes.
@@ -67,9 +95,13 @@ impl Passes {
             layout,
             instructions: Cache::new(Shape::INSTRUCTIONS),
             data: Cache::new(Shape::DATA),
-            current: None,
+            total: Cost::default(),
+            pass: None,
             aside: false,
-            done: Vec::new(),
+            passes: Vec::new(),
+            activation: Cost::default(),
+            counted: 0,
+            activations: Vec::new(),
             missed: Vec::new(),
             by_line: BTreeMap::new(),
         }
@@ -87,13 +119,14 @@ impl Passes {
             self.aside = true;
         } else if address == self.layout.aside_ends {
             self.aside = false;
+            self.activation_is_over();
+        } else if address == self.layout.counts {
+            self.counted += 1;
         }
         if self.aside {
             return;
         }
-        if let Some(pass) = &mut self.current {
-            pass.instructions += 1;
-        }
+        self.total.instructions += 1;
         if self.layout.code.contains(&address) {
             self.fetches(address);
         }
@@ -109,44 +142,53 @@ impl Passes {
         } else if self.layout.constants.contains(&address)
             && !self.layout.is_in_ram(address)
             && self.data.misses(address)
-            && let Some(pass) = &mut self.current
         {
-            pass.constants += 1;
+            self.total.constants += 1;
             self.missed.push(self.data.line_of(address));
         }
     }
 
     fn fetches(&mut self, address: u64) {
-        if !self.layout.is_in_ram(address)
-            && self.instructions.misses(address)
-            && let Some(pass) = &mut self.current
-        {
-            pass.code += 1;
+        if !self.layout.is_in_ram(address) && self.instructions.misses(address) {
+            self.total.code += 1;
             self.missed.push(self.instructions.line_of(address));
         }
     }
 
     fn begin(&mut self) {
-        self.current = Some(Pass::default());
+        self.pass = Some(self.total);
+        self.activation = self.total;
         self.missed.clear();
     }
 
     fn end(&mut self, armed: bool) {
-        let Some(pass) = self.current.take() else { return };
-        self.done.push(Pass { armed, ..pass });
+        let Some(before) = self.pass.take() else { return };
+        self.passes.push((armed, self.total.since(before)));
+        self.activation = self.total;
         if armed {
             for line in self.missed.drain(..) {
                 *self.by_line.entry(line).or_default() += 1;
             }
         }
     }
+
+    /// What was aside is over; an activation only when its mark was seen meanwhile.
+    fn activation_is_over(&mut self) {
+        if let Some(place) = std::mem::take(&mut self.counted).checked_sub(1) {
+            self.activations.push((place, self.total.since(self.activation)));
+            self.activation = self.total;
+        }
+    }
 }
 
-/// One line a pass, then one a line of memory: `pass ARMED INSTRUCTIONS CODE CONSTANTS`, `line ADDRESS MISSES`.
+/// One line a pass, then one an activation, then one a line of memory: `pass ARMED COST`, `activation PLACE COST`, `line ADDRESS MISSES`.
 impl Display for Passes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for Pass { armed, instructions, code, constants } in &self.done {
-            writeln!(f, "pass {} {instructions} {code} {constants}", u8::from(*armed))?;
+        for (armed, cost) in &self.passes {
+            writeln!(f, "pass {} {cost}", u8::from(*armed))?;
+        }
+        for (place, cost) in &self.activations {
+            writeln!(f, "activation {place} {cost}")?;
         }
         self.by_line.iter().try_for_each(|(line, misses)| writeln!(f, "line {line:x} {misses}"))
     }
@@ -166,6 +208,7 @@ mod tests {
             ends_armed: 0x1200,
             aside_begins: 0x1300,
             aside_ends: 0x1400,
+            counts: 0x1480,
         }
     }
 
@@ -186,8 +229,8 @@ mod tests {
         }
         passes.executes(0x1700);
         // The mark itself, 0x1600 and the second constant; 0x1800 is in RAM, 0x5000 no flash.
-        let first = Pass { armed: true, instructions: 6, code: 2, constants: 1 };
-        assert_eq!(passes.done, [first, Pass { code: 0, constants: 0, ..first }]);
+        let first = Cost { instructions: 6, code: 2, constants: 1 };
+        assert_eq!(passes.passes, [(true, first), (true, Cost { code: 0, constants: 0, ..first })]);
         assert_eq!(passes.to_string().lines().last(), Some("line 2600 1"));
     }
 
@@ -211,12 +254,30 @@ mod tests {
     }
 
     #[test]
+    fn an_activation_is_what_its_mark_was_counted_for() {
+        let mut passes = Passes::new(layout());
+        passes.executes(0x1000);
+        passes.executes(0x1500);
+        // Something that is written aside and ends no activation.
+        for address in [0x1300, 0x1400] {
+            passes.executes(address);
+        }
+        passes.executes(0x1600);
+        for address in [0x1300, 0x1480, 0x1480, 0x1480, 0x1400, 0x1700, 0x1300, 0x1480, 0x1400] {
+            passes.executes(address);
+        }
+        // An instruction is counted after its mark: what returns from aside belongs to what follows.
+        let cost = |instructions, code| Cost { instructions, code, constants: 0 };
+        assert_eq!(passes.activations, [(2, cost(4, 4)), (0, cost(2, 1))]);
+    }
+
+    #[test]
     fn literals_come_through_the_cache_of_instructions() {
         let mut passes = Passes::new(layout());
         passes.executes(0x1000);
         passes.reads(0x1500);
         passes.executes(0x1500);
         passes.executes(0x1100);
-        assert_eq!(passes.done[0].code, 2);
+        assert_eq!(passes.passes[0].1.code, 2);
     }
 }
