@@ -142,9 +142,8 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let wanted = match state.phase {
         FlightPhase::IdleGround => {
             // A program or a click holds the place: they have no sticks.
-            let click = facts.button == Some(ButtonGesture::Click);
             state.pending = None;
-            let program = facts.asked.flies() || click;
+            let program = facts.asked.flies() || facts.click_arms();
             Some(pilot.mode.filter(|_| !program).unwrap_or(FlightMode::PosHold))
         }
         FlightPhase::Armed | FlightPhase::Flying => {
@@ -272,7 +271,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             (level && (state.inverted || given_up)) || waited(config.flip_timeout)
         }
         Event::Arm => {
-            let wanted = asked.arm || pilot.switch.rises || facts.button == Some(ButtonGesture::Click);
+            let wanted = asked.arm || pilot.switch.rises || facts.click_arms();
             let refused = kill() || asked.disarm || asked.land || pilot.switch.falls || facts.pressed();
             wanted && !refused && arming::blocks(config, state, facts).is_empty()
         }

@@ -90,6 +90,8 @@ pub struct Facts {
     pub stop_button: bool,
     /// A gesture on the button that stopped nothing.
     pub button: Option<ButtonGesture>,
+    /// A click does not arm: something blocked that when the button was pressed.
+    pub click_is_void: bool,
     /// The cut-off has stopped the motors.
     pub cut_off: bool,
     /// Cosine of the tilt; less than zero is upside down.
@@ -124,6 +126,7 @@ impl Facts {
             sticks: input.sticks,
             stop_button,
             button,
+            click_is_void: false,
             cut_off: input.cut_off,
             upright: frame::cos_tilt(&input.estimate.attitude),
             at_rest: input.estimate.angular_rate.norm_squared() < REST_RATE * REST_RATE
@@ -141,6 +144,12 @@ impl Facts {
     #[must_use]
     pub fn throttle_rests(&self, config: &ModeConfig) -> bool {
         self.pilot.frame.as_ref().is_some_and(|(_, input)| input.throttle <= config.throttle_rest)
+    }
+
+    /// Does a click ask for arming?
+    #[must_use]
+    pub fn click_arms(&self) -> bool {
+        self.button == Some(ButtonGesture::Click) && !self.click_is_void
     }
 
     /// Has the button just been pressed, by a person at the vehicle?

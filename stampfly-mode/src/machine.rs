@@ -22,7 +22,8 @@ pub struct ModeOutput {
     pub flight_status: FlightStatus,
     /// What the estimator is to do.
     pub estimator: EstimatorCommand,
-    /// Arming was asked for in this step and refused; [`ModeMachine::refusals`] says why.
+    /// Arming was asked for in this step and refused; [`ModeMachine::refusals`] says why. A click of the button is also refused when
+    /// something blocked arming as it was pressed.
     pub refused: bool,
 }
 
@@ -53,6 +54,8 @@ pub struct ModeMachine {
     state: State,
     transmitter: Transmitter,
     stop_button: StopButton,
+    /// Something blocked arming when the button was pressed.
+    blocked_when_pressed: bool,
     refusals: Refusals,
 }
 
@@ -88,7 +91,10 @@ impl ModeMachine {
         // The button is on the vehicle: a gesture on an armed one means that it is held in a hand.
         let stop_button = self.stop_button.stops(now, self.config.button_release, input.button, armed);
         let button = self.stop_button.unused(input.button);
-        let facts = Facts::read(now, input, pilot, armed, stop_button, button);
+        let mut facts = Facts::read(now, input, pilot, armed, stop_button, button);
+        // A click is known half a second after the button was let go. Whoever pressed it saw a vehicle that would not arm, and has perhaps
+        // taken hold of it when a transmitter comes on meanwhile.
+        facts.click_is_void = self.blocked_when_pressed;
 
         let State { phase, unacknowledged, pairing, .. } = self.state;
         advance(&self.config, &mut self.state, &facts);
@@ -107,6 +113,9 @@ impl ModeMachine {
             self.refusals.step(&self.config, &checked, &facts);
             self.refusals.iter().fold(ArmBlocks::NONE, |blocks, refusal| blocks | refusal.check)
         };
+        if input.button == Some(ButtonGesture::Press) {
+            self.blocked_when_pressed = blocks != ArmBlocks::NONE;
+        }
         // A landing makes its own thrust, in every mode.
         let lands = state.phase == FlightPhase::Landing;
         let is_thrust = state.mode.is_manual() && state.commander == CommandSource::Pilot && !lands;

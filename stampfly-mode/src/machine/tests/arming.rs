@@ -67,6 +67,22 @@ fn a_vehicle_that_hears_neither_pilot_nor_program_does_not_arm() {
 }
 
 #[test]
+fn a_click_counts_only_when_nothing_blocked_arming_as_the_button_went_down() {
+    let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+    let mut gesture = |alerts, gesture| {
+        world.alerts = alerts;
+        world.button = Some(gesture);
+        let output = world.step(&mut machine, &[]);
+        (output.flight_status.armed, output.refused)
+    };
+    assert_eq!(gesture(Alerts::COMM_LOST, ButtonGesture::Press), (false, false));
+    // The transmitter comes on before the click is known.
+    assert_eq!(gesture(Alerts::NONE, ButtonGesture::Click), (false, true));
+    assert_eq!(gesture(Alerts::NONE, ButtonGesture::Press), (false, false));
+    assert_eq!(gesture(Alerts::NONE, ButtonGesture::Click), (true, false));
+}
+
+#[test]
 fn a_mode_that_holds_height_does_not_arm_without_one() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
     world.estimate.valid = Validity::TILT;
