@@ -70,7 +70,8 @@ pub fn start(group: TIMG1<'static>, report: Option<CutoffStateTx<'static>>) -> &
     &WATCHDOG
 }
 
-/// Stops the motors until the next power-on.
+/// Stops the motors until the next power-on. Not inlined, as [`stand_down`] is not, so that `cargo xtask panic-calls` finds it.
+#[inline(never)]
 pub fn lock_out() {
     WATCHDOG.lock_out();
     safe_state::cut();
@@ -81,6 +82,7 @@ const WRITE_KEY: u32 = 0x50D8_3AA1;
 
 /// Keeps the watchdog from restarting a vehicle that has stopped on purpose. Writes registers and takes no lock: the driver's own
 /// function asks for the clock tree, which whoever panicked may have held.
+#[inline(never)]
 pub fn stand_down() {
     let registers = TIMG1::regs();
     // SAFETY: `Watch` may be in the middle of feeding it, on the other core too; a watchdog that is off needs no feeding, and

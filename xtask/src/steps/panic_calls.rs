@@ -3,6 +3,9 @@
 //! `panic-proof` links the flight code alone; this looks at what the firmware made of it, drivers and their waiting
 //! included, in the ESP32-C6 program. A call belongs to the source file that it passes on: what the
 //! manufacturer's library does inside one of our generic functions is that library's. A call that tells no place is ours.
+//!
+//! Panics remain in what starts the vehicle. What they do before their message must not hang, so it may call nobody: whoever panicked may
+//! hold any lock.
 
 use super::esp32;
 use crate::arguments::Arguments;
@@ -21,11 +24,29 @@ const ALLOWED: [(&str, &str, &str); 3] = [
     ("/esp32c6-", "panic_bounds_check", "the manufacturer's table of registers: every pin has one"),
 ];
 
+/// What a panic does to motors and watchdog.
+const AT_A_PANIC: [&str; 2] = ["stampfly_esp32s3::cutoff::lock_out", "stampfly_esp32s3::cutoff::stand_down"];
+/// Calls the manufacturer's drivers.
+const CONTROL: &str = "stampfly_esp32s3::cutoff::__esp_hal_internal_look";
+/// The program's own crate.
+const FIRMWARE: &str = "stampfly_esp32s3";
+
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
     let libraries = repository.libraries()?.into_iter().filter(|library| library.bare_metal);
     let flight = libraries.map(|library| library.name).filter(|name| !NOT_FLIGHT.contains(&name.as_str()));
-    let found = calls(&Program::read(&path)?, &flight.map(|name| name.replace('-', "_")).collect());
+    let program = Program::read(&path)?;
+    for function in AT_A_PANIC {
+        let strangers = strangers(&program, function)?;
+        if !strangers.is_empty() {
+            return Err(format!("{function}, which a panic calls, may wait for {strangers:?}"));
+        }
+    }
+    if strangers(&program, CONTROL)?.is_empty() {
+        return Err(format!("{CONTROL} calls nobody: is the program read as it should be?"));
+    }
+    println!("a panic waits for nobody before its message");
+    let found = calls(&program, &flight.map(|name| name.replace('-', "_")).collect());
     // Nothing to be found would look just like nothing found.
     if let Some((place, callee, _)) = ALLOWED.iter().find(|row| !found.iter().any(|call| call.is_allowed_by(row))) {
         return Err(format!("no call of `{callee}` from `{place}` is left: is the program read as it should be?"));
@@ -35,6 +56,28 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     let said: Vec<String> =
         ours.iter().map(|call| format!("{:.150} calls {} at {}", call.caller, call.callee, call.place)).collect();
     if said.is_empty() { Ok(()) } else { Err(said.join("\n  ")) }
+}
+
+/// What a function of the firmware calls that is not the firmware's own, at any depth.
+fn strangers(program: &Program, name: &str) -> Result<BTreeSet<String>, Failure> {
+    let root = program.symbols.iter().find(|(_, symbol)| symbol.name == name && symbol.code.is_some());
+    let (root, _) = root.ok_or_else(|| format!("no function {name}"))?;
+    let (mut found, mut seen, mut open) = (BTreeSet::new(), BTreeSet::new(), vec![*root]);
+    while let Some(address) = open.pop() {
+        let Some((start, symbol)) = program.at(address) else {
+            found.insert(program.outside(address));
+            continue;
+        };
+        if !seen.insert(start) {
+            continue;
+        }
+        let Some(code) = symbol.code.as_ref().filter(|code| symbol.owner == FIRMWARE && code.indirect == 0) else {
+            found.insert(symbol.name.clone());
+            continue;
+        };
+        open.extend(&code.calls);
+    }
+    Ok(found)
 }
 
 /// A call of something that panics.
@@ -85,6 +128,20 @@ mod tests {
             ("stampfly_eskf::other", 0, &[], 0),
         ]);
         assert_eq!(calls(&program, &["stampfly_eskf".to_owned()].into()), [call("", BOUNDS)].into());
+    }
+
+    #[test]
+    fn a_panic_may_call_the_firmware_alone() {
+        let program = program(&[
+            ("stampfly_esp32s3::cutoff::lock_out", 0, &[32], 0),
+            ("stampfly_esp32s3::safe_state::cut", 0, &[], 0),
+            ("stampfly_esp32s3::cutoff::stand_down", 0, &[64], 0),
+            ("stampfly_esp32s3::other", 0, &[80], 0),
+            ("esp_hal::Wdt::new", 0, &[], 0),
+        ]);
+        assert!(strangers(&program, AT_A_PANIC[0]).expect("found").is_empty());
+        assert_eq!(strangers(&program, AT_A_PANIC[1]).expect("found"), ["esp_hal::Wdt::new".to_owned()].into());
+        assert!(strangers(&program, CONTROL).is_err());
     }
 
     #[test]
