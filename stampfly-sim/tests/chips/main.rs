@@ -11,6 +11,7 @@ mod ina3221;
 mod interrupt_pin;
 mod pmw3901;
 mod vl53l3cx;
+mod wire;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};

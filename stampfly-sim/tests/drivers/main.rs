@@ -16,6 +16,7 @@ mod neighbours;
 #[path = "../hover/pilot.rs"]
 mod pilot;
 mod pmw3901;
+mod polarity;
 mod self_tests;
 mod slots;
 mod spi;
