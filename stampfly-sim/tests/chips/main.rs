@@ -9,6 +9,7 @@ mod compensation;
 mod floating_select;
 mod ina3221;
 mod interrupt_pin;
+mod latency;
 mod pmw3901;
 mod vl53l3cx;
 mod wire;

@@ -193,6 +193,34 @@ fn the_first_transfer_after_reset_is_wrong_on_an_esp32_s3_unless_a_byte_to_nobod
     assert_eq!(first_identity(Controller::LevelFirst, false), 0x49);
 }
 
+/// A chip that answers what time it is and was when it took a byte.
+#[derive(Debug, Default)]
+struct Watch(u64);
+
+impl Chip for Watch {
+    fn read(&mut self, _: u16, _: Instant) -> u16 {
+        0
+    }
+    fn write(&mut self, _: u16, _: u16, _: Instant) {}
+    fn reset(&mut self, _: Instant) {}
+    fn set_id(&mut self, _: u16) {}
+}
+
+impl SpiChip for Watch {
+    const HIGHEST_CLOCK: u32 = 1_000_000;
+    fn answer(&mut self, _: usize, now: Instant) -> u8 {
+        assert!(now.as_micros() >= self.0, "time goes back");
+        (now.as_micros() as u8).wrapping_add(self.0 as u8)
+    }
+    fn take(&mut self, _: usize, _: u8, now: Instant) {
+        assert!(now.as_micros() >= self.0, "time goes back");
+        self.0 = now.as_micros();
+    }
+    fn release(&mut self, now: Instant) {
+        assert!(now.as_micros() >= self.0, "time goes back");
+    }
+}
+
 /// A part of a transfer.
 #[derive(Clone, Debug)]
 enum Part {
@@ -227,7 +255,7 @@ fn played(
     (controller, modes): (Controller, [Mode; 4]),
     errors: f64,
     edge_by_edge: bool,
-) -> (Vec<(Vec<u8>, Instant)>, [u64; 4]) {
+) -> (Vec<(Vec<u8>, Instant)>, [u64; 5]) {
     let simulation = standing();
     let (world, clock) = (&simulation.world, &simulation.clock);
     let bus = SpiBus::new(clock, 1);
@@ -241,6 +269,8 @@ fn played(
     let (imu, _) = bus.attach(10_000_000, Bmi270::new(world, clock, 1, 1.0, &[1]));
     let (baro, _) = bus.attach(7_000_000, Bmp280::new(world, clock, 1));
     let (mag, _) = bus.attach(3_300_000, Bmm150::new(world, clock, 1));
+    let (watch, _) = bus.attach(700_000, Watch::default());
+    let mut watch = watch.with_mode(modes[0]);
     let (mut flow, mut imu) = (flow.with_mode(modes[0]), imu.with_mode(modes[1]));
     let (mut baro, mut mag) = (baro.with_mode(modes[2]), mag.with_mode(modes[3]));
     wait(&simulation, 50_000);
@@ -268,18 +298,20 @@ fn played(
             0 => flow.transaction(&mut operations),
             1 => imu.transaction(&mut operations),
             2 => baro.transaction(&mut operations),
-            _ => mag.transaction(&mut operations),
+            3 => mag.transaction(&mut operations),
+            _ => watch.transaction(&mut operations),
         };
         outcome.unwrap();
         wait(&simulation, *pause);
         (buffers.concat(), clock.now())
     });
     let read = read.collect();
-    (read, [flow.rising_edges(), imu.rising_edges(), baro.rising_edges(), mag.rising_edges()])
+    let [a, b, c] = [flow.rising_edges(), imu.rising_edges(), baro.rising_edges()];
+    (read, [a, b, c, mag.rising_edges(), watch.rising_edges()])
 }
 
 fn asked() -> impl Strategy<Value = Vec<Asked>> {
-    vec((0..4usize, vec(part(), 0..5), 0..200u64), 1..40)
+    vec((0..5usize, vec(part(), 0..5), 0..200u64), 1..40)
 }
 
 fn plain_mode() -> impl Strategy<Value = Mode> {
