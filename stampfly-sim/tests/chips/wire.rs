@@ -318,6 +318,10 @@ fn plain_mode() -> impl Strategy<Value = Mode> {
     prop_oneof![Just(MODE_0), Just(MODE_3)]
 }
 
+fn any_mode() -> impl Strategy<Value = Mode> {
+    prop_oneof![Just(MODE_0), Just(MODE_1), Just(MODE_2), Just(MODE_3)]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
@@ -340,5 +344,18 @@ proptest! {
         prop_assert_eq!(&bytes, &played(&transfers, bus, errors, true));
         // And the controller makes no difference.
         prop_assert_eq!(&bytes, &played(&transfers, (Controller::LevelFirst, [mode; 4]), errors, true));
+    }
+
+    #[test]
+    fn whatever_the_modes_a_transfer_takes_as_long_and_has_eight_edges_a_byte_or_one_more(
+        transfers in asked(), modes in [any_mode(), any_mode(), any_mode(), any_mode()],
+    ) {
+        let (plain, expected) = played(&transfers, (Controller::LevelFirst, [MODE_3; 4]), 0.0, false);
+        let (seen, edges) = played(&transfers, (Controller::LevelWithTransfer, modes), 0.0, false);
+        let ends = |transfers: &[(Vec<u8>, Instant)]| transfers.iter().map(|transfer| transfer.1).collect::<Vec<_>>();
+        prop_assert_eq!(ends(&plain), ends(&seen));
+        let more = edges.iter().zip(expected).map(|(edges, expected)| edges.checked_sub(expected));
+        let more: Option<u64> = more.sum();
+        prop_assert!(more.is_some_and(|more| more <= transfers.len() as u64), "{:?}, {:?}", edges, expected);
     }
 }

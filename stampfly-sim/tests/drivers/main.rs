@@ -9,6 +9,7 @@ mod bmp280;
 #[path = "../chips/compensation.rs"]
 mod compensation;
 mod display;
+mod flow_restarts;
 mod ina3221;
 mod linux;
 mod mounting;
