@@ -10,6 +10,25 @@ use crate::world::World;
 use embedded_hal::spi::{MODE_3, Mode};
 
 /// How a processor drives the two chips on SPI.
+///
+/// ```
+/// use embedded_hal::spi::{MODE_0, Operation, SpiDevice};
+/// use stampfly_sim::chips::{Board, SpiSetup, stand_in_image};
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Instant;
+///
+/// // The inertial sensor in another mode than the flow sensor, on an ESP32-S3.
+/// let setup = SpiSetup { imu: (MODE_0, 10_000_000), ..SpiSetup::default() };
+/// let config = SimulationConfig::example();
+/// let Simulation { world, clock, .. } = Simulation::new(&config);
+/// let Board { mut imu, mut flow, .. } = Board::on(&setup, &world, &clock, &config, &stand_in_image());
+/// clock.advance_to(Instant::from_millis(50));
+/// imu.write(&[0x80, 0, 0])?;
+/// let mut id = [0];
+/// flow.transaction(&mut [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)])?;
+/// assert_ne!(id, [0x49], "the clock rose under the selected chip");
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpiSetup {
     /// When it sets the level at which the clock idles.

@@ -11,6 +11,23 @@ use stampfly_types::Duration;
 ///
 /// On SPI, a transfer of which the processor does every part itself is one that its task does not give way in: other
 /// tasks wait, and no deadline can end it.
+///
+/// ```
+/// use embedded_hal::spi::{Operation, SpiDevice};
+/// use stampfly_sim::chips::{Latency, Pmw3901, SpiBus};
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Duration;
+///
+/// let simulation = Simulation::new(&SimulationConfig::example());
+/// let clock = simulation.clock.clone();
+/// let bus = SpiBus::new(&clock, 1);
+/// let (mut port, _) = bus.attach(2_000_000, Pmw3901::new(&simulation.world, &clock, 1));
+/// bus.set_latency(Latency { wake: Duration::from_micros(105), ..Latency::default() });
+/// let (begun, mut id) = (clock.now(), [0]);
+/// port.transaction(&mut [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)])?;
+/// assert_eq!(clock.now().since(begun), Duration::from_micros(4 + 105 + 35 + 4 + 105), "woken after each operation");
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
     /// Before the first bit of each transfer: taking the bus, setting it up.
