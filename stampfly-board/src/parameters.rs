@@ -2,14 +2,12 @@
 //!
 //! One line per parameter: name, range, unit, field, meaning. Ranges exclude what no vehicle could fly with, and where one
 //! value has to stay below another their ranges do not overlap. Defaults are the fields' own. The log stores every
-//! value, so a replay flies with the parameters of the flight. [`stampfly_flight::parameters`] finds and changes them by
-//! name.
+//! value, so a replay flies with the parameters of the flight. [`stampfly_flight::parameters`] finds and changes them by name.
 
 use crate::config::{ControllerKind, EstimatorKind, VehicleConfig};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters, Value};
 
-/// The name in flash of the transmitter the vehicle is paired with: the six bytes of its address as one value, so that a
-/// power cut cannot leave half of an address.
+/// The name in flash of the transmitter the vehicle is paired with: all of its address is one value, which no power cut can halve.
 pub const PEER: &str = "link.peer";
 
 /// A line of the table.

@@ -1,11 +1,11 @@
 //! The SPI bus: the inertial sensor and the flow sensor, each with its own speed and chip select.
 //!
-//! Both are in mode 3, for the unit changes the clock's idle level only when a transfer begins. After a transfer in mode 0 the clock would
+//! Both are in [one mode](devices::SPI_MODE), for the unit changes the clock's idle level only when a transfer begins. After a transfer in mode 0 the clock would
 //! rise with the flow sensor already selected, which would take that for a bit (the S3's SPI with a chip select of the program's:
 //! esp-idf issue 12543). The inertial sensor takes either mode, by the clock's level when it is selected (BMI270 data sheet,
 //! section 7.1).
 //!
-//! Transfers go by DMA. A transfer that is dropped half-way releases its chip, so that the next one finds the bus in
+//! Long transfers go by DMA. A transfer that is dropped half-way releases its chip, so that the next one finds the bus in
 //! order. Both chips are deselected before the first transfer, or the one nobody talks to would talk, too. Who transfers
 //! when is decided by [slots](stampfly_drivers::slot); the lock here is never waited for.
 
@@ -13,6 +13,7 @@ use crate::clock::Clock;
 use crate::pins::SpiPins;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
+use embedded_hal::spi::{Phase, Polarity};
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 use esp_hal::Async;
@@ -24,14 +25,19 @@ use esp_hal::spi::master::{Config, Spi, SpiDma};
 use esp_hal::spi::{Error, Mode};
 use esp_hal::time::Rate;
 use esp_hal::{dma_rx_buffer, dma_tx_buffer};
+use stampfly_board::devices;
 
 /// The longest transfer is a chunk of the inertial sensor's configuration with its address.
 const LONGEST: usize = 512;
-/// Transfers up to this are done by the processor: setting the DMA up would take longer, and what waits for its interrupt has a deadline.
-/// A flow sensor's burst is twelve bytes.
-const SHORT: usize = 16;
-/// A pause up to this is spun away, ns: an alarm of the executor's comes later than these are long.
-const SPUN: u32 = 50_000;
+/// [`devices::SPI_SPUN`], ns.
+const SPUN: u32 = devices::SPI_SPUN.as_micros() as u32 * 1_000;
+/// The unit's name for the mode.
+const MODE: Mode = match (devices::SPI_MODE.polarity, devices::SPI_MODE.phase) {
+    (Polarity::IdleLow, Phase::CaptureOnFirstTransition) => Mode::_0,
+    (Polarity::IdleLow, Phase::CaptureOnSecondTransition) => Mode::_1,
+    (Polarity::IdleHigh, Phase::CaptureOnFirstTransition) => Mode::_2,
+    (Polarity::IdleHigh, Phase::CaptureOnSecondTransition) => Mode::_3,
+};
 
 /// What the bus is made of. It is started where it is used, so that its interrupts come there.
 pub struct Parts {
@@ -93,18 +99,17 @@ impl Bus {
     }
 }
 
-/// BMI270: 10 MHz.
 fn imu_config() -> Config {
-    config(Rate::from_mhz(10))
+    config(devices::SPI_CLOCKS[0])
 }
 
-/// PMW3901: 2 MHz.
 fn flow_config() -> Config {
-    config(Rate::from_mhz(2))
+    config(devices::SPI_CLOCKS[1])
 }
 
-fn config(frequency: Rate) -> Config {
-    Config::default().with_frequency(frequency).with_mode(Mode::_3).with_min_async_transfer_size(SHORT)
+fn config(hertz: u32) -> Config {
+    let config = Config::default().with_frequency(Rate::from_hz(hertz)).with_mode(MODE);
+    config.with_min_async_transfer_size(devices::SPI_DMA_FROM)
 }
 
 /// A chip that listens until this is dropped.

@@ -47,7 +47,7 @@ impl Surroundings {
     #[must_use]
     pub fn new(setup: &Setup) -> Self {
         let Simulation { clock, world, sensors } = Simulation::new(&setup.simulation);
-        let board = chips::Board::new(&world, &clock, &setup.simulation, &sensing::IMAGE);
+        let board = chips::Board::on(&sensing::SPI, &world, &clock, &setup.simulation, &sensing::IMAGE);
         Self {
             shared: Shared::new(&clock, &board.i2c),
             setup: setup.clone(),

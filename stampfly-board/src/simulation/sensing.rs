@@ -8,7 +8,7 @@ use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
 use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
-use stampfly_sim::chips::{self, I2cBus, stand_in_image};
+use stampfly_sim::chips::{self, Controller, I2cBus, SpiSetup, stand_in_image};
 use stampfly_sim::sensors::{ButtonModel, IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use std::sync::LazyLock;
@@ -23,6 +23,14 @@ pub enum Sensing {
     /// To bytes: the real drivers over emulated chips, on buses that take their time.
     Chips,
 }
+
+/// The SPI as the firmware has it.
+pub const SPI: SpiSetup = SpiSetup {
+    controller: Controller::LevelWithTransfer,
+    imu: (devices::SPI_MODE, devices::SPI_CLOCKS[0]),
+    flow: (devices::SPI_MODE, devices::SPI_CLOCKS[1]),
+    begins_with_nobody: true,
+};
 
 /// What stands in for the inertial sensor's configuration file, at both ends of the bus.
 pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);

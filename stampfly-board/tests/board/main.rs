@@ -8,4 +8,6 @@ mod exchange;
 mod golden;
 mod pairing;
 mod self_test;
+#[cfg(feature = "simulation")]
+mod software_time;
 mod state;

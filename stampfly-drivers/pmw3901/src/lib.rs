@@ -68,7 +68,7 @@ impl Default for Config {
 ///
 /// A chip without its settings goes on counting, badly and without saying so. A start therefore reads back all of them,
 /// and once a second `next` reads back one: another value is [`ChipError::Restarted`], and the next call sets the chip up
-/// again. The registers are undocumented. One that reads the same other value at two starts in a row cannot be read back
+/// again. A start that failed, wherever it was, is begun again from the reset. The registers are undocumented. One that reads the same other value at two starts in a row cannot be read back
 /// and is not asked. What else may have gone wrong costs ten seconds: after as long with a quality of zero, which is also
 /// what it sees in the dark, `next` says [`ChipError::NoSample`], and the one after sets the chip up again.
 ///

@@ -106,7 +106,7 @@ impl spi::SpiDevice for Device {
             assert!(self.0.now() >= chip.ready, "the pause between two accesses is too short");
             let fault = chip.fault.take();
             let pause = match operations {
-                [Operation::Write([register, value]), Operation::DelayNs(20_000..)] if register & 0x80 != 0 => {
+                [Operation::Write([register, value]), Operation::DelayNs(35_000..)] if register & 0x80 != 0 => {
                     chip.write(register & 0x7F, *value);
                     45
                 }

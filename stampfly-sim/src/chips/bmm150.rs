@@ -354,21 +354,22 @@ impl SpiChip for Bmm150 {
     /// DS, "Serial peripheral interface".
     const HIGHEST_CLOCK: u32 = 10_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+    fn answer(&mut self, index: usize, now: Instant) -> u8 {
         let silent = 0xFF;
-        if index == 0 {
-            self.command = byte;
-            self.pointer = u16::from(byte & 0x7F);
-            return silent;
-        }
-        if self.command & 0x80 == 0 {
-            if index == 1 {
-                self.write(self.pointer, u16::from(byte), now);
-            }
+        if index == 0 || self.command & 0x80 == 0 {
             return silent;
         }
         let sent = self.send(index - 1, now);
         if self.three_wires { silent } else { sent }
+    }
+
+    fn take(&mut self, index: usize, byte: u8, now: Instant) {
+        if index == 0 {
+            self.command = byte;
+            self.pointer = u16::from(byte & 0x7F);
+        } else if index == 1 && self.command & 0x80 == 0 {
+            self.write(self.pointer, u16::from(byte), now);
+        }
     }
 
     fn release(&mut self, _: Instant) {}

@@ -326,21 +326,24 @@ impl SpiChip for Bmp280 {
     /// DS table 28.
     const HIGHEST_CLOCK: u32 = 10_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+    fn answer(&mut self, index: usize, now: Instant) -> u8 {
         let silent = 0xFF;
-        if index == 0 {
-            self.command = byte;
-            self.pointer = 0x80 | u16::from(byte);
-            return silent;
-        }
-        if self.command & 0x80 == 0 {
-            // Another address, or its value: the same as on I2C, but for bit 7.
-            self.receive(index, if index.is_multiple_of(2) { byte | 0x80 } else { byte }, now);
+        if index == 0 || self.command & 0x80 == 0 {
             return silent;
         }
         let sent = self.send(index - 1, now);
         self.pointer |= 0x80;
         if self.config & 1 == 0 { sent } else { silent }
+    }
+
+    fn take(&mut self, index: usize, byte: u8, now: Instant) {
+        if index == 0 {
+            self.command = byte;
+            self.pointer = 0x80 | u16::from(byte);
+        } else if self.command & 0x80 == 0 {
+            // Another address, or its value: the same as on I2C, but for bit 7.
+            self.receive(index, if index.is_multiple_of(2) { byte | 0x80 } else { byte }, now);
+        }
     }
 
     fn release(&mut self, _: Instant) {}

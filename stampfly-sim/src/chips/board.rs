@@ -1,15 +1,57 @@
 //! All chips of the StampFly, wired: two buses and the pins beside them.
 
-use super::{Attached, Bmi270, Bmm150, Bmp280, I2cBus, Ina3221, Pmw3901, ShutdownPin, SpiBus, SpiPort, Vl53l3cx};
+use super::{
+    Attached, Bmi270, Bmm150, Bmp280, Controller, I2cBus, Ina3221, Pmw3901, ShutdownPin, SpiBus, SpiPort, Vl53l3cx,
+};
 use crate::SimulationConfig;
 use crate::sensors::Mount;
 use crate::time::Clock;
 use crate::world::World;
+use embedded_hal::spi::{MODE_3, Mode};
 
-/// Clock of the inertial sensor's SPI, Hz.
-const IMU_CLOCK: u32 = 10_000_000;
-/// Clock of the flow sensor's SPI, Hz: the chip's limit.
-const FLOW_CLOCK: u32 = 2_000_000;
+/// How a processor drives the two chips on SPI.
+///
+/// ```
+/// use embedded_hal::spi::{MODE_0, Operation, SpiDevice};
+/// use stampfly_sim::chips::{Board, SpiSetup, stand_in_image};
+/// use stampfly_sim::{Simulation, SimulationConfig};
+/// use stampfly_types::Instant;
+///
+/// // The inertial sensor in another mode than the flow sensor, on an ESP32-S3.
+/// let setup = SpiSetup { imu: (MODE_0, 10_000_000), ..SpiSetup::default() };
+/// let config = SimulationConfig::example();
+/// let Simulation { world, clock, .. } = Simulation::new(&config);
+/// let Board { mut imu, mut flow, .. } = Board::on(&setup, &world, &clock, &config, &stand_in_image());
+/// clock.advance_to(Instant::from_millis(50));
+/// imu.write(&[0x80, 0, 0])?;
+/// let mut id = [0];
+/// flow.transaction(&mut [Operation::Write(&[0]), Operation::DelayNs(35_000), Operation::Read(&mut id)])?;
+/// assert_ne!(id, [0x49], "the clock rose under the selected chip");
+/// # Ok::<(), stampfly_sim::chips::BusError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SpiSetup {
+    /// When it sets the level at which the clock idles.
+    pub controller: Controller,
+    /// The inertial sensor's mode and clock, Hz.
+    pub imu: (Mode, u32),
+    /// The flow sensor's.
+    pub flow: (Mode, u32),
+    /// Sends a byte to nobody in the inertial sensor's mode, before the first transfer.
+    pub begins_with_nobody: bool,
+}
+
+impl Default for SpiSetup {
+    /// The StampFly's firmware: an ESP32-S3, both chips in mode 3, each with the fastest clock that it allows.
+    fn default() -> Self {
+        Self {
+            controller: Controller::LevelWithTransfer,
+            imu: (MODE_3, 10_000_000),
+            flow: (MODE_3, 2_000_000),
+            begins_with_nobody: true,
+        }
+    }
+}
 
 /// The chips of one vehicle, just powered, with both chip selects of the SPI driven high. The same configuration is the
 /// same specimens as [`Sensors`](crate::sensors::Sensors).
@@ -93,10 +135,21 @@ impl Board {
     /// Chips around this world. `image` is what the inertial sensor takes for its configuration file.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, config: &SimulationConfig, image: &[u8]) -> Self {
+        Self::on(&SpiSetup::default(), world, clock, config, image)
+    }
+
+    /// The same with another set-up of the SPI.
+    #[must_use]
+    pub fn on(setup: &SpiSetup, world: &World, clock: &Clock, config: &SimulationConfig, image: &[u8]) -> Self {
         let seed = config.seed;
         let (i2c, spi) = (I2cBus::new(clock, seed), SpiBus::new(clock, seed));
-        let (imu, imu_attached) = spi.attach(IMU_CLOCK, Bmi270::new(world, clock, seed, config.vibration, image));
-        let (flow, flow_attached) = spi.attach(FLOW_CLOCK, Pmw3901::new(world, clock, seed));
+        spi.set_controller(setup.controller);
+        if setup.begins_with_nobody {
+            spi.send_to_nobody(setup.imu.0);
+        }
+        let (imu, imu_attached) = spi.attach(setup.imu.1, Bmi270::new(world, clock, seed, config.vibration, image));
+        let (flow, flow_attached) = spi.attach(setup.flow.1, Pmw3901::new(world, clock, seed));
+        let (imu, flow) = (imu.with_mode(setup.imu.0), flow.with_mode(setup.flow.0));
         let (bottom, shutdown_bottom) = Vl53l3cx::new(world, clock, seed, Mount::Bottom);
         let (front, shutdown_front) = Vl53l3cx::new(world, clock, seed, Mount::Front);
         let attached = AttachedChips {

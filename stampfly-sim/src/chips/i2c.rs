@@ -5,6 +5,7 @@
 //! that is dropped before its end has done nothing but to occupy the line.
 
 use super::fault::{Attached, Faults, carry};
+use super::latency::Latency;
 use super::{BusError, I2cChip, after};
 use crate::noise::Noise;
 use crate::time::Clock;
@@ -46,6 +47,7 @@ struct State {
     noise: RefCell<Noise>,
     /// Every operation begins with a start.
     restarts: Cell<bool>,
+    latency: Cell<Latency>,
 }
 
 /// A handle to the bus. Clones are the same bus; each may belong to another driver.
@@ -87,6 +89,7 @@ impl I2cBus {
             shorted: Cell::new(false),
             noise: RefCell::new(Noise::new(seed, STREAM)),
             restarts: Cell::new(false),
+            latency: Cell::default(),
         }))
     }
 
@@ -94,6 +97,11 @@ impl I2cBus {
     /// makes a message of each operation, and so do some other controllers' drivers.
     pub fn restart_between_operations(&self) {
         self.0.restarts.set(true);
+    }
+
+    /// From now on the software takes so long: once to set a transfer up, and once to wake its task for each operation above what is polled.
+    pub fn set_latency(&self, latency: Latency) {
+        self.0.latency.set(latency);
     }
 
     /// Solders a chip to the bus at a 7-bit address. Where several have the same, all of them take what is written, and
@@ -145,13 +153,23 @@ impl I2cBus {
 
     /// Takes the bus. Returns the start, the end, and what is already known to fail.
     fn begin(&self, address: u8, operations: &[Operation<'_>]) -> (Instant, Instant, Result<(), BusError>) {
-        let start = self.0.clock.now();
+        let mut latency = self.0.latency.get();
+        if latency.jitter > Duration::ZERO {
+            latency = latency.drawn(self.0.noise.borrow_mut().unit());
+        }
+        let start = self.0.clock.now() + latency.setup;
+        let woken = operations.iter().fold(Duration::ZERO, |late, operation| {
+            late + latency.of_bytes(match operation {
+                Operation::Read(bytes) => bytes.len(),
+                Operation::Write(bytes) => bytes.len(),
+            })
+        });
         let (bits, stretch, outcome) = match self.stretch(address) {
             _ if !self.sda_is_high() => (1, Duration::ZERO, Err(BusError::ArbitrationLost)),
             None => (2 + BYTE, Duration::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
             Some(stretch) => (self.length(operations), stretch, Ok(())),
         };
-        let end = start + Duration::from_micros((bits * BIT).div_ceil(1_000)) + stretch;
+        let end = start + Duration::from_micros((bits * BIT).div_ceil(1_000)) + stretch + woken;
         self.0.busy_until.set(end);
         (start, end, outcome)
     }

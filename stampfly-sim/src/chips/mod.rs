@@ -28,6 +28,8 @@
 //! | data line held low by a chip, or shorted to ground | [`I2cBus::hold_sda`], [`I2cBus::short_sda`] |
 //! | data line from the chips stuck | [`SpiBus::hold_miso`] |
 //! | chip select that nobody drives yet | [`SpiBus::attach_floating`] |
+//! | clock at the wrong level, wrong mode, wrong order of bits | [`SpiBus::set_controller`], [`SpiPort::with_mode`], [`SpiPort::with_order`] |
+//! | software that takes its time | [`SpiBus::set_latency`], [`I2cBus::set_latency`] |
 
 mod bmi270;
 mod bmm150;
@@ -36,6 +38,7 @@ mod board;
 mod fault;
 mod i2c;
 mod ina3221;
+mod latency;
 mod lines;
 mod pmw3901;
 mod spi;
@@ -44,13 +47,14 @@ mod vl53l3cx;
 pub use bmi270::{Bmi270, InterruptPin};
 pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
-pub use board::{AttachedChips, Board, stand_in_image};
+pub use board::{AttachedChips, Board, SpiSetup, stand_in_image};
 pub use fault::{Attached, Faults, Flaw};
 pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
+pub use latency::Latency;
 pub use lines::{ClockLine, DataLine};
 pub use pmw3901::Pmw3901;
-pub use spi::{SpiBus, SpiPort};
+pub use spi::{BitOrder, Controller, SpiBus, SpiPort};
 pub use vl53l3cx::{ShutdownPin, Vl53l3cx};
 
 use core::cell::Cell;
@@ -100,8 +104,19 @@ pub trait I2cChip: Chip {
 pub trait SpiChip: Chip {
     /// The fastest clock that the chip allows, Hz.
     const HIGHEST_CLOCK: u32;
-    /// Takes and gives byte number `index` since the chip was selected.
-    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8;
+    /// What the chip shifts out while byte number `index` since it was selected comes in: it does not know that one yet. Asked once a byte,
+    /// when the first bit is looked at. All ones where the chip does not drive its line.
+    fn answer(&mut self, _index: usize, _now: Instant) -> u8 {
+        0xFF
+    }
+    /// Byte number `index` has come in.
+    fn take(&mut self, _index: usize, _byte: u8, _now: Instant) {}
+    /// Takes and gives byte number `index`, where polarity plays no part.
+    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+        let answer = self.answer(index, now);
+        self.take(index, byte, now);
+        answer
+    }
     /// Chip select goes high.
     fn release(&mut self, now: Instant);
 }

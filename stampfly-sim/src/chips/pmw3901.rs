@@ -294,24 +294,9 @@ impl Chip for Pmw3901 {
 impl SpiChip for Pmw3901 {
     const HIGHEST_CLOCK: u32 = 2_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
-        if index == 0 {
-            self.command = byte;
-            self.commanded = now;
-            self.accepts = now >= self.idle_until;
-            self.written = None;
-            return 0;
-        }
-        if !self.accepts {
-            return 0;
-        }
-        if self.command & 0x80 != 0 {
-            if index == 1 {
-                self.written = Some((byte, now));
-            }
-            return 0;
-        }
-        if now < self.commanded + READ_PAUSE || now < self.ready {
+    fn answer(&mut self, index: usize, now: Instant) -> u8 {
+        let reads = index > 0 && self.accepts && self.command & 0x80 == 0;
+        if !reads || now < self.commanded + READ_PAUSE || now < self.ready {
             return 0;
         }
         if self.command != BURST {
@@ -321,6 +306,17 @@ impl SpiChip for Pmw3901 {
             self.fill_burst(now);
         }
         self.burst.get(index - 1).copied().unwrap_or(0)
+    }
+
+    fn take(&mut self, index: usize, byte: u8, now: Instant) {
+        if index == 0 {
+            self.command = byte;
+            self.commanded = now;
+            self.accepts = now >= self.idle_until;
+            self.written = None;
+        } else if index == 1 && self.accepts && self.command & 0x80 != 0 {
+            self.written = Some((byte, now));
+        }
     }
 
     fn release(&mut self, now: Instant) {

@@ -195,9 +195,12 @@ impl Chip for Echo {
 impl SpiChip for Echo {
     const HIGHEST_CLOCK: u32 = 10_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+    fn answer(&mut self, _: usize, _: Instant) -> u8 {
+        self.last
+    }
+    fn take(&mut self, index: usize, byte: u8, now: Instant) {
         self.times.push((index, now.as_micros()));
-        core::mem::replace(&mut self.last, byte)
+        self.last = byte;
     }
     fn release(&mut self, _: Instant) {
         self.releases += 1;

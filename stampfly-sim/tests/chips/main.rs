@@ -9,8 +9,10 @@ mod compensation;
 mod floating_select;
 mod ina3221;
 mod interrupt_pin;
+mod latency;
 mod pmw3901;
 mod vl53l3cx;
+mod wire;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};

@@ -9,6 +9,7 @@ mod bmp280;
 #[path = "../chips/compensation.rs"]
 mod compensation;
 mod display;
+mod flow_restarts;
 mod ina3221;
 mod linux;
 mod mounting;
@@ -16,6 +17,7 @@ mod neighbours;
 #[path = "../hover/pilot.rs"]
 mod pilot;
 mod pmw3901;
+mod polarity;
 mod self_tests;
 mod slots;
 mod spi;

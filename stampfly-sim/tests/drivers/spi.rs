@@ -29,9 +29,6 @@ const SPEEDS: [u32; 2] = [8_000_000, 1_000_000];
 
 impl SpiChip for Display {
     const HIGHEST_CLOCK: u32 = 10_000_000;
-    fn exchange(&mut self, _: usize, _: u8, _: Instant) -> u8 {
-        0xFF
-    }
     fn release(&mut self, _: Instant) {}
 }
 

@@ -99,7 +99,7 @@ pub fn with_vehicle<T>(defect: Option<&Defect>, seed: u64, examine: impl FnOnce(
     }
     let configuration = SimulationConfig { seed, ..SimulationConfig::new(plant) };
     let Simulation { clock, world, sensors } = Simulation::new(&configuration);
-    let board = chips::Board::new(&world, &clock, &configuration, &IMAGE);
+    let board = chips::Board::on(&sensing::SPI, &world, &clock, &configuration, &IMAGE);
     if let Some(defect) = defect {
         defect.damage(&board);
     }

@@ -22,7 +22,7 @@ impl Bmi270 {
         register
     }
 
-    fn take(&mut self, byte: u8, now: Instant) {
+    fn store(&mut self, byte: u8, now: Instant) {
         let register = self.step();
         if self.accepts {
             self.write(register, u16::from(byte), now);
@@ -44,25 +44,24 @@ impl Bmi270 {
 impl SpiChip for Bmi270 {
     const HIGHEST_CLOCK: u32 = 10_000_000;
 
-    fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
+    fn answer(&mut self, index: usize, now: Instant) -> u8 {
+        if index == 0 || !self.spi || self.command & 0x80 == 0 {
+            return 0xFF;
+        }
+        if index == 1 {
+            return 0;
+        }
+        let register = self.step();
+        self.read(register, now) as u8
+    }
+
+    fn take(&mut self, index: usize, byte: u8, now: Instant) {
         if index == 0 {
             self.command = byte;
             self.begin(byte, now);
-            return 0xFF;
+        } else if self.spi && self.command & 0x80 == 0 {
+            self.store(byte, now);
         }
-        let reads = self.command & 0x80 != 0;
-        if !self.spi {
-            return 0xFF;
-        }
-        if reads && index == 1 {
-            return 0;
-        }
-        if reads {
-            let register = self.step();
-            return self.read(register, now) as u8;
-        }
-        self.take(byte, now);
-        0xFF
     }
 
     fn release(&mut self, now: Instant) {
@@ -80,7 +79,7 @@ impl I2cChip for Bmi270 {
             self.begin(byte, now);
         } else {
             self.command = 1;
-            self.take(byte, now);
+            self.store(byte, now);
         }
         true
     }

@@ -1,0 +1,290 @@
+//! One chip on an SPI bus: what a transfer of its driver costs, and what goes through it.
+
+use super::bus::SpiBus;
+use super::wire::{self, BitOrder, Controller, Levels, Wire};
+use crate::chips::fault::{Attached, carry};
+use crate::chips::{BusError, Latency, SpiChip, after};
+use crate::time::Clock;
+use core::cell::{Cell, RefCell};
+use embedded_hal::spi::{ErrorType, MODE_3, Mode, Operation};
+use stampfly_types::{Duration, Instant};
+use std::rc::Rc;
+
+/// Share of the bits that a chip with a floating select spoils by answering into the same line: its select is taken for
+/// low some of the time, and half of its bits are wrong. *Unverified*: a floating line may do anything.
+const DISTURBANCE: f64 = 0.05;
+/// Share of the bits that are wrong on a clock faster than the chip allows. *Unverified*: some chips take a little more.
+const TOO_FAST: f64 = 0.05;
+/// One chip's place on the bus. Implements the `SpiDevice` traits of embedded-hal, `async` and blocking.
+pub struct SpiPort<C> {
+    bus: SpiBus,
+    chip: Rc<RefCell<C>>,
+    attached: Attached,
+    /// Nanoseconds per byte.
+    byte: u64,
+    /// Share of the bits that this clock spoils.
+    garbled: f64,
+    mode: Mode,
+    order: BitOrder,
+    /// Rising edges of the clock while the chip was selected.
+    rising: Cell<u64>,
+    /// Nobody has driven the chip select yet.
+    floating: Cell<bool>,
+}
+
+/// A transfer that has begun.
+struct Transfer {
+    start: Instant,
+    end: Instant,
+    /// What is already known to fail.
+    outcome: Result<(), BusError>,
+    /// The lines as the chip select falls.
+    levels: Levels,
+    latency: Latency,
+    /// The processor does all of it itself, so that its task does not give way.
+    blocks: bool,
+}
+
+impl SpiBus {
+    /// Solders a chip to the bus and to a chip select of its own, which is driven high. `frequency` is the clock for
+    /// this chip, Hz; above the [highest](SpiChip::HIGHEST_CLOCK) that it allows its transfers are garbled. The mode is 3, see
+    /// [`SpiPort::with_mode`].
+    pub fn attach<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
+        self.solder(frequency, chip, false)
+    }
+
+    /// The same with a chip select that floats: as long as nobody drives it, by [`SpiPort::park`] or a first transfer,
+    /// the chip disturbs what the others answer. So does a flow sensor of the StampFly that is not looked after before
+    /// the inertial sensor is asked.
+    pub fn attach_floating<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
+        self.solder(frequency, chip, true)
+    }
+
+    fn solder<C: SpiChip + 'static>(&self, frequency: u32, chip: C, floating: bool) -> (SpiPort<C>, Attached) {
+        self.0.floating.set(self.0.floating.get() + u32::from(floating));
+        let chip = Rc::new(RefCell::new(chip));
+        let attached = Attached::new(&self.0.clock, chip.clone());
+        let byte = 8_000_000_000 / u64::from(frequency.max(1));
+        let garbled = if frequency > C::HIGHEST_CLOCK { TOO_FAST } else { 0.0 };
+        (
+            SpiPort {
+                bus: self.clone(),
+                chip,
+                attached: attached.clone(),
+                byte,
+                garbled,
+                mode: MODE_3,
+                order: BitOrder::MostFirst,
+                rising: Cell::new(0),
+                floating: Cell::new(floating),
+            },
+            attached,
+        )
+    }
+}
+
+impl<C: SpiChip> core::fmt::Debug for SpiPort<C> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("SpiPort").field("chip", &self.chip).finish_non_exhaustive()
+    }
+}
+
+impl<C> SpiPort<C> {
+    /// In this mode.
+    #[must_use]
+    pub const fn with_mode(mut self, mode: Mode) -> Self {
+        self.mode = mode;
+        self
+    }
+
+    /// With the bits of a byte in this order.
+    #[must_use]
+    pub const fn with_order(mut self, order: BitOrder) -> Self {
+        self.order = order;
+        self
+    }
+
+    /// How many rising edges of the clock the chip has seen while it was selected: eight a byte, unless polarity changed under it.
+    #[must_use]
+    pub fn rising_edges(&self) -> u64 {
+        self.rising.get()
+    }
+
+    /// Drives the chip select, high until the next transfer.
+    pub fn park(&self) {
+        let others = self.bus.0.floating.get() - u32::from(self.floating.take());
+        self.bus.0.floating.set(others);
+    }
+
+    /// The wires that it shares with others.
+    #[must_use]
+    pub fn bus(&self) -> SpiBus {
+        self.bus.clone()
+    }
+
+    /// The clock of the bus and the chip, for pins that the chip has beside it.
+    pub(in crate::chips) fn chip(&self) -> (Clock, Rc<RefCell<C>>) {
+        (self.bus.0.clock.clone(), self.chip.clone())
+    }
+}
+
+impl<C: SpiChip> SpiPort<C> {
+    /// Takes the bus.
+    fn begin(&self, operations: &[Operation<'_, u8>]) -> Transfer {
+        self.park();
+        let state = &self.bus.0;
+        let start = state.clock.now();
+        let refusals = self.attached.faults().refusals;
+        let refused = refusals > 0.0 && state.noise.borrow_mut().chance(refusals);
+        let mut latency = state.latency.get();
+        if latency.jitter > Duration::ZERO {
+            latency = latency.drawn(state.noise.borrow_mut().unit());
+        }
+        let mut levels = state.levels.get();
+        if state.controller.get() == Controller::LevelFirst {
+            levels.clock = wire::idles_high(self.mode);
+        }
+        let (mut nanoseconds, mut late, mut blocks) = (0, latency.setup, true);
+        state.levels.set(levels);
+        for operation in operations {
+            match operation {
+                Operation::DelayNs(delay) => {
+                    nanoseconds += u64::from(*delay);
+                    late += latency.of_pause(*delay);
+                    blocks &= latency.is_spun(*delay);
+                }
+                bytes => {
+                    let (length, last) = sent(bytes);
+                    nanoseconds += self.byte * length as u64;
+                    late += latency.of_bytes(length);
+                    blocks &= length <= latency.polled;
+                    if length > 0 {
+                        state.levels.set(Levels::after(self.mode, self.order, last));
+                    }
+                }
+            }
+        }
+        let end = start + late + Duration::from_micros(nanoseconds.div_ceil(1_000));
+        state.busy_until.set(end);
+        let outcome = if refused { Err(BusError::Overrun) } else { Ok(()) };
+        Transfer { start, end, outcome, levels, latency, blocks }
+    }
+
+    /// Exchanges the bytes of a transfer that is over.
+    fn exchange(&self, operations: &mut [Operation<'_, u8>], transfer: &Transfer) {
+        let Transfer { start, end, levels, latency, .. } = *transfer;
+        let faults = self.attached.faults();
+        let disturbance = if self.bus.0.floating.get() > 0 { DISTURBANCE } else { 0.0 };
+        let plain = wire::is_plain(levels, self.mode, self.order) && !self.bus.0.edge_by_edge.get();
+        let mut wire = (!plain).then(|| Wire::select(levels, self.mode, self.order));
+        let mut chip = self.chip.borrow_mut();
+        let mut noise = self.bus.0.noise.borrow_mut();
+        let (mut index, mut nanoseconds) = (0, latency.setup.as_micros() * 1_000);
+        let stuck = self.bus.0.stuck.get();
+        // A byte that begins at so many nanoseconds after the start.
+        let mut byte = |out: u8, begin: u64| {
+            if faults.dead {
+                return stuck.unwrap_or(0xFF);
+            }
+            let errors = faults.bit_errors.max(self.garbled);
+            let out = carry(out, errors, &mut noise);
+            let answer = match &mut wire {
+                None => {
+                    self.rising.set(self.rising.get() + 8);
+                    chip.exchange(index, out, after(start, begin + self.byte))
+                }
+                Some(wire) => {
+                    let before = wire.rising;
+                    let at = |bits: u32| after(start, begin + self.byte * u64::from(bits) / 8).min(end);
+                    let answer = wire.exchange(&mut *chip, out, at);
+                    self.rising.set(self.rising.get() + wire.rising - before);
+                    answer
+                }
+            };
+            index += 1;
+            stuck.unwrap_or(carry(answer, errors.max(disturbance), &mut noise))
+        };
+        for operation in operations {
+            let length = sent(operation).0;
+            match operation {
+                Operation::Read(bytes) => bytes.iter_mut().for_each(|slot| {
+                    *slot = byte(0, nanoseconds);
+                    nanoseconds += self.byte;
+                }),
+                Operation::Write(bytes) => bytes.iter().for_each(|out| {
+                    byte(*out, nanoseconds);
+                    nanoseconds += self.byte;
+                }),
+                Operation::Transfer(read, write) => {
+                    for place in 0..read.len().max(write.len()) {
+                        let answer = byte(write.get(place).copied().unwrap_or(0), nanoseconds);
+                        nanoseconds += self.byte;
+                        if let Some(slot) = read.get_mut(place) {
+                            *slot = answer;
+                        }
+                    }
+                }
+                Operation::TransferInPlace(bytes) => bytes.iter_mut().for_each(|slot| {
+                    *slot = byte(*slot, nanoseconds);
+                    nanoseconds += self.byte;
+                }),
+                Operation::DelayNs(delay) => {
+                    nanoseconds += u64::from(*delay) + latency.of_pause(*delay).as_micros() * 1_000;
+                    continue;
+                }
+            }
+            nanoseconds += latency.of_bytes(length).as_micros() * 1_000;
+        }
+        if !faults.dead {
+            chip.release(end);
+        }
+    }
+}
+
+/// How many bytes an operation moves, and which it sends last. A read sends zeros.
+fn sent(operation: &Operation<'_, u8>) -> (usize, u8) {
+    match operation {
+        Operation::Read(bytes) => (bytes.len(), 0),
+        Operation::Write(bytes) => (bytes.len(), bytes.last().copied().unwrap_or(0)),
+        Operation::Transfer(read, write) => {
+            let length = read.len().max(write.len());
+            (length, write.get(length.saturating_sub(1)).copied().unwrap_or(0))
+        }
+        Operation::TransferInPlace(bytes) => (bytes.len(), bytes.last().copied().unwrap_or(0)),
+        Operation::DelayNs(_) => (0, 0),
+    }
+}
+
+impl<C> ErrorType for SpiPort<C> {
+    type Error = BusError;
+}
+
+impl<C: SpiChip> embedded_hal_async::spi::SpiDevice for SpiPort<C> {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), BusError> {
+        let state = self.bus.0.clone();
+        while state.busy_until.get() > state.clock.now() {
+            state.clock.sleep_until(state.busy_until.get()).await;
+        }
+        let transfer = self.begin(operations);
+        if transfer.blocks {
+            state.clock.advance_to(transfer.end);
+        } else {
+            state.clock.sleep_until(transfer.end).await;
+        }
+        transfer.outcome?;
+        self.exchange(operations, &transfer);
+        Ok(())
+    }
+}
+
+impl<C: SpiChip> embedded_hal::spi::SpiDevice for SpiPort<C> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), BusError> {
+        let state = self.bus.0.clone();
+        state.clock.advance_to(state.busy_until.get());
+        let transfer = self.begin(operations);
+        state.clock.advance_to(transfer.end);
+        transfer.outcome?;
+        self.exchange(operations, &transfer);
+        Ok(())
+    }
+}
