@@ -12,6 +12,7 @@
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
+//! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
 //! fixed order, from the cheapest check to the dearest, a packet is taken whole or not at all, and nothing that was
@@ -47,6 +48,7 @@ pub mod json;
 mod pairing;
 mod peers;
 mod sequence;
+pub mod serial;
 mod session;
 mod telemetry;
 

@@ -1,0 +1,471 @@
+//! CRSF: frames of any kind with a CRC-8, sticks one way and telemetry the other. TBS Crossfire and ExpressLRS speak it.
+//!
+//! | byte | what |
+//! |---|---|
+//! | 0 | whom it is for; 0xC8 is a flight controller, 0xEE a transmitter, 0xEA its handset. From receivers come others, too |
+//! | 1 | how many bytes follow, 2 to 62 |
+//! | 2 | kind |
+//! | … | payload, numbers big-endian |
+//! | last | CRC-8 of kind and payload (polynomial 0xD5) |
+//!
+//! | kind | [`Message`] | from |
+//! |---|---|---|
+//! | 0x16 | [`Channels`], sixteen sticks | receiver |
+//! | 0x14 | [`LinkStatistics`] | receiver |
+//! | 0x08 | [`Battery`] | vehicle |
+//! | 0x1E | [`Attitude`] | vehicle |
+//!
+//! Other kinds come as [`Message::Other`], their payload in the frame. A payload that is longer than its kind is known to be is a newer
+//! version of it: the rest is not looked at. The format is TBS's (`crsf.md` of `tbs-fpv/tbs-crsf-spec`); where that document says 10 µV and
+//! 10 µA for a battery, which do not fit, receivers mean 0.1 V and 0.1 A.
+
+use super::Channels;
+use stampfly_types::math;
+
+/// The longest frame.
+const LONGEST: usize = 64;
+/// Address, length, kind, CRC.
+const OVERHEAD: usize = 4;
+/// The length says how much follows it.
+const AFTER_LENGTH: usize = 2;
+
+/// A flight controller's address.
+pub const FLIGHT_CONTROLLER: u8 = 0xC8;
+
+const LINK_STATISTICS: u8 = 0x14;
+const CHANNELS: u8 = 0x16;
+const BATTERY: u8 = 0x08;
+const ATTITUDE: u8 = 0x1E;
+
+/// CRC-8 with polynomial 0xD5, of kind and payload: DVB-S2's.
+const CRC: [u8; 256] = crc_table(0xD5);
+
+const fn crc_table(polynomial: u8) -> [u8; 256] {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < table.len() {
+        let (mut crc, mut bit) = (byte as u8, 0);
+        while bit < 8 {
+            crc = if crc & 0x80 != 0 { crc << 1 ^ polynomial } else { crc << 1 };
+            bit += 1;
+        }
+        table[byte] = crc;
+        byte += 1;
+    }
+    table
+}
+
+fn crc(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |crc, byte| CRC.get(usize::from(crc ^ byte)).copied().unwrap_or(0))
+}
+
+/// A frame whose CRC is right.
+///
+/// ```
+/// use stampfly_link::serial::{Channels, crsf::{CrsfFrame, Message}};
+/// let mut bytes = [0; 64];
+/// let length = Message::Channels(Channels([992; 16])).write(&mut bytes).expect("there is room");
+/// let frame = CrsfFrame::decode(&bytes[..length])?;
+/// assert_eq!(frame.message(), Message::Channels(Channels([992; 16])));
+/// # Ok::<(), stampfly_link::serial::crsf::CrsfError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CrsfFrame<'f> {
+    /// Whom it is for.
+    pub address: u8,
+    /// What its payload is.
+    pub kind: u8,
+    /// 0 to 60 bytes.
+    pub payload: &'f [u8],
+}
+
+/// Why bytes are no frame, in the order it is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CrsfError {
+    /// A length that no frame has.
+    Length,
+    /// More or fewer bytes than it says.
+    Size,
+    /// The CRC is wrong.
+    Crc,
+}
+
+impl core::fmt::Display for CrsfError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Length => "a length that no frame has",
+            Self::Size => "not as long as it says",
+            Self::Crc => "wrong CRC",
+        })
+    }
+}
+
+impl core::error::Error for CrsfError {}
+
+/// How long the frame is that begins so; `None` when none begins so, or that is not known yet.
+fn size(bytes: &[u8]) -> Option<usize> {
+    let length = usize::from(*bytes.get(1)?);
+    (2..=LONGEST - AFTER_LENGTH).contains(&length).then_some(length + AFTER_LENGTH)
+}
+
+impl<'f> CrsfFrame<'f> {
+    /// The longest frame on the wire.
+    pub const LONGEST: usize = LONGEST;
+
+    /// Reads a frame, which has to be all of `bytes`.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub fn decode(bytes: &'f [u8]) -> Result<Self, CrsfError> {
+        let size = size(bytes).ok_or(CrsfError::Length)?;
+        let [address, _, kind, payload @ .., last] = bytes else { return Err(CrsfError::Size) };
+        if bytes.len() != size {
+            return Err(CrsfError::Size);
+        }
+        let checked = bytes.get(AFTER_LENGTH..size - 1).unwrap_or_default();
+        if crc(checked) != *last {
+            return Err(CrsfError::Crc);
+        }
+        Ok(Self { address: *address, kind: *kind, payload })
+    }
+
+    /// Writes it as it travels and returns how long it is; `None` when `out` is too short, or no frame can be so long.
+    #[must_use]
+    pub fn write(&self, out: &mut [u8]) -> Option<usize> {
+        let size = self.payload.len() + OVERHEAD;
+        let out = out.get_mut(..size).filter(|_| size <= LONGEST)?;
+        let [address, length, kind, payload @ .., last] = out else { return None };
+        (*address, *length, *kind) = (self.address, (size - AFTER_LENGTH) as u8, self.kind);
+        payload.copy_from_slice(self.payload);
+        *last = CRC.get(usize::from(*kind)).map_or(0, |first| {
+            self.payload.iter().fold(*first, |crc, byte| CRC.get(usize::from(crc ^ byte)).copied().unwrap_or(0))
+        });
+        Some(size)
+    }
+
+    /// What it says. A kind that is not known here, or whose payload is too short, is [`Message::Other`].
+    #[must_use]
+    pub fn message(&self) -> Message {
+        let known = match self.kind {
+            CHANNELS => self.payload.first_chunk().map(|bytes| Message::Channels(Channels::unpack(bytes))),
+            LINK_STATISTICS => {
+                self.payload.first_chunk().map(|bytes| Message::LinkStatistics(LinkStatistics::read(bytes)))
+            }
+            BATTERY => self.payload.first_chunk().map(|bytes| Message::Battery(Battery::read(bytes))),
+            ATTITUDE => self.payload.first_chunk().map(|bytes| Message::Attitude(Attitude::read(bytes))),
+            _ => None,
+        };
+        known.unwrap_or(Message::Other)
+    }
+}
+
+/// What a frame says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Message {
+    /// The pilot's sticks.
+    Channels(Channels),
+    /// How well the radio is heard.
+    LinkStatistics(LinkStatistics),
+    /// The battery, for the pilot.
+    Battery(Battery),
+    /// The attitude, for the pilot.
+    Attitude(Attitude),
+    /// Something else: look at the frame.
+    Other,
+}
+
+impl Message {
+    /// Writes it as a frame for a [`FLIGHT_CONTROLLER`], which is also what receivers take telemetry from, and returns how long it is; `None` when `out` is
+    /// too short, and for [`Other`](Self::Other).
+    #[must_use]
+    pub fn write(&self, out: &mut [u8]) -> Option<usize> {
+        let mut write = |kind, payload: &[u8]| CrsfFrame { address: FLIGHT_CONTROLLER, kind, payload }.write(out);
+        match self {
+            Self::Channels(channels) => write(CHANNELS, &channels.pack()),
+            Self::LinkStatistics(statistics) => write(LINK_STATISTICS, &statistics.to_bytes()),
+            Self::Battery(battery) => write(BATTERY, &battery.to_bytes()),
+            Self::Attitude(attitude) => write(ATTITUDE, &attitude.to_bytes()),
+            Self::Other => None,
+        }
+    }
+}
+
+/// How well the radio is heard, at both ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkStatistics {
+    /// Strength at the receiver's two antennas, -dBm.
+    pub up_strength: [u8; 2],
+    /// Packets that arrived at the receiver, %.
+    pub up_quality: u8,
+    /// Signal to noise at the receiver, dB.
+    pub up_noise: i8,
+    /// The antenna that is used.
+    pub antenna: u8,
+    /// Packet rate, by the manufacturer's own number.
+    pub mode: u8,
+    /// The transmitter's power, by its number in the format's list: 0, 10, 25, 100, 500, 1000, 2000, 250, 50 mW.
+    pub power: u8,
+    /// Strength at the transmitter, -dBm.
+    pub down_strength: u8,
+    /// Packets that arrived at the transmitter, %.
+    pub down_quality: u8,
+    /// Signal to noise at the transmitter, dB.
+    pub down_noise: i8,
+}
+
+impl LinkStatistics {
+    fn read(bytes: &[u8; 10]) -> Self {
+        let [first, second, up_quality, up_noise, antenna, mode, power, down_strength, down_quality, down_noise] =
+            *bytes;
+        let (up_noise, down_noise) = (up_noise.cast_signed(), down_noise.cast_signed());
+        Self {
+            up_strength: [first, second],
+            up_quality,
+            up_noise,
+            antenna,
+            mode,
+            power,
+            down_strength,
+            down_quality,
+            down_noise,
+        }
+    }
+
+    fn to_bytes(self) -> [u8; 10] {
+        let [first, second] = self.up_strength;
+        [
+            first,
+            second,
+            self.up_quality,
+            self.up_noise.cast_unsigned(),
+            self.antenna,
+            self.mode,
+            self.power,
+            self.down_strength,
+            self.down_quality,
+            self.down_noise.cast_unsigned(),
+        ]
+    }
+}
+
+/// The battery, for the pilot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Battery {
+    /// V, in steps of 0.1.
+    pub voltage: f32,
+    /// A, in steps of 0.1.
+    pub current: f32,
+    /// What was taken out of it, mAh, up to 16 777 215.
+    pub used: u32,
+    /// What is left, %.
+    pub remaining: u8,
+}
+
+impl Battery {
+    fn read(bytes: &[u8; 8]) -> Self {
+        let [v1, v0, a1, a0, used @ .., remaining] = *bytes;
+        let tenths = |high, low| f32::from(u16::from_be_bytes([high, low])) / 10.0;
+        let [high, middle, low] = used;
+        Self {
+            voltage: tenths(v1, v0),
+            current: tenths(a1, a0),
+            used: u32::from_be_bytes([0, high, middle, low]),
+            remaining,
+        }
+    }
+
+    fn to_bytes(self) -> [u8; 8] {
+        // What is no number is zero, what does not fit is the most.
+        let tenths = |value: f32| (math::round(value * 10.0) as u16).to_be_bytes();
+        let ([v1, v0], [a1, a0]) = (tenths(self.voltage), tenths(self.current));
+        let [_, high, middle, low] = self.used.min(0xFF_FFFF).to_be_bytes();
+        [v1, v0, a1, a0, high, middle, low, self.remaining]
+    }
+}
+
+/// The attitude, for the pilot: rad, in steps of 0.0001, up to 3.2767 either way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Attitude {
+    /// Nose up is positive.
+    pub pitch: f32,
+    /// Right wing down is positive.
+    pub roll: f32,
+    /// From north, clockwise is positive.
+    pub yaw: f32,
+}
+
+impl Attitude {
+    fn read(bytes: &[u8; 6]) -> Self {
+        let [p1, p0, r1, r0, y1, y0] = *bytes;
+        let angle = |high, low| f32::from(i16::from_be_bytes([high, low])) / 10_000.0;
+        Self { pitch: angle(p1, p0), roll: angle(r1, r0), yaw: angle(y1, y0) }
+    }
+
+    fn to_bytes(self) -> [u8; 6] {
+        let angle = |value: f32| (math::round(value * 10_000.0) as i16).to_be_bytes();
+        let ([p1, p0], [r1, r0], [y1, y0]) = (angle(self.pitch), angle(self.roll), angle(self.yaw));
+        [p1, p0, r1, r0, y1, y0]
+    }
+}
+
+/// Finds frames in what a UART hands over.
+///
+/// A frame has no mark that bytes in it cannot have, so it is known by its CRC alone: after garbage every byte is tried as a beginning.
+///
+/// ```
+/// use stampfly_link::serial::{Channels, crsf::{CrsfDecoder, Message}};
+/// let mut bytes = [0; 64];
+/// let length = Message::Channels(Channels([992; 16])).write(&mut bytes).expect("there is room");
+/// let mut decoder = CrsfDecoder::new();
+/// let mut heard = [&[0xC8, 3, 1], &bytes[..length]].concat().into_iter();
+/// let found = heard.find_map(|byte| decoder.feed(byte).map(|frame| frame.message()));
+/// assert_eq!(found, Some(Message::Channels(Channels([992; 16]))));
+/// assert_eq!(decoder.discarded(), 3);
+/// ```
+#[derive(Clone, Debug)]
+pub struct CrsfDecoder {
+    bytes: [u8; LONGEST],
+    length: usize,
+    /// Bytes of the frame that was returned last.
+    taken: usize,
+    discarded: u32,
+}
+
+impl Default for CrsfDecoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl CrsfDecoder {
+    /// Has heard nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { bytes: [0; LONGEST], length: 0, taken: 0, discarded: 0 }
+    }
+
+    /// Bytes so far that were part of no frame. Wraps around.
+    #[must_use]
+    pub const fn discarded(&self) -> u32 {
+        self.discarded
+    }
+
+    /// Takes a byte. Returns the frame that it ends.
+    ///
+    /// After garbage that looked like a beginning, a frame that came whole meanwhile is found with the next byte, wherever it lies.
+    pub fn feed(&mut self, byte: u8) -> Option<CrsfFrame<'_>> {
+        let taken = core::mem::take(&mut self.taken);
+        self.drop_oldest(taken);
+        let place = self.bytes.get_mut(self.length)?;
+        *place = byte;
+        self.length += 1;
+        // Each turn drops a byte or ends this.
+        while let Some(heard) = self.bytes.get(..self.length).filter(|heard| heard.len() > 1) {
+            match size(heard).map(|size| heard.get(..size).map(CrsfFrame::decode)) {
+                // It may still become one.
+                Some(None) => return None,
+                Some(Some(Ok(frame))) => {
+                    self.taken = frame.payload.len() + OVERHEAD;
+                    return self.bytes.get(..self.taken).and_then(|bytes| CrsfFrame::decode(bytes).ok());
+                }
+                None | Some(Some(Err(_))) => {
+                    self.drop_oldest(1);
+                    self.discarded = self.discarded.wrapping_add(1);
+                }
+            }
+        }
+        None
+    }
+
+    fn drop_oldest(&mut self, count: usize) {
+        if count > 0 {
+            self.bytes.copy_within(count.min(self.length)..self.length, 0);
+            self.length = self.length.saturating_sub(count);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn heard(decoder: &mut CrsfDecoder, bytes: &[u8]) -> Vec<(u8, u8, Vec<u8>)> {
+        let mut found = Vec::new();
+        for byte in bytes {
+            found.extend(decoder.feed(*byte).map(|frame| (frame.address, frame.kind, frame.payload.to_vec())));
+        }
+        found
+    }
+
+    fn framed(kind: u8, payload: &[u8]) -> Vec<u8> {
+        let mut bytes = [0; LONGEST];
+        let length = CrsfFrame { address: FLIGHT_CONTROLLER, kind, payload }.write(&mut bytes).expect("there is room");
+        bytes[..length].to_vec()
+    }
+
+    #[test]
+    fn the_checksum_is_the_one_it_says() {
+        // The check value of CRC-8/DVB-S2.
+        assert_eq!(crc(b"123456789"), 0xBC);
+    }
+
+    #[test]
+    fn a_longer_payload_is_a_newer_version() {
+        let mut payload = Battery { voltage: 3.7, current: 0.5, used: 120, remaining: 55 }.to_bytes().to_vec();
+        payload.push(9);
+        let bytes = framed(BATTERY, &payload);
+        let Message::Battery(battery) = CrsfFrame::decode(&bytes).expect("a frame").message() else {
+            panic!("a battery")
+        };
+        assert_eq!((battery.used, battery.remaining), (120, 55));
+        let bytes = framed(BATTERY, &payload[..7]);
+        assert_eq!(CrsfFrame::decode(&bytes).expect("a frame").message(), Message::Other);
+    }
+
+    #[test]
+    fn values_that_do_not_fit_are_the_most_and_no_numbers_are_zero() {
+        let [v1, v0, a1, a0, ..] =
+            Battery { voltage: f32::INFINITY, current: f32::NAN, used: u32::MAX, remaining: 0 }.to_bytes();
+        assert_eq!(([v1, v0], [a1, a0]), ([0xFF; 2], [0; 2]));
+        assert_eq!(Attitude { pitch: -9.0, roll: 9.0, yaw: f32::NAN }.to_bytes(), [0x80, 0, 0x7F, 0xFF, 0, 0]);
+    }
+
+    #[test]
+    fn a_payload_that_is_too_long_is_not_written() {
+        let frame = CrsfFrame { address: 0, kind: 0, payload: &[0; 61] };
+        assert_eq!(frame.write(&mut [0; 100]), None);
+        assert_eq!(CrsfFrame { payload: &[0; 60], ..frame }.write(&mut [0; 64]), Some(64));
+        assert_eq!(CrsfFrame { payload: &[0; 60], ..frame }.write(&mut [0; 63]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_that_is_no_length_costs_no_frame(garbage in prop::collection::vec(prop_oneof![0..2_u8, 63..=u8::MAX], 0..64), kind: u8, payload in prop::collection::vec(any::<u8>(), 0..=60)) {
+            let mut decoder = CrsfDecoder::new();
+            // Of garbage that has a length one in 256 is a frame: a CRC of eight bits is no more.
+            let bytes = [&garbage[..], &framed(kind, &payload)].concat();
+            let expected = std::vec![(FLIGHT_CONTROLLER, kind, payload)];
+            prop_assert_eq!(heard(&mut decoder, &bytes), expected);
+        }
+
+        #[test]
+        fn one_wrong_bit_costs_the_frame(kind: u8, payload in prop::collection::vec(any::<u8>(), 0..=60), place: prop::sample::Index, bit in 0..8) {
+            let mut bytes = framed(kind, &payload);
+            // The address is not part of the CRC.
+            let place = 1 + place.index(bytes.len() - 1);
+            bytes[place] ^= 1_u8 << bit;
+            prop_assert!(CrsfFrame::decode(&bytes).is_err());
+        }
+
+        #[test]
+        fn every_byte_is_in_a_frame_or_discarded_or_waits(bytes in prop::collection::vec(prop_oneof![Just(2), Just(4), any::<u8>()], 0..300)) {
+            let mut decoder = CrsfDecoder::new();
+            let frames: usize = heard(&mut decoder, &bytes).iter().map(|(_, _, payload)| payload.len() + OVERHEAD).sum();
+            prop_assert_eq!(frames + decoder.discarded() as usize + decoder.length - decoder.taken, bytes.len());
+        }
+    }
+}
