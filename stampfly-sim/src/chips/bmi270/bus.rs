@@ -55,6 +55,8 @@ impl SpiChip for Bmi270 {
         self.read(register, now) as u8
     }
 
+    // Asked for every byte of the FIFO, in which it does nothing.
+    #[inline]
     fn take(&mut self, index: usize, byte: u8, now: Instant) {
         if index == 0 {
             self.command = byte;

@@ -145,7 +145,7 @@ impl<C: SpiChip> SpiPort<C> {
             levels.clock = wire::idles_high(self.mode);
         }
         let (mut nanoseconds, mut late, mut blocks) = (0, latency.setup, true);
-        state.levels.set(levels);
+        let mut sent_last = None;
         for operation in operations {
             match operation {
                 Operation::DelayNs(delay) => {
@@ -159,11 +159,12 @@ impl<C: SpiChip> SpiPort<C> {
                     late += latency.of_bytes(length);
                     blocks &= length <= latency.polled;
                     if length > 0 {
-                        state.levels.set(Levels::after(self.mode, self.order, last));
+                        sent_last = Some(last);
                     }
                 }
             }
         }
+        state.levels.set(sent_last.map_or(levels, |last| Levels::after(self.mode, self.order, last)));
         let end = start + late + Duration::from_micros(nanoseconds.div_ceil(1_000));
         state.busy_until.set(end);
         let outcome = if refused { Err(BusError::Overrun) } else { Ok(()) };
@@ -172,71 +173,78 @@ impl<C: SpiChip> SpiPort<C> {
 
     /// Exchanges the bytes of a transfer that is over.
     fn exchange(&self, operations: &mut [Operation<'_, u8>], transfer: &Transfer) {
-        let Transfer { start, end, levels, latency, .. } = *transfer;
+        let Transfer { start, end, levels, .. } = *transfer;
         let faults = self.attached.faults();
+        let stuck = self.bus.0.stuck.get();
+        if faults.dead {
+            return self.each(operations, transfer, |_, _, _| stuck.unwrap_or(0xFF));
+        }
+        let errors = faults.bit_errors.max(self.garbled);
         let disturbance = if self.bus.0.floating.get() > 0 { DISTURBANCE } else { 0.0 };
-        let plain = wire::is_plain(levels, self.mode, self.order) && !self.bus.0.edge_by_edge.get();
-        let mut wire = (!plain).then(|| Wire::select(levels, self.mode, self.order));
         let mut chip = self.chip.borrow_mut();
         let mut noise = self.bus.0.noise.borrow_mut();
+        if wire::is_plain(levels, self.mode, self.order) && !self.bus.0.edge_by_edge.get() {
+            let mut moved = 0;
+            self.each(operations, transfer, |index, out, begin| {
+                moved = index + 1;
+                let out = carry(out, errors, &mut noise);
+                let answer = chip.exchange(index, out, after(start, begin + self.byte));
+                stuck.unwrap_or(carry(answer, errors.max(disturbance), &mut noise))
+            });
+            self.rising.set(self.rising.get() + 8 * moved as u64);
+        } else {
+            let mut wire = Wire::select(levels, self.mode, self.order);
+            self.each(operations, transfer, |_, out, begin| {
+                let out = carry(out, errors, &mut noise);
+                let at = |bits: u32| after(start, begin + self.byte * u64::from(bits) / 8).min(end);
+                let answer = wire.exchange(&mut *chip, out, at);
+                stuck.unwrap_or(carry(answer, errors.max(disturbance), &mut noise))
+            });
+            self.rising.set(self.rising.get() + wire.rising);
+        }
+        chip.release(end);
+    }
+
+    /// Calls `byte` for every byte of a transfer, with its number, what is sent, and at how many nanoseconds after the start it begins. What
+    /// that gives is read.
+    fn each(
+        &self,
+        operations: &mut [Operation<'_, u8>],
+        transfer: &Transfer,
+        mut byte: impl FnMut(usize, u8, u64) -> u8,
+    ) {
+        let latency = transfer.latency;
         let (mut index, mut nanoseconds) = (0, latency.setup.as_micros() * 1_000);
-        let stuck = self.bus.0.stuck.get();
-        // A byte that begins at so many nanoseconds after the start.
-        let mut byte = |out: u8, begin: u64| {
-            if faults.dead {
-                return stuck.unwrap_or(0xFF);
-            }
-            let errors = faults.bit_errors.max(self.garbled);
-            let out = carry(out, errors, &mut noise);
-            let answer = match &mut wire {
-                None => {
-                    self.rising.set(self.rising.get() + 8);
-                    chip.exchange(index, out, after(start, begin + self.byte))
-                }
-                Some(wire) => {
-                    let before = wire.rising;
-                    let at = |bits: u32| after(start, begin + self.byte * u64::from(bits) / 8).min(end);
-                    let answer = wire.exchange(&mut *chip, out, at);
-                    self.rising.set(self.rising.get() + wire.rising - before);
-                    answer
-                }
-            };
+        let mut next = |out: u8, nanoseconds: &mut u64| {
+            let answer = byte(index, out, *nanoseconds);
             index += 1;
-            stuck.unwrap_or(carry(answer, errors.max(disturbance), &mut noise))
+            *nanoseconds += self.byte;
+            answer
         };
         for operation in operations {
             let length = sent(operation).0;
             match operation {
-                Operation::Read(bytes) => bytes.iter_mut().for_each(|slot| {
-                    *slot = byte(0, nanoseconds);
-                    nanoseconds += self.byte;
-                }),
+                Operation::Read(bytes) => bytes.iter_mut().for_each(|slot| *slot = next(0, &mut nanoseconds)),
                 Operation::Write(bytes) => bytes.iter().for_each(|out| {
-                    byte(*out, nanoseconds);
-                    nanoseconds += self.byte;
+                    next(*out, &mut nanoseconds);
                 }),
                 Operation::Transfer(read, write) => {
-                    for place in 0..read.len().max(write.len()) {
-                        let answer = byte(write.get(place).copied().unwrap_or(0), nanoseconds);
-                        nanoseconds += self.byte;
+                    for place in 0..length {
+                        let answer = next(write.get(place).copied().unwrap_or(0), &mut nanoseconds);
                         if let Some(slot) = read.get_mut(place) {
                             *slot = answer;
                         }
                     }
                 }
-                Operation::TransferInPlace(bytes) => bytes.iter_mut().for_each(|slot| {
-                    *slot = byte(*slot, nanoseconds);
-                    nanoseconds += self.byte;
-                }),
+                Operation::TransferInPlace(bytes) => {
+                    bytes.iter_mut().for_each(|slot| *slot = next(*slot, &mut nanoseconds));
+                }
                 Operation::DelayNs(delay) => {
                     nanoseconds += u64::from(*delay) + latency.of_pause(*delay).as_micros() * 1_000;
                     continue;
                 }
             }
             nanoseconds += latency.of_bytes(length).as_micros() * 1_000;
-        }
-        if !faults.dead {
-            chip.release(end);
         }
     }
 }
