@@ -1,0 +1,40 @@
+//! Serial receivers: bytes at a UART.
+
+use stampfly_link::serial::crsf::{CrsfDecoder, CrsfFrame};
+use stampfly_link::serial::ibus::{IbusDecoder, IbusFrame};
+use stampfly_link::serial::sbus::{SbusDecoder, SbusFrame};
+use stampfly_types::{Duration, Instant};
+
+/// Bytes on the wire to all three decoders. A frame means the same when it is sent again, and no byte is lost count of.
+pub fn receiver_bytes(data: &[u8]) {
+    let (mut sbus, mut crsf, mut ibus) = (SbusDecoder::new(), CrsfDecoder::new(), IbusDecoder::new());
+    let [mut in_sbus, mut in_crsf, mut in_ibus] = [0; 3];
+    let mut now = Instant::ZERO;
+    for byte in data {
+        // Now and then a pause, as the bytes will have it.
+        now += Duration::from_micros(if byte % 64 == 63 { 700 } else { 120 });
+        if let Some(frame) = sbus.feed(now, *byte) {
+            assert_eq!(SbusFrame::decode(&frame.to_bytes()), Ok(frame));
+            in_sbus += SbusFrame::LENGTH;
+        }
+        if let Some(frame) = ibus.feed(*byte) {
+            assert_eq!(IbusFrame::decode(&frame.to_bytes()), Ok(frame));
+            in_ibus += IbusFrame::LENGTH;
+        }
+        if let Some(frame) = crsf.feed(*byte) {
+            let mut again = [0; CrsfFrame::LONGEST];
+            let length = frame.write(&mut again).expect("it came from no more");
+            assert_eq!(CrsfFrame::decode(&again[..length]), Ok(frame));
+            // What is understood is written, and is understood again; numbers keep their steps.
+            if let Some(length) = frame.message().write(&mut again) {
+                let meant = CrsfFrame::decode(&again[..length]).expect("our own frame").message();
+                assert_eq!(meant, frame.message());
+            }
+            in_crsf += length;
+        }
+    }
+    let known = [in_sbus + sbus.discarded() as usize, in_crsf + crsf.discarded() as usize, in_ibus + ibus.discarded() as usize];
+    for (known, longest) in known.into_iter().zip([SbusFrame::LENGTH, CrsfFrame::LONGEST, IbusFrame::LENGTH]) {
+        assert!(known <= data.len() && data.len() - known < longest, "bytes that are nowhere");
+    }
+}
