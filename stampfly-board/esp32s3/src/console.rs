@@ -3,6 +3,7 @@
 
 use crate::clock::Clock;
 use crate::facts::Facts;
+use crate::hil;
 use crate::memory::{Memory, restart};
 use crate::sensors::Healths;
 use crate::storage::{Storage, StorageError};
@@ -161,6 +162,7 @@ impl Console {
             }
             Request::DumpLog => self.dump().await,
             Request::Reboot => restart(),
+            Request::HardwareInTheLoop => hil::restart_into(),
         }
     }
 

@@ -19,6 +19,7 @@ mod cutoff;
 mod facts;
 mod flash;
 mod flight;
+mod hil;
 mod i2c;
 mod imu_config;
 mod memory;
@@ -69,6 +70,9 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
     #[cfg(feature = "esp32c6")]
     esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
+    if hil::is_wanted() {
+        hil::run(chip)
+    }
     // On the heap, which the radio does not need yet: the stack would hold little else.
     let tested = self_test(&mut Box::new_uninit(), &mut fresh_bus());
     esp_println::println!("{tested}");
@@ -78,7 +82,7 @@ fn main() -> ! {
     start(chip, tested)
 }
 
-/// A bus for the self test. Not inlined, because it is made on the stack.
+/// A bus for the self test, or for a flight without a world of its own. Not inlined, because it is made on the stack.
 #[inline(never)]
 fn fresh_bus() -> Box<topics::Bus> {
     Box::new(topics::Bus::new())

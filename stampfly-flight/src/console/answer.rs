@@ -25,6 +25,8 @@ pub enum Request<R> {
     DumpLog,
     /// Restart.
     Reboot,
+    /// Restart into [hardware in the loop](crate::hil).
+    HardwareInTheLoop,
     /// One of the vehicle's own.
     Vehicle(R),
 }
@@ -161,6 +163,7 @@ pub fn answer<V: Vehicle>(
         Command::ParameterReset => Request::ResetParameters,
         Command::LogDump => Request::DumpLog,
         Command::Reboot => Request::Reboot,
+        Command::HardwareInTheLoop => Request::HardwareInTheLoop,
         Command::Vehicle(command) => match vehicle.answer(command, now, reply)? {
             Some(request) if !V::needs_disarmed(&request) => return Ok(Request::Vehicle(request)),
             Some(request) => Request::Vehicle(request),

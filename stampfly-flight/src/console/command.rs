@@ -36,6 +36,8 @@ pub enum Command<'l, C> {
     LogDump,
     /// Restart.
     Reboot,
+    /// Fly a world at the other end of the line.
+    HardwareInTheLoop,
     /// Version of the firmware.
     Version,
     /// One of the vehicle's own.
@@ -57,6 +59,7 @@ pub const COMMANDS: &[(&str, &str)] = &[
     ("doctor", "examine everything that needs nobody to look, one line a check"),
     (LOG, "send the log of the last flight"),
     ("reboot", "restart"),
+    ("hil", "restart, and fly a world that a program on this line simulates; motors stay off"),
     ("version", "version of the firmware"),
 ];
 
@@ -99,6 +102,7 @@ impl<'l, C> Command<'l, C> {
             ["log", "dump"] => Self::LogDump,
             ["log", ..] => return Err(CommandError::Usage(LOG)),
             ["reboot"] => Self::Reboot,
+            ["hil"] => Self::HardwareInTheLoop,
             ["version"] => Self::Version,
             words => Self::Vehicle(V::parse(words)?),
         })
