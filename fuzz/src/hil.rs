@@ -37,8 +37,8 @@ pub fn hil_frames(data: &[u8]) {
     }
     assert_eq!(greeted, Greeting::Starts(Instant::from_secs(1)), "whatever came before");
     let (mut place, mut bus) = (Box::new(MaybeUninit::uninit()), Box::new(Bus::new()));
-    let vehicle = Assembled::in_place(&mut place, &mut bus, None, &config, Instant::from_secs(1));
-    frames(&mut Flight::<Runnables>::new(&mut line, vehicle), data, sequence);
+    let vehicle = Assembled::in_place(&mut *place, &mut *bus, None, &config, Instant::from_secs(1));
+    frames(&mut Flight::<Runnables>::new(&mut line, vehicle, Instant::from_secs(1)), data, sequence);
 }
 
 /// What a decoder finds is written again as the same bytes' content.

@@ -1,8 +1,8 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
 use crate::{
-    console_line, estimator_stream, failsafe_stream, hil_frames, mode_machine, parameter_image, radio_packets, rover_datagrams,
-    ulog, whole_stack,
+    console_line, estimator_stream, failsafe_stream, hil_frames, mode_machine, parameter_image, radio_packets,
+    rover_datagrams, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

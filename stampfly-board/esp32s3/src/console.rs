@@ -22,6 +22,7 @@ use stampfly_board::{VehicleConfig, black_box, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::black_box::{DumpError, Refused, dump};
 use stampfly_flight::console::{LineEditor, Piece, Request, SensorLine, answer};
+use stampfly_flight::hil::COMMAND;
 use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
@@ -161,8 +162,8 @@ impl Console {
                     .await;
             }
             Request::DumpLog => self.dump().await,
+            Request::Reboot if line.trim() == COMMAND => hil::restart_into(),
             Request::Reboot => restart(),
-            Request::HardwareInTheLoop => hil::restart_into(),
         }
     }
 

@@ -21,6 +21,9 @@
 //! Nothing here touches hardware. The vehicle's ends of the motors are inside [`Flight`], so what they are to do goes to the
 //! line only. Not for a vehicle with its propellers on, nor for measuring a driver: sensors and actuators have no part in it.
 
+/// What is typed at a vehicle's [console](crate::console) to restart it into this.
+pub const COMMAND: &str = "hil";
+
 mod frame;
 mod protocol;
 mod serve;

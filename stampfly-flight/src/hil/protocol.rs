@@ -53,7 +53,8 @@ pub enum Refusal {
     UnknownParameter,
     /// The parameter does not take this value.
     OutOfRange,
-    /// A payload that is none of its kind, or a sample of a topic that nobody outside publishes.
+    /// A payload that is none of its kind, a sample of a topic that nobody outside publishes, or a step that leads back or ten
+    /// seconds ahead.
     Nonsense,
     /// Not at this point of the conversation, or a frame between was never seen.
     OutOfOrder,

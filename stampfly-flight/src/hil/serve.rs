@@ -66,7 +66,7 @@ where
             return Served::Nobody;
         }
     };
-    let mut flight = Flight::<R>::new(line, Assembled::in_place(place, bus, None, config, start));
+    let mut flight = Flight::<R>::new(line, Assembled::in_place(place, bus, None, config, start), start);
     loop {
         let count = wire.receive(&mut buffer).await;
         for byte in buffer.iter().take(count) {

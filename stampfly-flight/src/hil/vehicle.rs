@@ -12,6 +12,12 @@ use stampfly_types::{Duration, Instant};
 /// slow line.
 pub const SILENCE: Duration = Duration::from_secs(2);
 
+/// A step leads at most so far: what has become due meanwhile is made up for, tick by tick, and nobody waits for a year of it.
+const LEAP: Duration = Duration::from_secs(10);
+
+/// And the clock at power-on is at most this: nobody has to think of an instant that overflows.
+const LATEST_START: Instant = Instant::from_secs(1 << 40);
+
 /// Room for a question, and for what happens in a step, bytes: twice the longest of the StampFly.
 pub const LONGEST: usize = 4096;
 /// Room for an answer: the same as a frame.
@@ -111,6 +117,7 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
                 Err(_) => Reply::Refused(Refusal::OutOfRange),
             }
         }
+        (Some(Request::Start(at)), _) if at > LATEST_START => Reply::Refused(Refusal::Nonsense),
         (Some(Request::Start(at)), Turn::New) => {
             *last = Some(body.sequence);
             starts = Some(at);
@@ -161,7 +168,7 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
 ///
 /// let (mut place, mut bus) = (MaybeUninit::uninit(), Bus::new());
 /// let rover = Assembled::in_place(&mut place, &mut bus, None, &0.5, power_on);
-/// let mut flight = Flight::<Rover>::new(&mut line, rover);
+/// let mut flight = Flight::<Rover>::new(&mut line, rover, power_on);
 /// let (mut memory, now) = ([0; 64], power_on + Duration::from_millis(20));
 /// let mut samples = Log::new(&mut memory);
 /// let range = TofData { distance: 1.5, valid: true, ..Default::default() };
@@ -178,13 +185,15 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
 pub struct Flight<'l, 'm, 'b, R: Schedule> {
     line: &'l mut Line<'m>,
     vehicle: InPlace<'b, R>,
+    /// What the last step led up to.
+    clock: Instant,
     over: Option<Over>,
 }
 
 impl<'l, 'm, 'b, R: Schedule> Flight<'l, 'm, 'b, R> {
-    /// A vehicle at power-on, after [`Greeting::Starts`] on this line.
-    pub const fn new(line: &'l mut Line<'m>, vehicle: InPlace<'b, R>) -> Self {
-        Self { line, vehicle, over: None }
+    /// A vehicle at power-on, after [`Greeting::Starts`] with this instant on this line.
+    pub const fn new(line: &'l mut Line<'m>, vehicle: InPlace<'b, R>, start: Instant) -> Self {
+        Self { line, vehicle, clock: start, over: None }
     }
 
     /// The answer to send.
@@ -212,7 +221,7 @@ impl<'l, 'm, 'b, R: Schedule> Flight<'l, 'm, 'b, R> {
     pub fn feed(&mut self, byte: u8, clock: impl Fn() -> Instant) -> bool {
         let now = clock();
         self.over(now);
-        let Self { line: Line { decoder, log, reply, replied, last, heard }, vehicle, over } = self;
+        let Self { line: Line { decoder, log, reply, replied, last, heard }, vehicle, clock: before, over } = self;
         let garbled = decoder.garbled();
         let Some(body) = decoder.feed(byte) else { return false };
         let sequence = body.sequence;
@@ -228,7 +237,12 @@ impl<'l, 'm, 'b, R: Schedule> Flight<'l, 'm, 'b, R> {
             (Some(Request::Step { now: at, bands, samples }), Turn::New) if over.is_none() => {
                 (*last, *heard) = (Some(sequence), Some(now));
                 log.clear();
-                match step(vehicle, log, at, bands, samples) {
+                let leads_on = at >= *before && at.since(*before) <= LEAP;
+                let stepped = if leads_on { step(vehicle, log, at, bands, samples) } else { Err(Refusal::Nonsense) };
+                if stepped.is_ok() {
+                    *before = at;
+                }
+                match stepped {
                     Ok((next_tick, due)) => match log.bytes() {
                         Some(bytes) => Reply::Stepped(Stepped {
                             next_tick,
@@ -267,6 +281,9 @@ fn step<R: Schedule>(
     let InPlace { flight_loop, outside, taps } = vehicle;
     for entry in samples {
         let Ok(Entry::Sample { topic, at, words }) = entry else { return Err(Refusal::Nonsense) };
+        if at > now + LEAP {
+            return Err(Refusal::Nonsense);
+        }
         outside.publish_words(topic, at, &words).ok_or(Refusal::Nonsense)?;
     }
     let mut reporter = Reporter { taps, log, topics: <R::Topics as TopicTable>::TOPICS };

@@ -2,10 +2,9 @@
 
 use crate::doctor::Lost;
 use crate::doctor::console::{Serial, ask};
+use stampfly_flight::hil::COMMAND;
 use std::time::Duration;
 
-/// What is typed at the console.
-const COMMAND: &str = "hil";
 /// A vehicle that restarts has its port again by then.
 const RESTARTED: Duration = Duration::from_secs(15);
 /// And no port of before that any more.

@@ -111,8 +111,8 @@ fn a_flight_over_a_line_is_the_same_flight() {
 #[test]
 fn parameters_and_faults_are_those_of_the_computer() {
     let setup = setup(|options| {
-        options.param = vec!["cascade.rate.roll.kp=0.00011".into()];
-        options.fault = vec!["imu_dead@hover+0.02".into()];
+        options.param = vec!["rate.roll.ti=0.7".into()];
+        options.fault = vec!["imu-silent@hover+0.02".into()];
     });
     let (mut pipe, _vehicle) = vehicle();
     let (_, recorder, _) = flown(&setup, &mut pipe, Settings::default()).expect("it flies");
