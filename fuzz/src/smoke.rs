@@ -107,7 +107,7 @@ fn failsafe() {
 
 #[test]
 fn hil() {
-    smoke("hil_frames", hil_frames, 4_000);
+    smoke("hil_frames", hil_frames, 20_000);
 }
 
 #[test]

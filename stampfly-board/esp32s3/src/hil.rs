@@ -6,7 +6,7 @@
 use crate::clock::Clock;
 use crate::fresh_bus;
 use crate::memory::restart;
-use crate::pins::*;
+use crate::pins::MotorPins;
 use crate::safe_state::Parked;
 use crate::{cutoff, safe_state};
 use alloc::boxed::Box;
@@ -16,7 +16,7 @@ use embassy_futures::block_on;
 use embassy_time::{Duration, with_timeout};
 use embedded_io_async::{Read, Write};
 use esp_hal::Async;
-use esp_hal::peripherals::{Peripherals, USB_DEVICE};
+use esp_hal::peripherals::{FROM_CPU_INTR0, TIMG0, TIMG1, USB_DEVICE};
 use esp_hal::ram;
 use esp_hal::system::software_reset;
 use esp_hal::timer::timg::TimerGroup;
@@ -48,15 +48,23 @@ pub fn is_wanted() -> bool {
     NEXT_START.swap(0, Ordering::AcqRel) == WANTED
 }
 
+/// What it needs of the chip.
+pub struct Parts {
+    pub motors: MotorPins<'static>,
+    pub usb: USB_DEVICE<'static>,
+    pub ticks: TIMG0<'static>,
+    pub interrupt: FROM_CPU_INTR0<'static>,
+    pub cutoff: TIMG1<'static>,
+}
+
 /// Flies once what the computer says, and restarts.
 #[inline(never)]
-pub fn run(chip: Peripherals) -> ! {
+pub fn run(parts: Parts) -> ! {
     cutoff::lock_out();
-    let pins: Pins<'static> = split_resources!(chip);
-    let motors = Parked::new(pins.motors);
-    esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
-    cutoff::start(chip.TIMG1, None);
-    fly(chip.USB_DEVICE, &motors);
+    let motors = Parked::new(parts.motors);
+    esp_rtos::start(TimerGroup::new(parts.ticks).timer0, parts.interrupt);
+    cutoff::start(parts.cutoff, None);
+    fly(parts.usb, &motors);
     restart()
 }
 

@@ -71,7 +71,14 @@ fn main() -> ! {
     #[cfg(feature = "esp32c6")]
     esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
     if hil::is_wanted() {
-        hil::run(chip)
+        let pins: Pins<'static> = split_resources!(chip);
+        hil::run(hil::Parts {
+            motors: pins.motors,
+            usb: chip.USB_DEVICE,
+            ticks: chip.TIMG0,
+            interrupt: chip.FROM_CPU_INTR0,
+            cutoff: chip.TIMG1,
+        })
     }
     // On the heap, which the radio does not need yet: the stack would hold little else.
     let tested = self_test(&mut Box::new_uninit(), &mut fresh_bus());

@@ -22,6 +22,23 @@ use std::time::{Duration, Instant};
 /// Flies once: greets the vehicle, gives it the parameters of the setup, and lets it fly. `report` as in
 /// [`fly`](crate::flown::fly).
 ///
+/// ```
+/// use stampfly_board::{schedule::Runnables, simulation::StampFly};
+/// use stampfly_host::hil::emulated::{Pipe, start};
+/// use stampfly_host::hil::fly;
+/// use stampfly_sim::vehicle::{Options, Remote, Settings, Vehicle, Verdict};
+///
+/// let [mut here, there] = Pipe::pair();
+/// start::<Runnables>(there);
+/// let hop = Options { mission: Some("arm; takeoff 0.2; land".into()), ..Options::default() };
+/// let setup = StampFly::setup(&hop, 1)?;
+/// let mut remote = Remote::new(&mut here, Settings::default());
+/// let flown = fly::<StampFly>(&setup, &mut remote, &mut (), &mut |_, _| {})?;
+/// assert!(flown.outcome.succeeded());
+/// assert!(remote.figures().round_trips.len() > 1_000);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the vehicle refuses something, or is lost.
 pub fn fly<V: Vehicle>(

@@ -55,7 +55,7 @@ impl Default for Settings {
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum RemoteError {
-    /// There is no such thing.
+    /// This is not offered.
     NotOffered(&'static str),
     /// The line is gone.
     Port(io::Error),
@@ -72,7 +72,7 @@ pub enum RemoteError {
 impl fmt::Display for RemoteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotOffered(what) => write!(f, "there is no {what}"),
+            Self::NotOffered(what) => write!(f, "not offered: {what}"),
             Self::Port(error) => write!(f, "the line to the vehicle is gone: {error}"),
             Self::NoAnswer => f.write_str("the vehicle does not answer"),
             Self::Refused(why) => why.fmt(f),
@@ -97,9 +97,9 @@ pub struct Figures {
     pub round_trips: Vec<Duration>,
     /// How long after a step's time on the wall clock its answer came, each; empty unless in real time.
     pub behind: Vec<Duration>,
-    /// The longest step by the vehicle's own clock, and the sum of all.
+    /// The longest step, by the vehicle's own clock.
     pub longest: Duration,
-    /// As said.
+    /// All of them together.
     pub total: Duration,
     /// Questions that were asked again.
     pub again: u64,
@@ -109,7 +109,8 @@ pub struct Figures {
     pub lost: u32,
 }
 
-/// A vehicle at the other end of a line.
+/// A vehicle at the other end of a line: greet it, give it parameters, and hand it to [`fly_remote`](super::fly_remote).
+/// `stampfly_host::hil::fly` does all of it.
 pub struct Remote<'p> {
     port: &'p mut dyn Port,
     settings: Settings,

@@ -5,7 +5,7 @@
 //! conversation, compiled for it. The hash is over everything published, the duties too. Controls: another seed must give
 //! another hash, and a vehicle that is gone must be an error.
 
-use super::qemu::{MACHINES, Machine, PACKAGE, inside, toolchain};
+use super::qemu::{MACHINES, Machine, inside, toolchain};
 use crate::arguments::Arguments;
 use crate::machine::{EMULATED_OTHERS, provide};
 use crate::repository::{Failure, Repository, capture, run as run_program};

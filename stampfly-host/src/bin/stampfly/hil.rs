@@ -3,7 +3,7 @@
 use crate::arguments::HilOptions;
 use crate::doctor::port_of;
 use crate::failure::Failure;
-use crate::fly::{figures, fly_and_write, print_screen};
+use crate::fly::{self, figures, fly_and_write, print_screen};
 use serde_json::{Value, json};
 use stampfly_board::schedule::Runnables;
 use stampfly_bus::{Band, Schedule, TopicTable, Trigger};
@@ -19,6 +19,13 @@ use std::time::Duration;
 const USAGE: u8 = 2;
 
 pub fn run(options: &HilOptions) -> Result<ExitCode, Failure> {
+    if options.fly.from.is_some() {
+        eprintln!("stampfly: a flight of a campaign is flown again here: stampfly fly --from");
+        return Ok(ExitCode::from(USAGE));
+    }
+    if options.fly.scene.list {
+        return fly::run(&options.fly);
+    }
     let mut port: Box<dyn Port> = match &options.program {
         Some(command) => Box::new(Program::start(command).map_err(|error| format!("--program {command}: {error}"))?),
         None if options.emulated => {
