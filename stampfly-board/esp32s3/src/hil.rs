@@ -4,7 +4,6 @@
 //! computes, USB and the cut-off, which has been told to keep the motors off until the next start: no driver, no radio, no PWM.
 
 use crate::clock::Clock;
-use crate::fresh_bus;
 use crate::memory::restart;
 use crate::pins::MotorPins;
 use crate::safe_state::Parked;
@@ -24,6 +23,7 @@ use esp_hal::usb::usb_serial_jtag::{UsbSerialJtag, UsbSerialJtagRx, UsbSerialJta
 use portable_atomic::AtomicU32;
 use stampfly_board::VehicleConfig;
 use stampfly_board::schedule::Runnables;
+use stampfly_board::topics::Bus;
 use stampfly_drivers::Timebase;
 use stampfly_flight::hil::{LONGEST, LONGEST_FRAME, Line, Wire, serve};
 use stampfly_types::Instant;
@@ -34,7 +34,7 @@ const WANTED: u32 = 0x5746_4c59;
 #[ram(unstable(rtc_fast, persistent))]
 static NEXT_START: AtomicU32 = AtomicU32::new(0);
 /// A computer that takes nothing, or says nothing, for this long is asked again later.
-const PATIENCE: Duration = Duration::from_millis(20);
+const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Restarts into it.
 pub fn restart_into() -> ! {
@@ -55,6 +55,8 @@ pub struct Parts {
     pub ticks: TIMG0<'static>,
     pub interrupt: FROM_CPU_INTR0<'static>,
     pub cutoff: TIMG1<'static>,
+    /// On which nothing has been published.
+    pub bus: Box<Bus>,
 }
 
 /// Flies once what the computer says, and restarts.
@@ -64,16 +66,16 @@ pub fn run(parts: Parts) -> ! {
     let motors = Parked::new(parts.motors);
     esp_rtos::start(TimerGroup::new(parts.ticks).timer0, parts.interrupt);
     cutoff::start(parts.cutoff, None);
-    fly(parts.usb, &motors);
+    fly(parts.usb, parts.bus, &motors);
     restart()
 }
 
 /// Flies once. The motors are shown to be parked.
-fn fly(usb: USB_DEVICE<'static>, _motors: &Parked) {
+fn fly(usb: USB_DEVICE<'static>, mut bus: Box<Bus>, _motors: &Parked) {
     // The heap is the radio's otherwise.
     let (mut incoming, mut happened, mut reply) = (vec![0; LONGEST], vec![0; LONGEST], vec![0; LONGEST_FRAME]);
     let mut line = Line::new(&mut incoming, &mut happened, &mut reply);
-    let (mut place, mut bus, mut config) = (Box::new_uninit(), fresh_bus(), Box::new(VehicleConfig::default()));
+    let (mut place, mut config) = (Box::new_uninit(), Box::new(VehicleConfig::default()));
     let (keys, screen) = UsbSerialJtag::new(usb).into_async().split();
     // Nothing else is to be done on this core, so nobody is kept waiting.
     block_on(serve::<Runnables>(&mut Usb { keys, screen }, &mut line, &mut place, &mut bus, &mut config));

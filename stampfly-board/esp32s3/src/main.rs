@@ -78,6 +78,7 @@ fn main() -> ! {
             ticks: chip.TIMG0,
             interrupt: chip.FROM_CPU_INTR0,
             cutoff: chip.TIMG1,
+            bus: fresh_bus(),
         })
     }
     // On the heap, which the radio does not need yet: the stack would hold little else.

@@ -14,10 +14,10 @@ pub const GREETING: Duration = Duration::from_secs(60);
 /// A line of bytes, and the vehicle's own clock.
 #[allow(async_fn_in_trait, reason = "the caller polls one future, on one core")]
 pub trait Wire {
-    /// Waits for bytes, some tens of milliseconds at most, and returns how many came.
+    /// Waits for bytes, a tenth of a second at most, and returns how many came.
     async fn receive(&mut self, buffer: &mut [u8]) -> usize;
 
-    /// Sends bytes. What is not taken in some tens of milliseconds is lost, and is asked for again.
+    /// Sends bytes. What is not taken within a tenth of a second is lost, and is asked for again.
     async fn send(&mut self, bytes: &[u8]);
 
     /// The clock.

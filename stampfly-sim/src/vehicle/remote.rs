@@ -163,9 +163,7 @@ impl<'p> Remote<'p> {
                     let count = self.port.receive(&mut buffer, left)?;
                     self.received.extend_from_slice(&buffer[..count]);
                 }
-                let mut taken = 0;
-                for byte in &self.received {
-                    taken += 1;
+                for (place, byte) in self.received.iter().enumerate() {
                     let Some(body) = self.decoder.feed(*byte) else { continue };
                     // An answer to a question that was asked twice comes twice.
                     if body.sequence != self.sequence {
@@ -173,7 +171,7 @@ impl<'p> Remote<'p> {
                     }
                     let reply = Reply::read(body.kind, body.payload, topics).ok_or(RemoteError::Nonsense)?;
                     let outcome = take(reply);
-                    self.received.drain(..taken);
+                    self.received.drain(..=place);
                     self.figures.garbled[0] = self.decoder.garbled();
                     return outcome;
                 }
