@@ -143,12 +143,12 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
 /// use stampfly_flight::{Assembled, hil};
 /// use stampfly_types::{Duration, Instant, Message, messages::TofData};
 /// # use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
-/// # struct Nothing; impl Parameters for Nothing {
+/// # struct Nothing;
+/// # impl Parameters for Nothing {
 /// #     fn describe(&self, _: usize) -> Option<ParameterInfo<'_>> { None }
 /// #     fn get(&self, _: usize) -> Option<f32> { None }
 /// #     fn set(&mut self, _: usize, _: f32) -> Result<(), ParameterError> { Err(ParameterError::Unknown) }
 /// # }
-/// # let mut parameters = Nothing;
 ///
 /// # fn main() {
 /// let (mut incoming, mut happened, mut reply) = ([0; LONGEST], [0; LONGEST], [0; LONGEST_FRAME]);
@@ -162,7 +162,7 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
 /// let hello = Request::Hello { version: hil::VERSION, tables: tables::<Rover>() };
 /// let mut greeted = Greeting::Incomplete;
 /// for byte in [asked(hello, 1), asked(Request::Start(power_on), 2)].concat() {
-///     greeted = greet::<Rover>(&mut line, byte, Instant::ZERO, &mut parameters);
+///     greeted = greet::<Rover>(&mut line, byte, Instant::ZERO, &mut Nothing);
 /// }
 /// assert_eq!(greeted, Greeting::Starts(power_on));
 ///
