@@ -3,6 +3,7 @@
 
 use crate::clock::Clock;
 use crate::facts::Facts;
+#[cfg(feature = "hil")]
 use crate::hil;
 use crate::memory::{Memory, restart};
 use crate::sensors::Healths;
@@ -162,7 +163,12 @@ impl Console {
                     .await;
             }
             Request::DumpLog => self.dump().await,
+            #[cfg(feature = "hil")]
             Request::Reboot if line.trim() == COMMAND => hil::restart_into(),
+            #[cfg(not(feature = "hil"))]
+            Request::Reboot if line.trim() == COMMAND => {
+                self.screen.show("only in firmware with the feature hil\r\n").await
+            }
             Request::Reboot => restart(),
         }
     }

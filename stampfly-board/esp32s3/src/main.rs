@@ -19,6 +19,7 @@ mod cutoff;
 mod facts;
 mod flash;
 mod flight;
+#[cfg(feature = "hil")]
 mod hil;
 mod i2c;
 mod imu_config;
@@ -70,6 +71,7 @@ fn main() -> ! {
     esp_alloc::heap_allocator!(#[ram(unstable(dcache_reclaimed))] size: sizes::SECOND_HEAP);
     #[cfg(feature = "esp32c6")]
     esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
+    #[cfg(feature = "hil")]
     if hil::is_wanted() {
         let pins: Pins<'static> = split_resources!(chip);
         hil::run(hil::Parts {

@@ -21,8 +21,10 @@ pub fn hold_low() {
 }
 
 /// Motors' pins that are low until the next start. What drives a motor wants its pins, and nobody gets these back.
+#[cfg(feature = "hil")]
 pub struct Parked(#[expect(dead_code, reason = "held, and never given back")] [Output<'static>; 4]);
 
+#[cfg(feature = "hil")]
 impl Parked {
     /// Takes the pins, and makes them outputs that are low.
     pub fn new(pins: MotorPins<'static>) -> Self {
