@@ -23,6 +23,7 @@ use stampfly_board::{VehicleConfig, black_box, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::black_box::{DumpError, Refused, dump};
 use stampfly_flight::console::{LineEditor, Piece, Request, SensorLine, answer};
+#[cfg(feature = "hil")]
 use stampfly_flight::hil::COMMAND;
 use stampfly_link::Address;
 
@@ -165,10 +166,6 @@ impl Console {
             Request::DumpLog => self.dump().await,
             #[cfg(feature = "hil")]
             Request::Reboot if line.trim() == COMMAND => hil::restart_into(),
-            #[cfg(not(feature = "hil"))]
-            Request::Reboot if line.trim() == COMMAND => {
-                self.screen.show("only in firmware with the feature hil\r\n").await
-            }
             Request::Reboot => restart(),
         }
     }
