@@ -9,6 +9,7 @@
 //! | [`console_line`] | the serial port | lines stay short and printable, parameters in range, an armed vehicle does nothing |
 //! | [`estimator_stream`] | a stream of samples and times | numbers stay finite, the covariance symmetric with a diagonal of variances |
 //! | [`failsafe_stream`] | a stream of inertial samples | a sensor that gives nothing usable is found in time, an alert stays while the vehicle is armed |
+//! | [`hil_frames`] | a line with a computer that simulates the world | the vehicle answers whole frames alone, its clock is its own, entries end |
 //! | [`mode_machine`] | steps with any commands, gestures, frames, alerts | a kill disarms in its step, phases change by the table, order does not matter |
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
@@ -24,6 +25,7 @@ mod datagrams;
 mod estimator;
 mod failsafe;
 mod flash;
+mod hil;
 mod machine;
 mod packets;
 mod parameters;
@@ -34,6 +36,7 @@ pub use console::console_line;
 pub use datagrams::rover_datagrams;
 pub use estimator::estimator_stream;
 pub use failsafe::failsafe_stream;
+pub use hil::hil_frames;
 pub use machine::mode_machine;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;

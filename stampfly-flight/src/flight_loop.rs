@@ -223,6 +223,19 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         activation
     }
 
+    /// Reads the inputs of an activation that ran elsewhere, as it read them there, and runs nothing: this bus is then where
+    /// that one is, as far as readers go. Returns it as it was.
+    pub fn follow(&mut self, record: ActivationRecord) -> Activation {
+        let mut activation = Activation::replay(record);
+        R::read(&mut self.lines.ends, usize::from(record.index), &mut activation);
+        activation
+    }
+
+    /// Publishes what a runnable published elsewhere, as [`publish_words`](PublishWords::publish_words) does.
+    pub fn publish_words(&mut self, topic: usize, at: Instant, words: &[u32]) -> Option<u32> {
+        self.lines.ends.publish_words(topic, at, words)
+    }
+
     /// Puts a sample that a runnable published back on the bus, as
     /// [`restore_words`](PublishWords::restore_words) does.
     pub fn restore_words(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) -> Option<()> {

@@ -17,6 +17,7 @@
 //! | [`replay`](mod@replay) | the flight again, compared bit for bit (feature `replay`) |
 //! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
 //! | [`golden`] | a recorded flight that every machine must compute alike |
+//! | [`hil`] | hardware in the loop: the vehicle flies a world at the other end of a line |
 //! | [`mock`] | one runnable by itself, for tests |
 //! | [`newest`] | the newest sample of every topic, shown without its type |
 //! | [`parameters`] | parameters by name |
@@ -35,6 +36,7 @@ pub mod console;
 pub mod doctor;
 pub mod flight_loop;
 pub mod golden;
+pub mod hil;
 #[cfg(feature = "key-frame")]
 pub mod key_frame;
 pub mod log_schema;

@@ -165,6 +165,7 @@ fn what_must_not_happen_in_motion_is_refused_in_motion_and_before_anything_is_kn
         ("param reset", Request::ResetParameters),
         ("log dump", Request::DumpLog),
         ("reboot", Request::Reboot),
+        ("hil", Request::Reboot),
         ("wheel turn 3", Request::Vehicle(Wheel::Turn(3))),
     ];
     for (line, request) in requests {

@@ -7,6 +7,7 @@
 //! | [`recorder`] | the log of a flight |
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
+//! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
@@ -17,6 +18,7 @@ pub mod campaign;
 pub mod doctor;
 pub mod flown;
 pub mod golden;
+pub mod hil;
 mod inputs;
 mod page;
 pub mod recorder;

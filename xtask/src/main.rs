@@ -84,6 +84,7 @@ const STEPS: &[Step] = &[
     Step::new("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
         .beside()
         .accepting(&[Fix]),
+    Step::new("hil", "Fly a mission with the vehicle on an emulated core: the same bits", steps::hil::run),
     Step::new("cache", "Count what a pass of the flight band would fetch from flash", steps::cache::run)
         .beside()
         .accepting(&[Fix]),

@@ -3,6 +3,8 @@
 
 use crate::clock::Clock;
 use crate::facts::Facts;
+#[cfg(feature = "hil")]
+use crate::hil;
 use crate::memory::{Memory, restart};
 use crate::sensors::Healths;
 use crate::storage::{Storage, StorageError};
@@ -22,6 +24,8 @@ use stampfly_board::{VehicleConfig, black_box, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::black_box::{DumpError, Refused, dump};
 use stampfly_flight::console::{LineEditor, Piece, Request, SensorLine, answer};
+#[cfg(feature = "hil")]
+use stampfly_flight::hil::COMMAND;
 use stampfly_link::Address;
 
 const PROMPT: &str = "> ";
@@ -161,6 +165,8 @@ impl Console {
                     .await;
             }
             Request::DumpLog => self.dump().await,
+            #[cfg(feature = "hil")]
+            Request::Reboot if line.trim() == COMMAND => hil::restart_into(),
             Request::Reboot => restart(),
         }
     }

@@ -19,6 +19,8 @@ mod cutoff;
 mod facts;
 mod flash;
 mod flight;
+#[cfg(feature = "hil")]
+mod hil;
 mod i2c;
 mod imu_config;
 mod memory;
@@ -74,6 +76,18 @@ fn main() -> ! {
         esp_alloc::heap_allocator!(#[ram(reclaimed)] size: 64 * 1024);
         esp_alloc::heap_allocator!(size: sizes::SECOND_HEAP);
     }
+    #[cfg(feature = "hil")]
+    if hil::is_wanted() {
+        let pins: Pins<'static> = split_resources!(chip);
+        hil::run(hil::Parts {
+            motors: pins.motors,
+            usb: chip.USB_DEVICE,
+            ticks: chip.TIMG0,
+            interrupt: chip.FROM_CPU_INTR0,
+            cutoff: chip.TIMG1,
+            bus: fresh_bus(),
+        })
+    }
     // On the heap, which the radio does not need yet: the stack would hold little else.
     let tested = self_test(&mut Box::new_uninit(), &mut fresh_bus());
     esp_println::println!("{tested}");
@@ -83,7 +97,7 @@ fn main() -> ! {
     start(chip, tested)
 }
 
-/// A bus for the self test. Not inlined, because it is made on the stack.
+/// A bus for the self test, or for a flight without a world of its own. Not inlined, because it is made on the stack.
 #[inline(never)]
 fn fresh_bus() -> Box<topics::Bus> {
     Box::new(topics::Bus::new())

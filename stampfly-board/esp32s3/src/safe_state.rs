@@ -20,6 +20,20 @@ pub fn hold_low() {
     }
 }
 
+/// Motors' pins that are low until the next start. What drives a motor wants its pins, and nobody gets these back.
+#[cfg(feature = "hil")]
+pub struct Parked(#[expect(dead_code, reason = "held, and never given back")] [Output<'static>; 4]);
+
+#[cfg(feature = "hil")]
+impl Parked {
+    /// Takes the pins, and makes them outputs that are low.
+    pub fn new(pins: MotorPins<'static>) -> Self {
+        let MotorPins { front_right, rear_right, rear_left, front_left } = pins;
+        let pins: [AnyPin<'static>; 4] = [front_right.into(), rear_right.into(), rear_left.into(), front_left.into()];
+        Self(pins.map(|pin| Output::new(pin, Level::Low, OutputConfig::default())))
+    }
+}
+
 /// Deselects both chips on SPI. A resistor pulls the inertial sensor's select low, so that it is selected from power-on, and
 /// after a warm start drives the line on which the boot loader speaks.
 pub fn deselect() {

@@ -47,7 +47,8 @@ use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::FaultKind;
 use stampfly_sim::vehicle::{
-    self, Ended, FlightOptions, Golden, Options, Page, Setting, SetupError, Variety, Vehicle, Witness,
+    self, Ended, FlightOptions, Golden, Options, Page, Remote, RemoteError, Setting, SetupError, Variety, Vehicle,
+    Witness,
 };
 use stampfly_types::Message;
 use std::fmt::Display;
@@ -120,6 +121,16 @@ impl Vehicle for StampFly {
     ) -> Ended<Outcome> {
         let mut surroundings = flight::Surroundings::new(setup);
         vehicle::fly(&setup.vehicle, &Self::options(setup), &mut surroundings, witness, report)
+    }
+
+    fn fly_remote(
+        setup: &Setup,
+        remote: &mut Remote<'_>,
+        witness: &mut dyn Witness<Runnables>,
+        report: &mut dyn FnMut(f32, &'static str),
+    ) -> Result<Ended<Outcome>, RemoteError> {
+        let mut surroundings = flight::Surroundings::new(setup);
+        vehicle::fly_remote(&setup.vehicle, &Self::options(setup), &mut surroundings, remote, witness, report)
     }
 
     fn default_config() -> VehicleConfig {

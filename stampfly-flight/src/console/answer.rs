@@ -23,7 +23,7 @@ pub enum Request<R> {
     ResetParameters,
     /// Send the log.
     DumpLog,
-    /// Restart.
+    /// Restart; after the line [`hil::COMMAND`](crate::hil::COMMAND) into hardware in the loop, on a board that offers it.
     Reboot,
     /// One of the vehicle's own.
     Vehicle(R),
@@ -160,7 +160,7 @@ pub fn answer<V: Vehicle>(
         Command::ParameterSave => Request::SaveParameters,
         Command::ParameterReset => Request::ResetParameters,
         Command::LogDump => Request::DumpLog,
-        Command::Reboot => Request::Reboot,
+        Command::Reboot | Command::HardwareInTheLoop => Request::Reboot,
         Command::Vehicle(command) => match vehicle.answer(command, now, reply)? {
             Some(request) if !V::needs_disarmed(&request) => return Ok(Request::Vehicle(request)),
             Some(request) => Request::Vehicle(request),

@@ -2,6 +2,7 @@
 
 use super::Vehicle;
 use super::error::{CommandError, MAX_WORDS};
+use crate::hil;
 use heapless::Vec;
 
 /// What a line asks for, with names as they were typed. `C` are the vehicle's own commands.
@@ -36,6 +37,8 @@ pub enum Command<'l, C> {
     LogDump,
     /// Restart.
     Reboot,
+    /// Fly a world at the other end of the line.
+    HardwareInTheLoop,
     /// Version of the firmware.
     Version,
     /// One of the vehicle's own.
@@ -57,6 +60,7 @@ pub const COMMANDS: &[(&str, &str)] = &[
     ("doctor", "examine everything that needs nobody to look, one line a check"),
     (LOG, "send the log of the last flight"),
     ("reboot", "restart"),
+    (hil::COMMAND, "restart, and fly a world that a program on this line simulates; motors stay off"),
     ("version", "version of the firmware"),
 ];
 
@@ -99,6 +103,7 @@ impl<'l, C> Command<'l, C> {
             ["log", "dump"] => Self::LogDump,
             ["log", ..] => return Err(CommandError::Usage(LOG)),
             ["reboot"] => Self::Reboot,
+            [hil::COMMAND] => Self::HardwareInTheLoop,
             ["version"] => Self::Version,
             words => Self::Vehicle(V::parse(words)?),
         })

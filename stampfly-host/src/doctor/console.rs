@@ -98,6 +98,21 @@ impl Port for Serial {
     }
 }
 
+/// The same bytes, for hardware in the loop.
+impl stampfly_sim::vehicle::Port for Serial {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.port.write_all(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        self.port.set_timeout(patience.min(PATIENCE))?;
+        match self.port.read(buffer) {
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
+            other => other,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -386,3 +386,28 @@ fn the_doctor_says_what_it_found_by_its_exit_code_and_in_a_file() {
     // Nobody says that the propellers are off.
     assert_eq!(run(&folder, &["doctor", "--port", "/nowhere"]).code, 2);
 }
+
+#[test]
+fn hardware_in_the_loop_is_the_same_flight_or_an_error() {
+    let folder = folder("hil");
+    std::fs::write(folder.join("hop"), HOP).expect("writable");
+    let flown = |arguments: &[&str]| {
+        let all = [arguments, &["--mission", "hop", "--seed", "3", "--json"]].concat();
+        json(&run(&folder, &all))["log_hash"].clone()
+    };
+    assert_eq!(flown(&["hil", "--emulated"]), flown(&["fly"]));
+    assert!(folder.join("flight.ulg").exists() && folder.join("flight.html").exists());
+    let replayed = run(&folder, &["replay", "flight.ulg"]);
+    assert_eq!(replayed.code, 0, "{}", replayed.err);
+    let shown = run(&folder, &["hil", "--emulated", "--mission", "arm; takeoff 0.2; land", "--real-time"]);
+    assert!(shown.code == 0 && shown.out.contains("round trip") && shown.out.contains("real time"), "{}", shown.out);
+
+    let gone = run(&folder, &["hil", "--program", "true", "--mission", "hop"]);
+    assert!(gone.code == 1 && gone.err.contains("the line to the vehicle is gone"), "{}", gone.err);
+    let mute = run(&folder, &["hil", "--program", "sleep 60", "--mission", "hop"]);
+    assert!(mute.code == 1 && mute.err.contains("does not answer"), "{}", mute.err);
+    for usage in [&["hil", "--emulated", "--program", "true"][..], &["hil", "--emulated", "--from", "x", "--row", "0"]]
+    {
+        assert_eq!(run(&folder, usage).code, 2, "{usage:?}");
+    }
+}

@@ -16,6 +16,7 @@ mod flight_task;
 mod flips;
 mod flying_quality;
 mod held;
+mod hil;
 mod impact;
 mod in_flight;
 mod losses;

@@ -7,11 +7,12 @@
 //! between reading and publishing, as a preemptive executor on two cores would: generations are skipped, and the log
 //! must still replay.
 
-use super::jitter::Jitter;
-use super::{Around, Surroundings, Witness};
+use super::processor::{Here, Processor};
+use super::remote::{Remote, RemoteError, There};
+use super::{Around, Outside, Surroundings, Witness};
 use crate::time::Tasks;
-use stampfly_bus::{Band, Schedule, Taps, TopicTable};
-use stampfly_flight::{Assembled, Pending};
+use stampfly_bus::{Schedule, Taps, TopicTable};
+use stampfly_flight::Assembled;
 use stampfly_types::{Duration, Instant};
 
 /// How a flight is run.
@@ -48,63 +49,71 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
     witness: &mut dyn Witness<R>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Ended<S::Outcome> {
+    let mut bus = R::Topics::new();
+    let Assembled { flight_loop, outside, taps } = Assembled::<R>::new(&mut bus, None, config, options.start);
+    let here = Here::new(flight_loop, options.jitter);
+    match fly_on(here, outside, taps, options, surroundings, witness, report) {
+        Ok(ended) => ended,
+        Err(never) => match never {},
+    }
+}
+
+/// As [`fly`], with the runnables on a vehicle at the other end of a line, which has been
+/// [greeted](Remote::greet). The same flight bit for bit, if both compute alike.
+///
+/// # Errors
+/// When the vehicle refuses something or is lost; the flight is broken off. And for [`FlightOptions::jitter`], which is
+/// about an executor here.
+pub fn fly_remote<R: Schedule, S: Surroundings<Runnables = R>>(
+    config: &R::Config,
+    options: &FlightOptions,
+    surroundings: &mut S,
+    remote: &mut Remote<'_>,
+    witness: &mut dyn Witness<R>,
+    report: &mut dyn FnMut(f32, &'static str),
+) -> Result<Ended<S::Outcome>, RemoteError> {
+    if options.jitter.is_some() {
+        return Err(RemoteError::NotOffered("an executor that is late"));
+    }
+    let mut bus = R::Topics::new();
+    let Assembled { flight_loop, outside, taps } = Assembled::<R>::new(&mut bus, None, config, options.start);
+    let there = There::start(remote, flight_loop, options.start)?;
+    let ended = fly_on(there, outside, taps, options, surroundings, witness, report)?;
+    remote.end()?;
+    Ok(ended)
+}
+
+/// Flies on whatever runs the runnables.
+fn fly_on<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>>(
+    mut processor: P,
+    outside: Outside<'b, R>,
+    mut taps: <R::Topics as TopicTable>::Taps<'b>,
+    options: &FlightOptions,
+    surroundings: &'b mut S,
+    witness: &mut dyn Witness<R>,
+    report: &mut dyn FnMut(f32, &'static str),
+) -> Result<Ended<S::Outcome>, P::Error> {
     let (start, end) = (options.start, options.start + options.limit);
     let clock = surroundings.clock();
-    let mut bus = R::Topics::new();
-    let Assembled { mut flight_loop, outside, mut taps } = Assembled::<R>::new(&mut bus, None, config, start);
     witness.begins(start);
     let mut tasks = Tasks::new(clock.clone());
     let mut around = surroundings.start(&mut tasks, outside);
-
-    let mut jitter = Jitter::new(options.jitter);
-    let mut flight_at: Option<Instant> = None;
-    let mut interrupted: Option<(Instant, Pending)> = None;
     let mut next_report = start;
     loop {
-        let deadlines = [
-            tasks.next_deadline(),
-            // A tick that has passed is waiting for an executor that is late.
-            flight_loop.next_tick().filter(|tick| *tick > clock.now()),
-            // One that has passed waits for a processor that is held up.
-            flight_at.filter(|at| *at > clock.now()),
-            interrupted.as_ref().map(|(at, _)| *at),
-        ];
+        let deadlines = [tasks.next_deadline(), processor.deadline(clock.now())];
         let Some(next) = deadlines.into_iter().flatten().min() else { break };
         tasks.run_until(next.max(clock.now()));
         let now = clock.now();
         // What came from outside is in the log before the activations that read it.
-        drain(&mut taps, &mut around, witness);
+        drain(&mut taps, &mut processor, &mut around, witness);
 
         witness.turn(now);
-        let held_up = around.is_held_up(Band::Flight, now);
-        if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
-            flight_at = Some(now + jitter.flight());
-        }
-        if !held_up && flight_at.is_some_and(|at| at <= now) {
-            flight_at = None;
-            flight_loop.run_band(Band::Flight, now, witness);
-            around.drive(now);
-        }
-        match interrupted.take() {
-            Some((at, pending)) if at <= now => flight_loop.finish(pending, witness),
-            Some(pending) => interrupted = Some(pending),
-            None if around.is_held_up(Band::Background, now) => {}
-            None => {
-                while let Some(pending) = flight_loop.start_next(Band::Background, now, witness) {
-                    let takes = jitter.background();
-                    if takes > Duration::ZERO {
-                        interrupted = Some((now + takes, pending));
-                        break;
-                    }
-                    flight_loop.finish(pending, witness);
-                }
-            }
-        }
+        processor.turn(now, &mut around, witness)?;
         around.show(now);
-        drain(&mut taps, &mut around, witness);
+        drain(&mut taps, &mut processor, &mut around, witness);
         witness.lost(now, taps.lost());
-        if interrupted.is_none() {
-            witness.at_rest(now, &flight_loop);
+        if let Some(flight_loop) = processor.at_rest() {
+            witness.at_rest(now, flight_loop);
         }
 
         if now >= next_report {
@@ -117,18 +126,23 @@ pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
         }
     }
     drop(tasks);
-    if let Some((_, pending)) = interrupted {
-        flight_loop.finish(pending, witness);
-        drain(&mut taps, &mut around, witness);
+    if processor.end(witness) {
+        drain(&mut taps, &mut processor, &mut around, witness);
     }
     witness.ends();
-    Ended { outcome: around.finish(), duration: clock.now().since(start), log_lost: taps.lost() }
+    Ok(Ended { outcome: around.finish(), duration: clock.now().since(start), log_lost: taps.lost() })
 }
 
 /// Passes on what was published.
-fn drain<R: Schedule>(taps: &mut impl Taps, around: &mut impl Around, witness: &mut dyn Witness<R>) {
+fn drain<'b, R: Schedule>(
+    taps: &mut impl Taps,
+    processor: &mut impl Processor<'b, R>,
+    around: &mut impl Around,
+    witness: &mut dyn Witness<R>,
+) {
     taps.drain(&mut |topic, at, generation, words| {
         witness.published(topic, at, generation, words);
+        processor.published(topic, at, words);
         around.published(topic, at, words);
     });
     around.beside(&mut |place, at, generation, words| witness.beside(place, at, generation, words));

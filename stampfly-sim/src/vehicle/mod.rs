@@ -5,6 +5,7 @@
 //! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
 //! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
 //! | [`fly`] | one flight on virtual time |
+//! | [`Remote`], [`fly_remote`] | the same with the runnables on a vehicle at the other end of a line |
 //! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
 //! | [`Scenario`] | what to command and what must be true, as text |
 //! | [`Live`] | other programs fly it, in real time |
@@ -17,13 +18,16 @@ mod executor;
 mod jitter;
 mod live;
 mod page;
+mod processor;
+mod remote;
 mod scenario;
 mod scripted;
 mod witness;
 
-pub use executor::{Ended, FlightOptions, fly};
+pub use executor::{Ended, FlightOptions, fly, fly_remote};
 pub use live::{Link, Live};
 pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
+pub use remote::{Figures, Port, Remote, RemoteError, Settings};
 pub use scenario::Scenario;
 pub use scripted::{Following, Script, Scripted};
 pub use witness::Witness;
@@ -290,6 +294,19 @@ pub trait Vehicle: 'static {
         witness: &mut dyn Witness<Self::Runnables>,
         report: &mut dyn FnMut(f32, &'static str),
     ) -> Ended<Self::Outcome>;
+
+    /// Flies it in its surroundings with its runnables at the other end of a line, with [`fly_remote`].
+    ///
+    /// # Errors
+    /// As [`fly_remote`]; by default, that this vehicle does not offer it.
+    fn fly_remote(
+        _setup: &Self::Setup,
+        _remote: &mut Remote<'_>,
+        _witness: &mut dyn Witness<Self::Runnables>,
+        _report: &mut dyn FnMut(f32, &'static str),
+    ) -> Result<Ended<Self::Outcome>, RemoteError> {
+        Err(RemoteError::NotOffered("hardware in the loop for this vehicle"))
+    }
 
     /// The flight stack's configuration when nothing is changed.
     fn default_config() -> <Self::Runnables as Schedule>::Config;

@@ -2,7 +2,7 @@
 //!
 //! | check | proves | does not prove |
 //! |---|---|---|
-//! | S3, types | types, features, pins and borrows of the real firmware | machine code, linking, timing |
+//! | S3, types | types, features, pins and borrows of the real firmware, hardware in the loop included | machine code, linking, timing |
 //! | S3, a wrong pin | that the check above refuses one | |
 //! | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
 //! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
@@ -41,7 +41,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let config = repository.root.join(PACKAGE).join(".cargo/config.toml");
     flashes_fast(&fs::read_to_string(&config).map_err(|e| format!("{}: {e}", config.display()))?)?;
     let target = stand_in(repository)?;
-    run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples"]))?;
+    run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples", "--features", "hil"]))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let scripts = s3_scripts(repository)?;
     esp32_link::heap(repository, &scripts)?;

@@ -25,6 +25,7 @@ pub mod foreign;
 pub mod fuzz;
 pub mod golden;
 pub mod hals;
+pub mod hil;
 pub mod lines;
 pub mod loom;
 pub mod machine;

@@ -111,7 +111,7 @@ fn emulate(repository: &Repository, machine: &Machine) -> Result<String, Failure
 }
 
 /// The cargo for a machine, and what to tell it: rustup's where it has the target, else Debian's.
-fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec<String>), Failure> {
+pub fn toolchain(repository: &Repository, machine: &Machine) -> Result<(Command, Vec<String>), Failure> {
     let target_folder = repository.target("qemu").display().to_string();
     let mut options: Vec<String> =
         ["--quiet", "--release", "--locked", "--target-dir", &target_folder].map(str::to_owned).into();

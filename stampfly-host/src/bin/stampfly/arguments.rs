@@ -49,6 +49,8 @@ pub enum Command {
     Campaign(CampaignOptions),
     /// Run the estimator over recorded sensor data and say how good it is.
     Estimate(EstimateOptions),
+    /// Hardware in the loop: fly a vehicle at the other end of a serial port through the simulated world.
+    Hil(HilOptions),
     /// Play the golden flight: does this machine compute what it should?
     Golden(GoldenOptions),
 }
@@ -194,6 +196,26 @@ pub struct ServeOptions {
     /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,
+}
+
+/// Options of `hil`.
+#[derive(Clone, Debug, Args)]
+pub struct HilOptions {
+    #[command(flatten)]
+    pub fly: FlyOptions,
+    /// The vehicle's serial port. Without this: the only one that looks like a vehicle's.
+    #[arg(long, value_name = "PORT")]
+    pub port: Option<String>,
+    /// Fly a vehicle in this program instead: the same conversation, without a line.
+    #[arg(long, conflicts_with_all = ["port", "program"])]
+    pub emulated: bool,
+    /// Fly one in a program that speaks over its standard input and output, such as an emulator.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "port")]
+    pub program: Option<String>,
+    /// Ask for each step when its time has come, and say how late the answers were. Without this the vehicle's time passes as
+    /// fast as the line allows.
+    #[arg(long)]
+    pub real_time: bool,
 }
 
 /// Options of `golden`.

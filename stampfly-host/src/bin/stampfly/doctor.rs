@@ -40,6 +40,19 @@ pub fn run(options: &DoctorOptions) -> Result<ExitCode, Failure> {
     Ok(if chart.findings().next().is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
+/// The vehicle's serial port: the one that was typed, or the only one that looks like it. Says so when nobody can tell.
+pub fn port_of(typed: Option<&str>) -> Option<String> {
+    match (typed, Serial::candidates().as_slice()) {
+        (Some(path), _) => Some(path.into()),
+        (None, [only]) => Some(only.clone()),
+        (None, found) => {
+            let found = if found.is_empty() { "none is there".into() } else { found.join(", ") };
+            eprintln!("stampfly: which port is the vehicle's? --port PORT; {found}");
+            None
+        }
+    }
+}
+
 /// Examines the vehicle at a serial port. `None` when the propellers are on, or nobody can tell which port it is.
 fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
     if !options.yes {
@@ -51,15 +64,7 @@ fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
             return Ok(None);
         }
     }
-    let path = match (&options.port, Serial::candidates().as_slice()) {
-        (Some(path), _) => path.clone(),
-        (None, [only]) => only.clone(),
-        (None, found) => {
-            let found = if found.is_empty() { "none is there".into() } else { found.join(", ") };
-            eprintln!("stampfly: which port is the vehicle's? --port PORT; {found}");
-            return Ok(None);
-        }
-    };
+    let Some(path) = port_of(options.port.as_deref()) else { return Ok(None) };
     let mut newcomer = Newcomer {
         connect: |path| Serial::open(path, PLUGGED_IN),
         path,

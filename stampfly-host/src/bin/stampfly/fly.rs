@@ -55,7 +55,7 @@ impl ForVehicle for Again<'_> {
         let Self(options, row) = self;
         let case = row.case()?;
         let setup = V::setup(&case.options, case.seed)?;
-        let (flown, recorder) = fly_and_write::<V>(options, &case.options, case.seed, &setup)?;
+        let (flown, recorder) = fly_and_write::<V>(options, &case.options, case.seed, &setup, here::<V>)?;
         let again = campaign::flight::finished(Row::of(&case), &flown, recorder.hash());
         let digest = campaign::flight::digest::<V>(&setup);
         let same = again.log_hash == row.log_hash;
@@ -102,23 +102,36 @@ impl ForVehicle for Fly<'_> {
         }
         let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, live)?;
         let typed = options.scene.options(options.scene.jitter);
-        let (flown, recorder) = fly_and_write::<V>(options, &typed, options.seed, &setup)?;
+        let (flown, recorder) = fly_and_write::<V>(options, &typed, options.seed, &setup, here::<V>)?;
         if options.scene.json {
             outln!("{}", Value::Object(figures(&flown, recorder.hash())));
         } else {
-            let [log, page] = [LOG, PAGE].map(|name| options.out.join(name));
-            print_screen::<V>(&flown, &recorder, &log, &page);
+            print_screen::<V>(&flown, &recorder, &options.out);
         }
         Ok(if flown.outcome.succeeded() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 }
 
+/// What is told of progress.
+pub(crate) type Progress<'p> = &'p mut dyn FnMut(f32, &'static str);
+
+/// Flies it in this process.
+fn here<V: Vehicle>(
+    setup: &V::Setup,
+    recorder: Recorder<V>,
+    report: Progress<'_>,
+) -> Result<(Flown<V::Outcome>, Recorder<V>), Failure> {
+    let mut recorder = recorder.with_timing();
+    Ok((fly::<V>(setup, &mut recorder, report), recorder))
+}
+
 /// Flies it, and writes log, report and whatever else belongs to the flight.
-fn fly_and_write<V: Vehicle>(
+pub(crate) fn fly_and_write<V: Vehicle>(
     options: &FlyOptions,
     flight: &Options,
     seed: u64,
     setup: &V::Setup,
+    fly: impl FnOnce(&V::Setup, Recorder<V>, Progress<'_>) -> Result<(Flown<V::Outcome>, Recorder<V>), Failure>,
 ) -> Result<(Flown<V::Outcome>, Recorder<V>), Failure> {
     std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
     let facts = [
@@ -126,13 +139,14 @@ fn fly_and_write<V: Vehicle>(
         ("seed".to_owned(), seed.to_string()),
         ("mission".to_owned(), flight.mission.clone().unwrap_or_else(|| "default".into())),
     ];
-    let mut recorder = Recorder::<V>::with_log(setup, &facts).with_timing();
+    let recorder = Recorder::<V>::with_log(setup, &facts);
     let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
-    let flown = fly::<V>(setup, &mut recorder, &mut |done, word| {
+    let flown = fly(setup, recorder, &mut |done, word| {
         bar.set_message(word);
         bar.set_position((done * 1000.0) as u64);
     });
     bar.finish_and_clear();
+    let (flown, recorder) = flown?;
 
     let log = options.out.join(LOG);
     std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
@@ -171,7 +185,7 @@ fn write_report<V: Vehicle>(
 }
 
 /// The flight as a JSON object.
-fn figures(flown: &Flown<impl Verdict>, hash: u64) -> Map<String, Value> {
+pub(crate) fn figures(flown: &Flown<impl Verdict>, hash: u64) -> Map<String, Value> {
     let mut object = Map::new();
     for (name, value) in flown.outcome.facts() {
         object.insert(name.into(), json!(value));
@@ -193,7 +207,9 @@ pub(crate) fn add_findings(object: &mut Map<String, Value>, outcome: &impl Verdi
     }
 }
 
-fn print_screen<V: Vehicle>(flown: &Flown<V::Outcome>, recorder: &Recorder<V>, log: &Path, page: &Path) {
+/// Everything about a flight. `folder` is where log and report are.
+pub(crate) fn print_screen<V: Vehicle>(flown: &Flown<V::Outcome>, recorder: &Recorder<V>, folder: &Path) {
+    let [log, page] = [LOG, PAGE].map(|name| folder.join(name));
     outln!("flight");
     flown.outcome.story().iter().for_each(|line| outln!("  {line}"));
     outln!("\nfigures");
@@ -203,7 +219,9 @@ fn print_screen<V: Vehicle>(flown: &Flown<V::Outcome>, recorder: &Recorder<V>, l
             None => outln!("  {:<22} {:>8}", figure.name, "–"),
         }
     }
-    outln!("\nrunnables, wall time on this machine         mean      longest");
+    if !recorder.timing().is_empty() {
+        outln!("\nrunnables, wall time on this machine         mean      longest");
+    }
     for (info, row) in V::Runnables::ACTIVATIONS.iter().zip(recorder.timing()) {
         print_timing(info.name, row);
     }

@@ -15,6 +15,7 @@ mod fault_campaign;
 mod faults;
 mod fly;
 mod golden;
+mod hil;
 mod modes;
 mod replay;
 mod schedule;
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Command::Modes(_) => modes::run(),
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
+        Command::Hil(options) => hil::run(&options),
         Command::Golden(options) => golden::run(&options),
     };
     result.unwrap_or_else(|failure| failure::tell(&failure))

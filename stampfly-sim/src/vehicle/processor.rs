@@ -1,0 +1,99 @@
+//! What runs the runnables of a flight: a flight loop here, or a vehicle at the other end of a line.
+
+use super::jitter::Jitter;
+use super::{Around, Witness};
+use stampfly_bus::{Band, Schedule};
+use stampfly_flight::{FlightLoop, Pending};
+use stampfly_types::{Duration, Instant};
+use std::convert::Infallible;
+
+/// What the executor asks of it.
+pub(super) trait Processor<'b, R: Schedule> {
+    /// Why it cannot go on.
+    type Error;
+
+    /// The next instant after this one at which it has something to do by itself.
+    fn deadline(&self, now: Instant) -> Option<Instant>;
+
+    /// A sample was published, by whomever.
+    fn published(&mut self, topic: usize, at: Instant, words: &[u32]);
+
+    /// A turn of the executor: runs what is due, and has the outputs handed on.
+    fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>)
+    -> Result<(), Self::Error>;
+
+    /// The vehicle, when nothing is pending and its state is known here.
+    fn at_rest(&self) -> Option<&FlightLoop<'b, R>>;
+
+    /// The flight is over. Was something pending, which has been finished?
+    fn end(&mut self, witness: &mut dyn Witness<R>) -> bool;
+}
+
+/// A flight loop in this process, and an executor that may be late.
+pub(super) struct Here<'b, R: Schedule> {
+    flight_loop: FlightLoop<'b, R>,
+    jitter: Jitter,
+    flight_at: Option<Instant>,
+    interrupted: Option<(Instant, Pending)>,
+}
+
+impl<'b, R: Schedule> Here<'b, R> {
+    pub(super) fn new(flight_loop: FlightLoop<'b, R>, jitter: Option<u64>) -> Self {
+        Self { flight_loop, jitter: Jitter::new(jitter), flight_at: None, interrupted: None }
+    }
+}
+
+impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
+    type Error = Infallible;
+
+    fn deadline(&self, now: Instant) -> Option<Instant> {
+        let deadlines = [
+            // A tick that has passed is waiting for an executor that is late.
+            self.flight_loop.next_tick().filter(|tick| *tick > now),
+            // One that has passed waits for a processor that is held up.
+            self.flight_at.filter(|at| *at > now),
+            self.interrupted.as_ref().map(|(at, _)| *at),
+        ];
+        deadlines.into_iter().flatten().min()
+    }
+
+    fn published(&mut self, _: usize, _: Instant, _: &[u32]) {}
+
+    fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>) -> Result<(), Infallible> {
+        let Self { flight_loop, jitter, flight_at, interrupted } = self;
+        let held_up = around.is_held_up(Band::Flight, now);
+        if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
+            *flight_at = Some(now + jitter.flight());
+        }
+        if !held_up && flight_at.is_some_and(|at| at <= now) {
+            *flight_at = None;
+            flight_loop.run_band(Band::Flight, now, witness);
+            around.drive(now);
+        }
+        match interrupted.take() {
+            Some((at, pending)) if at <= now => flight_loop.finish(pending, witness),
+            Some(pending) => *interrupted = Some(pending),
+            None if around.is_held_up(Band::Background, now) => {}
+            None => {
+                while let Some(pending) = flight_loop.start_next(Band::Background, now, witness) {
+                    let takes = jitter.background();
+                    if takes > Duration::ZERO {
+                        *interrupted = Some((now + takes, pending));
+                        break;
+                    }
+                    flight_loop.finish(pending, witness);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn at_rest(&self) -> Option<&FlightLoop<'b, R>> {
+        self.interrupted.is_none().then_some(&self.flight_loop)
+    }
+
+    fn end(&mut self, witness: &mut dyn Witness<R>) -> bool {
+        let pending = self.interrupted.take();
+        pending.map(|(_, pending)| self.flight_loop.finish(pending, witness)).is_some()
+    }
+}

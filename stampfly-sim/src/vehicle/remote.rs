@@ -1,0 +1,354 @@
+//! A vehicle at the other end of a line: hardware in the loop, the computer's end. The vehicle's is
+//! [`stampfly_flight::hil`].
+//!
+//! The bus here mirrors the vehicle's: samples from outside are sent, what its runnables have published comes back, and each
+//! reader stands where it stands there. So whatever looks at a flight (pilot, judge, log, report) looks at this one the same
+//! way.
+
+use super::processor::Processor;
+use super::{Around, Witness};
+use stampfly_bus::{Band, Schedule, TopicTable, Trigger};
+use stampfly_flight::FlightLoop;
+use stampfly_flight::golden::tables;
+use stampfly_flight::hil::{
+    Bands, Decoder, Entries, Entry, LONGEST, LONGEST_FRAME, Log, Refusal, Reply, Request, VERSION,
+};
+use stampfly_types::Instant;
+use std::fmt;
+use std::io;
+use std::time::{Duration, Instant as Wall};
+
+/// Bytes to and from a vehicle.
+pub trait Port {
+    /// Sends bytes.
+    ///
+    /// # Errors
+    /// When the line is gone.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits for bytes, about so long, and returns how many came: 0 when none did.
+    ///
+    /// # Errors
+    /// When the line is gone.
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+}
+
+/// How to talk to a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// A question is asked again after this long, and each time in vain after twice as long. Default 250 ms: a vehicle that is
+    /// left alone for [`SILENCE`](stampfly_flight::hil::SILENCE) gives up.
+    pub patience: Duration,
+    /// A vehicle that has not answered a question asked so often is lost. Default 4.
+    pub tries: u32,
+    /// Ask for each step when its time has come on the wall clock, and not as soon as the last is over. Default off.
+    pub real_time: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { patience: Duration::from_millis(250), tries: 4, real_time: false }
+    }
+}
+
+/// Why a vehicle at the other end of a line cannot go on.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum RemoteError {
+    /// This is not offered.
+    NotOffered(&'static str),
+    /// The line is gone.
+    Port(io::Error),
+    /// No answer came.
+    NoAnswer,
+    /// It refuses.
+    Refused(Refusal),
+    /// It refuses a parameter.
+    Parameter(String, Refusal),
+    /// What it said cannot be.
+    Nonsense,
+}
+
+impl fmt::Display for RemoteError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotOffered(what) => write!(f, "not offered: {what}"),
+            Self::Port(error) => write!(f, "the line to the vehicle is gone: {error}"),
+            Self::NoAnswer => f.write_str("the vehicle does not answer"),
+            Self::Refused(why) => why.fmt(f),
+            Self::Parameter(name, why) => write!(f, "{name}: {why}"),
+            Self::Nonsense => f.write_str("the vehicle has answered what cannot be"),
+        }
+    }
+}
+
+impl std::error::Error for RemoteError {}
+
+impl From<io::Error> for RemoteError {
+    fn from(error: io::Error) -> Self {
+        Self::Port(error)
+    }
+}
+
+/// How the conversation went.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Figures {
+    /// Time from a step's question to its answer, each.
+    pub round_trips: Vec<Duration>,
+    /// How long after a step's time on the wall clock its answer came, each; empty unless in real time.
+    pub behind: Vec<Duration>,
+    /// The longest step, by the vehicle's own clock.
+    pub longest: Duration,
+    /// All of them together.
+    pub total: Duration,
+    /// Questions that were asked again.
+    pub again: u64,
+    /// Frames that came garbled, here and to the vehicle.
+    pub garbled: [u32; 2],
+    /// Samples that the vehicle's log has missed. What they were is missing in the log here, too.
+    pub lost: u32,
+}
+
+/// A vehicle at the other end of a line: greet it, give it parameters, and hand it to [`fly_remote`](super::fly_remote).
+/// `stampfly_host::hil::fly` does all of it.
+pub struct Remote<'p> {
+    port: &'p mut dyn Port,
+    settings: Settings,
+    decoder: Decoder<Vec<u8>>,
+    sequence: u16,
+    question: Vec<u8>,
+    /// Received, and not yet looked at.
+    received: Vec<u8>,
+    figures: Figures,
+}
+
+impl<'p> Remote<'p> {
+    /// Says nothing yet.
+    pub fn new(port: &'p mut dyn Port, settings: Settings) -> Self {
+        Self {
+            port,
+            settings,
+            decoder: Decoder::new(vec![0; LONGEST + 64]),
+            sequence: 0,
+            question: vec![0; LONGEST_FRAME],
+            received: Vec::new(),
+            figures: Figures::default(),
+        }
+    }
+
+    /// How the conversation has gone so far.
+    #[must_use]
+    pub fn figures(&self) -> &Figures {
+        &self.figures
+    }
+
+    /// Asks until there is an answer, and hands it to `take`.
+    fn ask<T>(
+        &mut self,
+        request: &Request<'_>,
+        topics: &'static [stampfly_bus::TopicInfo],
+        take: impl FnOnce(Reply<'_>) -> Result<T, RemoteError>,
+    ) -> Result<T, RemoteError> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let length = request.write(&mut self.question, self.sequence).ok_or(RemoteError::Nonsense)?;
+        let mut patience = self.settings.patience;
+        for attempt in 0..self.settings.tries {
+            self.figures.again += u64::from(attempt > 0);
+            self.port.send(&self.question[..length])?;
+            let asked = Wall::now();
+            while asked.elapsed() < patience {
+                if self.received.is_empty() {
+                    let mut buffer = [0; 4096];
+                    let left = patience.saturating_sub(asked.elapsed());
+                    let count = self.port.receive(&mut buffer, left)?;
+                    self.received.extend_from_slice(&buffer[..count]);
+                }
+                for (place, byte) in self.received.iter().enumerate() {
+                    let Some(body) = self.decoder.feed(*byte) else { continue };
+                    // An answer to a question that was asked twice comes twice.
+                    if body.sequence != self.sequence {
+                        continue;
+                    }
+                    let reply = Reply::read(body.kind, body.payload, topics).ok_or(RemoteError::Nonsense)?;
+                    let outcome = take(reply);
+                    self.received.drain(..=place);
+                    self.figures.garbled[0] = self.decoder.garbled();
+                    return outcome;
+                }
+                self.received.clear();
+            }
+            patience *= 2;
+        }
+        Err(RemoteError::NoAnswer)
+    }
+
+    /// Asks for something that is either done or refused.
+    fn want(&mut self, request: &Request<'_>) -> Result<(), RemoteError> {
+        self.ask(request, &[], |reply| match reply {
+            Reply::Taken => Ok(()),
+            Reply::Refused(why) => Err(RemoteError::Refused(why)),
+            Reply::Stepped(_) => Err(RemoteError::Nonsense),
+        })
+    }
+
+    /// Opens the conversation with a vehicle that has this activation table.
+    ///
+    /// # Errors
+    /// When nobody answers, or another vehicle does.
+    pub fn greet<R: Schedule>(&mut self) -> Result<(), RemoteError> {
+        self.want(&Request::Hello { version: VERSION, tables: tables::<R>() })
+    }
+
+    /// Changes a parameter of the vehicle that will fly.
+    ///
+    /// # Errors
+    /// When the vehicle refuses or is lost.
+    pub fn parameter(&mut self, name: &str, value: f32) -> Result<(), RemoteError> {
+        self.want(&Request::Parameter { name, value }).map_err(|error| match error {
+            RemoteError::Refused(why) => RemoteError::Parameter(name.into(), why),
+            other => other,
+        })
+    }
+
+    /// The flight is over.
+    pub(super) fn end(&mut self) -> Result<(), RemoteError> {
+        match self.want(&Request::End) {
+            // The vehicle does not stay to repeat an answer that was lost.
+            Err(RemoteError::NoAnswer | RemoteError::Port(_)) => Ok(()),
+            other => other,
+        }
+    }
+}
+
+/// A vehicle that flies, and the mirror of its bus.
+pub(super) struct There<'r, 'p, 'b, R: Schedule> {
+    remote: &'r mut Remote<'p>,
+    mirror: FlightLoop<'b, R>,
+    /// Samples that were not yet sent.
+    pending: Vec<u8>,
+    /// One of them is on a topic that activates something.
+    wakes: bool,
+    next_tick: Option<Instant>,
+    due: Bands,
+    /// When the flight began, by both clocks.
+    began: (Instant, Wall),
+}
+
+impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
+    /// Switches the vehicle on.
+    pub(super) fn start(
+        remote: &'r mut Remote<'p>,
+        mirror: FlightLoop<'b, R>,
+        at: Instant,
+    ) -> Result<Self, RemoteError> {
+        remote.want(&Request::Start(at))?;
+        let next_tick = mirror.next_tick();
+        let (pending, due) = (Vec::new(), Bands::default());
+        Ok(Self { remote, mirror, pending, wakes: false, next_tick, due, began: (at, Wall::now()) })
+    }
+
+    /// Has the vehicle anything to do in these bands?
+    fn is_needed(&self, now: Instant, bands: Bands) -> bool {
+        let may_be = self.wakes || self.next_tick.is_some_and(|tick| tick <= now);
+        let may_run = bands.flight || bands.background;
+        may_be && may_run || self.due.flight && bands.flight || self.due.background && bands.background
+    }
+
+    /// Asks the vehicle for a step, and repeats here what it has done.
+    fn step(&mut self, now: Instant, bands: Bands, witness: &mut dyn Witness<R>) -> Result<(), RemoteError> {
+        let Self { remote, mirror, pending, wakes, next_tick, due, began: (start, wall) } = self;
+        let planned = *wall + Duration::from_micros(now.since(*start).as_micros());
+        let real_time = remote.settings.real_time;
+        if real_time {
+            std::thread::sleep(planned.saturating_duration_since(Wall::now()));
+        }
+        let topics = <R::Topics as TopicTable>::TOPICS;
+        let request = Request::Step { now, bands, samples: Entries::new(pending, topics) };
+        let asked = Wall::now();
+        let (took, garbled, lost) = remote.ask(&request, topics, |reply| {
+            let stepped = match reply {
+                Reply::Stepped(stepped) => stepped,
+                Reply::Refused(why) => return Err(RemoteError::Refused(why)),
+                Reply::Taken => return Err(RemoteError::Nonsense),
+            };
+            (*next_tick, *due) = (stepped.next_tick, stepped.due);
+            for entry in stepped.entries {
+                match entry.map_err(|_| RemoteError::Nonsense)? {
+                    Entry::Activation(record) => {
+                        let index = usize::from(record.index);
+                        let activation = mirror.follow(record);
+                        if index >= R::ACTIVATIONS.len() || activation.is_missing_input() {
+                            return Err(RemoteError::Nonsense);
+                        }
+                        witness.starts(index);
+                        witness.has_read(&activation);
+                        witness.finished(&activation);
+                    }
+                    Entry::Sample { topic, at, words } => {
+                        mirror.publish_words(topic, at, &words).ok_or(RemoteError::Nonsense)?;
+                    }
+                }
+            }
+            Ok((stepped.took, stepped.garbled, stepped.lost))
+        })?;
+        let figures = &mut remote.figures;
+        figures.round_trips.push(asked.elapsed());
+        if real_time {
+            figures.behind.push(Wall::now().saturating_duration_since(planned));
+        }
+        let took = Duration::from_micros(took.as_micros());
+        figures.longest = figures.longest.max(took);
+        figures.total += took;
+        (figures.garbled[1], figures.lost) = (garbled, lost);
+        pending.clear();
+        *wakes = false;
+        Ok(())
+    }
+}
+
+/// Does a sample on this topic activate something?
+fn activates<R: Schedule>(topic: usize) -> bool {
+    R::ACTIVATIONS.iter().any(|line| matches!(line.trigger, Trigger::On(topics) if topics.contains(&topic)))
+}
+
+impl<'b, R: Schedule> Processor<'b, R> for There<'_, '_, 'b, R> {
+    type Error = RemoteError;
+
+    fn deadline(&self, now: Instant) -> Option<Instant> {
+        self.next_tick.filter(|tick| *tick > now)
+    }
+
+    fn published(&mut self, topic: usize, at: Instant, words: &[u32]) {
+        if <R::Topics as TopicTable>::TOPICS.get(topic).is_some_and(|info| info.is_outside) {
+            let mut memory = [0; 1024];
+            let mut log = Log::new(&mut memory);
+            log.sample(topic, at, words);
+            self.pending.extend_from_slice(log.bytes().unwrap_or_default());
+            self.wakes |= activates::<R>(topic);
+        }
+    }
+
+    fn turn(
+        &mut self,
+        now: Instant,
+        around: &mut impl Around,
+        witness: &mut dyn Witness<R>,
+    ) -> Result<(), RemoteError> {
+        let flight = !around.is_held_up(Band::Flight, now);
+        let bands = Bands { flight, background: !around.is_held_up(Band::Background, now) };
+        // A processor that is held up for long would get more at once than it has room for.
+        if self.is_needed(now, bands) || self.pending.len() > LONGEST / 2 {
+            self.step(now, bands, witness)?;
+            around.drive(now);
+        }
+        Ok(())
+    }
+
+    fn at_rest(&self) -> Option<&FlightLoop<'b, R>> {
+        None
+    }
+
+    fn end(&mut self, _: &mut dyn Witness<R>) -> bool {
+        false
+    }
+}
