@@ -33,7 +33,8 @@ pub fn receiver_bytes(data: &[u8]) {
             in_crsf += length;
         }
     }
-    let known = [in_sbus + sbus.discarded() as usize, in_crsf + crsf.discarded() as usize, in_ibus + ibus.discarded() as usize];
+    let known =
+        [in_sbus + sbus.discarded() as usize, in_crsf + crsf.discarded() as usize, in_ibus + ibus.discarded() as usize];
     for (known, longest) in known.into_iter().zip([SbusFrame::LENGTH, CrsfFrame::LONGEST, IbusFrame::LENGTH]) {
         assert!(known <= data.len() && data.len() - known < longest, "bytes that are nowhere");
     }

@@ -2,7 +2,7 @@
 
 use crate::{
     console_line, estimator_stream, failsafe_stream, hil_frames, mode_machine, parameter_image, radio_packets,
-    rover_datagrams, ulog, whole_stack,
+    receiver_bytes, rover_datagrams, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -118,6 +118,11 @@ fn machine() {
 #[test]
 fn packets() {
     smoke("radio_packets", radio_packets, 400_000);
+}
+
+#[test]
+fn receivers() {
+    smoke("receiver_bytes", receiver_bytes, 200_000);
 }
 
 #[test]
