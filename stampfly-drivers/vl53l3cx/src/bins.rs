@@ -1,0 +1,331 @@
+//! From the counts of a histogram to a distance: ambient light, pulse, sub-bin position, noise, status. Pure functions without a bus.
+//!
+//! Use it to work on recorded histograms; the driver uses it in [`Ranging::Histogram`](crate::Ranging). Not for the light mode, whose chip does
+//! this itself ([`Reading::decode`](crate::Reading::decode)).
+//!
+//! The chip counts photons in bins of one PLL clock each, 1.3 ns or 20 cm of distance, and a laser pulse is 2.5 bins long. Measurements
+//! take turns: the [first part](Part::First) has four bins of ambient light and then the 20 of its laser's period, the [second](Part::Second)
+//! the 24 of its own. A target beyond a period appears too close, and in each part at another place: that is how it is found out.
+//!
+//! **Unverified** on a chip. What a register means, the laser's periods, the phase at no distance and the gain are from the core that ST
+//! publishes for this part under BSD-3-Clause (VL53LX bare driver: `vl53lx_hist_map.h`, `vl53lx_api_core.c`, `vl53lx_core.c`,
+//! `vl53lx_hist_funcs.c`). How a pulse is found and its noise estimated is this file's own.
+
+use crate::codec::{RangeStatus, Reading};
+use stampfly_types::math;
+
+/// From the interrupt's status at 0x0088 to the last byte of the last bin at 0x00DA (`vl53lx_hist_map.h`).
+pub const BLOCK_BYTES: usize = 83;
+/// Bins of a histogram.
+pub const BINS: usize = 24;
+/// Bins of ambient light that the first part begins with.
+const AMBIENT_BINS: usize = 4;
+/// Periods of the laser in which a macro period counts (`VL53LX_RANGING_WINDOW_VCSEL_PERIODS`).
+const COUNTED_PERIODS: f32 = 2048.0;
+/// Phases of a bin (`VL53LX_hist_calc_zero_distance_phase`).
+const PHASES: f32 = 2048.0;
+/// Length of the laser's pulse in bins: 0x004A and 0x0034 of the preset, sixteenths (`VL53LX_get_histogram_bin_data`).
+const PULSE: f32 = 2.5;
+/// What light travels in air in a microsecond, there and back, m (`VL53LX_SPEED_OF_LIGHT_IN_AIR`).
+const HALF_LIGHT: f32 = 149.852;
+/// What ST multiplies every histogram's distance by, 1987 of 2048 (`VL53LX_TUNINGPARM_HIST_GAIN_FACTOR_DEFAULT`).
+const GAIN: f32 = 1_987.0 / 2_048.0;
+/// A bin with more than so many standard deviations of the ambient light above it belongs to a pulse: one in 10⁹ without one. ST takes 6.25.
+const THRESHOLD: f32 = 6.0;
+/// And no less than so many counts above it (`VL53LX_TUNINGPARM_HIST_MIN_AMB_THRESH_EVENTS_DEFAULT`).
+const FEWEST: f32 = 16.0;
+/// Counts of a pulse that are taken for a target (`VL53LX_TUNINGPARM_HIST_SIGNAL_TOTAL_EVENTS_LIMIT_DEFAULT`).
+const WEAKEST: f32 = 100.0;
+/// Bins that a pulse covers at most, with the bins beside it.
+const WIDEST: usize = 6;
+/// What a measurement is not better than, m (`VL53LX_TUNINGPARM_HIST_SIGMA_EST_REF_MM_DEFAULT`).
+const BEST_SIGMA: f32 = 0.001;
+/// Above this a distance is not vouched for, m (`VL53LX_TUNINGPARM_HIST_SIGMA_THRESH_MM_DEFAULT`, in quarters).
+const WORST_SIGMA: f32 = 0.045;
+/// How far a target may seem behind the sensor and how far away it may be, bins (`VL53LX_preset_mode_histogram_long_range`).
+const SHORTEST: f32 = -1.0;
+const FURTHEST: f32 = 17.0;
+/// By how much the two parts may disagree, bins (`VL53LX_TUNINGPARM_CONSISTENCY_HIST_PHASE_TOLERANCE_DEFAULT`).
+const TOLERANCE: f32 = 1.0;
+
+/// The furthest distance that is vouched for, m: 17 bins.
+pub const REACH: f32 = 3.2;
+
+/// Which of the two measurements that take turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Part {
+    /// Even numbers: a laser period of 20 bins, after four of ambient light.
+    First,
+    /// Odd numbers: a laser period of 24 bins.
+    Second,
+}
+
+impl Part {
+    /// The part that the measurement of this number is.
+    #[must_use]
+    pub const fn of(count: u8) -> Self {
+        if count & 1 == 0 { Self::First } else { Self::Second }
+    }
+
+    /// Period of the laser, in bins.
+    #[must_use]
+    pub const fn period(self) -> usize {
+        match self {
+            Self::First => BINS - AMBIENT_BINS,
+            Self::Second => BINS,
+        }
+    }
+}
+
+/// What a histogram was measured with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Exposure {
+    /// The fast oscillator as the factory measured it, register 0x0006: MHz with 12 bits after the point.
+    pub oscillator: u16,
+    /// Macro periods that were counted: of the first part and of the second.
+    pub macro_periods: [u16; 2],
+    /// Where in its period the laser was told to start, register 0x0047, bins.
+    pub laser_start: u8,
+}
+
+impl Exposure {
+    /// A bin's duration, µs: a period of the PLL, which makes 64 of one of the oscillator.
+    #[must_use]
+    pub fn bin(&self) -> f32 {
+        64.0 / f32::from(self.oscillator.max(1))
+    }
+
+    /// A bin's distance, m.
+    #[must_use]
+    pub fn bin_length(&self) -> f32 {
+        self.bin() * HALF_LIGHT * GAIN
+    }
+
+    /// For how long a bin of this part was counted in all, µs.
+    fn counted(&self, part: Part) -> f32 {
+        let [first, second] = self.macro_periods;
+        let periods = match part {
+            Part::First => first,
+            Part::Second => second,
+        };
+        f32::from(periods) * COUNTED_PERIODS * self.bin()
+    }
+}
+
+/// A measurement as the chip gives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Histogram {
+    /// The status register's code.
+    pub code: u8,
+    /// Number of the measurement since the start; goes from 255 to 128.
+    pub count: u8,
+    /// Detectors in use.
+    pub detectors: f32,
+    /// Photons in each bin.
+    pub bins: [u32; BINS],
+    /// Where the chip found its own reference pulse, in 2048ths of a bin.
+    pub reference_phase: u16,
+    /// Where the laser started for that, bins.
+    pub reference_start: u8,
+}
+
+/// Where a pulse is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pulse {
+    /// Bins from the first to where half of its counts lie.
+    middle: f32,
+    /// Variance of that.
+    variance: f32,
+    /// Counts above the ambient light.
+    counts: f32,
+}
+
+impl Histogram {
+    /// Takes the block apart; `None` when nobody drives the bus: every byte the same, all ones or all zeros.
+    ///
+    /// ```
+    /// use stampfly_vl53l3cx::bins::{BLOCK_BYTES, Histogram, Part};
+    /// let mut block = [0; BLOCK_BYTES];
+    /// block[3] = 7;
+    /// block[8] = 90; // lowest byte of bin 0
+    /// let histogram = Histogram::decode(&block).expect("a measurement");
+    /// assert_eq!((histogram.part(), histogram.bins[0], histogram.bins[1]), (Part::Second, 90, 0));
+    /// ```
+    #[must_use]
+    pub fn decode(block: &[u8; BLOCK_BYTES]) -> Option<Self> {
+        if *block == [0xFF; BLOCK_BYTES] || *block == [0; BLOCK_BYTES] {
+            return None;
+        }
+        let [_interrupt, status, _report, count, d1, d0, rest @ ..] = *block;
+        let mut bins = [0; BINS];
+        for (bin, bytes) in bins.iter_mut().zip(rest.chunks_exact(3)) {
+            *bin = bytes.iter().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
+        }
+        let [.., p1, p0, start, high, low] = *block;
+        // The lowest byte of the last bin has lost its place to the phase (`VL53LX_get_histogram_bin_data`).
+        if let Some(last) = bins.last_mut() {
+            *last = (*last & !0xFF) | u32::from((high << 2).wrapping_add(low));
+        }
+        Some(Self {
+            code: status & 0x1F,
+            count,
+            detectors: f32::from(u16::from_be_bytes([d1, d0])) / 256.0,
+            bins,
+            reference_phase: u16::from_be_bytes([p1, p0]),
+            reference_start: start,
+        })
+    }
+
+    /// Which part this is.
+    #[must_use]
+    pub const fn part(&self) -> Part {
+        Part::of(self.count)
+    }
+
+    /// The bins of the laser's period.
+    fn period(&self) -> &[u32] {
+        match self.part() {
+            Part::First => self.bins.get(AMBIENT_BINS..).unwrap_or(&[]),
+            Part::Second => &self.bins,
+        }
+    }
+
+    /// Counts of ambient light in a bin, and the variance of that.
+    fn ambient(&self) -> (f32, f32) {
+        match self.part() {
+            Part::First => {
+                let sum: u32 = self.bins.iter().take(AMBIENT_BINS).sum();
+                let mean = sum as f32 / AMBIENT_BINS as f32;
+                (mean, mean / AMBIENT_BINS as f32)
+            }
+            // The middle one of those that no pulse reaches.
+            Part::Second => {
+                let rank = (BINS - WIDEST) / 2;
+                let below = |value: &u32| self.bins.iter().filter(|bin| *bin < value).count();
+                let middle = self.bins.iter().filter(|bin| below(bin) <= rank).max().copied().unwrap_or(0) as f32;
+                // Of a median: π/2 of a mean's.
+                (middle, middle * core::f32::consts::FRAC_PI_2 / (BINS - WIDEST) as f32)
+            }
+        }
+    }
+
+    /// The strongest pulse that stands above this ambient light.
+    fn pulse(&self, ambient: f32, of_ambient: f32) -> Option<Pulse> {
+        let bins = self.period();
+        let threshold = ambient + (THRESHOLD * math::sqrt(ambient)).max(FEWEST);
+        let above = |bin: &&u32| **bin as f32 > threshold;
+        // A place outside of every pulse to begin at, for one may reach around the end of the period.
+        let begin = bins.iter().position(|bin| !above(&bin))?;
+        let mut strongest: Option<(f32, usize, usize)> = None;
+        let mut run: Option<(f32, usize)> = None;
+        for (place, bin) in bins.iter().cycle().enumerate().skip(begin).take(bins.len() + 1) {
+            let counts = *bin as f32 - ambient;
+            if above(&bin) {
+                let (sum, from) = run.unwrap_or((0.0, place));
+                run = Some((sum + counts, from));
+            } else if let Some((sum, from)) = run.take()
+                && strongest.is_none_or(|(most, ..)| sum > most)
+            {
+                strongest = Some((sum, from, place));
+            }
+        }
+        let (_, from, until) = strongest?;
+        // The bins beside it have the edges of the pulse.
+        let from = (from + bins.len()).saturating_sub(1);
+        let width = (until + bins.len() + 1).saturating_sub(from).min(bins.len());
+        let window = || bins.iter().cycle().skip(from).take(width).map(|bin| *bin as f32);
+        let counts = window().sum::<f32>() - width as f32 * ambient;
+        let (mut before, mut reached) = (0.0, 0.0);
+        for (index, raw) in window().enumerate() {
+            let own = raw - ambient;
+            if before + own >= counts / 2.0 && own > 0.0 {
+                let after = counts - before - own;
+                let share = (counts / 2.0 - before) / own;
+                // The middle is at ½ + (after − before) / 2 own: what each sum varies by, as a Poisson process, and what the ambient
+                // light taken off it varies by.
+                let raw_after = (window().sum::<f32>() - reached - raw).max(0.0);
+                let slope = (after - before) / (2.0 * own * own);
+                let uneven = (width as f32 - 1.0 - 2.0 * index as f32) / (2.0 * own);
+                let variance =
+                    (reached + raw_after) / (4.0 * own * own) + slope * slope * raw + uneven * uneven * of_ambient;
+                let middle = (from + index) as f32 + share;
+                return Some(Pulse { middle: middle % bins.len() as f32, variance, counts });
+            }
+            before += own;
+            reached += raw;
+        }
+        None
+    }
+
+    /// How far from no distance the middle of the pulse is, in bins, within the period.
+    fn travelled(&self, middle: f32, laser_start: u8) -> f32 {
+        let period = self.part().period() as f32;
+        let start = f32::from(self.reference_start) - f32::from(laser_start);
+        let zero = f32::from(self.reference_phase) / PHASES + start;
+        let travelled = (middle - zero) % period;
+        let travelled = if travelled < 0.0 { travelled + period } else { travelled };
+        // A little behind the sensor, by noise or by an offset.
+        if travelled > period + SHORTEST { travelled - period } else { travelled }
+    }
+
+    /// The measurement in the terms of the light mode, and how many bins the light travelled, which the next one is told as `before`;
+    /// `None` without a target. `offset` is what the factory found to be missing, m.
+    ///
+    /// It is [`RangeStatus::Valid`] when the measurement before, which is of the other part, saw the target at the same distance; without one
+    /// [`RangeStatus::NotCheckedForWrap`].
+    ///
+    /// ```
+    /// use stampfly_vl53l3cx::RangeStatus;
+    /// use stampfly_vl53l3cx::bins::{BINS, Exposure, Histogram};
+    /// let exposure = Exposure { oscillator: 48_333, macro_periods: [86, 72], laser_start: 9 };
+    /// let mut bins = [100; BINS];
+    /// bins[9..12].fill(1_100); // after four bins of ambient light: from 5 to 8, the middle at 6.5
+    /// let histogram = Histogram { code: 9, count: 0, detectors: 200.0, bins, reference_phase: 3 * 1024, reference_start: 9 };
+    /// let (reading, travelled) = histogram.reading(&exposure, 0.0, None);
+    /// assert!((travelled.expect("a target") - 5.0).abs() < 1e-3);
+    /// assert_eq!(reading.status(), RangeStatus::NotCheckedForWrap);
+    /// assert!((reading.distance - 0.96).abs() < 0.01 && reading.sigma < 0.01);
+    /// ```
+    #[must_use]
+    pub fn reading(&self, exposure: &Exposure, offset: f32, before: Option<f32>) -> (Reading, Option<f32>) {
+        let (ambient, of_ambient) = self.ambient();
+        let counted = exposure.counted(self.part()).max(f32::MIN_POSITIVE);
+        let mut reading = Reading {
+            code: self.code,
+            count: self.count,
+            detectors: self.detectors,
+            signal_rate: 0.0,
+            ambient_rate: ambient / counted,
+            sigma: 0.0,
+            distance: 0.0,
+        };
+        if matches!(RangeStatus::decode(self.code), RangeStatus::Hardware) {
+            return (reading, None);
+        }
+        let Some(pulse) = self.pulse(ambient, of_ambient).filter(|pulse| pulse.counts >= WEAKEST) else {
+            reading.code = RangeStatus::SignalTooLow.code();
+            return (reading, None);
+        };
+        let travelled = self.travelled(pulse.middle, exposure.laser_start);
+        let length = exposure.bin_length();
+        reading.signal_rate = pulse.counts / (counted * PULSE);
+        reading.sigma = math::sqrt(pulse.variance * length * length + BEST_SIGMA * BEST_SIGMA);
+        reading.distance = travelled * length + offset * GAIN;
+        let status = if !(SHORTEST..=FURTHEST).contains(&travelled) {
+            RangeStatus::OutOfBounds
+        } else if reading.sigma > WORST_SIGMA {
+            RangeStatus::SigmaTooHigh
+        } else {
+            match before {
+                None => RangeStatus::NotCheckedForWrap,
+                Some(before) if (before - travelled).abs() < TOLERANCE => RangeStatus::Valid,
+                Some(_) => RangeStatus::WrapAround,
+            }
+        };
+        reading.code = status.code();
+        (reading, Some(travelled))
+    }
+}
