@@ -19,8 +19,9 @@ use stampfly_types::Instant;
 
 /// The fast oscillator as the factory measured it, 2 bytes: MHz with 12 bits after the point.
 const FAST_OSCILLATOR: u16 = 0x0006;
-/// What the factory found to be missing from the distances of the inner and the outer detectors, mm, 2 bytes each.
-const FACTORY_OFFSETS: u16 = 0x0020;
+/// What the factory found to be missing from every distance, as it is there after a start: quarters of a millimetre, 13 bits with a sign in 2
+/// bytes. ST's core takes it from here, not from [`codec::register::MM_CONFIG_OUTER_OFFSET_MM`] (`VL53LX_get_customer_nvm_managed`).
+const FACTORY_OFFSET: u16 = codec::register::ALGO_PART_TO_PART_RANGE_OFFSET_MM;
 /// Where the laser starts in its period while the chip finds its own reference pulse, bins.
 const LASER_START: u8 = 9;
 /// Oscillators that there can be: a third from the nominal 11.8 MHz.
@@ -212,19 +213,17 @@ impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
         if !OSCILLATORS.contains(&oscillator) {
             return Err(ChipError::Data);
         }
-        let [i1, i0, o1, o0] = self.port.read_twice(FACTORY_OFFSETS).await?;
+        let missing = i16::from_be_bytes(self.port.read_twice(FACTORY_OFFSET).await?);
         for (register, values) in PATCH {
             self.port.write(register, values).await?;
         }
         self.port.write(STATIC_FROM, &STATIC).await?;
         let budget = self.config.budget.as_micros() as u32;
         let (settings, macro_periods) = settings(budget, oscillator);
-        // Three parts of the light come from the outer detectors (`VL53LX_read_p2p_data`, where the factory says nothing).
-        let offset = f32::from(i16::from_be_bytes([i1, i0])) + 3.0 * f32::from(i16::from_be_bytes([o1, o0]));
         self.session = Some(Session {
             exposure: Exposure { oscillator, macro_periods, laser_start: LASER_START },
             settings,
-            offset: offset / 4_000.0,
+            offset: f32::from((missing << 3) >> 3) / 4_000.0,
             before: None,
             count: None,
         });
