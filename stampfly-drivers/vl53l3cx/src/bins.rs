@@ -329,3 +329,150 @@ impl Histogram {
         (reading, Some(travelled))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXPOSURE: Exposure = Exposure { oscillator: 48_333, macro_periods: [85, 71], laser_start: 9 };
+    const AMBIENT: f64 = 40.0;
+
+    /// A rectangle of 2.5 bins with this many photons, its middle so many bins after the start of the period, without noise.
+    fn histogram(count: u8, middle: f64, photons: f64) -> Histogram {
+        let part = Part::of(count);
+        let (first, period) = (BINS - part.period(), part.period() as f64);
+        let bins = core::array::from_fn(|place| {
+            if place < first {
+                return AMBIENT as u32;
+            }
+            let bin = (place - first) as f64;
+            let covered: f64 = [-period, 0.0, period]
+                .iter()
+                .map(|round| (bin + 1.0).min(middle + round + 1.25) - bin.max(middle + round - 1.25))
+                .map(|covered| covered.max(0.0))
+                .sum();
+            (AMBIENT + photons * covered / 2.5).round() as u32
+        });
+        Histogram { code: 9, count, detectors: 200.0, bins, reference_phase: 4 * 2_048, reference_start: 9 }
+    }
+
+    #[test]
+    fn a_pulse_is_found_wherever_it_falls_between_and_around_the_bins() {
+        for step in 0..24 * 16 {
+            let middle = f64::from(step) / 16.0;
+            for count in [0, 1] {
+                let period = Part::of(count).period() as f64;
+                if middle >= period {
+                    continue;
+                }
+                let (_, travelled) = histogram(count, middle, 50_000.0).reading(&EXPOSURE, 0.0, None);
+                let expected = (middle - 4.0).rem_euclid(period);
+                let error = f64::from(travelled.expect("a pulse")) - expected;
+                // Where the whole period is as good as none.
+                let error = if error.abs() > period / 2.0 { error.abs() - period } else { error };
+                assert!(error.abs() < 0.002, "{middle} of part {count}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_distance_in_both_parts_is_valid_and_another_is_not() {
+        let (first, travelled) = histogram(0, 9.3, 2_000.0).reading(&EXPOSURE, 0.0, None);
+        assert_eq!(first.status(), RangeStatus::NotCheckedForWrap);
+        let (second, _) = histogram(1, 9.3, 2_000.0).reading(&EXPOSURE, 0.0, travelled);
+        assert_eq!(second.status(), RangeStatus::Valid);
+        assert!((second.distance - 5.3 * EXPOSURE.bin_length()).abs() < 0.002, "{second:?}");
+        // 25 bins away: 5 in one part, 1 in the other.
+        let (_, near) = histogram(0, 9.0, 2_000.0).reading(&EXPOSURE, 0.0, None);
+        let (wrapped, _) = histogram(1, 5.0, 2_000.0).reading(&EXPOSURE, 0.0, near);
+        assert_eq!(wrapped.status(), RangeStatus::WrapAround);
+        // 18 bins away, the same in both.
+        let (_, far) = histogram(0, 2.0, 2_000.0).reading(&EXPOSURE, 0.0, None);
+        let (beyond, _) = histogram(1, 22.0, 2_000.0).reading(&EXPOSURE, 0.0, far);
+        assert_eq!(beyond.status(), RangeStatus::OutOfBounds);
+    }
+
+    #[test]
+    fn offset_rates_and_reference_are_in_their_units() {
+        let shifted = |reference_start| Histogram { reference_start, ..histogram(0, 9.0, 3_000.0) };
+        let (plain, _) = shifted(9).reading(&EXPOSURE, 0.0, None);
+        let (longer, _) = shifted(9).reading(&EXPOSURE, 0.010, None);
+        assert!((longer.distance - plain.distance - 0.0097).abs() < 1e-5);
+        let (nearer, _) = shifted(11).reading(&EXPOSURE, 0.0, None);
+        assert!((plain.distance - nearer.distance - 2.0 * EXPOSURE.bin_length()).abs() < 1e-5);
+        // 85 macro periods of 2048 bins of 1.324 ns: 0.2305 ms of ambient light, 2.5 times that of the laser's.
+        assert!((plain.ambient_rate - 40.0 / 230.5).abs() < 1e-3, "{plain:?}");
+        assert!((plain.signal_rate - 3_000.0 / 576.3).abs() < 0.02, "{plain:?}");
+        assert!((EXPOSURE.bin_length() - 0.1925).abs() < 1e-4);
+    }
+
+    #[test]
+    fn little_light_or_light_everywhere_is_no_target() {
+        for (count, photons) in [(0, 0.0), (1, 0.0), (0, 90.0), (1, 90.0)] {
+            let (reading, travelled) = histogram(count, 9.0, photons).reading(&EXPOSURE, 0.0, None);
+            assert_eq!((reading.status(), travelled), (RangeStatus::SignalTooLow, None), "{photons}");
+        }
+        // No bin of the laser's period is as dark as the ambient ones.
+        let mut bins = [9_000; BINS];
+        bins[..4].fill(10);
+        let flooded = Histogram { bins, ..histogram(0, 9.0, 0.0) };
+        assert_eq!(flooded.reading(&EXPOSURE, 0.0, None).0.status(), RangeStatus::SignalTooLow);
+    }
+
+    #[test]
+    fn what_the_chip_calls_a_failure_is_one_whatever_it_counted() {
+        let failed = Histogram { code: 2, ..histogram(0, 9.0, 5_000.0) };
+        let (reading, travelled) = failed.reading(&EXPOSURE, 0.0, Some(5.0));
+        assert_eq!((reading.status(), travelled), (RangeStatus::Hardware, None));
+    }
+
+    #[test]
+    fn a_faint_target_spread_over_metres_is_not_vouched_for() {
+        let mut spread = histogram(0, 9.0, 0.0);
+        spread.bins.iter_mut().for_each(|bin| *bin = 6_000);
+        spread.bins[6..20].iter_mut().for_each(|bin| *bin += 500);
+        let (reading, _) = spread.reading(&EXPOSURE, 0.0, Some(5.0));
+        assert_eq!(reading.status(), RangeStatus::SigmaTooHigh, "{reading:?}");
+    }
+
+    #[test]
+    fn the_block_is_taken_apart_with_the_last_byte_from_elsewhere() {
+        let mut block = [0; BLOCK_BYTES];
+        block[1..4].copy_from_slice(&[0xE9, 0, 3]);
+        block[4..6].copy_from_slice(&[0xC8, 0x80]);
+        for (bin, bytes) in block[6..78].chunks_exact_mut(3).enumerate() {
+            bytes.copy_from_slice(&(70_000 + bin as u32).to_be_bytes()[1..]);
+        }
+        block[77] = 0xEE;
+        block[78..83].copy_from_slice(&[0x12, 0x34, 11, 0x87 >> 2, 0x87 & 3]);
+        let histogram = Histogram::decode(&block).expect("a measurement");
+        assert_eq!((histogram.code, histogram.count, histogram.detectors), (9, 3, 200.5));
+        assert_eq!(
+            (histogram.bins[0], histogram.bins[22], histogram.bins[23]),
+            (70_000, 70_022, 70_000 & !0xFF | 0x87)
+        );
+        assert_eq!((histogram.reference_phase, histogram.reference_start), (0x1234, 11));
+        assert_eq!(Histogram::decode(&[0xFF; BLOCK_BYTES]), None);
+        assert_eq!(Histogram::decode(&[0; BLOCK_BYTES]), None);
+    }
+
+    #[test]
+    fn no_block_whatever_is_in_it_makes_a_number_that_is_none() {
+        let mut state = 1u64;
+        for round in 0..200_000u32 {
+            let block: [u8; BLOCK_BYTES] = core::array::from_fn(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 56) as u8 & [0xFF, 0x0F, 0x01, 0xC3][round as usize % 4]
+            });
+            let Some(histogram) = Histogram::decode(&block) else { continue };
+            let exposure = Exposure { oscillator: round as u16, ..EXPOSURE };
+            let (reading, travelled) = histogram.reading(&exposure, 0.0, Some(3.0));
+            let numbers = [reading.distance, reading.sigma, reading.signal_rate, reading.ambient_rate];
+            assert!(
+                numbers.iter().all(|number| number.is_finite()) && travelled.is_none_or(f32::is_finite),
+                "{histogram:?}"
+            );
+            assert!(reading.status() != RangeStatus::Valid || (reading.sigma > 0.0 && reading.distance < 4_000.0));
+        }
+    }
+}
