@@ -19,27 +19,35 @@ pub struct Config {
     pub ranging: Ranging,
 }
 
-impl Default for Config {
-    /// 4 m, 33 ms, 30 Hz, as it comes from the factory; the light mode.
-    fn default() -> Self {
+impl Config {
+    /// The default with [`Ranging::Automatic`]. `target`: is something in reach for sure when the driver is first used?
+    ///
+    /// ```
+    /// use stampfly_vl53l3cx::{Config, Ranging};
+    /// // It looks at the floor that the vehicle stands on when it is switched on.
+    /// let config = Config::automatic(true);
+    /// assert_eq!(config, Config { ranging: Ranging::Automatic { target: true }, ..Config::default() });
+    /// ```
+    #[must_use]
+    pub const fn automatic(target: bool) -> Self {
         Self {
             mode: DistanceMode::Long,
             budget: Duration::from_micros(33_000),
             period: Duration::from_micros(33_333),
             offset: 0.0,
-            ranging: Ranging::Light,
+            ranging: Ranging::Automatic { target },
         }
     }
 }
 
+impl Default for Config {
+    /// 4 m, 33 ms, 30 Hz, as it comes from the factory; the light mode.
+    fn default() -> Self {
+        Self { ranging: Ranging::Light, ..Self::automatic(false) }
+    }
+}
+
 /// Which way to measure. Both give the same kind of sample.
-///
-/// ```
-/// use stampfly_vl53l3cx::{Config, Ranging};
-/// // It looks at the floor that the vehicle stands on when it is switched on.
-/// let config = Config { ranging: Ranging::Automatic { target: true }, ..Config::default() };
-/// assert_ne!(config.ranging, Config::default().ranging);
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

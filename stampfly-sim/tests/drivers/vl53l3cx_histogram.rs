@@ -9,7 +9,7 @@ use stampfly_sim::chips::{self, Attached, BusError, Flaw, I2cBus, Nonsense, Shut
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::messages::TofData;
-use stampfly_types::{Duration, Instant};
+use stampfly_types::{Duration, Instant, math};
 
 const ADDRESS: u8 = 0x30;
 const AT_TARGET: Ranging = Ranging::Automatic { target: true };
@@ -52,7 +52,7 @@ fn valid(outcomes: &[Outcome]) -> Vec<TofData> {
 fn spread(values: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
     let count = values.clone().count() as f32;
     let mean = values.clone().sum::<f32>() / count;
-    (mean, (values.map(|value| (value - mean).powi(2)).sum::<f32>() / count).sqrt())
+    (mean, math::sqrt(values.map(|value| (value - mean) * (value - mean)).sum::<f32>() / count))
 }
 
 #[test]
