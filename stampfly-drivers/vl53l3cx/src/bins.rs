@@ -18,6 +18,8 @@ use stampfly_types::math;
 pub const BLOCK_BYTES: usize = 83;
 /// Bins of a histogram.
 pub const BINS: usize = 24;
+/// The most that a bin counts: 24 bits. Four times a sum of all has 31.
+const FULL: u32 = 0xFF_FFFF;
 /// Bins of ambient light that the first part begins with.
 const AMBIENT_BINS: usize = 4;
 /// Periods of the laser in which a macro period counts (`VL53LX_RANGING_WINDOW_VCSEL_PERIODS`).
@@ -124,7 +126,7 @@ pub struct Histogram {
     pub count: u8,
     /// Detectors in use.
     pub detectors: f32,
-    /// Photons in each bin.
+    /// Photons in each bin, no more than 24 bits.
     pub bins: [u32; BINS],
     /// Where the chip found its own reference pulse, in 2048ths of a bin.
     pub reference_phase: u16,
@@ -185,77 +187,73 @@ impl Histogram {
         Part::of(self.count)
     }
 
-    /// The bins of the laser's period.
-    fn period(&self) -> &[u32] {
-        match self.part() {
-            Part::First => self.bins.get(AMBIENT_BINS..).unwrap_or(&[]),
-            Part::Second => &self.bins,
-        }
+    /// Four times what a bin of the laser's period has more than this, which is four times the ambient light. Places go around.
+    fn above(&self, place: usize, ambient: i32) -> i32 {
+        let period = self.part().period();
+        let bin = self.bins.get(BINS - period + place % period).copied().unwrap_or(0);
+        (4 * bin.min(FULL)) as i32 - ambient
     }
 
-    /// Counts of ambient light in a bin, and the variance of that.
-    fn ambient(&self) -> (f32, f32) {
+    /// Four times the counts of ambient light in a bin, and the variance of one such count.
+    fn ambient(&self) -> (i32, f32) {
         match self.part() {
             Part::First => {
-                let sum: u32 = self.bins.iter().take(AMBIENT_BINS).sum();
-                let mean = sum as f32 / AMBIENT_BINS as f32;
-                (mean, mean / AMBIENT_BINS as f32)
+                let sum: u32 = self.bins.iter().take(AMBIENT_BINS).map(|bin| (*bin).min(FULL)).sum();
+                (sum as i32, sum as f32 / (4 * AMBIENT_BINS) as f32)
             }
             // The middle one of those that no pulse reaches.
             Part::Second => {
                 let rank = (BINS - WIDEST) / 2;
                 let below = |value: &u32| self.bins.iter().filter(|bin| *bin < value).count();
-                let middle = self.bins.iter().filter(|bin| below(bin) <= rank).max().copied().unwrap_or(0) as f32;
+                let middle = self.bins.iter().filter(|bin| below(bin) <= rank).max().copied().unwrap_or(0).min(FULL);
                 // Of a median: π/2 of a mean's.
-                (middle, middle * core::f32::consts::FRAC_PI_2 / (BINS - WIDEST) as f32)
+                (4 * middle as i32, middle as f32 * core::f32::consts::FRAC_PI_2 / (BINS - WIDEST) as f32)
             }
         }
     }
 
     /// The strongest pulse that stands above this ambient light.
-    fn pulse(&self, ambient: f32, of_ambient: f32) -> Option<Pulse> {
-        let bins = self.period();
-        let threshold = ambient + (THRESHOLD * math::sqrt(ambient)).max(FEWEST);
-        let above = |bin: &&u32| **bin as f32 > threshold;
+    fn pulse(&self, ambient: i32, of_ambient: f32) -> Option<Pulse> {
+        let period = self.part().period();
+        let threshold = (4.0 * (THRESHOLD * math::sqrt(ambient as f32 / 4.0)).max(FEWEST)) as i32;
         // A place outside of every pulse to begin at, for one may reach around the end of the period.
-        let begin = bins.iter().position(|bin| !above(&bin))?;
-        let mut strongest: Option<(f32, usize, usize)> = None;
-        let mut run: Option<(f32, usize)> = None;
-        for (place, bin) in bins.iter().cycle().enumerate().skip(begin).take(bins.len() + 1) {
-            let counts = *bin as f32 - ambient;
-            if above(&bin) {
-                let (sum, from) = run.unwrap_or((0.0, place));
-                run = Some((sum + counts, from));
-            } else if let Some((sum, from)) = run.take()
-                && strongest.is_none_or(|(most, ..)| sum > most)
-            {
-                strongest = Some((sum, from, place));
+        let begin = (0..period).find(|place| self.above(*place, ambient) <= threshold)?;
+        let (mut most, mut strongest, mut sum, mut from) = (0, None, 0, 0);
+        for place in begin..=begin + period {
+            let counts = self.above(place, ambient);
+            if counts > threshold {
+                from = if sum == 0 { place } else { from };
+                sum += counts;
+            } else {
+                if sum > most {
+                    (most, strongest) = (sum, Some((from, place)));
+                }
+                sum = 0;
             }
         }
-        let (_, from, until) = strongest?;
         // The bins beside it have the edges of the pulse.
-        let from = (from + bins.len()).saturating_sub(1);
-        let width = (until + bins.len() + 1).saturating_sub(from).min(bins.len());
-        let window = || bins.iter().cycle().skip(from).take(width).map(|bin| *bin as f32);
-        let counts = window().sum::<f32>() - width as f32 * ambient;
-        let (mut before, mut reached) = (0.0, 0.0);
-        for (index, raw) in window().enumerate() {
-            let own = raw - ambient;
-            if before + own >= counts / 2.0 && own > 0.0 {
-                let after = counts - before - own;
-                let share = (counts / 2.0 - before) / own;
+        let (from, until) = strongest?;
+        let window = from + period - 1..from + period + (until - from + 1).min(period - 1);
+        let counts: i32 = window.clone().map(|place| self.above(place, ambient)).sum();
+        let (mut before, mut bins) = (0, 0.0);
+        for place in window.clone() {
+            let own = self.above(place, ambient);
+            let after = counts - before - own;
+            if own > 0 && before + own >= after {
                 // The middle is at ½ + (after − before) / 2 own: what each sum varies by, as a Poisson process, and what the ambient
                 // light taken off it varies by.
-                let raw_after = (window().sum::<f32>() - reached - raw).max(0.0);
-                let slope = (after - before) / (2.0 * own * own);
-                let uneven = (width as f32 - 1.0 - 2.0 * index as f32) / (2.0 * own);
+                let width = window.len() as f32;
+                let [before, own, after, ambient] = [before, own, after, ambient].map(|fourfold| fourfold as f32 / 4.0);
+                let beside = before + after + (width - 1.0) * ambient;
+                let tilt = (after - before) / (2.0 * own);
+                let uneven = (width - 1.0) / 2.0 - bins;
                 let variance =
-                    (reached + raw_after) / (4.0 * own * own) + slope * slope * raw + uneven * uneven * of_ambient;
-                let middle = (from + index) as f32 + share;
-                return Some(Pulse { middle: middle % bins.len() as f32, variance, counts });
+                    (beside / 4.0 + tilt * tilt * (own + ambient) + uneven * uneven * of_ambient) / (own * own);
+                let middle = (place % period) as f32 + 0.5 + tilt;
+                return Some(Pulse { middle, variance: variance.max(0.0), counts: before + own + after });
             }
             before += own;
-            reached += raw;
+            bins += 1.0;
         }
         None
     }
@@ -265,8 +263,8 @@ impl Histogram {
         let period = self.part().period() as f32;
         let start = f32::from(self.reference_start) - f32::from(laser_start);
         let zero = f32::from(self.reference_phase) / PHASES + start;
-        let travelled = (middle - zero) % period;
-        let travelled = if travelled < 0.0 { travelled + period } else { travelled };
+        let travelled = middle - zero;
+        let travelled = travelled - period * math::floor(travelled / period);
         // A little behind the sensor, by noise or by an offset.
         if travelled > period + SHORTEST { travelled - period } else { travelled }
     }
@@ -298,7 +296,7 @@ impl Histogram {
             count: self.count,
             detectors: self.detectors,
             signal_rate: 0.0,
-            ambient_rate: ambient / counted,
+            ambient_rate: ambient as f32 / 4.0 / counted,
             sigma: 0.0,
             distance: 0.0,
         };
@@ -417,6 +415,19 @@ mod tests {
         bins[..4].fill(10);
         let flooded = Histogram { bins, ..histogram(0, 9.0, 0.0) };
         assert_eq!(flooded.reading(&EXPOSURE, 0.0, None).0.status(), RangeStatus::SignalTooLow);
+    }
+
+    #[test]
+    fn bins_that_are_full_do_not_overflow() {
+        for count in [0, 1] {
+            for bin in [u32::MAX, 0xFF_FFFF] {
+                let mut full = Histogram { bins: [bin; BINS], ..histogram(count, 9.0, 0.0) };
+                assert_eq!(full.reading(&EXPOSURE, 0.0, None).1, None);
+                full.bins[..12].fill(0);
+                let (reading, _) = full.reading(&EXPOSURE, 0.0, None);
+                assert!(reading.signal_rate.is_finite() && reading.signal_rate > 0.0, "{reading:?}");
+            }
+        }
     }
 
     #[test]

@@ -10,8 +10,8 @@
 //! that only store.
 
 use crate::bins::{BLOCK_BYTES, Exposure, Histogram, Part};
-use crate::codec::{self, Reading};
-use crate::{POLL, REPETITIONS, Vl53l3cx, Xshut, early};
+use crate::codec::{self, RangeStatus, Reading};
+use crate::{REPETITIONS, Vl53l3cx, Xshut, early};
 use embedded_hal_async::i2c::I2c;
 use stampfly_driver_core::Timebase;
 use stampfly_driver_core::chip::ChipError;
@@ -37,6 +37,7 @@ const BLOCK: u16 = 0x0088;
 /// Where [`STATIC`] and the settings begin, and where in the latter the times do.
 const STATIC_FROM: u16 = 0x0024;
 const SETTINGS_FROM: u16 = 0x0044;
+const TIMES_FROM: u16 = 0x005A;
 const TIMES: usize = 0x5A - 0x44;
 /// Where in the settings the number of their group is, and its bit.
 const GROUP: [usize; 3] = [0x71 - 0x44, 0x7C - 0x44, 0x82 - 0x44];
@@ -207,19 +208,23 @@ fn settings(budget: u32, oscillator: u16) -> ([u8; 68], [u16; 2]) {
 }
 
 impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
-    /// Sets a chip up that has just been woken, and lets it measure once: the first result is a histogram of nothing.
+    /// Sets a chip up that has just been woken. It measures when it is asked to.
     pub(crate) async fn start_histogram(&mut self) -> Result<(), ChipError<I::Error>> {
         let oscillator = u16::from_be_bytes(self.port.read_twice(FAST_OSCILLATOR).await?);
         if !OSCILLATORS.contains(&oscillator) {
             return Err(ChipError::Data);
         }
         let missing = i16::from_be_bytes(self.port.read_twice(FACTORY_OFFSET).await?);
-        for (register, values) in PATCH {
+        let (settings, macro_periods) = settings(self.config.budget.as_micros() as u32, oscillator);
+        let times: [u8; 10] = core::array::from_fn(|index| settings.get(TIMES + index).copied().unwrap_or(0));
+        for (register, values) in PATCH.into_iter().chain([(STATIC_FROM, &STATIC[..]), (TIMES_FROM, &times)]) {
             self.port.write(register, values).await?;
         }
-        self.port.write(STATIC_FROM, &STATIC).await?;
-        let budget = self.config.budget.as_micros() as u32;
-        let (settings, macro_periods) = settings(budget, oscillator);
+        // A wrong bit in here would not be noticed as anything but wrong distances.
+        let kept: [u8; 10] = self.port.read(TIMES_FROM).await?;
+        if kept != times {
+            return Err(ChipError::Configuration { status: kept[6] });
+        }
         self.session = Some(Session {
             exposure: Exposure { oscillator, macro_periods, laser_start: LASER_START },
             settings,
@@ -227,17 +232,11 @@ impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
             before: None,
             count: None,
         });
-        self.arm().await?;
-        let sent: [u8; 10] = core::array::from_fn(|index| settings.get(TIMES + index).copied().unwrap_or(0));
-        let kept: [u8; 10] = self.port.read(SETTINGS_FROM + TIMES as u16).await?;
-        if kept != sent {
-            return Err(ChipError::Configuration { status: kept[6] });
-        }
-        self.histogram_ready().await?;
-        self.arm().await
+        self.stale = true;
+        Ok(())
     }
 
-    /// Sends the settings, which takes the interrupt back and starts the next measurement.
+    /// Sends the settings, which takes the interrupt back and starts a measurement.
     async fn arm(&mut self) -> Result<(), ChipError<I::Error>> {
         let Some(session) = &mut self.session else { return Err(ChipError::NoSample) };
         for (place, run) in (SETTINGS_FROM..).step_by(RUN).zip(session.settings.chunks(RUN)) {
@@ -249,46 +248,29 @@ impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
                 *hold ^= GROUP_ID;
             }
         }
+        self.stale = false;
         self.due = self.port.now() + early(self.config.budget);
         Ok(())
     }
 
-    /// Waits for the measurement that runs, and gives the instant it was there.
-    async fn histogram_ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
-        let deadline = self.port.now().max(self.due) + self.config.period * 2;
-        self.port.wait_until(self.due).await;
-        let mut before = None;
-        loop {
-            let looks = self.port.now();
-            let up = self.look().await?;
-            let now = self.port.now();
-            if up {
-                return Ok(before.map_or(now, |before: Instant| before + now.since(before) / 2));
-            }
-            if looks > deadline {
-                self.ranging = false;
-                return Err(ChipError::NoSample);
-            }
-            before = Some(now);
-            self.port.wait(POLL).await;
-        }
-    }
-
-    /// The next measurement, whose successor it starts.
+    /// A measurement, and when it was there: one that runs already, because a call for it was dropped, or one of its own.
     pub(crate) async fn histogram(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
-        for _ in 0..=REPETITIONS {
-            // One that nobody came for in time is too old, and so is one whose reading was broken off.
+        // The first one after a start is of nothing.
+        for _ in 0..=REPETITIONS + 1 {
+            // One that nobody came for in time is too old.
             if self.stale || self.port.now() > self.due + self.config.period / 4 {
+                // A chip that lost its power does not answer here any more.
+                self.look().await?;
                 self.arm().await?;
             }
-            let seen = self.histogram_ready().await?;
-            self.stale = true;
+            let seen = self.ready().await?;
             let block: [u8; BLOCK_BYTES] = self.read(BLOCK).await?;
-            self.arm().await?;
-            self.stale = false;
+            self.stale = true;
             let histogram = Histogram::decode(&block).ok_or(ChipError::Data)?;
             let Some(session) = &mut self.session else { break };
-            if session.count.replace(histogram.count) == Some(histogram.count) {
+            if RangeStatus::decode(histogram.code) == RangeStatus::Starting
+                || session.count.replace(histogram.count) == Some(histogram.count)
+            {
                 continue;
             }
             let (reading, travelled) = histogram.reading(&session.exposure, session.offset, session.before);
@@ -325,6 +307,6 @@ mod tests {
         assert_eq!(GROUP.map(|place| settings[place]), [3, 3, 2]);
         assert_eq!(GROUP.map(|place| SETTINGS_FROM as usize + place), [0x71, 0x7C, 0x82]);
         assert_eq!(SETTINGS_FROM as usize + settings.len() - 1, 0x87);
-        assert_eq!(SETTINGS_FROM as usize + TIMES, 0x5A);
+        assert_eq!(SETTINGS_FROM as usize + TIMES, TIMES_FROM as usize);
     }
 }

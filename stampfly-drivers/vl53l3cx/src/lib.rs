@@ -57,6 +57,11 @@ const ADVANCES: usize = 2;
 ///
 /// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip.
 ///
+/// # Two ways
+/// [`Config::ranging`] says whether the chip computes the distance or the driver does, from a histogram. In [`Ranging::Automatic`] a call ends once with
+/// [`ChipError::Implausible`] when the driver changes over, and with [`ChipError::SelfTest`] if it changes back because neither way measures
+/// anything; the next call starts the chip again.
+///
 /// A sample is vouched for (`valid`) when the chip calls it [`RangeStatus::Valid`] and it is above zero and within the
 /// mode's reach. The first one after a start is not: the chip tells a target beyond its reach from one within by
 /// comparing measurements. `status` is [`RangeStatus::number`]; [`reading`](Self::reading) has everything it said.
@@ -82,6 +87,7 @@ const ADVANCES: usize = 2;
 /// # Times
 /// The first sample takes 10 ms and two measurements, 80 ms in all. `next` ends within two periods and 20 ms
 /// ([`ChipError::NoSample`]), one period later for each of up to two results that it has seen before; when it has to start the chip, within four more periods and 350 ms.
+/// From histograms the first sample takes 100 ms, and each one after it the budget and 4 to 6 ms.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock, Pin};
@@ -290,10 +296,12 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.ranging = false;
         if self.histogram {
             self.doubt = Some(reason);
-            // Where it sees nothing either there is no reason to prefer it.
             self.trial = Some(Trial::new(true));
+            Err(ChipError::Implausible)
+        } else {
+            // Where it sees nothing either there is no reason to prefer it.
+            Err(ChipError::SelfTest)
         }
-        Err(ChipError::Implausible)
     }
 
     /// From whatever state to the firmware running at the chip's own address.
@@ -439,7 +447,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         let asked = self.port.now();
         let deadline = asked.max(self.due) + period + period;
         // An interrupt that may have been up for long tells nothing about when: take it back and wait for the next.
-        self.stale |= asked > self.due + period / 4;
+        // A histogram is only measured when it is asked for.
+        self.stale |= !self.histogram && asked > self.due + period / 4;
         self.port.wait_until(self.due).await;
         let mut before = None;
         loop {

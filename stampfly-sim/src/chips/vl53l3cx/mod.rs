@@ -359,7 +359,8 @@ impl State {
         match self.flaw {
             Some(Flaw::Offset(metres)) => reading.distance += metres as f32,
             Some(Flaw::Covered(metres)) => {
-                reading = TofData { distance: metres as f32, sigma: 0.001, status: STATUS_VALID, valid: true };
+                let distance = self.photons.near(metres) as f32;
+                reading = TofData { distance, sigma: 0.001, status: STATUS_VALID, valid: true };
             }
             _ => {}
         }

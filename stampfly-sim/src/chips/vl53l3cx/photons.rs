@@ -77,6 +77,11 @@ impl Photons {
         ((phase * 2048.0).round() as u16, laser_start + self.later)
     }
 
+    /// A measurement by the part itself of something so near that noise is a millimetre.
+    pub(super) fn near(&mut self, metres: f64) -> f64 {
+        metres + 0.001 * self.noise.normal()
+    }
+
     /// The bins, and how many detectors were in use.
     pub(super) fn count(&mut self, shot: &Shot) -> ([u32; BINS], f64) {
         let strength = shot.distance.map_or(0.0, |metres| FLOOR / metres.max(NEAR).powi(2));
