@@ -157,6 +157,8 @@ impl Histogram {
     /// assert_eq!((histogram.part(), histogram.bins[0], histogram.bins[1]), (Part::Second, 90, 0));
     /// ```
     #[must_use]
+    // In flash once: compilers put it into the state machine of each caller, and unroll it there.
+    #[inline(never)]
     pub fn decode(block: &[u8; BLOCK_BYTES]) -> Option<Self> {
         if *block == [0xFF; BLOCK_BYTES] || *block == [0; BLOCK_BYTES] {
             return None;
@@ -195,6 +197,7 @@ impl Histogram {
     }
 
     /// Four times the counts of ambient light in a bin, and the variance of one such count.
+    #[inline(never)]
     fn ambient(&self) -> (i32, f32) {
         match self.part() {
             Part::First => {
@@ -213,6 +216,7 @@ impl Histogram {
     }
 
     /// The strongest pulse that stands above this ambient light.
+    #[inline(never)]
     fn pulse(&self, ambient: i32, of_ambient: f32) -> Option<Pulse> {
         let period = self.part().period();
         let threshold = (4.0 * (THRESHOLD * math::sqrt(ambient as f32 / 4.0)).max(FEWEST)) as i32;
@@ -288,6 +292,8 @@ impl Histogram {
     /// assert!((reading.distance - 0.96).abs() < 0.01 && reading.sigma < 0.01);
     /// ```
     #[must_use]
+    // In flash once: compilers put it into the state machine of each caller, and unroll it there.
+    #[inline(never)]
     pub fn reading(&self, exposure: &Exposure, offset: f32, before: Option<f32>) -> (Reading, Option<f32>) {
         let (ambient, of_ambient) = self.ambient();
         let counted = exposure.counted(self.part()).max(f32::MIN_POSITIVE);

@@ -119,6 +119,7 @@ const fn macro_periods(micros: u32, bins: u32, oscillator: u16) -> u32 {
 }
 
 /// What is sent before each measurement, from 0x0044 to the start at 0x0087, and the macro periods that it asks for.
+#[inline(never)]
 fn settings(budget: u32, oscillator: u16) -> ([u8; 68], [u16; 2]) {
     let part = budget.saturating_sub(OVERHEAD) / PARTS;
     let bins = [Part::First, Part::Second].map(|part| part.period() as u32);

@@ -74,6 +74,7 @@ impl Trial {
     }
 
     /// Takes note of a result, `None` for none in time. A verdict when there is one.
+    #[inline(never)]
     pub(crate) fn note(&mut self, now: Instant, result: Option<Reading>) -> Option<Verdict> {
         let until = *self.until.get_or_insert(now + LIMIT);
         if now > until {
