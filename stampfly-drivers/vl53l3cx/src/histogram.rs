@@ -1,7 +1,7 @@
 //! The chip as ST's own driver runs it: each measurement is a histogram of photons over time, whose pulse the processor finds.
 //!
 //! It is the second way to range ([`Ranging::Histogram`](crate::Ranging)), for a part that makes nonsense of the first. Every public program that is known to
-//! range with a VL53L3CX does it this way; none is known that does it like a VL53L1X, which [`codec`] describes. It costs the bus 3.4 ms a
+//! range with a VL53L3CX does it this way; none is known that does it like a VL53L1X, which [`codec`] describes. It costs the bus 3.7 ms a
 //! measurement instead of 0.6, and the processor what [`bins`](crate::bins) does. Not for several targets: the strongest one counts.
 //!
 //! **Unverified** on a chip. Addresses, values and their order are those that ST's core writes (VL53LX bare driver, BSD-3-Clause:
