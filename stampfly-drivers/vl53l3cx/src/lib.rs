@@ -9,6 +9,7 @@ mod boot;
 pub mod codec;
 mod config;
 mod histogram;
+mod preset;
 mod trial;
 mod xshut;
 
@@ -27,7 +28,7 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_
 pub use stampfly_types::messages::TofData;
 pub use stampfly_types::{Duration, Instant};
 
-use histogram::Session;
+use preset::Session;
 pub use trial::Implausible;
 use trial::{Trial, Verdict};
 pub use xshut::{NoXshut, Xshut};
