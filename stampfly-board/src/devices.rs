@@ -71,14 +71,14 @@ pub fn power<I: I2c, T: Timebase>(i2c: I, clock: T) -> Ina3221<I2cRegisters<I>, 
     Ina3221::new(i2c, Ina3221::A0_GROUND, clock, ina3221::Config::default()).with_transfer_limit(I2C)
 }
 
-/// The range finder that looks down. Create both range finders before either is used: creating one resets it.
+/// The range finder that looks down, at first at the floor underfoot. Create both before either is used: creating one resets it.
 pub fn range_down<I: I2c, X: OutputPin, T: Timebase>(
     i2c: I,
     shutdown: X,
     boot: &BootAddress,
     clock: T,
 ) -> Vl53l3cx<'_, I, X, T> {
-    Vl53l3cx::new(i2c, shutdown, boot, 0x30, clock, vl53l3cx::Config::default()).with_transfer_limit(I2C)
+    Vl53l3cx::new(i2c, shutdown, boot, 0x30, clock, vl53l3cx::Config::automatic(true)).with_transfer_limit(I2C)
 }
 
 /// The range finder that looks ahead. On the battery hat: it answers on USB power, but cannot measure.
@@ -88,7 +88,7 @@ pub fn range_ahead<I: I2c, X: OutputPin, T: Timebase>(
     boot: &BootAddress,
     clock: T,
 ) -> Vl53l3cx<'_, I, X, T> {
-    Vl53l3cx::new(i2c, shutdown, boot, 0x31, clock, vl53l3cx::Config::default()).with_transfer_limit(I2C)
+    Vl53l3cx::new(i2c, shutdown, boot, 0x31, clock, vl53l3cx::Config::automatic(false)).with_transfer_limit(I2C)
 }
 
 #[cfg(test)]

@@ -109,4 +109,7 @@ fn chips() {
     black_box((ina3221::codec::shunt_volts(black_box(0)), ina3221::codec::bus_volts(black_box(0))));
     black_box(pmw3901::codec::Motion::decode(&black_box([0; 12])).map(|motion| motion.is_valid()));
     black_box(vl53l3cx::codec::Reading::decode(&black_box([0; 17])).map(|reading| reading.status()));
+    let exposure = vl53l3cx::bins::Exposure { oscillator: 48_333, macro_periods: [85, 71], laser_start: 9 };
+    let histogram = vl53l3cx::bins::Histogram::decode(&black_box([0; vl53l3cx::bins::BLOCK_BYTES]));
+    black_box(histogram.map(|histogram| histogram.reading(&black_box(exposure), 0.0, black_box(None))));
 }

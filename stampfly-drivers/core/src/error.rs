@@ -28,6 +28,8 @@ pub enum SensorErrorKind {
     Restarted,
     /// No chip answered: the data line was as one that nobody drives, all ones or all zeros.
     Absent,
+    /// What the chip measured could not be right; it measures another way from the next call on.
+    Implausible,
     /// None of the above.
     Other,
 }
@@ -43,6 +45,7 @@ impl Display for SensorErrorKind {
             Self::Data => "the chip answered with data that cannot be",
             Self::Restarted => "the chip lost its settings",
             Self::Absent => "no chip answered",
+            Self::Implausible => "what it measured could not be right: it measures another way now",
             Self::Other => "another error of the sensor",
         })
     }

@@ -20,7 +20,7 @@ pub struct SensorHealth {
 }
 
 /// Every kind of error, so that one fits into a word.
-const KINDS: [SensorErrorKind; 9] = [
+const KINDS: [SensorErrorKind; 10] = [
     SensorErrorKind::Bus,
     SensorErrorKind::Timeout,
     SensorErrorKind::Identification,
@@ -29,6 +29,7 @@ const KINDS: [SensorErrorKind; 9] = [
     SensorErrorKind::Data,
     SensorErrorKind::Restarted,
     SensorErrorKind::Absent,
+    SensorErrorKind::Implausible,
     SensorErrorKind::Other,
 ];
 

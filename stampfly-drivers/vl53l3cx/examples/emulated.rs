@@ -2,11 +2,11 @@
 //!
 //! `cargo run -p stampfly-vl53l3cx --example emulated-vl53l3cx`, in the repository.
 
-use stampfly_sim::chips::{self, I2cBus};
+use stampfly_sim::chips::{self, Flaw, I2cBus, Nonsense};
 use stampfly_sim::sensors::Mount;
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig};
-use stampfly_vl53l3cx::{BootAddress, Config, RangeFinder, Vl53l3cx};
+use stampfly_vl53l3cx::{BootAddress, ChipError, Config, RangeFinder, Ranging, Vl53l3cx};
 
 fn main() {
     let simulation = Simulation::new(&SimulationConfig::example());
@@ -26,4 +26,19 @@ fn main() {
         println!("{:.3} m to the floor, {:.3} m ahead (status {})", floor.distance, wall.distance, wall.status);
         assert!(floor.distance < 0.1, "the vehicle stands on it");
     }
+
+    // A third one cannot range by itself: the driver notices, for there is a floor, and works from histograms.
+    let bus = I2cBus::new(&clock, 2);
+    let (chip, xshut) = chips::Vl53l3cx::new(&simulation.world, &clock, 2, Mount::Bottom);
+    bus.attach(Vl53l3cx::BOOT_ADDRESS, chip).set_flaw(Some(Flaw::LightMode(Nonsense::Blind)));
+    let mut odd = Vl53l3cx::new(bus, xshut, &boot, 0x30, clock.clone(), Config::automatic(true));
+    let floor = loop {
+        match block_on(&clock, odd.next()) {
+            Ok(sample) if sample.data.valid => break sample.data,
+            Ok(_) | Err(ChipError::Implausible) => {}
+            Err(error) => panic!("{error}"),
+        }
+    };
+    println!("{:.3} m to the floor by {:?}, because of {:?}", floor.distance, odd.ranging(), odd.doubt());
+    assert!(floor.distance < 0.1 && odd.ranging() == Ranging::Histogram);
 }

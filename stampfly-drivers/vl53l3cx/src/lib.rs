@@ -4,15 +4,19 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod bins;
 mod boot;
 pub mod codec;
 mod config;
+mod histogram;
+mod preset;
+mod trial;
 mod xshut;
 
 pub use boot::BootAddress;
 use codec::{RESULT_BYTES, register};
 pub use codec::{RangeStatus, Reading};
-pub use config::{Config, DistanceMode};
+pub use config::{Config, DistanceMode, Ranging};
 use embedded_hal::i2c::{Error, ErrorKind};
 use embedded_hal_async::i2c::I2c;
 #[cfg(feature = "embassy-time")]
@@ -24,6 +28,9 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_
 pub use stampfly_types::messages::TofData;
 pub use stampfly_types::{Duration, Instant};
 
+use preset::Session;
+pub use trial::Implausible;
+use trial::{Trial, Verdict};
 pub use xshut::{NoXshut, Xshut};
 
 /// In reset. The data sheet gives no shortest time.
@@ -51,6 +58,11 @@ const ADVANCES: usize = 2;
 ///
 /// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip.
 ///
+/// # Two ways
+/// [`Config::ranging`] says whether the chip computes the distance or the driver does, from a histogram. In [`Ranging::Automatic`] a call ends once with
+/// [`ChipError::Implausible`] when the driver changes over, and with [`ChipError::SelfTest`] if it changes back because neither way measures
+/// anything; the next call starts the chip again.
+///
 /// A sample is vouched for (`valid`) when the chip calls it [`RangeStatus::Valid`] and it is above zero and within the
 /// mode's reach. The first one after a start is not: the chip tells a target beyond its reach from one within by
 /// comparing measurements. `status` is [`RangeStatus::number`]; [`reading`](Self::reading) has everything it said.
@@ -76,6 +88,7 @@ const ADVANCES: usize = 2;
 /// # Times
 /// The first sample takes 10 ms and two measurements, 80 ms in all. `next` ends within two periods and 20 ms
 /// ([`ChipError::NoSample`]), one period later for each of up to two results that it has seen before; when it has to start the chip, within four more periods and 350 ms.
+/// From histograms the first sample takes 100 ms, and each one after it the budget and 4 to 6 ms.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock, Pin};
@@ -114,6 +127,13 @@ pub struct Vl53l3cx<'b, I, X, T> {
     /// The newest result since the start, as it came.
     block: Option<[u8; RESULT_BYTES]>,
     reading: Option<Reading>,
+    /// The histogram's rhythm, where that is measured since the start.
+    session: Option<Session>,
+    /// Whether a histogram is to be measured.
+    histogram: bool,
+    /// As long as it is not settled which way to measure.
+    trial: Option<Trial>,
+    doubt: Option<Implausible>,
 }
 
 impl Vl53l3cx<'_, (), (), ()> {
@@ -139,6 +159,13 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             due: Instant::ZERO,
             block: None,
             reading: None,
+            session: None,
+            histogram: config.ranging == Ranging::Histogram,
+            trial: match config.ranging {
+                Ranging::Automatic { target } => Some(Trial::new(target)),
+                Ranging::Light | Ranging::Histogram => None,
+            },
+            doubt: None,
         }
     }
 
@@ -156,6 +183,18 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.reading
     }
 
+    /// Which way it measures: [`Ranging::Light`] or [`Ranging::Histogram`].
+    #[must_use]
+    pub const fn ranging(&self) -> Ranging {
+        if self.histogram { Ranging::Histogram } else { Ranging::Light }
+    }
+
+    /// Why the light mode's results could not be right, in [`Ranging::Automatic`]; `None` as long as they could.
+    #[must_use]
+    pub const fn doubt(&self) -> Option<Implausible> {
+        self.doubt
+    }
+
     /// Sets the chip up: reset, identification, address, configuration, a first measurement that is thrown away.
     ///
     /// # Errors
@@ -165,13 +204,19 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         if !codec::is_possible(&self.config) {
             return Err(ChipError::InvalidConfiguration);
         }
+        self.session = None;
         self.wake().await?;
-        self.configure().await?;
-        // The first measurement finds the detector's bias; those after it only follow its drift.
-        self.port.write(register::SYSTEM_MODE_START, &[codec::RANGING]).await?;
         self.stale = false;
         self.first = true;
         self.block = None;
+        if self.histogram {
+            self.start_histogram().await?;
+            self.ranging = true;
+            return Ok(());
+        }
+        self.configure().await?;
+        // The first measurement finds the detector's bias; those after it only follow its drift.
+        self.port.write(register::SYSTEM_MODE_START, &[codec::RANGING]).await?;
         self.due = self.port.now() + self.config.budget;
         self.ready().await?;
         self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;
@@ -199,10 +244,10 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
     pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
         self.start().await?;
         // The first one after a start is not a measurement of anything: only its number counts.
-        let mut before = self.measurement().await?.count;
+        let mut before = self.measurement().await?.1.count;
         self.first = false;
         for _ in 0..ADVANCES {
-            let reading = self.measurement().await?;
+            let (_, reading) = self.measurement().await?;
             if !reading.status().is_measurement() {
                 return Err(ChipError::SelfTest);
             }
@@ -214,10 +259,50 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
-    /// The next result, taken apart.
-    async fn measurement(&mut self) -> Result<Reading, ChipError<I::Error>> {
-        let (_, block) = self.result().await?;
-        Reading::decode(&block).ok_or(ChipError::Data)
+    /// The next result, taken apart, and when it was there.
+    async fn measurement(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
+        if self.histogram {
+            return self.histogram().await;
+        }
+        let (seen, block) = self.result().await?;
+        Ok((seen, Reading::decode(&block).ok_or(ChipError::Data)?))
+    }
+
+    /// Starts if it has to, and takes the next measurement.
+    async fn started_measurement(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
+        if !self.ranging {
+            self.start().await?;
+        }
+        self.measurement().await
+    }
+
+    /// Takes note of a result as long as it is not settled which way to measure, and settles it.
+    fn try_out(
+        &mut self,
+        outcome: &Result<(Instant, Reading), ChipError<I::Error>>,
+    ) -> Result<(), ChipError<I::Error>> {
+        let now = self.port.now();
+        let result = match outcome {
+            // Not a measurement of anything.
+            Ok(_) if self.first => return Ok(()),
+            Ok((_, reading)) => Some(*reading),
+            Err(ChipError::NoSample) => None,
+            // Whatever this is, the other way would not mend it.
+            Err(_) => return Ok(()),
+        };
+        let Some(verdict) = self.trial.as_mut().and_then(|trial| trial.note(now, result)) else { return Ok(()) };
+        self.trial = None;
+        let Verdict::Implausible(reason) = verdict else { return Ok(()) };
+        self.histogram = !self.histogram;
+        self.ranging = false;
+        if self.histogram {
+            self.doubt = Some(reason);
+            self.trial = Some(Trial::new(true));
+            Err(ChipError::Implausible)
+        } else {
+            // Where it sees nothing either there is no reason to prefer it.
+            Err(ChipError::SelfTest)
+        }
     }
 
     /// From whatever state to the firmware running at the chip's own address.
@@ -279,6 +364,11 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
+    /// The furthest distance that is vouched for, m.
+    const fn reach(&self) -> f32 {
+        if self.histogram { bins::REACH } else { self.config.mode.reach() }
+    }
+
     async fn configure(&mut self) -> Result<(), ChipError<I::Error>> {
         for (register, values) in codec::FIXED {
             self.port.write(register, values).await?;
@@ -338,28 +428,34 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Err(ChipError::NoSample)
     }
 
+    /// Is the interrupt up? Notices a chip that came back with other settings.
+    async fn look(&mut self) -> Result<bool, ChipError<I::Error>> {
+        let [mut control, mut status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
+        if control != codec::ACTIVE_HIGH {
+            // Twice, before a wrong bit on the bus costs a start.
+            [control, status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
+        }
+        if control != codec::ACTIVE_HIGH {
+            self.ranging = false;
+            return Err(ChipError::Restarted);
+        }
+        Ok(status & 1 != 0)
+    }
+
     /// Waits for a new measurement, and gives the instant it was there.
     async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
         let period = self.config.period;
         let asked = self.port.now();
         let deadline = asked.max(self.due) + period + period;
         // An interrupt that may have been up for long tells nothing about when: take it back and wait for the next.
-        self.stale |= asked > self.due + period / 4;
+        // A histogram is only measured when it is asked for.
+        self.stale |= !self.histogram && asked > self.due + period / 4;
         self.port.wait_until(self.due).await;
         let mut before = None;
         loop {
             let looks = self.port.now();
-            let [mut control, mut status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
-            if control != codec::ACTIVE_HIGH {
-                // Twice, before a wrong bit on the bus costs a start.
-                [control, status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
-            }
+            let up = self.look().await?;
             let now = self.port.now();
-            if control != codec::ACTIVE_HIGH {
-                self.ranging = false;
-                return Err(ChipError::Restarted);
-            }
-            let up = status & 1 != 0;
             if up && !self.stale {
                 // Between two looks; or, up at the first look, when the rhythm says, for all that is known.
                 let seen = match before {
@@ -446,16 +542,16 @@ impl<I: I2c, X: Xshut, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
     type Error = ChipError<I::Error>;
 
     async fn next(&mut self) -> Result<Sample<TofData>, Self::Error> {
-        if !self.ranging {
-            self.start().await?;
+        let outcome = self.started_measurement().await;
+        if self.trial.is_some() {
+            self.try_out(&outcome)?;
         }
-        let (seen, block) = self.result().await?;
-        let reading = Reading::decode(&block).ok_or(ChipError::Data)?;
+        let (seen, reading) = outcome?;
         self.reading = Some(reading);
         let checked = !core::mem::replace(&mut self.first, false);
         let distance = reading.distance + self.config.offset;
         // Zero is what the chip says when it knows nothing, not a distance.
-        let plausible = reading.distance > 0.0 && distance > 0.0 && distance <= self.config.mode.reach();
+        let plausible = reading.distance > 0.0 && distance > 0.0 && distance <= self.reach();
         let data = TofData {
             distance: distance.max(0.0),
             sigma: reading.sigma,

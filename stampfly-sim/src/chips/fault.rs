@@ -34,10 +34,28 @@ pub enum Flaw {
     Offset(f64),
     /// Something lies this far in front of it, m. VL53L3CX.
     Covered(f64),
+    /// What it computes by itself is nonsense; its histograms are not. VL53L3CX.
+    LightMode(Nonsense),
     /// It sees so many times the voltage, as behind another divider. INA3221.
     Voltage(f64),
     /// It sees so many times the current, as across another shunt. INA3221.
     Current(f64),
+}
+
+/// What a range finder says that cannot measure in the way it is driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Nonsense {
+    /// Its interrupt never comes.
+    Silent,
+    /// No measurement succeeds: there is no bias voltage for the detector.
+    Failing,
+    /// The same distance, to the last bit.
+    Frozen,
+    /// Light comes back, but the distance is never certain enough.
+    Unseen,
+    /// No light comes back.
+    Blind,
 }
 
 impl Flaw {

@@ -48,7 +48,7 @@ pub use bmi270::{Bmi270, InterruptPin};
 pub use bmm150::Bmm150;
 pub use bmp280::Bmp280;
 pub use board::{AttachedChips, Board, SpiSetup, stand_in_image};
-pub use fault::{Attached, Faults, Flaw};
+pub use fault::{Attached, Faults, Flaw, Nonsense};
 pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
 pub use latency::Latency;

@@ -66,6 +66,11 @@ impl RangePhysics {
         (beam.z > 1e-3).then(|| self.world.inspect(|plant| plant.scene().distance(&motion.position, &beam)))
     }
 
+    /// What this specimen's light travels to the floor, m; `None` when the beam misses it.
+    pub(crate) fn optical_distance(&self, instant: Instant) -> Option<f64> {
+        self.true_distance(instant).map(|distance| distance + self.offset)
+    }
+
     /// A measurement around `instant`.
     pub(crate) fn measure(&mut self, instant: Instant) -> TofData {
         let distance = self.true_distance(instant);

@@ -208,3 +208,85 @@ fn an_xshut_that_rises_in_the_middle_of_a_transfer_leaves_the_chip_mute_until_it
     wait(&bench.simulation, 1_200);
     assert_eq!(bench.read(0x010F), [0xEA]);
 }
+
+/// Sends what a histogram wants, which also takes note of the one before.
+fn shoot(bench: &mut Bench, group: u8) {
+    bench.write(0x0024, &[0x14, 0x00]);
+    bench.write(0x0034, &[0x08]);
+    bench.write(0x0046, &[0x20, 0x09, 0x00, 0x00, 0x02]);
+    bench.write(0x005E, &[0x00, 0x54, 0x09, 0x00, 0x23, 0x0B, 0x07, 0x21, 0x43, 0x10, 0x32, 0x54]);
+    bench.write(0x0082, &[group, 0x01, 0x00, 0x01, 0x01, 0x26]);
+}
+
+#[test]
+fn a_histogram_is_measured_for_each_start_and_tells_which() {
+    let mut bench = Bench::new();
+    let mut told = Vec::new();
+    for shot in 0..260u32 {
+        let begun = bench.simulation.clock.now();
+        shoot(&mut bench, [2, 0][shot as usize % 2]);
+        assert!(!bench.is_ready());
+        while !bench.is_ready() {
+            wait(&bench.simulation, 500);
+        }
+        let took = bench.simulation.clock.now().since(begun).seconds();
+        let [interrupt, status, _, number]: [u8; 4] = bench.read(0x0088);
+        told.push((interrupt >> 4, status & 0x1F, number));
+        // Six times 85 or 36 macro periods of 61 and 73 µs, 1.7 ms, and what the settings take.
+        let expected = if number & 1 == 0 { 0.0328 } else { 0.0175 };
+        assert!((took - expected).abs() < 0.0035, "{took} s for number {number}");
+        wait(&bench.simulation, 100_000);
+        assert_eq!(bench.read(0x008B), [number], "no other without a start");
+    }
+    // Of the settings before the last, but for the first.
+    assert_eq!(told[..4], [(2, 18, 0), (2, 9, 0), (0, 9, 1), (2, 9, 2)]);
+    assert_eq!((told[256].2, told[257].2, told[258].2), (255, 128, 129));
+    bench.write(0x0087, &[0]);
+    shoot(&mut bench, 2);
+    wait(&bench.simulation, 50_000);
+    assert_eq!((bench.read(0x0089), bench.read(0x008B)), ([18], [0]), "begun anew");
+}
+
+#[test]
+fn a_histogram_has_ambient_light_first_and_a_pulse_where_the_reference_says() {
+    let mut bench = Bench::new();
+    let mut bins = [0u32; 24];
+    for shot in 0..42 {
+        shoot(&mut bench, 0);
+        wait(&bench.simulation, 40_000);
+        let block: [u8; 83] = bench.read(0x0088);
+        if shot < 2 || block[3] & 1 == 1 {
+            continue;
+        }
+        for (bin, bytes) in bins.iter_mut().zip(block[6..].chunks_exact(3)) {
+            *bin += bytes.iter().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
+        }
+        assert_eq!(block[0x00D5 - 0x0088], 0, "the last byte is elsewhere");
+        bins[23] += u32::from(block[81] << 2 | block[82]);
+    }
+    let [p1, p0, start]: [u8; 3] = bench.read(0x00D6);
+    let zero = f64::from(u16::from_be_bytes([p1, p0])) / 2048.0 + f64::from(start) - 9.0;
+    let ambient = bins[..4].iter().sum::<u32>() / 4;
+    let pulse: Vec<_> = bins[4..].iter().map(|bin| f64::from(bin.saturating_sub(ambient + ambient / 2))).collect();
+    let total: f64 = pulse.iter().sum();
+    let centre = pulse.iter().enumerate().map(|(place, bin)| (place as f64 + 0.5) * bin).sum::<f64>() / total;
+    // It stands 30 mm above the floor: 0.15 bins, and some millimetres of its own.
+    assert!((centre - zero - 0.15).abs() < 0.12, "{centre} {zero}");
+    let wide = pulse.iter().filter(|bin| **bin > total / 100.0).count();
+    assert!((3..=5).contains(&wide), "a pulse of 2.5 bins: {pulse:?}");
+}
+
+#[test]
+fn without_firmware_there_is_no_histogram_and_the_patch_is_kept() {
+    let mut bench = Bench::new();
+    bench.write(0x0476, &[0x29, 0xC9]);
+    assert_eq!(bench.read(0x0476), [0x29, 0xC9]);
+    shoot(&mut bench, 0);
+    wait(&bench.simulation, 50_000);
+    bench.write(0x0085, &[0, 1, 0x26]);
+    wait(&bench.simulation, 100_000);
+    assert!(!bench.is_ready());
+    bench.chip.reset();
+    wait(&bench.simulation, 2_000);
+    assert_eq!(bench.read(0x0476), [0, 0]);
+}

@@ -24,6 +24,7 @@ mod spi;
 mod spoilt;
 mod starts;
 mod vl53l3cx;
+mod vl53l3cx_histogram;
 
 use core::cell::RefCell;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};

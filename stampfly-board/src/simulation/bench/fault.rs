@@ -10,7 +10,7 @@ use crate::topics;
 use core::fmt;
 use stampfly_flight::doctor::{FlashAccess, Restart};
 use stampfly_flight::golden::{self, GoldenError, Report};
-use stampfly_sim::chips::{Board, Faults, Flaw};
+use stampfly_sim::chips::{Board, Faults, Flaw, Nonsense};
 use stampfly_types::messages::PilotInput;
 use std::boxed::Box;
 use std::format;
@@ -113,6 +113,7 @@ const FAULTS: &[(&str, Defect)] = &[
     ("mag-mirrored", Defect::Flaw("mag", Flaw::Mounting(Y_REVERSED))),
     ("tof-offset", Defect::Flaw("tof", Flaw::Offset(0.2))),
     ("tof-covered", Defect::Flaw("tof", Flaw::Covered(0.025))),
+    ("tof-light-mode", Defect::Flaw("tof", Flaw::LightMode(Nonsense::Unseen))),
     ("tof-front-covered", Defect::Flaw("tof_front", Flaw::Covered(0.025))),
     ("flow-x-reversed", Defect::Flaw("flow", Flaw::Mounting(X_REVERSED))),
     ("flow-y-reversed", Defect::Flaw("flow", Flaw::Mounting(Y_REVERSED))),

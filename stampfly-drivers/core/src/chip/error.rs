@@ -37,6 +37,8 @@ pub enum ChipError<E> {
     SelfTest,
     /// The chip answered with data that cannot be.
     Data,
+    /// What the chip measured could not be right. The driver measures another way from the next call on.
+    Implausible,
     /// The clock of the [`Timebase`](crate::Timebase) stands still while its delays end, so no deadline would ever come.
     ClockStopped,
 }
@@ -56,6 +58,7 @@ impl<E: Debug> SensorError for ChipError<E> {
             Self::Pin | Self::ClockStopped => SensorErrorKind::Other,
             Self::SelfTest => SensorErrorKind::SelfTest,
             Self::Data => SensorErrorKind::Data,
+            Self::Implausible => SensorErrorKind::Implausible,
         }
     }
 }
@@ -76,6 +79,7 @@ impl<E: Debug> Display for ChipError<E> {
             Self::Restarted => "the chip lost its settings",
             Self::SelfTest => "the self test failed",
             Self::Data => "the chip answered with data that cannot be",
+            Self::Implausible => "what it measured could not be right: it measures another way now",
             Self::ClockStopped => "the clock stands still: what does the time base's `now` return?",
         };
         f.write_str(said)

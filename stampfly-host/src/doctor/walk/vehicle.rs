@@ -102,6 +102,10 @@ impl<V: Visit> Examination<'_, V> {
             let seen = format!("{samples} samples, {errors} errors, last: {last_error}");
             let numb = [SensorErrorKind::SelfTest, SensorErrorKind::Data].map(|kind| kind.to_string());
             match () {
+                () if self.works(name) && new < LOOSE && *last_error == SensorErrorKind::Implausible.to_string() => {
+                    let advice = "it works, but not the way it does elsewhere: please report it";
+                    self.chart.note(&format!("{dashed}-light-mode"), Verdict::Look, seen, advice);
+                }
                 () if self.works(name) && new < LOOSE => self.chart.pass(name, seen),
                 () if self.works(name) => {
                     let advice = "its transfers fail now and then: a bad joint, or a chip that restarts";

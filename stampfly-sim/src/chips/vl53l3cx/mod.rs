@@ -1,4 +1,4 @@
-//! The range finder VL53L3CX: ST DS13204 ("DS" below), ranging on one target.
+//! The range finder VL53L3CX: ST DS13204 ("DS" below), ranging on one target by itself, or giving histograms.
 //!
 //! ST publishes no register map of this part, only its drivers; the map here is the one of the VL53L1 family as public
 //! drivers and application notes name it (ST UM2510, UM2356), and *all of it is unverified* on this part, but for what
@@ -8,27 +8,39 @@
 //! |---|---|---|
 //! | 0x0000 | 0 holds the chip still, 1 then starts it anew at 0x29, as ST's drivers of the VL53L1 do | 1 |
 //! | 0x0001 | address, 7 bits; acts from the end of the transfer | 0x29 |
+//! | 0x0006 | fast oscillator as the factory measured it, 4.12 MHz | the specimen's |
 //! | 0x0010, 0x00E5 | bit 0: the firmware runs | 1, 3 |
-//! | 0x001E | added to every distance, quarters of a millimetre, 13 bits | 0 |
+//! | 0x001E | added to every distance, quarters of a millimetre, 13 bits | the specimen's |
 //! | 0x0022 | what the factory found to be missing from this specimen's distances, mm | the specimen's |
+//! | 0x0024 | wanted signal rate of a histogram, 9.7 Mcps | 0 |
 //! | 0x0030 | bit 4: interrupt line active low | 0x11 |
 //! | 0x0031 | bit 0: level of the interrupt line | |
+//! | 0x0034, 0x004A | length of the laser's pulse: sixteenths, and whole pixel clocks | 0 |
 //! | 0x0046 | interrupt at: 0x20 a new measurement | 0 |
+//! | 0x0047 | start of the laser, pixel clocks | 0 |
 //! | 0x005E, 0x0061 | time-outs A and B, macro periods, coded | 0 |
 //! | 0x0060, 0x0063 | periods of the laser A and B, half pixel clocks less one | 0x0B, 0x09 |
+//! | 0x0064–0x0069 | groups of bins that a histogram counts: three bytes of even ones, three of odd ones | 0 |
 //! | 0x006C–0x006F | period of measurements, ticks of the slow oscillator | 0 |
+//! | 0x0082 | bit 1: number of the group of settings | 0 |
+//! | 0x0085 | bit 0: the firmware may run | 1 |
 //! | 0x0086 | bit 0 clears the interrupt and lets the next measurement begin | |
-//! | 0x0087 | 0x40 measures again and again, 0x10 once, 0x80 and 0 stop | 0 |
-//! | 0x0088 | interrupt status, (2:0) | 0 |
-//! | 0x0089 | (4:0) 9 valid, 6 sigma, 4 signal, 5 phase, 3 no bias voltage | 0 |
+//! | 0x0087 | 0x40 measures again and again, 0x10 once, 0x26 a histogram, 0x80 and 0 stop | 0 |
+//! | 0x0088 | interrupt status, (2:0); number of the group of settings, (5:4) | 0 |
+//! | 0x0089 | (4:0) 9 valid, 6 sigma, 4 signal, 5 phase, 3 no bias voltage, 18 first histogram | 0 |
 //! | 0x008B | number of the measurement, 0 to 255 and then from 128 | 0 |
 //! | 0x008C | spads that saw something, 8.8 | 0 |
 //! | 0x008E, 0x0090 | signal and ambient rate, 9.7 Mcps | 0 |
 //! | 0x0092 | sigma, 14.2 mm | 0 |
 //! | 0x0096 | distance, mm | 0 |
 //! | 0x0098 | signal rate less crosstalk, 9.7 Mcps | 0 |
+//! | 0x008E–0x00D5 | of a histogram: 24 bins, 3 bytes each, but for the last byte, whose bits are (7:2) in 0x00D9 and (1:0) in 0x00DA | 0 |
+//! | 0x00D6, 0x00D8 | phase of the reference pulse, 2048ths of a pixel clock; where the laser started for it | 0 |
 //! | 0x00DE | slow oscillator: ticks per 1.075⁻¹ ms | |
 //! | 0x010F, 0x0110, 0x0111 | model 0xEA, module type 0xAA, revision 0x10 | |
+//! | 0x011E–0x013D | detectors that work, a bit each | all |
+//! | 0x013E, 0x013F | centre and size of the inner detectors | 0xC7, 0x33 |
+//! | 0x0470–0x04B5 | patch of the firmware; kept, without effect | 0 |
 //!
 //! Addresses have two bytes, numbers of more than one byte begin with the highest (DS 3.2). Both directions go on to
 //! the next register. 1.2 ms from the release of XSHUT or from power to the first answer (DS 2.8); until then nobody
@@ -38,12 +50,20 @@
 //! mute until the next time, *unverified*. The chip has no other memory than these registers: an edge of XSHUT or a dip of
 //! the supply brings it back to 0x29. A dead detector is one for which no bias voltage is found, so it counts nothing.
 //!
-//! A specimen measures too short by what is in 0x0022, until a driver puts that into 0x001E, as ST's core does where no measurement of the
-//! mode is corrected (`vl53lx_api_core.c`), and as public drivers of the VL53L1X do. *Unverified*: how much it is, some millimetres here.
+//! A specimen measures too short by what is in 0x0022, unless that is in 0x001E, where ST's core puts it when no measurement of the
+//! mode is corrected (`vl53lx_api_core.c`), and public drivers of the VL53L1X do. That core takes what is in 0x001E after a start for what is
+//! missing from histograms (`VL53LX_get_customer_nvm_managed`), so it is there. *Unverified*: how much it is, some millimetres here.
 //!
-//! Not modelled: the histogram and several targets, thresholds, other calibration data, the region of interest.
+//! A histogram is measured once for each 0x26, as ST's driver drives it (VL53LX bare driver, BSD-3-Clause; its core runs over this emulator):
+//! the settings are sent anew each time, and what acts is what was sent before the last start. The first one after a stop says 18 and is number
+//! 0, as is the next; they go from 255 to 128. Even ones have the laser period and time-out A, odd ones B. It takes six time-outs and 1.7 ms,
+//! as that driver reckons. What is counted is in `photons.rs`.
+//!
+//! Not modelled: several targets, thresholds, groups of bins for bright light, other calibration data, the region of interest.
 
-use super::{Chip, Flaw, I2cChip};
+mod photons;
+
+use super::{Chip, Flaw, I2cChip, Nonsense};
 use crate::noise::Noise;
 use crate::sensors::schedule::Schedule;
 use crate::sensors::tof::{Mount, RATE, RangePhysics, STATUS_OUT_OF_BOUNDS, STATUS_SIGMA, STATUS_SIGNAL, STATUS_VALID};
@@ -52,6 +72,7 @@ use crate::world::World;
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
+use photons::{BINS, Photons, Shot};
 use stampfly_types::messages::TofData;
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
@@ -59,8 +80,22 @@ use std::rc::Rc;
 const SOFT_RESET: u16 = 0x0000;
 const ADDRESS: u16 = 0x0001;
 const FIRMWARE: [(u16, u8); 2] = [(0x0010, 1), (0x00E5, 3)];
+const FAST_OSCILLATOR: u16 = 0x0006;
 const RANGE_OFFSET: u16 = 0x001E;
 const FACTORY_OFFSET: u16 = 0x0022;
+const WANTED_RATE: u16 = 0x0024;
+const PULSE_SIXTEENTHS: u16 = 0x0034;
+const LASER_START: u16 = 0x0047;
+const PULSE_CLOCKS: u16 = 0x004A;
+const GROUPS_OF_BINS: [u16; 2] = [0x0064, 0x0067];
+const GROUP: u16 = 0x0082;
+const ENABLE: u16 = 0x0085;
+const BINS_FROM: u16 = 0x008E;
+const REFERENCE: u16 = 0x00D6;
+const LAST_BYTE: u16 = 0x00D9;
+const DETECTORS: core::ops::RangeInclusive<u16> = 0x011E..=0x013D;
+const INNER_DETECTORS: u16 = 0x013E;
+const PATCH: core::ops::RangeInclusive<u16> = 0x0470..=0x04B5;
 const POLARITY: u16 = 0x0030;
 const LINE: u16 = 0x0031;
 const INTERRUPT_AT: u16 = 0x0046;
@@ -68,6 +103,7 @@ const TIMEOUT_A: u16 = 0x005E;
 const PERIOD_A: u16 = 0x0060;
 const TIMEOUT_B: u16 = 0x0061;
 const PERIOD_B: u16 = 0x0063;
+const TIMES: [[u16; 2]; 2] = [[TIMEOUT_A, PERIOD_A], [TIMEOUT_B, PERIOD_B]];
 const PERIOD: u16 = 0x006C;
 const CLEAR: u16 = 0x0086;
 const MODE: u16 = 0x0087;
@@ -76,14 +112,23 @@ const OSCILLATOR: u16 = 0x00DE;
 const MODEL: u16 = 0x010F;
 /// Status of a measurement without a bias voltage for the detector.
 const NO_BIAS: u8 = 3;
+/// The first histogram after a stop.
+const FIRST_OF_GROUP: u8 = 18;
+/// What a histogram needs: its bit in [`MODE`].
+const HISTOGRAM: u8 = 0x02;
 /// Everything a driver may write lies below.
-const SIZE: usize = 0x0140;
+const SIZE: usize = 0x04B6;
 
 const FIRST_ADDRESS: u8 = 0x29;
 const BOOT: Duration = Duration::from_micros(1_200);
 /// Stream of the specimens' offsets; no sensor has this number. Their standard deviation, mm.
 const STREAM: u64 = 104;
 const OFFSETS: f64 = 8.0;
+/// Stream of the specimens' photons, by mount.
+const PHOTONS: u64 = 106;
+/// Nominal fast oscillator, MHz, and how often a pixel clock comes in it.
+const FAST: f64 = 11.8;
+const CLOCKS: f64 = 64.0;
 /// When a chip answers that came out of its reset in the middle of a transfer.
 const NEVER: Instant = Instant::from_secs(u64::MAX / 2_000_000);
 /// Slow oscillator of this specimen.
@@ -91,6 +136,9 @@ const SLOW_OSCILLATOR: u16 = 0x03C0;
 /// Duration of a macro period per pixel clock of the laser's period: 2304 clocks of the fast oscillator, 11.8 MHz, in
 /// 64 phases, µs.
 const MACRO_PERIOD: f64 = 2304.0 / 11.8 / 64.0;
+/// What a histogram takes beside its time-outs, µs, and how many those are.
+const HISTOGRAM_OVERHEAD: f64 = 1_700.0;
+const HISTOGRAM_PARTS: f64 = 6.0;
 /// What a measurement takes beside its two time-outs.
 const OVERHEAD: f64 = 14_000.0;
 
@@ -159,6 +207,9 @@ struct State {
     begin: Option<Instant>,
     /// A measurement waits to be taken note of.
     pending: bool,
+    photons: Photons,
+    /// How many histograms since the last stop, and the groups of settings that were and will be sent; `None` when none are measured.
+    histograms: Option<(u32, [u8; 2])>,
     /// The detector feels nothing.
     broken: bool,
     flaw: Option<Flaw>,
@@ -190,12 +241,19 @@ impl State {
         self.registers.fill(0);
         self.begin = None;
         self.pending = false;
+        self.histograms = None;
         self.set(SOFT_RESET, &[1]);
         self.set(ADDRESS, &[FIRST_ADDRESS]);
         for (register, value) in FIRMWARE {
             self.set(register, &[value]);
         }
+        // The specimen's pace is its oscillator's.
+        self.set(FAST_OSCILLATOR, &((FAST / self.pace * 4096.0).round() as u16).to_be_bytes());
         self.set(FACTORY_OFFSET, &self.short.to_be_bytes());
+        self.set(RANGE_OFFSET, &((self.short * 4) & 0x1FFF).to_be_bytes());
+        DETECTORS.for_each(|register| self.set(register, &[0xFF]));
+        self.set(INNER_DETECTORS, &[0xC7, 0x33]);
+        self.set(ENABLE, &[1]);
         self.set(POLARITY, &[0x11]);
         self.set(PERIOD_A, &[0x0B]);
         self.set(PERIOD_B, &[0x09]);
@@ -212,12 +270,25 @@ impl State {
         Duration::from_micros((microseconds * self.pace) as u64)
     }
 
+    /// The number of the histogram that is measured now or was last, and which of the two parts it is.
+    fn histogram_number(count: u32) -> (u8, usize) {
+        let number = match count.saturating_sub(1) {
+            early @ 0..=255 => early as u8,
+            late => 128 + ((late - 256) % 128) as u8,
+        };
+        (number, usize::from(number & 1))
+    }
+
     /// How long a measurement takes.
     fn duration(&self) -> Duration {
         let range = |timeout, period| {
             let clocks = 2.0 * (f64::from(self.byte(period)) + 1.0);
             macro_periods(self.word(timeout)) * clocks * MACRO_PERIOD
         };
+        if let Some((count, _)) = self.histograms {
+            let [timeout, period] = TIMES[Self::histogram_number(count).1];
+            return self.true_time(HISTOGRAM_OVERHEAD + HISTOGRAM_PARTS * range(timeout, period));
+        }
         self.true_time(OVERHEAD + range(TIMEOUT_A, PERIOD_A) + range(TIMEOUT_B, PERIOD_B))
     }
 
@@ -229,11 +300,58 @@ impl State {
 
     fn update(&mut self, now: Instant) {
         while let Some(begin) = self.begin.filter(|begin| !self.pending && *begin + self.duration() <= now) {
+            if self.histograms.is_some() {
+                self.measure_histogram(begin);
+                self.pending = true;
+                self.begin = None;
+                return;
+            }
             self.measure(begin);
-            self.pending = true;
+            self.pending = self.flaw != Some(Flaw::LightMode(Nonsense::Silent));
             // Once, or again when the period is over and this one has been taken note of.
             self.begin = (self.byte(MODE) == 0x40).then(|| begin + self.period());
         }
+    }
+
+    fn measure_histogram(&mut self, begin: Instant) {
+        let Some((count, [group, _])) = self.histograms else { return };
+        let (number, part) = Self::histogram_number(count);
+        let [timeout, period] = TIMES[part];
+        let mut distance = self.physics.optical_distance(begin + self.duration() / 2);
+        match self.flaw {
+            Some(Flaw::Offset(metres)) => distance = distance.map(|distance| distance + metres),
+            Some(Flaw::Covered(metres)) => distance = Some(metres),
+            _ => {}
+        }
+        let from = GROUPS_OF_BINS[part];
+        let shot = Shot {
+            distance,
+            short: f64::from(self.short) * 1e-3,
+            bin: self.pace / (CLOCKS * FAST),
+            period: 2 * (usize::from(self.byte(period)) + 1),
+            macro_periods: macro_periods(self.word(timeout)),
+            width: f64::from(self.byte(PULSE_CLOCKS)) + f64::from(self.byte(PULSE_SIXTEENTHS)) / 16.0,
+            wanted: f64::from(self.word(WANTED_RATE)) / 128.0,
+            groups: core::array::from_fn(|n| self.byte(from + n as u16 / 2) >> (4 * (n % 2)) & 0xF),
+        };
+        let (bins, detectors) = self.photons.count(&shot);
+        let (phase, start) = self.photons.reference(self.byte(LASER_START));
+        let code = match count {
+            _ if self.broken => NO_BIAS,
+            0 => FIRST_OF_GROUP,
+            _ => 9,
+        };
+        self.set(RESULT, &[3 | group << 4, code, 0, number]);
+        self.set(0x008C, &((detectors * 256.0) as u16).to_be_bytes());
+        for (place, bin) in (BINS_FROM..).step_by(3).zip(if self.broken { [0; BINS] } else { bins }) {
+            self.set(place, &bin.to_be_bytes()[1..]);
+        }
+        let lowest = self.byte(REFERENCE - 1);
+        self.set(REFERENCE - 1, &[0]);
+        self.set(REFERENCE, &phase.to_be_bytes());
+        self.set(REFERENCE + 2, &[start]);
+        self.set(LAST_BYTE, &[lowest >> 2, lowest & 3]);
+        self.histograms = Some((count + 1, self.histograms.map_or([0; 2], |(_, groups)| groups)));
     }
 
     fn measure(&mut self, begin: Instant) {
@@ -241,7 +359,8 @@ impl State {
         match self.flaw {
             Some(Flaw::Offset(metres)) => reading.distance += metres as f32,
             Some(Flaw::Covered(metres)) => {
-                reading = TofData { distance: metres as f32, sigma: 0.001, status: STATUS_VALID, valid: true };
+                let distance = self.photons.near(metres) as f32;
+                reading = TofData { distance, sigma: 0.001, status: STATUS_VALID, valid: true };
             }
             _ => {}
         }
@@ -249,10 +368,22 @@ impl State {
             255 => 128,
             number => number + 1,
         };
-        if self.broken {
+        if self.broken || self.flaw == Some(Flaw::LightMode(Nonsense::Failing)) {
             self.set(RESULT, &[3, NO_BIAS, 0, number]);
             (0x008C..0x009A).for_each(|register| self.set(register, &[0]));
             return;
+        }
+        match self.flaw {
+            Some(Flaw::LightMode(Nonsense::Frozen)) => {
+                reading = TofData { distance: 0.255, sigma: 0.001, status: STATUS_VALID, valid: true };
+            }
+            Some(Flaw::LightMode(Nonsense::Unseen)) => {
+                reading = TofData { distance: 0.255, sigma: 0.5, status: STATUS_SIGMA, valid: false };
+            }
+            Some(Flaw::LightMode(Nonsense::Blind)) => {
+                reading = TofData { distance: 0.0, sigma: 0.0, status: STATUS_SIGNAL, valid: false };
+            }
+            _ => {}
         }
         // 13 bits, quarters of a millimetre.
         let added = ((self.word(RANGE_OFFSET) << 3) as i16) >> 3;
@@ -294,6 +425,15 @@ impl Vl53l3cx {
             registers: Box::new([0; SIZE]),
             begin: None,
             pending: false,
+            photons: Photons::new(Noise::new(
+                seed,
+                PHOTONS
+                    + match mount {
+                        Mount::Bottom => 0,
+                        Mount::Front => 1,
+                    },
+            )),
+            histograms: None,
             broken: false,
             flaw: None,
             pointer: 0,
@@ -358,15 +498,22 @@ impl Chip for Vl53l3cx {
             }
             MODE => {
                 state.set(MODE, &[byte]);
+                let group = state.byte(GROUP) & 2;
+                state.histograms = match state.histograms {
+                    _ if byte & HISTOGRAM == 0 => None,
+                    None => Some((0, [group; 2])),
+                    Some((count, [_, sent])) => Some((count, [sent, group])),
+                };
                 state.begin = match byte {
-                    0x40 | 0x10 => Some(now),
+                    _ if state.byte(ENABLE) & 1 == 0 => None,
+                    0x40 | 0x10 | 0x26 => Some(now),
                     _ => None,
                 };
             }
             // What the chip found and what it is cannot be written, nor what does not exist.
             LINE | RESULT..MODEL => {}
             ADDRESS => state.set(ADDRESS, &[byte & 0x7F]),
-            _ if usize::from(register) < SIZE && register < RESULT => state.set(register, &[byte]),
+            _ if register < RESULT || PATCH.contains(&register) => state.set(register, &[byte]),
             _ => {}
         }
     }

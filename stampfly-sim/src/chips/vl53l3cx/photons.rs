@@ -1,0 +1,180 @@
+//! Photons over time: what the detectors of a VL53L3CX count in a histogram, from light that travels, spreads and arrives at random.
+//!
+//! The laser's pulse is a rectangle of the length that is set, blurred by the detectors' jitter; it falls anywhere between bins. It comes
+//! back weaker with the square of the distance, over ambient light, and each bin counts by Poisson's law. The part dims itself by using fewer
+//! detectors when more comes back than it wants. A pulse that takes longer than a laser period arrives in the next one.
+//!
+//! What ST's algorithms take for granted is so here: bins of a PLL period, the phase of no distance as found by the part's own reference
+//! pulse, ambient bins that count as long as the others, distances that come out long by 2048 to 1987, and a factory's offset before that
+//! (VL53LX bare driver: `VL53LX_range_maths`, `VL53LX_hist_calc_zero_distance_phase`). *Unverified*: strength and shape of the pulse, jitter,
+//! ambient light, the places of reference pulses. Not modelled: cross-talk of a cover glass, several targets, detectors that are still blind
+//! from the photon before.
+
+use crate::noise::Noise;
+
+/// Bins of a histogram.
+pub(super) const BINS: usize = 24;
+/// Detectors that there are, less those behind smaller openings.
+const DETECTORS: f64 = 200.0;
+/// A floor at one metre, 10⁶ photons a second on all detectors: 40 % of the light it gets is scattered.
+const FLOOR: f64 = 8.0;
+/// Ambient light of a room, likewise.
+const AMBIENT: f64 = 0.5;
+/// The nearest a floor can be for the square of its distance to count, m.
+const NEAR: f64 = 0.05;
+/// Blur of the pulse, standard deviation in bins: 0.3 ns.
+const JITTER: f64 = 0.23;
+/// Speed of light in air, m/µs.
+const LIGHT: f64 = 299.704;
+/// How much longer distances come out.
+const STRETCH: f64 = 2048.0 / 1987.0;
+/// Laser periods in which a macro period counts.
+const COUNTED_PERIODS: f64 = 2048.0;
+/// Means above this are drawn from a normal distribution.
+const MANY: f64 = 50.0;
+
+/// How a histogram is measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shot {
+    /// Way to the target, m; `None` without one.
+    pub distance: Option<f64>,
+    /// What the factory found to be missing, m.
+    pub short: f64,
+    /// A bin, µs.
+    pub bin: f64,
+    /// Laser period, bins.
+    pub period: usize,
+    /// Macro periods.
+    pub macro_periods: f64,
+    /// Length of the pulse, bins.
+    pub width: f64,
+    /// Photons wanted at most, 10⁶/s.
+    pub wanted: f64,
+    /// Which four bins each of the six groups counts; 7 is ambient light.
+    pub groups: [u8; 6],
+}
+
+/// A specimen's optics.
+#[derive(Debug)]
+pub(super) struct Photons {
+    noise: Noise,
+    /// Phase of no distance, bins after the laser's start as set.
+    zero: f64,
+    /// By how many bins later the laser starts for the reference pulse.
+    later: u8,
+}
+
+impl Photons {
+    pub(super) fn new(mut noise: Noise) -> Self {
+        let zero = 3.5 + noise.within(1.0);
+        let later = (noise.unit() * 3.0) as u8;
+        Self { noise, zero, later }
+    }
+
+    /// The reference pulse: its phase, 2048ths of a bin, and where the laser started for it.
+    pub(super) fn reference(&mut self, laser_start: u8) -> (u16, u8) {
+        let phase = self.zero - f64::from(self.later) + 0.002 * self.noise.normal();
+        ((phase * 2048.0).round() as u16, laser_start + self.later)
+    }
+
+    /// A measurement by the part itself of something so near that noise is a millimetre.
+    pub(super) fn near(&mut self, metres: f64) -> f64 {
+        metres + 0.001 * self.noise.normal()
+    }
+
+    /// The bins, and how many detectors were in use.
+    pub(super) fn count(&mut self, shot: &Shot) -> ([u32; BINS], f64) {
+        let strength = shot.distance.map_or(0.0, |metres| FLOOR / metres.max(NEAR).powi(2));
+        let share = (shot.wanted / (strength + AMBIENT)).min(1.0);
+        let exposure = shot.macro_periods * COUNTED_PERIODS * shot.bin * share;
+        let travelled = (shot.distance.unwrap_or(0.0) * STRETCH - shot.short) / (0.5 * LIGHT * shot.bin);
+        let (middle, period) = (self.zero + travelled, shot.period as f64);
+        let mut bins = [0; BINS];
+        for (place, bin) in bins.iter_mut().enumerate() {
+            let group = shot.groups[place / 4];
+            let ambient = AMBIENT * exposure;
+            let mean = if group & 7 == 7 {
+                ambient
+            } else {
+                let from = f64::from(group) * 4.0 + (place % 4) as f64;
+                let rounds = (-1..=8).map(|round| from + f64::from(round) * period - middle);
+                let arriving: f64 =
+                    rounds.map(|from| fraction(from + 1.0, shot.width) - fraction(from, shot.width)).sum();
+                ambient + strength * exposure * shot.width * arriving
+            };
+            *bin = self.poisson(mean);
+        }
+        (bins, DETECTORS * share)
+    }
+
+    fn poisson(&mut self, mean: f64) -> u32 {
+        if mean > MANY {
+            return (mean + mean.sqrt() * self.noise.normal()).round().max(0.0) as u32;
+        }
+        let (limit, mut product, mut count) = (libm::exp(-mean), self.noise.unit(), 0);
+        while product > limit {
+            product *= self.noise.unit();
+            count += 1;
+        }
+        count
+    }
+}
+
+/// Share of a pulse of this width, around zero, that has arrived by then: the integral of a rectangle with blurred edges.
+fn fraction(by: f64, width: f64) -> f64 {
+    let edge = |at: f64| {
+        let scaled = at / JITTER;
+        let normal = 0.5 * libm::erfc(-scaled / core::f64::consts::SQRT_2);
+        let density = libm::exp(-0.5 * scaled * scaled) / libm::sqrt(core::f64::consts::TAU);
+        at * normal + JITTER * density
+    };
+    (edge(by + 0.5 * width) - edge(by - 0.5 * width)) / width
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHOT: Shot = Shot {
+        distance: Some(1.0),
+        short: 0.0,
+        bin: 1.0 / (64.0 * 11.8),
+        period: 24,
+        macro_periods: 72.0,
+        width: 2.5,
+        wanted: 40.0,
+        groups: [0, 1, 2, 3, 4, 5],
+    };
+
+    #[test]
+    fn a_pulse_arrives_once_half_of_it_by_its_middle() {
+        assert!(
+            fraction(-3.0, 2.5) < 1e-6 && (fraction(0.0, 2.5) - 0.5).abs() < 1e-12 && fraction(3.0, 2.5) > 1.0 - 1e-6
+        );
+    }
+
+    #[test]
+    fn light_weakens_with_the_square_of_the_distance_and_scatters_as_its_square_root() {
+        let mut photons = Photons::new(Noise::new(1, 0));
+        let mut sums = |distance| -> Vec<f64> {
+            let shot = Shot { distance, ..SHOT };
+            (0..2_000).map(|_| photons.count(&shot).0.iter().map(|bin| f64::from(*bin)).sum()).collect()
+        };
+        let mean = |sums: &[f64]| sums.iter().sum::<f64>() / sums.len() as f64;
+        let [dark, one, two] = [None, Some(1.0), Some(2.0)].map(&mut sums);
+        let ratio = (mean(&one) - mean(&dark)) / (mean(&two) - mean(&dark));
+        assert!((ratio - 4.0).abs() < 0.05, "{ratio}");
+        for sums in [dark, one, two] {
+            let variance = sums.iter().map(|sum| (sum - mean(&sums)).powi(2)).sum::<f64>() / sums.len() as f64;
+            assert!((variance / mean(&sums) - 1.0).abs() < 0.12, "{variance} of {}", mean(&sums));
+        }
+    }
+
+    #[test]
+    fn what_is_near_is_seen_by_fewer_detectors() {
+        let mut photons = Photons::new(Noise::new(1, 0));
+        let near = photons.count(&Shot { distance: Some(0.1), ..SHOT }).1;
+        let far = photons.count(&SHOT).1;
+        assert!((near - 200.0 * 40.0 / 800.5).abs() < 0.01 && far == 200.0, "{near} {far}");
+    }
+}
