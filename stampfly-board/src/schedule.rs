@@ -18,24 +18,24 @@ stampfly_bus::schedule! {
     /// Anomaly detection.
     failsafe = Failsafe: after estimation or at latest 5 ms, flight, 86 us;
     /// Take-off and landing manager.
-    landing = Landing: after failsafe, flight, 48 us;
+    landing = Landing: after failsafe, flight, 50 us;
     /// State management: the only place where the vehicle changes state.
-    mode = Mode: after landing, flight, 130 us;
+    mode = Mode: after landing, flight, 132 us;
     /// Navigator: every set-point there is.
-    navigation = Navigation: after mode, flight, 230 us;
+    navigation = Navigation: after mode, flight, 228 us;
     /// Control.
-    control = Control: after navigation or at latest 10 ms, flight, 190 us;
+    control = Control: after navigation or at latest 10 ms, flight, 198 us;
     /// Mixer, motor curve, motor output.
     actuation = Actuation: after control, flight, 40 us;
 
     /// Still-calibration.
-    calibration = Calibration: every 20 ms, background, 142 us;
+    calibration = Calibration: every 20 ms, background, 144 us;
     /// Command arbitration.
     command = Command: every 20 ms, background, 42 us;
     /// Button gestures.
-    button = Button: every 20 ms, background, 22 us;
+    button = Button: every 20 ms, background, 24 us;
     /// Lights and sound.
-    notification = Notification: every 33 ms, background, 84 us;
+    notification = Notification: every 33 ms, background, 86 us;
     /// Downlink.
-    telemetry = Telemetry: every 20 ms, background, 85 us;
+    telemetry = Telemetry: every 20 ms, background, 88 us;
 }
