@@ -13,7 +13,7 @@
 //! | [`mode_machine`] | steps with any commands, gestures, frames, alerts | a kill disarms in its step, phases change by the table, order does not matter |
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
-//! | [`receiver_bytes`] | a radio receiver at a UART | frames mean the same when sent again, every byte is accounted for |
+//! | [`receiver_bytes`] | a radio receiver or a configurator at a UART | frames mean the same when sent again, every byte is accounted for |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
 //! | [`whole_stack`] | edits of all that a flying vehicle is given | every invariant that an open loop can keep |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |

@@ -1,14 +1,19 @@
-//! Serial receivers: bytes at a UART.
+//! Serial receivers and configurators: bytes at a UART.
 
+use stampfly_link::msp::MspDecoder;
 use stampfly_link::serial::crsf::{CrsfDecoder, CrsfFrame};
 use stampfly_link::serial::ibus::{IbusDecoder, IbusFrame};
 use stampfly_link::serial::sbus::{SbusDecoder, SbusFrame};
 use stampfly_types::{Duration, Instant};
 
-/// Bytes on the wire to all three decoders. A frame means the same when it is sent again, and no byte is lost count of.
+/// Longest frame of MSP, bytes.
+const MSP: usize = 64;
+
+/// Bytes on the wire to all four decoders. A frame means the same when it is sent again, and no byte is lost count of.
 pub fn receiver_bytes(data: &[u8]) {
     let (mut sbus, mut crsf, mut ibus) = (SbusDecoder::new(), CrsfDecoder::new(), IbusDecoder::new());
-    let [mut in_sbus, mut in_crsf, mut in_ibus] = [0; 3];
+    let mut msp = MspDecoder::<MSP>::new();
+    let [mut in_sbus, mut in_crsf, mut in_ibus, mut in_msp] = [0; 4];
     let mut now = Instant::ZERO;
     for byte in data {
         // Now and then a pause, as the bytes will have it.
@@ -20,6 +25,13 @@ pub fn receiver_bytes(data: &[u8]) {
         if let Some(frame) = ibus.feed(*byte) {
             assert_eq!(IbusFrame::decode(&frame.to_bytes()), Ok(frame));
             in_ibus += IbusFrame::LENGTH;
+        }
+        if let Some(frame) = msp.feed(*byte) {
+            let mut written = [0; MSP];
+            let length = frame.write(&mut written).expect("it came from no more");
+            let mut again = MspDecoder::<MSP>::new();
+            assert!(written[..length].iter().any(|byte| again.feed(*byte) == Some(frame)));
+            in_msp += length;
         }
         if let Some(frame) = crsf.feed(*byte) {
             let mut again = [0; CrsfFrame::LONGEST];
@@ -33,9 +45,13 @@ pub fn receiver_bytes(data: &[u8]) {
             in_crsf += length;
         }
     }
-    let known =
-        [in_sbus + sbus.discarded() as usize, in_crsf + crsf.discarded() as usize, in_ibus + ibus.discarded() as usize];
-    for (known, longest) in known.into_iter().zip([SbusFrame::LENGTH, CrsfFrame::LONGEST, IbusFrame::LENGTH]) {
+    for (in_frames, discarded, longest) in [
+        (in_sbus, sbus.discarded(), SbusFrame::LENGTH),
+        (in_crsf, crsf.discarded(), CrsfFrame::LONGEST),
+        (in_ibus, ibus.discarded(), IbusFrame::LENGTH),
+        (in_msp, msp.discarded(), MSP + 1),
+    ] {
+        let known = in_frames + discarded as usize;
         assert!(known <= data.len() && data.len() - known < longest, "bytes that are nowhere");
     }
 }

@@ -12,6 +12,7 @@
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
+//! | [`msp`] | frames of the MultiWii serial protocol, versions 1 and 2 | for configurators and telemetry scripts |
 //! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
@@ -43,8 +44,10 @@ extern crate std;
 
 mod address;
 mod control;
+mod crc8;
 pub mod datagram;
 pub mod json;
+pub mod msp;
 mod pairing;
 mod peers;
 mod sequence;
