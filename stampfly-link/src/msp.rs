@@ -26,7 +26,7 @@ const JUMBO: u8 = 255;
 /// Of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
-    /// Ids up to 254.
+    /// Ids of eight bits. 255 says that a frame of version 2 is in the payload; it is not taken out here.
     One,
     /// Ids of 16 bits, and a flag.
     Two,
@@ -118,7 +118,7 @@ impl<'f> MspFrame<'f> {
         let long = u16::try_from(self.payload.len()).ok()?;
         let ([l0, l1], [i0, i1]) = (long.to_le_bytes(), self.id.to_le_bytes());
         let (mark, header): (u8, &[u8]) = match (self.version, u8::try_from(self.id)) {
-            (Version::One, Ok(JUMBO) | Err(_)) => return None,
+            (Version::One, Err(_)) => return None,
             (Version::One, Ok(id)) if long >= u16::from(JUMBO) => (VERSION_1, &[JUMBO, id, l0, l1]),
             (Version::One, Ok(id)) => (VERSION_1, &[l0, id]),
             (Version::Two, _) => (VERSION_2, &[self.flag, i0, i1, l0, l1]),
@@ -278,12 +278,18 @@ mod tests {
     }
 
     #[test]
-    fn version_1_has_no_id_above_254() {
-        let frame = MspFrame { version: Version::One, ..MspFrame::request(255) };
-        assert_eq!(frame.write(&mut [0; 64]), None);
+    fn version_1_has_ids_of_eight_bits() {
         assert_eq!(MspFrame { version: Version::One, ..MspFrame::request(256) }.write(&mut [0; 64]), None);
         assert_eq!(MspFrame::request(254).version, Version::One);
         assert_eq!(MspFrame::request(255).version, Version::Two);
+        let carrier = written(MspFrame { version: Version::One, ..MspFrame::request(255) });
+        assert_eq!(heard(&mut MspDecoder::<64>::new(), &carrier), [(255, Vec::new())]);
+    }
+
+    #[test]
+    fn a_short_payload_may_come_as_jumbo() {
+        let bytes = [b'$', b'M', b'>', 255, 108, 1, 0, 7, 255 ^ 108 ^ 1 ^ 7];
+        assert_eq!(heard(&mut MspDecoder::<64>::new(), &bytes), [(108, std::vec![7])]);
     }
 
     #[test]
@@ -343,7 +349,7 @@ mod tests {
             let mut decoder = MspDecoder::<64>::new();
             let mut in_frames = 0;
             for byte in &bytes {
-                in_frames += decoder.feed(*byte).map_or(0, |frame| written(frame).len());
+                in_frames += if decoder.feed(*byte).is_some() { decoder.taken } else { 0 };
             }
             prop_assert_eq!(in_frames + decoder.discarded() as usize + decoder.length - decoder.taken, bytes.len());
         }
