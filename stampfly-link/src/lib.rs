@@ -46,6 +46,7 @@ mod address;
 mod control;
 mod crc8;
 pub mod datagram;
+mod heard;
 pub mod json;
 pub mod msp;
 mod pairing;

@@ -14,6 +14,7 @@
 //! MultiWii and Betaflight wikis.
 
 use crate::crc8::crc8;
+use crate::heard::Heard;
 
 const START: u8 = b'$';
 const VERSION_1: u8 = b'M';
@@ -89,16 +90,65 @@ pub struct MspFrame<'f> {
 }
 
 /// What the bytes so far are.
-enum Parsed<'f> {
+enum Parsed {
     /// The beginning of a frame, or nothing yet.
     Incomplete,
     /// No frame begins here.
     Nothing,
-    /// One that is so long.
-    Frame(MspFrame<'f>, usize),
+    /// A sound frame.
+    Frame(Outline),
 }
 
-impl<'f> MspFrame<'f> {
+/// A frame but for its payload.
+#[derive(Clone, Copy)]
+struct Outline {
+    version: Version,
+    direction: Direction,
+    flag: u8,
+    id: u16,
+    /// Where its payload begins and ends. A byte follows.
+    payload: (usize, usize),
+}
+
+impl Outline {
+    const fn size(&self) -> usize {
+        self.payload.1 + 1
+    }
+
+    fn frame<'f>(&self, bytes: &'f [u8]) -> Option<MspFrame<'f>> {
+        let Self { version, direction, flag, id, payload: (start, end) } = *self;
+        Some(MspFrame { version, direction, flag, id, payload: bytes.get(start..end)? })
+    }
+
+    /// Reads the frame that begins at the first byte.
+    fn parse(bytes: &[u8]) -> Parsed {
+        let version = match bytes {
+            [] | [START] => return Parsed::Incomplete,
+            [START, VERSION_1, ..] => Version::One,
+            [START, VERSION_2, ..] => Version::Two,
+            _ => return Parsed::Nothing,
+        };
+        let Some(direction) = bytes.get(2) else { return Parsed::Incomplete };
+        let Some(direction) = Direction::of(*direction) else { return Parsed::Nothing };
+        let rest = bytes.get(PREAMBLE..).unwrap_or_default();
+        let (flag, id, length, header) = match (version, rest) {
+            (Version::One, [JUMBO, id, l0, l1, ..]) => (0, u16::from(*id), u16::from_le_bytes([*l0, *l1]), 4),
+            (Version::One, [length, id, ..]) if *length != JUMBO => (0, u16::from(*id), u16::from(*length), 2),
+            (Version::Two, [flag, i0, i1, l0, l1, ..]) => {
+                (*flag, u16::from_le_bytes([*i0, *i1]), u16::from_le_bytes([*l0, *l1]), 5)
+            }
+            _ => return Parsed::Incomplete,
+        };
+        let end = header + usize::from(length);
+        let (Some(checked), Some(last)) = (rest.get(..end), rest.get(end)) else { return Parsed::Incomplete };
+        if version.check(checked) != *last {
+            return Parsed::Nothing;
+        }
+        Parsed::Frame(Self { version, direction, flag, id, payload: (PREAMBLE + header, PREAMBLE + end) })
+    }
+}
+
+impl MspFrame<'_> {
     /// A question without a payload, in version 1 where its id allows that.
     #[must_use]
     pub const fn request(id: u16) -> MspFrame<'static> {
@@ -133,34 +183,6 @@ impl<'f> MspFrame<'f> {
         *last = self.version.check(checked);
         Some(size)
     }
-
-    /// Reads the frame that begins at the first byte.
-    fn parse(bytes: &'f [u8]) -> Parsed<'f> {
-        let version = match bytes {
-            [] | [START] => return Parsed::Incomplete,
-            [START, VERSION_1, ..] => Version::One,
-            [START, VERSION_2, ..] => Version::Two,
-            _ => return Parsed::Nothing,
-        };
-        let Some(direction) = bytes.get(2) else { return Parsed::Incomplete };
-        let Some(direction) = Direction::of(*direction) else { return Parsed::Nothing };
-        let rest = bytes.get(PREAMBLE..).unwrap_or_default();
-        let (flag, id, length, header) = match (version, rest) {
-            (Version::One, [JUMBO, id, l0, l1, ..]) => (0, u16::from(*id), u16::from_le_bytes([*l0, *l1]), 4),
-            (Version::One, [length, id, ..]) if *length != JUMBO => (0, u16::from(*id), u16::from(*length), 2),
-            (Version::Two, [flag, i0, i1, l0, l1, ..]) => {
-                (*flag, u16::from_le_bytes([*i0, *i1]), u16::from_le_bytes([*l0, *l1]), 5)
-            }
-            _ => return Parsed::Incomplete,
-        };
-        let end = header + usize::from(length);
-        let (Some(checked), Some(last)) = (rest.get(..end), rest.get(end)) else { return Parsed::Incomplete };
-        if version.check(checked) != *last {
-            return Parsed::Nothing;
-        }
-        let payload = checked.get(header..).unwrap_or_default();
-        Parsed::Frame(Self { version, direction, flag, id, payload }, PREAMBLE + end + 1)
-    }
 }
 
 impl Version {
@@ -179,11 +201,9 @@ impl Version {
 /// have come to show that it is not. For a byte that shows it, the work grows with `N`²; for others it does not depend on `N`.
 #[derive(Clone, Debug)]
 pub struct MspDecoder<const N: usize> {
-    bytes: [u8; N],
-    length: usize,
+    heard: Heard<N>,
     /// Bytes of the frame that was returned last.
     taken: usize,
-    discarded: u32,
 }
 
 impl<const N: usize> Default for MspDecoder<N> {
@@ -196,63 +216,46 @@ impl<const N: usize> MspDecoder<N> {
     /// Has heard nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bytes: [0; N], length: 0, taken: 0, discarded: 0 }
+        Self { heard: Heard::new(), taken: 0 }
     }
 
     /// Bytes so far that were part of no frame. Wraps around.
     #[must_use]
     pub const fn discarded(&self) -> u32 {
-        self.discarded
+        self.heard.discarded()
     }
 
     /// Nothing has come for a while: what seemed to begin a frame is none. A configurator that gets no answer asks again, and its question would be
     /// taken for the rest of the one that was cut short.
     pub fn silence(&mut self) {
-        let taken = core::mem::take(&mut self.taken);
-        self.drop_oldest(taken);
-        self.discarded = self.discarded.wrapping_add(self.length as u32);
-        self.length = 0;
+        self.heard.take(core::mem::take(&mut self.taken));
+        self.heard.discard(self.heard.len());
     }
 
     /// Takes a byte. Returns the frame that it ends.
     pub fn feed(&mut self, byte: u8) -> Option<MspFrame<'_>> {
-        let taken = core::mem::take(&mut self.taken);
-        self.drop_oldest(taken);
-        if self.length == N {
+        self.heard.take(core::mem::take(&mut self.taken));
+        if self.heard.is_full() {
             // Longer than there is room for.
             self.discard();
         }
-        let place = self.bytes.get_mut(self.length)?;
-        *place = byte;
-        self.length += 1;
+        self.heard.push(byte);
         loop {
-            match MspFrame::parse(self.bytes.get(..self.length).unwrap_or_default()) {
+            match Outline::parse(self.heard.bytes()) {
                 Parsed::Incomplete => return None,
                 Parsed::Nothing => self.discard(),
-                Parsed::Frame(_, size) => {
-                    self.taken = size;
-                    return match MspFrame::parse(self.bytes.get(..size)?) {
-                        Parsed::Frame(frame, _) => Some(frame),
-                        Parsed::Incomplete | Parsed::Nothing => None,
-                    };
+                Parsed::Frame(outline) => {
+                    self.taken = outline.size();
+                    return outline.frame(self.heard.bytes());
                 }
             }
         }
     }
 
-    /// Drops the oldest byte, and all up to where a frame may begin.
+    /// Gives up the oldest byte, and all up to where a frame may begin.
     fn discard(&mut self) {
-        let later = self.bytes.get(..self.length).unwrap_or_default().iter().skip(1).position(|byte| *byte == START);
-        let count = later.map_or(self.length, |later| later + 1);
-        self.drop_oldest(count);
-        self.discarded = self.discarded.wrapping_add(count as u32);
-    }
-
-    fn drop_oldest(&mut self, count: usize) {
-        if count > 0 {
-            self.bytes.copy_within(count.min(self.length)..self.length, 0);
-            self.length = self.length.saturating_sub(count);
-        }
+        let later = self.heard.bytes().iter().skip(1).position(|byte| *byte == START);
+        self.heard.discard(later.map_or(self.heard.len(), |later| later + 1));
     }
 }
 
@@ -351,7 +354,7 @@ mod tests {
             for byte in &bytes {
                 in_frames += if decoder.feed(*byte).is_some() { decoder.taken } else { 0 };
             }
-            prop_assert_eq!(in_frames + decoder.discarded() as usize + decoder.length - decoder.taken, bytes.len());
+            prop_assert_eq!(in_frames + decoder.discarded() as usize + decoder.heard.len() - decoder.taken, bytes.len());
         }
     }
 }

@@ -21,6 +21,7 @@
 
 use super::Channels;
 use crate::crc8::crc8;
+use crate::heard::Heard;
 use stampfly_types::math;
 
 /// The longest frame.
@@ -88,6 +89,11 @@ fn size(bytes: &[u8]) -> Option<usize> {
     (2..=LONGEST - AFTER_LENGTH).contains(&length).then_some(length + AFTER_LENGTH)
 }
 
+/// Is the CRC of a frame right, which is all of `bytes`?
+fn is_sound(bytes: &[u8]) -> bool {
+    matches!(bytes, [_, _, checked @ .., last] if crc8(checked) == *last)
+}
+
 impl<'f> CrsfFrame<'f> {
     /// The longest frame on the wire.
     pub const LONGEST: usize = LONGEST;
@@ -98,15 +104,14 @@ impl<'f> CrsfFrame<'f> {
     /// When it is none.
     pub fn decode(bytes: &'f [u8]) -> Result<Self, CrsfError> {
         let size = size(bytes).ok_or(CrsfError::Length)?;
-        let [address, _, kind, payload @ .., last] = bytes else { return Err(CrsfError::Size) };
-        if bytes.len() != size {
-            return Err(CrsfError::Size);
-        }
-        let checked = bytes.get(AFTER_LENGTH..size - 1).unwrap_or_default();
-        if crc8(checked) != *last {
-            return Err(CrsfError::Crc);
-        }
-        Ok(Self { address: *address, kind: *kind, payload })
+        let (Some(frame), true) = (Self::of(bytes), bytes.len() == size) else { return Err(CrsfError::Size) };
+        if is_sound(bytes) { Ok(frame) } else { Err(CrsfError::Crc) }
+    }
+
+    /// Takes it apart, sound or not.
+    const fn of(bytes: &'f [u8]) -> Option<Self> {
+        let [address, _, kind, payload @ .., _] = bytes else { return None };
+        Some(Self { address: *address, kind: *kind, payload })
     }
 
     /// Writes it as it travels and returns how long it is; `None` when `out` is too short, or no frame can be so long.
@@ -304,11 +309,9 @@ impl Attitude {
 /// ```
 #[derive(Clone, Debug)]
 pub struct CrsfDecoder {
-    bytes: [u8; LONGEST],
-    length: usize,
+    heard: Heard<LONGEST>,
     /// Bytes of the frame that was returned last.
     taken: usize,
-    discarded: u32,
 }
 
 impl Default for CrsfDecoder {
@@ -321,47 +324,35 @@ impl CrsfDecoder {
     /// Has heard nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bytes: [0; LONGEST], length: 0, taken: 0, discarded: 0 }
+        Self { heard: Heard::new(), taken: 0 }
     }
 
     /// Bytes so far that were part of no frame. Wraps around.
     #[must_use]
     pub const fn discarded(&self) -> u32 {
-        self.discarded
+        self.heard.discarded()
     }
 
     /// Takes a byte. Returns the frame that it ends.
     ///
     /// After garbage that looked like a beginning, a frame that came whole meanwhile is found with the next byte, wherever it lies.
     pub fn feed(&mut self, byte: u8) -> Option<CrsfFrame<'_>> {
-        let taken = core::mem::take(&mut self.taken);
-        self.drop_oldest(taken);
-        let place = self.bytes.get_mut(self.length)?;
-        *place = byte;
-        self.length += 1;
+        self.heard.take(core::mem::take(&mut self.taken));
+        self.heard.push(byte);
         // Each turn drops a byte or ends this.
-        while let Some(heard) = self.bytes.get(..self.length).filter(|heard| heard.len() > 1) {
-            match size(heard).map(|size| heard.get(..size).map(CrsfFrame::decode)) {
+        while self.heard.len() > 1 {
+            let bytes = self.heard.bytes();
+            match size(bytes).map(|size| bytes.get(..size).map(is_sound)) {
                 // It may still become one.
                 Some(None) => return None,
-                Some(Some(Ok(frame))) => {
-                    self.taken = frame.payload.len() + OVERHEAD;
-                    return self.bytes.get(..self.taken).and_then(|bytes| CrsfFrame::decode(bytes).ok());
+                Some(Some(true)) => {
+                    self.taken = size(bytes)?;
+                    return self.heard.bytes().get(..self.taken).and_then(CrsfFrame::of);
                 }
-                None | Some(Some(Err(_))) => {
-                    self.drop_oldest(1);
-                    self.discarded = self.discarded.wrapping_add(1);
-                }
+                None | Some(Some(false)) => self.heard.discard(1),
             }
         }
         None
-    }
-
-    fn drop_oldest(&mut self, count: usize) {
-        if count > 0 {
-            self.bytes.copy_within(count.min(self.length)..self.length, 0);
-            self.length = self.length.saturating_sub(count);
-        }
     }
 }
 
@@ -437,7 +428,7 @@ mod tests {
         fn every_byte_is_in_a_frame_or_discarded_or_waits(bytes in prop::collection::vec(prop_oneof![Just(2), Just(4), any::<u8>()], 0..300)) {
             let mut decoder = CrsfDecoder::new();
             let frames: usize = heard(&mut decoder, &bytes).iter().map(|(_, _, payload)| payload.len() + OVERHEAD).sum();
-            prop_assert_eq!(frames + decoder.discarded() as usize + decoder.length - decoder.taken, bytes.len());
+            prop_assert_eq!(frames + decoder.discarded() as usize + decoder.heard.len() - decoder.taken, bytes.len());
         }
     }
 }

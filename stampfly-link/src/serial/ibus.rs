@@ -10,6 +10,8 @@
 //! Not for the older IA6, whose frames begin with 0x55. The format is not published; frames of two receivers from public tests are among the
 //! vectors it is tested with.
 
+use crate::heard::Heard;
+
 const LENGTH: usize = 32;
 const SERVOS: u8 = 0x40;
 const LOW: u16 = 0x0FFF;
@@ -136,9 +138,7 @@ impl IbusFrame {
 /// ```
 #[derive(Clone, Debug)]
 pub struct IbusDecoder {
-    bytes: [u8; LENGTH],
-    length: usize,
-    discarded: u32,
+    heard: Heard<LENGTH>,
 }
 
 impl Default for IbusDecoder {
@@ -151,40 +151,29 @@ impl IbusDecoder {
     /// Has heard nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bytes: [0; LENGTH], length: 0, discarded: 0 }
+        Self { heard: Heard::new() }
     }
 
     /// Bytes so far that were part of no frame. Wraps around.
     #[must_use]
     pub const fn discarded(&self) -> u32 {
-        self.discarded
+        self.heard.discarded()
     }
 
     /// Takes a byte. Returns the frame that it ends.
     pub fn feed(&mut self, byte: u8) -> Option<IbusFrame> {
-        let place = self.bytes.get_mut(self.length)?;
-        *place = byte;
-        self.length += 1;
-        if self.length == LENGTH {
-            if let Ok(frame) = IbusFrame::decode(&self.bytes) {
-                self.length = 0;
+        self.heard.push(byte);
+        if let Some(whole) = self.heard.whole() {
+            if let Ok(frame) = IbusFrame::decode(whole) {
+                self.heard.take(LENGTH);
                 return Some(frame);
             }
-            self.discard(1);
+            self.heard.discard(1);
         }
-        let heard = self.bytes.get(..self.length).unwrap_or_default();
-        let first = (0..heard.len()).find(|first| heard.get(*first..).is_some_and(begins));
-        self.discard(first.unwrap_or(self.length));
+        let bytes = self.heard.bytes();
+        let first = (0..bytes.len()).find(|first| bytes.get(*first..).is_some_and(begins));
+        self.heard.discard(first.unwrap_or(self.heard.len()));
         None
-    }
-
-    /// Drops the oldest bytes.
-    fn discard(&mut self, count: usize) {
-        if count > 0 {
-            self.bytes.copy_within(count.min(self.length)..self.length, 0);
-            self.length = self.length.saturating_sub(count);
-            self.discarded = self.discarded.wrapping_add(count as u32);
-        }
     }
 }
 
@@ -217,7 +206,7 @@ mod tests {
         fn every_byte_is_in_a_frame_or_discarded_or_waits(bytes in prop::collection::vec(prop_oneof![Just(0x20), Just(0x40), any::<u8>()], 0..300)) {
             let mut decoder = IbusDecoder::new();
             let frames = heard(&mut decoder, &bytes).len();
-            prop_assert_eq!(frames * LENGTH + decoder.discarded() as usize + decoder.length, bytes.len());
+            prop_assert_eq!(frames * LENGTH + decoder.discarded() as usize + decoder.heard.len(), bytes.len());
         }
     }
 }

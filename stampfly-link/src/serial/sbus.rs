@@ -11,6 +11,7 @@
 //! the format; this is what receivers send, as many flight controllers read it.
 
 use super::Channels;
+use crate::heard::Heard;
 use stampfly_types::{Duration, Instant};
 
 const START: u8 = 0x0F;
@@ -141,10 +142,8 @@ impl SbusFrame {
 /// ```
 #[derive(Clone, Debug)]
 pub struct SbusDecoder {
-    bytes: [u8; SbusFrame::LENGTH],
-    length: usize,
+    heard: Heard<{ SbusFrame::LENGTH }>,
     newest: Instant,
-    discarded: u32,
 }
 
 impl Default for SbusDecoder {
@@ -157,44 +156,33 @@ impl SbusDecoder {
     /// Has heard nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bytes: [0; SbusFrame::LENGTH], length: 0, newest: Instant::ZERO, discarded: 0 }
+        Self { heard: Heard::new(), newest: Instant::ZERO }
     }
 
     /// Bytes so far that were part of no frame. Wraps around.
     #[must_use]
     pub const fn discarded(&self) -> u32 {
-        self.discarded
+        self.heard.discarded()
     }
 
     /// Takes a byte that came at `at`. Returns the frame that it ends.
     pub fn feed(&mut self, at: Instant, byte: u8) -> Option<SbusFrame> {
         if at.since(self.newest) >= PAUSE {
-            self.discard(self.length);
+            self.heard.discard(self.heard.len());
         }
         self.newest = at;
-        let place = self.bytes.get_mut(self.length)?;
-        *place = byte;
-        self.length += 1;
-        if self.length == SbusFrame::LENGTH {
-            if let Ok(frame) = SbusFrame::decode(&self.bytes) {
-                self.length = 0;
+        self.heard.push(byte);
+        if let Some(whole) = self.heard.whole() {
+            if let Ok(frame) = SbusFrame::decode(whole) {
+                self.heard.take(SbusFrame::LENGTH);
                 return Some(frame);
             }
-            self.discard(1);
+            self.heard.discard(1);
         }
         // What does not begin as a frame is none.
-        let begins = self.bytes.iter().take(self.length).position(|byte| *byte == START);
-        self.discard(begins.unwrap_or(self.length));
+        let begins = self.heard.bytes().iter().position(|byte| *byte == START);
+        self.heard.discard(begins.unwrap_or(self.heard.len()));
         None
-    }
-
-    /// Drops the oldest bytes.
-    fn discard(&mut self, count: usize) {
-        if count > 0 {
-            self.bytes.copy_within(count.min(self.length)..self.length, 0);
-            self.length = self.length.saturating_sub(count);
-            self.discarded = self.discarded.wrapping_add(count as u32);
-        }
     }
 }
 
@@ -252,7 +240,7 @@ mod tests {
         fn every_byte_is_in_a_frame_or_discarded_or_waits(bytes in prop::collection::vec(prop_oneof![Just(START), Just(0), any::<u8>()], 0..300)) {
             let (mut decoder, mut at) = (SbusDecoder::new(), Instant::ZERO);
             let frames = heard(&mut decoder, &mut at, 0, &bytes).len();
-            let known = frames * SbusFrame::LENGTH + decoder.discarded() as usize + decoder.length;
+            let known = frames * SbusFrame::LENGTH + decoder.discarded() as usize + decoder.heard.len();
             prop_assert_eq!(known, bytes.len());
         }
     }

@@ -1,0 +1,60 @@
+//! The bytes that a decoder has heard and not made a frame of yet: oldest first, counted when they are given up.
+
+/// Room for `N` bytes, which is the longest frame.
+#[derive(Clone, Debug)]
+pub struct Heard<const N: usize> {
+    bytes: [u8; N],
+    length: usize,
+    discarded: u32,
+}
+
+impl<const N: usize> Heard<N> {
+    pub const fn new() -> Self {
+        Self { bytes: [0; N], length: 0, discarded: 0 }
+    }
+
+    /// Bytes so far that were part of no frame. Wraps around.
+    pub const fn discarded(&self) -> u32 {
+        self.discarded
+    }
+
+    pub const fn is_full(&self) -> bool {
+        self.length == N
+    }
+
+    pub const fn len(&self) -> usize {
+        self.length
+    }
+
+    /// All of them.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    /// All of them, when they fill the room.
+    pub const fn whole(&self) -> Option<&[u8; N]> {
+        if self.is_full() { Some(&self.bytes) } else { None }
+    }
+
+    /// One more. Nothing happens when there is no room.
+    pub fn push(&mut self, byte: u8) {
+        if let Some(place) = self.bytes.get_mut(self.length) {
+            *place = byte;
+            self.length += 1;
+        }
+    }
+
+    /// The oldest were a frame.
+    pub fn take(&mut self, count: usize) {
+        if count > 0 {
+            self.bytes.copy_within(count.min(self.length)..self.length, 0);
+            self.length = self.length.saturating_sub(count);
+        }
+    }
+
+    /// The oldest are part of no frame.
+    pub fn discard(&mut self, count: usize) {
+        self.take(count);
+        self.discarded = self.discarded.wrapping_add(count as u32);
+    }
+}
