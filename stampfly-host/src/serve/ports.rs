@@ -121,6 +121,11 @@ impl OpenPorts {
         &self.places
     }
 
+    /// Asks for the end of the flight.
+    pub fn close(&self) {
+        self.events.close();
+    }
+
     /// Connects a page at this port: what it says is put in by [`page_heard`](Self::page_heard), answers go to `deliver`.
     #[must_use]
     pub fn with_page(mut self, port: usize, deliver: impl Fn(SocketAddr, &[u8]) + Send + Sync + 'static) -> Self {
@@ -176,5 +181,9 @@ impl Ports for OpenPorts {
         } else {
             self.connections.send(to, bytes);
         }
+    }
+
+    fn are_closed(&self) -> bool {
+        !self.events.are_open()
     }
 }

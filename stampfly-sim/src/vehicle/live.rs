@@ -86,6 +86,9 @@ pub trait Ports: fmt::Debug + Send + Sync {
 
     /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes nothing is closed.
     fn send(&self, to: &Client, bytes: &[u8]);
+
+    /// Has somebody asked for the end of the flight?
+    fn are_closed(&self) -> bool;
 }
 
 /// Where other programs reach a vehicle, and for how long.
@@ -101,13 +104,16 @@ pub struct Live {
     pub speed: f32,
 }
 
+/// Where answers go.
+pub type Put<'p> = &'p mut dyn FnMut(&Client, &[u8]);
+
 /// What a vehicle makes of what it hears.
 pub trait Link {
     /// Something was heard.
-    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>);
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>);
 
-    /// A tick has run: hands the answers to `put`.
-    fn answer(&mut self, now: Instant, tick: u32, put: &mut dyn FnMut(&Client, &[u8]));
+    /// A tick has run.
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>);
 }
 
 impl Live {
@@ -120,10 +126,13 @@ impl Live {
             let due = period.as_micros() * (begun + u64::from(tick));
             clock.sleep_until(Instant::from_micros(due)).await;
             until = next_tick(until, std::time::Instant::now(), real_period);
-            self.ports.receive(until, &mut |from, heard| link.hear(clock.now(), from, heard));
+            let ports = &self.ports;
+            ports.receive(until, &mut |from, heard| {
+                link.hear(clock.now(), from, heard, &mut |to, bytes| ports.send(to, bytes));
+            });
             std::thread::sleep(until.saturating_duration_since(std::time::Instant::now()));
             clock.sleep_until(clock.now() + AFTER_TICK).await;
-            link.answer(clock.now(), tick, &mut |to, bytes| self.ports.send(to, bytes));
+            link.answer(clock.now(), tick, &mut |to, bytes| ports.send(to, bytes));
         }
     }
 }

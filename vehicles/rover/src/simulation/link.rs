@@ -3,7 +3,7 @@
 use crate::com::{Body, SUBSCRIPTION};
 use crate::topics::LinkEnds;
 use stampfly_link::Peers;
-use stampfly_sim::vehicle::{Client, Heard, Link};
+use stampfly_sim::vehicle::{Client, Heard, Link, Put};
 use stampfly_types::Instant;
 
 /// Every n-th tick subscribers are told the state of the parameters even when it has not changed.
@@ -24,7 +24,7 @@ pub(super) struct UdpLink<'b> {
 }
 
 impl Link for UdpLink<'_> {
-    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>) {
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, _: Put<'_>) {
         let Heard::Bytes(bytes) = heard else { return };
         let Some((peer, body)) = self.peers.hear(now, from, bytes) else { return };
         match body {
@@ -41,7 +41,7 @@ impl Link for UdpLink<'_> {
         }
     }
 
-    fn answer(&mut self, now: Instant, tick: u32, put: &mut dyn FnMut(&Client, &[u8])) {
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
         let Self { peers, ends } = self;
         let wants = |peer: &Peer, n: u32| {
             peer.subscription.is_some_and(|(every, until)| now <= until && every > 0 && n.is_multiple_of(every))
