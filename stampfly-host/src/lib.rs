@@ -9,6 +9,7 @@
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
+//! | [`ground`] | a page that shows vehicles as they fly, and asks them for things |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
 //! The executor is `stampfly-sim`'s, replay and golden flight are `stampfly-flight`'s; everything here is generic over
@@ -18,6 +19,7 @@ pub mod campaign;
 pub mod doctor;
 pub mod flown;
 pub mod golden;
+pub mod ground;
 pub mod hil;
 mod inputs;
 mod page;

@@ -1,0 +1,21 @@
+//! A ground station: one page in a browser that shows vehicles as they fly, and asks them for things.
+//!
+//! A program that flies vehicles makes a [`Hub`] of their [`VehicleCard`]s, gives each flight the hub's witness, and carries
+//! out what [`Hub::asks`] gives. Everything is offline: the page is one file without a reference to the outside.
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`ask`] | what can be asked, as JSON |
+//! | [`VehicleCard`] | what a page is told of a vehicle once |
+//! | [`Hub`] | what flights and sockets share |
+//!
+//! The protocol is described in `docs/ground-station.md`.
+
+pub mod ask;
+mod card;
+mod hub;
+mod newest;
+
+pub use card::{Calibration, CalibrationKind, ParameterCard, TopicCard, VehicleCard};
+pub use hub::{Client, Connection, Event, Hub, NotAsked, Reply};
+pub use newest::Watch;
