@@ -82,7 +82,8 @@ pub enum Ask {
     },
     /// Stops the motor test.
     MotorStop {},
-    /// A fault, as [`Fault::parse`](stampfly_sim::fault::Fault::parse) reads it; without a moment it begins now.
+    /// A fault, as [`Fault::parse`](stampfly_sim::fault::Fault::parse) reads it. One whose time is past (`@0`) begins at once, and
+    /// lasts its seconds from then.
     Fault {
         /// The text.
         text: String,
@@ -296,7 +297,7 @@ impl fmt::Display for AskError {
 impl std::error::Error for AskError {}
 
 /// The object in this text.
-pub(super) fn object(text: &str) -> Result<Map<String, Value>, AskError> {
+fn object(text: &str) -> Result<Map<String, Value>, AskError> {
     if text.len() > LONGEST {
         return Err(AskError::TooLong);
     }
@@ -312,7 +313,7 @@ impl Asked {
         Self::from_object(object(text)?)
     }
 
-    pub(super) fn from_object(mut object: Map<String, Value>) -> Result<Self, AskError> {
+    fn from_object(mut object: Map<String, Value>) -> Result<Self, AskError> {
         let mut number = |name, highest| {
             let number = object.remove(name).and_then(|value| value.as_u64()).filter(|number| *number <= highest);
             number.ok_or(AskError::Missing(name))
@@ -339,6 +340,66 @@ pub const NAMES: &[&str] = &[
     "fault_clear",
     "speed",
 ];
+
+/// Any text of a client: an ask of a vehicle, or of the server itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Incoming {
+    /// From now on, send the state of these topics this often: `{"id":1,"do":"subscribe","topics":["estimate_state"],"rate":50}`.
+    Subscribe {
+        /// The answer carries it.
+        id: u32,
+        /// Names of topics, at most [`MOST_TOPICS`].
+        topics: Vec<String>,
+        /// Texts a second, 1 to [`FASTEST_RATE`].
+        rate: u8,
+    },
+    /// Of a vehicle.
+    Ask(Asked),
+}
+
+/// Most topics a client can subscribe to.
+pub const MOST_TOPICS: usize = 64;
+/// Most state texts a second.
+pub const FASTEST_RATE: u8 = 50;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Subscribe {
+    #[allow(dead_code, reason = "known, and read before")]
+    r#do: String,
+    topics: Vec<String>,
+    rate: u8,
+}
+
+impl Incoming {
+    /// Reads a text.
+    ///
+    /// # Errors
+    /// The id, as far as there is one, and why it is refused.
+    pub fn parse(text: &str) -> Result<Self, (u32, AskError)> {
+        let mut object = object(text).map_err(|error| (0, error))?;
+        let id = object.get("id").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());
+        if object.get("do").is_some_and(|name| name == "subscribe") {
+            let id = id.ok_or((0, AskError::Missing("id")))?;
+            object.remove("id");
+            return Self::subscribe(id, object).map_err(|error| (id, error));
+        }
+        Asked::from_object(object).map(Self::Ask).map_err(|error| (id.unwrap_or_default(), error))
+    }
+
+    fn subscribe(id: u32, object: Map<String, Value>) -> Result<Self, AskError> {
+        let Subscribe { topics, rate, .. } =
+            serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
+        if topics.len() > MOST_TOPICS {
+            return Err(AskError::OutOfRange("topics"));
+        }
+        topics.iter().try_for_each(|topic| printable(topic))?;
+        if !(1..=FASTEST_RATE).contains(&rate) {
+            return Err(AskError::OutOfRange("rate"));
+        }
+        Ok(Self::Subscribe { id, topics, rate })
+    }
+}
 
 impl Ask {
     /// Its name: the value of `do`.
@@ -495,6 +556,20 @@ mod tests {
         assert_eq!(Asked::parse("[]"), Err(AskError::NotJson));
         assert_eq!(Asked::parse(r#"{"vehicle":0,"do":"param_save"}"#), Err(AskError::Missing("id")));
         assert_eq!(Asked::parse(r#"{"vehicle":-1,"id":1,"do":"param_save"}"#), Err(AskError::Missing("vehicle")));
+    }
+
+    #[test]
+    fn a_subscription_is_for_the_server() {
+        let parse = |text: &str| Incoming::parse(text);
+        let good = parse(r#"{"id":3,"do":"subscribe","topics":["truth"],"rate":20}"#);
+        assert_eq!(good, Ok(Incoming::Subscribe { id: 3, topics: vec!["truth".into()], rate: 20 }));
+        for (rate, name) in [("0", "rate"), ("51", "rate")] {
+            let refused = parse(&format!(r#"{{"id":3,"do":"subscribe","topics":[],"rate":{rate}}}"#));
+            assert_eq!(refused, Err((3, AskError::OutOfRange(name))));
+        }
+        let vehicle = parse(r#"{"id":3,"do":"subscribe","topics":[],"rate":1,"vehicle":0}"#);
+        assert!(matches!(vehicle, Err((3, AskError::Unknown(_)))), "{vehicle:?}");
+        assert_eq!(parse(r#"{"id":9,"do":"param_save"}"#), Err((9, AskError::Missing("vehicle"))));
     }
 
     #[test]

@@ -8,14 +8,22 @@
 //! | [`ask`] | what can be asked, as JSON |
 //! | [`VehicleCard`] | what a page is told of a vehicle once |
 //! | [`Hub`] | what flights and sockets share |
+//! | [`Server`] | serves the page and its WebSockets |
+//! | [`http`] | the little HTTP that needs, over bytes |
 //!
 //! The protocol is described in `docs/ground-station.md`.
 
 pub mod ask;
 mod card;
+mod client;
+mod feed;
+pub mod http;
 mod hub;
 mod newest;
+mod page;
+mod server;
 
 pub use card::{Calibration, CalibrationKind, ParameterCard, TopicCard, VehicleCard};
 pub use hub::{Client, Connection, Event, Hub, NotAsked, Reply};
 pub use newest::Watch;
+pub use server::{Limits, Server};
