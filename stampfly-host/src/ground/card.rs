@@ -33,6 +33,9 @@ pub struct VehicleCard {
     pub calibrations: Vec<Calibration>,
     /// What to show, and what it looks like.
     pub page: &'static Page,
+    /// Where the origin of its world lies among the others', north and east, m: vehicles that were simulated apart are not
+    /// drawn on top of each other.
+    pub place: [f32; 2],
     /// How many of the topics are on the bus.
     pub(super) on_bus: usize,
 }
@@ -128,6 +131,7 @@ impl VehicleCard {
             offers: Vec::new(),
             calibrations: Vec::new(),
             page: const { &V::PAGE },
+            place: [0.0; 2],
             on_bus: <<V::Runnables as Schedule>::Topics as TopicTable>::TOPICS.len(),
         }
     }
@@ -150,7 +154,7 @@ impl VehicleCard {
             "topics": self.topics.iter().map(TopicCard::json).collect::<Vec<_>>(),
             "parameters": self.parameters.iter().map(ParameterCard::json).collect::<Vec<_>>(),
             "faults": self.faults.iter().map(fault).collect::<Vec<_>>(),
-            "missions": self.missions, "offers": self.offers,
+            "place": self.place, "missions": self.missions, "offers": self.offers,
             "calibrations": self.calibrations.iter()
                 .map(|calibration| json!({ "kind": calibration.kind.name(), "line": calibration.line }))
                 .collect::<Vec<_>>(),

@@ -3,7 +3,26 @@
 use std::hash::{BuildHasher, RandomState};
 
 /// The script, in the order its parts need each other.
-const SCRIPT: &str = concat!("'use strict';\n(() => {\n", include_str!("page.js"), "})();\n",);
+const SCRIPT: &str = concat!(
+    "'use strict';\n(() => {\n",
+    include_str!("../page/base.js"),
+    include_str!("../page/canvas.js"),
+    include_str!("../page/scene.js"),
+    include_str!("page/vehicle.js"),
+    include_str!("page/link.js"),
+    include_str!("page/ulog.js"),
+    include_str!("page/view.js"),
+    include_str!("page/horizon.js"),
+    include_str!("page/strips.js"),
+    include_str!("page/status.js"),
+    include_str!("page/controls.js"),
+    include_str!("page/sticks.js"),
+    include_str!("page/panels.js"),
+    include_str!("page/calibration.js"),
+    include_str!("page/playback.js"),
+    include_str!("page/main.js"),
+    "})();\n",
+);
 
 /// The page, and the header lines that say what it may do: its own style and script, and talk to this server.
 ///
@@ -12,9 +31,9 @@ pub(super) fn html() -> (String, String) {
     let random = || RandomState::new().hash_one(0_u8);
     let nonce = format!("{:016x}{:016x}", random(), random());
     let html = format!(
-        include_str!("page.html"),
+        include_str!("page/page.html"),
         nonce = nonce,
-        style = [include_str!("../page/page.css"), include_str!("page.css")].concat(),
+        style = [include_str!("../page/page.css"), include_str!("page/page.css")].concat(),
         script = SCRIPT
     );
     let policy = format!(
