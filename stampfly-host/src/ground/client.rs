@@ -4,9 +4,9 @@
 //! left out and counted until it does, and asks are still heard. Answers and events are not left out: a client that takes
 //! nothing for too long is cut off.
 
-use super::ask::{AskError, Asked, Incoming};
+use super::ask::{AskError, Asked, Incoming, Reply};
 use super::feed::Feed;
-use super::hub::{Connection, Hub, Reply};
+use super::hub::{Connection, Hub};
 use super::server::Limits;
 use std::io::{self, ErrorKind};
 use std::net::TcpStream;

@@ -21,7 +21,7 @@
 //! assert!(page.take()[0].contains("on its way"));
 //! ```
 
-use super::ask::{Ask, Asked, Guided};
+use super::ask::{Ask, Asked, Guided, Reply, reply_text};
 use super::card::{self, TopicCard, VehicleCard};
 use super::newest::{Newest, Watch};
 use serde::Serialize;
@@ -45,26 +45,17 @@ const EVENTS: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Client(u64);
 
-/// What a vehicle answers.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Reply {
-    /// For people.
-    pub text: String,
-    /// The number that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<f64>,
-}
-
-impl Reply {
-    /// Only words.
-    pub fn text(text: impl Into<String>) -> Self {
-        Self { text: text.into(), value: None }
+impl Client {
+    /// Its number: no two clients of a hub have the same.
+    #[must_use]
+    pub const fn number(self) -> u64 {
+        self.0
     }
 
-    /// A number.
+    /// The client of this number.
     #[must_use]
-    pub fn value(value: f64) -> Self {
-        Self { text: value.to_string(), value: Some(value) }
+    pub const fn of(number: u64) -> Self {
+        Self(number)
     }
 }
 
@@ -199,16 +190,14 @@ impl Hub {
     }
 
     pub(super) fn answer_to(&self, client: Client, vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) {
-        let (ok, reply) = match answer {
-            Ok(reply) => (true, reply),
-            Err(text) => (false, Reply::text(text)),
-        };
-        let text = json!({ "reply": {
-            "vehicle": vehicle, "id": id, "ok": ok, "text": reply.text, "value": reply.value,
-        }});
+        self.send(client, &reply_text(vehicle, id, answer));
+    }
+
+    /// Sends a client a text that is JSON already, such as [`Asked::answered`]. One that has gone gets nothing.
+    pub fn send(&self, client: Client, text: &str) {
         let clients = lock(&self.clients);
         if let Some(outbox) = clients.iter().find(|outbox| outbox.client == client) {
-            outbox.put(text.to_string().into());
+            outbox.put(text.into());
         }
     }
 

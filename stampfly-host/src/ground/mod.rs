@@ -13,7 +13,6 @@
 //!
 //! The protocol is described in `docs/ground-station.md`.
 
-pub mod ask;
 mod card;
 mod client;
 mod feed;
@@ -24,6 +23,9 @@ mod page;
 mod server;
 
 pub use card::{Calibration, CalibrationKind, ParameterCard, TopicCard, VehicleCard};
-pub use hub::{Client, Connection, Event, Hub, NotAsked, Reply};
+pub use hub::{Client, Connection, Event, Hub, NotAsked};
 pub use newest::Watch;
 pub use server::{Limits, Server};
+/// What can be asked.
+pub use stampfly_sim::ask;
+pub use stampfly_sim::ask::Reply;

@@ -1,6 +1,7 @@
 //! What a page or another program asks of a vehicle: JSON as it arrives, and what it means.
 //!
-//! Use it on both sides of the hub: the server makes an [`Asked`] of every text that arrives, the vehicle carries it out.
+//! Use it on both sides: a server makes an [`Asked`] of every text that arrives, the vehicle carries it out and answers with a
+//! [`Reply`].
 //! Nothing here knows a particular vehicle. [`Guided`] becomes the [`GuidedCommand`] and [`Sticks`] the [`PilotInput`] that
 //! every radio link of the project ends in.
 //!
@@ -8,21 +9,21 @@
 //! belongs to it:
 //!
 //! ```
-//! use stampfly_host::ground::ask::{Ask, Asked, Guided};
+//! use stampfly_sim::ask::{Ask, Asked, Guided};
 //!
 //! let text = r#"{"vehicle":0,"id":17,"do":"guided","kind":"take_off","height":0.5}"#;
 //! let asked = Asked::parse(text)?;
 //! assert_eq!((asked.vehicle, asked.id), (0, 17));
 //! assert_eq!(asked.ask, Ask::Guided(Guided::TakeOff { height: 0.5 }));
 //! assert!(Asked::parse(r#"{"vehicle":0,"id":17,"do":"guided","kind":"take_off","height":"much"}"#).is_err());
-//! # Ok::<(), stampfly_host::ground::ask::AskError>(())
+//! # Ok::<(), stampfly_sim::ask::AskError>(())
 //! ```
 //!
 //! Strict on purpose: a field that is not known, a number that is not finite or out of its range, a text that is too long
 //! refuse the whole ask.
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use stampfly_types::Vec3;
 use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
 use std::fmt;
@@ -82,7 +83,7 @@ pub enum Ask {
     },
     /// Stops the motor test.
     MotorStop {},
-    /// A fault, as [`Fault::parse`](stampfly_sim::fault::Fault::parse) reads it. One whose time is past (`@0`) begins at once, and
+    /// A fault, as [`Fault::parse`](crate::fault::Fault::parse) reads it. One whose time is past (`@0`) begins at once, and
     /// lasts its seconds from then.
     Fault {
         /// The text.
@@ -233,7 +234,7 @@ impl From<Sticks> for PilotInput {
 }
 
 /// ```
-/// use stampfly_host::ground::ask::Guided;
+/// use stampfly_sim::ask::Guided;
 /// use stampfly_types::messages::{GuidedCommand, GuidedKind};
 ///
 /// let command = GuidedCommand::from(Guided::TakeOff { height: 0.5 });
@@ -341,6 +342,46 @@ pub const NAMES: &[&str] = &[
     "speed",
 ];
 
+/// What a vehicle answers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reply {
+    /// For people.
+    pub text: String,
+    /// The number that was asked for.
+    pub value: Option<f64>,
+}
+
+impl Reply {
+    /// Only words.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self { text: text.into(), value: None }
+    }
+
+    /// A number.
+    #[must_use]
+    pub fn value(value: f64) -> Self {
+        Self { text: value.to_string(), value: Some(value) }
+    }
+}
+
+impl Asked {
+    /// The text that answers it: `{"reply":{"vehicle":0,"id":17,"ok":true,"text":"armed","value":null}}`.
+    #[must_use]
+    pub fn answered(&self, answer: Result<Reply, String>) -> String {
+        reply_text(Some(self.vehicle), self.id, answer)
+    }
+}
+
+/// The text that answers what came with this id. Without a vehicle, the server answers.
+#[must_use]
+pub fn reply_text(vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) -> String {
+    let (ok, Reply { text, value }) = match answer {
+        Ok(reply) => (true, reply),
+        Err(text) => (false, Reply::text(text)),
+    };
+    json!({ "reply": { "vehicle": vehicle, "id": id, "ok": ok, "text": text, "value": value } }).to_string()
+}
+
 /// Any text of a client: an ask of a vehicle, or of the server itself.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Incoming {
@@ -405,7 +446,7 @@ impl Ask {
     /// Its name: the value of `do`.
     ///
     /// ```
-    /// use stampfly_host::ground::ask::Ask;
+    /// use stampfly_sim::ask::Ask;
     /// assert_eq!(Ask::ParamSave {}.name(), "param_save");
     /// ```
     #[must_use]
