@@ -10,6 +10,7 @@
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
 //! | [`serve`] | the ports at which other programs fly a simulated vehicle |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
+//! | [`ground`] | a page that shows vehicles as they fly, and asks them for things |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
 //! The executor is `stampfly-sim`'s, replay and golden flight are `stampfly-flight`'s; everything here is generic over
@@ -19,6 +20,7 @@ pub mod campaign;
 pub mod doctor;
 pub mod flown;
 pub mod golden;
+pub mod ground;
 pub mod hil;
 mod inputs;
 mod page;

@@ -159,6 +159,11 @@ impl Vehicle for StampFly {
         parameters::set(config, name, value).map(drop).map_err(|error| format!("{name}: {error}"))
     }
 
+    fn parameter_range(name: &str) -> Option<[f64; 2]> {
+        let info = crate::parameters::all().find(|info| info.name == name)?;
+        Some([info.min, info.max].map(f64::from))
+    }
+
     fn golden() -> Option<Golden<Self>> {
         Some(Golden {
             setup: Setup { mission: Mission::parse(GOLDEN).ok()?, ..Setup::reference(1) },

@@ -326,6 +326,11 @@ pub trait Vehicle: 'static {
         value: ParameterValue,
     ) -> Result<(), SetupError>;
 
+    /// Lowest and highest value of a parameter, for people who choose one; `None` where the vehicle does not say.
+    fn parameter_range(_name: &str) -> Option<[f64; 2]> {
+        None
+    }
+
     /// Its golden flight, if it has one.
     fn golden() -> Option<Golden<Self>> {
         None
