@@ -9,6 +9,9 @@
 //! | [`ControlPacket`] | sticks and switches, 14 bytes | in a transmitter, a simulator, a test |
 //! | [`PairingPacket`] | the vehicle's call for a transmitter, 11 bytes | in a transmitter |
 //! | [`TelemetryPacket`] | what the vehicle tells its pilot, 22 bytes | at either end |
+//! | [`JoystickPacket`] | sticks and buttons of M5Stack's own transmitter, 25 bytes | in a vehicle flown with it |
+//! | [`Slots`] | up to ten transmitters on one channel | in a transmitter |
+//! | [`BroadcastPacket`] | what a vehicle tells every program on its network | for displays and plots |
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
@@ -43,10 +46,13 @@
 extern crate std;
 
 mod address;
+mod broadcast;
 mod control;
 mod crc8;
 pub mod datagram;
+mod fields;
 mod heard;
+mod joystick;
 pub mod json;
 pub mod msp;
 mod pairing;
@@ -54,15 +60,19 @@ mod peers;
 mod sequence;
 pub mod serial;
 mod session;
+mod slots;
 mod telemetry;
 
 pub use address::Address;
+pub use broadcast::{BroadcastError, BroadcastPacket, BroadcastSensors};
 pub use control::{ControlError, ControlPacket};
 pub use datagram::{Datagram, DatagramError};
+pub use joystick::{ArmButton, JoystickError, JoystickPacket};
 pub use pairing::{PairingError, PairingPacket};
 pub use peers::{MAX_DATAGRAM, Peers};
 pub use sequence::SequenceFilter;
 pub use session::{Counters, PairingRefused, Rejected, Session};
+pub use slots::{SlotBeacon, SlotTurn, Slots};
 pub use telemetry::{LinkState, TelemetryError, TelemetryPacket};
 
 /// Messages, time, vectors: the words that signatures here are written in.
