@@ -22,6 +22,10 @@ impl Fields<'_> {
         u16::from_le_bytes(self.array())
     }
 
+    pub fn i16(&mut self) -> i16 {
+        i16::from_le_bytes(self.array())
+    }
+
     pub fn u32(&mut self) -> u32 {
         u32::from_le_bytes(self.array())
     }
@@ -50,6 +54,10 @@ impl Places<'_> {
         self.put(value.to_le_bytes());
     }
 
+    pub fn i16(&mut self, value: i16) {
+        self.put(value.to_le_bytes());
+    }
+
     pub fn u32(&mut self, value: u32) {
         self.put(value.to_le_bytes());
     }
@@ -61,4 +69,9 @@ impl Places<'_> {
     pub fn vector(&mut self, vector: &Vec3) {
         vector.iter().for_each(|value| self.f32(*value));
     }
+}
+
+/// The check of packets that have one: all bytes before it, combined by exclusive or.
+pub fn exclusive_or(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |all, byte| all ^ byte)
 }

@@ -12,6 +12,7 @@
 //! | [`JoystickPacket`] | sticks and buttons of M5Stack's own transmitter, 25 bytes | in a vehicle flown with it |
 //! | [`Slots`] | up to ten transmitters on one channel | in a transmitter |
 //! | [`BroadcastPacket`] | what a vehicle tells every program on its network | for displays and plots |
+//! | [`stream`] | every control cycle of a flight | for a log on a PC |
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
@@ -61,6 +62,7 @@ mod sequence;
 pub mod serial;
 mod session;
 mod slots;
+pub mod stream;
 mod telemetry;
 
 pub use address::Address;
