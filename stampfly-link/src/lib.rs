@@ -13,6 +13,7 @@
 //! | [`Slots`] | up to ten transmitters on one channel | in a transmitter |
 //! | [`BroadcastPacket`] | what a vehicle tells every program on its network | for displays and plots |
 //! | [`stream`] | every control cycle of a flight | for a log on a PC |
+//! | [`tello`] | commands in words, and their answers | for programs written for a Tello |
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
@@ -64,6 +65,7 @@ mod session;
 mod slots;
 pub mod stream;
 mod telemetry;
+pub mod tello;
 
 pub use address::Address;
 pub use broadcast::{BroadcastError, BroadcastPacket, BroadcastSensors};
