@@ -18,6 +18,7 @@
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
 //! | [`msp`] | frames of the MultiWii serial protocol, versions 1 and 2 | for configurators and telemetry scripts |
+//! | [`hisky`] | a receiver of a small transmitter that hops | beside an nRF24L01 |
 //! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
@@ -54,6 +55,7 @@ mod crc8;
 pub mod datagram;
 mod fields;
 mod heard;
+pub mod hisky;
 mod joystick;
 pub mod json;
 pub mod msp;
