@@ -44,17 +44,12 @@ impl Channels {
 
     /// Least significant bit first.
     pub(super) fn unpack(bytes: &[u8; Self::PACKED]) -> Self {
-        let (mut bits, mut count, mut rest) = (0_u32, 0, bytes.iter());
-        Self([(); 16].map(|()| {
-            while count < BITS {
-                // 16 channels are as many bits as there are bytes for.
-                bits |= u32::from(rest.next().copied().unwrap_or(0)) << count;
-                count += 8;
-            }
-            let channel = (bits & MASK) as u16;
-            bits >>= BITS;
-            count -= BITS;
-            channel
+        // A channel is in two or three bytes, and after the last one there is none.
+        let byte = |place| bytes.get(place).map_or(0, |byte| u32::from(*byte));
+        Self(core::array::from_fn(|channel| {
+            let (place, shift) = (channel * BITS as usize / 8, channel * BITS as usize % 8);
+            let bits = byte(place) | byte(place + 1) << 8 | byte(place + 2) << 16;
+            (bits >> shift & MASK) as u16
         }))
     }
 
