@@ -50,13 +50,13 @@ impl<const N: usize> Heard<N> {
 
     /// As many as there is room for, of `count` at most, off the front of `bytes`.
     pub fn fill(&mut self, count: usize, bytes: &mut &[u8]) {
-        let room = N - self.length.min(N);
-        let (taken, rest) = bytes.split_at(count.min(room).min(bytes.len()));
-        if let Some(places) = self.bytes.get_mut(self.length..self.length + taken.len()) {
-            places.copy_from_slice(taken);
-            self.length += taken.len();
+        let room = self.bytes.get_mut(self.length..).unwrap_or_default();
+        let count = count.min(room.len()).min(bytes.len());
+        if let (Some(places), Some((taken, rest))) = (room.get_mut(..count), bytes.split_at_checked(count)) {
+            places.iter_mut().zip(taken).for_each(|(place, byte)| *place = *byte);
+            self.length += count;
+            *bytes = rest;
         }
-        *bytes = rest;
     }
 
     /// So many bytes that begin nothing, while there are no others.
@@ -67,8 +67,9 @@ impl<const N: usize> Heard<N> {
     /// The oldest were a frame.
     pub fn take(&mut self, count: usize) {
         // Nothing is left most of the time.
-        if self.length > count && count > 0 {
-            self.bytes.copy_within(count..self.length.min(N), 0);
+        let end = self.length.min(N);
+        if count < end {
+            self.bytes.copy_within(count..end, 0);
         }
         self.length = self.length.saturating_sub(count);
     }

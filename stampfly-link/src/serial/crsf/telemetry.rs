@@ -149,7 +149,7 @@ impl FlightModeName {
     fn of(name: &[u8]) -> Option<Self> {
         let mut bytes = [0; NAME + 1];
         let places = bytes.get_mut(..NAME)?.get_mut(..name.len())?;
-        places.copy_from_slice(name);
+        places.iter_mut().zip(name).for_each(|(place, byte)| *place = *byte);
         name.iter().all(|byte| *byte == b' ' || byte.is_ascii_graphic()).then_some(Self { bytes })
     }
 
