@@ -18,14 +18,17 @@ impl<const N: usize> Heard<N> {
         self.discarded
     }
 
+    #[inline]
     pub const fn is_full(&self) -> bool {
         self.length == N
     }
 
+    #[inline]
     pub const fn len(&self) -> usize {
         self.length
     }
 
+    #[inline]
     pub const fn is_empty(&self) -> bool {
         self.length == 0
     }
@@ -41,6 +44,7 @@ impl<const N: usize> Heard<N> {
     }
 
     /// One more, and whether they fill the room now. Nothing happens when there is no room.
+    #[inline]
     pub fn push(&mut self, byte: u8) -> bool {
         let Some(place) = self.bytes.get_mut(self.length) else { return true };
         *place = byte;
@@ -53,13 +57,14 @@ impl<const N: usize> Heard<N> {
         let room = self.bytes.get_mut(self.length..).unwrap_or_default();
         let count = count.min(room.len()).min(bytes.len());
         if let (Some(places), Some((taken, rest))) = (room.get_mut(..count), bytes.split_at_checked(count)) {
-            places.iter_mut().zip(taken).for_each(|(place, byte)| *place = *byte);
+            places.copy_from_slice(taken);
             self.length += count;
             *bytes = rest;
         }
     }
 
     /// So many bytes that begin nothing, while there are no others.
+    #[inline]
     pub const fn skip(&mut self, count: usize) {
         self.discarded = self.discarded.wrapping_add(count as u32);
     }

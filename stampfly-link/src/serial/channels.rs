@@ -44,13 +44,16 @@ impl Channels {
 
     /// Least significant bit first.
     pub(super) fn unpack(bytes: &[u8; Self::PACKED]) -> Self {
-        // A channel is in two or three bytes, and after the last one there is none.
-        let byte = |place| bytes.get(place).map_or(0, |byte| u32::from(*byte));
-        Self(core::array::from_fn(|channel| {
-            let (place, shift) = (channel * BITS as usize / 8, channel * BITS as usize % 8);
-            let bits = byte(place) | byte(place + 1) << 8 | byte(place + 2) << 16;
-            (bits >> shift & MASK) as u16
-        }))
+        // Five channels are in eight bytes, wherever they begin in the first one.
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v] = *bytes;
+        let first = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
+        let second = u64::from_le_bytes([g, h, i, j, k, l, m, n]) >> 7;
+        let third = u64::from_le_bytes([n, o, p, q, r, s, t, u]) >> 6;
+        let last = u64::from(u16::from_le_bytes([u, v]) >> 5);
+        let channel = |bits: u64, place: u32| (bits >> (place * BITS)) as u16 & MASK as u16;
+        let five = |bits| [0, 1, 2, 3, 4].map(|place| channel(bits, place));
+        let ([a, b, c, d, e], [f, g, h, i, j], [k, l, m, n, o]) = (five(first), five(second), five(third));
+        Self([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, channel(last, 0)])
     }
 
     /// Positions beyond 2047 are 2047.

@@ -211,6 +211,7 @@ impl SbusDecoder {
     }
 
     /// A pause ends what was not whole.
+    #[inline]
     fn pause(&mut self, at: Instant) {
         if at.since(self.newest) >= PAUSE {
             self.heard.discard(self.heard.len());
@@ -219,6 +220,7 @@ impl SbusDecoder {
     }
 
     /// The frame that all bytes are, or those from the next one on that may begin one.
+    #[inline]
     fn ended(&mut self) -> Option<SbusFrame> {
         if let Some(Ok(frame)) = self.heard.whole().map(SbusFrame::decode) {
             self.heard.take(SbusFrame::LENGTH);
