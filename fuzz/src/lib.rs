@@ -7,16 +7,19 @@
 //! | target | bytes from | checked besides panics |
 //! |---|---|---|
 //! | [`console_line`] | the serial port | lines stay short and printable, parameters in range, an armed vehicle does nothing |
+//! | [`data_stream`] | UDP, and a vehicle that fills packets | packets mean the same when sent again, are never too long, hold what was taken |
 //! | [`estimator_stream`] | a stream of samples and times | numbers stay finite, the covariance symmetric with a diagonal of variances |
 //! | [`failsafe_stream`] | a stream of inertial samples | a sensor that gives nothing usable is found in time, an alert stays while the vehicle is armed |
 //! | [`ground_ask`] | a WebSocket of the ground station | numbers are finite and in range, what is accepted is accepted again |
 //! | [`ground_http`] | a browser | a head has an end, a refusal stays one, what follows a head means nothing |
 //! | [`hil_frames`] | a line with a computer that simulates the world | the vehicle answers whole frames alone, its clock is its own, entries end |
+//! | [`hisky`] | a receiver's radio | the armed keep their transmitter, the radio is told channels that it has |
 //! | [`mode_machine`] | steps with any commands, gestures, frames, alerts | a kill disarms in its step, phases change by the table, order does not matter |
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
 //! | [`receiver_bytes`] | a radio receiver or a configurator at a UART | frames mean the same when sent again, every byte is accounted for |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
+//! | [`tello_text`] | any program on the network | what is accepted is within limits, every answer is text that can be read |
 //! | [`whole_stack`] | edits of all that a flying vehicle is given | every invariant that an open loop can keep |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |
 //!
@@ -29,12 +32,15 @@ mod estimator;
 mod failsafe;
 mod flash;
 mod hil;
+mod hisky;
 mod http;
 mod machine;
 mod packets;
 mod parameters;
 mod receivers;
 mod stack;
+mod stream;
+mod tello;
 mod ulog_file;
 
 pub use console::console_line;
@@ -42,12 +48,15 @@ pub use datagrams::rover_datagrams;
 pub use estimator::estimator_stream;
 pub use failsafe::failsafe_stream;
 pub use hil::hil_frames;
+pub use hisky::hisky;
 pub use http::{ground_ask, ground_http};
 pub use machine::mode_machine;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;
 pub use receivers::receiver_bytes;
 pub use stack::whole_stack;
+pub use stream::data_stream;
+pub use tello::tello_text;
 pub use ulog_file::ulog;
 
 use stampfly_types::Vec3;

@@ -1,7 +1,10 @@
 //! Frames from the radio.
 
 use crate::Input;
-use stampfly_link::{Address, ControlPacket, PairingPacket, Session, TelemetryPacket};
+use stampfly_link::{
+    Address, BroadcastPacket, ControlPacket, JoystickPacket, PairingPacket, Session, SlotBeacon, SlotTurn, Slots,
+    TelemetryPacket,
+};
 use stampfly_types::{Duration, Instant};
 
 const VEHICLE: Address = Address([0x34, 0x85, 0x18, 0xAB, 0xCD, 0xEF]);
@@ -105,5 +108,44 @@ fn decode(bytes: &[u8]) {
     }
     if let Ok(packet) = TelemetryPacket::decode(bytes) {
         assert_eq!(packet.to_bytes(), bytes);
+    }
+    // Random bytes hardly ever have the right sum: with it put right, too.
+    let mut repaired = bytes.to_vec();
+    repair(&mut repaired);
+    for bytes in [bytes, &repaired] {
+        if let Ok(packet) = JoystickPacket::decode(bytes, VEHICLE) {
+            assert_eq!(packet.to_bytes(), bytes);
+            let input = packet.pilot_input(false);
+            assert_eq!(input, input.cleaned());
+        }
+    }
+    if let Ok(packet) = BroadcastPacket::decode(bytes) {
+        let mut again = [0; BroadcastPacket::LONGEST];
+        assert_eq!(packet.write(&mut again), Some(bytes.len()));
+        // Two places that are not looked at.
+        let looked_at = |place: &usize| !(101..104).contains(place) && !(122..124).contains(place);
+        assert!((0..bytes.len()).filter(looked_at).all(|place| again[place] == bytes[place]));
+    }
+    slots(bytes);
+}
+
+/// The bytes as a life among other transmitters: the first one is the slot, the others are the time until the next beacon. Packets leave,
+/// whatever is heard.
+fn slots(bytes: &[u8]) {
+    let mut input = Input(bytes);
+    let Some(mut slots) = Slots::new(input.byte(), Instant::ZERO) else { return };
+    let (mut now, mut sent) = (Instant::ZERO, Instant::ZERO);
+    while !input.is_empty() {
+        let next = now + Duration::from_micros(u64::from(input.byte()) * 150);
+        while slots.due() < next {
+            let due = slots.due();
+            if slots.poll(due) == Some(SlotTurn::Packet) {
+                assert!(due.since(sent) <= Duration::from_millis(40), "silenced");
+                sent = due;
+            }
+        }
+        now = next;
+        slots.heard(now, SlotBeacon);
+        assert!(!slots.is_lost(now) && slots.due() <= now + Duration::from_millis(40));
     }
 }

@@ -54,4 +54,33 @@ pub fn receiver_bytes(data: &[u8]) {
         assert!(known <= data.len() && data.len() - known < longest, "bytes that are nowhere");
     }
     assert!(msp.discarded() as usize <= data.len());
+    by_buffer(data);
+}
+
+/// The same frames, when the bytes come in buffers. The first byte says how long these are.
+fn by_buffer(data: &[u8]) {
+    let size = 1 + usize::from(data.first().copied().unwrap_or(0));
+    let (mut sbus, mut crsf) = (SbusDecoder::new(), CrsfDecoder::new());
+    let (mut one_sbus, mut one_crsf) = (SbusDecoder::new(), CrsfDecoder::new());
+    let (mut sticks, mut frames) = (Vec::new(), Vec::new());
+    for buffer in data.chunks(size) {
+        let (mut for_sbus, mut for_crsf) = (buffer, buffer);
+        while let Some(frame) = sbus.read(Instant::ZERO, &mut for_sbus) {
+            sticks.push(frame);
+        }
+        while let Some(frame) = crsf.read(&mut for_crsf) {
+            frames.push((frame.kind, frame.payload.to_vec()));
+        }
+        assert!(for_sbus.is_empty() && for_crsf.is_empty());
+    }
+    let expected: Vec<_> = data.iter().filter_map(|byte| one_sbus.feed(Instant::ZERO, *byte)).collect();
+    assert_eq!((sticks, sbus.discarded()), (expected, one_sbus.discarded()));
+    let mut expected = Vec::new();
+    for byte in data {
+        expected.extend(one_crsf.feed(*byte).map(|frame| (frame.kind, frame.payload.to_vec())));
+    }
+    while let Some(frame) = one_crsf.read(&mut &[][..]) {
+        expected.push((frame.kind, frame.payload.to_vec()));
+    }
+    assert_eq!((frames, crsf.discarded()), (expected, one_crsf.discarded()));
 }

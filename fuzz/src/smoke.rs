@@ -1,8 +1,8 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
 use crate::{
-    console_line, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, mode_machine,
-    parameter_image, radio_packets, receiver_bytes, rover_datagrams, ulog, whole_stack,
+    console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, hisky,
+    mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, tello_text, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -129,6 +129,21 @@ fn packets() {
 #[test]
 fn receivers() {
     smoke("receiver_bytes", receiver_bytes, 200_000);
+}
+
+#[test]
+fn small_transmitters() {
+    smoke("hisky", hisky, 200_000);
+}
+
+#[test]
+fn words() {
+    smoke("tello_text", tello_text, 200_000);
+}
+
+#[test]
+fn log_stream() {
+    smoke("data_stream", data_stream, 200_000);
 }
 
 #[test]

@@ -18,12 +18,19 @@ impl<const N: usize> Heard<N> {
         self.discarded
     }
 
+    #[inline]
     pub const fn is_full(&self) -> bool {
         self.length == N
     }
 
+    #[inline]
     pub const fn len(&self) -> usize {
         self.length
+    }
+
+    #[inline]
+    pub const fn is_empty(&self) -> bool {
+        self.length == 0
     }
 
     /// All of them.
@@ -36,25 +43,45 @@ impl<const N: usize> Heard<N> {
         if self.is_full() { Some(&self.bytes) } else { None }
     }
 
-    /// One more. Nothing happens when there is no room.
-    pub fn push(&mut self, byte: u8) {
-        if let Some(place) = self.bytes.get_mut(self.length) {
-            *place = byte;
-            self.length += 1;
+    /// One more, and whether they fill the room now. Nothing happens when there is no room.
+    #[inline]
+    pub fn push(&mut self, byte: u8) -> bool {
+        let Some(place) = self.bytes.get_mut(self.length) else { return true };
+        *place = byte;
+        self.length += 1;
+        self.length == N
+    }
+
+    /// As many as there is room for, of `count` at most, off the front of `bytes`.
+    pub fn fill(&mut self, count: usize, bytes: &mut &[u8]) {
+        let room = self.bytes.get_mut(self.length..).unwrap_or_default();
+        let count = count.min(room.len()).min(bytes.len());
+        if let (Some(places), Some((taken, rest))) = (room.get_mut(..count), bytes.split_at_checked(count)) {
+            places.copy_from_slice(taken);
+            self.length += count;
+            *bytes = rest;
         }
+    }
+
+    /// So many bytes that begin nothing, while there are no others.
+    #[inline]
+    pub const fn skip(&mut self, count: usize) {
+        self.discarded = self.discarded.wrapping_add(count as u32);
     }
 
     /// The oldest were a frame.
     pub fn take(&mut self, count: usize) {
-        if count > 0 {
-            self.bytes.copy_within(count.min(self.length)..self.length, 0);
-            self.length = self.length.saturating_sub(count);
+        // Nothing is left most of the time.
+        let end = self.length.min(N);
+        if count < end {
+            self.bytes.copy_within(count..end, 0);
         }
+        self.length = self.length.saturating_sub(count);
     }
 
     /// The oldest are part of no frame.
     pub fn discard(&mut self, count: usize) {
         self.take(count);
-        self.discarded = self.discarded.wrapping_add(count as u32);
+        self.skip(count);
     }
 }

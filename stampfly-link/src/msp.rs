@@ -91,8 +91,8 @@ pub struct MspFrame<'f> {
 
 /// What the bytes so far are.
 enum Parsed {
-    /// The beginning of a frame, or nothing yet.
-    Incomplete,
+    /// The beginning of a frame, or nothing yet. With fewer bytes than these there is nothing more to be said.
+    Incomplete(usize),
     /// No frame begins here.
     Nothing,
     /// A sound frame.
@@ -123,12 +123,13 @@ impl Outline {
     /// Reads the frame that begins at the first byte.
     fn parse(bytes: &[u8]) -> Parsed {
         let version = match bytes {
-            [] | [START] => return Parsed::Incomplete,
+            [] => return Parsed::Incomplete(1),
+            [START] => return Parsed::Incomplete(2),
             [START, VERSION_1, ..] => Version::One,
             [START, VERSION_2, ..] => Version::Two,
             _ => return Parsed::Nothing,
         };
-        let Some(direction) = bytes.get(2) else { return Parsed::Incomplete };
+        let Some(direction) = bytes.get(2) else { return Parsed::Incomplete(PREAMBLE) };
         let Some(direction) = Direction::of(*direction) else { return Parsed::Nothing };
         let rest = bytes.get(PREAMBLE..).unwrap_or_default();
         let (flag, id, length, header) = match (version, rest) {
@@ -137,10 +138,14 @@ impl Outline {
             (Version::Two, [flag, i0, i1, l0, l1, ..]) => {
                 (*flag, u16::from_le_bytes([*i0, *i1]), u16::from_le_bytes([*l0, *l1]), 5)
             }
-            _ => return Parsed::Incomplete,
+            (Version::One, [JUMBO, ..]) => return Parsed::Incomplete(PREAMBLE + 4),
+            (Version::One, _) => return Parsed::Incomplete(PREAMBLE + 2),
+            (Version::Two, _) => return Parsed::Incomplete(PREAMBLE + 5),
         };
         let end = header + usize::from(length);
-        let (Some(checked), Some(last)) = (rest.get(..end), rest.get(end)) else { return Parsed::Incomplete };
+        let (Some(checked), Some(last)) = (rest.get(..end), rest.get(end)) else {
+            return Parsed::Incomplete(PREAMBLE + end + 1);
+        };
         if version.check(checked) != *last {
             return Parsed::Nothing;
         }
@@ -202,6 +207,8 @@ impl Version {
 #[derive(Clone, Debug)]
 pub struct MspDecoder<const N: usize> {
     heard: Heard<N>,
+    /// With fewer bytes there is nothing to be found.
+    need: usize,
     /// Bytes of the frame that was returned last.
     taken: usize,
 }
@@ -216,7 +223,7 @@ impl<const N: usize> MspDecoder<N> {
     /// Has heard nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { heard: Heard::new(), taken: 0 }
+        Self { heard: Heard::new(), need: 0, taken: 0 }
     }
 
     /// Bytes so far that were part of no frame. Wraps around.
@@ -228,21 +235,38 @@ impl<const N: usize> MspDecoder<N> {
     /// Nothing has come for a while: what seemed to begin a frame is none. A configurator that gets no answer asks again, and its question would be
     /// taken for the rest of the one that was cut short.
     pub fn silence(&mut self) {
-        self.heard.take(core::mem::take(&mut self.taken));
+        self.forget();
         self.heard.discard(self.heard.len());
+        self.need = 0;
     }
 
     /// Takes a byte. Returns the frame that it ends.
+    #[inline]
     pub fn feed(&mut self, byte: u8) -> Option<MspFrame<'_>> {
-        self.heard.take(core::mem::take(&mut self.taken));
+        self.forget();
         if self.heard.is_full() {
             // Longer than there is room for.
             self.discard();
         }
         self.heard.push(byte);
+        if self.heard.len() < self.need { None } else { self.look() }
+    }
+
+    /// The frame that was returned last is not needed any more.
+    fn forget(&mut self) {
+        if self.taken > 0 {
+            self.heard.take(core::mem::take(&mut self.taken));
+            self.need = 0;
+        }
+    }
+
+    fn look(&mut self) -> Option<MspFrame<'_>> {
         loop {
             match Outline::parse(self.heard.bytes()) {
-                Parsed::Incomplete => return None,
+                Parsed::Incomplete(need) => {
+                    self.need = need;
+                    return None;
+                }
                 Parsed::Nothing => self.discard(),
                 Parsed::Frame(outline) => {
                     self.taken = outline.size();
@@ -256,6 +280,7 @@ impl<const N: usize> MspDecoder<N> {
     fn discard(&mut self) {
         let later = self.heard.bytes().iter().skip(1).position(|byte| *byte == START);
         self.heard.discard(later.map_or(self.heard.len(), |later| later + 1));
+        self.need = 0;
     }
 }
 

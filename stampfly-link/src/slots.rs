@@ -116,7 +116,8 @@ impl Slots {
         let this = self.begins(at);
         // The slot of this frame may have been used already, by what was known before.
         let next = if this.since(self.used) < FRAME / 2 { this + FRAME } else { this };
-        if self.packet <= at || next.since(self.used) <= FRAME * 2 {
+        // What is due within its slot still leaves; what was not asked for in time is over.
+        if self.packet + SLOT <= at || next.since(self.used) <= FRAME * 2 {
             self.packet = next;
         }
     }

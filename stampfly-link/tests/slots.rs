@@ -89,6 +89,23 @@ fn a_slot_that_was_missed_is_not_made_up_for() {
     assert_eq!(slots.due(), at(1_008_500));
 }
 
+/// Also those that come just when a packet is due.
+#[test]
+fn beacons_without_end_silence_nobody() {
+    for number in 1..10 {
+        let mut slots = Slots::new(number, at(0)).expect("one of ten");
+        let mut sent = vec![0];
+        for now in (0..1_000_000).step_by(500) {
+            slots.heard(at(now), SlotBeacon);
+            if slots.poll(at(now)) == Some(SlotTurn::Packet) {
+                sent.push(now);
+            }
+        }
+        let gap = sent.windows(2).map(|pair| pair[1] - pair[0]).max();
+        assert!(gap.is_some_and(|gap| gap <= 40_000), "{number}: {gap:?} µs");
+    }
+}
+
 #[test]
 fn without_a_beacon_it_goes_on_and_says_so() {
     assert_eq!(Slots::new(10, at(0)), None);

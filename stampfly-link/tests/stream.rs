@@ -1,6 +1,7 @@
 //! The data stream: bytes by hand from the tables, what does not fit, and that nothing else is taken for a packet.
 
 use proptest::prelude::*;
+use serde_json::Value;
 use stampfly_link::stream::{
     CYCLES, LONGEST, StreamBuildError, StreamBuilder, StreamCycle, StreamEntry, StreamError, StreamGains, StreamOutput,
     StreamPacket, StreamPhase, StreamRequest, StreamSink, StreamStatus,
@@ -340,4 +341,75 @@ proptest! {
         packet.entries().for_each(|entry| builder.entry(&entry).expect("they came from no more"));
         prop_assert_eq!(builder.finish().expect("whole"), bytes);
     }
+}
+
+/// Packed by another program, with the format strings of the one that reads these packets on a PC.
+#[test]
+fn packets_that_another_program_has_packed_mean_what_it_meant() {
+    let vectors: Value = serde_json::from_str(include_str!("vectors/stream.json")).expect("well-formed");
+    let numbers = |value: &Value| -> Vec<f64> {
+        value.as_array().expect("a list").iter().map(|number| number.as_f64().expect("a number")).collect()
+    };
+    let same = |numbers: &[f32], expected: &[f64], steps: f64| {
+        assert_eq!(numbers.len(), expected.len());
+        for (number, expected) in numbers.iter().zip(expected) {
+            assert!((f64::from(*number) - expected / steps).abs() < 1e-6 * expected.abs().max(1.0), "{number}");
+        }
+    };
+    let bytes = hex(&vectors["unified"]);
+    let packet = StreamPacket::decode(&bytes).expect("well-formed");
+    assert_eq!(packet.sequence, 513);
+    for (index, cycle) in packet.cycles().enumerate() {
+        let imu = numbers(&vectors["imu"][index]);
+        assert_eq!(u64::from(cycle.time), imu[0] as u64 % (1 << 32));
+        let vectors_of = [cycle.rate, cycle.force, cycle.raw_rate, cycle.raw_force];
+        same(&vectors_of.map(|vector| vector.to_array()).concat(), &imu[1..13], 1.0);
+        same(&cycle.attitude.wxyz(), &imu[13..17], 1.0);
+        same(&[cycle.rate_bias.to_array(), cycle.force_bias.to_array()].concat(), &imu[17..], 1e4);
+        let position = numbers(&vectors["posvel"][index]);
+        assert_eq!(f64::from(cycle.position_time), position[0]);
+        same(&[cycle.position.to_array(), cycle.velocity.to_array()].concat(), &position[1..], 1.0);
+        same(&cycle.wanted_rate.to_array(), &numbers(&vectors["rate_ref"][index]), 1e3);
+    }
+    let expected = vectors["entries"].as_array().expect("entries");
+    assert_eq!(packet.entries().count(), expected.len());
+    for (entry, expected) in packet.entries().zip(expected) {
+        let (id, numbers) = (expected[0].as_u64().expect("an id"), numbers(&expected[1]));
+        let floats: Vec<f32> = numbers.iter().map(|number| *number as f32).collect();
+        let four = |start: usize| [0, 1, 2, 3].map(|place| floats[start + place]);
+        let time = numbers[0] as u32;
+        let meant = match id {
+            0x42 => {
+                let [throttle, roll, pitch, yaw] = four(1);
+                StreamEntry::Pilot { time, throttle, roll, pitch, yaw }
+            }
+            0x43 => StreamEntry::Flow { time, counts: [-300, 17], surface_quality: 99 },
+            0x44 => StreamEntry::Below { time, distance: floats[1], status: 0 },
+            0x47 => StreamEntry::InFront { time, distance: floats[1], status: 255 },
+            0x45 => StreamEntry::Barometer { time, height: floats[1], pressure: floats[2] },
+            0x46 => StreamEntry::Magnetometer { time, field: Vec3::new(floats[1], floats[2], floats[3]) },
+            0x48 => StreamEntry::Wanted { time, mode: 3, angle: [0.25, -0.25], thrust: floats[5], duty: four(6) },
+            0x4A => StreamEntry::Duty(core::array::from_fn(|cycle| four(cycle * 4).map(|duty| duty / 65_535.0))),
+            0x4B => StreamEntry::Output(core::array::from_fn(|cycle| {
+                let [thrust, roll, pitch, yaw] = four(cycle * 4);
+                StreamOutput { thrust, torque: Vec3::new(roll, pitch, yaw) }
+            })),
+            _ => panic!("{id:x}"),
+        };
+        assert_eq!(entry, meant);
+    }
+    let statuses = vectors["status"].as_array().expect("statuses");
+    let [oldest, with_gains, present] =
+        [0, 1, 2].map(|version| StreamStatus::decode(&hex(&statuses[version])).expect("well-formed"));
+    assert_eq!((present.sequence, present.uptime, present.voltage, present.reset_reason), (300, 123_456, 3.75, 9));
+    let rate = core::array::from_fn(|axis| core::array::from_fn(|gain| (axis * 3 + gain + 1) as f32 / 8.0));
+    assert_eq!(present.gains, Some(StreamGains { rate, current: Some(812.5) }));
+    assert_eq!(with_gains, StreamStatus { gains: Some(StreamGains { rate, current: None }), ..present });
+    assert_eq!(oldest, StreamStatus { gains: None, ..present });
+}
+
+fn hex(value: &Value) -> Vec<u8> {
+    let digits: Vec<u8> =
+        value.as_str().expect("hex").chars().map(|digit| digit.to_digit(16).expect("a digit") as u8).collect();
+    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
 }

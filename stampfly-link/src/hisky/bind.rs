@@ -97,7 +97,7 @@ impl HiskyBinding {
         if channels.iter().any(|channel| *channel > LAST) {
             return None;
         }
-        places.copy_from_slice(channels);
+        places.iter_mut().zip(channels).for_each(|(place, channel)| *place = *channel);
         *lists += 1;
         if *lists < 3 {
             return None;

@@ -43,10 +43,11 @@ impl HiskyChannels {
         let mut packet = [0; PAYLOAD];
         let [low @ .., first, second] = &mut packet;
         let mut high = 0_u16;
-        for (place, channel) in low.iter_mut().zip(self.0).rev() {
+        for (place, channel) in low.iter_mut().zip(self.0) {
             let channel = channel.min(MAX);
             *place = channel as u8;
-            high = high << 2 | channel >> 8;
+            // The first one ends up in the lowest two bits.
+            high = high >> 2 | (channel >> 8) << 14;
         }
         [*first, *second] = high.to_le_bytes();
         packet

@@ -44,18 +44,16 @@ impl Channels {
 
     /// Least significant bit first.
     pub(super) fn unpack(bytes: &[u8; Self::PACKED]) -> Self {
-        let (mut bits, mut count, mut rest) = (0_u32, 0, bytes.iter());
-        Self([(); 16].map(|()| {
-            while count < BITS {
-                // 16 channels are as many bits as there are bytes for.
-                bits |= u32::from(rest.next().copied().unwrap_or(0)) << count;
-                count += 8;
-            }
-            let channel = (bits & MASK) as u16;
-            bits >>= BITS;
-            count -= BITS;
-            channel
-        }))
+        // Five channels are in eight bytes, wherever they begin in the first one.
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v] = *bytes;
+        let first = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
+        let second = u64::from_le_bytes([g, h, i, j, k, l, m, n]) >> 7;
+        let third = u64::from_le_bytes([n, o, p, q, r, s, t, u]) >> 6;
+        let last = u64::from(u16::from_le_bytes([u, v]) >> 5);
+        let channel = |bits: u64, place: u32| (bits >> (place * BITS)) as u16 & MASK as u16;
+        let five = |bits| [0, 1, 2, 3, 4].map(|place| channel(bits, place));
+        let ([a, b, c, d, e], [f, g, h, i, j], [k, l, m, n, o]) = (five(first), five(second), five(third));
+        Self([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, channel(last, 0)])
     }
 
     /// Positions beyond 2047 are 2047.

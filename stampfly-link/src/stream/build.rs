@@ -131,11 +131,11 @@ impl StreamBuilder {
         if let Some(count) = self.bytes.get_mut(COUNT) {
             *count = self.entries;
         }
-        let (before, rest) = self.bytes.split_at_mut(self.end);
-        if let Some(check) = rest.first_mut() {
+        let whole = self.bytes.get_mut(..=self.end).unwrap_or_default();
+        if let Some((check, before)) = whole.split_last_mut() {
             *check = exclusive_or(before);
         }
-        Ok(self.bytes.get(..=self.end).unwrap_or_default())
+        Ok(whole)
     }
 
     /// Begins the next packet: its number is one more, and it is empty.

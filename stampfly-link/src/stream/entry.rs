@@ -180,8 +180,8 @@ impl<'d> StreamEntry<'d> {
     /// Writes what follows its length; `None` when a number that travels in 16 bits is none.
     pub(super) fn write(&self, out: &mut [u8]) -> Option<()> {
         if let Self::Other { data, .. } = self {
-            out.get_mut(..data.len())?.copy_from_slice(data);
-            return Some(());
+            out.iter_mut().zip(*data).for_each(|(place, byte)| *place = *byte);
+            return (out.len() == data.len()).then_some(());
         }
         let mut places = Places(out);
         match self {

@@ -37,10 +37,12 @@ mod number;
 mod reply;
 mod state;
 mod text;
+mod words;
 
-pub use command::{TelloAxis, TelloCommand, TelloDirection, TelloError, TelloOther, TelloQuery, TelloWave};
+pub use command::{TelloCommand, TelloError};
 pub use reply::TelloReply;
 pub use state::TelloState;
+pub use words::{TelloAxis, TelloDirection, TelloOther, TelloQuery, TelloWave};
 
 /// The vehicle's port for commands, which it answers from.
 pub const COMMAND_PORT: u16 = 8889;

@@ -10,7 +10,8 @@ struct Text<'b> {
 impl Write for Text<'_> {
     fn write_str(&mut self, part: &str) -> fmt::Result {
         let end = self.length + part.len();
-        self.out.get_mut(self.length..end).ok_or(fmt::Error)?.copy_from_slice(part.as_bytes());
+        let places = self.out.get_mut(self.length..end).ok_or(fmt::Error)?;
+        places.iter_mut().zip(part.bytes()).for_each(|(place, byte)| *place = byte);
         self.length = end;
         Ok(())
     }
