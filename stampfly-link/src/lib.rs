@@ -13,6 +13,7 @@
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
 //! | [`msp`] | frames of the MultiWii serial protocol, versions 1 and 2 | for configurators and telemetry scripts |
+//! | [`secure`] | sessions with keys: sealed frames, handshake, replay protection | over a radio or a network that strangers can send on |
 //! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
@@ -51,6 +52,7 @@ pub mod json;
 pub mod msp;
 mod pairing;
 mod peers;
+pub mod secure;
 mod sequence;
 pub mod serial;
 mod session;
