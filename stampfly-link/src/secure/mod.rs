@@ -35,8 +35,9 @@
 //! | 02 ready | station | H(K, Nv ‖ Ns) | the same session; 1, 2, … | nothing |
 //!
 //! The vehicle announces at power-on, when its station has been silent for half a second, when the motors may turn from now on, and when a
-//! counter is near its end; four times a second, until a station joins. It repeats the welcome every 100 ms for a second. The first frame
-//! that the station seals in the new session ends the one before, so that control is never interrupted.
+//! counter is near its end; every 100 ms, until a station joins. The station repeats its answer every 100 ms for a second, and the
+//! vehicle its welcome every 50 ms for a second. The first frame that the station seals in the new session ends the one before, so
+//! that control is never interrupted. With 95 % of all frames lost a session comes about in some seconds.
 //!
 //! # Why a replay fails
 //!

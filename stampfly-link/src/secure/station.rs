@@ -16,6 +16,10 @@ use stampfly_types::{Duration, Instant};
 
 /// Announcements that are answered at a time. Old ones that someone repeats take places, too.
 const OFFERS: usize = 4;
+/// Time between two answers.
+const ANSWER_PERIOD: Duration = Duration::from_millis(100);
+/// For this long an answer is repeated after its announcement was heard.
+const ANSWER_TIME: Duration = Duration::from_secs(1);
 
 /// An announcement that was heard.
 #[derive(Clone, Debug)]
@@ -23,8 +27,10 @@ struct Offer {
     of_vehicle: [u8; 8],
     /// Once it is answered: the session that comes of it, and our random number in it.
     answer: Option<(Channel, [u8; 8])>,
-    /// Is an answer to be sent?
-    due: bool,
+    /// When it was heard last.
+    heard: Instant,
+    /// When to answer next.
+    answer_at: Instant,
 }
 
 /// The station's end of the link with one vehicle. See [`Vehicle`](super::Vehicle) for an example.
@@ -107,11 +113,11 @@ impl Station {
         }
         let of_vehicle = header.number();
         if let Some(known) = self.offers.iter_mut().flatten().find(|offer| offer.of_vehicle == of_vehicle) {
-            known.due = true;
+            known.heard = now;
         } else {
             self.offers.rotate_right(1);
             let [newest, ..] = &mut self.offers;
-            *newest = Some(Offer { of_vehicle, answer: None, due: true });
+            *newest = Some(Offer { of_vehicle, answer: None, heard: now, answer_at: now });
         }
         Ok(())
     }
@@ -185,7 +191,8 @@ impl Station {
             let length = self.current.as_mut()?.seal(Kind::Ready, tick, room, |_| Ok(0)).ok()?;
             return room.get(..length);
         }
-        let offer = self.offers.iter_mut().flatten().find(|offer| offer.due)?;
+        let is_due = |offer: &&mut Offer| now >= offer.answer_at && now.since(offer.heard) <= ANSWER_TIME;
+        let offer = self.offers.iter_mut().flatten().find(is_due)?;
         if offer.answer.is_none() {
             if random == self.used {
                 return None;
@@ -195,7 +202,7 @@ impl Station {
             offer.answer =
                 Some((Channel::new(self.key.secret(), Sender::Station, id, offer.of_vehicle, random), random));
         }
-        offer.due = false;
+        offer.answer_at = now + ANSWER_PERIOD;
         let (_, of_station) = offer.answer.as_ref()?;
         let header = Header::of_number(Kind::Join, self.key.id(), *of_station);
         // The same bytes whenever it is the same answer: one nonce never seals two texts.

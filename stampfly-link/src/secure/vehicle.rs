@@ -21,9 +21,9 @@ use super::refused::{Refused, SealError, Tally};
 use stampfly_types::{Duration, Instant};
 
 /// Time between two announcements.
-const ANNOUNCEMENT_PERIOD: Duration = Duration::from_millis(250);
+const ANNOUNCEMENT_PERIOD: Duration = Duration::from_millis(100);
 /// Time between two welcomes.
-const WELCOME_PERIOD: Duration = Duration::from_millis(100);
+const WELCOME_PERIOD: Duration = Duration::from_millis(50);
 /// For this long a welcome is repeated; then the session is offered anew.
 const WELCOME_TIME: Duration = Duration::from_secs(1);
 /// A station that has been silent for this long may have been switched off: the vehicle offers a session to the next.
