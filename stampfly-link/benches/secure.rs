@@ -4,10 +4,10 @@
 use chacha20poly1305::aead::AeadInOut;
 use chacha20poly1305::{ChaCha20Poly1305, KeyInit, Nonce};
 use criterion::{Criterion, criterion_group, criterion_main};
-use std::hint::black_box;
 use stampfly_link::secure::{Key, MAX_FRAME, Payload, Station, Vehicle};
 use stampfly_types::Instant;
 use stampfly_types::messages::PilotInput;
+use std::hint::black_box;
 
 const NOW: Instant = Instant::from_millis(20);
 
@@ -16,9 +16,9 @@ fn joined() -> (Vehicle, Station) {
     let key = Key::generate(1, core::array::from_fn(|place| place as u8)).expect("a key");
     let (mut vehicle, mut station, mut room) = (Vehicle::new(key.clone()), Station::new(key), [0; MAX_FRAME]);
     for turn in 0..2 {
-        let mut frame = vehicle.transmit(NOW, [turn; 8], &mut room).expect("a frame").to_vec();
+        let mut frame = vehicle.transmit(NOW, [turn + 1; 8], &mut room).expect("a frame").to_vec();
         station.receive(NOW, &mut frame).expect("taken");
-        let mut frame = station.transmit(NOW, [turn + 2; 8], &mut room).expect("a frame").to_vec();
+        let mut frame = station.transmit(NOW, [turn + 3; 8], &mut room).expect("a frame").to_vec();
         vehicle.receive(NOW, &mut frame).expect("taken");
     }
     (vehicle, station)
@@ -42,7 +42,9 @@ fn frames(criterion: &mut Criterion) {
     // What is encrypted of such a frame: when it was sealed, and 18 bytes of sticks.
     let (nonce, head, mut text) = (Nonce::from([1; 12]), [2; 11], [3; 22]);
     group.bench_function("cipher alone, seal", |bench| {
-        bench.iter(|| cipher.encrypt_inout_detached(black_box(&nonce), &head, text.as_mut_slice().into()).expect("sealed"));
+        bench.iter(|| {
+            cipher.encrypt_inout_detached(black_box(&nonce), &head, text.as_mut_slice().into()).expect("sealed")
+        });
     });
     group.bench_function("cipher alone, seal and open", |bench| {
         bench.iter(|| {
