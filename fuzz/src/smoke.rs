@@ -2,7 +2,7 @@
 
 use crate::{
     console_line, estimator_stream, failsafe_stream, hil_frames, mode_machine, parameter_image, radio_packets,
-    receiver_bytes, rover_datagrams, ulog, whole_stack,
+    receiver_bytes, rover_datagrams, secure_session, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -123,6 +123,11 @@ fn packets() {
 #[test]
 fn receivers() {
     smoke("receiver_bytes", receiver_bytes, 200_000);
+}
+
+#[test]
+fn secured() {
+    smoke("secure_session", secure_session, 100_000);
 }
 
 #[test]

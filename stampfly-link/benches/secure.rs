@@ -59,7 +59,7 @@ fn frames(criterion: &mut Criterion) {
     let (bad, mut now) = (room, NOW);
     group.bench_function("a bad tag", |bench| {
         bench.iter(|| {
-            now = now + stampfly_types::Duration::from_micros(2_500);
+            now += stampfly_types::Duration::from_micros(2_500);
             let mut frame = bad;
             vehicle.receive(now, black_box(&mut frame[..length])).is_err()
         });

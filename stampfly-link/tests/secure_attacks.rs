@@ -17,7 +17,7 @@ const FRAMES: usize = 100_000;
 fn made_up(random: &mut Random, air: &Air, counter: u32) -> Vec<u8> {
     let mut frame = vec![0; random.below(251)];
     random.fill(&mut frame);
-    if random.next() % 2 == 0 && frame.len() >= MIN_FRAME {
+    if random.next().is_multiple_of(2) && frame.len() >= MIN_FRAME {
         let kinds = [0x01, 0x02, 0x10, 0x11, 0x12, 0x20, 0x21, 0x30];
         frame[..3].copy_from_slice(&[1, kinds[random.below(kinds.len())], air.key.id()]);
         frame[3..7].copy_from_slice(&air.vehicle.session().unwrap_or(7).to_le_bytes());
@@ -33,7 +33,7 @@ fn l01_random_frames_of_every_length_are_refused_and_are_no_sign_of_life() {
         let begun = air.now;
         for _ in 0..FRAMES / 2 {
             // One a tick, so that every one is looked at.
-            air.now = air.now + TICK;
+            air.now += TICK;
             let frame = made_up(&mut random, &air, 100);
             assert!(air.deliver(To::Vehicle, &frame).is_err() && air.deliver(To::Station, &frame).is_err());
         }
@@ -54,7 +54,7 @@ fn l02_no_frame_survives_a_flipped_bit() {
     let taken = air.taken();
     let mut refused = 0;
     let mut refuse = |air: &mut Air, frame: &[u8]| {
-        air.now = air.now + TICK;
+        air.now += TICK;
         assert!(air.deliver(To::Vehicle, frame).is_err(), "{frame:?}");
         refused += 1;
     };
@@ -86,7 +86,7 @@ fn l02_no_frame_survives_a_flipped_bit() {
             frame[bit / 8] ^= 1 << (bit % 8);
         }
         if frame != *whole {
-            air.now = air.now + TICK;
+            air.now += TICK;
             assert!(air.deliver(To::Vehicle, &frame).is_err());
             refused += 1;
         }
@@ -105,7 +105,7 @@ fn replay(air: &mut Air) {
     for (place, (_, frame)) in captured.iter().enumerate() {
         let times = if place % 97 == 0 { 1_000 } else { 3 };
         for _ in 0..times {
-            air.now = air.now + Duration::from_micros(500);
+            air.now += Duration::from_micros(500);
             // To whom it was and, reflected, to whom it came from.
             assert!(air.deliver(To::Vehicle, frame).is_err(), "{frame:02x?}");
             let _ = air.deliver(To::Station, frame);
@@ -234,7 +234,7 @@ fn l05_a_station_with_another_key_of_the_same_number_is_refused() {
     assert_eq!(other.vehicle.session(), air.vehicle.session());
     let taken = air.taken();
     for (_, frame) in &other.captured {
-        air.now = air.now + TICK;
+        air.now += TICK;
         assert!(air.deliver(To::Vehicle, frame).is_err() && air.deliver(To::Station, frame).is_err());
     }
     assert_eq!(air.taken(), taken);
@@ -253,7 +253,7 @@ fn l05_a_station_with_another_key_of_the_same_number_is_refused() {
 fn flood(air: &mut Air, per_tick: usize, kind: Option<u8>, seconds: u64) -> (u32, u32) {
     let (mut random, mut arrived, mut most) = (Random(66), 0, 0);
     for tick in 0..seconds * 400 {
-        air.now = air.now + TICK;
+        air.now += TICK;
         let bad = air.vehicle.tally().tag;
         let pilot = (tick % 8 == 0).then(|| random.below(per_tick));
         for place in 0..per_tick {
@@ -286,7 +286,7 @@ fn l06_a_flood_takes_eight_frames_a_tick_at_most_and_none_of_the_pilots() {
     assert!(arrived < 25 && air.vehicle.tally().flood > 30_000);
     let (taken, before) = (air.taken(), air.vehicle.age(air.now).expect("heard"));
     for _ in 0..400 {
-        air.now = air.now + TICK;
+        air.now += TICK;
         let frame = made_up(&mut Random(air.now.as_micros()), &air, 1_000);
         assert!(air.deliver(To::Vehicle, &frame).is_err());
     }
@@ -401,7 +401,7 @@ fn l10_an_authentic_frame_with_a_value_that_must_not_be_used_is_refused_whole() 
     let (count, age) = (bodies.len() as u32, air.vehicle.age(air.now).expect("heard"));
     let (begun, counter) = (air.now, air.station.counter());
     for (place, (kind, body)) in bodies.into_iter().enumerate() {
-        air.now = air.now + TICK;
+        air.now += TICK;
         let frame = air.forge(kind, counter + 1 + place as u32, air.tick(), &body);
         assert_eq!(air.deliver(To::Vehicle, &frame), Err(Refused::Content), "{kind:02x} {body:?}");
     }
@@ -452,7 +452,7 @@ fn l12_what_was_held_up_for_longer_than_200_ms_is_not_used() {
     for held in (0..=1_000).step_by(10) {
         let mut air = Air::joined(12);
         let (frame, kill) = (air.seal(&sticks()), air.seal(&Payload::Kill));
-        air.now = air.now + Duration::from_millis(held);
+        air.now += Duration::from_millis(held);
         let outcome = air.deliver(To::Vehicle, &frame);
         match held {
             // A millisecond of either clock's steps and of what is taken off for their drift.
@@ -569,7 +569,7 @@ fn l14_one_authentic_kill_is_enough_at_any_time() {
             // At every moment of the change to the session of the armed vehicle.
             (0..turn).for_each(|_| air.run(PERIOD));
             let frame = air.seal(&kill);
-            air.now = air.now + Duration::from_millis(10 * turn);
+            air.now += Duration::from_millis(10 * turn);
             let mut frame = frame.clone();
             let received = air.vehicle.receive(air.now, &mut frame).expect("taken").expect("a kill");
             assert!(received.payload.is_kill());
@@ -597,7 +597,7 @@ fn l14_a_kill_is_not_delayed_by_a_flood() {
         let (mut air, mut random) = (Air::joined(seed), Random(seed));
         let begun = air.now;
         'until_heard: for tick in 0.. {
-            air.now = air.now + TICK;
+            air.now += TICK;
             let ours = (tick % 4 == 0).then(|| random.below(20));
             for place in 0..20 {
                 let mut frame = air.seal(&Payload::Kill);

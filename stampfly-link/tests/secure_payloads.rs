@@ -109,7 +109,7 @@ proptest! {
         for bit in 0..8 * frame.len() {
             let mut frame = frame.clone();
             frame[bit / 8] ^= 1 << (bit % 8);
-            air.now = air.now + TICK;
+            air.now += TICK;
             prop_assert!(air.deliver(to, &frame).is_err(), "bit {}", bit);
         }
         let outcome = air.deliver(to, &frame);

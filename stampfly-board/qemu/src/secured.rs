@@ -1,7 +1,7 @@
 //! What a secured frame costs on emulated cores: `cargo xtask qemu`.
 //!
-//! Frames of sticks, sealed by a station and opened by the vehicle, and frames whose tag is wrong, which is what a flood consists of. A
-//! program of its own, so that the flight's is as it was. Instructions are not cycles; see `main.rs`.
+//! Frames of sticks, sealed by a station and opened by the vehicle, and frames whose tag is wrong, which is what a flood consists of; and
+//! the same bytes through the crate `chacha20poly1305` alone. A program of its own, so that the flight's is as it was. Instructions are not cycles; see `main.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg_attr(target_arch = "arm", path = "machine/arm.rs")]
@@ -10,6 +10,8 @@
 #[cfg_attr(not(any(target_arch = "arm", target_arch = "riscv32", target_arch = "xtensa")), path = "machine/host.rs")]
 mod machine;
 
+use chacha20poly1305::aead::AeadInOut;
+use chacha20poly1305::{ChaCha20Poly1305, KeyInit};
 use core::hint::black_box;
 use stampfly_link::secure::{Key, MAX_FRAME, Payload, Station, Vehicle};
 use stampfly_types::messages::PilotInput;
@@ -74,7 +76,7 @@ fn run() -> Option<()> {
     let sticks = black_box(Payload::Sticks(PilotInput { roll: 0.5, throttle: 0.25, ..Default::default() }));
     let tallies: (&mut Tally, &mut Tally, &mut Tally) = (&mut sealed, &mut opened, &mut refused);
     for _ in 0..FRAMES {
-        now = now + Duration::from_millis(20);
+        now += Duration::from_millis(20);
         let length = tallies.0.count(|| station.seal(now, &sticks, &mut room).map(<[u8]>::len)).ok()?;
         let mut bad = room;
         *bad.get_mut(length - 1)? ^= 1;
@@ -85,6 +87,17 @@ fn run() -> Option<()> {
         let received = tallies.1.count(|| vehicle.receive(now, room.get_mut(..length)?).ok());
         received?.filter(|received| received.payload == sticks)?;
     }
+    let cipher = ChaCha20Poly1305::new(&black_box([7; 32]).into());
+    let (nonce, head, mut text) = (black_box([1; 12]).into(), black_box([2; 11]), black_box([3; 22]));
+    let (mut alone_sealed, mut alone_opened) = (Tally::default(), Tally::default());
+    for _ in 0..FRAMES {
+        let seal = || cipher.encrypt_inout_detached(&nonce, &head, text.as_mut_slice().into());
+        let tag = alone_sealed.count(seal).ok()?;
+        let open = || cipher.decrypt_inout_detached(&nonce, &head, text.as_mut_slice().into(), &tag);
+        alone_opened.count(open).ok()?;
+    }
+    alone_sealed.print("cipher alone, sealed");
+    alone_opened.print("cipher alone, opened");
     sealed.print("secured frame, sealed");
     opened.print("secured frame, opened");
     refused.print("secured frame, refused");

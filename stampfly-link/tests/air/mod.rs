@@ -105,7 +105,7 @@ impl Air {
     pub fn run_with(&mut self, time: Duration, mut fate: impl FnMut(&mut Random, To, &[u8]) -> Fate) {
         let end = self.now + time;
         while self.now < end {
-            self.now = self.now + PERIOD;
+            self.now += PERIOD;
             for (to, frame) in self.exchange() {
                 self.captured.push((to, frame.clone()));
                 if fate(&mut self.random, to, &frame) == Fate::Arrives {

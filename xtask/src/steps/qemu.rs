@@ -35,7 +35,7 @@ const CHAIN: &str = "chain";
 /// What it may never take, in instructions, on a machine of this name: the mean, and the most.
 const BAR: (&str, f64, f64) = ("Cortex-M4F", 18_000.0, 30_000.0);
 
-/// The program that counts what a secured frame costs, and what all of its lines begin with.
+/// The program that counts what a secured frame costs, and what the lines about it begin with.
 const SECURED: (&str, &str) = ("stampfly-secured", "secured frame, ");
 /// What none of them may ever take: at 50 frames a second each way, 2 % of a core of [`CLOCK`].
 const SECURED_BAR: f64 = 48_000.0;
@@ -232,9 +232,13 @@ fn hold_secured(budget: &Budget, machine: &Machine, said: &str) -> Result<(), Fa
 
 /// What was counted of secured frames: sealed, opened, refused.
 fn secured(said: &str) -> Result<Vec<Count>, Failure> {
-    let counts: Vec<Count> = said.lines().filter_map(Count::read).collect();
-    let all = counts.len() == 3 && counts.iter().all(|count| count.name.starts_with(SECURED.1) && count.mean > 0.0);
-    if all { Ok(counts) } else { Err(format!("no counts of secured frames:\n{said}")) }
+    let counts = said.lines().filter_map(Count::read).filter(|count| count.name.starts_with(SECURED.1));
+    let counts: Vec<Count> = counts.collect();
+    if counts.len() == 3 && counts.iter().all(|count| count.mean > 0.0) {
+        Ok(counts)
+    } else {
+        Err(format!("no counts of secured frames:\n{said}"))
+    }
 }
 
 /// Is the chain within what it may never exceed?
