@@ -92,7 +92,7 @@ def vectors():
         "of_vehicle": of_vehicle.hex(),
         "of_station": of_station.hex(),
         "announcement": frame(handshake, by, 0x81, key_id, *vehicle_number, 0, b"").hex(),
-        "join": frame(handshake, to, 0x01, key_id, *station_number, 0, of_vehicle).hex(),
+        "join": frame(hchacha20(handshake, of_vehicle + bytes(8)), to, 0x01, key_id, *station_number, 0, b"").hex(),
         "frames": frames,
     }
 

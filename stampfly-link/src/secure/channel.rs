@@ -10,9 +10,15 @@ const RESERVE: u32 = 1 << 22;
 /// HChaCha20's input for the key that seals the handshake.
 const HANDSHAKE: [u8; 16] = *b"stampfly-secure1";
 
-/// The key that announcements and answers to them are sealed with.
+/// The key that announcements are sealed with.
 pub fn handshake_secret(shared: &Secret) -> Secret {
     shared.derive(HANDSHAKE)
+}
+
+/// The key that answers to one announcement are sealed with: one for each, so that a station whose random numbers come again
+/// seals no two texts with one nonce.
+pub fn answer_secret(handshake: &Secret, [a, b, c, d, e, f, g, h]: [u8; 8]) -> Secret {
+    handshake.derive([a, b, c, d, e, f, g, h, 0, 0, 0, 0, 0, 0, 0, 0])
 }
 
 /// One end of a session.

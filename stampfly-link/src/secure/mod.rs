@@ -25,14 +25,16 @@
 //!
 //! # Handshake
 //!
-//! K is the shared key, H(K, x) is HChaCha20 (draft-irtf-cfrg-xchacha-03) with the 16 bytes x.
+//! K is the shared key, H(K, x) is HChaCha20 (draft-irtf-cfrg-xchacha-03) with the 16 bytes x, and A is H(K, `stampfly-secure1`).
 //!
-//! | kind | from | sealed with | session and counter are | body |
-//! |---|---|---|---|---|
-//! | 81 announcement | vehicle | H(K, `stampfly-secure1`) | Nv, eight random bytes | nothing |
-//! | 01 join | station | H(K, `stampfly-secure1`) | Ns, eight random bytes | Nv |
-//! | 82 welcome | vehicle | H(K, Nv ‖ Ns) | those of the new session: the first four bytes of Nv; 1, 2, … | nothing |
-//! | 02 ready | station | H(K, Nv ‖ Ns) | the same session; 1, 2, … | nothing |
+//! | kind | from | sealed with | session and counter are |
+//! |---|---|---|---|
+//! | 81 announcement | vehicle | A | Nv, eight random bytes |
+//! | 01 join | station | H(A, Nv ‖ eight zeros) | Ns, eight random bytes |
+//! | 82 welcome | vehicle | H(K, Nv ‖ Ns) | those of the new session: the first four bytes of Nv; 1, 2, … |
+//! | 02 ready | station | H(K, Nv ‖ Ns) | the same session; 1, 2, … |
+//!
+//! None of them has a body.
 //!
 //! The vehicle announces at power-on, when its station has been silent for half a second, when the motors may turn from now on, and when a
 //! counter is near its end; every 100 ms, until a station joins. The station repeats its answer every 100 ms for a second, and the
@@ -46,14 +48,14 @@
 //! | a frame of this session | either end | its counter is not newer than the newest; there is no window |
 //! | a frame of a session before | either end | that session's number is not in use; were the number the same by chance, its key is not, because Nv and Ns are others |
 //! | a frame of the other direction | its sender | the kind says so; with that bit turned, the tag is wrong, and so is the nonce |
-//! | an old announcement | station | it answers, the vehicle refuses the answer to an Nv that is not in force. The station leaves its session only for a welcome, and a welcome under a key of its new Ns does not exist |
-//! | an old answer | vehicle | it names an old Nv. With the Nv in force: an announcement is good for one session and then void, so there is no way back to one that is over |
+//! | an old announcement | station | it answers, and the answer's key is not that of the Nv in force, if one is. The station leaves its session only for a welcome, and a welcome under a key of its new Ns does not exist |
+//! | an old answer | vehicle | its key comes of an old Nv. With the Nv in force: an announcement is good for one session and then void, so there is no way back to one that is over |
 //! | an old welcome | station | it is sealed under a key of another Ns |
 //! | an old ready | vehicle | it is sealed under a key of another Nv, or its counter is old |
 //!
 //! Each end so depends on its own random number alone: the vehicle takes nothing old as long as its Nv are new, even if the
 //! station's generator always gives the same number, and the other way round. No nonce seals two texts under one key: counters only count up,
-//! sessions have keys of their own, and announcements and answers are the same bytes whenever their number is the same.
+//! sessions have keys of their own, and so have answers to each announcement; an announcement is the same bytes whenever its number is the same.
 //!
 //! # What is held up
 //!

@@ -4,7 +4,7 @@
 //! into [`Station::receive`], and what [`Station::transmit`] returns is sent, every 20 ms or so.
 
 use super::budget::Budget;
-use super::channel::{Channel, handshake_secret};
+use super::channel::{Channel, answer_secret, handshake_secret};
 use super::cipher::Secret;
 use super::clock::{Tick, VehicleClock};
 use super::frame::{Header, Kind, MAX_FRAME, Sender};
@@ -206,13 +206,8 @@ impl Station {
         let (_, of_station) = offer.answer.as_ref()?;
         let header = Header::of_number(Kind::Join, self.key.id(), *of_station);
         // The same bytes whenever it is the same answer: one nonce never seals two texts.
-        let body = offer.of_vehicle;
-        let write = |place: &mut [u8]| {
-            let place = place.first_chunk_mut().ok_or(SealError::Length)?;
-            *place = body;
-            Ok(body.len())
-        };
-        let length = header.seal(&self.handshake, Sender::Station, Tick(0), room, write).ok()?;
+        let secret = answer_secret(&self.handshake, offer.of_vehicle);
+        let length = header.seal(&secret, Sender::Station, Tick(0), room, |_| Ok(0)).ok()?;
         room.get(..length)
     }
 

@@ -10,7 +10,7 @@
 //! found right. Only what [`Vehicle::receive`] returns is a sign of life.
 
 use super::budget::Budget;
-use super::channel::{Channel, handshake_secret};
+use super::channel::{Channel, answer_secret, handshake_secret};
 use super::cipher::Secret;
 use super::clock::{MAX_AGE, Tick};
 use super::frame::{Header, Kind, MAX_FRAME, Sender};
@@ -145,10 +145,10 @@ impl Vehicle {
         if !self.budget.admits(now, false) {
             return Err(Refused::Flood);
         }
-        let answered = match header.open(&self.handshake, Sender::Station, frame) {
-            Ok((_, body)) if body == offer => Ok(()),
-            // Authentic, and made for an announcement that is no longer in force.
-            Ok(_) => Err(Refused::Session),
+        // An answer to any other announcement is sealed with another key.
+        let answered = match header.open(&answer_secret(&self.handshake, offer), Sender::Station, frame) {
+            Ok((_, [])) => Ok(()),
+            Ok(_) => Err(Refused::Content),
             Err(error) => Err(error),
         };
         answered.inspect_err(|_| self.budget.charge(now))?;
@@ -205,7 +205,7 @@ impl Vehicle {
     }
 
     /// What is to be sent to every station now, if anything: an announcement or a welcome. `random` are eight bytes of the
-    /// hardware's generator of random numbers, new ones at every call. If they are those that were used last, no session is
+    /// hardware's generator of random numbers (an ESP32's is one only while its radio is on), new ones at every call. If they are those that were used last, no session is
     /// offered.
     pub fn transmit<'r>(&mut self, now: Instant, random: [u8; 8], room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]> {
         self.next.take_if(|next| now.since(next.since) > WELCOME_TIME);
