@@ -149,6 +149,22 @@ fn l03_replays_of_this_session_and_of_earlier_ones_are_refused() {
     replay(&mut air);
 }
 
+#[test]
+fn l03_a_frame_that_comes_back_to_its_sender_is_refused_for_its_direction() {
+    let mut air = Air::joined(3);
+    air.vehicle.set_armed(true);
+    air.run(Duration::from_secs(1));
+    for (to, frame) in air.captured.clone() {
+        air.now += TICK;
+        let back = if to == To::Vehicle { To::Station } else { To::Vehicle };
+        assert_eq!(air.deliver(back, &frame), Err(Refused::Kind));
+        // And with the bit of the direction turned, so that it seems to be for its sender.
+        let mut turned = frame.clone();
+        turned[1] ^= 0x80;
+        assert!(air.deliver(back, &turned).is_err());
+    }
+}
+
 /// One end's generator always says the same. The other end takes nothing old for it.
 #[test]
 fn l03_an_end_with_a_good_generator_takes_no_replay_when_the_other_has_none() {
@@ -315,6 +331,21 @@ fn l07_jammed_at_any_moment_the_age_counts_from_the_last_authentic_frame() {
         air.run(Duration::from_secs(1));
         assert!(air.vehicle.is_joined(air.now) && air.vehicle.session() == air.station.session());
     }
+}
+
+/// A station that answered and then is gone, as one that starts again: the next is offered a session.
+#[test]
+fn l07_a_station_that_is_gone_in_the_middle_of_the_handshake_does_not_keep_others_out() {
+    let (mut air, mut room) = (Air::new(7), [0; MAX_FRAME]);
+    let mut announcement = air.vehicle.transmit(air.now, [1; 8], &mut room).expect("it announces").to_vec();
+    air.station.receive(air.now, &mut announcement).expect("authentic");
+    let answer = air.station.transmit(air.now, [2; 8], &mut room).expect("it answers").to_vec();
+    assert_eq!(air.deliver(To::Vehicle, &answer), Ok(false));
+    air.station = Station::new(air.key.clone());
+    air.run(Duration::from_millis(900));
+    assert_eq!(air.vehicle.session(), None, "it waits for the one that answered");
+    air.run(Duration::from_millis(400));
+    assert!(air.vehicle.is_joined(air.now) && air.vehicle.session() == air.station.session());
 }
 
 #[test]
@@ -544,6 +575,7 @@ fn l13_random_numbers_that_are_none_are_not_used() {
     assert_eq!(Key::generate(1, [0; 32]).err(), Some(KeyError::NotRandom));
     assert_eq!(Key::generate(1, [0xFF; 32]).err(), Some(KeyError::NotRandom));
     // Every session has numbers of its own, and one that was used is not used again.
+    assert_eq!(Vehicle::new(key(1)).transmit(Instant::ZERO, [0; 8], &mut [0; MAX_FRAME]), None);
     let mut air = Air::joined(13);
     let mut room = [0; MAX_FRAME];
     let used = air.numbers.0;
