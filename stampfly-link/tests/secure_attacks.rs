@@ -311,7 +311,8 @@ fn l06_a_flood_takes_eight_frames_a_tick_at_most_and_none_of_the_pilots() {
 }
 
 /// The age that the failsafe goes by counts from the last authentic frame, whenever a jammer begins; and when he ends, the link is
-/// back at once. What a vehicle does meanwhile, campaigns with losses of the link show.
+/// back at once. What a vehicle does meanwhile, flights with the faults `link-lost` and `link-flap` of `stampfly-board` show, and what
+/// its failsafe does, the tests of `stampfly-mode`.
 #[test]
 fn l07_jammed_at_any_moment_the_age_counts_from_the_last_authentic_frame() {
     for begin in 0..60 {
@@ -346,6 +347,27 @@ fn l07_a_station_that_is_gone_in_the_middle_of_the_handshake_does_not_keep_other
     assert_eq!(air.vehicle.session(), None, "it waits for the one that answered");
     air.run(Duration::from_millis(400));
     assert!(air.vehicle.is_joined(air.now) && air.vehicle.session() == air.station.session());
+}
+
+/// The way up is jammed just when the station goes over to the next session: it goes on hearing the vehicle, in the one before.
+#[test]
+fn l07_telemetry_goes_on_while_the_vehicle_does_not_know_of_the_change() {
+    let mut air = Air::joined(7);
+    air.run(Duration::from_secs(1));
+    let first = air.station.session();
+    air.vehicle.set_armed(true);
+    while air.station.session() == first {
+        air.run_with(
+            PERIOD,
+            |_, _, frame| if frame[1] == 0x02 || frame[1] == 0x10 { Fate::Lost } else { Fate::Arrives },
+        );
+    }
+    let heard = air.station.tally().accepted;
+    air.run_with(Duration::from_millis(400), |_, to, _| if to == To::Vehicle { Fate::Lost } else { Fate::Arrives });
+    assert_eq!(air.vehicle.session(), first);
+    assert!(air.station.tally().accepted >= heard + 19, "{} of 20", air.station.tally().accepted - heard);
+    air.run(Duration::from_millis(100));
+    assert_eq!(air.vehicle.session(), air.station.session());
 }
 
 #[test]
@@ -530,15 +552,19 @@ fn l12_the_age_is_never_underestimated() {
     }
 }
 
-/// Bytes of keys as anything would print them.
+/// Bytes of keys as anything would print them, without white space.
 fn printed(secret: &[u8]) -> Vec<String> {
-    let windows = secret.windows(3);
-    windows
-        .flat_map(|bytes| {
-            let hexadecimal: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-            [hexadecimal.to_uppercase(), hexadecimal, format!("{bytes:?}").trim_matches(['[', ']']).to_owned()]
-        })
-        .collect()
+    let forms = |bytes: &[u8]| {
+        let hexadecimal: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let lists = [format!("{bytes:?}"), format!("{bytes:02x?}"), format!("{bytes:x?}"), format!("{bytes:02X?}")];
+        let lists = lists.map(|list| bare(list.trim_matches(['[', ']'])));
+        [lists.to_vec(), vec![hexadecimal.to_uppercase(), hexadecimal]].concat()
+    };
+    secret.windows(3).flat_map(forms).collect()
+}
+
+fn bare(text: &str) -> String {
+    text.split_whitespace().collect()
 }
 
 #[test]
@@ -555,6 +581,7 @@ fn l13_no_key_is_printed_but_where_it_is_asked_for() {
             texts.extend(error.map(|error| format!("{error} {error:?}")));
         }
     }
+    let texts: Vec<String> = texts.iter().map(|text| bare(text)).collect();
     let secrets = [printed(air.key.bytes()), printed(&air.session_key())].concat();
     for secret in &secrets {
         assert!(!texts.iter().any(|text| text.contains(secret)), "{secret}");
