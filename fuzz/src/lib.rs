@@ -9,6 +9,8 @@
 //! | [`console_line`] | the serial port | lines stay short and printable, parameters in range, an armed vehicle does nothing |
 //! | [`estimator_stream`] | a stream of samples and times | numbers stay finite, the covariance symmetric with a diagonal of variances |
 //! | [`failsafe_stream`] | a stream of inertial samples | a sensor that gives nothing usable is found in time, an alert stays while the vehicle is armed |
+//! | [`ground_ask`] | a WebSocket of the ground station | numbers are finite and in range, what is accepted is accepted again |
+//! | [`ground_http`] | a browser | a head has an end, a refusal stays one, what follows a head means nothing |
 //! | [`hil_frames`] | a line with a computer that simulates the world | the vehicle answers whole frames alone, its clock is its own, entries end |
 //! | [`mode_machine`] | steps with any commands, gestures, frames, alerts | a kill disarms in its step, phases change by the table, order does not matter |
 //! | [`parameter_image`] | flash, left by other firmware or a power cut | values in range, what was saved is loaded |
@@ -28,6 +30,7 @@ mod estimator;
 mod failsafe;
 mod flash;
 mod hil;
+mod http;
 mod machine;
 mod packets;
 mod parameters;
@@ -41,6 +44,7 @@ pub use datagrams::rover_datagrams;
 pub use estimator::estimator_stream;
 pub use failsafe::failsafe_stream;
 pub use hil::hil_frames;
+pub use http::{ground_ask, ground_http};
 pub use machine::mode_machine;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;

@@ -1,8 +1,8 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
 use crate::{
-    console_line, estimator_stream, failsafe_stream, hil_frames, mode_machine, parameter_image, radio_packets,
-    receiver_bytes, rover_datagrams, secure_session, ulog, whole_stack,
+    console_line, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, mode_machine,
+    parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -103,6 +103,12 @@ fn estimator() {
 #[test]
 fn failsafe() {
     smoke("failsafe_stream", failsafe_stream, 10_000);
+}
+
+#[test]
+fn ground() {
+    smoke("ground_ask", ground_ask, 150_000);
+    smoke("ground_http", ground_http, 150_000);
 }
 
 #[test]

@@ -8,7 +8,10 @@
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
+//! | [`log`] | tools for logs: info, tables, MCAP, a part of one |
+//! | [`serve`] | the ports at which other programs fly a simulated vehicle |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
+//! | [`ground`] | a page that shows vehicles as they fly, and asks them for things |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
 //! The executor is `stampfly-sim`'s, replay and golden flight are `stampfly-flight`'s; everything here is generic over
@@ -18,11 +21,14 @@ pub mod campaign;
 pub mod doctor;
 pub mod flown;
 pub mod golden;
+pub mod ground;
 pub mod hil;
 mod inputs;
+pub mod log;
 mod page;
 pub mod recorder;
 pub mod report;
+pub mod serve;
 pub mod vehicles;
 
 pub use report::Report;

@@ -8,6 +8,7 @@
 //! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
 //! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
 //! * [`fault`]: what goes wrong in a flight, when, and for how long;
+//! * [`ask`]: what a ground station asks of a vehicle that flies in real time;
 //! * [`vehicle`]: a whole vehicle with its flight stack, on virtual time;
 //! * [`Simulation`]: all of it from one [`SimulationConfig`].
 //!
@@ -18,6 +19,7 @@
 //! the plant is a quadrotor in X of up to a few hundred grams with brushed motors; the chips, and the vibration they
 //! feel, are the StampFly's.
 
+pub mod ask;
 pub mod chips;
 pub mod fault;
 mod noise;

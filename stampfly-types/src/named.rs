@@ -86,13 +86,13 @@ macro_rules! message_enum {
 /// ```
 #[macro_export]
 macro_rules! message_flags {
-    ($(#[$meta:meta])* $vis:vis struct $Name:ident { $($(#[$flag_meta:meta])* $FLAG:ident = $bit:literal),* $(,)? }) => {
+    ($(#[$meta:meta])* $vis:vis struct $Name:ident { $($(#[doc = $doc:literal])* $FLAG:ident = $bit:literal),* $(,)? }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         $vis struct $Name(u32);
 
         impl $Name {
-            $($(#[$flag_meta])* pub const $FLAG: Self = Self(1 << $bit);)*
+            $($(#[doc = $doc])* pub const $FLAG: Self = Self(1 << $bit);)*
             /// Nothing.
             pub const NONE: Self = Self(0);
             /// Every named bit.
@@ -101,6 +101,8 @@ macro_rules! message_flags {
             pub const EACH: &'static [Self] = &[$(Self::$FLAG),*];
             /// Names and bit masks.
             pub const NAMES: &'static [(&'static str, u32)] = &[$((stringify!($FLAG), 1 << $bit)),*];
+            /// Names and what they mean, as their documentation says it.
+            pub const MEANINGS: &'static [(&'static str, &'static str)] = &[$((stringify!($FLAG), concat!($($doc),*))),*];
 
             /// Does the set hold all of `other`?
             #[must_use]

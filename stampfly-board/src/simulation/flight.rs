@@ -4,23 +4,25 @@ use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
 use super::judge::{Judge, Sight};
+use super::live::{self, Seen, Services};
 use super::outcome::Outcome;
 use super::pilot::{Meaning, Pilot};
 use super::radio::Radio;
 use super::sensing::{self, Healths, Others, Sensing, Shared};
 use super::setup::Setup;
 use super::watch::Watch;
+use crate::console::Profile;
 use crate::messages::{ButtonContact, CutoffState};
-use crate::schedule::Runnables;
+use crate::schedule::{ACTIVATIONS, Runnables};
 use crate::topics::{self, Id};
 use stampfly_bus::Band;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
 use stampfly_flight::Watchdog;
 use stampfly_sim::chips;
-use stampfly_sim::fault::Moment;
+use stampfly_sim::fault::{Injector, Moment};
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_sim::vehicle;
+use stampfly_sim::vehicle::{self, Live};
 use stampfly_sim::{Simulation, Truth, World};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
@@ -40,6 +42,8 @@ pub struct Surroundings {
     health: Healths,
     wrong: Option<Wrong>,
     watchdog: Watchdog,
+    seen: Seen,
+    profile: Profile,
 }
 
 impl Surroundings {
@@ -57,8 +61,13 @@ impl Surroundings {
             board: Some(board),
             progress: Progress::default(),
             health: Healths::default(),
-            wrong: Some(Wrong::new(&setup.faults, setup.simulation.start, setup.simulation.seed)),
+            wrong: Some(match setup.live {
+                Some(_) => Wrong::on_demand(&setup.faults, setup.simulation.start, setup.simulation.seed),
+                None => Wrong::new(&setup.faults, setup.simulation.start, setup.simulation.seed),
+            }),
             watchdog: Watchdog::new(CUT_OFF),
+            seen: Seen::default(),
+            profile: Profile::new(&ACTIVATIONS),
         }
     }
 
@@ -79,12 +88,13 @@ impl vehicle::Surroundings for Surroundings {
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
-        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog } = self;
+        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog, seen, profile } =
+            self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
         let wrong = wrong.take().expect("surroundings are started once");
         let cameras = setup.cameras;
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
-        let Others { motors, indicator, button, link, cutoff, .. } = match setup.sensing {
+        let Others { motors, indicator, button, link, cutoff, console, .. } = match setup.sensing {
             Sensing::Models => sensing::start_models(tasks, clock, (sensors, &wrong), outside, cameras, health),
             Sensing::Chips => {
                 sensing::start_drivers(tasks, clock, (board, shared), (sensors, &wrong), outside, cameras, health)
@@ -94,21 +104,34 @@ impl vehicle::Surroundings for Surroundings {
         let home = Home::new(&world.truth_at(setup.simulation.start));
         let radio = Radio::new(clock, link, &wrong);
         let waits = wrong.injector.wants(Moment::Ground);
-        match setup.pilot {
-            None => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
-            Some(mode) => {
+        match (&setup.live, setup.pilot) {
+            (Some(live), _) => {
+                let shared = (&*seen, &*health, &*profile);
+                let services =
+                    Services::new(live, radio, console, (&setup.vehicle, setup.sensing), &wrong.injector, shared);
+                tasks.spawn(live.serve(clock.clone(), live::PERIOD, services));
+            }
+            (None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
+            (None, Some(mode)) => {
                 let meaning = Meaning::new(&setup.vehicle.navigator, &setup.vehicle.cascade);
                 tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
             }
         }
         let hover_without_link = setup.vehicle.mode.hover_without_link;
-        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, hover_without_link);
+        // What people break on purpose is not judged.
+        let judged = match setup.live {
+            Some(_) => Injector::new(setup.simulation.start, &setup.faults),
+            None => wrong.injector.clone(),
+        };
+        let judge = Judge::new(&judged, &setup.mission, setup.pilot, hover_without_link);
         Around {
             clock: clock.clone(),
             world: world.clone(),
             steps: setup.mission.steps.len(),
             progress,
             watch: Watch::new(home),
+            live: setup.live.as_ref(),
+            seen,
             judge,
             wrong,
             chips,
@@ -137,6 +160,9 @@ pub struct Around<'a> {
     steps: usize,
     progress: &'a Progress,
     watch: Watch,
+    /// The programs that fly it, if there are.
+    live: Option<&'a Live>,
+    seen: &'a Seen,
     judge: Judge,
     wrong: Wrong,
     chips: Option<chips::AttachedChips>,
@@ -191,6 +217,9 @@ impl vehicle::Around for Around<'_> {
         if let Some(id) = Id::ALL.get(topic) {
             self.watch.note(*id, at, words);
             self.judge.published(*id, at, words);
+            if self.live.is_some() {
+                self.seen.note(*id, at, words);
+            }
         }
     }
 
@@ -215,6 +244,9 @@ impl vehicle::Around for Around<'_> {
     }
 
     fn is_over(&mut self, now: Instant) -> bool {
+        if let Some(live) = self.live {
+            return live.ports.are_closed();
+        }
         if self.judge.is_over(now) {
             return true;
         }
@@ -231,7 +263,7 @@ impl vehicle::Around for Around<'_> {
             metrics: watch.collector.finish(),
             phases: watch.phases,
             tuned: watch.tuned,
-            finished: self.progress.finished.get(),
+            finished: self.progress.finished.get() || self.live.is_some(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),
             judgement: self.judge.finish(),

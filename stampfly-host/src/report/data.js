@@ -1,16 +1,6 @@
 // The data of the page: channels as numbers, the shared state, colours and number formats.
 
 const data = JSON.parse(document.getElementById('data').textContent);
-const element = (id) => document.getElementById(id);
-const make = (tag, parent, className = '', text = '') => {
-  const node = document.createElement(tag);
-  if (className) node.className = className;
-  if (text) node.textContent = text;
-  if (parent) parent.append(node);
-  return node;
-};
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-
 const NO_VALUE = 65535;
 const channels = data.channels.map(({ low, step, codes }) => {
   const bytes = atob(codes);
@@ -30,18 +20,11 @@ const state = { time: data.start, from: data.start, to: end, hover: null, playin
 const HINT = 'drag in a plot to zoom · click to set the time · space plays';
 const SPEEDS = [1, 2, 4, 0.25, 0.5];
 
-let styles = getComputedStyle(document.documentElement);
-const ROLES = ['estimate', 'truth', 'setpoint', 'device', 'range'];
-const variable = (role) => (ROLES.includes(role) ? `--${role}` : `--c${Number(role) % 8}`);
-const color = (name) => styles.getPropertyValue(name).trim();
-
 /** As many decimals as a channel's largest value deserves, so that a read-out does not jump. */
 const decimals = channels.map((values) => {
   let size = 0;
   for (const value of values) if (Math.abs(value) > size) size = Math.abs(value);
   return size >= 1000 ? 0 : size >= 30 ? 1 : size >= 3 ? 2 : 3;
 });
-const fixed = (value, digits) => value.toFixed(digits).replace(/^-(0\.?0*)$/, '$1').replace('-', '−');
-const number = (value, digits) => (Number.isFinite(value) ? fixed(value, digits) : '–');
 const clock = (time) => `${(time - data.start).toFixed(2)} s`;
 

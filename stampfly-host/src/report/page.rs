@@ -12,6 +12,9 @@ use std::path::Path;
 /// The page's script, in the order its parts need each other.
 const SCRIPT: &str = concat!(
     "'use strict';\n(() => {\n",
+    include_str!("../page/base.js"),
+    include_str!("../page/canvas.js"),
+    include_str!("../page/scene.js"),
     include_str!("data.js"),
     include_str!("plots.js"),
     include_str!("space.js"),

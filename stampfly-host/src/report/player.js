@@ -133,7 +133,11 @@ document.addEventListener('keydown', (event) => {
 buildPlots();
 buildFigures();
 buildLegend();
-turnWithPointer();
+turnWithPointer(canvas, camera, {
+  farthest: size * 8,
+  reset: () => Object.assign(camera, HOME, { target: [...middle] }),
+  changed: refresh,
+});
 // Without anything to see in space the plots have the page for themselves.
 document.querySelector('main').classList.toggle('flat', !data.scene.length);
 const seen = new IntersectionObserver((entries) => {

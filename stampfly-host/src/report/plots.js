@@ -3,33 +3,6 @@
 const LEFT = 66, RIGHT = 12, TOP = 6, BOTTOM = 6;
 const areas = []; // Everything with the shared time axis.
 
-/** Round steps between ticks: 1, 2 or 5 times a power of ten. */
-const tickStep = (span, count) => {
-  const raw = span / count;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  return power * [1, 2, 5, 10].find((factor) => factor * power >= raw * 0.999);
-};
-const ticks = (low, high, count) => {
-  const step = tickStep(high - low, count);
-  const list = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) list.push(k * step);
-  return { list, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
-};
-
-/** A canvas as sharp as the screen. */
-const prepare = (canvas) => {
-  const ratio = window.devicePixelRatio || 1;
-  const { clientWidth: width, clientHeight: height } = canvas;
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-  }
-  const context = canvas.getContext('2d');
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return { context, width, height };
-};
-
 /** Cursor, hover line and pointer handling common to plots and bands. */
 const makeArea = (parent, height, left, draw) => {
   const node = make('div', parent, 'area');

@@ -15,6 +15,7 @@ mod figures;
 mod flight_task;
 mod flips;
 mod flying_quality;
+mod ground;
 mod held;
 mod hil;
 mod impact;

@@ -4,11 +4,11 @@
 //! |---|---|
 //! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
 //! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
-//! | [`fly`] | one flight on virtual time |
+//! | [`fly`], [`Flying`] | one flight on virtual time, at once or turn by turn |
 //! | [`Remote`], [`fly_remote`] | the same with the runnables on a vehicle at the other end of a line |
 //! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
 //! | [`Scenario`] | what to command and what must be true, as text |
-//! | [`Live`] | other programs fly it, in real time |
+//! | [`Live`], [`Ports`], [`Link`] | other programs fly it, in real time |
 //! | [`Witness`] | is told everything that happens: a log, a hash, a test |
 //!
 //! A program that flies vehicles (missions, campaigns, replay, report) knows them through [`Vehicle`] alone, so a new
@@ -24,8 +24,8 @@ mod scenario;
 mod scripted;
 mod witness;
 
-pub use executor::{Ended, FlightOptions, fly, fly_remote};
-pub use live::{Link, Live};
+pub use executor::{Ended, FlightOptions, Flying, fly, fly_remote};
+pub use live::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed, Transport};
 pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
 pub use remote::{Figures, Port, Remote, RemoteError, Settings};
 pub use scenario::Scenario;
@@ -266,6 +266,8 @@ pub trait Vehicle: 'static {
     const FAULTS: &'static [FaultKind] = &[];
     /// What the flights of a campaign vary. Nothing by default.
     const VARIETY: Variety = Variety::NONE;
+    /// Where other programs reach it while it is live. Nowhere by default.
+    const PORTS: &'static [PortSpec] = &[];
     /// What a page about a flight shows of it. By default a plot per topic and unit.
     const PAGE: Page = Page::EMPTY;
     /// Its runnables. Serialisable, so that a log can hold key frames.
@@ -323,6 +325,11 @@ pub trait Vehicle: 'static {
         name: &str,
         value: ParameterValue,
     ) -> Result<(), SetupError>;
+
+    /// Lowest and highest value of a parameter, for people who choose one; `None` where the vehicle does not say.
+    fn parameter_range(_name: &str) -> Option<[f64; 2]> {
+        None
+    }
 
     /// Its golden flight, if it has one.
     fn golden() -> Option<Golden<Self>> {

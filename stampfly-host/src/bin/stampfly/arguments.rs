@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};
 use stampfly_host::campaign::shard::Shard;
+use stampfly_host::serve::PortOption;
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
 use stampfly_lab::estimate::{Method, Suite, suite};
@@ -35,6 +36,9 @@ pub enum Command {
     Serve(ServeOptions),
     /// Fly a log again, bit for bit, from what came from outside.
     Replay(ReplayOptions),
+    /// Look into a log, cut it, write it in other formats.
+    #[command(subcommand)]
+    Log(LogCommand),
     /// List the topics: type, policy, rate, publisher, readers.
     Topics(TopicsOptions),
     /// List the runnables: what activates them, budget, response time.
@@ -186,16 +190,78 @@ impl Default for FlyOptions {
 #[derive(Clone, Debug, Args)]
 pub struct ServeOptions {
     #[command(flatten)]
-    pub fly: FlyOptions,
-    /// Where to hear other programs. They are not authenticated: leave it on this machine, or in a network of your own.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:47003")]
-    pub listen: SocketAddr,
-    /// For how long, in the vehicle's seconds.
-    #[arg(long = "for", value_name = "SECONDS", default_value_t = 600.0, value_parser = seconds)]
-    pub seconds: f32,
+    pub scene: SceneOptions,
+    /// Seed of everything random. The second vehicle has the next one, and so on.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the log and the report.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// How many vehicles. The ports of each are ten numbers above those of the one before it.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=32))]
+    pub count: u8,
+    /// Where a port is to be, or not at all: `mavlink-tcp=5760`, `console=0.0.0.0:2323`, `mavlink-udp=off`; may be repeated. Number
+    /// 0 is any that is free. Who is heard there is not authenticated: leave it on this machine, or in a network of your own.
+    #[arg(long, value_name = "NAME=ADDRESS")]
+    pub port: Vec<PortOption>,
+    /// The same as `--port listen=ADDRESS`.
+    #[arg(long, value_name = "ADDRESS")]
+    pub listen: Option<SocketAddr>,
+    /// For how long, in the vehicle's seconds. Without this: until Ctrl-C.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    pub seconds: Option<f32>,
     /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,
+}
+
+/// What to do with a log.
+#[derive(Clone, Debug, Subcommand)]
+pub enum LogCommand {
+    /// Vehicle, length, topics with their rates, gaps.
+    Info {
+        /// A ULog file.
+        file: PathBuf,
+        /// Print one JSON object on standard output.
+        #[arg(long)]
+        json: bool,
+    },
+    /// A table a topic.
+    Csv {
+        /// A ULog file.
+        file: PathBuf,
+        /// Only this topic; may be repeated.
+        #[arg(long, value_name = "NAME")]
+        topic: Vec<String>,
+        /// Folder for the tables.
+        #[arg(long, value_name = "DIR", default_value = ".")]
+        out: PathBuf,
+    },
+    /// MCAP, for Foxglove and PlotJuggler.
+    Mcap {
+        /// A ULog file.
+        file: PathBuf,
+        /// Only this topic; may be repeated.
+        #[arg(long, value_name = "NAME")]
+        topic: Vec<String>,
+        /// The file to write. Without this: beside the log.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// A part of a flight, which replays from its first key frame on.
+    Cut {
+        /// A ULog file.
+        file: PathBuf,
+        /// From when on, seconds since power-on.
+        #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+        from: f64,
+        /// Up to when.
+        #[arg(long, value_name = "SECONDS", default_value_t = 1e9)]
+        to: f64,
+        /// The file to write.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
 }
 
 /// Options of `hil`.

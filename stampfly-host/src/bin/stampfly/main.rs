@@ -16,9 +16,11 @@ mod faults;
 mod fly;
 mod golden;
 mod hil;
+mod log;
 mod modes;
 mod replay;
 mod schedule;
+mod serve;
 mod terminal;
 mod topics;
 
@@ -29,8 +31,9 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
+        Command::Log(command) => log::run(&command),
         Command::Fly(options) => fly::run(&options),
-        Command::Serve(options) => fly::serve(&options),
+        Command::Serve(options) => serve::run(&options),
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),

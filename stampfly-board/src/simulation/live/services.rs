@@ -1,0 +1,182 @@
+//! The services of the simulated StampFly, each at its port.
+
+use super::seats::{Controls, Seats};
+use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
+use crate::VehicleConfig;
+use crate::console::Newest;
+use crate::console::Profile;
+use crate::simulation::radio::Radio;
+use crate::simulation::sensing::{Healths, Sensing};
+use crate::simulation::terminal::{Desk, Terminal};
+use crate::topics::ConsoleEnds;
+use stampfly_link::mavlink::dialects::common::MavType;
+use stampfly_services::mavlink::{Identity, Mavlink};
+use stampfly_services::tello::Destination;
+use stampfly_services::{Lease, Tello, View};
+use stampfly_sim::ask::{Ask, Asked};
+use stampfly_sim::fault::Injector;
+use stampfly_sim::vehicle::{Client, Heard, Link, Live, Put, Speed};
+use stampfly_types::Instant;
+use std::vec::Vec;
+
+/// What the simulated vehicle calls itself.
+pub(super) const NOT_SIMULATED: &str = "not of a simulated vehicle";
+const VERSION: &str = concat!("stampfly ", env!("CARGO_PKG_VERSION"), ", simulated");
+/// Ticks between two turns of the services that send by themselves: 20 ms.
+const TURN: u32 = 4;
+
+/// The services.
+pub struct Services<'b> {
+    pub(super) controls: Controls<'b>,
+    pub(super) seen: &'b Seen,
+    sensing: Sensing,
+    health: &'b Healths,
+    profile: &'b Profile,
+    mavlink: Mavlink<Client>,
+    tello: Tello<Client>,
+    /// Number of the port that a Tello's state is sent to.
+    tello_state: Option<u16>,
+    telemetry: Option<Client>,
+    terminals: Vec<(Client, Terminal)>,
+    pub(super) faults: Injector,
+    pub(super) speed: Option<Speed>,
+}
+
+impl<'b> Services<'b> {
+    /// Those of this vehicle, which can be broken by these faults.
+    pub fn new(
+        live: &Live,
+        radio: Radio<'b>,
+        console: ConsoleEnds<'b>,
+        (config, sensing): (&VehicleConfig, Sensing),
+        faults: &Injector,
+        (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
+    ) -> Self {
+        let identity = Identity {
+            system: u8::try_from(live.number + 1).unwrap_or(u8::MAX),
+            kind: MavType::MAV_TYPE_QUADROTOR,
+            take_off_height: 0.5,
+            version: [0, 2, 0],
+        };
+        let controls = Controls {
+            radio,
+            console,
+            lease: Lease::new(),
+            places: seen.places.clone(),
+            config: config.clone(),
+            sticks: None,
+        };
+        Self {
+            controls,
+            seen,
+            sensing,
+            health,
+            profile,
+            mavlink: Mavlink::new(identity),
+            tello: Tello::new(),
+            tello_state: None,
+            telemetry: None,
+            terminals: Vec::new(),
+            faults: faults.clone(),
+            speed: live.speed.clone(),
+        }
+    }
+
+    fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
+        let newest = self.seen.newest.borrow();
+        let desk = Desk {
+            version: VERSION,
+            newest: &newest,
+            sensing: self.sensing,
+            health: self.health,
+            profile: self.profile,
+            facts: &[],
+        };
+        let Some((_, terminal)) = self.terminals.iter_mut().find(|(client, _)| *client == from) else { return };
+        let Controls { config, console, .. } = &mut self.controls;
+        for _ in terminal.send(now, keys, &desk, config, console) {
+            terminal.screen.push_str(NOT_SIMULATED);
+            terminal.screen.push_str("\r\n");
+        }
+        put(&from, core::mem::take(&mut terminal.screen).as_bytes());
+    }
+}
+
+impl Services<'_> {
+    pub(super) fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
+    where
+        Self: 'd,
+    {
+        Desk { version: VERSION, newest, sensing: self.sensing, health: self.health, profile: self.profile, facts: &[] }
+    }
+}
+
+impl Link for Services<'_> {
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
+        let newest = self.seen.newest.borrow();
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        match (from.port, heard) {
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) => self.mavlink.open(now, from, true),
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => self.mavlink.hear(now, from, bytes, &mut cockpit, put),
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Closed) => self.mavlink.close(from),
+            (TELLO, Heard::Bytes(text)) => {
+                let tello_state = self.tello_state;
+                self.tello.hear(now, from, text, &mut cockpit, &mut |to, what, bytes| {
+                    put(&destination(*to, what, tello_state), bytes);
+                });
+            }
+            (TELLO_STATE, Heard::Opened) => self.tello_state = Some(from.address.port()),
+            (TELEMETRY, Heard::Opened) => self.telemetry = Some(from),
+            (STREAM, Heard::Bytes(request)) => self.seen.stream.borrow_mut().hear(now, from, request),
+            (CONSOLE, Heard::Opened) => {
+                let mut terminal = Terminal::new();
+                terminal.greet(VERSION);
+                put(&from, core::mem::take(&mut terminal.screen).as_bytes());
+                self.terminals.push((from, terminal));
+            }
+            (CONSOLE, Heard::Bytes(keys)) => {
+                drop(newest);
+                self.type_in(now, from, keys, put);
+            }
+            (PAGE, Heard::Bytes(text)) => {
+                drop(newest);
+                let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
+                let Some(asked) = asked else { return };
+                let answer = self.page(now, &asked.ask);
+                // What is said again and again needs no answer.
+                if !matches!(asked.ask, Ask::Sticks(_) | Ask::Alive {}) {
+                    put(&from, asked.answered(answer).as_bytes());
+                }
+            }
+            (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
+            _ => {}
+        }
+    }
+
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
+        let newest = self.seen.newest.borrow();
+        self.controls.poll(now, &newest);
+        let view = View::new(&*newest, &self.seen.places);
+        self.seen.stream.borrow_mut().poll(now, &view, put);
+        if let Some(to) = &self.telemetry {
+            self.seen.telemetry.borrow_mut().poll(now, &view, &mut |packet| put(to, packet));
+        }
+        if !tick.is_multiple_of(TURN) {
+            return;
+        }
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        self.mavlink.poll(now, &mut cockpit, put);
+        let tello_state = self.tello_state;
+        self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| put(&destination(*to, what, tello_state), bytes));
+    }
+}
+
+/// A Tello's state goes to another port of the program's machine.
+fn destination(program: Client, what: Destination, state: Option<u16>) -> Client {
+    match (what, state) {
+        (Destination::State, Some(number)) => {
+            Client { port: TELLO_STATE, address: (program.address.ip(), number).into() }
+        }
+        _ => program,
+    }
+}

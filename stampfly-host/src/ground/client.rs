@@ -1,0 +1,133 @@
+//! One WebSocket: asks in; state, answers and events out.
+//!
+//! One thread does both. Writing gives up after a few milliseconds when the client does not take what is sent; then state is
+//! left out and counted until it does, and asks are still heard. Answers and events are not left out: a client that takes
+//! nothing for too long is cut off.
+
+use super::ask::{AskError, Asked, Incoming, Reply};
+use super::feed::Feed;
+use super::hub::{Connection, Hub};
+use super::server::Limits;
+use std::io::{self, ErrorKind};
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, WebSocket};
+
+/// Longest wait for an ask: as long may an answer wait.
+const LOOK: Duration = Duration::from_millis(10);
+/// Longest wait for a client to take something.
+const WRITE: Duration = Duration::from_millis(5);
+/// Texts a second at first.
+const RATE: u8 = 50;
+/// What may wait to be written, bytes.
+const WAITING: usize = 4 << 20;
+
+struct Page {
+    hub: Arc<Hub>,
+    connection: Connection,
+    socket: WebSocket<TcpStream>,
+    feed: Feed,
+    period: Duration,
+}
+
+/// Serves a client whose handshake has been answered; `rest` are the bytes that came behind it.
+pub(super) fn serve(hub: Arc<Hub>, stream: TcpStream, rest: Vec<u8>, limits: &Limits, is_over: &dyn Fn() -> bool) {
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(2 * super::ask::LONGEST))
+        .max_frame_size(Some(2 * super::ask::LONGEST))
+        .read_buffer_size(16 << 10)
+        .write_buffer_size(0)
+        .max_write_buffer_size(WAITING);
+    if stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(WRITE))).is_err() {
+        return;
+    }
+    let socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
+    let (connection, feed) = (hub.connect(), Feed::new(hub.clone()));
+    let mut page = Page { hub, connection, socket, feed, period: period(RATE) };
+    // Whatever ends it, nobody is left to be told.
+    let _ = page.run(limits, is_over);
+}
+
+fn period(rate: u8) -> Duration {
+    Duration::from_secs(1) / u32::from(rate.max(1))
+}
+
+/// Was it only not possible now? Systems name it differently.
+fn is_full(error: &Error) -> bool {
+    matches!(error, Error::Io(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+}
+
+impl Page {
+    fn run(&mut self, limits: &Limits, is_over: &dyn Fn() -> bool) -> Result<(), Error> {
+        let hello = self.hub.hello();
+        self.put(hello.into())?;
+        let mut due = Instant::now();
+        let mut stalled: Option<Instant> = None;
+        while !is_over() {
+            if self.connection.has_overflown() || stalled.is_some_and(|since| since.elapsed() > limits.stall) {
+                return Err(io::Error::from(ErrorKind::TimedOut).into());
+            }
+            for text in self.connection.take() {
+                self.put(Message::text(&*text))?;
+            }
+            let now = Instant::now();
+            if now >= due {
+                match stalled {
+                    None => {
+                        let text = self.feed.text();
+                        self.put(text.into())?;
+                    }
+                    Some(_) => self.feed.dropped += 1,
+                }
+                // A late one keeps the plan; time that is lost is not made up for.
+                due = (due + self.period).max(now);
+            }
+            match self.socket.flush() {
+                Ok(()) => stalled = None,
+                Err(error) if is_full(&error) => stalled = stalled.or(Some(now)),
+                Err(error) => return Err(error),
+            }
+            // No time at all would be refused.
+            let wait = due.saturating_duration_since(Instant::now()).clamp(Duration::from_millis(1), LOOK);
+            self.socket.get_ref().set_read_timeout(Some(wait))?;
+            match self.socket.read() {
+                Ok(Message::Text(text)) => self.hear(&text),
+                Ok(Message::Close(_)) => return Ok(()),
+                Ok(_) => {}
+                Err(error) if is_full(&error) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let _ = self.socket.close(None);
+        self.socket.flush()
+    }
+
+    /// Writes, or leaves it to a later flush.
+    fn put(&mut self, message: Message) -> Result<(), Error> {
+        match self.socket.write(message) {
+            Err(error) if is_full(&error) => Ok(()),
+            result => result,
+        }
+    }
+
+    fn hear(&mut self, text: &str) {
+        let client = self.connection.client();
+        let refuse = |vehicle, id, why: String| self.hub.answer_to(client, vehicle, id, Err(why));
+        match Incoming::parse(text) {
+            Ok(Incoming::Subscribe { id, topics, rate }) => {
+                self.period = period(rate);
+                self.feed.subscribe(topics);
+                self.hub.answer_to(client, None, id, Ok(Reply::text("subscribed")));
+            }
+            Ok(Incoming::Ask(asked)) => {
+                let Asked { vehicle, id, .. } = asked;
+                if let Err(why) = self.hub.ask(client, asked) {
+                    refuse(Some(vehicle), id, why.to_string());
+                }
+            }
+            Err((id, why)) => refuse(None, id, AskError::to_string(&why)),
+        }
+    }
+}

@@ -1,0 +1,454 @@
+//! What flights and sockets share: cards, newest samples, asks on their way to a vehicle, answers on their way to a page.
+//!
+//! A flight's thread uses [`Hub::witness`], [`Hub::asks`], [`Hub::answer`], [`Hub::tell_all`] and [`Hub::provide_log`]; none
+//! of them waits for a socket. Every queue is bounded: a vehicle that does not look is sent no more asks, a client that does
+//! not read its answers is cut off.
+//!
+//! ```
+//! use stampfly_board::simulation::StampFly;
+//! use stampfly_host::ground::{Hub, Reply, VehicleCard, ask::Asked};
+//! use stampfly_sim::vehicle::Vehicle;
+//!
+//! let hub = Hub::new(vec![VehicleCard::of::<StampFly>("StampFly 1", &StampFly::default_config()).offering(&["guided"])]);
+//! // A socket:
+//! let page = hub.connect();
+//! let asked = Asked::parse(r#"{"vehicle":0,"id":1,"do":"guided","kind":"arm"}"#).unwrap();
+//! hub.ask(page.client(), asked).unwrap();
+//! // The flight's thread:
+//! for (client, asked) in hub.asks(0) {
+//!     hub.answer(client, &asked, Ok(Reply::text("on its way")));
+//! }
+//! assert!(page.take()[0].contains("on its way"));
+//! ```
+
+use super::ask::{Ask, Asked, Guided, Reply, reply_text};
+use super::card::{self, TopicCard, VehicleCard};
+use super::newest::{Newest, Watch};
+use serde::Serialize;
+use serde_json::{Value, json};
+use stampfly_types::Instant;
+use std::collections::VecDeque;
+use std::fmt;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Asks that wait for one vehicle.
+const ASKS: usize = 192;
+/// More of them, for those that stop motors.
+const ROOM_TO_STOP: usize = 64;
+/// Texts that wait for one client.
+const TEXTS: usize = 512;
+/// Events that a page which comes later is told.
+const EVENTS: usize = 64;
+
+/// Who asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Client(u64);
+
+impl Client {
+    /// Its number: no two clients of a hub have the same.
+    #[must_use]
+    pub const fn number(self) -> u64 {
+        self.0
+    }
+
+    /// The client of this number.
+    #[must_use]
+    pub const fn of(number: u64) -> Self {
+        Self(number)
+    }
+}
+
+/// What all pages are told.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Event {
+    /// Something to read.
+    Text {
+        /// A sentence.
+        text: String,
+    },
+    /// A parameter has changed.
+    Parameter {
+        /// Its name.
+        name: String,
+        /// Its value now.
+        value: f64,
+    },
+    /// Virtual time runs this much faster than the wall's.
+    Speed {
+        /// 0 while it stands.
+        factor: f32,
+    },
+    /// The flight is over; nothing more will come of this vehicle.
+    Ended {
+        /// How it went.
+        text: String,
+    },
+}
+
+/// Why an ask did not reach a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NotAsked {
+    /// There is no such vehicle.
+    NoVehicle,
+    /// It does not carry this out.
+    NotOffered,
+    /// It has not looked at those before.
+    Busy,
+}
+
+impl fmt::Display for NotAsked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoVehicle => "there is no such vehicle",
+            Self::NotOffered => "this vehicle does not offer it",
+            Self::Busy => "the vehicle does not answer",
+        })
+    }
+}
+
+impl std::error::Error for NotAsked {}
+
+type LogSource = Box<dyn Fn() -> Vec<u8> + Send + Sync>;
+
+struct Shared {
+    card: Mutex<VehicleCard>,
+    topics: Arc<[TopicCard]>,
+    newest: Arc<Newest>,
+    asks: Mutex<VecDeque<(Client, Asked)>>,
+    log: Mutex<Option<Arc<LogSource>>>,
+    /// Sticks that found the queue full.
+    sticks_lost: AtomicU64,
+}
+
+/// See the module.
+pub struct Hub {
+    vehicles: Vec<Shared>,
+    clients: Mutex<Vec<Arc<Outbox>>>,
+    events: Mutex<VecDeque<Arc<str>>>,
+    next: AtomicU64,
+}
+
+impl fmt::Debug for Hub {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Hub").field("vehicles", &self.vehicles.len()).finish_non_exhaustive()
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is in them is whole at any time.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Hub {
+    /// For these vehicles, numbered from 0.
+    #[must_use]
+    pub fn new(cards: Vec<VehicleCard>) -> Arc<Self> {
+        let vehicles = cards.into_iter().map(|card| {
+            let newest = Newest::new(card.topics.iter().map(|topic| topic.words), card.on_bus);
+            Shared {
+                topics: card.topics.clone().into(),
+                newest: Arc::new(newest),
+                card: Mutex::new(card),
+                asks: Mutex::default(),
+                log: Mutex::default(),
+                sticks_lost: AtomicU64::new(0),
+            }
+        });
+        Arc::new(Self {
+            vehicles: vehicles.collect(),
+            clients: Mutex::default(),
+            events: Mutex::default(),
+            next: AtomicU64::new(1),
+        })
+    }
+
+    /// How many vehicles there are.
+    #[must_use]
+    pub fn vehicles(&self) -> usize {
+        self.vehicles.len()
+    }
+
+    /// Keeps the newest samples of this vehicle for the pages; `None` when there is no such vehicle.
+    #[must_use]
+    pub fn witness(&self, vehicle: usize) -> Option<Watch> {
+        Some(Watch(self.vehicles.get(vehicle)?.newest.clone()))
+    }
+
+    /// What this vehicle has been asked since the last call, oldest first, with who asked. Of a client's sticks only the
+    /// newest are left where nothing else came between.
+    #[must_use]
+    pub fn asks(&self, vehicle: usize) -> Vec<(Client, Asked)> {
+        self.vehicles.get(vehicle).map(|shared| lock(&shared.asks).drain(..).collect()).unwrap_or_default()
+    }
+
+    /// Answers an ask. A client that has gone gets nothing.
+    pub fn answer(&self, client: Client, asked: &Asked, answer: Result<Reply, String>) {
+        self.answer_to(client, Some(asked.vehicle), asked.id, answer);
+    }
+
+    pub(super) fn answer_to(&self, client: Client, vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) {
+        self.send(client, &reply_text(vehicle, id, answer));
+    }
+
+    /// Sends a client a text that is JSON already, such as [`Asked::answered`]. One that has gone gets nothing.
+    pub fn send(&self, client: Client, text: &str) {
+        let clients = lock(&self.clients);
+        if let Some(outbox) = clients.iter().find(|outbox| outbox.client == client) {
+            outbox.put(text.into());
+        }
+    }
+
+    /// Tells all pages, and those that come later as far as it is among the last sixty-four events. A parameter's new value is on the card from now on.
+    pub fn tell_all(&self, vehicle: usize, event: &Event) {
+        let Some(shared) = self.vehicles.get(vehicle) else { return };
+        if let Event::Parameter { name, value } = event {
+            let mut card = lock(&shared.card);
+            if let Some(row) = card.parameters.iter_mut().find(|row| row.setting.name == name) {
+                row.value = *value;
+            }
+        }
+        let mut body = serde_json::to_value(event).unwrap_or_default();
+        body["vehicle"] = vehicle.into();
+        body["at"] = seconds(shared.newest.clock()).into();
+        let text: Arc<str> = json!({ "event": body }).to_string().into();
+        if !matches!(event, Event::Parameter { .. }) {
+            let mut events = lock(&self.events);
+            if events.len() >= EVENTS {
+                events.pop_front();
+            }
+            events.push_back(text.clone());
+        }
+        lock(&self.clients).iter().for_each(|outbox| outbox.put(text.clone()));
+    }
+
+    /// Where the log of this vehicle so far comes from: bytes of a ULog file.
+    pub fn provide_log(&self, vehicle: usize, source: impl Fn() -> Vec<u8> + Send + Sync + 'static) {
+        if let Some(shared) = self.vehicles.get(vehicle) {
+            *lock(&shared.log) = Some(Arc::new(Box::new(source)));
+        }
+    }
+
+    /// The log of this vehicle so far.
+    #[must_use]
+    pub fn log(&self, vehicle: usize) -> Option<Vec<u8>> {
+        let source = lock(&self.vehicles.get(vehicle)?.log).clone()?;
+        Some(source())
+    }
+
+    /// Sticks that this vehicle has lost because it did not look.
+    #[must_use]
+    pub fn sticks_lost(&self, vehicle: usize) -> u64 {
+        self.vehicles.get(vehicle).map_or(0, |shared| shared.sticks_lost.load(Ordering::Relaxed))
+    }
+
+    /// A client has come. It is told the events so far.
+    pub fn connect(self: &Arc<Self>) -> Connection {
+        let client = Client(self.next.fetch_add(1, Ordering::Relaxed));
+        let texts = lock(&self.events).iter().cloned().collect();
+        let outbox = Arc::new(Outbox { client, texts: Mutex::new(texts), overflown: AtomicBool::new(false) });
+        lock(&self.clients).push(outbox.clone());
+        Connection { hub: self.clone(), outbox }
+    }
+
+    /// Puts an ask into the vehicle's queue.
+    ///
+    /// # Errors
+    /// [`NotAsked`].
+    pub fn ask(&self, client: Client, asked: Asked) -> Result<(), NotAsked> {
+        let shared = self.vehicles.get(asked.vehicle).ok_or(NotAsked::NoVehicle)?;
+        if !lock(&shared.card).does_offer(&asked.ask) {
+            return Err(NotAsked::NotOffered);
+        }
+        let stops = matches!(asked.ask, Ask::Guided(Guided::Kill {} | Guided::Disarm {}) | Ask::MotorStop {})
+            || matches!(asked.ask, Ask::Sticks(sticks) if sticks.kill);
+        let is_sticks = matches!(asked.ask, Ask::Sticks(_));
+        let mut asks = lock(&shared.asks);
+        if let Some((last, Asked { ask: ask @ Ask::Sticks(_), .. })) = asks.back_mut()
+            && is_sticks
+            && *last == client
+            && !matches!(ask, Ask::Sticks(sticks) if sticks.kill)
+        {
+            *ask = asked.ask;
+            return Ok(());
+        }
+        let room = ASKS + if stops { ROOM_TO_STOP } else { 0 };
+        if asks.len() < room {
+            asks.push_back((client, asked));
+            return Ok(());
+        }
+        if is_sticks {
+            shared.sticks_lost.fetch_add(1, Ordering::Relaxed);
+        }
+        Err(NotAsked::Busy)
+    }
+
+    /// The first thing a page is told.
+    pub(super) fn hello(&self) -> String {
+        let cards = self.vehicles.iter().enumerate().map(|(number, shared)| lock(&shared.card).json(number));
+        let cards: Vec<Value> = cards.collect();
+        json!({ "hello": { "version": env!("CARGO_PKG_VERSION"), "vehicles": cards, "words": card::words() } })
+            .to_string()
+    }
+
+    /// Of each vehicle: its newest samples, and what their words mean.
+    pub(super) fn samples(&self) -> impl Iterator<Item = (&Newest, &[TopicCard])> {
+        self.vehicles.iter().map(|shared| (&*shared.newest, &*shared.topics))
+    }
+}
+
+fn seconds(at: Instant) -> f64 {
+    at.as_micros() as f64 * 1e-6
+}
+
+/// Texts on their way to one client.
+#[derive(Debug)]
+struct Outbox {
+    client: Client,
+    texts: Mutex<VecDeque<Arc<str>>>,
+    overflown: AtomicBool,
+}
+
+impl Outbox {
+    fn put(&self, text: Arc<str>) {
+        let mut texts = lock(&self.texts);
+        if texts.len() < TEXTS {
+            texts.push_back(text);
+        } else {
+            self.overflown.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// A client that is connected; dropped, it has gone.
+#[derive(Debug)]
+pub struct Connection {
+    hub: Arc<Hub>,
+    outbox: Arc<Outbox>,
+}
+
+impl Connection {
+    /// Who it is.
+    #[must_use]
+    pub fn client(&self) -> Client {
+        self.outbox.client
+    }
+
+    /// What it is to be sent.
+    #[must_use]
+    pub fn take(&self) -> Vec<Arc<str>> {
+        lock(&self.outbox.texts).drain(..).collect()
+    }
+
+    /// Has something been lost, because nobody took it? Then it has to be cut off: an answer must not be missing unnoticed.
+    #[must_use]
+    pub fn has_overflown(&self) -> bool {
+        self.outbox.overflown.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        lock(&self.hub.clients).retain(|outbox| outbox.client != self.outbox.client);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ask::NAMES;
+    use super::*;
+    use stampfly_board::simulation::StampFly;
+    use stampfly_sim::vehicle::Vehicle;
+
+    fn hub() -> Arc<Hub> {
+        let card = |name| VehicleCard::of::<StampFly>(name, &StampFly::default_config()).offering(NAMES);
+        Hub::new(vec![card("one"), card("two")])
+    }
+
+    fn asked(vehicle: usize, rest: &str) -> Asked {
+        Asked::parse(&format!(r#"{{"vehicle":{vehicle},"id":5,{rest}}}"#)).expect("an ask")
+    }
+
+    const STICKS: &str =
+        r#""do":"sticks","roll":0,"pitch":0,"yaw":0,"throttle":0,"mode":"poshold","arm":false,"kill":false"#;
+
+    #[test]
+    fn asks_reach_their_vehicle_and_answers_their_client() {
+        let hub = hub();
+        let (first, second) = (hub.connect(), hub.connect());
+        hub.ask(second.client(), asked(1, r#""do":"param_save""#)).expect("room");
+        assert_eq!(hub.asks(0), []);
+        let asks = hub.asks(1);
+        assert_eq!(asks, [(second.client(), asked(1, r#""do":"param_save""#))]);
+        hub.answer(asks[0].0, &asks[0].1, Err("no flash".into()));
+        assert!(first.take().is_empty());
+        let texts = second.take();
+        let reply: Value = serde_json::from_str(&texts[0]).expect("JSON");
+        assert_eq!(reply["reply"], json!({ "vehicle": 1, "id": 5, "ok": false, "text": "no flash", "value": null }));
+        assert_eq!(hub.ask(first.client(), asked(2, r#""do":"param_save""#)), Err(NotAsked::NoVehicle));
+    }
+
+    #[test]
+    fn what_a_card_does_not_offer_is_refused() {
+        let hub = Hub::new(vec![VehicleCard::of::<StampFly>("one", &StampFly::default_config()).offering(&["guided"])]);
+        let page = hub.connect();
+        assert_eq!(hub.ask(page.client(), asked(0, r#""do":"param_save""#)), Err(NotAsked::NotOffered));
+        hub.ask(page.client(), asked(0, r#""do":"guided","kind":"arm""#)).expect("offered");
+    }
+
+    #[test]
+    fn a_full_queue_still_takes_what_stops_motors() {
+        let hub = hub();
+        let page = hub.connect();
+        let ask = |rest| hub.ask(page.client(), asked(0, rest));
+        while ask(r#""do":"param_save""#).is_ok() {}
+        assert_eq!(ask(STICKS), Err(NotAsked::Busy));
+        assert_eq!(hub.sticks_lost(0), 1);
+        ask(r#""do":"guided","kind":"kill""#).expect("room to stop");
+        assert_eq!(hub.asks(0).len(), ASKS + 1);
+        ask(STICKS).expect("room again");
+    }
+
+    #[test]
+    fn only_the_newest_sticks_wait_but_a_kill_stays() {
+        let hub = hub();
+        let page = hub.connect();
+        let kill = STICKS.replace(r#""kill":false"#, r#""kill":true"#);
+        for rest in [STICKS, STICKS, &kill, STICKS, STICKS] {
+            hub.ask(page.client(), asked(0, rest)).expect("room");
+        }
+        let kills: Vec<bool> =
+            hub.asks(0).iter().map(|(_, asked)| matches!(asked.ask, Ask::Sticks(sticks) if sticks.kill)).collect();
+        assert_eq!(kills, [true, false]);
+    }
+
+    #[test]
+    fn a_client_that_takes_nothing_overflows_and_stops_nobody() {
+        let hub = hub();
+        let (deaf, well) = (hub.connect(), hub.connect());
+        for _ in 0..=TEXTS {
+            hub.tell_all(0, &Event::Text { text: "gust".into() });
+            let _ = well.take();
+        }
+        assert!(deaf.has_overflown() && !well.has_overflown());
+        drop(deaf);
+        assert_eq!(lock(&hub.clients).len(), 1);
+        assert_eq!(hub.connect().take().len(), EVENTS, "the newest events of the past");
+    }
+
+    #[test]
+    fn a_changed_parameter_is_on_the_card() {
+        let hub = hub();
+        hub.tell_all(1, &Event::Parameter { name: "eskf.gate".into(), value: 3.5 });
+        let hello: Value = serde_json::from_str(&hub.hello()).expect("JSON");
+        let value = |vehicle: usize| {
+            let rows = hello["hello"]["vehicles"][vehicle]["parameters"].as_array().expect("rows");
+            rows.iter().find(|row| row["name"] == "eskf.gate").map(|row| row["value"].clone())
+        };
+        assert_ne!(value(0), value(1));
+        assert_eq!(value(1), Some(json!(3.5)));
+        assert!(hub.connect().take().is_empty(), "no event of the past");
+    }
+}

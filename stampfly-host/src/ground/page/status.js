@@ -1,0 +1,102 @@
+// State, phase, reasons against arming and alerts of the chosen vehicle, in words.
+
+const PHASES = {
+  Init: 'starting', IdleGround: 'on the ground', IdleHeld: 'in a hand', Armed: 'armed', TakeOff: 'taking off', Flying: 'flying',
+  Landing: 'landing', Flip: 'flipping',
+};
+const MODES = { Acro: 'acro', Stabilize: 'stabilize', AltHold: 'altitude hold', PosHold: 'position hold' };
+const plain = (name) => name.replace(/([a-z])([A-Z])/g, '$1 $2').replaceAll('_', ' ').toLowerCase();
+let words = { alerts: {}, blocks: {} };
+
+/** Puts texts into a list without touching it when nothing changes: a screen reader would read it again. */
+const setList = (node, texts, className = '') => {
+  const key = JSON.stringify(texts);
+  if (node.dataset.key === key) return;
+  node.dataset.key = key;
+  node.replaceChildren();
+  for (const text of texts) make('li', node, className, text);
+};
+const setText = (node, text) => { if (node.textContent !== text) node.textContent = text; };
+
+const isArmed = (vehicle) => Boolean(vehicle && field(vehicle, 'flight_status', 'armed')?.[0]);
+const phaseOf = (vehicle) => named(vehicle, 'flight_status', 'phase');
+
+const writeStatus = (vehicle) => {
+  const [phase, mode] = [phaseOf(vehicle), named(vehicle, 'flight_status', 'mode')];
+  setText(element('phase'), vehicle.ended ? 'flight over' : phase ? (PHASES[phase] ?? plain(phase)) : 'no state yet');
+  setText(element('armed'), phase === null ? '' : isArmed(vehicle) ? 'ARMED' : 'disarmed');
+  element('armed').className = isArmed(vehicle) ? 'chip armed' : 'chip';
+  setText(element('mode'), mode ? MODES[mode] ?? plain(mode) : '');
+  const commander = named(vehicle, 'flight_status', 'commander');
+  setText(element('commander'), commander && commander !== 'None' ? `by ${plain(commander)}` : '');
+  const blocks = named(vehicle, 'flight_status', 'blocks') ?? [];
+  const isIdle = !isArmed(vehicle) && phase !== null;
+  setList(element('blocks'), isIdle ? blocks.map((name) => words.blocks[name] ?? plain(name)) : []);
+  element('ready').hidden = !(isIdle && blocks.length === 0 && !vehicle.isLog);
+  element('blocked').hidden = !(isIdle && blocks.length > 0);
+  const alerts = vehicle.card.page.alerts ? named(vehicle, ...vehicle.card.page.alerts) ?? [] : [];
+  setList(element('alerts'), alerts.map((name) => words.alerts[name] ?? plain(name)));
+  element('alarm').hidden = alerts.length === 0;
+  const { main } = observersOf(vehicle.card);
+  const pose = poseOf(vehicle, main);
+  const velocity = field(vehicle, main?.topic, 'velocity');
+  const [roll, pitch, yaw] = pose ? rollPitchYaw(pose.attitude).map((angle) => angle * DEGREES) : [NaN, NaN, NaN];
+  const voltage = column(vehicle, 'sensor_power', 'voltage')(), current = column(vehicle, 'sensor_power', 'current')();
+  const figures = {
+    height: [pose ? -pose.place[2] : NaN, 2], north: [pose?.place[0] ?? NaN, 2], east: [pose?.place[1] ?? NaN, 2],
+    speed: [velocity ? Math.hypot(...velocity) : NaN, 2], roll: [roll, 1], pitch: [pitch, 1], heading: [(yaw + 360) % 360, 0],
+    voltage: [voltage, 2], current: [current, 2],
+  };
+  for (const [name, [value, digits]] of Object.entries(figures)) setText(element(`figure-${name}`), number(value, digits));
+  setText(element('clock'), Number.isFinite(vehicle.clock) ? `${vehicle.clock.toFixed(1)} s` : '–');
+};
+
+const writeLink = () => {
+  measureLink();
+  const node = element('link');
+  node.className = link.isOpen ? (link.rate < RATE * 0.7 ? 'chip weak' : 'chip good') : 'chip bad';
+  const parts = [`${Math.round(link.rate)} Hz`];
+  if (Number.isFinite(link.delay)) parts.push(`${Math.round(link.delay)} ms`);
+  if (link.dropped) parts.push(`${link.dropped} dropped`);
+  setText(node, link.isOpen ? parts.join(' · ') : 'not connected');
+  node.title = 'Texts a second from the server, the time of the last answer, texts left out because this page was too slow';
+};
+
+/** Samples a second of each topic, for those who want to know. */
+const writeRates = (vehicle) => {
+  const body = element('rates');
+  if (body.closest('[hidden]')) return;
+  const rows = vehicle.list.filter((topic) => topic.count > 0);
+  const key = `${vehicle.number} ${rows.length}`;
+  if (body.dataset.key !== key) {
+    body.dataset.key = key;
+    body.replaceChildren();
+    for (const topic of rows) {
+      const row = make('tr', body);
+      make('th', row, '', topic.name).scope = 'row';
+      row.title = topic.doc;
+      topic.output = make('td', row);
+      make('td', row, 'dim', topic.rate);
+    }
+  }
+  for (const topic of rows) {
+    const [samples, time] = [topic.count - (topic.counted ?? topic.count), vehicle.clock - (topic.countedAt ?? vehicle.clock)];
+    if (topic.output) topic.output.textContent = time > 0 ? `${(samples / time).toFixed(samples / time < 10 ? 1 : 0)} Hz` : '–';
+    [topic.counted, topic.countedAt] = [topic.count, vehicle.clock];
+  }
+};
+
+const messages = [];
+/** What the vehicle and the server say, newest first. */
+const log = (text, kind = '') => {
+  const list = element('messages');
+  const item = document.createElement('li');
+  item.className = kind;
+  make('time', item, '', new Date().toLocaleTimeString());
+  make('span', item, '', text);
+  list.prepend(item);
+  messages.push(text);
+  while (list.children.length > 100) list.lastChild.remove();
+  if (kind === 'bad') setText(element('toast'), text);
+};
+

@@ -1,0 +1,661 @@
+//! What a page or another program asks of a vehicle: JSON as it arrives, and what it means.
+//!
+//! Use it on both sides: a server makes an [`Asked`] of every text that arrives, the vehicle carries it out and answers with a
+//! [`Reply`].
+//! Nothing here knows a particular vehicle. [`Guided`] becomes the [`GuidedCommand`] and [`Sticks`] the [`PilotInput`] that
+//! every radio link of the project ends in.
+//!
+//! An ask is a JSON object with `vehicle` (its number), `id` (whatever the page likes; the answer repeats it), `do`, and what
+//! belongs to it:
+//!
+//! ```
+//! use stampfly_sim::ask::{Ask, Asked, Guided};
+//!
+//! let text = r#"{"vehicle":0,"id":17,"do":"guided","kind":"take_off","height":0.5}"#;
+//! let asked = Asked::parse(text)?;
+//! assert_eq!((asked.vehicle, asked.id), (0, 17));
+//! assert_eq!(asked.ask, Ask::Guided(Guided::TakeOff { height: 0.5 }));
+//! assert!(Asked::parse(r#"{"vehicle":0,"id":17,"do":"guided","kind":"take_off","height":"much"}"#).is_err());
+//! # Ok::<(), stampfly_sim::ask::AskError>(())
+//! ```
+//!
+//! Strict on purpose: a field that is not known, a number that is not finite or out of its range, a text that is too long
+//! refuse the whole ask.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use stampfly_types::Vec3;
+use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
+use std::fmt;
+
+/// Longest ask, bytes.
+pub const LONGEST: usize = 4096;
+/// Longest text within an ask (a console line, a fault, a name), bytes.
+pub const LONGEST_TEXT: usize = 256;
+/// Highest number of a vehicle.
+const VEHICLES: u64 = 1000;
+
+/// One thing that is asked of one vehicle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Asked {
+    /// Number of the vehicle, from 0.
+    pub vehicle: usize,
+    /// Chosen by whoever asks; the answer carries it.
+    pub id: u32,
+    /// What is asked.
+    #[serde(flatten)]
+    pub ask: Ask,
+}
+
+/// What can be asked.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Ask {
+    /// A guided command.
+    Guided(Guided),
+    /// Sticks and switches, sent again and again while somebody flies by hand. Has no answer.
+    Sticks(Sticks),
+    /// Somebody is there: to be said at least every second, or the vehicle takes the link for lost. Has no answer.
+    Alive {},
+    /// Changes a parameter.
+    ParamSet {
+        /// Its name.
+        name: String,
+        /// The new value, in the parameter's unit.
+        value: f32,
+    },
+    /// Asks for a parameter's value.
+    ParamGet {
+        /// Its name.
+        name: String,
+    },
+    /// Keeps the parameters for the next start.
+    ParamSave {},
+    /// A line for the vehicle's console; the answer's text is what the console says.
+    Console {
+        /// Without its end.
+        line: String,
+    },
+    /// Turns one motor of the disarmed vehicle, for as long as the vehicle's own limit. Repeated while a button is held.
+    MotorTest {
+        /// From 1.
+        motor: u8,
+        /// Share of the full duty, 0 to 1.
+        duty: f32,
+    },
+    /// Stops the motor test.
+    MotorStop {},
+    /// A fault, as [`Fault::parse`](crate::fault::Fault::parse) reads it. One whose time is past (`@0`) begins at once, and
+    /// lasts its seconds from then.
+    Fault {
+        /// The text.
+        text: String,
+    },
+    /// Ends every fault.
+    FaultClear {},
+    /// Virtual seconds in a second of the wall; 0 pauses.
+    Speed {
+        /// At most [`FASTEST`].
+        factor: f32,
+    },
+}
+
+/// Most virtual seconds in a second of the wall.
+pub const FASTEST: f32 = 100.0;
+
+/// A guided command: what programs ask of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Guided {
+    /// Allow the motors.
+    Arm {},
+    /// Land if flying, then stop the motors.
+    Disarm {},
+    /// Rise.
+    TakeOff {
+        /// Above the present place, m, above 0 and at most [`HIGHEST`].
+        height: f32,
+    },
+    /// Append a way-point to the route.
+    GoTo {
+        /// Relative to the origin, m.
+        north: f32,
+        /// Relative to the origin, m.
+        east: f32,
+        /// Above the origin, m.
+        up: f32,
+        /// Heading at the goal, rad from north, clockwise.
+        yaw: f32,
+        /// Highest speed, m/s; 0, or left out, is the vehicle's default.
+        #[serde(default)]
+        speed: f32,
+        /// Time to stay there, s.
+        #[serde(default)]
+        dwell: f32,
+    },
+    /// Forget the route and stay here.
+    Hold {},
+    /// Land here.
+    Land {},
+    /// Motors off now.
+    Kill {},
+    /// Turn over once.
+    Flip {
+        /// Which way.
+        direction: Direction,
+    },
+    /// Tune one rate loop, from a hover; any other command ends it.
+    Autotune {
+        /// Which one.
+        axis: Axis,
+    },
+}
+
+/// Highest take-off, m.
+pub const HIGHEST: f32 = 100.0;
+/// Farthest way-point along each axis, m.
+pub const FARTHEST: f32 = 1000.0;
+
+/// Which way to turn over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// Left wing down.
+    Left,
+    /// Right wing down.
+    Right,
+    /// Nose down.
+    Forward,
+    /// Nose up.
+    Back,
+}
+
+/// An axis of the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// Forward.
+    Roll,
+    /// Right.
+    Pitch,
+    /// Down.
+    Yaw,
+}
+
+/// Sticks and switches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sticks {
+    /// −1 to 1, right positive.
+    pub roll: f32,
+    /// −1 to 1, forward positive.
+    pub pitch: f32,
+    /// −1 to 1, clockwise seen from above positive.
+    pub yaw: f32,
+    /// −1 to 1, up positive, spring centred.
+    pub throttle: f32,
+    /// The flight mode.
+    pub mode: Mode,
+    /// Arm switch.
+    pub arm: bool,
+    /// Motors off now.
+    pub kill: bool,
+}
+
+/// A flight mode, as sticks name it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Sticks command rates.
+    Acro,
+    /// Sticks command angles.
+    Stabilize,
+    /// Throttle commands climb rate.
+    AltHold,
+    /// Sticks command velocities.
+    #[default]
+    PosHold,
+}
+
+impl From<Mode> for FlightMode {
+    fn from(mode: Mode) -> Self {
+        match mode {
+            Mode::Acro => Self::Acro,
+            Mode::Stabilize => Self::Stabilize,
+            Mode::AltHold => Self::AltHold,
+            Mode::PosHold => Self::PosHold,
+        }
+    }
+}
+
+impl From<Sticks> for PilotInput {
+    fn from(sticks: Sticks) -> Self {
+        let Sticks { roll, pitch, yaw, throttle, mode, arm, kill } = sticks;
+        Self { roll, pitch, yaw, throttle, mode: mode.into(), arm, kill }
+    }
+}
+
+/// ```
+/// use stampfly_sim::ask::Guided;
+/// use stampfly_types::messages::{GuidedCommand, GuidedKind};
+///
+/// let command = GuidedCommand::from(Guided::TakeOff { height: 0.5 });
+/// assert_eq!((command.kind, command.position.z), (GuidedKind::TakeOff, -0.5));
+/// ```
+impl From<Guided> for GuidedCommand {
+    fn from(guided: Guided) -> Self {
+        let plain = |kind| Self { kind, ..Self::default() };
+        match guided {
+            Guided::Arm {} => plain(GuidedKind::Arm),
+            Guided::Disarm {} => plain(GuidedKind::Disarm),
+            Guided::TakeOff { height } => Self { position: Vec3::new(0.0, 0.0, -height), ..plain(GuidedKind::TakeOff) },
+            Guided::GoTo { north, east, up, yaw, speed, dwell } => {
+                Self { kind: GuidedKind::WayPoint, position: Vec3::new(north, east, -up), yaw, speed, dwell }
+            }
+            Guided::Hold {} => plain(GuidedKind::Hold),
+            Guided::Land {} => plain(GuidedKind::Land),
+            Guided::Kill {} => plain(GuidedKind::Kill),
+            Guided::Flip { direction: Direction::Left } => plain(GuidedKind::FlipLeft),
+            Guided::Flip { direction: Direction::Right } => plain(GuidedKind::FlipRight),
+            Guided::Flip { direction: Direction::Forward } => plain(GuidedKind::FlipForward),
+            Guided::Flip { direction: Direction::Back } => plain(GuidedKind::FlipBack),
+            Guided::Autotune { axis: Axis::Roll } => plain(GuidedKind::AutotuneRoll),
+            Guided::Autotune { axis: Axis::Pitch } => plain(GuidedKind::AutotunePitch),
+            Guided::Autotune { axis: Axis::Yaw } => plain(GuidedKind::AutotuneYaw),
+        }
+    }
+}
+
+/// Why an ask was refused.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum AskError {
+    /// More than [`LONGEST`] bytes, or a text in it of more than [`LONGEST_TEXT`].
+    TooLong,
+    /// No JSON object.
+    NotJson,
+    /// `vehicle` or `id` is missing or no such number.
+    Missing(&'static str),
+    /// Not one of the asks, a field too many or too few, or of another type; the sentence says which.
+    Unknown(String),
+    /// This number is not in its range.
+    OutOfRange(&'static str),
+    /// A text with control characters.
+    NotPrintable,
+}
+
+impl fmt::Display for AskError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooLong => write!(f, "longer than {LONGEST} bytes, or with a text longer than {LONGEST_TEXT}"),
+            Self::NotJson => f.write_str("no JSON object"),
+            Self::Missing(name) => write!(f, "'{name}' is missing or not the number it has to be"),
+            Self::Unknown(why) => f.write_str(why),
+            Self::OutOfRange(name) => write!(f, "'{name}' is out of its range"),
+            Self::NotPrintable => f.write_str("a text with control characters"),
+        }
+    }
+}
+
+impl std::error::Error for AskError {}
+
+/// The object in this text.
+fn object(text: &str) -> Result<Map<String, Value>, AskError> {
+    if text.len() > LONGEST {
+        return Err(AskError::TooLong);
+    }
+    serde_json::from_str(text).map_err(|_| AskError::NotJson)
+}
+
+impl Asked {
+    /// Reads an ask.
+    ///
+    /// # Errors
+    /// [`AskError`] when it is not exactly one.
+    pub fn parse(text: &str) -> Result<Self, AskError> {
+        Self::from_object(object(text)?)
+    }
+
+    fn from_object(mut object: Map<String, Value>) -> Result<Self, AskError> {
+        let mut number = |name, highest| {
+            let number = object.remove(name).and_then(|value| value.as_u64()).filter(|number| *number <= highest);
+            number.ok_or(AskError::Missing(name))
+        };
+        let vehicle = number("vehicle", VEHICLES)? as usize;
+        let id = number("id", u32::MAX.into())? as u32;
+        let ask: Ask = serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
+        ask.check()?;
+        Ok(Self { vehicle, id, ask })
+    }
+}
+
+/// Every ask by name.
+pub const NAMES: &[&str] = &[
+    "guided",
+    "sticks",
+    "alive",
+    "param_set",
+    "param_get",
+    "param_save",
+    "console",
+    "motor_test",
+    "motor_stop",
+    "fault",
+    "fault_clear",
+    "speed",
+];
+
+/// What a vehicle answers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reply {
+    /// For people.
+    pub text: String,
+    /// The number that was asked for.
+    pub value: Option<f64>,
+}
+
+impl Reply {
+    /// Only words.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self { text: text.into(), value: None }
+    }
+
+    /// A number.
+    #[must_use]
+    pub fn value(value: f64) -> Self {
+        Self { text: value.to_string(), value: Some(value) }
+    }
+}
+
+impl Asked {
+    /// The text that answers it: `{"reply":{"vehicle":0,"id":17,"ok":true,"text":"armed","value":null}}`.
+    #[must_use]
+    pub fn answered(&self, answer: Result<Reply, String>) -> String {
+        reply_text(Some(self.vehicle), self.id, answer)
+    }
+}
+
+/// The text that answers what came with this id. Without a vehicle, the server answers.
+#[must_use]
+pub fn reply_text(vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) -> String {
+    let (ok, Reply { text, value }) = match answer {
+        Ok(reply) => (true, reply),
+        Err(text) => (false, Reply::text(text)),
+    };
+    json!({ "reply": { "vehicle": vehicle, "id": id, "ok": ok, "text": text, "value": value } }).to_string()
+}
+
+/// Any text of a client: an ask of a vehicle, or of the server itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Incoming {
+    /// From now on, send the state of these topics this often: `{"id":1,"do":"subscribe","topics":["estimate_state"],"rate":50}`.
+    Subscribe {
+        /// The answer carries it.
+        id: u32,
+        /// Names of topics, at most [`MOST_TOPICS`].
+        topics: Vec<String>,
+        /// Texts a second, 1 to [`FASTEST_RATE`].
+        rate: u8,
+    },
+    /// Of a vehicle.
+    Ask(Asked),
+}
+
+/// Most topics a client can subscribe to.
+pub const MOST_TOPICS: usize = 64;
+/// Most state texts a second.
+pub const FASTEST_RATE: u8 = 50;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Subscribe {
+    #[allow(dead_code, reason = "known, and read before")]
+    r#do: String,
+    topics: Vec<String>,
+    rate: u8,
+}
+
+impl Incoming {
+    /// Reads a text.
+    ///
+    /// # Errors
+    /// The id, as far as there is one, and why it is refused.
+    pub fn parse(text: &str) -> Result<Self, (u32, AskError)> {
+        let mut object = object(text).map_err(|error| (0, error))?;
+        let id = object.get("id").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());
+        if object.get("do").is_some_and(|name| name == "subscribe") {
+            let id = id.ok_or((0, AskError::Missing("id")))?;
+            object.remove("id");
+            return Self::subscribe(id, object).map_err(|error| (id, error));
+        }
+        Asked::from_object(object).map(Self::Ask).map_err(|error| (id.unwrap_or_default(), error))
+    }
+
+    fn subscribe(id: u32, object: Map<String, Value>) -> Result<Self, AskError> {
+        let Subscribe { topics, rate, .. } =
+            serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
+        if topics.len() > MOST_TOPICS {
+            return Err(AskError::OutOfRange("topics"));
+        }
+        topics.iter().try_for_each(|topic| printable(topic))?;
+        if !(1..=FASTEST_RATE).contains(&rate) {
+            return Err(AskError::OutOfRange("rate"));
+        }
+        Ok(Self::Subscribe { id, topics, rate })
+    }
+}
+
+impl Ask {
+    /// Its name: the value of `do`.
+    ///
+    /// ```
+    /// use stampfly_sim::ask::Ask;
+    /// assert_eq!(Ask::ParamSave {}.name(), "param_save");
+    /// ```
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Guided(_) => "guided",
+            Self::Sticks(_) => "sticks",
+            Self::Alive {} => "alive",
+            Self::ParamSet { .. } => "param_set",
+            Self::ParamGet { .. } => "param_get",
+            Self::ParamSave {} => "param_save",
+            Self::Console { .. } => "console",
+            Self::MotorTest { .. } => "motor_test",
+            Self::MotorStop {} => "motor_stop",
+            Self::Fault { .. } => "fault",
+            Self::FaultClear {} => "fault_clear",
+            Self::Speed { .. } => "speed",
+        }
+    }
+
+    /// Is every number in its range, and every text printable and short?
+    fn check(&self) -> Result<(), AskError> {
+        // Not `!(a..b)`: what is no number is in no range.
+        let within = |name, value: f32, low: f32, high: f32| {
+            (low..=high).contains(&value).then_some(()).ok_or(AskError::OutOfRange(name))
+        };
+        match self {
+            Self::Guided(guided) => guided.check(&within),
+            Self::Sticks(Sticks { roll, pitch, yaw, throttle, .. }) => {
+                let sticks = [("roll", roll), ("pitch", pitch), ("yaw", yaw), ("throttle", throttle)];
+                sticks.into_iter().try_for_each(|(name, value)| within(name, *value, -1.0, 1.0))
+            }
+            Self::ParamSet { name, value } => {
+                printable(name)?;
+                within("value", *value, f32::MIN, f32::MAX)
+            }
+            Self::ParamGet { name: text } | Self::Console { line: text } | Self::Fault { text } => printable(text),
+            Self::MotorTest { motor, duty } => {
+                within("motor", f32::from(*motor), 1.0, 8.0)?;
+                within("duty", *duty, 0.0, 1.0)
+            }
+            Self::Speed { factor } => within("factor", *factor, 0.0, FASTEST),
+            Self::Alive {} | Self::ParamSave {} | Self::MotorStop {} | Self::FaultClear {} => Ok(()),
+        }
+    }
+}
+
+impl Guided {
+    fn check(&self, within: &dyn Fn(&'static str, f32, f32, f32) -> Result<(), AskError>) -> Result<(), AskError> {
+        match *self {
+            Self::TakeOff { height } => within("height", height, 0.05, HIGHEST),
+            Self::GoTo { north, east, up, yaw, speed, dwell } => {
+                within("north", north, -FARTHEST, FARTHEST)?;
+                within("east", east, -FARTHEST, FARTHEST)?;
+                within("up", up, -HIGHEST, HIGHEST)?;
+                within("yaw", yaw, -7.0, 7.0)?;
+                within("speed", speed, 0.0, 100.0)?;
+                within("dwell", dwell, 0.0, 3600.0)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn printable(text: &str) -> Result<(), AskError> {
+    if text.len() > LONGEST_TEXT {
+        return Err(AskError::TooLong);
+    }
+    if text.chars().any(char::is_control) { Err(AskError::NotPrintable) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn with(rest: &str) -> Result<Ask, AskError> {
+        Asked::parse(&format!(r#"{{"vehicle":2,"id":7,{rest}}}"#)).map(|asked| asked.ask)
+    }
+
+    #[test]
+    fn every_ask_is_read() {
+        let asks = [
+            (r#""do":"guided","kind":"arm""#, Ask::Guided(Guided::Arm {})),
+            (
+                r#""do":"guided","kind":"go_to","north":1,"east":-2.5,"up":0.5,"yaw":0"#,
+                Ask::Guided(Guided::GoTo { north: 1.0, east: -2.5, up: 0.5, yaw: 0.0, speed: 0.0, dwell: 0.0 }),
+            ),
+            (
+                r#""do":"guided","kind":"flip","direction":"back""#,
+                Ask::Guided(Guided::Flip { direction: Direction::Back }),
+            ),
+            (
+                r#""do":"sticks","roll":0,"pitch":-1,"yaw":1,"throttle":0.5,"mode":"althold","arm":true,"kill":false"#,
+                Ask::Sticks(Sticks {
+                    pitch: -1.0,
+                    yaw: 1.0,
+                    throttle: 0.5,
+                    mode: Mode::AltHold,
+                    arm: true,
+                    ..Default::default()
+                }),
+            ),
+            (
+                r#""do":"param_set","name":"eskf.gate","value":3.5"#,
+                Ask::ParamSet { name: "eskf.gate".into(), value: 3.5 },
+            ),
+            (r#""do":"param_save""#, Ask::ParamSave {}),
+            (r#""do":"console","line":"status""#, Ask::Console { line: "status".into() }),
+            (r#""do":"motor_test","motor":3,"duty":0.1"#, Ask::MotorTest { motor: 3, duty: 0.1 }),
+            (r#""do":"fault","text":"tof-stuck=0.03""#, Ask::Fault { text: "tof-stuck=0.03".into() }),
+            (r#""do":"speed","factor":0.5"#, Ask::Speed { factor: 0.5 }),
+        ];
+        for (text, ask) in asks {
+            assert!(NAMES.contains(&ask.name()) && text.contains(&format!("\"do\":\"{}\"", ask.name())), "{text}");
+            assert_eq!(with(text), Ok(ask), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_exactly_an_ask_is_refused() {
+        let unknown = [
+            r#""do":"guided","kind":"arm","extra":1"#,
+            r#""do":"guided","kind":"fly""#,
+            r#""do":"param_save","extra":1"#,
+            r#""do":"motor_stop","motor":1"#,
+            r#""do":"take_off""#,
+            r#""do":"sticks","roll":0"#,
+            r#""do":"param_set","name":"x","value":null"#,
+        ];
+        for text in unknown {
+            assert!(matches!(with(text), Err(AskError::Unknown(_))), "{text}: {:?}", with(text));
+        }
+        let out_of_range = [
+            (r#""do":"guided","kind":"take_off","height":1e39"#, "height"),
+            (r#""do":"guided","kind":"take_off","height":0"#, "height"),
+            (r#""do":"guided","kind":"go_to","north":0,"east":1e6,"up":0,"yaw":0"#, "east"),
+            (r#""do":"param_set","name":"x","value":-1e300"#, "value"),
+            (r#""do":"motor_test","motor":0,"duty":0.1"#, "motor"),
+            (r#""do":"motor_test","motor":1,"duty":1.1"#, "duty"),
+            (r#""do":"speed","factor":-1"#, "factor"),
+        ];
+        for (text, name) in out_of_range {
+            assert_eq!(with(text), Err(AskError::OutOfRange(name)), "{text}");
+        }
+        assert_eq!(with(r#""do":"console","line":"a\nb""#), Err(AskError::NotPrintable));
+        assert_eq!(with(&format!(r#""do":"console","line":"{}""#, "x".repeat(257))), Err(AskError::TooLong));
+        assert_eq!(Asked::parse(&" ".repeat(5000)), Err(AskError::TooLong));
+        assert_eq!(Asked::parse("[]"), Err(AskError::NotJson));
+        assert_eq!(Asked::parse(r#"{"vehicle":0,"do":"param_save"}"#), Err(AskError::Missing("id")));
+        assert_eq!(Asked::parse(r#"{"vehicle":-1,"id":1,"do":"param_save"}"#), Err(AskError::Missing("vehicle")));
+    }
+
+    #[test]
+    fn a_subscription_is_for_the_server() {
+        let parse = |text: &str| Incoming::parse(text);
+        let good = parse(r#"{"id":3,"do":"subscribe","topics":["truth"],"rate":20}"#);
+        assert_eq!(good, Ok(Incoming::Subscribe { id: 3, topics: vec!["truth".into()], rate: 20 }));
+        for (rate, name) in [("0", "rate"), ("51", "rate")] {
+            let refused = parse(&format!(r#"{{"id":3,"do":"subscribe","topics":[],"rate":{rate}}}"#));
+            assert_eq!(refused, Err((3, AskError::OutOfRange(name))));
+        }
+        let vehicle = parse(r#"{"id":3,"do":"subscribe","topics":[],"rate":1,"vehicle":0}"#);
+        assert!(matches!(vehicle, Err((3, AskError::Unknown(_)))), "{vehicle:?}");
+        assert_eq!(parse(r#"{"id":9,"do":"param_save"}"#), Err((9, AskError::Missing("vehicle"))));
+    }
+
+    #[test]
+    fn every_guided_ask_becomes_the_command_of_its_kind() {
+        let kinds = [
+            (r#""kind":"arm""#, GuidedKind::Arm),
+            (r#""kind":"disarm""#, GuidedKind::Disarm),
+            (r#""kind":"hold""#, GuidedKind::Hold),
+            (r#""kind":"land""#, GuidedKind::Land),
+            (r#""kind":"kill""#, GuidedKind::Kill),
+            (r#""kind":"flip","direction":"left""#, GuidedKind::FlipLeft),
+            (r#""kind":"flip","direction":"right""#, GuidedKind::FlipRight),
+            (r#""kind":"flip","direction":"forward""#, GuidedKind::FlipForward),
+            (r#""kind":"flip","direction":"back""#, GuidedKind::FlipBack),
+            (r#""kind":"autotune","axis":"roll""#, GuidedKind::AutotuneRoll),
+            (r#""kind":"autotune","axis":"pitch""#, GuidedKind::AutotunePitch),
+            (r#""kind":"autotune","axis":"yaw""#, GuidedKind::AutotuneYaw),
+        ];
+        for (text, kind) in kinds {
+            let Ok(Ask::Guided(guided)) = with(&format!(r#""do":"guided",{text}"#)) else { panic!("{text}") };
+            assert_eq!(GuidedCommand::from(guided), GuidedCommand { kind, ..Default::default() });
+        }
+        let goal = Guided::GoTo { north: 1.0, east: 2.0, up: 3.0, yaw: 0.5, speed: 0.4, dwell: 1.5 };
+        let expected = GuidedCommand {
+            kind: GuidedKind::WayPoint,
+            position: Vec3::new(1.0, 2.0, -3.0),
+            yaw: 0.5,
+            speed: 0.4,
+            dwell: 1.5,
+        };
+        assert_eq!(GuidedCommand::from(goal), expected);
+    }
+
+    proptest! {
+        #[test]
+        fn sticks_come_back(sticks in prop::array::uniform4(-1.0_f32..=1.0), arm: bool, kill: bool) {
+            let [roll, pitch, yaw, throttle] = sticks;
+            let ask = Ask::Sticks(Sticks { roll, pitch, yaw, throttle, mode: Mode::Acro, arm, kill });
+            let asked = Asked { vehicle: 1, id: 9, ask };
+            let text = serde_json::to_string(&asked).expect("JSON");
+            prop_assert_eq!(Asked::parse(&text), Ok(asked));
+        }
+    }
+}
