@@ -20,6 +20,7 @@
 //! | [`receiver_bytes`] | a radio receiver or a configurator at a UART | frames mean the same when sent again, every byte is accounted for |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
 //! | [`tello_text`] | any program on the network | what is accepted is within limits, every answer is text that can be read |
+//! | [`secure_session`] | the radio, from strangers and from whoever has the key | what was changed or heard before is refused, and is no sign of life |
 //! | [`whole_stack`] | edits of all that a flying vehicle is given | every invariant that an open loop can keep |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |
 //!
@@ -38,6 +39,7 @@ mod machine;
 mod packets;
 mod parameters;
 mod receivers;
+mod secured;
 mod stack;
 mod stream;
 mod tello;
@@ -54,6 +56,7 @@ pub use machine::mode_machine;
 pub use packets::radio_packets;
 pub use parameters::parameter_image;
 pub use receivers::receiver_bytes;
+pub use secured::secure_session;
 pub use stack::whole_stack;
 pub use stream::data_stream;
 pub use tello::tello_text;

@@ -178,7 +178,7 @@ impl<'b> Visitor for Writer<'b> {
         let header = header.chain(self.time.as_micros().to_le_bytes());
         let all = header.chain(words.as_ref().iter().flat_map(|word| word.to_le_bytes()));
         rest.iter_mut().zip(all).for_each(|(to, from)| *to = from);
-        *checksum = crc32(rest).to_le_bytes();
+        *checksum = crc32(&*rest).to_le_bytes();
         Ok(bytes)
     }
 }
@@ -199,8 +199,8 @@ impl Source for Words<'_> {
 }
 
 /// CRC-32 of IEEE 802.3: reflected polynomial 0xEDB8_8320. Bit by bit, because a datagram has some 100 bytes.
-fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, byte| {
+pub(crate) fn crc32<'b>(bytes: impl IntoIterator<Item = &'b u8>) -> u32 {
+    !bytes.into_iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg()))
     })
 }

@@ -19,6 +19,7 @@
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
 //! | `mavlink` | frames and signatures of MAVLink 1 and 2 (feature `mavlink`) | for ground stations |
 //! | [`msp`] | frames of the MultiWii serial protocol, versions 1 and 2 | for configurators and telemetry scripts |
+//! | [`secure`] | sessions with keys: sealed frames, handshake, replay protection | over a radio or a network that strangers can send on |
 //! | [`hisky`] | a receiver of a small transmitter that hops | beside an nRF24L01 |
 //! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
@@ -64,6 +65,7 @@ pub mod mavlink;
 pub mod msp;
 mod pairing;
 mod peers;
+pub mod secure;
 mod sequence;
 pub mod serial;
 mod session;

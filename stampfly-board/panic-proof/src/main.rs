@@ -4,7 +4,7 @@
 //! drops the handler and the program links; one index that it cannot bound, anywhere in what is called here, and the
 //! linker misses the function. What is called, with data the compiler knows nothing about: every runnable with everything
 //! behind it, whichever estimator and controller the parameters choose; the bus with its taps; the black box; the self
-//! test; the radio's packets and session; the decoders of every chip and the motors.
+//! test; the radio's packets and session; the secure session at both ends; the decoders of every chip and the motors.
 //!
 //! Not here: the drivers' waiting. An `async` function may be polled once too often only by an executor that is broken.
 //!
@@ -23,6 +23,7 @@ use stampfly_bus::{Band, Taps};
 use stampfly_drivers::Decimator;
 use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
 use stampfly_flight::Assembled;
+use stampfly_link::secure::{Guarded, Key, MAX_FRAME, Payload, Policy, Station, Vehicle};
 use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
 use stampfly_types::Instant;
 
@@ -44,6 +45,7 @@ extern "C" fn flight() {
         return;
     }
     vehicle();
+    sealed();
     chips();
     let _ = black_box(golden::self_test(&mut MaybeUninit::uninit(), &mut topics::Bus::new()));
 }
@@ -86,6 +88,30 @@ fn vehicle() {
         black_box(outside.storage.link_peer.latest());
         taps.drain(&mut |topic, at, generation, words| memory.note(topic, at, generation, words));
         black_box(memory.records().count());
+    }
+}
+
+/// The secure session, at both ends: every byte that strangers can send, and everything that an end can say.
+fn sealed() {
+    let Ok(key) = Key::generate(black_box(1), black_box([0; 32])) else { return };
+    let Ok(other) = Key::from_uri(black_box("")) else { return };
+    let open = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
+    let mut guarded = Guarded::new(Vehicle::new(key), open, black_box(Policy::default()));
+    let mut station = Station::new(other);
+    let mut room = [0; MAX_FRAME];
+    while black_box(true) {
+        let (at, random): (Instant, [u8; 8]) = (black_box(Instant::ZERO), black_box([0; 8]));
+        let mut frame = black_box([0; MAX_FRAME]);
+        let Some(frame) = frame.get_mut(..black_box(0)) else { continue };
+        let _ = black_box(guarded.receive(at, black_box(Address([0; 6])), frame));
+        let _ = black_box(station.receive(at, frame));
+        guarded.set_armed(black_box(false));
+        black_box(guarded.transmit(at, random, &mut room));
+        black_box(station.transmit(at, random, &mut room));
+        let payload: Payload<'_> = black_box(Payload::Kill);
+        let _ = black_box(guarded.vehicle().seal(at, &payload, &mut room));
+        let _ = black_box(station.seal(at, &payload, &mut room));
+        black_box((guarded.age(at), guarded.vehicle().tally().refused(), station.tally()));
     }
 }
 

@@ -35,6 +35,11 @@ const CHAIN: &str = "chain";
 /// What it may never take, in instructions, on a machine of this name: the mean, and the most.
 const BAR: (&str, f64, f64) = ("Cortex-M4F", 18_000.0, 30_000.0);
 
+/// The program that counts what a secured frame costs, and what the lines about it begin with.
+const SECURED: (&str, &str) = ("stampfly-secured", "secured frame, ");
+/// What none of them may ever take: at 50 frames a second each way, 2 % of a core of [`CLOCK`].
+const SECURED_BAR: f64 = 48_000.0;
+
 /// An emulated machine.
 pub struct Machine {
     /// As in the budget and in the table.
@@ -72,7 +77,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     let budget = Budget::read(repository, BUDGET)?;
     let mut all = Vec::new();
     for machine in &MACHINES {
-        let said = emulate(repository, machine)?;
+        let said = emulate(repository, machine, "stampfly-qemu")?;
         let found = bits(&said);
         if found != expected {
             return Err(format!("{}: other bits than on this PC:\n{found:#?}\n{expected:#?}", machine.name));
@@ -80,6 +85,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         println!("{}: {}", machine.name, found.join("; "));
         let counts = counts(&said)?;
         hold(&budget, machine, &counts)?;
+        hold_secured(&budget, machine, &emulate(repository, machine, SECURED.0)?)?;
         all.push(counts);
     }
     let table = table(&all)?;
@@ -99,14 +105,14 @@ pub fn program(repository: &Repository, machine: &Machine) -> Result<PathBuf, Fa
     Ok(repository.target("qemu").join(machine.target).join("release/stampfly-qemu"))
 }
 
-/// Builds the program for a machine, runs it there and returns what it says.
-fn emulate(repository: &Repository, machine: &Machine) -> Result<String, Failure> {
+/// Builds the programs for a machine, runs one there and returns what it says.
+fn emulate(repository: &Repository, machine: &Machine, name: &str) -> Result<String, Failure> {
     // Apart from running it, which has little time.
     program(repository, machine)?;
     let (cargo, options) = toolchain(repository, machine)?;
     let mut limited = inside(repository, repository.command("timeout"));
     limited.envs(cargo.get_envs().filter_map(|(key, value)| Some((key, value?))));
-    limited.arg(SECONDS).arg(cargo.get_program()).arg("run").args(&options);
+    limited.arg(SECONDS).arg(cargo.get_program()).arg("run").args(&options).args(["--bin", name]);
     Ok(capture(&mut limited)?.0)
 }
 
@@ -212,6 +218,29 @@ fn hold(budget: &Budget, machine: &Machine, counts: &[Count]) -> Result<(), Fail
     Ok(())
 }
 
+/// Compares what a secured frame takes with the committed figures of a machine, and with what it may never take.
+fn hold_secured(budget: &Budget, machine: &Machine, said: &str) -> Result<(), Failure> {
+    for Count { name, mean, most, .. } in secured(said)? {
+        if most > SECURED_BAR {
+            return Err(format!("{}: {name}: {most} instructions; {SECURED_BAR} is the bar", machine.name));
+        }
+        let what = name.strip_prefix(SECURED.1).unwrap_or(&name);
+        budget.hold(&[machine.name, what], mean, "instructions of a secured frame")?;
+    }
+    Ok(())
+}
+
+/// What was counted of secured frames: sealed, opened, refused.
+fn secured(said: &str) -> Result<Vec<Count>, Failure> {
+    let counts = said.lines().filter_map(Count::read).filter(|count| count.name.starts_with(SECURED.1));
+    let counts: Vec<Count> = counts.collect();
+    if counts.len() == 3 && counts.iter().all(|count| count.mean > 0.0) {
+        Ok(counts)
+    } else {
+        Err(format!("no counts of secured frames:\n{said}"))
+    }
+}
+
 /// Is the chain within what it may never exceed?
 fn within_bar(machine: &str, chain: &Count) -> Result<(), Failure> {
     let (barred, mean, most) = BAR;
@@ -298,6 +327,16 @@ mod tests {
         assert!(within_bar("Cortex-M4F", &chain(18_001.0, 30_000.0)).is_err());
         assert!(within_bar("Cortex-M4F", &chain(18_000.0, 30_001.0)).is_err());
         assert!(within_bar("Xtensa", &chain(30_000.0, 56_000.0)).is_ok());
+    }
+
+    #[test]
+    fn secured_frames_are_counted_or_it_is_said_that_they_are_not() {
+        let said = "secured frame, sealed: mean 5 most 9 count 2\nsecured frame, opened: mean 6 most 9 count 2\n";
+        let third = "secured frame, refused: mean 4 most 4 count 2\n";
+        let counts = secured(&format!("{said}{third}")).expect("counts");
+        assert_eq!((counts[2].name.as_str(), counts[2].mean), ("secured frame, refused", 4.0));
+        assert!(secured(said).is_err() && secured("").is_err());
+        assert!(secured(&format!("{said}{}", third.replace('4', "0"))).is_err());
     }
 
     #[test]

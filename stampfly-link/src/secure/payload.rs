@@ -1,0 +1,258 @@
+//! What is inside a frame, for whom it is for.
+//!
+//! | kind | from | body, little-endian |
+//! |---|---|---|
+//! | 10 sticks | station | roll, pitch, yaw, throttle as 4 × f32 from −1 to 1; u8 flight mode; u8 switches: 0 arm, 1 kill |
+//! | 11 guided | station | u8 what; goal 3 × f32 to ±10 km; f32 heading to ±2π; f32 speed to 100 m/s; f32 dwell to an hour |
+//! | 12 kill | station | nothing |
+//! | 20 read parameter | station | u16 place in the vehicle's table |
+//! | 21 write parameter | station | u16 place; f32 value, finite |
+//! | 30 line | station | text |
+//! | 90 telemetry | vehicle | a [`TelemetryPacket`], with its checksum |
+//! | A0 parameter | vehicle | u16 place; f32 value; u8 whether a write was taken |
+//! | B0 reply | vehicle | u8 whether it is the last; text |
+//! | C0 sample | vehicle | u16 topic; u64 instant, µs; the words of the message, u32 each |
+//! | D0 acknowledgement | vehicle | u32 counter of a frame of the station; u8 whether it was taken |
+//!
+//! Numbers of kinds are hexadecimal. A body has exactly the length of its kind. Numbers are finite and in their range; −0 and
+//! subnormal numbers are refused, so that a value has one form; they are sent as zero. Text is UTF-8 without control
+//! characters other than line ends and tabulators. Words of a sample are not looked at: what they are, the topic's message says.
+
+use super::frame::Kind;
+use super::refused::SealError;
+use super::values::{Reader, Writer};
+use crate::TelemetryPacket;
+use core::f32::consts::TAU;
+use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
+use stampfly_types::{Instant, Vec3};
+
+const ARM: u8 = 1;
+const KILL: u8 = 1 << 1;
+/// What a goal may be off the origin, m: farther than any such radio reaches.
+const FARTHEST: f32 = 10_000.0;
+/// What may be asked for as speed, m/s.
+const FASTEST: f32 = 100.0;
+/// What may be asked for as a stay, s.
+const LONGEST: f32 = 3_600.0;
+
+/// What is inside a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Payload<'f> {
+    /// Sticks and switches, from the station.
+    Sticks(PilotInput),
+    /// A program's command, from the station.
+    Guided(GuidedCommand),
+    /// Motors off now, from the station.
+    Kill,
+    /// The value of a parameter is asked for, from the station.
+    ReadParameter {
+        /// Place in the vehicle's table.
+        index: u16,
+    },
+    /// A parameter is to have another value, from the station. Not with motors armed. Its range is the vehicle's to check.
+    WriteParameter {
+        /// Place in the vehicle's table.
+        index: u16,
+        /// In the parameter's unit.
+        value: f32,
+    },
+    /// A line for the console, from the station. Not with motors armed.
+    Line(&'f str),
+    /// The vehicle's state.
+    Telemetry(TelemetryPacket),
+    /// The value of a parameter, from the vehicle.
+    Parameter {
+        /// Place in the vehicle's table.
+        index: u16,
+        /// In the parameter's unit.
+        value: f32,
+        /// Was it changed as it was asked for? `true` where nothing was.
+        taken: bool,
+    },
+    /// A part of the console's answer, from the vehicle.
+    Reply {
+        /// The part.
+        text: &'f str,
+        /// Is it the last?
+        last: bool,
+    },
+    /// A message of one of the vehicle's topics.
+    Sample(Sample<'f>),
+    /// What became of a frame of the station, from the vehicle.
+    Acknowledgement {
+        /// The frame's counter.
+        counter: u32,
+        /// Was it taken?
+        taken: bool,
+    },
+}
+
+impl<'f> Payload<'f> {
+    /// Its kind.
+    #[must_use]
+    pub const fn kind(&self) -> Kind {
+        match self {
+            Self::Sticks(_) => Kind::Sticks,
+            Self::Guided(_) => Kind::Guided,
+            Self::Kill => Kind::Kill,
+            Self::ReadParameter { .. } => Kind::ReadParameter,
+            Self::WriteParameter { .. } => Kind::WriteParameter,
+            Self::Line(_) => Kind::Line,
+            Self::Telemetry(_) => Kind::Telemetry,
+            Self::Parameter { .. } => Kind::Parameter,
+            Self::Reply { .. } => Kind::Reply,
+            Self::Sample(_) => Kind::Sample,
+            Self::Acknowledgement { .. } => Kind::Acknowledgement,
+        }
+    }
+
+    /// Are the motors to be off, whatever else it says?
+    ///
+    /// ```
+    /// use stampfly_link::secure::Payload;
+    /// use stampfly_link::types::messages::PilotInput;
+    /// assert!(Payload::Kill.is_kill());
+    /// assert!(Payload::Sticks(PilotInput { kill: true, ..Default::default() }).is_kill());
+    /// assert!(!Payload::Line("reboot").is_kill());
+    /// ```
+    #[must_use]
+    pub const fn is_kill(&self) -> bool {
+        match self {
+            Self::Kill => true,
+            Self::Sticks(input) => input.kill,
+            Self::Guided(command) => matches!(command.kind, GuidedKind::Kill),
+            _ => false,
+        }
+    }
+
+    /// Writes the body, and returns its length.
+    ///
+    /// # Errors
+    /// When a value must not be used, or there is no room for it.
+    pub fn encode(&self, place: &mut [u8]) -> Result<usize, SealError> {
+        let mut to = Writer::new(place);
+        match self {
+            Self::Sticks(input) => {
+                let PilotInput { roll, pitch, yaw, throttle, mode, arm, kill } = *input;
+                [roll, pitch, yaw, throttle].into_iter().try_for_each(|stick| to.number(stick, 1.0))?;
+                to.bytes(&[mode as u8, (u8::from(arm) * ARM) | (u8::from(kill) * KILL)])?;
+            }
+            Self::Guided(command) => {
+                let GuidedCommand { kind, position, yaw, speed, dwell } = *command;
+                to.bytes(&[kind as u8])?;
+                position.iter().try_for_each(|axis| to.number(*axis, FARTHEST))?;
+                to.number(yaw, TAU)?;
+                to.positive(speed, FASTEST)?;
+                to.positive(dwell, LONGEST)?;
+            }
+            Self::Kill => {}
+            Self::ReadParameter { index } => to.bytes(&index.to_le_bytes())?,
+            Self::WriteParameter { index, value } => {
+                to.bytes(&index.to_le_bytes())?;
+                to.number(*value, f32::MAX)?;
+            }
+            Self::Line(text) => to.text(text)?,
+            Self::Telemetry(packet) => to.bytes(&packet.to_bytes())?,
+            Self::Parameter { index, value, taken } => {
+                to.bytes(&index.to_le_bytes())?;
+                to.number(*value, f32::MAX)?;
+                to.truth(*taken)?;
+            }
+            Self::Reply { text, last } => {
+                to.truth(*last)?;
+                to.text(text)?;
+            }
+            Self::Sample(sample) => {
+                to.bytes(&sample.topic.to_le_bytes())?;
+                to.bytes(&sample.at.as_micros().to_le_bytes())?;
+                sample.words().try_for_each(|word| to.bytes(&word.to_le_bytes()))?;
+            }
+            Self::Acknowledgement { counter, taken } => {
+                to.bytes(&counter.to_le_bytes())?;
+                to.truth(*taken)?;
+            }
+        }
+        Ok(to.length())
+    }
+
+    /// Reads the body of a frame of this kind. `None` when it is none; nothing of it may be used then.
+    #[must_use]
+    pub fn decode(kind: Kind, body: &'f [u8]) -> Option<Self> {
+        let mut from = Reader(body);
+        let payload = match kind {
+            Kind::Sticks => {
+                let mut stick = || from.number(1.0);
+                let (roll, pitch, yaw, throttle) = (stick()?, stick()?, stick()?, stick()?);
+                let (mode, switches) = (FlightMode::from_number(from.byte()?.into())?, from.byte()?);
+                if switches & !(ARM | KILL) != 0 {
+                    return None;
+                }
+                let (arm, kill) = (switches & ARM != 0, switches & KILL != 0);
+                Self::Sticks(PilotInput { roll, pitch, yaw, throttle, mode, arm, kill })
+            }
+            Kind::Guided => {
+                let kind = GuidedKind::from_number(from.byte()?.into())?;
+                let mut axis = || from.number(FARTHEST);
+                let position = Vec3::new(axis()?, axis()?, axis()?);
+                let (yaw, speed, dwell) = (from.number(TAU)?, from.positive(FASTEST)?, from.positive(LONGEST)?);
+                Self::Guided(GuidedCommand { kind, position, yaw, speed, dwell })
+            }
+            Kind::Kill => Self::Kill,
+            Kind::ReadParameter => Self::ReadParameter { index: u16::from_le_bytes(from.bytes()?) },
+            Kind::WriteParameter => {
+                let (index, value) = (u16::from_le_bytes(from.bytes()?), from.number(f32::MAX)?);
+                Self::WriteParameter { index, value }
+            }
+            Kind::Line => Self::Line(from.text()?),
+            Kind::Telemetry => Self::Telemetry(TelemetryPacket::decode(&from.bytes::<22>()?).ok()?),
+            Kind::Parameter => {
+                let (index, value) = (u16::from_le_bytes(from.bytes()?), from.number(f32::MAX)?);
+                Self::Parameter { index, value, taken: from.truth()? }
+            }
+            Kind::Reply => {
+                let last = from.truth()?;
+                Self::Reply { text: from.text()?, last }
+            }
+            Kind::Sample => {
+                let topic = u16::from_le_bytes(from.bytes()?);
+                let at = Instant::from_micros(u64::from_le_bytes(from.bytes()?));
+                let (words, rest) = from.0.as_chunks::<4>();
+                from.0 = rest;
+                Self::Sample(Sample { topic, at, words })
+            }
+            Kind::Acknowledgement => {
+                let counter = u32::from_le_bytes(from.bytes()?);
+                Self::Acknowledgement { counter, taken: from.truth()? }
+            }
+            Kind::Join | Kind::Ready | Kind::Announcement | Kind::Welcome => return None,
+        };
+        from.end(payload)
+    }
+}
+
+/// A message of a topic, as words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample<'f> {
+    /// Place in the vehicle's topic table.
+    pub topic: u16,
+    /// When it was published.
+    pub at: Instant,
+    words: &'f [[u8; 4]],
+}
+
+impl<'f> Sample<'f> {
+    /// The most words that fit.
+    pub const MAX_WORDS: usize = (super::frame::MAX_BODY - 10) / 4;
+
+    /// A message whose words lie here as bytes, each little-endian.
+    #[must_use]
+    pub const fn new(topic: u16, at: Instant, words: &'f [[u8; 4]]) -> Self {
+        Self { topic, at, words }
+    }
+
+    /// The words of the message.
+    pub fn words(&self) -> impl ExactSizeIterator<Item = u32> + use<'f> {
+        self.words.iter().map(|bytes| u32::from_le_bytes(*bytes))
+    }
+}
