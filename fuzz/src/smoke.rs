@@ -1,7 +1,9 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
 use crate::{
-    console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, hisky, mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session, tello_text, ulog, whole_stack,
+    console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, hisky,
+    mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session, tello_text, ulog,
+    whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -131,7 +133,23 @@ fn receivers() {
 }
 
 #[test]
-    100_000, 200_000, data_stream, fn, hisky, log_stream, secure_session, secured, small_transmitters, smoke, tello_text, test, words,
+fn small_transmitters() {
+    smoke("hisky", hisky, 200_000);
+}
+
+#[test]
+fn words() {
+    smoke("tello_text", tello_text, 200_000);
+}
+
+#[test]
+fn log_stream() {
+    smoke("data_stream", data_stream, 200_000);
+}
+
+#[test]
+fn secured() {
+    smoke("secure_session", secure_session, 100_000);
 }
 
 #[test]
