@@ -79,7 +79,7 @@ const buildControls = () => {
   click('view-top', () => { camera.tilt = Math.PI / 2; camera.turn = 0; });
   click('view-follow', () => toggle(element('view-follow'), (pressed) => {
     view.follow = pressed;
-    if (!pressed) camera.target = [0, 0, -0.25];
+    if (!pressed) camera.target = home().target;
   }));
   element('speed').addEventListener('change', () => command({ do: 'speed', factor: Number(element('speed').value) }, `time ×${element('speed').value}`));
   document.addEventListener('keydown', (event) => {

@@ -43,7 +43,10 @@ on('hello', (hello) => {
   tabs.hidden = station.vehicles.length < 2;
   setText(element('version'), hello.version);
   subscribe([...new Set(station.vehicles.flatMap((vehicle) => topicsOf(vehicle.card)))]);
-  if (!playback.vehicle) choose(station.chosen);
+  if (!playback.vehicle) {
+    choose(station.chosen);
+    resetCamera();
+  }
 });
 
 on('state', (state) => {

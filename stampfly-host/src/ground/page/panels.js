@@ -155,7 +155,7 @@ const buildMotors = () => {
   });
   for (const kind of ['pointerup', 'pointercancel', 'keyup', 'keydown']) document.addEventListener(kind, stopMotor);
   element('motors').addEventListener('pointerleave', stopMotor);
-  element('motors').addEventListener('focusout', stopMotor);
+  element('motors').addEventListener('focusout', (event) => { if (!element('motors').contains(event.relatedTarget)) stopMotor(); });
   window.addEventListener('blur', stopMotor);
   document.addEventListener('visibilitychange', stopMotor);
   element('motor-duty').addEventListener('input', () => setText(element('motor-percent'), `${element('motor-duty').value} %`));

@@ -1,8 +1,15 @@
 // All vehicles in space with their trails, above a grid; a click on the ground asks the chosen one to go there.
 
 const canvas = element('space');
-const HOME = { turn: -2.25, tilt: 0.5, distance: 3.4 };
-const camera = { ...HOME, target: [0, 0, -0.25] };
+/** A camera that sees where all vehicles begin. */
+const home = () => {
+  const places = scene().map((vehicle) => vehicle.card.place);
+  const low = [0, 1].map((axis) => Math.min(0, ...places.map((place) => place[axis])));
+  const high = [0, 1].map((axis) => Math.max(0, ...places.map((place) => place[axis])));
+  const wide = Math.hypot(high[0] - low[0], high[1] - low[1]);
+  return { turn: -2.25, tilt: 0.5, distance: 3.4 + wide * 0.9, target: [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, -0.25] };
+};
+const camera = { turn: -2.25, tilt: 0.5, distance: 3.4, target: [0, 0, -0.25] };
 const view = { follow: false };
 const TRAIL = 60; // Seconds of the past that are drawn.
 
@@ -10,10 +17,10 @@ const colorOf = (vehicle) => (vehicle.isLog || scene().length === 1 ? '--estimat
 const shifted = ([n, e, d], vehicle) => [n + vehicle.card.place[0], e + vehicle.card.place[1], d];
 
 const drawGround = (context, project) => {
-  const step = tickStep(camera.distance * 2, 10);
-  const reach = step * 12;
+  const step = tickStep(camera.distance * 1.2, 10);
+  const reach = step * 16;
   const center = [0, 1].map((axis) => Math.round(camera.target[axis] / step) * step);
-  for (let k = -12; k <= 12; k++) {
+  for (let k = -16; k <= 16; k++) {
     for (const axis of [0, 1]) {
       const a = [0, 0, 0], b = [0, 0, 0];
       a[axis] = b[axis] = center[axis] + k * step;
@@ -139,7 +146,7 @@ const groundAt = (x, y) => {
   return [camera.target[0] + ahead * ct - right * st, camera.target[1] + ahead * st + right * ct];
 };
 
-const resetCamera = () => Object.assign(camera, HOME, { target: [0, 0, -0.25] });
+const resetCamera = () => Object.assign(camera, home());
 turnWithPointer(canvas, camera, {
   farthest: 60, lowest: 0.06, reset: resetCamera, changed: () => {},
   clicked: (event) => {
