@@ -8,6 +8,7 @@
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
+//! | [`serve`] | the ports at which other programs fly a simulated vehicle |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
 //! | [`ground`] | a page that shows vehicles as they fly, and asks them for things |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
@@ -25,6 +26,7 @@ mod inputs;
 mod page;
 pub mod recorder;
 pub mod report;
+pub mod serve;
 pub mod vehicles;
 
 pub use report::Report;

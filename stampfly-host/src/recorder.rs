@@ -57,11 +57,12 @@ pub struct Timing {
     pub longest_ns: u64,
 }
 
-/// Records one flight of a vehicle.
-pub struct Recorder<V: Vehicle> {
+/// Records one flight of a vehicle, with its log in memory unless another sink is given.
+pub struct Recorder<V: Vehicle, S: Sink = Memory> {
     hash: FlightHash,
-    log: Option<stampfly_flight::Recorder<V::Runnables, Memory>>,
-    bytes: Vec<u8>,
+    log: Option<stampfly_flight::Recorder<V::Runnables, S>>,
+    /// The log, once the flight is over.
+    written: Option<S>,
     timing: Option<Vec<Timing>>,
     started: Option<std::time::Instant>,
     inputs: Option<Inputs>,
@@ -79,10 +80,29 @@ impl<V: Vehicle> Recorder<V> {
     /// Only the hash.
     #[must_use]
     pub fn hash_only() -> Self {
+        Self::on(None)
+    }
+
+    /// The hash and a ULog in memory. `facts` are written into its head.
+    #[must_use]
+    pub fn with_log(setup: &V::Setup, facts: &[(String, String)]) -> Self {
+        // The sink is memory, and the schema is the vehicle's own: this cannot fail.
+        Self::with_sink(Memory::default(), setup, facts).unwrap_or_default()
+    }
+
+    /// The log, once the flight is over; empty when there is none.
+    #[must_use]
+    pub fn log(&self) -> &[u8] {
+        self.written.as_ref().map_or(&[], |memory| &memory.0)
+    }
+}
+
+impl<V: Vehicle, S: Sink> Recorder<V, S> {
+    fn on(log: Option<stampfly_flight::Recorder<V::Runnables, S>>) -> Self {
         Self {
             hash: FlightHash::new(),
-            log: None,
-            bytes: Vec::new(),
+            log,
+            written: None,
             timing: None,
             started: None,
             inputs: None,
@@ -91,13 +111,20 @@ impl<V: Vehicle> Recorder<V> {
         }
     }
 
-    /// The hash and a ULog in memory. `facts` are written into its head.
+    /// The hash and a ULog in a sink. `facts` are written into its head.
+    ///
+    /// # Errors
+    /// When the sink refuses the head.
+    pub fn with_sink(sink: S, setup: &V::Setup, facts: &[(String, String)]) -> Result<Self, WriteError<S::Error>> {
+        let head = head::<V, _>(sink, V::options(setup).start, V::config(setup), facts)?;
+        let log = head.data(LogSchema::new(V::BESIDE))?;
+        Ok(Self::on(Some(stampfly_flight::Recorder::new(log))))
+    }
+
+    /// Messages that the sink has refused so far.
     #[must_use]
-    pub fn with_log(setup: &V::Setup, facts: &[(String, String)]) -> Self {
-        let head = head::<V, _>(Memory::default(), V::options(setup).start, V::config(setup), facts);
-        // The sink is memory, and the schema is the vehicle's own: this cannot fail.
-        let log = head.and_then(|head| head.data(LogSchema::new(V::BESIDE))).ok();
-        Self { log: log.map(stampfly_flight::Recorder::new), ..Self::hash_only() }
+    pub fn refused(&self) -> u32 {
+        self.log.as_ref().map_or(0, stampfly_flight::Recorder::lost)
     }
 
     /// Measures how long each runnable takes, too. Costs some tens of nanoseconds an activation.
@@ -118,12 +145,6 @@ impl<V: Vehicle> Recorder<V> {
         self.hash.finish()
     }
 
-    /// The log, once the flight is over; empty when there is none.
-    #[must_use]
-    pub fn log(&self) -> &[u8] {
-        &self.bytes
-    }
-
     /// What the vehicle was given, in order; empty when it was not collected.
     #[must_use]
     pub fn into_inputs(self) -> Vec<Event> {
@@ -137,7 +158,7 @@ impl<V: Vehicle> Recorder<V> {
     }
 }
 
-impl<V: Vehicle> Observer for Recorder<V> {
+impl<V: Vehicle, S: Sink> Observer for Recorder<V, S> {
     fn has_read(&mut self, activation: &Activation) {
         if let Some(inputs) = &mut self.inputs {
             inputs.activation();
@@ -166,7 +187,7 @@ impl<V: Vehicle> Observer for Recorder<V> {
     }
 }
 
-impl<V: Vehicle> Witness<V::Runnables> for Recorder<V> {
+impl<V: Vehicle, S: Sink> Witness<V::Runnables> for Recorder<V, S> {
     fn turn(&mut self, clock: Instant) {
         if let Some(inputs) = &mut self.inputs {
             inputs.turn(clock);
@@ -195,7 +216,7 @@ impl<V: Vehicle> Witness<V::Runnables> for Recorder<V> {
         loop {
             match key_frame::encode(flight_loop, clock, &mut self.frame) {
                 Ok(length) => {
-                    // The sink is memory.
+                    // What the sink refuses is counted.
                     let _ = log.key_frame(clock, self.frame.get(..length).unwrap_or_default());
                     return;
                 }
@@ -213,7 +234,7 @@ impl<V: Vehicle> Witness<V::Runnables> for Recorder<V> {
 
     fn ends(&mut self) {
         if let Some(log) = self.log.take() {
-            self.bytes = log.into_sink().0;
+            self.written = Some(log.into_sink());
         }
     }
 }

@@ -12,6 +12,7 @@
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
+//! | `mavlink` | frames and signatures of MAVLink 1 and 2 (feature `mavlink`) | for ground stations |
 //! | [`msp`] | frames of the MultiWii serial protocol, versions 1 and 2 | for configurators and telemetry scripts |
 //! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
@@ -48,6 +49,8 @@ mod crc8;
 pub mod datagram;
 mod heard;
 pub mod json;
+#[cfg(feature = "mavlink")]
+pub mod mavlink;
 pub mod msp;
 mod pairing;
 mod peers;

@@ -4,14 +4,16 @@ use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
 use super::judge::{Judge, Sight};
+use super::live::{self, Seen, Services};
 use super::outcome::Outcome;
 use super::pilot::{Meaning, Pilot};
 use super::radio::Radio;
 use super::sensing::{self, Healths, Others, Sensing, Shared};
 use super::setup::Setup;
 use super::watch::Watch;
+use crate::console::Profile;
 use crate::messages::{ButtonContact, CutoffState};
-use crate::schedule::Runnables;
+use crate::schedule::{ACTIVATIONS, Runnables};
 use crate::topics::{self, Id};
 use stampfly_bus::Band;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
@@ -20,7 +22,7 @@ use stampfly_sim::chips;
 use stampfly_sim::fault::Moment;
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
-use stampfly_sim::vehicle;
+use stampfly_sim::vehicle::{self, Live};
 use stampfly_sim::{Simulation, Truth, World};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
@@ -40,6 +42,8 @@ pub struct Surroundings {
     health: Healths,
     wrong: Option<Wrong>,
     watchdog: Watchdog,
+    seen: Seen,
+    profile: Profile,
 }
 
 impl Surroundings {
@@ -59,6 +63,8 @@ impl Surroundings {
             health: Healths::default(),
             wrong: Some(Wrong::new(&setup.faults, setup.simulation.start, setup.simulation.seed)),
             watchdog: Watchdog::new(CUT_OFF),
+            seen: Seen::default(),
+            profile: Profile::new(&ACTIVATIONS),
         }
     }
 
@@ -79,12 +85,13 @@ impl vehicle::Surroundings for Surroundings {
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
-        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog } = self;
+        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog, seen, profile } =
+            self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
         let wrong = wrong.take().expect("surroundings are started once");
         let cameras = setup.cameras;
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
-        let Others { motors, indicator, button, link, cutoff, .. } = match setup.sensing {
+        let Others { motors, indicator, button, link, cutoff, console, .. } = match setup.sensing {
             Sensing::Models => sensing::start_models(tasks, clock, (sensors, &wrong), outside, cameras, health),
             Sensing::Chips => {
                 sensing::start_drivers(tasks, clock, (board, shared), (sensors, &wrong), outside, cameras, health)
@@ -94,9 +101,14 @@ impl vehicle::Surroundings for Surroundings {
         let home = Home::new(&world.truth_at(setup.simulation.start));
         let radio = Radio::new(clock, link, &wrong);
         let waits = wrong.injector.wants(Moment::Ground);
-        match setup.pilot {
-            None => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
-            Some(mode) => {
+        match (&setup.live, setup.pilot) {
+            (Some(live), _) => {
+                let shared = (&*seen, &*health, &*profile);
+                let services = Services::new(live.number, radio, console, &setup.vehicle, shared);
+                tasks.spawn(live.serve(clock.clone(), live::PERIOD, services));
+            }
+            (None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
+            (None, Some(mode)) => {
                 let meaning = Meaning::new(&setup.vehicle.navigator, &setup.vehicle.cascade);
                 tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
             }
@@ -109,6 +121,8 @@ impl vehicle::Surroundings for Surroundings {
             steps: setup.mission.steps.len(),
             progress,
             watch: Watch::new(home),
+            live: setup.live.as_ref(),
+            seen,
             judge,
             wrong,
             chips,
@@ -137,6 +151,9 @@ pub struct Around<'a> {
     steps: usize,
     progress: &'a Progress,
     watch: Watch,
+    /// The programs that fly it, if there are.
+    live: Option<&'a Live>,
+    seen: &'a Seen,
     judge: Judge,
     wrong: Wrong,
     chips: Option<chips::AttachedChips>,
@@ -192,6 +209,9 @@ impl vehicle::Around for Around<'_> {
             self.watch.note(*id, at, words);
             self.judge.published(*id, at, words);
         }
+        if self.live.is_some() {
+            self.seen.0.borrow_mut().note(topic, at, words);
+        }
     }
 
     fn beside(&mut self, record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {
@@ -215,6 +235,9 @@ impl vehicle::Around for Around<'_> {
     }
 
     fn is_over(&mut self, now: Instant) -> bool {
+        if let Some(live) = self.live {
+            return live.ports.are_closed();
+        }
         if self.judge.is_over(now) {
             return true;
         }
@@ -231,7 +254,7 @@ impl vehicle::Around for Around<'_> {
             metrics: watch.collector.finish(),
             phases: watch.phases,
             tuned: watch.tuned,
-            finished: self.progress.finished.get(),
+            finished: self.progress.finished.get() || self.live.is_some(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),
             judgement: self.judge.finish(),

@@ -10,6 +10,7 @@
 //! | [`bench`](mod@bench) | a vehicle on a bench, with somebody who holds it, looks, listens and presses its button |
 //! | [`metrics`] | how good a flight was |
 //! | [`flight`] | one flight: what is started, what is watched |
+//! | `live`, `terminal` | its ports and services when other programs fly it; a command line |
 //! | [`Setup`], [`Outcome`] | what decides a flight, and how it went |
 //!
 //! For programs on a PC (feature `simulation`); nothing of it is in the firmware.
@@ -20,6 +21,7 @@ pub mod flight;
 pub mod ground_station;
 mod home;
 pub mod judge;
+mod live;
 pub mod metrics;
 pub mod mission;
 mod outcome;
@@ -29,6 +31,7 @@ pub mod plant;
 pub mod radio;
 pub mod sensing;
 mod setup;
+mod terminal;
 mod watch;
 
 pub use outcome::{Outcome, PhaseChange};
@@ -47,8 +50,8 @@ use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::FaultKind;
 use stampfly_sim::vehicle::{
-    self, Ended, FlightOptions, Golden, Options, Page, Remote, RemoteError, Setting, SetupError, Variety, Vehicle,
-    Witness,
+    self, Ended, FlightOptions, Golden, Options, Page, PortSpec, Remote, RemoteError, Setting, SetupError, Variety,
+    Vehicle, Witness,
 };
 use stampfly_types::Message;
 use std::fmt::Display;
@@ -65,17 +68,23 @@ impl Vehicle for StampFly {
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
     const VARIETY: Variety = Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"] };
+    const PORTS: &'static [PortSpec] = live::PORTS;
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
     type Outcome = Outcome;
 
     fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
-        if options.live.is_some() {
-            return Err("the StampFly is not flown by other programs".into());
-        }
         let mut setup = Setup::reference(seed);
         setup.mission = mission_of(options, seed)?;
+        if let Some(live) = &options.live {
+            if options.mission.is_some() || options.pilot.is_some() {
+                return Err("other programs fly it: it has neither a mission nor a pilot".into());
+            }
+            setup.mission = Mission { steps: Vec::new() };
+            setup.limit = live.limit;
+            setup.live = Some(live.clone());
+        }
         if let Some(vibration) = options.vibration {
             setup.simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
         }

@@ -6,6 +6,7 @@ use super::sensing::Sensing;
 use crate::config::VehicleConfig;
 use stampfly_sim::SimulationConfig;
 use stampfly_sim::fault::Fault;
+use stampfly_sim::vehicle::Live;
 use stampfly_types::Duration;
 use stampfly_types::messages::FlightMode;
 use std::vec::Vec;
@@ -29,6 +30,8 @@ pub struct Setup {
     pub cameras: bool,
     /// Seed of the executor's delays; `None` for an executor that is never late.
     pub jitter: Option<u64>,
+    /// Other programs fly it, instead of a mission.
+    pub live: Option<Live>,
     /// The flight is broken off after this long.
     pub limit: Duration,
 }
@@ -46,6 +49,7 @@ impl Setup {
             pilot: None,
             cameras: false,
             jitter: None,
+            live: None,
             limit: Duration::from_secs(180),
             simulation,
         }

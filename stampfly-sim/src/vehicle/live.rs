@@ -4,37 +4,116 @@
 //! hears meanwhile what arrives. A machine that comes too late for a tick loses the time: the vehicle does not hurry after
 //! it, because nobody could steer it there. What is published is in the log, so the flight can be replayed without the
 //! programs.
+//!
+//! A vehicle lists its ports ([`PortSpec`]); the program that flies it opens them ([`Ports`]), and the vehicle makes of the
+//! bytes what it wants ([`Link`]). No socket is known here.
 
 use crate::time::Clock;
+use core::fmt;
+use core::net::SocketAddr;
 use stampfly_types::{Duration, Instant};
-use std::net::{SocketAddr, UdpSocket};
 use std::sync::Arc;
 
-/// Datagrams heard in one tick: a bound on what a flood can cost.
-const DATAGRAMS: usize = 256;
-/// Longest datagram, bytes.
-const LONGEST: usize = 2048;
 /// Between a tick and its answers: the executor has run it by then.
 const AFTER_TICK: Duration = Duration::from_millis(1);
+
+/// How bytes come to a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Datagrams come to it, and answers go from it.
+    Udp,
+    /// Datagrams are sent to it, whether or not somebody listens, and answers are heard.
+    UdpTo,
+    /// Programs connect to it.
+    Tcp,
+    /// A page in a browser, which the program that flies the vehicle serves for all vehicles together.
+    Page,
+}
+
+/// A port of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PortSpec {
+    /// Name, as options take it.
+    pub name: &'static str,
+    /// How bytes come to it.
+    pub transport: Transport,
+    /// Its number, unless another is asked for. Of the n-th vehicle from zero: ten times n more, but for
+    /// [`Transport::UdpTo`] and [`Transport::Page`].
+    pub number: u16,
+    /// What is spoken there.
+    pub meaning: &'static str,
+}
+
+impl PortSpec {
+    /// A port that datagrams come to.
+    #[must_use]
+    pub const fn udp(name: &'static str, number: u16, meaning: &'static str) -> Self {
+        Self { name, transport: Transport::Udp, number, meaning }
+    }
+
+    /// A port that programs connect to.
+    #[must_use]
+    pub const fn tcp(name: &'static str, number: u16, meaning: &'static str) -> Self {
+        Self { name, transport: Transport::Tcp, number, meaning }
+    }
+}
+
+/// Who speaks: a program at one of the vehicle's ports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Client {
+    /// Place of the port in [`Vehicle::PORTS`](super::Vehicle::PORTS).
+    pub port: usize,
+    /// Where the program is. Unlike every other at this port.
+    pub address: SocketAddr,
+}
+
+/// What is heard of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard<'b> {
+    /// It has connected; at a port of [`Transport::UdpTo`], the address to which datagrams are to be sent.
+    Opened,
+    /// A datagram, or the next part of a stream.
+    Bytes(&'b [u8]),
+    /// It is gone.
+    Closed,
+}
+
+/// The open ports of one vehicle.
+pub trait Ports: fmt::Debug + Send + Sync {
+    /// Hands over what has come in, in order, and waits for more until then; a bounded number, so that a flood does not hold
+    /// time up.
+    fn receive(&self, until: std::time::Instant, hear: &mut dyn FnMut(Client, Heard<'_>));
+
+    /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes nothing is closed.
+    fn send(&self, to: &Client, bytes: &[u8]);
+
+    /// Has somebody asked for the end of the flight?
+    fn are_closed(&self) -> bool;
+}
 
 /// Where other programs reach a vehicle, and for how long.
 #[derive(Clone, Debug)]
 pub struct Live {
     /// Where they are heard and answered.
-    pub socket: Arc<UdpSocket>,
+    pub ports: Arc<dyn Ports>,
+    /// Which of several vehicles this is, from zero.
+    pub number: usize,
     /// The flight is broken off after this long, in virtual time.
     pub limit: Duration,
     /// Virtual seconds in a second of the wall, above 0; 1 is real time.
     pub speed: f32,
 }
 
-/// What a vehicle makes of datagrams.
-pub trait Link {
-    /// One has arrived.
-    fn hear(&mut self, now: Instant, from: SocketAddr, bytes: &[u8]);
+/// Where answers go.
+pub type Put<'p> = &'p mut dyn FnMut(&Client, &[u8]);
 
-    /// A tick has run: hands the answers to `put`.
-    fn answer(&mut self, now: Instant, tick: u32, put: &mut dyn FnMut(&SocketAddr, &[u8]));
+/// What a vehicle makes of what it hears.
+pub trait Link {
+    /// Something was heard.
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>);
+
+    /// A tick has run.
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>);
 }
 
 impl Live {
@@ -42,33 +121,19 @@ impl Live {
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
         let real_period = std::time::Duration::from_micros(period.as_micros()).div_f32(self.speed);
         let mut until = std::time::Instant::now();
+        let begun = clock.now().as_micros() / period.as_micros();
         for tick in 1_u32.. {
-            let due = period.as_micros() * u64::from(tick);
+            let due = period.as_micros() * (begun + u64::from(tick));
             clock.sleep_until(Instant::from_micros(due)).await;
             until = next_tick(until, std::time::Instant::now(), real_period);
-            self.receive(until, &mut |from, bytes| link.hear(clock.now(), from, bytes));
+            let ports = &self.ports;
+            ports.receive(until, &mut |from, heard| {
+                link.hear(clock.now(), from, heard, &mut |to, bytes| ports.send(to, bytes));
+            });
+            std::thread::sleep(until.saturating_duration_since(std::time::Instant::now()));
             clock.sleep_until(clock.now() + AFTER_TICK).await;
-            // An answer that cannot be sent is lost, as on any network.
-            link.answer(clock.now(), tick, &mut |to, bytes| _ = self.socket.send_to(bytes, to));
+            link.answer(clock.now(), tick, &mut |to, bytes| ports.send(to, bytes));
         }
-    }
-
-    /// Hears until then, on the wall clock. What has arrived already is heard even when it is later.
-    fn receive(&self, until: std::time::Instant, hear: &mut dyn FnMut(SocketAddr, &[u8])) {
-        let left = || until.saturating_duration_since(std::time::Instant::now());
-        let mut buffer = [0; LONGEST];
-        for _ in 0..DATAGRAMS {
-            let left = left();
-            // The socket refuses to wait for no time at all.
-            let wait = Some(left.max(std::time::Duration::from_micros(1)));
-            match self.socket.set_read_timeout(wait).and_then(|()| self.socket.recv_from(&mut buffer)) {
-                Ok((length, from)) => hear(from, &buffer[..length]),
-                Err(_) if left.is_zero() => return,
-                // The time is over, or the system reports that an answer found its receiver gone.
-                Err(_) => {}
-            }
-        }
-        std::thread::sleep(left());
     }
 }
 

@@ -8,7 +8,7 @@
 //! | [`Remote`], [`fly_remote`] | the same with the runnables on a vehicle at the other end of a line |
 //! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
 //! | [`Scenario`] | what to command and what must be true, as text |
-//! | [`Live`] | other programs fly it, in real time |
+//! | [`Live`], [`Ports`], [`Link`] | other programs fly it, in real time |
 //! | [`Witness`] | is told everything that happens: a log, a hash, a test |
 //!
 //! A program that flies vehicles (missions, campaigns, replay, report) knows them through [`Vehicle`] alone, so a new
@@ -25,7 +25,7 @@ mod scripted;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, fly, fly_remote};
-pub use live::{Link, Live};
+pub use live::{Client, Heard, Link, Live, PortSpec, Ports, Put, Transport};
 pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
 pub use remote::{Figures, Port, Remote, RemoteError, Settings};
 pub use scenario::Scenario;
@@ -266,6 +266,8 @@ pub trait Vehicle: 'static {
     const FAULTS: &'static [FaultKind] = &[];
     /// What the flights of a campaign vary. Nothing by default.
     const VARIETY: Variety = Variety::NONE;
+    /// Where other programs reach it while it is live. Nowhere by default.
+    const PORTS: &'static [PortSpec] = &[];
     /// What a page about a flight shows of it. By default a plot per topic and unit.
     const PAGE: Page = Page::EMPTY;
     /// Its runnables. Serialisable, so that a log can hold key frames.

@@ -15,20 +15,20 @@ pub use people::{Lamp, Spin};
 
 use super::faults::Wrong;
 use super::plant::PLANT;
-use super::sensing::{self, Healths, IMAGE, NAMES, Others, Shared};
-use crate::console::{Command, Console, Newest, Profile};
+use super::sensing::{self, Healths, IMAGE, Others, Shared};
+use super::terminal::{Desk, Terminal};
+use crate::VehicleConfig;
+use crate::console::{Newest, Profile};
 use crate::golden;
 use crate::link::{self, Link};
 use crate::messages::ButtonContact;
 use crate::schedule::{ACTIVATIONS, Runnables};
 use crate::topics::{self, Id};
-use crate::{VehicleConfig, console};
 use core::fmt::Display;
 use people::{Loudspeaker, Wiring};
 use processor::Processor;
 use stampfly_bus::{Band, Taps as _};
 use stampfly_drivers::{Button, Buzzer, Indicator, Lights, MotorOutputs};
-use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
 use stampfly_flight::doctor::{Fact, FlashAccess, Restart};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::{Address, ControlPacket, Session};
@@ -38,13 +38,11 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig, World, chips};
 use stampfly_types::messages::{MotorOutput, PilotInput};
 use stampfly_types::{Duration, Instant};
-use std::format;
 use std::string::String;
 use std::vec::Vec;
 
 /// What the program on the bench calls itself.
 const VERSION: &str = concat!("stampfly-bench ", env!("CARGO_PKG_VERSION"));
-const PROMPT: &str = "> ";
 const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
 /// The transmitter that it was paired with.
 const TRANSMITTER: Address = Address([2, 0, 0, 0, 0, 1]);
@@ -66,9 +64,7 @@ pub struct Bench<'b> {
     processor: Processor<'b>,
     config: VehicleConfig,
     console: topics::ConsoleEnds<'b>,
-    editor: LineEditor<80>,
-    /// Written to the serial port and not yet read.
-    screen: String,
+    terminal: Terminal,
     facts: [(&'static str, FactOf); 2],
     motors: (MotorModel, topics::ActuatorMotorRx<'b>),
     wiring: Wiring,
@@ -129,8 +125,7 @@ pub fn with_vehicle<T>(defect: Option<&Defect>, seed: u64, examine: impl FnOnce(
         processor: Processor::new(&profile, &ACTIVATIONS, fault::load(defect), flash),
         config,
         console,
-        editor: LineEditor::new(),
-        screen: String::new(),
+        terminal: Terminal::new(),
         facts: [("restart", FactOf::Restart(restart)), ("flash", FactOf::Flash(flash))],
         motors: (motors.0, motors.1.actuator_motor),
         wiring: Wiring::of(defect),
@@ -229,32 +224,6 @@ impl Bench<'_> {
 
     /// Types into the serial port, keys as they are sent.
     pub fn send(&mut self, keys: &[u8]) {
-        for key in keys {
-            let line = self.editor.feed(*key, &mut self.screen).map(String::from);
-            if let Some(line) = line {
-                self.obey(&line);
-                self.screen.push_str(PROMPT);
-            }
-        }
-    }
-
-    /// What the serial port has written since the last call.
-    pub fn read(&mut self) -> String {
-        core::mem::take(&mut self.screen)
-    }
-
-    fn obey(&mut self, line: &str) {
-        let now = self.clock.now();
-        let errors: Vec<_> = self.health.iter().map(|health| health.last_error()).collect();
-        let each = NAMES.iter().zip(self.health).zip(&errors);
-        let sensors: Vec<_> = each
-            .map(|((name, health), error)| SensorLine {
-                name,
-                samples: health.samples(),
-                errors: health.errors(),
-                last_error: error.as_ref().map(|error| error as &dyn Display),
-            })
-            .collect();
         let facts: Vec<Fact<'_>> = self
             .facts
             .iter()
@@ -266,26 +235,17 @@ impl Bench<'_> {
                 Fact { name, verdict, value, advice }
             })
             .collect();
-        let mut vehicle = Console {
-            version: VERSION,
-            newest: &self.newest,
-            sensors: &sensors,
-            profile: self.profile,
-            facts: &facts,
-            config: &mut self.config,
-        };
-        match answer(line, now, &mut vehicle, &mut self.screen) {
-            Ok(Request::Vehicle(command)) => self.carry_out(command),
-            Ok(Request::Nothing) | Err(_) => {}
-            Ok(_) => self.screen.push_str("not on this bench\r\n"),
+        let desk =
+            Desk { version: VERSION, newest: &self.newest, health: self.health, profile: self.profile, facts: &facts };
+        let (now, terminal) = (self.clock.now(), &mut self.terminal);
+        for _ in terminal.send(now, keys, &desk, &mut self.config, &mut self.console) {
+            terminal.screen.push_str("not on this bench\r\n");
         }
     }
 
-    fn carry_out(&mut self, command: Command) {
-        command.publish(self.clock.now(), &mut self.console);
-        if let Command::TestMotor { motor, .. } = command {
-            self.screen += &format!("motor {motor} turns for {} s\r\n", console::TEST_TIME.seconds());
-        }
+    /// What the serial port has written since the last call.
+    pub fn read(&mut self) -> String {
+        core::mem::take(&mut self.terminal.screen)
     }
 
     /// A hand takes the vehicle to a place, world NED, m, turned by roll, pitch and yaw, rad, in this time, and holds it there.

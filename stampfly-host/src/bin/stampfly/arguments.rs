@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};
 use stampfly_host::campaign::shard::Shard;
+use stampfly_host::serve::PortOption;
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
 use stampfly_lab::estimate::{Method, Suite, suite};
@@ -186,13 +187,26 @@ impl Default for FlyOptions {
 #[derive(Clone, Debug, Args)]
 pub struct ServeOptions {
     #[command(flatten)]
-    pub fly: FlyOptions,
-    /// Where to hear other programs. They are not authenticated: leave it on this machine, or in a network of your own.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:47003")]
-    pub listen: SocketAddr,
-    /// For how long, in the vehicle's seconds.
-    #[arg(long = "for", value_name = "SECONDS", default_value_t = 600.0, value_parser = seconds)]
-    pub seconds: f32,
+    pub scene: SceneOptions,
+    /// Seed of everything random. The second vehicle has the next one, and so on.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the log and the report.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// How many vehicles. The ports of each are ten numbers above those of the one before it.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=32))]
+    pub count: u8,
+    /// Where a port is to be, or not at all: `mavlink-tcp=5760`, `console=0.0.0.0:2323`, `mavlink-udp=off`; may be repeated. Number
+    /// 0 is any that is free. Who is heard there is not authenticated: leave it on this machine, or in a network of your own.
+    #[arg(long, value_name = "NAME=ADDRESS")]
+    pub port: Vec<PortOption>,
+    /// The same as `--port listen=ADDRESS`.
+    #[arg(long, value_name = "ADDRESS")]
+    pub listen: Option<SocketAddr>,
+    /// For how long, in the vehicle's seconds. Without this: until Ctrl-C.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    pub seconds: Option<f32>,
     /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,

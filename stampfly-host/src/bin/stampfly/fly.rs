@@ -1,7 +1,6 @@
-//! `stampfly fly`: one flight, its log and its report, and one screen about it. `stampfly serve`: the same, flown by other
-//! programs.
+//! `stampfly fly`: one flight, its log and its report, and one screen about it.
 
-use crate::arguments::{FlyOptions, ServeOptions};
+use crate::arguments::FlyOptions;
 use crate::failure::Failure;
 use crate::terminal;
 use serde_json::{Map, Value, json};
@@ -13,9 +12,7 @@ use stampfly_host::recorder::{Recorder, Timing};
 use stampfly_host::report::{Metric, Report};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::flight_log;
-use stampfly_sim::vehicle::{Live, Options, Vehicle, Verdict};
-use stampfly_types::Duration;
-use std::net::UdpSocket;
+use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -27,14 +24,7 @@ pub fn run(options: &FlyOptions) -> Result<ExitCode, Failure> {
     if let Some((file, row)) = options.from.as_ref().zip(options.row) {
         return again(options, file, row);
     }
-    vehicles::with(&options.scene.vehicle.name, Fly(options, None))?
-}
-
-pub fn serve(options: &ServeOptions) -> Result<ExitCode, Failure> {
-    let socket = UdpSocket::bind(options.listen).map_err(|error| format!("--listen {}: {error}", options.listen))?;
-    outln!("listening on {}", socket.local_addr()?);
-    let live = Live { socket: socket.into(), limit: Duration::from_seconds(options.seconds), speed: options.speed };
-    vehicles::with(&options.fly.scene.vehicle.name, Fly(&options.fly, Some(live)))?
+    vehicles::with(&options.scene.vehicle.name, Fly(options))?
 }
 
 /// A flight of a campaign, from its row.
@@ -89,18 +79,18 @@ impl ForVehicle for Again<'_> {
     }
 }
 
-struct Fly<'o>(&'o FlyOptions, Option<Live>);
+struct Fly<'o>(&'o FlyOptions);
 
 impl ForVehicle for Fly<'_> {
     type Output = Result<ExitCode, Failure>;
 
     fn run<V: Vehicle>(self) -> Self::Output {
-        let Self(options, live) = self;
+        let Self(options) = self;
         if options.scene.list {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
         }
-        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, live)?;
+        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, None)?;
         let typed = options.scene.options(options.scene.jitter);
         let (flown, recorder) = fly_and_write::<V>(options, &typed, options.seed, &setup, here::<V>)?;
         if options.scene.json {
@@ -150,7 +140,13 @@ pub(crate) fn fly_and_write<V: Vehicle>(
 
     let log = options.out.join(LOG);
     std::fs::write(&log, recorder.log()).map_err(|error| format!("{}: {error}", log.display()))?;
-    write_report::<V>(&flown, &recorder, flight.mission.as_deref(), seed, &options.out.join(PAGE))?;
+    write_report::<V>(
+        &flown,
+        (recorder.log(), recorder.hash()),
+        flight.mission.as_deref(),
+        seed,
+        &options.out.join(PAGE),
+    )?;
     for (name, contents) in flown.outcome.files() {
         let path = options.out.join(name);
         std::fs::write(&path, contents).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -159,20 +155,20 @@ pub(crate) fn fly_and_write<V: Vehicle>(
 }
 
 /// The report is made from the log, so it shows what the log holds and nothing else.
-fn write_report<V: Vehicle>(
+pub(crate) fn write_report<V: Vehicle>(
     flown: &Flown<V::Outcome>,
-    recorder: &Recorder<V>,
+    (log, hash): (&[u8], u64),
     mission: Option<&str>,
     seed: u64,
     page: &Path,
 ) -> Result<(), Failure> {
-    let parsed = flight_log::parse(recorder.log())?;
+    let parsed = flight_log::parse(log)?;
     let outcome = &flown.outcome;
     let mut metrics = vec![Metric::new("verdict", outcome.sentence(), "").judged(outcome.succeeded())];
     let figures = outcome.figures();
     let figures = figures.iter().filter_map(|figure| Some((figure, figure.value?)));
     metrics.extend(figures.map(|(figure, value)| Metric::new(figure.title(), format!("{value:.3}"), figure.unit)));
-    metrics.push(Metric::new("log hash", format!("{:016x}", recorder.hash()), ""));
+    metrics.push(Metric::new("log hash", format!("{hash:016x}"), ""));
     let mission = mission.map(|mission| format!("mission {mission}, ")).unwrap_or_default();
     let report = Report {
         title: format!("Flight of {}", V::NAME),

@@ -19,6 +19,7 @@ mod hil;
 mod modes;
 mod replay;
 mod schedule;
+mod serve;
 mod terminal;
 mod topics;
 
@@ -30,7 +31,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
         Command::Fly(options) => fly::run(&options),
-        Command::Serve(options) => fly::serve(&options),
+        Command::Serve(options) => serve::run(&options),
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),

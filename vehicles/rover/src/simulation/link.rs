@@ -3,9 +3,8 @@
 use crate::com::{Body, SUBSCRIPTION};
 use crate::topics::LinkEnds;
 use stampfly_link::Peers;
-use stampfly_sim::vehicle::Link;
+use stampfly_sim::vehicle::{Client, Heard, Link, Put};
 use stampfly_types::Instant;
-use std::net::SocketAddr;
 
 /// Every n-th tick subscribers are told the state of the parameters even when it has not changed.
 const STATUS_EVERY: u32 = 10;
@@ -20,12 +19,13 @@ pub(super) struct Peer {
 
 /// The rover's end of the conversations.
 pub(super) struct UdpLink<'b> {
-    pub(super) peers: Peers<SocketAddr, Peer, 16>,
+    pub(super) peers: Peers<Client, Peer, 16>,
     pub(super) ends: LinkEnds<'b>,
 }
 
 impl Link for UdpLink<'_> {
-    fn hear(&mut self, now: Instant, from: SocketAddr, bytes: &[u8]) {
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, _: Put<'_>) {
+        let Heard::Bytes(bytes) = heard else { return };
         let Some((peer, body)) = self.peers.hear(now, from, bytes) else { return };
         match body {
             Body::OperatorCommand(command) => _ = self.ends.operator_command.publish(now, &command),
@@ -41,7 +41,7 @@ impl Link for UdpLink<'_> {
         }
     }
 
-    fn answer(&mut self, now: Instant, tick: u32, put: &mut dyn FnMut(&SocketAddr, &[u8])) {
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
         let Self { peers, ends } = self;
         let wants = |peer: &Peer, n: u32| {
             peer.subscription.is_some_and(|(every, until)| now <= until && every > 0 && n.is_multiple_of(every))

@@ -14,7 +14,7 @@ use stampfly_log::ulog::ParameterValue;
 use stampfly_param::ParameterTable;
 use stampfly_sim::Noise;
 use stampfly_sim::vehicle::{
-    self, Ended, FlightOptions, Options, Page, Script, Scripted, Setting, SetupError, Vehicle, Witness,
+    self, Ended, FlightOptions, Options, Page, PortSpec, Script, Scripted, Setting, SetupError, Vehicle, Witness,
 };
 use stampfly_types::{Duration, Instant};
 use std::prelude::v1::*;
@@ -31,6 +31,7 @@ const STREAM: u64 = 1_100;
 
 impl Vehicle for Rover {
     const NAME: &'static str = "rover";
+    const PORTS: &'static [PortSpec] = &[PortSpec::udp("listen", 47_003, "commands and the log")];
     const PAGE: Page = page::PAGE;
     type Runnables = Runnables;
     type Setup = Setup;
@@ -86,9 +87,8 @@ impl Vehicle for Rover {
     }
 
     fn parameters(config: &Parameters) -> Vec<Setting> {
-        let value = |row: &stampfly_param::Parameter<_>| row.get(config).into();
-        let rows = Parameters::TABLE.iter();
-        rows.map(|row| Setting { name: row.name, value: value(row), unit: row.unit, meaning: row.meaning }).collect()
+        let rows = Parameters::TABLE.iter().map(|row| (row, row.get(config).into()));
+        rows.map(|(row, value)| Setting { name: row.name, value, unit: row.unit, meaning: row.meaning }).collect()
     }
 
     fn set_parameter(config: &mut Parameters, name: &str, value: ParameterValue) -> Result<(), SetupError> {

@@ -1,0 +1,103 @@
+//! The services of the simulated StampFly, each at its port.
+
+use super::seats::{Controls, Seats};
+use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, Seen};
+use crate::VehicleConfig;
+use crate::console::Profile;
+use crate::simulation::radio::Radio;
+use crate::simulation::sensing::Healths;
+use crate::simulation::terminal::{Desk, Terminal};
+use crate::topics::{ConsoleEnds, TOPICS};
+use stampfly_link::mavlink::dialects::common::MavType;
+use stampfly_services::mavlink::{Identity, Mavlink};
+use stampfly_services::{Lease, Places};
+use stampfly_sim::vehicle::{Client, Heard, Link, Put};
+use stampfly_types::Instant;
+use std::vec::Vec;
+
+/// What the simulated vehicle calls itself.
+const VERSION: &str = concat!("stampfly ", env!("CARGO_PKG_VERSION"), ", simulated");
+/// Ticks between two turns of the services that send by themselves: 20 ms.
+const TURN: u32 = 4;
+
+/// The services.
+pub struct Services<'b> {
+    controls: Controls<'b>,
+    seen: &'b Seen,
+    health: &'b Healths,
+    profile: &'b Profile,
+    mavlink: Mavlink<Client>,
+    terminals: Vec<(Client, Terminal)>,
+}
+
+impl<'b> Services<'b> {
+    /// Those of the `number`-th vehicle, from zero.
+    pub fn new(
+        number: usize,
+        radio: Radio<'b>,
+        console: ConsoleEnds<'b>,
+        config: &VehicleConfig,
+        (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
+    ) -> Self {
+        let identity = Identity {
+            system: u8::try_from(number + 1).unwrap_or(u8::MAX),
+            kind: MavType::MAV_TYPE_QUADROTOR,
+            take_off_height: 0.5,
+            version: [0, 2, 0],
+        };
+        let controls = Controls {
+            radio,
+            console,
+            lease: Lease::new(),
+            places: Places::of(&TOPICS),
+            config: config.clone(),
+            sticks: None,
+        };
+        Self { controls, seen, health, profile, mavlink: Mavlink::new(identity), terminals: Vec::new() }
+    }
+
+    fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
+        let newest = self.seen.0.borrow();
+        let desk = Desk { version: VERSION, newest: &newest, health: self.health, profile: self.profile, facts: &[] };
+        let Some((_, terminal)) = self.terminals.iter_mut().find(|(client, _)| *client == from) else { return };
+        let Controls { config, console, .. } = &mut self.controls;
+        for _ in terminal.send(now, keys, &desk, config, console) {
+            terminal.screen.push_str("not of a simulated vehicle\r\n");
+        }
+        put(&from, core::mem::take(&mut terminal.screen).as_bytes());
+    }
+}
+
+impl Link for Services<'_> {
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
+        let newest = self.seen.0.borrow();
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        match (from.port, heard) {
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) => self.mavlink.open(now, from, true),
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => self.mavlink.hear(now, from, bytes, &mut cockpit, put),
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Closed) => self.mavlink.close(from),
+            (CONSOLE, Heard::Opened) => {
+                let mut terminal = Terminal::new();
+                terminal.greet(VERSION);
+                put(&from, core::mem::take(&mut terminal.screen).as_bytes());
+                self.terminals.push((from, terminal));
+            }
+            (CONSOLE, Heard::Bytes(keys)) => {
+                drop(newest);
+                self.type_in(now, from, keys, put);
+            }
+            (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
+            _ => {}
+        }
+    }
+
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
+        let newest = self.seen.0.borrow();
+        self.controls.poll(now, &newest);
+        if !tick.is_multiple_of(TURN) {
+            return;
+        }
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        self.mavlink.poll(now, &mut cockpit, put);
+    }
+}

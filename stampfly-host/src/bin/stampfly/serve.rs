@@ -1,0 +1,168 @@
+//! `stampfly serve`: simulated vehicles in real time, flown by other programs.
+//!
+//! Each vehicle has a thread, its ports and its log. Ctrl-C ends them, a report of each is written, and the exit code says whether
+//! a vehicle did what it must not.
+
+use crate::arguments::ServeOptions;
+use crate::failure::Failure;
+use crate::fly::{figures, write_report};
+use serde_json::Value;
+use stampfly_host::flown::{Flown, fly};
+use stampfly_host::recorder::Recorder;
+use stampfly_host::serve::{OpenPorts, PortOption};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_log::ulog::Sink;
+use stampfly_sim::vehicle::{Live, Options, Transport, Vehicle, Verdict};
+use stampfly_types::Duration;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::thread;
+
+/// A log of more bytes has no report: a browser would not open it. Some ten minutes of one vehicle.
+const LARGEST_REPORT: u64 = 300_000_000;
+/// As good as for ever, s: a year.
+const FOR_EVER: u64 = 365 * 86_400;
+/// After Ctrl-C, a vehicle that does not end in this time is left where it is.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(3);
+
+pub fn run(options: &ServeOptions) -> Result<ExitCode, Failure> {
+    vehicles::with(&options.scene.vehicle.name, Serve(options))?
+}
+
+struct Serve<'o>(&'o ServeOptions);
+
+impl ForVehicle for Serve<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let Self(options) = self;
+        if options.scene.list {
+            options.scene.print_list::<V>(options.seed)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let ports = open::<V>(options)?;
+        let closing = ports.clone();
+        ctrlc::set_handler(move || {
+            closing.iter().for_each(|ports| ports.close());
+            thread::sleep(PATIENCE);
+            std::process::exit(130);
+        })?;
+        std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
+        let flights: Vec<_> = ports
+            .iter()
+            .enumerate()
+            .map(|(number, ports)| Flight::<V>::prepare(options, number, ports))
+            .collect::<Result<_, _>>()?;
+        let ended: Vec<_> = thread::scope(|scope| {
+            let threads: Vec<_> = flights.into_iter().map(|flight| scope.spawn(move || flight.fly())).collect();
+            threads.into_iter().map(thread::ScopedJoinHandle::join).collect()
+        });
+        let mut all_well = true;
+        for ended in ended {
+            let (flown, hash, log) = ended.map_err(|_| "a vehicle's thread has failed")?;
+            all_well &= flown.outcome.succeeded();
+            report::<V>(options, &flown, hash, &log)?;
+        }
+        Ok(if all_well { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+}
+
+/// Opens the ports of every vehicle, and says where they are.
+fn open<V: Vehicle>(options: &ServeOptions) -> Result<Vec<Arc<OpenPorts>>, Failure> {
+    if V::PORTS.is_empty() {
+        return Err(format!("the vehicle '{}' has no ports", V::NAME).into());
+    }
+    let listen = options.listen.map(|address| PortOption { name: "listen".into(), address: Some(address) });
+    let wanted: Vec<_> = options.port.iter().cloned().chain(listen).collect();
+    if let Some(unknown) = wanted.iter().find(|wanted| V::PORTS.iter().all(|port| port.name != wanted.name)) {
+        let names: Vec<_> = V::PORTS.iter().map(|port| port.name).collect();
+        return Err(format!("{} has no port '{}'; it has {}", V::NAME, unknown.name, names.join(", ")).into());
+    }
+    let mut all = Vec::new();
+    for number in 0..usize::from(options.count) {
+        let opened = OpenPorts::open(V::PORTS, &wanted, number)?;
+        for (port, place) in opened.places() {
+            let does = if port.transport == Transport::UdpTo { "sending to" } else { "listening on" };
+            let which = if options.count == 1 { String::new() } else { format!("vehicle {}  ", number + 1) };
+            outln!("{which}{:<12} {:<42} {does} {place}", port.name, port.meaning);
+        }
+        all.push(Arc::new(opened));
+    }
+    Ok(all)
+}
+
+/// A log on the disk.
+struct LogFile(BufWriter<File>);
+
+impl Sink for LogFile {
+    type Error = std::io::Error;
+
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.0.write_all(bytes)
+    }
+}
+
+/// One vehicle, ready to be switched on.
+struct Flight<V: Vehicle> {
+    setup: V::Setup,
+    recorder: Recorder<V, LogFile>,
+    log: PathBuf,
+}
+
+impl<V: Vehicle> Flight<V> {
+    fn prepare(options: &ServeOptions, number: usize, ports: &Arc<OpenPorts>) -> Result<Self, Failure> {
+        let ServeOptions { scene, seed, out, count, speed, seconds, .. } = options;
+        let limit = seconds.map_or(Duration::from_secs(FOR_EVER), Duration::from_seconds);
+        let live = Live { ports: ports.clone(), number, limit, speed: *speed };
+        let seed = seed + number as u64;
+        let typed = Options { live: Some(live), ..scene.options(scene.jitter) };
+        let setup = V::setup(&typed, seed)?;
+        let name = if *count == 1 { "flight.ulg".into() } else { format!("flight-{}.ulg", number + 1) };
+        let log = out.join(name);
+        let failed = |error| format!("{}: {error}", log.display());
+        let file = LogFile(BufWriter::new(File::create(&log).map_err(failed)?));
+        let facts = [
+            ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("seed".to_owned(), seed.to_string()),
+            ("mission".to_owned(), "other programs".to_owned()),
+        ];
+        let recorder =
+            Recorder::with_sink(file, &setup, &facts).map_err(|error| format!("{}: {error:?}", log.display()))?;
+        Ok(Self { setup, recorder, log })
+    }
+
+    fn fly(self) -> (Flown<V::Outcome>, u64, PathBuf) {
+        let Self { setup, mut recorder, log } = self;
+        let flown = fly::<V>(&setup, &mut recorder, &mut |_, _| {});
+        (flown, recorder.hash(), log)
+    }
+}
+
+/// Says how it went, and writes the report.
+fn report<V: Vehicle>(options: &ServeOptions, flown: &Flown<V::Outcome>, hash: u64, log: &Path) -> Result<(), Failure> {
+    let page = log.with_extension("html");
+    let size = std::fs::metadata(log).map_or(0, |file| file.len());
+    let shown = size <= LARGEST_REPORT;
+    if shown {
+        let bytes = std::fs::read(log).map_err(|error| format!("{}: {error}", log.display()))?;
+        write_report::<V>(flown, (&bytes, hash), None, options.seed, &page)?;
+    }
+    for (name, contents) in flown.outcome.files() {
+        let path = options.out.join(name);
+        std::fs::write(&path, contents).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    if options.scene.json {
+        outln!("{}", Value::Object(figures(flown, hash)));
+        return Ok(());
+    }
+    outln!("{:.1} s, {}", flown.duration.seconds_f64(), flown.outcome.sentence());
+    outln!("log     {}", log.display());
+    match shown {
+        true => outln!("report  {}", page.display()),
+        false => outln!("report  none: the log has {} MB", size / 1_000_000),
+    }
+    Ok(())
+}

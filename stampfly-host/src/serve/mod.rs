@@ -1,0 +1,16 @@
+//! A simulated vehicle at its ports: sockets at this machine's side of `stampfly serve`.
+//!
+//! | part | what it does |
+//! |---|---|
+//! | [`PortOption`] | where a port is to be, as typed: `NAME=ADDRESS` or `NAME=off` |
+//! | [`OpenPorts`] | opens a vehicle's ports and carries bytes between sockets and the flight |
+//!
+//! What the bytes mean is the vehicle's business ([`Link`](stampfly_sim::vehicle::Link)).
+
+mod connections;
+mod events;
+mod option;
+mod ports;
+
+pub use option::{PortOption, PortOptionError};
+pub use ports::{OpenError, OpenPorts};

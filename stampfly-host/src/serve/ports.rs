@@ -1,0 +1,189 @@
+//! The open ports of one vehicle: a thread a socket, one queue of bounded length to the flight.
+//!
+//! Datagrams that come while the queue is full are lost, as in a socket's own buffer; streams wait. The flight takes a bounded
+//! number in a tick, so a flood costs datagrams and no time.
+
+use super::connections::Connections;
+use super::events::{self, Event, Events, POLL};
+use super::option::PortOption;
+use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports, Transport};
+use std::fmt;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// Heard in one tick.
+const HEARD: usize = 256;
+/// Longest datagram, bytes: the most that goes through a network in one frame, with room.
+const LONGEST: usize = 2048;
+
+/// A port cannot be opened.
+#[derive(Debug)]
+pub struct OpenError {
+    name: &'static str,
+    address: SocketAddr,
+    error: std::io::Error,
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, address, error } = self;
+        write!(
+            f,
+            "port '{name}' at {address}: {error}; '--port {name}=NUMBER' chooses another, '--port {name}=off' none"
+        )
+    }
+}
+
+impl std::error::Error for OpenError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(&self.error)
+    }
+}
+
+/// What carries answers to a page.
+type Deliver = Box<dyn Fn(SocketAddr, &[u8]) + Send + Sync>;
+
+/// The open ports of one vehicle.
+pub struct OpenPorts {
+    events: Events,
+    heard: Mutex<Receiver<(Client, Event)>>,
+    /// Sockets of datagrams by port.
+    sockets: Vec<Option<UdpSocket>>,
+    connections: Arc<Connections>,
+    page: Option<(usize, Deliver)>,
+    places: Vec<(&'static PortSpec, SocketAddr)>,
+}
+
+impl fmt::Debug for OpenPorts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OpenPorts").field("places", &self.places).finish_non_exhaustive()
+    }
+}
+
+impl OpenPorts {
+    /// Opens those of the `number`-th vehicle, from zero, where the options want them.
+    ///
+    /// # Errors
+    /// When one cannot be opened: another program has it.
+    pub fn open(ports: &'static [PortSpec], options: &[PortOption], number: usize) -> Result<Self, OpenError> {
+        let (events, heard) = events::queue();
+        let connections = Arc::new(Connections::default());
+        let mut opened = Self {
+            heard: Mutex::new(heard),
+            sockets: Vec::new(),
+            connections: Arc::clone(&connections),
+            page: None,
+            places: Vec::new(),
+            events: events.clone(),
+        };
+        for (port, spec) in ports.iter().enumerate() {
+            let mut socket = None;
+            if let Some(address) = PortOption::place(options, spec, number) {
+                let failed = |error| OpenError { name: spec.name, address, error };
+                let place = match spec.transport {
+                    Transport::Udp => {
+                        socket = Some(UdpSocket::bind(address).map_err(failed)?);
+                        socket.as_ref().map_or(Ok(address), UdpSocket::local_addr).map_err(failed)?
+                    }
+                    Transport::UdpTo => {
+                        let from = if address.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
+                        socket = Some(UdpSocket::bind((from, 0)).map_err(failed)?);
+                        events.offer(Client { port, address }, Heard::Opened);
+                        address
+                    }
+                    Transport::Tcp => {
+                        let listener = TcpListener::bind(address).map_err(failed)?;
+                        let place = listener.local_addr().map_err(failed)?;
+                        let (connections, events) = (Arc::clone(&connections), events.clone());
+                        std::thread::spawn(move || connections.accept(port, &listener, &events));
+                        place
+                    }
+                    // Served for all vehicles together.
+                    Transport::Page => address,
+                };
+                if let Some(socket) = &socket {
+                    let (socket, events) = (socket.try_clone().map_err(failed)?, events.clone());
+                    socket.set_read_timeout(Some(POLL)).map_err(failed)?;
+                    std::thread::spawn(move || receive(port, &socket, &events));
+                }
+                opened.places.push((spec, place));
+            }
+            opened.sockets.push(socket);
+        }
+        Ok(opened)
+    }
+
+    /// Where each port is that is open.
+    #[must_use]
+    pub fn places(&self) -> &[(&'static PortSpec, SocketAddr)] {
+        &self.places
+    }
+
+    /// Asks for the end of the flight.
+    pub fn close(&self) {
+        self.events.close();
+    }
+
+    /// Connects a page at this port: what it says is put in by [`page_heard`](Self::page_heard), answers go to `deliver`.
+    #[must_use]
+    pub fn with_page(mut self, port: usize, deliver: impl Fn(SocketAddr, &[u8]) + Send + Sync + 'static) -> Self {
+        self.page = Some((port, Box::new(deliver)));
+        self
+    }
+
+    /// A page has said something.
+    pub fn page_heard(&self, address: SocketAddr, heard: Heard<'_>) {
+        if let Some((port, _)) = self.page {
+            self.events.offer(Client { port, address }, heard);
+        }
+    }
+}
+
+impl Drop for OpenPorts {
+    fn drop(&mut self) {
+        self.events.close();
+    }
+}
+
+fn receive(port: usize, socket: &UdpSocket, events: &Events) {
+    let mut buffer = [0; LONGEST];
+    while events.are_open() {
+        // An error says that the time is over, or that an answer found its receiver gone.
+        if let Ok((length, address)) = socket.recv_from(&mut buffer) {
+            events.offer(Client { port, address }, Heard::Bytes(buffer.get(..length).unwrap_or_default()));
+        }
+    }
+}
+
+impl Ports for OpenPorts {
+    fn receive(&self, until: Instant, hear: &mut dyn FnMut(Client, Heard<'_>)) {
+        let heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
+        for _ in 0..HEARD {
+            let Ok((client, event)) = heard.recv_timeout(until.saturating_duration_since(Instant::now())) else {
+                return;
+            };
+            match &event {
+                Event::Opened => hear(client, Heard::Opened),
+                Event::Bytes(bytes) => hear(client, Heard::Bytes(bytes)),
+                Event::Closed => hear(client, Heard::Closed),
+            }
+        }
+    }
+
+    fn send(&self, to: &Client, bytes: &[u8]) {
+        if let Some(socket) = self.sockets.get(to.port).and_then(Option::as_ref) {
+            // An answer that cannot be sent is lost, as on any network.
+            _ = socket.send_to(bytes, to.address);
+        } else if let Some((_, deliver)) = self.page.as_ref().filter(|(port, _)| *port == to.port) {
+            deliver(to.address, bytes);
+        } else {
+            self.connections.send(to, bytes);
+        }
+    }
+
+    fn are_closed(&self) -> bool {
+        !self.events.are_open()
+    }
+}

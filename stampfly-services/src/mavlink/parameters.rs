@@ -1,0 +1,121 @@
+//! The parameter protocol: a list, one by number or name, and setting.
+//!
+//! MAVLink's names have at most 16 characters; a longer one is [shortened](short_name). A parameter that is set answers with the
+//! value that it has then, which is how a client learns that it was refused.
+
+use super::Put;
+use super::client::Client;
+use super::streams::text;
+use crate::cockpit::Cockpit;
+use core::fmt::Write;
+use heapless::String;
+use stampfly_flight::parameters::{self, Parameters};
+use stampfly_link::mavlink::dialects::common::*;
+
+/// Characters of a name.
+const NAME: usize = 16;
+/// Parameters of a list that are sent at once: with fifty turns a second, two hundred parameters are there in two thirds of a
+/// second, and a serial line of 115200 baud still carries it.
+const AT_ONCE: usize = 6;
+
+/// The name that MAVLink has room for: the name itself, or its first ten characters, a tilde and five characters that are made of
+/// all of it.
+///
+/// ```
+/// use stampfly_services::mavlink::short_name;
+/// assert_eq!(short_name("rate.roll.kp"), "rate.roll.kp");
+/// assert_eq!(short_name("mode.takeoff.throttle"), "mode.takeo~ykaa2");
+/// ```
+#[must_use]
+pub fn short_name(name: &str) -> String<NAME> {
+    let mut short = String::new();
+    if short.push_str(name).is_ok() {
+        return short;
+    }
+    // FNV-1a.
+    let mut hash = name.bytes().fold(0x811C_9DC5_u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+    for character in name.chars().filter(char::is_ascii).take(NAME - 6) {
+        _ = short.push(character);
+    }
+    _ = short.push('~');
+    for _ in 0..5 {
+        _ = short.push(char::from_digit(hash % 36, 36).unwrap_or('0'));
+        hash /= 36;
+    }
+    short
+}
+
+fn count(parameters: &dyn Parameters) -> usize {
+    (0..).take_while(|index| parameters.describe(*index).is_some()).count()
+}
+
+fn find(parameters: &dyn Parameters, id: &[u8; NAME]) -> Option<usize> {
+    let end = id.iter().position(|byte| *byte == 0).unwrap_or(NAME);
+    let wanted = core::str::from_utf8(id.get(..end)?).ok()?;
+    let mut all = (0..).map_while(|index| parameters.describe(index));
+    all.position(|info| info.name == wanted || short_name(info.name) == wanted)
+}
+
+fn value(parameters: &dyn Parameters, index: usize) -> Option<MavMessage> {
+    let (info, value) = (parameters.describe(index)?, parameters.get(index)?);
+    let mut id = [0; NAME];
+    id.iter_mut().zip(short_name(info.name).bytes()).for_each(|(to, from)| *to = from);
+    Some(MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
+        param_value: value,
+        param_count: count(parameters) as u16,
+        param_index: index as u16,
+        param_id: id.into(),
+        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+    }))
+}
+
+/// Sends the next ones of a list that was asked for.
+pub(super) fn send_next<C>(client: &mut Client<C>, parameters: &dyn Parameters, put: Put<'_, C>) {
+    for _ in 0..AT_ONCE {
+        let Some(index) = client.next_parameter else { return };
+        let Some(message) = value(parameters, index) else {
+            client.next_parameter = None;
+            return;
+        };
+        client.next_parameter = Some(index + 1);
+        client.send(&message, put);
+    }
+}
+
+/// Answers a question for one. Nothing is said of one that there is not.
+pub(super) fn read<C>(
+    client: &mut Client<C>,
+    request: &PARAM_REQUEST_READ_DATA,
+    parameters: &dyn Parameters,
+    put: Put<'_, C>,
+) {
+    let index = match usize::try_from(request.param_index) {
+        Ok(index) => Some(index),
+        // Negative: by name.
+        Err(_) => find(parameters, &request.param_id.into()),
+    };
+    if let Some(message) = index.and_then(|index| value(parameters, index)) {
+        client.send(&message, put);
+    }
+}
+
+/// Sets one, and answers with what it is then.
+pub(super) fn set<C>(client: &mut Client<C>, request: &PARAM_SET_DATA, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+    let armed = cockpit.view().state().armed;
+    let parameters = cockpit.parameters();
+    let Some(index) = find(parameters, &request.param_id.into()) else { return };
+    let name: String<64> = parameters.describe(index).and_then(|info| info.name.try_into().ok()).unwrap_or_default();
+    let mut why = String::<50>::new();
+    // What does not fit is cut off.
+    if armed {
+        _ = why.write_str("not while armed");
+    } else if let Err(error) = parameters::set(parameters, &name, request.param_value) {
+        _ = write!(why, "{name}: {error}");
+    }
+    if let Some(message) = value(parameters, index) {
+        client.send(&message, put);
+    }
+    if !why.is_empty() {
+        client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "", &why), put);
+    }
+}
