@@ -109,7 +109,7 @@ def keyboard_moves_tabs(page: Page) -> None:
 def changes_a_parameter(page: Page) -> None:
     page.click("#tab-parameters")
     page.fill("#parameter-search", "eskf.gate")
-    row = page.locator("#parameters tr:visible").filter(has=page.locator("th", has_text=re.compile(r"^eskf\.gate\b")))
+    row = page.locator("#parameters tr[data-name='eskf.gate']:visible")
     until("one parameter is found", lambda: row.count() == 1)
     value = row.locator("input")
     before = float(value.input_value())

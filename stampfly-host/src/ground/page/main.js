@@ -53,6 +53,7 @@ on('state', (state) => {
   for (const [number, clock, ...samples] of state) {
     const vehicle = station.vehicles[number];
     if (!vehicle) continue;
+    if (clock < vehicle.clock) forget(vehicle);
     vehicle.clock = clock;
     for (const [place, count, at, ...values] of samples) {
       const topic = vehicle.list[place];

@@ -11,6 +11,7 @@ const buildParameters = (vehicle) => {
   const canSet = !vehicle.isLog && vehicle.card.offers.includes('param_set');
   vehicle.rows = vehicle.card.parameters.map((parameter) => {
     const row = make('tr', body);
+    row.dataset.name = parameter.name;
     const name = make('th', row, '', parameter.name);
     name.scope = 'row';
     make('small', name, '', parameter.meaning);
@@ -78,6 +79,7 @@ const buildFaults = (vehicle) => {
   const canInject = !vehicle.isLog && vehicle.card.offers.includes('fault');
   vehicle.faultRows = vehicle.card.faults.map((fault) => {
     const item = make('li', list);
+    item.dataset.name = fault.name;
     const button = make('button', item, '', fault.name);
     button.disabled = !canInject;
     if (!canInject) button.title = 'Not offered by this vehicle';
