@@ -121,6 +121,12 @@ impl<V: Vehicle, S: Sink> Recorder<V, S> {
         Ok(Self::on(Some(stampfly_flight::Recorder::new(log))))
     }
 
+    /// The sink with the log, once the flight is over.
+    #[must_use]
+    pub const fn written(&self) -> Option<&S> {
+        self.written.as_ref()
+    }
+
     /// Messages that the sink has refused so far.
     #[must_use]
     pub fn refused(&self) -> u32 {

@@ -9,11 +9,17 @@
 //! | [`ControlPacket`] | sticks and switches, 14 bytes | in a transmitter, a simulator, a test |
 //! | [`PairingPacket`] | the vehicle's call for a transmitter, 11 bytes | in a transmitter |
 //! | [`TelemetryPacket`] | what the vehicle tells its pilot, 22 bytes | at either end |
+//! | [`JoystickPacket`] | sticks and buttons of M5Stack's own transmitter, 25 bytes | in a vehicle flown with it |
+//! | [`Slots`] | up to ten transmitters on one channel | in a transmitter |
+//! | [`BroadcastPacket`] | what a vehicle tells every program on its network | for displays and plots |
+//! | [`stream`] | every control cycle of a flight | for a log on a PC |
+//! | [`tello`] | commands in words, and their answers | for programs written for a Tello |
 //! | [`Datagram`] | any message as a UDP datagram or a JSON line | between programs |
 //! | [`Peers`] | the programs that talk to a vehicle by datagrams | at the vehicle's end |
 //! | [`SequenceFilter`] | refuses old and repeated datagrams | where datagrams are received |
 //! | `mavlink` | frames and signatures of MAVLink 1 and 2 (feature `mavlink`) | for ground stations |
 //! | [`msp`] | frames of the MultiWii serial protocol, versions 1 and 2 | for configurators and telemetry scripts |
+//! | [`hisky`] | a receiver of a small transmitter that hops | beside an nRF24L01 |
 //! | [`serial`] | what receivers of other makes say over a wire: SBUS, CRSF, iBUS | beside a UART |
 //!
 //! Nothing here does input or output, allocates or reads a clock. Every byte comes from strangers: it is looked at in a
@@ -44,10 +50,14 @@
 extern crate std;
 
 mod address;
+mod broadcast;
 mod control;
 mod crc8;
 pub mod datagram;
+mod fields;
 mod heard;
+pub mod hisky;
+mod joystick;
 pub mod json;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
@@ -57,15 +67,21 @@ mod peers;
 mod sequence;
 pub mod serial;
 mod session;
+mod slots;
+pub mod stream;
 mod telemetry;
+pub mod tello;
 
 pub use address::Address;
+pub use broadcast::{BroadcastError, BroadcastPacket, BroadcastSensors};
 pub use control::{ControlError, ControlPacket};
 pub use datagram::{Datagram, DatagramError};
+pub use joystick::{ArmButton, JoystickError, JoystickPacket};
 pub use pairing::{PairingError, PairingPacket};
 pub use peers::{MAX_DATAGRAM, Peers};
 pub use sequence::SequenceFilter;
 pub use session::{Counters, PairingRefused, Rejected, Session};
+pub use slots::{SlotBeacon, SlotTurn, Slots};
 pub use telemetry::{LinkState, TelemetryError, TelemetryPacket};
 
 /// Messages, time, vectors: the words that signatures here are written in.

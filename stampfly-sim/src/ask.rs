@@ -55,6 +55,8 @@ pub enum Ask {
     Guided(Guided),
     /// Sticks and switches, sent again and again while somebody flies by hand. Has no answer.
     Sticks(Sticks),
+    /// Somebody is there: to be said at least every second, or the vehicle takes the link for lost. Has no answer.
+    Alive {},
     /// Changes a parameter.
     ParamSet {
         /// Its name.
@@ -331,6 +333,7 @@ impl Asked {
 pub const NAMES: &[&str] = &[
     "guided",
     "sticks",
+    "alive",
     "param_set",
     "param_get",
     "param_save",
@@ -454,6 +457,7 @@ impl Ask {
         match self {
             Self::Guided(_) => "guided",
             Self::Sticks(_) => "sticks",
+            Self::Alive {} => "alive",
             Self::ParamSet { .. } => "param_set",
             Self::ParamGet { .. } => "param_get",
             Self::ParamSave {} => "param_save",
@@ -488,7 +492,7 @@ impl Ask {
                 within("duty", *duty, 0.0, 1.0)
             }
             Self::Speed { factor } => within("factor", *factor, 0.0, FASTEST),
-            Self::ParamSave {} | Self::MotorStop {} | Self::FaultClear {} => Ok(()),
+            Self::Alive {} | Self::ParamSave {} | Self::MotorStop {} | Self::FaultClear {} => Ok(()),
         }
     }
 }

@@ -19,7 +19,7 @@ use stampfly_bus::Band;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
 use stampfly_flight::Watchdog;
 use stampfly_sim::chips;
-use stampfly_sim::fault::Moment;
+use stampfly_sim::fault::{Injector, Moment};
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, Live};
@@ -61,7 +61,10 @@ impl Surroundings {
             board: Some(board),
             progress: Progress::default(),
             health: Healths::default(),
-            wrong: Some(Wrong::new(&setup.faults, setup.simulation.start, setup.simulation.seed)),
+            wrong: Some(match setup.live {
+                Some(_) => Wrong::on_demand(&setup.faults, setup.simulation.start, setup.simulation.seed),
+                None => Wrong::new(&setup.faults, setup.simulation.start, setup.simulation.seed),
+            }),
             watchdog: Watchdog::new(CUT_OFF),
             seen: Seen::default(),
             profile: Profile::new(&ACTIVATIONS),
@@ -104,7 +107,8 @@ impl vehicle::Surroundings for Surroundings {
         match (&setup.live, setup.pilot) {
             (Some(live), _) => {
                 let shared = (&*seen, &*health, &*profile);
-                let services = Services::new(live.number, radio, console, &setup.vehicle, shared);
+                let services =
+                    Services::new(live, radio, console, (&setup.vehicle, setup.sensing), &wrong.injector, shared);
                 tasks.spawn(live.serve(clock.clone(), live::PERIOD, services));
             }
             (None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
@@ -114,7 +118,12 @@ impl vehicle::Surroundings for Surroundings {
             }
         }
         let hover_without_link = setup.vehicle.mode.hover_without_link;
-        let judge = Judge::new(&wrong.injector, &setup.mission, setup.pilot, hover_without_link);
+        // What people break on purpose is not judged.
+        let judged = match setup.live {
+            Some(_) => Injector::new(setup.simulation.start, &setup.faults),
+            None => wrong.injector.clone(),
+        };
+        let judge = Judge::new(&judged, &setup.mission, setup.pilot, hover_without_link);
         Around {
             clock: clock.clone(),
             world: world.clone(),

@@ -38,8 +38,16 @@ pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
 /// How the sensors do, in the order in which they were started.
 pub type Healths = [SensorHealth; 8];
 
-/// What each measures, in the same order: the topics' names without `sensor_`.
-pub const NAMES: [&str; 7] = ["imu", "tof", "tof_front", "flow", "mag", "baro", "power"];
+impl Sensing {
+    /// What each sensor measures, in the order in which they are started: the topics' names without `sensor_`.
+    #[must_use]
+    pub const fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::Models => &["imu", "tof", "flow", "mag", "baro", "power"],
+            Self::Chips => &["imu", "tof", "tof_front", "flow", "mag", "baro", "power"],
+        }
+    }
+}
 
 /// A task that publishes a sensor's samples, as far as they come through its line, for as long as the vehicle is on.
 macro_rules! spawn {

@@ -1,7 +1,7 @@
 //! The command line of one program: keys in, an answer out, for the vehicle in the air and for the one on the bench.
 
 use crate::console::{Command, Console, Newest, Profile};
-use crate::simulation::sensing::{Healths, NAMES};
+use crate::simulation::sensing::{Healths, Sensing};
 use crate::topics::ConsoleEnds;
 use crate::{VehicleConfig, console};
 use core::fmt::{Display, Write as _};
@@ -18,6 +18,7 @@ pub struct Desk<'d> {
     /// Version of the program.
     pub version: &'d str,
     pub newest: &'d Newest,
+    pub sensing: Sensing,
     pub health: &'d Healths,
     pub profile: &'d Profile,
     pub facts: &'d [Fact<'d>],
@@ -70,7 +71,7 @@ impl Terminal {
 
     fn obey(&mut self, now: Instant, line: &str, desk: &Desk<'_>, config: &mut VehicleConfig) -> Request<Command> {
         let errors: Vec<_> = desk.health.iter().map(|health| health.last_error()).collect();
-        let each = NAMES.iter().zip(desk.health).zip(&errors);
+        let each = desk.sensing.names().iter().zip(desk.health).zip(&errors);
         let sensors: Vec<_> = each
             .map(|((name, health), error)| SensorLine {
                 name,

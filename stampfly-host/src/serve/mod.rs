@@ -13,4 +13,4 @@ mod option;
 mod ports;
 
 pub use option::{PortOption, PortOptionError};
-pub use ports::{OpenError, OpenPorts};
+pub use ports::{OpenError, OpenPorts, Page};

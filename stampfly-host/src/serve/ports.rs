@@ -42,8 +42,14 @@ impl std::error::Error for OpenError {
     }
 }
 
-/// What carries answers to a page.
-type Deliver = Box<dyn Fn(SocketAddr, &[u8]) + Send + Sync>;
+/// A page in browsers, at the other end of a port of [`Transport::Page`].
+pub trait Page: Send + Sync {
+    /// What was said since the last call, and by whom.
+    fn take(&self) -> Vec<(SocketAddr, Vec<u8>)>;
+
+    /// Answers.
+    fn deliver(&self, to: SocketAddr, bytes: &[u8]);
+}
 
 /// The open ports of one vehicle.
 pub struct OpenPorts {
@@ -52,8 +58,9 @@ pub struct OpenPorts {
     /// Sockets of datagrams by port.
     sockets: Vec<Option<UdpSocket>>,
     connections: Arc<Connections>,
-    page: Option<(usize, Deliver)>,
+    page: Option<(usize, Box<dyn Page>)>,
     places: Vec<(&'static PortSpec, SocketAddr)>,
+    specs: &'static [PortSpec],
 }
 
 impl fmt::Debug for OpenPorts {
@@ -76,6 +83,7 @@ impl OpenPorts {
             connections: Arc::clone(&connections),
             page: None,
             places: Vec::new(),
+            specs: ports,
             events: events.clone(),
         };
         for (port, spec) in ports.iter().enumerate() {
@@ -126,18 +134,12 @@ impl OpenPorts {
         self.events.close();
     }
 
-    /// Connects a page at this port: what it says is put in by [`page_heard`](Self::page_heard), answers go to `deliver`.
+    /// Connects a page. Nothing happens when the vehicle has no port for one, or it is off.
     #[must_use]
-    pub fn with_page(mut self, port: usize, deliver: impl Fn(SocketAddr, &[u8]) + Send + Sync + 'static) -> Self {
-        self.page = Some((port, Box::new(deliver)));
+    pub fn with_page(mut self, page: impl Page + 'static) -> Self {
+        let port = self.specs.iter().position(|port| port.transport == Transport::Page);
+        self.page = port.map(|port| (port, Box::new(page) as Box<dyn Page>));
         self
-    }
-
-    /// A page has said something.
-    pub fn page_heard(&self, address: SocketAddr, heard: Heard<'_>) {
-        if let Some((port, _)) = self.page {
-            self.events.offer(Client { port, address }, heard);
-        }
     }
 }
 
@@ -159,6 +161,11 @@ fn receive(port: usize, socket: &UdpSocket, events: &Events) {
 
 impl Ports for OpenPorts {
     fn receive(&self, until: Instant, hear: &mut dyn FnMut(Client, Heard<'_>)) {
+        if let Some((port, page)) = &self.page {
+            for (address, bytes) in page.take() {
+                hear(Client { port: *port, address }, Heard::Bytes(&bytes));
+            }
+        }
         let heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         for _ in 0..HEARD {
             let Ok((client, event)) = heard.recv_timeout(until.saturating_duration_since(Instant::now())) else {
@@ -176,8 +183,8 @@ impl Ports for OpenPorts {
         if let Some(socket) = self.sockets.get(to.port).and_then(Option::as_ref) {
             // An answer that cannot be sent is lost, as on any network.
             _ = socket.send_to(bytes, to.address);
-        } else if let Some((_, deliver)) = self.page.as_ref().filter(|(port, _)| *port == to.port) {
-            deliver(to.address, bytes);
+        } else if let Some((_, page)) = self.page.as_ref().filter(|(port, _)| *port == to.port) {
+            page.deliver(to.address, bytes);
         } else {
             self.connections.send(to, bytes);
         }

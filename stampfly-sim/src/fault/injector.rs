@@ -2,13 +2,14 @@
 
 use super::{Fault, Moment, When};
 use core::cell::Cell;
-use stampfly_types::Instant;
+use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
 #[derive(Debug)]
 struct Entry {
     fault: Fault,
     begun: Cell<Option<Instant>>,
+    lasts: Cell<Option<Duration>>,
     changed: Cell<u64>,
 }
 
@@ -37,7 +38,7 @@ impl Injector {
                 When::After(time) => Some(start + time),
                 When::Moment(_) => None,
             };
-            Entry { fault: *fault, begun: Cell::new(begun), changed: Cell::new(0) }
+            Entry { fault: *fault, begun: Cell::new(begun), lasts: Cell::new(fault.lasts), changed: Cell::new(0) }
         };
         Self(faults.iter().map(entry).collect())
     }
@@ -60,6 +61,23 @@ impl Injector {
         }
     }
 
+    /// Begins the fault at this place now, whatever it waits for: somebody who watches the flight has asked for it.
+    pub fn begin(&self, place: usize, now: Instant, lasts: Option<Duration>) {
+        if let Some(entry) = self.0.get(place) {
+            entry.begun.set(Some(now));
+            entry.lasts.set(lasts);
+        }
+    }
+
+    /// Ends the fault at this place, if it has begun.
+    pub fn end(&self, place: usize, now: Instant) {
+        if let Some((entry, begun)) = self.0.get(place).and_then(|entry| Some((entry, entry.begun.get()?)))
+            && begun <= now
+        {
+            entry.lasts.set(Some(now.since(begun)));
+        }
+    }
+
     /// When the fault at this place begins or began; `None` when its moment has not come.
     #[must_use]
     pub fn begins(&self, place: usize) -> Option<Instant> {
@@ -79,7 +97,7 @@ impl Injector {
             entry
                 .begun
                 .get()
-                .is_some_and(|begun| begun <= now && entry.fault.lasts.is_none_or(|lasts| now < begun + lasts))
+                .is_some_and(|begun| begun <= now && entry.lasts.get().is_none_or(|lasts| now < begun + lasts))
         })
     }
 

@@ -188,6 +188,14 @@ impl Fault {
         Ok(Self { kind, value, when, lasts })
     }
 
+    /// The fault of this row with its usual value, which begins when somebody [asks](Injector::begin) for it: by itself not before a
+    /// century has passed.
+    #[must_use]
+    pub const fn on_demand(kind: &'static FaultKind) -> Self {
+        let when = When::After(Duration::from_secs(100 * 365 * 86_400));
+        Self { kind, value: kind.value.default(), when, lasts: None }
+    }
+
     /// The worst end that is acceptable.
     #[must_use]
     pub fn expected(&self) -> Class {

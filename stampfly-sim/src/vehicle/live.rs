@@ -13,7 +13,10 @@ use core::fmt;
 use core::net::SocketAddr;
 use stampfly_types::{Duration, Instant};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
+/// In a pause, programs are heard this often.
+const PAUSE: std::time::Duration = std::time::Duration::from_millis(20);
 /// Between a tick and its answers: the executor has run it by then.
 const AFTER_TICK: Duration = Duration::from_millis(1);
 
@@ -100,8 +103,31 @@ pub struct Live {
     pub number: usize,
     /// The flight is broken off after this long, in virtual time.
     pub limit: Duration,
-    /// Virtual seconds in a second of the wall, above 0; 1 is real time.
-    pub speed: f32,
+    /// How fast time passes.
+    pub speed: Speed,
+}
+
+/// Virtual seconds in a second of the wall: 1 is real time, 0 is a pause. A handle: clones share it.
+#[derive(Clone, Debug)]
+pub struct Speed(Arc<AtomicU32>);
+
+impl Speed {
+    /// This fast.
+    #[must_use]
+    pub fn new(factor: f32) -> Self {
+        Self(Arc::new(AtomicU32::new(factor.to_bits())))
+    }
+
+    /// How fast.
+    #[must_use]
+    pub fn get(&self) -> f32 {
+        f32::from_bits(self.0.load(Ordering::Relaxed))
+    }
+
+    /// From now on this fast.
+    pub fn set(&self, factor: f32) {
+        self.0.store(factor.to_bits(), Ordering::Relaxed);
+    }
 }
 
 /// Where answers go.
@@ -119,17 +145,25 @@ pub trait Link {
 impl Live {
     /// Connects a vehicle to other programs, tick by tick, the first one period after the clock's zero.
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
-        let real_period = std::time::Duration::from_micros(period.as_micros()).div_f32(self.speed);
+        let real_period = std::time::Duration::from_micros(period.as_micros());
         let mut until = std::time::Instant::now();
         let begun = clock.now().as_micros() / period.as_micros();
         for tick in 1_u32.. {
             let due = period.as_micros() * (begun + u64::from(tick));
             clock.sleep_until(Instant::from_micros(due)).await;
-            until = next_tick(until, std::time::Instant::now(), real_period);
             let ports = &self.ports;
-            ports.receive(until, &mut |from, heard| {
-                link.hear(clock.now(), from, heard, &mut |to, bytes| ports.send(to, bytes));
-            });
+            let mut hear = |until| {
+                ports.receive(until, &mut |from, heard| {
+                    link.hear(clock.now(), from, heard, &mut |to, bytes| ports.send(to, bytes));
+                });
+            };
+            while self.speed.get() <= 0.0 && !ports.are_closed() {
+                hear(std::time::Instant::now() + PAUSE);
+            }
+            // A pause that has just ended is not made up for, and a speed of a hundred thousandth is none.
+            let period = real_period.div_f32(self.speed.get().max(1e-5));
+            until = next_tick(until, std::time::Instant::now(), period);
+            hear(until);
             std::thread::sleep(until.saturating_duration_since(std::time::Instant::now()));
             clock.sleep_until(clock.now() + AFTER_TICK).await;
             link.answer(clock.now(), tick, &mut |to, bytes| ports.send(to, bytes));

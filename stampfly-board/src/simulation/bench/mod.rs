@@ -15,7 +15,7 @@ pub use people::{Lamp, Spin};
 
 use super::faults::Wrong;
 use super::plant::PLANT;
-use super::sensing::{self, Healths, IMAGE, Others, Shared};
+use super::sensing::{self, Healths, IMAGE, Others, Sensing, Shared};
 use super::terminal::{Desk, Terminal};
 use crate::VehicleConfig;
 use crate::console::{Newest, Profile};
@@ -235,8 +235,14 @@ impl Bench<'_> {
                 Fact { name, verdict, value, advice }
             })
             .collect();
-        let desk =
-            Desk { version: VERSION, newest: &self.newest, health: self.health, profile: self.profile, facts: &facts };
+        let desk = Desk {
+            version: VERSION,
+            newest: &self.newest,
+            sensing: Sensing::Chips,
+            health: self.health,
+            profile: self.profile,
+            facts: &facts,
+        };
         let (now, terminal) = (self.clock.now(), &mut self.terminal);
         for _ in terminal.send(now, keys, &desk, &mut self.config, &mut self.console) {
             terminal.screen.push_str("not on this bench\r\n");

@@ -42,6 +42,12 @@ impl Wrong {
         Self { injector: Injector::new(start, faults), in_force: vec![0.0; acts.len()], strikes: 0, acts, seed }
     }
 
+    /// These, and every one there is with its usual value, on demand.
+    pub fn on_demand(faults: &[Fault], start: Instant, seed: u64) -> Self {
+        let faults: Vec<_> = faults.iter().copied().chain(FAULTS.iter().map(Fault::on_demand)).collect();
+        Self::new(&faults, start, seed)
+    }
+
     /// The way to a topic, or from the telemetry's to the radio.
     pub fn line<M: Message>(&self, topic: Id) -> Line<M> {
         let on_it = |(place, act): &(usize, Act)| match act {

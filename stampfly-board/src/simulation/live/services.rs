@@ -1,46 +1,54 @@
 //! The services of the simulated StampFly, each at its port.
 
 use super::seats::{Controls, Seats};
-use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, Seen};
+use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, Seen};
 use crate::VehicleConfig;
+use crate::console::Newest;
 use crate::console::Profile;
 use crate::simulation::radio::Radio;
-use crate::simulation::sensing::Healths;
+use crate::simulation::sensing::{Healths, Sensing};
 use crate::simulation::terminal::{Desk, Terminal};
 use crate::topics::{ConsoleEnds, TOPICS};
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_services::mavlink::{Identity, Mavlink};
 use stampfly_services::{Lease, Places};
-use stampfly_sim::vehicle::{Client, Heard, Link, Put};
+use stampfly_sim::ask::{Ask, Asked};
+use stampfly_sim::fault::Injector;
+use stampfly_sim::vehicle::{Client, Heard, Link, Live, Put, Speed};
 use stampfly_types::Instant;
 use std::vec::Vec;
 
 /// What the simulated vehicle calls itself.
+pub(super) const NOT_SIMULATED: &str = "not of a simulated vehicle";
 const VERSION: &str = concat!("stampfly ", env!("CARGO_PKG_VERSION"), ", simulated");
 /// Ticks between two turns of the services that send by themselves: 20 ms.
 const TURN: u32 = 4;
 
 /// The services.
 pub struct Services<'b> {
-    controls: Controls<'b>,
-    seen: &'b Seen,
+    pub(super) controls: Controls<'b>,
+    pub(super) seen: &'b Seen,
+    sensing: Sensing,
     health: &'b Healths,
     profile: &'b Profile,
     mavlink: Mavlink<Client>,
     terminals: Vec<(Client, Terminal)>,
+    pub(super) faults: Injector,
+    pub(super) speed: Speed,
 }
 
 impl<'b> Services<'b> {
-    /// Those of the `number`-th vehicle, from zero.
+    /// Those of this vehicle, which can be broken by these faults.
     pub fn new(
-        number: usize,
+        live: &Live,
         radio: Radio<'b>,
         console: ConsoleEnds<'b>,
-        config: &VehicleConfig,
+        (config, sensing): (&VehicleConfig, Sensing),
+        faults: &Injector,
         (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
     ) -> Self {
         let identity = Identity {
-            system: u8::try_from(number + 1).unwrap_or(u8::MAX),
+            system: u8::try_from(live.number + 1).unwrap_or(u8::MAX),
             kind: MavType::MAV_TYPE_QUADROTOR,
             take_off_height: 0.5,
             version: [0, 2, 0],
@@ -53,18 +61,45 @@ impl<'b> Services<'b> {
             config: config.clone(),
             sticks: None,
         };
-        Self { controls, seen, health, profile, mavlink: Mavlink::new(identity), terminals: Vec::new() }
+        Self {
+            controls,
+            seen,
+            sensing,
+            health,
+            profile,
+            mavlink: Mavlink::new(identity),
+            terminals: Vec::new(),
+            faults: faults.clone(),
+            speed: live.speed.clone(),
+        }
     }
 
     fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
         let newest = self.seen.0.borrow();
-        let desk = Desk { version: VERSION, newest: &newest, health: self.health, profile: self.profile, facts: &[] };
+        let desk = Desk {
+            version: VERSION,
+            newest: &newest,
+            sensing: self.sensing,
+            health: self.health,
+            profile: self.profile,
+            facts: &[],
+        };
         let Some((_, terminal)) = self.terminals.iter_mut().find(|(client, _)| *client == from) else { return };
         let Controls { config, console, .. } = &mut self.controls;
         for _ in terminal.send(now, keys, &desk, config, console) {
-            terminal.screen.push_str("not of a simulated vehicle\r\n");
+            terminal.screen.push_str(NOT_SIMULATED);
+            terminal.screen.push_str("\r\n");
         }
         put(&from, core::mem::take(&mut terminal.screen).as_bytes());
+    }
+}
+
+impl Services<'_> {
+    pub(super) fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
+    where
+        Self: 'd,
+    {
+        Desk { version: VERSION, newest, sensing: self.sensing, health: self.health, profile: self.profile, facts: &[] }
     }
 }
 
@@ -85,6 +120,16 @@ impl Link for Services<'_> {
             (CONSOLE, Heard::Bytes(keys)) => {
                 drop(newest);
                 self.type_in(now, from, keys, put);
+            }
+            (PAGE, Heard::Bytes(text)) => {
+                drop(newest);
+                let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
+                let Some(asked) = asked else { return };
+                let answer = self.page(now, &asked.ask);
+                // What is said again and again needs no answer.
+                if !matches!(asked.ask, Ask::Sticks(_) | Ask::Alive {}) {
+                    put(&from, asked.answered(answer).as_bytes());
+                }
             }
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
             _ => {}

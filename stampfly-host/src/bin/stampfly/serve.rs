@@ -8,23 +8,28 @@ use crate::failure::Failure;
 use crate::fly::{figures, write_report};
 use serde_json::Value;
 use stampfly_host::flown::{Flown, fly};
+use stampfly_host::ground::{Client, Hub, Limits, Server, VehicleCard, Watch, ask};
 use stampfly_host::recorder::Recorder;
-use stampfly_host::serve::{OpenPorts, PortOption};
+use stampfly_host::serve::{OpenPorts, Page, PortOption};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_log::ulog::Sink;
-use stampfly_sim::vehicle::{Live, Options, Transport, Vehicle, Verdict};
+use stampfly_sim::vehicle::{Live, Options, Speed, Transport, Vehicle, Verdict};
 use stampfly_types::Duration;
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use std::net::{Ipv6Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 /// A log of more bytes has no report: a browser would not open it. Some ten minutes of one vehicle.
 const LARGEST_REPORT: u64 = 300_000_000;
 /// As good as for ever, s: a year.
 const FOR_EVER: u64 = 365 * 86_400;
+/// Vehicles stand side by side in rows of so many, so far apart, m.
+const COLUMNS: u8 = 8;
+const APART: f32 = 2.0;
 /// After Ctrl-C, a vehicle that does not end in this time is left where it is.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(3);
 
@@ -43,7 +48,9 @@ impl ForVehicle for Serve<'_> {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
         }
-        let ports = open::<V>(options)?;
+        let hub = hub::<V>(options)?;
+        let ports = open::<V>(options, &hub)?;
+        let _server = ground::<V>(&ports, &hub)?;
         let closing = ports.clone();
         ctrlc::set_handler(move || {
             closing.iter().for_each(|ports| ports.close());
@@ -54,7 +61,7 @@ impl ForVehicle for Serve<'_> {
         let flights: Vec<_> = ports
             .iter()
             .enumerate()
-            .map(|(number, ports)| Flight::<V>::prepare(options, number, ports))
+            .map(|(number, ports)| Flight::<V>::prepare(options, number, ports, &hub))
             .collect::<Result<_, _>>()?;
         let ended: Vec<_> = thread::scope(|scope| {
             let threads: Vec<_> = flights.into_iter().map(|flight| scope.spawn(move || flight.fly())).collect();
@@ -70,8 +77,58 @@ impl ForVehicle for Serve<'_> {
     }
 }
 
+/// What a page is told of every vehicle, and what it shares with their flights.
+fn hub<V: Vehicle>(options: &ServeOptions) -> Result<Arc<Hub>, Failure> {
+    let mut cards = Vec::new();
+    let offers: Vec<_> = ask::NAMES.iter().copied().filter(|name| *name != "param_save").collect();
+    for number in 0..options.count {
+        let setup = options.scene.setup::<V>(options.seed + u64::from(number), None, None)?;
+        let name = format!("{} {}", V::NAME, number + 1);
+        let mut card = VehicleCard::of::<V>(&name, V::config(&setup)).offering(&offers);
+        let [column, row] = [number % COLUMNS, number / COLUMNS].map(|place| f32::from(place) * APART);
+        card.place = [-row, column];
+        cards.push(card);
+    }
+    Ok(Hub::new(cards))
+}
+
+/// Starts the ground station where the first vehicle has its port for one, if it has and it is not off.
+fn ground<V: Vehicle>(ports: &[Arc<OpenPorts>], hub: &Arc<Hub>) -> Result<Option<Server>, Failure> {
+    let place =
+        ports.first().and_then(|ports| ports.places().iter().find(|(port, _)| port.transport == Transport::Page));
+    let Some((port, address)) = place else { return Ok(None) };
+    let server = Server::start(hub.clone(), *address, Limits::default())
+        .map_err(|error| format!("port '{}' at {address}: {error}; '--port {0}=NUMBER' chooses another", port.name))?;
+    outln!("{:<12} {:<42} open http://{} in a browser", port.name, port.meaning, server.address());
+    Ok(Some(server))
+}
+
+/// The page's end of one vehicle's port.
+struct PageOf {
+    hub: Arc<Hub>,
+    vehicle: usize,
+}
+
+impl Page for PageOf {
+    fn take(&self) -> Vec<(SocketAddr, Vec<u8>)> {
+        let asks = self.hub.asks(self.vehicle).into_iter();
+        asks.filter_map(|(client, asked)| Some((address(client), serde_json::to_vec(&asked).ok()?))).collect()
+    }
+
+    fn deliver(&self, to: SocketAddr, bytes: &[u8]) {
+        if let (SocketAddr::V6(to), Ok(text)) = (to, std::str::from_utf8(bytes)) {
+            self.hub.send(Client::of(to.ip().to_bits() as u64), text);
+        }
+    }
+}
+
+/// A page has no address of its own: its number, written as one.
+fn address(client: Client) -> SocketAddr {
+    (Ipv6Addr::from_bits(client.number().into()), 0).into()
+}
+
 /// Opens the ports of every vehicle, and says where they are.
-fn open<V: Vehicle>(options: &ServeOptions) -> Result<Vec<Arc<OpenPorts>>, Failure> {
+fn open<V: Vehicle>(options: &ServeOptions, hub: &Arc<Hub>) -> Result<Vec<Arc<OpenPorts>>, Failure> {
     if V::PORTS.is_empty() {
         return Err(format!("the vehicle '{}' has no ports", V::NAME).into());
     }
@@ -84,24 +141,31 @@ fn open<V: Vehicle>(options: &ServeOptions) -> Result<Vec<Arc<OpenPorts>>, Failu
     let mut all = Vec::new();
     for number in 0..usize::from(options.count) {
         let opened = OpenPorts::open(V::PORTS, &wanted, number)?;
-        for (port, place) in opened.places() {
+        for (port, place) in opened.places().iter().filter(|(port, _)| port.transport != Transport::Page) {
             let does = if port.transport == Transport::UdpTo { "sending to" } else { "listening on" };
             let which = if options.count == 1 { String::new() } else { format!("vehicle {}  ", number + 1) };
             outln!("{which}{:<12} {:<42} {does} {place}", port.name, port.meaning);
         }
-        all.push(Arc::new(opened));
+        all.push(Arc::new(opened.with_page(PageOf { hub: hub.clone(), vehicle: number })));
     }
     Ok(all)
 }
 
-/// A log on the disk.
-struct LogFile(BufWriter<File>);
+/// A log on the disk. Shared with those who want to read it during the flight.
+#[derive(Clone)]
+struct LogFile(Arc<Mutex<BufWriter<File>>>);
+
+impl LogFile {
+    fn lock(&self) -> MutexGuard<'_, BufWriter<File>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl Sink for LogFile {
     type Error = std::io::Error;
 
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        self.0.write_all(bytes)
+        self.lock().write_all(bytes)
     }
 }
 
@@ -110,33 +174,45 @@ struct Flight<V: Vehicle> {
     setup: V::Setup,
     recorder: Recorder<V, LogFile>,
     log: PathBuf,
+    watch: Watch,
 }
 
 impl<V: Vehicle> Flight<V> {
-    fn prepare(options: &ServeOptions, number: usize, ports: &Arc<OpenPorts>) -> Result<Self, Failure> {
+    fn prepare(options: &ServeOptions, number: usize, ports: &Arc<OpenPorts>, hub: &Hub) -> Result<Self, Failure> {
         let ServeOptions { scene, seed, out, count, speed, seconds, .. } = options;
         let limit = seconds.map_or(Duration::from_secs(FOR_EVER), Duration::from_seconds);
-        let live = Live { ports: ports.clone(), number, limit, speed: *speed };
+        let live = Live { ports: ports.clone(), number, limit, speed: Speed::new(*speed) };
         let seed = seed + number as u64;
         let typed = Options { live: Some(live), ..scene.options(scene.jitter) };
         let setup = V::setup(&typed, seed)?;
         let name = if *count == 1 { "flight.ulg".into() } else { format!("flight-{}.ulg", number + 1) };
         let log = out.join(name);
         let failed = |error| format!("{}: {error}", log.display());
-        let file = LogFile(BufWriter::new(File::create(&log).map_err(failed)?));
+        let file = LogFile(Arc::new(Mutex::new(BufWriter::new(File::create(&log).map_err(failed)?))));
         let facts = [
             ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
             ("seed".to_owned(), seed.to_string()),
             ("mission".to_owned(), "other programs".to_owned()),
         ];
+        let (so_far, path) = (file.clone(), log.clone());
+        hub.provide_log(number, move || {
+            // What is still in memory goes to the disk first.
+            _ = so_far.lock().flush();
+            std::fs::read(&path).unwrap_or_default()
+        });
+        let watch = hub.witness(number).ok_or("the ground station does not know this vehicle")?;
         let recorder =
             Recorder::with_sink(file, &setup, &facts).map_err(|error| format!("{}: {error:?}", log.display()))?;
-        Ok(Self { setup, recorder, log })
+        Ok(Self { setup, recorder, log, watch })
     }
 
     fn fly(self) -> (Flown<V::Outcome>, u64, PathBuf) {
-        let Self { setup, mut recorder, log } = self;
-        let flown = fly::<V>(&setup, &mut recorder, &mut |_, _| {});
+        let Self { setup, recorder, log, watch } = self;
+        let mut witnesses = (recorder, watch);
+        let flown = fly::<V>(&setup, &mut witnesses, &mut |_, _| {});
+        let (recorder, _) = witnesses;
+        // The page may still hold the file.
+        _ = recorder.written().map(|file| file.lock().flush());
         (flown, recorder.hash(), log)
     }
 }

@@ -61,6 +61,15 @@ const connect = () => {
   });
 };
 
+const SIGN_OF_LIFE = 500;
+
+/** Tells these vehicles again and again that somebody is there. */
+const stayAlive = (vehicles) => {
+  clearInterval(link.alive);
+  link.alive = setInterval(() => vehicles.forEach((vehicle) => say(vehicle, { do: 'alive' })), SIGN_OF_LIFE);
+};
+on('hello', ({ vehicles }) => stayAlive(vehicles.filter(({ offers }) => offers.includes('alive')).map(({ number }) => number)));
+
 /** Measures the rate of what arrives; called once a second. */
 const measureLink = () => {
   const now = performance.now();
