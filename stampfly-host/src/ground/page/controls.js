@@ -36,12 +36,8 @@ const goTo = async (north, east, up) => {
   const round = (value) => Math.round(value * 1000) / 1000;
   vehicle.goal = { north: round(north), east: round(east), up };
   const place = `${fixed(north, 2)} m north, ${fixed(east, 2)} m east, ${fixed(up, 2)} m up`;
-  const hold = await ask(vehicle.number, { do: 'guided', kind: 'hold' });
-  const reply = hold.ok ? await guided('go_to', `go to ${place}`, { ...vehicle.goal, yaw: round(yaw) }) : hold;
-  if (!reply.ok) {
-    vehicle.goal = null;
-    if (!hold.ok) log(`${vehicle.card.name}, go to ${place}: ${hold.text}`, 'bad');
-  }
+  const reply = await guided('go_to', `go to ${place}`, { ...vehicle.goal, yaw: round(yaw) });
+  if (!reply.ok) vehicle.goal = null;
 };
 const goByClick = ([north, east]) => {
   const vehicle = live();

@@ -23,6 +23,7 @@ const choose = (number) => {
   buildFaults(vehicle);
   buildCalibration(vehicle);
   offer(vehicle);
+  element('key-main').style.color = `var(${colorOf(vehicle)})`;
   const download = element('download');
   download.hidden = vehicle.isLog;
   download.href = `/log/${vehicle.number}`;

@@ -118,7 +118,7 @@ const plotsOf = (vehicle) => {
       const get = column(vehicle, panel.topic, name);
       return { name: title, role, get: () => get() * panel.factor };
     });
-    plots.push({ title: panel.title, unit: panel.unit, least: panel.title === 'Voltage' ? 0.2 : 0, lines });
+    plots.push({ title: panel.title, unit: panel.unit, least: { V: 0.2, '%': 10 }[panel.unit] ?? 0, lines });
   }
   plots.forEach((plot, index) => plot.lines.forEach((line) => { line.key = `${index}.${line.name}`; }));
   return plots;
