@@ -6,6 +6,9 @@
 //! | [`cockpit`] | what a service sees of a vehicle, and what it may ask for |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`lease`] | one program at a time commands; whoever flies by hand comes first |
+//! | [`telemetry`] | a packet for whoever listens, fifty times a second |
+//! | [`data_stream`] | every control cycle, for whoever asked for it |
+//! | [`tello`] | the text commands of a Tello, and its state |
 //! | [`mavlink`] | the vehicle's end of MAVLink (feature `mavlink`) |
 //!
 //! A service takes bytes and the time and gives bytes. It does no input or output, allocates nothing, and every client costs it a
@@ -16,13 +19,19 @@
 extern crate std;
 
 pub mod cockpit;
+pub mod data_stream;
 pub mod lease;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
+pub mod telemetry;
+pub mod tello;
 pub mod view;
 
 pub use cockpit::{Cockpit, Refusal, Request, Seat};
+pub use data_stream::DataStream;
 pub use lease::Lease;
+pub use telemetry::Telemetry;
+pub use tello::Tello;
 pub use view::{Places, Samples, View};
 
 /// The wire formats.

@@ -217,9 +217,9 @@ impl vehicle::Around for Around<'_> {
         if let Some(id) = Id::ALL.get(topic) {
             self.watch.note(*id, at, words);
             self.judge.published(*id, at, words);
-        }
-        if self.live.is_some() {
-            self.seen.0.borrow_mut().note(topic, at, words);
+            if self.live.is_some() {
+                self.seen.note(*id, at, words);
+            }
         }
     }
 

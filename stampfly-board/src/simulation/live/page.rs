@@ -15,7 +15,7 @@ impl Services<'_> {
     /// Does what a page asks for.
     pub(super) fn page(&mut self, now: Instant, ask: &Ask) -> Result<Reply, String> {
         let seen = self.seen;
-        let newest = seen.0.borrow();
+        let newest = seen.newest.borrow();
         let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
         cockpit.alive(now, Seat::Page);
         let said = |result: Result<(), Refusal>| match result {

@@ -1,17 +1,18 @@
 //! The services of the simulated StampFly, each at its port.
 
 use super::seats::{Controls, Seats};
-use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, Seen};
+use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
 use crate::VehicleConfig;
 use crate::console::Newest;
 use crate::console::Profile;
 use crate::simulation::radio::Radio;
 use crate::simulation::sensing::{Healths, Sensing};
 use crate::simulation::terminal::{Desk, Terminal};
-use crate::topics::{ConsoleEnds, TOPICS};
+use crate::topics::ConsoleEnds;
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_services::mavlink::{Identity, Mavlink};
-use stampfly_services::{Lease, Places};
+use stampfly_services::tello::Destination;
+use stampfly_services::{Lease, Tello, View};
 use stampfly_sim::ask::{Ask, Asked};
 use stampfly_sim::fault::Injector;
 use stampfly_sim::vehicle::{Client, Heard, Link, Live, Put, Speed};
@@ -32,6 +33,10 @@ pub struct Services<'b> {
     health: &'b Healths,
     profile: &'b Profile,
     mavlink: Mavlink<Client>,
+    tello: Tello<Client>,
+    /// Number of the port that a Tello's state is sent to.
+    tello_state: Option<u16>,
+    telemetry: Option<Client>,
     terminals: Vec<(Client, Terminal)>,
     pub(super) faults: Injector,
     pub(super) speed: Speed,
@@ -57,7 +62,7 @@ impl<'b> Services<'b> {
             radio,
             console,
             lease: Lease::new(),
-            places: Places::of(&TOPICS),
+            places: seen.places.clone(),
             config: config.clone(),
             sticks: None,
         };
@@ -68,6 +73,9 @@ impl<'b> Services<'b> {
             health,
             profile,
             mavlink: Mavlink::new(identity),
+            tello: Tello::new(),
+            tello_state: None,
+            telemetry: None,
             terminals: Vec::new(),
             faults: faults.clone(),
             speed: live.speed.clone(),
@@ -75,7 +83,7 @@ impl<'b> Services<'b> {
     }
 
     fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
-        let newest = self.seen.0.borrow();
+        let newest = self.seen.newest.borrow();
         let desk = Desk {
             version: VERSION,
             newest: &newest,
@@ -105,12 +113,21 @@ impl Services<'_> {
 
 impl Link for Services<'_> {
     fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
-        let newest = self.seen.0.borrow();
+        let newest = self.seen.newest.borrow();
         let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
         match (from.port, heard) {
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) => self.mavlink.open(now, from, true),
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => self.mavlink.hear(now, from, bytes, &mut cockpit, put),
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Closed) => self.mavlink.close(from),
+            (TELLO, Heard::Bytes(text)) => {
+                let tello_state = self.tello_state;
+                self.tello.hear(now, from, text, &mut cockpit, &mut |to, what, bytes| {
+                    put(&destination(*to, what, tello_state), bytes);
+                });
+            }
+            (TELLO_STATE, Heard::Opened) => self.tello_state = Some(from.address.port()),
+            (TELEMETRY, Heard::Opened) => self.telemetry = Some(from),
+            (STREAM, Heard::Bytes(request)) => self.seen.stream.borrow_mut().hear(now, from, request),
             (CONSOLE, Heard::Opened) => {
                 let mut terminal = Terminal::new();
                 terminal.greet(VERSION);
@@ -137,12 +154,29 @@ impl Link for Services<'_> {
     }
 
     fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
-        let newest = self.seen.0.borrow();
+        let newest = self.seen.newest.borrow();
         self.controls.poll(now, &newest);
+        let view = View::new(&*newest, &self.seen.places);
+        self.seen.stream.borrow_mut().poll(now, &view, put);
+        if let Some(to) = &self.telemetry {
+            self.seen.telemetry.borrow_mut().poll(now, &view, &mut |packet| put(to, packet));
+        }
         if !tick.is_multiple_of(TURN) {
             return;
         }
         let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
         self.mavlink.poll(now, &mut cockpit, put);
+        let tello_state = self.tello_state;
+        self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| put(&destination(*to, what, tello_state), bytes));
+    }
+}
+
+/// A Tello's state goes to another port of the program's machine.
+fn destination(program: Client, what: Destination, state: Option<u16>) -> Client {
+    match (what, state) {
+        (Destination::State, Some(number)) => {
+            Client { port: TELLO_STATE, address: (program.address.ip(), number).into() }
+        }
+        _ => program,
     }
 }

@@ -1,0 +1,204 @@
+//! The text commands of a Tello, carried out and answered, and the state that programs listen for.
+//!
+//! As a Tello does it: a program says `command`, then commands are answered with `ok` when they have been carried out, and the state
+//! is sent to the program ten times a second. A program that says nothing for fifteen seconds has gone; its vehicle loses its
+//! link, and what it does then is the failsafe's business.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `action.rs` | what takes its time: taking off, landing, moving, turning |
+//! | `answers.rs` | questions, and the state |
+//!
+//! One program at a time: the last that said `command`. `emergency`, `land` and `stop` interrupt what goes on; anything else waits for nothing and is answered `error busy`.
+
+mod action;
+mod answers;
+
+use crate::cockpit::{Cockpit, Seat};
+use action::{Action, Outcome};
+use stampfly_link::tello::{TelloCommand, TelloReply, TelloState};
+use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
+use stampfly_types::{Duration, Instant};
+
+/// Without a command for this long, a Tello lands.
+const SILENCE: Duration = Duration::from_secs(15);
+/// Between two states.
+const STATE: Duration = Duration::from_millis(100);
+/// Sticks that do not come again are centred after this long: a program sends them ten times a second at least.
+const STICKS: Duration = Duration::from_millis(500);
+/// Speed of moves without one of their own, m/s, as a Tello's.
+const SPEED: f32 = 0.5;
+
+/// Where a datagram goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Destination {
+    /// To the program's port, from which it asked.
+    Program,
+    /// To the port of the program's machine where states are heard.
+    State,
+}
+
+/// The vehicle's end of a Tello's conversation. `C` tells programs apart: an address.
+///
+/// Give it datagrams with [`hear`](Self::hear) and call [`poll`](Self::poll) about fifty times a second.
+#[derive(Clone, Debug)]
+pub struct Tello<C> {
+    /// Who commands, and when it was last heard.
+    program: Option<(C, Instant)>,
+    action: Option<Action>,
+    speed: f32,
+    /// Sticks as they were last sent, and when.
+    sticks: Option<(Instant, PilotInput)>,
+    next_state: Instant,
+    /// Since when it flies.
+    took_off: Option<Instant>,
+}
+
+/// Where datagrams go.
+type Put<'p, C> = &'p mut dyn FnMut(&C, Destination, &[u8]);
+
+impl<C> Default for Tello<C> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<C> Tello<C> {
+    /// Nobody has said anything.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { program: None, action: None, speed: SPEED, sticks: None, next_state: Instant::ZERO, took_off: None }
+    }
+}
+
+impl<C: Copy + PartialEq> Tello<C> {
+    /// Takes a datagram.
+    pub fn hear(&mut self, now: Instant, from: C, datagram: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        let mut say = |reply: TelloReply<'_>| send(&from, &reply, put);
+        let command = match TelloCommand::parse(datagram) {
+            Ok(command) => command,
+            Err(error) => return say(TelloReply::Refused(error)),
+        };
+        let is_program = self.program.is_some_and(|(program, _)| program == from);
+        if command == TelloCommand::Command {
+            let taken = self.program.filter(|(program, heard)| *program != from && now.since(*heard) < SILENCE);
+            if taken.is_some() {
+                return say(TelloReply::Error("another program commands"));
+            }
+            self.program = Some((from, now));
+            return say(TelloReply::Ok);
+        }
+        // Motors off is everybody's.
+        if command == TelloCommand::Emergency {
+            self.action = None;
+            let killed =
+                cockpit.guide(now, Seat::Tello, GuidedCommand { kind: GuidedKind::Kill, ..Default::default() });
+            return say(if killed.is_ok() { TelloReply::Ok } else { TelloReply::Error("not taken") });
+        }
+        if !is_program {
+            return say(TelloReply::Error("say command first"));
+        }
+        self.program = Some((from, now));
+        cockpit.alive(now, Seat::Tello);
+        match command {
+            TelloCommand::KeepAlive => say(TelloReply::Ok),
+            TelloCommand::Speed { speed } => {
+                self.speed = speed;
+                say(TelloReply::Ok);
+            }
+            TelloCommand::Query(query) => say(answers::answer(query, self.speed, self.in_air(now), &cockpit.view())),
+            // Not answered, as a Tello does not.
+            TelloCommand::Sticks { right, forward, up, clockwise } => {
+                let input = PilotInput {
+                    roll: right,
+                    pitch: forward,
+                    throttle: up,
+                    yaw: clockwise,
+                    mode: FlightMode::PosHold,
+                    arm: cockpit.view().state().armed,
+                    kill: false,
+                };
+                let centred = input.roll == 0.0 && input.pitch == 0.0 && input.throttle == 0.0 && input.yaw == 0.0;
+                // Programs that do not fly by hand send centred sticks to be sure: they take nothing over.
+                if self.sticks.is_some() || !centred {
+                    self.sticks = Some((now, input));
+                }
+            }
+            command => self.begin(now, &from, command, cockpit, put),
+        }
+    }
+
+    /// Begins what takes its time.
+    fn begin(&mut self, now: Instant, from: &C, command: TelloCommand, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        let interrupts = matches!(command, TelloCommand::Stop | TelloCommand::Land);
+        if self.action.is_some() {
+            if !interrupts {
+                return send(from, &TelloReply::Error("busy"), put);
+            }
+            self.action = None;
+            send(from, &TelloReply::Error("interrupted"), put);
+        }
+        self.sticks = None;
+        match Action::begin(now, command, self.speed, cockpit) {
+            Ok(Some(action)) => self.action = Some(action),
+            Ok(None) => send(from, &TelloReply::Ok, put),
+            Err(why) => send(from, &TelloReply::Error(why), put),
+        }
+    }
+
+    /// Goes on with what takes its time, and sends the state. Call it about fifty times a second.
+    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        let status = cockpit.view().state();
+        self.took_off = self.took_off.filter(|_| status.armed).or_else(|| status.armed.then_some(now));
+        let Some((program, heard)) = self.program else { return };
+        if now.since(heard) >= SILENCE {
+            (self.action, self.sticks) = (None, None);
+            return;
+        }
+        cockpit.alive(now, Seat::Tello);
+        if let Some(action) = &mut self.action {
+            let outcome = action.go_on(now, cockpit);
+            let reply = match outcome {
+                Outcome::GoesOn => None,
+                Outcome::Done => Some(TelloReply::Ok),
+                Outcome::Failed(why) => Some(TelloReply::Error(why)),
+            };
+            if let Some(reply) = reply {
+                self.action = None;
+                send(&program, &reply, put);
+            }
+        }
+        self.fly_by_hand(now, cockpit);
+        if now >= self.next_state {
+            self.next_state = now + STATE;
+            let state = answers::state(self.in_air(now), &cockpit.view());
+            let mut line = [0; TelloState::LONGEST];
+            if let Some(line) = state.write(&mut line).and_then(|length| line.get(..length)) {
+                put(&program, Destination::State, line);
+            }
+        }
+    }
+
+    /// Passes on the sticks. When they stop coming, the vehicle holds its place under the program's command again.
+    fn fly_by_hand(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
+        let Some((at, input)) = self.sticks else { return };
+        if now.since(at) < STICKS {
+            _ = cockpit.steer(now, Seat::Tello, &PilotInput { arm: cockpit.view().state().armed, ..input });
+        } else {
+            self.sticks = None;
+            _ = cockpit.guide(now, Seat::Tello, GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
+        }
+    }
+
+    /// How long it has been armed.
+    fn in_air(&self, now: Instant) -> Duration {
+        self.took_off.map_or(Duration::ZERO, |took_off| now.since(took_off))
+    }
+}
+
+fn send<C>(to: &C, reply: &TelloReply<'_>, put: Put<'_, C>) {
+    let mut bytes = [0; 2 * TelloReply::LONGEST];
+    if let Some(text) = reply.write(&mut bytes).and_then(|length| bytes.get(..length)) {
+        put(to, Destination::Program, text);
+    }
+}
