@@ -220,6 +220,15 @@ def drop(page: Page, contents: bytes) -> None:
     )
 
 
+def shows_every_topic(page: Page, picture) -> None:
+    page.click("#tab-log")
+    row = page.locator("#rates tr", has=page.locator("button", has_text="sensor_imu"))
+    until("a topic that no plot needs is counted", lambda: re.match(r"\d{3} Hz", row.locator("td").first.inner_text()))
+    page.get_by_role("button", name="flight_status").click()
+    until("and one is spelt out", lambda: "IdleGround" in page.inner_text("#rates"))
+    picture("topics")
+
+
 def asks_the_console(page: Page) -> None:
     page.click("#tab-console")
     page.fill("#console-line", "status")
@@ -341,6 +350,7 @@ def look(browser, address: str, options, folder: Path) -> None:
     injects_a_fault(page, picture)
     kills(page)
     opens_the_log(page, folder, picture)
+    shows_every_topic(page, picture)
     asks_the_console(page)
     turns_a_motor(page, picture)
     flies_by_hand(page, picture)

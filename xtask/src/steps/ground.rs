@@ -11,7 +11,16 @@ use crate::repository::{Failure, Repository, python_tool, run as run_program};
 const PLAYWRIGHT: &str = "playwright==1.65.2";
 const SCRIPT: &str = "xtask/ground/page.py";
 /// Any free port for the page; nobody else is to be found here.
-const PORTS: [&str; 4] = ["http=0", "mavlink-udp=off", "mavlink-tcp=off", "console=off"];
+const PORTS: [&str; 8] = [
+    "http=0",
+    "mavlink-udp=off",
+    "mavlink-tcp=off",
+    "tello=off",
+    "tello-state=off",
+    "telemetry=off",
+    "stream=off",
+    "console=off",
+];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&BROWSER])?;

@@ -13,7 +13,7 @@ const choose = (number) => {
     element('player').hidden = element('live').hidden = true;
   }
   stopMotor();
-  sticks.arm = false;
+  dropSticks();
   const vehicle = selected();
   element('empty').hidden = Boolean(vehicle);
   if (!vehicle) return;
@@ -22,6 +22,7 @@ const choose = (number) => {
   buildParameters(vehicle);
   buildFaults(vehicle);
   buildCalibration(vehicle);
+  buildTopics(vehicle);
   offer(vehicle);
   element('key-main').style.color = `var(${colorOf(vehicle)})`;
   const download = element('download');
@@ -43,7 +44,7 @@ on('hello', (hello) => {
   }
   tabs.hidden = station.vehicles.length < 2;
   setText(element('version'), hello.version);
-  subscribe([...new Set(station.vehicles.flatMap((vehicle) => topicsOf(vehicle.card)))]);
+  subscribeAgain();
   if (!playback.vehicle) {
     choose(station.chosen);
     resetCamera();
@@ -100,6 +101,7 @@ const buildTabs = () => {
       element(other.getAttribute('aria-controls')).hidden = !isShown;
     }
     stopMotor();
+    subscribeAgain();
   };
   tabs.forEach((tab, index) => {
     tab.addEventListener('click', () => show(tab));
@@ -129,6 +131,7 @@ const frame = (now) => {
       written = now;
       writeStatus(vehicle);
       writeStrips(vehicle);
+      writeTopic(vehicle);
     }
   }
   requestAnimationFrame(frame);

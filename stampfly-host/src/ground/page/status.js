@@ -65,30 +65,6 @@ const writeLink = () => {
   node.title = 'Texts a second from the server, the time of the last answer, texts left out because this page was too slow';
 };
 
-/** Samples a second of each topic, for those who want to know. */
-const writeRates = (vehicle) => {
-  const body = element('rates');
-  if (body.closest('[hidden]')) return;
-  const rows = vehicle.list.filter((topic) => topic.count > 0);
-  const key = `${vehicle.number} ${rows.length}`;
-  if (body.dataset.key !== key) {
-    body.dataset.key = key;
-    body.replaceChildren();
-    for (const topic of rows) {
-      const row = make('tr', body);
-      make('th', row, '', topic.name).scope = 'row';
-      row.title = topic.doc;
-      topic.output = make('td', row);
-      make('td', row, 'dim', topic.rate);
-    }
-  }
-  for (const topic of rows) {
-    const [samples, time] = [topic.count - (topic.counted ?? topic.count), vehicle.clock - (topic.countedAt ?? vehicle.clock)];
-    if (topic.output) topic.output.textContent = time > 0 ? `${(samples / time).toFixed(samples / time < 10 ? 1 : 0)} Hz` : '–';
-    [topic.counted, topic.countedAt] = [topic.count, vehicle.clock];
-  }
-};
-
 const messages = [];
 /** What the vehicle and the server say, newest first. */
 const log = (text, kind = '') => {

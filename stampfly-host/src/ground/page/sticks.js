@@ -81,6 +81,13 @@ const drawSticks = () => {
   element('stick-arm').setAttribute('aria-pressed', sticks.arm);
 };
 
+/** Lets go: the sticks of one vehicle are not those of the next. */
+const dropSticks = () => {
+  Object.assign(sticks, { isKeyboard: false, isGamepad: false, arm: false, kill: false, now: { roll: 0, pitch: 0, yaw: 0, throttle: 0 } });
+  sticks.keys.clear();
+  for (const id of ['by-keyboard', 'by-gamepad']) element(id).setAttribute('aria-pressed', false);
+};
+
 const buildSticks = () => {
   element('by-keyboard').addEventListener('click', (event) => toggle(event.currentTarget, (pressed) => {
     sticks.isKeyboard = pressed;

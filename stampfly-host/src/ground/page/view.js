@@ -58,9 +58,13 @@ const drawTrail = (context, project, vehicle, name, time) => {
   const to = framesUntil(vehicle, time), from = framesUntil(vehicle, time - TRAIL);
   const stride = Math.max(1, Math.floor((to - from) / 800));
   const points = [];
+  let before = null;
   // Counted from the beginning, so that a trail does not tremble while it grows.
   for (let index = from - (from % stride); index < to; index += stride) {
     const point = columns.map((values) => values[index]);
+    // An estimate that begins anew is no way that was flown.
+    if (before && Math.hypot(...point.map((value, axis) => value - before[axis])) > 0.3 * stride) points.push(null);
+    before = point;
     points.push(point.every(Number.isFinite) ? project(shifted(point, vehicle)) : null);
   }
   strokePoints(context, points);
