@@ -160,7 +160,7 @@ fn receive(port: usize, socket: &UdpSocket, events: &Events) {
 }
 
 impl Ports for OpenPorts {
-    fn receive(&self, until: Instant, hear: &mut dyn FnMut(Client, Heard<'_>)) {
+    fn receive(&self, until: Option<Instant>, hear: &mut dyn FnMut(Client, Heard<'_>)) {
         if let Some((port, page)) = &self.page {
             for (address, bytes) in page.take() {
                 hear(Client { port: *port, address }, Heard::Bytes(&bytes));
@@ -168,9 +168,11 @@ impl Ports for OpenPorts {
         }
         let heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         for _ in 0..HEARD {
-            let Ok((client, event)) = heard.recv_timeout(until.saturating_duration_since(Instant::now())) else {
-                return;
+            let next = match until {
+                Some(until) => heard.recv_timeout(until.saturating_duration_since(Instant::now())).ok(),
+                None => heard.try_recv().ok(),
             };
+            let Some((client, event)) = next else { return };
             match &event {
                 Event::Opened => hear(client, Heard::Opened),
                 Event::Bytes(bytes) => hear(client, Heard::Bytes(bytes)),

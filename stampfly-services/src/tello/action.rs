@@ -19,12 +19,16 @@ const FOLLOWS: f32 = 0.5;
 const QUARTER: f32 = core::f32::consts::FRAC_PI_2;
 /// What takes longer has failed. Programs wait seven seconds for most answers and twenty for a take-off.
 const LONGEST: Duration = Duration::from_secs(20);
+/// So long a take-off waits until the vehicle may arm: its calibration takes a few seconds after power-on.
+const READY: Duration = Duration::from_secs(8);
 /// The vehicle has seen a command after this long, and answers for it.
 const SEEN: Duration = Duration::from_millis(200);
 
 /// What is going on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
+    /// About to be allowed to turn the motors.
+    GettingReady,
     /// Allowed to turn the motors, about to rise.
     Arming,
     Rising,
@@ -85,13 +89,8 @@ impl Action {
         let mut guide = |command| said(cockpit.guide(now, Seat::Tello, command));
         let kind = match command {
             TelloCommand::TakeOff if status.armed => return Err("already in the air"),
-            TelloCommand::TakeOff if !status.blocks.is_empty() => {
-                return Err(status.blocks.names().next().unwrap_or("not ready"));
-            }
-            TelloCommand::TakeOff => {
-                guide(simple(GuidedKind::Arm))?;
-                Kind::Arming
-            }
+            // A program that is used to a Tello knows of no calibration.
+            TelloCommand::TakeOff => Kind::GettingReady,
             TelloCommand::Land => {
                 guide(simple(GuidedKind::Land))?;
                 if !status.armed {
@@ -160,10 +159,18 @@ impl Action {
         if age < SEEN {
             return Outcome::GoesOn;
         }
-        if !status.armed && !matches!(self.kind, Kind::Landing | Kind::Arming) {
+        if !status.armed && !matches!(self.kind, Kind::Landing | Kind::Arming | Kind::GettingReady) {
             return Outcome::Failed("motors are off");
         }
         match &mut self.kind {
+            Kind::GettingReady if status.blocks.is_empty() => {
+                match said(cockpit.guide(now, Seat::Tello, simple(GuidedKind::Arm))) {
+                    Ok(()) => *self = Self { kind: Kind::Arming, begun: now },
+                    Err(why) => return Outcome::Failed(why),
+                }
+                Outcome::GoesOn
+            }
+            Kind::GettingReady if age >= READY => Outcome::Failed(status.blocks.names().next().unwrap_or("not ready")),
             Kind::Arming if status.armed => {
                 let position = Vec3::new(0.0, 0.0, -TAKE_OFF);
                 let rise = GuidedCommand { position, ..simple(GuidedKind::TakeOff) };

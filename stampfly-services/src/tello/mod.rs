@@ -50,8 +50,9 @@ pub struct Tello<C> {
     /// Sticks as they were last sent, and when.
     sticks: Option<(Instant, PilotInput)>,
     next_state: Instant,
-    /// Since when it flies.
+    /// Since when the motors are on, and how long they were when they went off.
     took_off: Option<Instant>,
+    in_air: Duration,
 }
 
 /// Where datagrams go.
@@ -67,7 +68,15 @@ impl<C> Tello<C> {
     /// Nobody has said anything.
     #[must_use]
     pub const fn new() -> Self {
-        Self { program: None, action: None, speed: SPEED, sticks: None, next_state: Instant::ZERO, took_off: None }
+        Self {
+            program: None,
+            action: None,
+            speed: SPEED,
+            sticks: None,
+            next_state: Instant::ZERO,
+            took_off: None,
+            in_air: Duration::ZERO,
+        }
     }
 }
 
@@ -106,7 +115,7 @@ impl<C: Copy + PartialEq> Tello<C> {
                 self.speed = speed;
                 say(TelloReply::Ok);
             }
-            TelloCommand::Query(query) => say(answers::answer(query, self.speed, self.in_air(now), &cockpit.view())),
+            TelloCommand::Query(query) => say(answers::answer(query, self.speed, self.in_air, &cockpit.view())),
             // Not answered, as a Tello does not.
             TelloCommand::Sticks { right, forward, up, clockwise } => {
                 let input = PilotInput {
@@ -150,6 +159,7 @@ impl<C: Copy + PartialEq> Tello<C> {
     pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
         let status = cockpit.view().state();
         self.took_off = self.took_off.filter(|_| status.armed).or_else(|| status.armed.then_some(now));
+        self.in_air = self.took_off.map_or(self.in_air, |took_off| now.since(took_off));
         let Some((program, heard)) = self.program else { return };
         if now.since(heard) >= SILENCE {
             (self.action, self.sticks) = (None, None);
@@ -171,7 +181,7 @@ impl<C: Copy + PartialEq> Tello<C> {
         self.fly_by_hand(now, cockpit);
         if now >= self.next_state {
             self.next_state = now + STATE;
-            let state = answers::state(self.in_air(now), &cockpit.view());
+            let state = answers::state(self.in_air, &cockpit.view());
             let mut line = [0; TelloState::LONGEST];
             if let Some(line) = state.write(&mut line).and_then(|length| line.get(..length)) {
                 put(&program, Destination::State, line);
@@ -188,11 +198,6 @@ impl<C: Copy + PartialEq> Tello<C> {
             self.sticks = None;
             _ = cockpit.guide(now, Seat::Tello, GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
         }
-    }
-
-    /// How long it has been armed.
-    fn in_air(&self, now: Instant) -> Duration {
-        self.took_off.map_or(Duration::ZERO, |took_off| now.since(took_off))
     }
 }
 

@@ -10,7 +10,7 @@
 use super::processor::{Here, Processor};
 use super::remote::{Remote, RemoteError, There};
 use super::{Around, Outside, Surroundings, Witness};
-use crate::time::Tasks;
+use crate::time::{Clock, Tasks};
 use stampfly_bus::{Schedule, Taps, TopicTable};
 use stampfly_flight::Assembled;
 use stampfly_types::{Duration, Instant};
@@ -85,52 +85,144 @@ pub fn fly_remote<R: Schedule, S: Surroundings<Runnables = R>>(
 
 /// Flies on whatever runs the runnables.
 fn fly_on<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>>(
-    mut processor: P,
+    processor: P,
     outside: Outside<'b, R>,
-    mut taps: <R::Topics as TopicTable>::Taps<'b>,
+    taps: <R::Topics as TopicTable>::Taps<'b>,
     options: &FlightOptions,
     surroundings: &'b mut S,
     witness: &mut dyn Witness<R>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Result<Ended<S::Outcome>, P::Error> {
-    let (start, end) = (options.start, options.start + options.limit);
-    let clock = surroundings.clock();
-    witness.begins(start);
-    let mut tasks = Tasks::new(clock.clone());
-    let mut around = surroundings.start(&mut tasks, outside);
-    let mut next_report = start;
-    loop {
+    let mut turns = Turns::begin(processor, outside, taps, options, surroundings, witness);
+    let mut next_report = options.start;
+    while turns.next(witness)? {
+        let now = turns.clock.now();
+        if now >= next_report {
+            next_report = now + REPORT_PERIOD;
+            let (done, word) = turns.around.progress();
+            report(done, word);
+        }
+    }
+    Ok(turns.end(witness))
+}
+
+/// A flight in this process, turn by turn, for a caller that cannot wait for its end: a page in a browser, a game's loop.
+///
+/// ```no_run
+/// use stampfly_bus::{Schedule, TopicTable};
+/// use stampfly_sim::vehicle::{FlightOptions, Flying, Surroundings};
+/// use stampfly_types::{Duration, Instant};
+///
+/// fn two_halves<S: Surroundings>(config: &<S::Runnables as Schedule>::Config, around: &mut S, options: &FlightOptions) {
+///     let mut bus = <S::Runnables as Schedule>::Topics::new();
+///     let mut flying = Flying::begin(&mut bus, config, options, around, &mut ());
+///     flying.go_on(options.start + Duration::from_secs(1), &mut ());
+///     flying.go_on(options.start + options.limit, &mut ());
+///     println!("{:.1} s", flying.end(&mut ()).duration.seconds());
+/// }
+/// ```
+pub struct Flying<'b, R: Schedule, S: Surroundings<Runnables = R> + 'b>(Turns<'b, R, S, Here<'b, R>>);
+
+impl<'b, R: Schedule, S: Surroundings<Runnables = R>> Flying<'b, R, S> {
+    /// Switches the vehicle on.
+    pub fn begin(
+        bus: &'b mut R::Topics,
+        config: &R::Config,
+        options: &FlightOptions,
+        surroundings: &'b mut S,
+        witness: &mut dyn Witness<R>,
+    ) -> Self {
+        let Assembled { flight_loop, outside, taps } = Assembled::<R>::new(bus, None, config, options.start);
+        let here = Here::new(flight_loop, options.jitter);
+        Self(Turns::begin(here, outside, taps, options, surroundings, witness))
+    }
+
+    /// Flies up to then. Is there more to fly?
+    pub fn go_on(&mut self, until: Instant, witness: &mut dyn Witness<R>) -> bool {
+        while !self.0.is_over && self.0.clock.now() < until {
+            match self.0.next(witness) {
+                Ok(_) => {}
+                Err(never) => match never {},
+            }
+        }
+        !self.0.is_over
+    }
+
+    /// What the clock shows.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.0.clock.now()
+    }
+
+    /// Ends the flight.
+    pub fn end(self, witness: &mut dyn Witness<R>) -> Ended<S::Outcome> {
+        self.0.end(witness)
+    }
+}
+
+/// A flight, turn by turn.
+struct Turns<'b, R: Schedule, S: Surroundings<Runnables = R> + 'b, P: Processor<'b, R>> {
+    processor: P,
+    taps: <R::Topics as TopicTable>::Taps<'b>,
+    tasks: Tasks<'b>,
+    around: S::Around<'b>,
+    clock: Clock,
+    start: Instant,
+    limit: Instant,
+    is_over: bool,
+}
+
+impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns<'b, R, S, P> {
+    fn begin(
+        processor: P,
+        outside: Outside<'b, R>,
+        taps: <R::Topics as TopicTable>::Taps<'b>,
+        options: &FlightOptions,
+        surroundings: &'b mut S,
+        witness: &mut dyn Witness<R>,
+    ) -> Self {
+        let (start, limit) = (options.start, options.start + options.limit);
+        let clock = surroundings.clock();
+        witness.begins(start);
+        let mut tasks = Tasks::new(clock.clone());
+        let around = surroundings.start(&mut tasks, outside);
+        Self { processor, taps, tasks, around, clock, start, limit, is_over: false }
+    }
+
+    /// One turn of the executor. Is there another?
+    fn next(&mut self, witness: &mut dyn Witness<R>) -> Result<bool, P::Error> {
+        let Self { processor, taps, tasks, around, clock, .. } = self;
         let deadlines = [tasks.next_deadline(), processor.deadline(clock.now())];
-        let Some(next) = deadlines.into_iter().flatten().min() else { break };
+        let Some(next) = deadlines.into_iter().flatten().min() else {
+            self.is_over = true;
+            return Ok(false);
+        };
         tasks.run_until(next.max(clock.now()));
         let now = clock.now();
         // What came from outside is in the log before the activations that read it.
-        drain(&mut taps, &mut processor, &mut around, witness);
+        drain(taps, processor, around, witness);
 
         witness.turn(now);
-        processor.turn(now, &mut around, witness)?;
+        processor.turn(now, around, witness)?;
         around.show(now);
-        drain(&mut taps, &mut processor, &mut around, witness);
+        drain(taps, processor, around, witness);
         witness.lost(now, taps.lost());
         if let Some(flight_loop) = processor.at_rest() {
             witness.at_rest(now, flight_loop);
         }
+        self.is_over = self.around.is_over(now) || now >= self.limit;
+        Ok(!self.is_over)
+    }
 
-        if now >= next_report {
-            next_report = now + REPORT_PERIOD;
-            let (done, word) = around.progress();
-            report(done, word);
+    fn end(self, witness: &mut dyn Witness<R>) -> Ended<S::Outcome> {
+        let Self { mut processor, mut taps, tasks, mut around, clock, start, .. } = self;
+        drop(tasks);
+        if processor.end(witness) {
+            drain(&mut taps, &mut processor, &mut around, witness);
         }
-        if around.is_over(now) || now >= end {
-            break;
-        }
+        witness.ends();
+        Ended { outcome: around.finish(), duration: clock.now().since(start), log_lost: taps.lost() }
     }
-    drop(tasks);
-    if processor.end(witness) {
-        drain(&mut taps, &mut processor, &mut around, witness);
-    }
-    witness.ends();
-    Ok(Ended { outcome: around.finish(), duration: clock.now().since(start), log_lost: taps.lost() })
 }
 
 /// Passes on what was published.

@@ -83,9 +83,9 @@ pub enum Heard<'b> {
 
 /// The open ports of one vehicle.
 pub trait Ports: fmt::Debug + Send + Sync {
-    /// Hands over what has come in, in order, and waits for more until then; a bounded number, so that a flood does not hold
-    /// time up.
-    fn receive(&self, until: std::time::Instant, hear: &mut dyn FnMut(Client, Heard<'_>));
+    /// Hands over what has come in, in order, and waits for more until then, if at all; a bounded number, so that a flood does not
+    /// hold time up.
+    fn receive(&self, until: Option<std::time::Instant>, hear: &mut dyn FnMut(Client, Heard<'_>));
 
     /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes nothing is closed.
     fn send(&self, to: &Client, bytes: &[u8]);
@@ -103,8 +103,8 @@ pub struct Live {
     pub number: usize,
     /// The flight is broken off after this long, in virtual time.
     pub limit: Duration,
-    /// How fast time passes.
-    pub speed: Speed,
+    /// How fast time passes. `None` where somebody else sees to that, and nothing here may wait.
+    pub speed: Option<Speed>,
 }
 
 /// Virtual seconds in a second of the wall: 1 is real time, 0 is a pause. A handle: clones share it.
@@ -145,29 +145,50 @@ pub trait Link {
 impl Live {
     /// Connects a vehicle to other programs, tick by tick, the first one period after the clock's zero.
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
-        let real_period = std::time::Duration::from_micros(period.as_micros());
-        let mut until = std::time::Instant::now();
+        let ports = &self.ports;
+        let mut pace = self.speed.as_ref().map(|speed| Pace::new(speed, period));
         let begun = clock.now().as_micros() / period.as_micros();
         for tick in 1_u32.. {
             let due = period.as_micros() * (begun + u64::from(tick));
             clock.sleep_until(Instant::from_micros(due)).await;
-            let ports = &self.ports;
             let mut hear = |until| {
                 ports.receive(until, &mut |from, heard| {
                     link.hear(clock.now(), from, heard, &mut |to, bytes| ports.send(to, bytes));
                 });
             };
-            while self.speed.get() <= 0.0 && !ports.are_closed() {
-                hear(std::time::Instant::now() + PAUSE);
+            match &mut pace {
+                Some(pace) => pace.wait(&mut |until| hear(Some(until)), &|| ports.are_closed()),
+                None => hear(None),
             }
-            // A pause that has just ended is not made up for, and a speed of a hundred thousandth is none.
-            let period = real_period.div_f32(self.speed.get().max(1e-5));
-            until = next_tick(until, std::time::Instant::now(), period);
-            hear(until);
-            std::thread::sleep(until.saturating_duration_since(std::time::Instant::now()));
             clock.sleep_until(clock.now() + AFTER_TICK).await;
             link.answer(clock.now(), tick, &mut |to, bytes| ports.send(to, bytes));
         }
+    }
+}
+
+/// Holds virtual time to the wall's.
+struct Pace<'s> {
+    speed: &'s Speed,
+    period: std::time::Duration,
+    until: std::time::Instant,
+}
+
+impl<'s> Pace<'s> {
+    fn new(speed: &'s Speed, period: Duration) -> Self {
+        let period = std::time::Duration::from_micros(period.as_micros());
+        Self { speed, period, until: std::time::Instant::now() }
+    }
+
+    /// Waits for the next tick, and has programs heard meanwhile.
+    fn wait(&mut self, hear: &mut dyn FnMut(std::time::Instant), are_closed: &dyn Fn() -> bool) {
+        while self.speed.get() <= 0.0 && !are_closed() {
+            hear(std::time::Instant::now() + PAUSE);
+        }
+        // A pause that has just ended is not made up for, and a speed of a hundred thousandth is none.
+        let period = self.period.div_f32(self.speed.get().max(1e-5));
+        self.until = next_tick(self.until, std::time::Instant::now(), period);
+        hear(self.until);
+        std::thread::sleep(self.until.saturating_duration_since(std::time::Instant::now()));
     }
 }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
 //! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
-//! | [`fly`] | one flight on virtual time |
+//! | [`fly`], [`Flying`] | one flight on virtual time, at once or turn by turn |
 //! | [`Remote`], [`fly_remote`] | the same with the runnables on a vehicle at the other end of a line |
 //! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
 //! | [`Scenario`] | what to command and what must be true, as text |
@@ -24,7 +24,7 @@ mod scenario;
 mod scripted;
 mod witness;
 
-pub use executor::{Ended, FlightOptions, fly, fly_remote};
+pub use executor::{Ended, FlightOptions, Flying, fly, fly_remote};
 pub use live::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed, Transport};
 pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
 pub use remote::{Figures, Port, Remote, RemoteError, Settings};

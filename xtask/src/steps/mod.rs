@@ -7,6 +7,7 @@ pub mod budget;
 pub mod bugs;
 pub mod cache;
 pub mod campaign;
+pub mod clients;
 pub mod clippy;
 pub mod constants;
 pub mod cortex_m4f;

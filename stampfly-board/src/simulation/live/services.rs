@@ -39,7 +39,7 @@ pub struct Services<'b> {
     telemetry: Option<Client>,
     terminals: Vec<(Client, Terminal)>,
     pub(super) faults: Injector,
-    pub(super) speed: Speed,
+    pub(super) speed: Option<Speed>,
 }
 
 impl<'b> Services<'b> {

@@ -181,7 +181,7 @@ impl<V: Vehicle> Flight<V> {
     fn prepare(options: &ServeOptions, number: usize, ports: &Arc<OpenPorts>, hub: &Hub) -> Result<Self, Failure> {
         let ServeOptions { scene, seed, out, count, speed, seconds, .. } = options;
         let limit = seconds.map_or(Duration::from_secs(FOR_EVER), Duration::from_seconds);
-        let live = Live { ports: ports.clone(), number, limit, speed: Speed::new(*speed) };
+        let live = Live { ports: ports.clone(), number, limit, speed: Some(Speed::new(*speed)) };
         let seed = seed + number as u64;
         let typed = Options { live: Some(live), ..scene.options(scene.jitter) };
         let setup = V::setup(&typed, seed)?;

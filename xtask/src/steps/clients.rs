@@ -1,0 +1,146 @@
+//! `clients`: programs that others have written fly a simulated StampFly.
+//!
+//! Each script of `examples/clients` runs against a vehicle of its own, at ports that the system chooses. It has to succeed, the
+//! vehicle must not have done what it never may, and the log of the flight has to replay bit for bit without the program. Control: against
+//! a vehicle that is not there, every script has to fail.
+
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, capture, run as run_program};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+const FOLDER: &str = "examples/clients";
+const PACKAGES: [&str; 2] = ["pymavlink==2.4.50", "djitellopy==2.5.0"];
+/// A script that takes longer hangs.
+const SECONDS: &str = "120";
+/// djitellopy cannot be told to take any port that is free: these are asked for first.
+const FREE: usize = 3;
+
+/// A script, and its arguments with the names of ports in braces.
+const SCRIPTS: [(&str, &[&str]); 5] = [
+    ("mavlink_square.py", &["tcp:{mavlink-tcp}"]),
+    ("mavlink_square.py", &["udpin:{mavlink-udp}"]),
+    ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"]),
+    ("read_streams.py", &["{telemetry#}", "{stream}"]),
+    ("console.py", &["{console}"]),
+];
+
+pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    let python = environment(repository)?;
+    run_program(repository.cargo().args(["build", "--quiet", "--release", "-p", "stampfly-host"]))?;
+    let program = repository.target("release").join("stampfly");
+    for (place, (script, arguments)) in SCRIPTS.iter().enumerate() {
+        let out = repository.target("clients").join(place.to_string());
+        let mut vehicle = Vehicle::start(&program, &out)?;
+        let said = script_with(repository, &python, script, arguments, &vehicle)?;
+        print!("{script}\n{}", indented(&said));
+        vehicle.end()?;
+        let (replayed, _) = capture(Command::new(&program).arg("replay").arg(out.join("flight.ulg")))?;
+        if !replayed.contains("identical") {
+            return Err(format!("{script}: the flight does not replay:\n{replayed}"));
+        }
+        if script_with(repository, &python, script, arguments, &vehicle).is_ok() {
+            return Err(format!("{script} succeeds without a vehicle"));
+        }
+    }
+    Ok(())
+}
+
+fn indented(text: &str) -> String {
+    text.lines().map(|line| format!("    {line}\n")).collect()
+}
+
+/// A Python with the packages. Made once, and again when their versions are others.
+fn environment(repository: &Repository) -> Result<PathBuf, Failure> {
+    let folder = repository.target("python").join(format!("clients-{}", PACKAGES.join("-").replace(['=', '.'], "")));
+    let python = folder.join("bin/python");
+    let made = folder.join("made");
+    if !made.exists() {
+        run_program(repository.command("python3").args(["-m", "venv"]).arg(&folder))?;
+        let mut pip = Command::new(&python);
+        run_program(pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).args(PACKAGES))?;
+        std::fs::write(&made, "").map_err(|error| error.to_string())?;
+    }
+    Ok(python)
+}
+
+fn script_with(
+    repository: &Repository,
+    python: &Path,
+    script: &str,
+    arguments: &[&str],
+    vehicle: &Vehicle,
+) -> Result<String, Failure> {
+    let mut command = Command::new("timeout");
+    command.arg(SECONDS).arg(python).arg("-u").arg(repository.root.join(FOLDER).join(script));
+    command.args(arguments.iter().map(|argument| vehicle.fill_in(argument)));
+    capture(&mut command).map(|(said, _)| said)
+}
+
+/// A simulated vehicle in a process of its own.
+struct Vehicle {
+    process: Child,
+    /// Names and places of its ports, and one that is free.
+    ports: Vec<(String, String)>,
+}
+
+impl Vehicle {
+    fn start(program: &Path, out: &Path) -> Result<Self, Failure> {
+        let free = free_ports()?;
+        let [state, telemetry, mavlink] = free;
+        let mut command = Command::new(program);
+        command.args(["serve", "--for", SECONDS, "--out"]).arg(out);
+        for name in ["http", "mavlink-tcp", "tello", "stream", "console"] {
+            command.args(["--port", &format!("{name}=0")]);
+        }
+        for (name, number) in [("tello-state", state), ("telemetry", telemetry), ("mavlink-udp", mavlink)] {
+            command.args(["--port", &format!("{name}={number}")]);
+        }
+        let mut process = command.stdout(Stdio::piped()).spawn().map_err(|error| format!("{program:?}: {error}"))?;
+        let stdout = process.stdout.take().ok_or("no standard output")?;
+        let mut vehicle = Self { process, ports: vec![("free".into(), free_ports()?[0].to_string())] };
+        for line in BufReader::new(stdout).lines() {
+            let line = line.map_err(|error| error.to_string())?;
+            let mut words = line.split_whitespace();
+            let name = words.next().unwrap_or_default().to_owned();
+            if name == "http" {
+                return Ok(vehicle);
+            }
+            vehicle.ports.push((name, words.next_back().unwrap_or_default().to_owned()));
+        }
+        Err("stampfly serve ended".into())
+    }
+
+    /// `{name}` is where the port is, `{name#}` its number.
+    fn fill_in(&self, argument: &str) -> String {
+        self.ports.iter().fold(argument.to_owned(), |text, (name, place)| {
+            let number = place.rsplit(':').next().unwrap_or(place);
+            text.replace(&format!("{{{name}#}}"), number).replace(&format!("{{{name}}}"), place)
+        })
+    }
+
+    /// Ends it as Ctrl-C does, and hears whether all was well. One that never took off did not land, which is said by its exit code,
+    /// too: what counts is that it ends by itself.
+    fn end(&mut self) -> Result<(), Failure> {
+        run_program(Command::new("kill").args(["-INT", &self.process.id().to_string()]))?;
+        let ended = self.process.wait().map_err(|error| error.to_string())?;
+        if matches!(ended.code(), Some(0 | 1)) { Ok(()) } else { Err(format!("stampfly serve: {ended}")) }
+    }
+}
+
+impl Drop for Vehicle {
+    fn drop(&mut self) {
+        _ = self.process.kill();
+        _ = self.process.wait();
+    }
+}
+
+fn free_ports() -> Result<[u16; FREE], Failure> {
+    let sockets: Vec<_> = (0..FREE).map(|_| std::net::UdpSocket::bind("127.0.0.1:0")).collect();
+    let mut ports = [0; FREE];
+    for (port, socket) in ports.iter_mut().zip(sockets) {
+        *port = socket.and_then(|socket| socket.local_addr()).map_err(|error| error.to_string())?.port();
+    }
+    Ok(ports)
+}
