@@ -20,11 +20,19 @@ const inputNumber = (id) => {
   return node.value.trim() !== '' && node.checkValidity() ? Number(node.value) : NaN;
 };
 
-const kill = () => {
-  const vehicle = live();
+/** The chosen vehicle, also while a log is in front of it. */
+const kill = async () => {
+  const vehicle = station.vehicles[station.chosen];
   if (!vehicle) return;
   sticks.kill = true;
-  guided('kill', 'KILL');
+  const reply = await ask(vehicle.number, { do: 'guided', kind: 'kill' });
+  log(`${vehicle.card.name}, KILL${reply.ok ? '' : `: ${reply.text}`}`, 'bad');
+};
+
+const killAll = () => {
+  sticks.kill = true;
+  for (const { number } of station.vehicles) ask(number, { do: 'guided', kind: 'kill' });
+  log('KILL, all vehicles', 'bad');
 };
 
 const goTo = async (north, east, up) => {
@@ -79,7 +87,9 @@ const buildControls = () => {
   }));
   element('speed').addEventListener('change', () => command({ do: 'speed', factor: Number(element('speed').value) }, `time ×${element('speed').value}`));
   document.addEventListener('keydown', (event) => {
-    if (event.key === 'Escape') { event.preventDefault(); kill(); }
+    if (event.key !== 'Escape') return;
+    event.preventDefault();
+    if (event.shiftKey) killAll(); else kill();
   }, { capture: true });
 };
 

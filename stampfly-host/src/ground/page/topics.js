@@ -65,7 +65,7 @@ const writeRates = (vehicle) => {
   for (const entry of topics.rows) {
     const [samples, time] = [entry.topic.count - entry.count, vehicle.clock - entry.at];
     const rate = samples / time;
-    entry.rate.textContent = time > 0 && samples >= 0 && entry.topic.count ? `${rate.toFixed(rate < 10 ? 1 : 0)} Hz` : '–';
+    entry.rate.textContent = time > 0 && samples > 0 ? `${rate.toFixed(rate < 10 ? 1 : 0)} Hz` : '–';
     [entry.count, entry.at] = [entry.topic.count, vehicle.clock];
   }
 };

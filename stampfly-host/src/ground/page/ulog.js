@@ -22,7 +22,7 @@ const readLog = (buffer) => {
     if (to > bytes.length) break; // Cut off by a crash: the rest is still worth reading.
     at = to;
     if (kind === 'F') {
-      const [name, fields] = text(from, to).split(':');
+      const [name, fields = ''] = text(from, to).split(':');
       log.formats.set(name, fields.split(';').filter(Boolean));
     } else if (kind === 'I' || kind === 'P') {
       const key = text(from + 1, from + 1 + bytes[from]), value = from + 1 + bytes[from];
