@@ -8,6 +8,7 @@
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
+//! | [`log`] | tools for logs: info, tables, MCAP, a part of one |
 //! | [`serve`] | the ports at which other programs fly a simulated vehicle |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
 //! | [`ground`] | a page that shows vehicles as they fly, and asks them for things |
@@ -23,6 +24,7 @@ pub mod golden;
 pub mod ground;
 pub mod hil;
 mod inputs;
+pub mod log;
 mod page;
 pub mod recorder;
 pub mod report;

@@ -20,6 +20,7 @@ mod held;
 mod hil;
 mod impact;
 mod in_flight;
+mod log_tools;
 mod losses;
 mod made_up;
 mod missions;

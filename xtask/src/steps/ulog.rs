@@ -1,10 +1,12 @@
-//! `ulog`: the tools of the format's own authors open the log of a flight and find samples in it.
+//! `ulog`: the tools of the formats' own authors open the log of a flight, and find in it what ours say is in it.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use std::fs;
+use std::path::Path;
 
 const PYULOG: &str = "pyulog==1.3.0";
+const MCAP: &str = "mcap==1.6.0";
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let folder = repository.target("ulog");
@@ -38,7 +40,28 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     if rows == 0 {
         return Err("the tools found no sample".to_owned());
     }
+    mcap(repository, &log)?;
     two_instances(repository)
+}
+
+/// The same log as MCAP, read by the format's own library: every sample is there.
+fn mcap(repository: &Repository, log: &Path) -> Result<(), Failure> {
+    let stampfly = || {
+        let mut command = repository.cargo();
+        command.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "log"]);
+        command
+    };
+    let file = repository.target("ulog").join("flight.mcap");
+    run_program(stampfly().arg("mcap").arg(log).arg("--out").arg(&file))?;
+    let (info, _) = capture(stampfly().arg("info").arg(log))?;
+    let samples = |line: &str| line.split_whitespace().nth(1)?.parse::<usize>().ok();
+    let table = info.lines().skip_while(|line| !line.starts_with("topic")).skip(1);
+    let expected: usize = table.filter_map(samples).sum();
+    let count = "import sys; from mcap.reader import make_reader; \
+                 print(sum(1 for _ in make_reader(open(sys.argv[1], 'rb')).iter_messages()))";
+    let (found, _) = capture(python_tool(repository, MCAP, "python3")?.args(["-c", count]).arg(&file))?;
+    println!("{} messages in the MCAP, {expected} samples in the log", found.trim());
+    if found.trim().parse() == Ok(expected) && expected > 0 { Ok(()) } else { Err("the MCAP is another flight".into()) }
 }
 
 /// The example's two batteries are two instances of one topic, to the authors' tools as well.

@@ -36,6 +36,9 @@ pub enum Command {
     Serve(ServeOptions),
     /// Fly a log again, bit for bit, from what came from outside.
     Replay(ReplayOptions),
+    /// Look into a log, cut it, write it in other formats.
+    #[command(subcommand)]
+    Log(LogCommand),
     /// List the topics: type, policy, rate, publisher, readers.
     Topics(TopicsOptions),
     /// List the runnables: what activates them, budget, response time.
@@ -210,6 +213,55 @@ pub struct ServeOptions {
     /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,
+}
+
+/// What to do with a log.
+#[derive(Clone, Debug, Subcommand)]
+pub enum LogCommand {
+    /// Vehicle, length, topics with their rates, gaps.
+    Info {
+        /// A ULog file.
+        file: PathBuf,
+        /// Print one JSON object on standard output.
+        #[arg(long)]
+        json: bool,
+    },
+    /// A table a topic.
+    Csv {
+        /// A ULog file.
+        file: PathBuf,
+        /// Only this topic; may be repeated.
+        #[arg(long, value_name = "NAME")]
+        topic: Vec<String>,
+        /// Folder for the tables.
+        #[arg(long, value_name = "DIR", default_value = ".")]
+        out: PathBuf,
+    },
+    /// MCAP, for Foxglove and PlotJuggler.
+    Mcap {
+        /// A ULog file.
+        file: PathBuf,
+        /// Only this topic; may be repeated.
+        #[arg(long, value_name = "NAME")]
+        topic: Vec<String>,
+        /// The file to write. Without this: beside the log.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// A part of a flight, which replays from its first key frame on.
+    Cut {
+        /// A ULog file.
+        file: PathBuf,
+        /// From when on, seconds since power-on.
+        #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+        from: f64,
+        /// Up to when.
+        #[arg(long, value_name = "SECONDS", default_value_t = 1e9)]
+        to: f64,
+        /// The file to write.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
 }
 
 /// Options of `hil`.

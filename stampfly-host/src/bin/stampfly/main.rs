@@ -16,6 +16,7 @@ mod faults;
 mod fly;
 mod golden;
 mod hil;
+mod log;
 mod modes;
 mod replay;
 mod schedule;
@@ -30,6 +31,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
+        Command::Log(command) => log::run(&command),
         Command::Fly(options) => fly::run(&options),
         Command::Serve(options) => serve::run(&options),
         Command::Replay(options) => replay::run(&options),

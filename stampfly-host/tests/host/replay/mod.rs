@@ -20,18 +20,18 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 /// Everything in the mission that makes the stack do something.
-fn setup(seed: u64, jitter: Option<u64>) -> Setup {
+pub fn setup(seed: u64, jitter: Option<u64>) -> Setup {
     let mission = Mission::parse("arm\ntakeoff 0.4\ngoto 0.5 -0.3 0.6 yaw 60\nland").expect("a mission");
     Setup { mission, jitter, ..Setup::reference(seed) }
 }
 
-fn record(setup: &Setup) -> Vec<u8> {
+pub fn record(setup: &Setup) -> Vec<u8> {
     let mut recorder = Recorder::<StampFly>::with_log(setup, &[("seed".to_owned(), setup.simulation.seed.to_string())]);
     fly::<StampFly>(setup, &mut recorder, &mut |_, _| {});
     recorder.log().to_vec()
 }
 
-fn replay(log: &[u8]) -> Result<Replay, ReplayError> {
+pub fn replay(log: &[u8]) -> Result<Replay, ReplayError> {
     replay_from(log, None)
 }
 

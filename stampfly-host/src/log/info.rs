@@ -1,0 +1,108 @@
+//! What is in a log.
+
+use serde::Serialize;
+use stampfly_lab::flight_log::FlightLog;
+use stampfly_types::Instant;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// What is in a log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Info {
+    /// Facts that it states: vehicle, version, seed.
+    pub facts: BTreeMap<String, String>,
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Instant of the first sample, s since power-on.
+    pub first_s: f64,
+    /// Instant of the last sample, s since power-on.
+    pub last_s: f64,
+    /// Its topics, by name.
+    pub topics: BTreeMap<String, TopicInfo>,
+    /// Gaps that the writer has marked.
+    pub gaps: usize,
+    /// What of it cannot be read.
+    pub omissions: Vec<String>,
+}
+
+/// One topic of a log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TopicInfo {
+    /// Samples.
+    pub samples: usize,
+    /// Samples a second, between the first and the last; `None` with fewer than two.
+    pub rate_hz: Option<f64>,
+    /// Longest time between two samples, s.
+    pub longest_gap_s: f64,
+    /// Numbers in a sample.
+    pub fields: usize,
+}
+
+impl Info {
+    /// Looks into a log.
+    ///
+    /// ```
+    /// use stampfly_host::log::info::Info;
+    /// use stampfly_lab::flight_log;
+    /// use stampfly_log::ulog::{Definitions, Ram, Sample, Topic};
+    /// use stampfly_types::{Instant, Message, messages::PowerData};
+    ///
+    /// let mut memory = [0; 4096];
+    /// let topics = [Topic { name: "sensor_power", fields: PowerData::FIELDS }];
+    /// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?.data(&topics[..])?;
+    /// for ms in [0, 500, 1000] {
+    ///     let words = PowerData::default().to_words();
+    ///     log.sample(0, &Sample { at: Instant::from_millis(ms), generation: 1, words: &words })?;
+    /// }
+    /// let info = Info::of(&flight_log::parse(log.sink().written())?);
+    /// assert_eq!((info.topics["sensor_power"].samples, info.topics["sensor_power"].rate_hz), (3, Some(2.0)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn of(log: &FlightLog) -> Self {
+        let flight = &log.flight;
+        let seconds = |at: Instant| at.as_micros() as f64 * 1e-6;
+        let stamps = || flight.topics.values().flat_map(|series| series.at.iter().copied());
+        let topics = flight.topics.iter().map(|(name, series)| {
+            let ends = series.at.iter().min().zip(series.at.iter().max());
+            let length = ends.map_or(0.0, |(first, last)| seconds(*last) - seconds(*first));
+            let gaps = series.at.windows(2).map(|pair| seconds(pair[1]) - seconds(pair[0]));
+            let info = TopicInfo {
+                samples: series.at.len(),
+                rate_hz: (length > 0.0).then(|| (series.at.len() - 1) as f64 / length),
+                longest_gap_s: gaps.fold(0.0, f64::max),
+                fields: series.columns.len(),
+            };
+            (name.clone(), info)
+        });
+        Self {
+            facts: flight.info.iter().map(|(name, value)| (name.clone(), value.clone())).collect(),
+            parameters: flight.parameters.len(),
+            first_s: stamps().min().map_or(0.0, seconds),
+            last_s: stamps().max().map_or(0.0, seconds),
+            topics: topics.collect(),
+            gaps: log.dropouts.len(),
+            omissions: log.omissions.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (name, value) in &self.facts {
+            writeln!(f, "{name:<24}{value}")?;
+        }
+        writeln!(f, "{:<24}{}", "parameters", self.parameters)?;
+        writeln!(f, "{:<24}{:.3} s to {:.3} s", "samples", self.first_s, self.last_s)?;
+        writeln!(f, "\n{:<24}{:>9} {:>10} {:>13} {:>7}", "topic", "samples", "rate, Hz", "longest gap, s", "fields")?;
+        for (name, topic) in &self.topics {
+            let rate = topic.rate_hz.map_or_else(|| "–".to_owned(), |rate| format!("{rate:.1}"));
+            let TopicInfo { samples, longest_gap_s, fields, .. } = topic;
+            writeln!(f, "{name:<24}{samples:>9} {rate:>10} {longest_gap_s:>14.3} {fields:>7}")?;
+        }
+        if self.gaps > 0 {
+            writeln!(f, "\n{} gaps: the writer could not keep up, or a part was cut out", self.gaps)?;
+        }
+        self.omissions.iter().try_for_each(|omission| writeln!(f, "\nnot read: {omission}"))
+    }
+}
