@@ -116,7 +116,7 @@ pub enum Guided {
         /// Above the present place, m, above 0 and at most [`HIGHEST`].
         height: f32,
     },
-    /// Append a way-point to the route.
+    /// Forget the route, and go there.
     GoTo {
         /// Relative to the origin, m.
         north: f32,

@@ -7,7 +7,7 @@
 use super::ask::{AskError, Asked, Incoming, Reply};
 use super::feed::Feed;
 use super::hub::{Connection, Hub};
-use super::server::Limits;
+use super::limits::Limits;
 use std::io::{self, ErrorKind};
 use std::net::TcpStream;
 use std::sync::Arc;

@@ -266,12 +266,14 @@ impl Hub {
             || matches!(asked.ask, Ask::Sticks(sticks) if sticks.kill);
         let is_sticks = matches!(asked.ask, Ask::Sticks(_));
         let mut asks = lock(&shared.asks);
-        if let Some((last, Asked { ask: ask @ Ask::Sticks(_), .. })) = asks.back_mut()
-            && is_sticks
+        if let Ask::Sticks(new) = asked.ask
+            && let Some((last, Asked { ask: Ask::Sticks(waiting), .. })) = asks.back_mut()
             && *last == client
-            && !matches!(ask, Ask::Sticks(sticks) if sticks.kill)
+            && !waiting.kill
+            // A switch that was thrown is to be seen in both positions.
+            && (waiting.arm, waiting.mode) == (new.arm, new.mode)
         {
-            *ask = asked.ask;
+            *waiting = new;
             return Ok(());
         }
         let room = ASKS + if stops { ROOM_TO_STOP } else { 0 };
@@ -422,6 +424,19 @@ mod tests {
         let kills: Vec<bool> =
             hub.asks(0).iter().map(|(_, asked)| matches!(asked.ask, Ask::Sticks(sticks) if sticks.kill)).collect();
         assert_eq!(kills, [true, false]);
+    }
+
+    #[test]
+    fn an_arm_switch_that_was_thrown_is_seen_in_both_positions() {
+        let hub = hub();
+        let page = hub.connect();
+        let armed = STICKS.replace(r#""arm":false"#, r#""arm":true"#);
+        for rest in [STICKS, STICKS, &armed, &armed, STICKS] {
+            hub.ask(page.client(), asked(0, rest)).expect("room");
+        }
+        let switch: Vec<bool> =
+            hub.asks(0).iter().map(|(_, asked)| matches!(asked.ask, Ask::Sticks(sticks) if sticks.arm)).collect();
+        assert_eq!(switch, [false, true, false]);
     }
 
     #[test]

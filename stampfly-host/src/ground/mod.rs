@@ -18,14 +18,16 @@ mod client;
 mod feed;
 pub mod http;
 mod hub;
+mod limits;
 mod newest;
 mod page;
 mod server;
 
 pub use card::{Calibration, CalibrationKind, ParameterCard, TopicCard, VehicleCard};
 pub use hub::{Client, Connection, Event, Hub, NotAsked};
+pub use limits::Limits;
 pub use newest::Watch;
-pub use server::{Limits, Server};
+pub use server::Server;
 /// What can be asked.
 pub use stampfly_sim::ask;
 pub use stampfly_sim::ask::Reply;

@@ -19,6 +19,7 @@ const SCRIPT: &str = concat!(
     include_str!("page/sticks.js"),
     include_str!("page/panels.js"),
     include_str!("page/calibration.js"),
+    include_str!("page/topics.js"),
     include_str!("page/playback.js"),
     include_str!("page/main.js"),
     "})();\n",

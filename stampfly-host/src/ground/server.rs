@@ -6,6 +6,7 @@
 use super::client;
 use super::http::{self, Hosts, Refusal, Request, Wanted};
 use super::hub::Hub;
+use super::limits::Limits;
 use super::page;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -13,23 +14,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
-
-/// What a client may cost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Connections at a time.
-    pub connections: usize,
-    /// Time for the head of a request.
-    pub head: Duration,
-    /// Longest time in which a client takes nothing of what it is sent.
-    pub stall: Duration,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self { connections: 16, head: Duration::from_secs(5), stall: Duration::from_secs(5) }
-    }
-}
 
 /// A server that runs until it is dropped.
 ///

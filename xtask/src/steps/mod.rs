@@ -25,6 +25,7 @@ pub mod fmt;
 pub mod foreign;
 pub mod fuzz;
 pub mod golden;
+pub mod ground;
 pub mod hals;
 pub mod hil;
 pub mod lines;

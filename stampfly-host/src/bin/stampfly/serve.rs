@@ -50,7 +50,7 @@ impl ForVehicle for Serve<'_> {
         }
         let hub = hub::<V>(options)?;
         let ports = open::<V>(options, &hub)?;
-        let _server = ground::<V>(&ports, &hub)?;
+        let _server = ground(&ports, &hub)?;
         let closing = ports.clone();
         ctrlc::set_handler(move || {
             closing.iter().for_each(|ports| ports.close());
@@ -93,7 +93,7 @@ fn hub<V: Vehicle>(options: &ServeOptions) -> Result<Arc<Hub>, Failure> {
 }
 
 /// Starts the ground station where the first vehicle has its port for one, if it has and it is not off.
-fn ground<V: Vehicle>(ports: &[Arc<OpenPorts>], hub: &Arc<Hub>) -> Result<Option<Server>, Failure> {
+fn ground(ports: &[Arc<OpenPorts>], hub: &Arc<Hub>) -> Result<Option<Server>, Failure> {
     let place =
         ports.first().and_then(|ports| ports.places().iter().find(|(port, _)| port.transport == Transport::Page));
     let Some((port, address)) = place else { return Ok(None) };

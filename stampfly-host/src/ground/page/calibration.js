@@ -58,11 +58,14 @@ const KINDS = [
 const buildCalibration = (vehicle) => {
   const root = element('calibrations');
   root.replaceChildren();
-  for (const [kind, title, text, steps] of KINDS) {
-    const offered = vehicle.isLog ? null : vehicle.card.calibrations.find((calibration) => calibration.kind === kind);
+  const offer = (kind) => (vehicle.isLog ? undefined : vehicle.card.calibrations.find((calibration) => calibration.kind === kind));
+  const sorted = [...KINDS.filter(([kind]) => offer(kind)), ...KINDS.filter(([kind]) => !offer(kind))];
+  for (const [kind, title, text, steps] of sorted) {
+    const offered = offer(kind);
     const section = make('section', root, offered ? '' : 'absent');
     make('h3', section, '', title);
-    make('p', section, 'dim', offered ? text : `${text} Not offered by this vehicle.`);
+    make('p', section, 'dim', offered ? text : `${text} `);
+    if (!offered) make('em', section.lastChild, '', vehicle.isLog ? 'A recorded flight.' : 'Not offered by this vehicle.');
     const row = make('div', section, 'steps');
     for (const [side, shape, name] of steps) {
       const button = make('button', row, 'step');

@@ -20,11 +20,19 @@ const inputNumber = (id) => {
   return node.value.trim() !== '' && node.checkValidity() ? Number(node.value) : NaN;
 };
 
-const kill = () => {
-  const vehicle = live();
+/** The chosen vehicle, also while a log is in front of it. */
+const kill = async () => {
+  const vehicle = station.vehicles[station.chosen];
   if (!vehicle) return;
   sticks.kill = true;
-  guided('kill', 'KILL');
+  const reply = await ask(vehicle.number, { do: 'guided', kind: 'kill' });
+  log(`${vehicle.card.name}, KILL${reply.ok ? '' : `: ${reply.text}`}`, 'bad');
+};
+
+const killAll = () => {
+  sticks.kill = true;
+  for (const { number } of station.vehicles) ask(number, { do: 'guided', kind: 'kill' });
+  log('KILL, all vehicles', 'bad');
 };
 
 const goTo = async (north, east, up) => {
@@ -36,12 +44,8 @@ const goTo = async (north, east, up) => {
   const round = (value) => Math.round(value * 1000) / 1000;
   vehicle.goal = { north: round(north), east: round(east), up };
   const place = `${fixed(north, 2)} m north, ${fixed(east, 2)} m east, ${fixed(up, 2)} m up`;
-  const hold = await ask(vehicle.number, { do: 'guided', kind: 'hold' });
-  const reply = hold.ok ? await guided('go_to', `go to ${place}`, { ...vehicle.goal, yaw: round(yaw) }) : hold;
-  if (!reply.ok) {
-    vehicle.goal = null;
-    if (!hold.ok) log(`${vehicle.card.name}, go to ${place}: ${hold.text}`, 'bad');
-  }
+  const reply = await guided('go_to', `go to ${place}`, { ...vehicle.goal, yaw: round(yaw) });
+  if (!reply.ok) vehicle.goal = null;
 };
 const goByClick = ([north, east]) => {
   const vehicle = live();
@@ -79,11 +83,13 @@ const buildControls = () => {
   click('view-top', () => { camera.tilt = Math.PI / 2; camera.turn = 0; });
   click('view-follow', () => toggle(element('view-follow'), (pressed) => {
     view.follow = pressed;
-    if (!pressed) camera.target = [0, 0, -0.25];
+    if (!pressed) camera.target = home().target;
   }));
   element('speed').addEventListener('change', () => command({ do: 'speed', factor: Number(element('speed').value) }, `time ×${element('speed').value}`));
   document.addEventListener('keydown', (event) => {
-    if (event.key === 'Escape') { event.preventDefault(); kill(); }
+    if (event.key !== 'Escape') return;
+    event.preventDefault();
+    if (event.shiftKey) killAll(); else kill();
   }, { capture: true });
 };
 

@@ -13,7 +13,7 @@ const choose = (number) => {
     element('player').hidden = element('live').hidden = true;
   }
   stopMotor();
-  sticks.arm = false;
+  dropSticks();
   const vehicle = selected();
   element('empty').hidden = Boolean(vehicle);
   if (!vehicle) return;
@@ -22,7 +22,9 @@ const choose = (number) => {
   buildParameters(vehicle);
   buildFaults(vehicle);
   buildCalibration(vehicle);
+  buildTopics(vehicle);
   offer(vehicle);
+  element('key-main').style.color = `var(${colorOf(vehicle)})`;
   const download = element('download');
   download.hidden = vehicle.isLog;
   download.href = `/log/${vehicle.number}`;
@@ -42,14 +44,18 @@ on('hello', (hello) => {
   }
   tabs.hidden = station.vehicles.length < 2;
   setText(element('version'), hello.version);
-  subscribe([...new Set(station.vehicles.flatMap((vehicle) => topicsOf(vehicle.card)))]);
-  if (!playback.vehicle) choose(station.chosen);
+  subscribeAgain();
+  if (!playback.vehicle) {
+    choose(station.chosen);
+    resetCamera();
+  }
 });
 
 on('state', (state) => {
   for (const [number, clock, ...samples] of state) {
     const vehicle = station.vehicles[number];
     if (!vehicle) continue;
+    if (clock < vehicle.clock) forget(vehicle);
     vehicle.clock = clock;
     for (const [place, count, at, ...values] of samples) {
       const topic = vehicle.list[place];
@@ -95,6 +101,7 @@ const buildTabs = () => {
       element(other.getAttribute('aria-controls')).hidden = !isShown;
     }
     stopMotor();
+    subscribeAgain();
   };
   tabs.forEach((tab, index) => {
     tab.addEventListener('click', () => show(tab));
@@ -124,6 +131,7 @@ const frame = (now) => {
       written = now;
       writeStatus(vehicle);
       writeStrips(vehicle);
+      writeTopic(vehicle);
     }
   }
   requestAnimationFrame(frame);

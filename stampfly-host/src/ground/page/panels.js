@@ -11,6 +11,7 @@ const buildParameters = (vehicle) => {
   const canSet = !vehicle.isLog && vehicle.card.offers.includes('param_set');
   vehicle.rows = vehicle.card.parameters.map((parameter) => {
     const row = make('tr', body);
+    row.dataset.name = parameter.name;
     const name = make('th', row, '', parameter.name);
     name.scope = 'row';
     make('small', name, '', parameter.meaning);
@@ -78,6 +79,7 @@ const buildFaults = (vehicle) => {
   const canInject = !vehicle.isLog && vehicle.card.offers.includes('fault');
   vehicle.faultRows = vehicle.card.faults.map((fault) => {
     const item = make('li', list);
+    item.dataset.name = fault.name;
     const button = make('button', item, '', fault.name);
     button.disabled = !canInject;
     if (!canInject) button.title = 'Not offered by this vehicle';
@@ -155,7 +157,7 @@ const buildMotors = () => {
   });
   for (const kind of ['pointerup', 'pointercancel', 'keyup', 'keydown']) document.addEventListener(kind, stopMotor);
   element('motors').addEventListener('pointerleave', stopMotor);
-  element('motors').addEventListener('focusout', stopMotor);
+  element('motors').addEventListener('focusout', (event) => { if (!element('motors').contains(event.relatedTarget)) stopMotor(); });
   window.addEventListener('blur', stopMotor);
   document.addEventListener('visibilitychange', stopMotor);
   element('motor-duty').addEventListener('input', () => setText(element('motor-percent'), `${element('motor-duty').value} %`));

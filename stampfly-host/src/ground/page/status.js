@@ -27,6 +27,9 @@ const writeStatus = (vehicle) => {
   setText(element('armed'), phase === null ? '' : isArmed(vehicle) ? 'ARMED' : 'disarmed');
   element('armed').className = isArmed(vehicle) ? 'chip armed' : 'chip';
   setText(element('mode'), mode ? MODES[mode] ?? plain(mode) : '');
+  // What comes next stands out.
+  const next = vehicle.isLog ? '' : !isArmed(vehicle) ? 'arm' : phase === 'Armed' ? 'take-off' : 'land';
+  for (const id of ['arm', 'take-off', 'land']) element(id).classList.toggle('main', id === next);
   const commander = named(vehicle, 'flight_status', 'commander');
   setText(element('commander'), commander && commander !== 'None' ? `by ${plain(commander)}` : '');
   const blocks = named(vehicle, 'flight_status', 'blocks') ?? [];
@@ -44,7 +47,7 @@ const writeStatus = (vehicle) => {
   const voltage = column(vehicle, 'sensor_power', 'voltage')(), current = column(vehicle, 'sensor_power', 'current')();
   const figures = {
     height: [pose ? -pose.place[2] : NaN, 2], north: [pose?.place[0] ?? NaN, 2], east: [pose?.place[1] ?? NaN, 2],
-    speed: [velocity ? Math.hypot(...velocity) : NaN, 2], roll: [roll, 1], pitch: [pitch, 1], heading: [(yaw + 360) % 360, 0],
+    speed: [velocity ? Math.hypot(...velocity) : NaN, 2], roll: [roll, 1], pitch: [pitch, 1], heading: [Math.round(yaw + 360) % 360, 0],
     voltage: [voltage, 2], current: [current, 2],
   };
   for (const [name, [value, digits]] of Object.entries(figures)) setText(element(`figure-${name}`), number(value, digits));
@@ -60,30 +63,6 @@ const writeLink = () => {
   if (link.dropped) parts.push(`${link.dropped} dropped`);
   setText(node, link.isOpen ? parts.join(' · ') : 'not connected');
   node.title = 'Texts a second from the server, the time of the last answer, texts left out because this page was too slow';
-};
-
-/** Samples a second of each topic, for those who want to know. */
-const writeRates = (vehicle) => {
-  const body = element('rates');
-  if (body.closest('[hidden]')) return;
-  const rows = vehicle.list.filter((topic) => topic.count > 0);
-  const key = `${vehicle.number} ${rows.length}`;
-  if (body.dataset.key !== key) {
-    body.dataset.key = key;
-    body.replaceChildren();
-    for (const topic of rows) {
-      const row = make('tr', body);
-      make('th', row, '', topic.name).scope = 'row';
-      row.title = topic.doc;
-      topic.output = make('td', row);
-      make('td', row, 'dim', topic.rate);
-    }
-  }
-  for (const topic of rows) {
-    const [samples, time] = [topic.count - (topic.counted ?? topic.count), vehicle.clock - (topic.countedAt ?? vehicle.clock)];
-    if (topic.output) topic.output.textContent = time > 0 ? `${(samples / time).toFixed(samples / time < 10 ? 1 : 0)} Hz` : '–';
-    [topic.counted, topic.countedAt] = [topic.count, vehicle.clock];
-  }
 };
 
 const messages = [];

@@ -1,6 +1,6 @@
 // Flying by hand: a gamepad or the keyboard becomes sticks, sent fifty times a second while it is switched on.
 
-const sticks = { isKeyboard: false, isGamepad: false, arm: false, kill: false, mode: 'poshold', keys: new Set(), now: { roll: 0, pitch: 0, yaw: 0, throttle: 0 }, buttons: [] };
+const sticks = { isKeyboard: false, isGamepad: false, arm: false, kill: false, sent: 0, mode: 'poshold', keys: new Set(), now: { roll: 0, pitch: 0, yaw: 0, throttle: 0 }, buttons: [] };
 const KEYS = {
   KeyW: ['throttle', 1], KeyS: ['throttle', -1], KeyD: ['yaw', 1], KeyA: ['yaw', -1],
   ArrowUp: ['pitch', 1], ArrowDown: ['pitch', -1], ArrowRight: ['roll', 1], ArrowLeft: ['roll', -1],
@@ -8,6 +8,7 @@ const KEYS = {
 const GENTLE = 0.5; // A key's deflection; with Shift all of it.
 const STEP = 0.05; // Per 20 ms: a key's stick is out in two tenths of a second.
 const DEAD = 0.06;
+const SEEN = 10; // Frames with the switch off before it may be on: a vehicle arms only when it sees it thrown.
 
 const isTyping = (event) => event.target.closest?.('input, select, textarea, [contenteditable]');
 
@@ -60,8 +61,9 @@ const tickSticks = () => {
   const { roll, pitch, yaw, throttle } = sticks.now;
   say(vehicle.number, {
     do: 'sticks', roll: round(roll), pitch: round(pitch), yaw: round(yaw), throttle: round(throttle),
-    mode: sticks.mode, arm: sticks.arm && !sticks.kill, kill: sticks.kill,
+    mode: sticks.mode, arm: sticks.arm && !sticks.kill && sticks.sent > SEEN, kill: sticks.kill,
   });
+  sticks.sent++;
   if (sticks.kill) sticks.arm = false;
 };
 
@@ -81,16 +83,29 @@ const drawSticks = () => {
   element('stick-arm').setAttribute('aria-pressed', sticks.arm);
 };
 
+/** Lets go: the sticks of one vehicle are not those of the next. */
+const dropSticks = () => {
+  Object.assign(sticks, { isKeyboard: false, isGamepad: false, arm: false, kill: false, sent: 0, now: { roll: 0, pitch: 0, yaw: 0, throttle: 0 } });
+  sticks.keys.clear();
+  for (const id of ['by-keyboard', 'by-gamepad']) element(id).setAttribute('aria-pressed', false);
+};
+
+/** The first of both is switched on or off: the arm switch begins off. Not while the other one flies. */
+const beginSticks = () => {
+  sticks.kill = false;
+  if (!sticks.isKeyboard && !sticks.isGamepad) Object.assign(sticks, { arm: false, sent: 0 });
+};
+
 const buildSticks = () => {
   element('by-keyboard').addEventListener('click', (event) => toggle(event.currentTarget, (pressed) => {
+    beginSticks();
     sticks.isKeyboard = pressed;
-    sticks.kill = false;
     sticks.keys.clear();
     if (pressed) canvas.focus();
   }));
   element('by-gamepad').addEventListener('click', (event) => toggle(event.currentTarget, (pressed) => {
+    beginSticks();
     sticks.isGamepad = pressed;
-    sticks.kill = false;
   }));
   element('stick-arm').addEventListener('click', () => { sticks.arm = !sticks.arm; sticks.kill = false; });
   element('stick-mode').addEventListener('change', (event) => { sticks.mode = event.target.value; });

@@ -13,6 +13,7 @@ const readLog = (buffer) => {
   if (bytes.length < 16 || MAGIC.some((byte, index) => bytes[index] !== byte)) throw new Error('this is no ULog file');
   const text = (from, to) => new TextDecoder().decode(bytes.subarray(from, to));
   const log = { formats: new Map(), topics: new Map(), info: new Map(), parameters: [], texts: [], damaged: 0, view };
+  const micros = (place) => (view.getUint32(place, true) + view.getUint32(place + 4, true) * 2 ** 32) * 1e-6;
   const byId = new Map();
   let at = 16;
   while (at + 3 <= bytes.length) {
@@ -21,7 +22,7 @@ const readLog = (buffer) => {
     if (to > bytes.length) break; // Cut off by a crash: the rest is still worth reading.
     at = to;
     if (kind === 'F') {
-      const [name, fields] = text(from, to).split(':');
+      const [name, fields = ''] = text(from, to).split(':');
       log.formats.set(name, fields.split(';').filter(Boolean));
     } else if (kind === 'I' || kind === 'P') {
       const key = text(from + 1, from + 1 + bytes[from]), value = from + 1 + bytes[from];
@@ -35,15 +36,18 @@ const readLog = (buffer) => {
       const format = text(from + 3, to), multi = bytes[from];
       const topic = { format, name: multi ? `${format}_${multi}` : format, times: [], offsets: [] };
       byId.set(view.getUint16(from + 1, true), topic);
-      if (!log.topics.has(topic.name)) log.topics.set(topic.name, topic);
+      // Which runnable ran when is half of a log, and for a replay alone.
+      topic.isSkipped = format.startsWith('activation_');
+      if (!topic.isSkipped && !log.topics.has(topic.name)) log.topics.set(topic.name, topic);
     } else if (kind === 'D') {
       const topic = byId.get(view.getUint16(from, true));
+      if (topic?.isSkipped) continue;
       if (!topic || size < 10) { log.damaged++; continue; }
-      topic.times.push(Number(view.getBigUint64(from + 2, true)) * 1e-6);
+      topic.times.push(micros(from + 2));
       topic.offsets.push(from + 2);
       topic.size = size - 2;
     } else if (kind === 'L') {
-      log.texts.push([Number(view.getBigUint64(from + 1, true)) * 1e-6, text(from + 9, to)]);
+      log.texts.push([micros(from + 1), text(from + 9, to)]);
     }
   }
   for (const topic of log.topics.values()) topic.fields = fieldsOf(log, topic);
@@ -89,7 +93,6 @@ const cardOfLog = (log, title, cards) => {
 const vehicleOfLog = (log, title, cards) => {
   const used = [...log.topics.values()].filter((topic) => topic.times.length && topic.fields.length);
   const vehicle = makeVehicle(cardOfLog(log, title, cards), -1);
-  // Records of activations come first in a flight and last longest; they are no part of what is shown.
   const shown = used.filter((topic) => topicsOf(vehicle.card).includes(topic.name));
   const spans = (shown.length ? shown : used).map((topic) => [topic.times[0], topic.times[topic.times.length - 1]]);
   if (!spans.length) throw new Error('this log has no samples');
@@ -107,9 +110,9 @@ const vehicleOfLog = (log, title, cards) => {
     }
     return values;
   };
-  vehicle.seek = (time) => {
+  vehicle.seek = (time, isQuick = false) => {
     vehicle.clock = time;
-    for (const topic of shown) {
+    for (const topic of isQuick || !topicsAreShown() ? shown : used) {
       const entry = vehicle.topics.get(topic.name);
       let low = 0, high = topic.times.length;
       while (low < high) {
@@ -125,7 +128,7 @@ const vehicleOfLog = (log, title, cards) => {
   };
   const step = Math.max(0.02, (vehicle.end - vehicle.start) / 20000);
   for (let time = vehicle.start; time <= vehicle.end; time += step) {
-    vehicle.seek(time);
+    vehicle.seek(time, true);
     keepFrame(vehicle, Infinity);
   }
   vehicle.seek(vehicle.start);

@@ -107,7 +107,8 @@ const plotsOf = (vehicle) => {
       const attitude = field(vehicle, main.topic, 'attitude');
       return attitude ? rollPitchYaw(attitude)[index] * DEGREES : NaN;
     };
-    const angles = ['roll', 'pitch', 'yaw'].map((name, index) => ({ name, role: index, get: angle(index) }));
+    // Not yaw: its turns would leave nothing to see of the others.
+    const angles = ['roll', 'pitch'].map((name, index) => ({ name, role: index, get: angle(index) }));
     plots.push({ title: 'Attitude', unit: '°', least: 10, lines: angles });
   }
   const wanted = ['Voltage', 'Motor duty'];
@@ -117,7 +118,7 @@ const plotsOf = (vehicle) => {
       const get = column(vehicle, panel.topic, name);
       return { name: title, role, get: () => get() * panel.factor };
     });
-    plots.push({ title: panel.title, unit: panel.unit, least: panel.title === 'Voltage' ? 0.2 : 0, lines });
+    plots.push({ title: panel.title, unit: panel.unit, least: { V: 0.2, '%': 10 }[panel.unit] ?? 0, lines });
   }
   plots.forEach((plot, index) => plot.lines.forEach((line) => { line.key = `${index}.${line.name}`; }));
   return plots;
@@ -136,7 +137,6 @@ const keepFrame = (vehicle, limit = KEPT) => {
   const { times } = vehicle;
   const last = times[times.length - 1];
   if (vehicle.clock === last) return;
-  if (vehicle.clock < last) forget(vehicle);
   times.push(vehicle.clock);
   for (const kept of vehicle.columns.values()) kept.values.push(kept.get());
   if (times.length > limit * 1.2) {
@@ -149,6 +149,7 @@ const keepFrame = (vehicle, limit = KEPT) => {
 /** The clock went back: another flight has begun. */
 const forget = (vehicle) => {
   vehicle.times.length = 0;
+  for (const topic of vehicle.list) topic.values = null;
   for (const kept of vehicle.columns.values()) kept.values.length = 0;
 };
 

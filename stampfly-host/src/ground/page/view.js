@@ -1,8 +1,15 @@
 // All vehicles in space with their trails, above a grid; a click on the ground asks the chosen one to go there.
 
 const canvas = element('space');
-const HOME = { turn: -2.25, tilt: 0.5, distance: 3.4 };
-const camera = { ...HOME, target: [0, 0, -0.25] };
+/** A camera that sees where all vehicles begin. */
+const home = () => {
+  const places = scene().map((vehicle) => vehicle.card.place);
+  const low = [0, 1].map((axis) => Math.min(0, ...places.map((place) => place[axis])));
+  const high = [0, 1].map((axis) => Math.max(0, ...places.map((place) => place[axis])));
+  const wide = Math.hypot(high[0] - low[0], high[1] - low[1]);
+  return { turn: -2.25, tilt: 0.5, distance: 3.4 + wide * 0.9, target: [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, -0.25] };
+};
+const camera = { turn: -2.25, tilt: 0.5, distance: 3.4, target: [0, 0, -0.25] };
 const view = { follow: false };
 const TRAIL = 60; // Seconds of the past that are drawn.
 
@@ -10,10 +17,10 @@ const colorOf = (vehicle) => (vehicle.isLog || scene().length === 1 ? '--estimat
 const shifted = ([n, e, d], vehicle) => [n + vehicle.card.place[0], e + vehicle.card.place[1], d];
 
 const drawGround = (context, project) => {
-  const step = tickStep(camera.distance * 2, 10);
-  const reach = step * 12;
+  const step = tickStep(camera.distance * 1.2, 10);
+  const reach = step * 16;
   const center = [0, 1].map((axis) => Math.round(camera.target[axis] / step) * step);
-  for (let k = -12; k <= 12; k++) {
+  for (let k = -16; k <= 16; k++) {
     for (const axis of [0, 1]) {
       const a = [0, 0, 0], b = [0, 0, 0];
       a[axis] = b[axis] = center[axis] + k * step;
@@ -51,9 +58,13 @@ const drawTrail = (context, project, vehicle, name, time) => {
   const to = framesUntil(vehicle, time), from = framesUntil(vehicle, time - TRAIL);
   const stride = Math.max(1, Math.floor((to - from) / 800));
   const points = [];
+  let before = null;
   // Counted from the beginning, so that a trail does not tremble while it grows.
   for (let index = from - (from % stride); index < to; index += stride) {
     const point = columns.map((values) => values[index]);
+    // An estimate that begins anew is no way that was flown.
+    if (before && Math.hypot(...point.map((value, axis) => value - before[axis])) > 0.3 * stride) points.push(null);
+    before = point;
     points.push(point.every(Number.isFinite) ? project(shifted(point, vehicle)) : null);
   }
   strokePoints(context, points);
@@ -139,7 +150,7 @@ const groundAt = (x, y) => {
   return [camera.target[0] + ahead * ct - right * st, camera.target[1] + ahead * st + right * ct];
 };
 
-const resetCamera = () => Object.assign(camera, HOME, { target: [0, 0, -0.25] });
+const resetCamera = () => Object.assign(camera, home());
 turnWithPointer(canvas, camera, {
   farthest: 60, lowest: 0.06, reset: resetCamera, changed: () => {},
   clicked: (event) => {
