@@ -65,6 +65,12 @@ impl<R: Schedule, S: Sink> Recorder<R, S> {
         self.log.lost()
     }
 
+    /// Where it goes.
+    #[must_use]
+    pub const fn sink(&self) -> &S {
+        self.log.sink()
+    }
+
     /// Ends the log. It is complete at every moment; nothing is written here.
     #[must_use]
     pub fn into_sink(self) -> S {

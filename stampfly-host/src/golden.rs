@@ -7,11 +7,11 @@
 //! when it plays the record.
 
 use crate::flown::fly;
-pub use crate::inputs::{Event, Inputs};
 use crate::recorder::Recorder;
 use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_flight::Observer;
 use stampfly_flight::golden::{GoldenError, PlayObserver, Report, Writer, play, tables};
+pub use stampfly_sim::inputs::{Event, Inputs};
 use stampfly_sim::vehicle::{Golden, Vehicle, Verdict};
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;

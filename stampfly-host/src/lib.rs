@@ -4,7 +4,6 @@
 //! |---|---|
 //! | [`vehicles`] | the list of vehicles: the only place that names one |
 //! | [`flown`] | one simulated flight, with its figures |
-//! | [`recorder`] | the log of a flight |
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
@@ -23,12 +22,12 @@ pub mod flown;
 pub mod golden;
 pub mod ground;
 pub mod hil;
-mod inputs;
 pub mod log;
 mod page;
-pub mod recorder;
 pub mod report;
 pub mod serve;
 pub mod vehicles;
 
 pub use report::Report;
+/// The log of a flight.
+pub use stampfly_sim::recorder;

@@ -10,6 +10,7 @@
 //! * [`fault`]: what goes wrong in a flight, when, and for how long;
 //! * [`ask`]: what a ground station asks of a vehicle that flies in real time;
 //! * [`vehicle`]: a whole vehicle with its flight stack, on virtual time;
+//! * [`recorder`], [`inputs`]: the log of a simulated flight, and what a vehicle was given in it;
 //! * [`Simulation`]: all of it from one [`SimulationConfig`].
 //!
 //! Everything is a value: no global, no thread, and no wall clock but in [`vehicle::Live`]. A process can hold as many vehicles as memory allows,
@@ -22,9 +23,11 @@
 pub mod ask;
 pub mod chips;
 pub mod fault;
+pub mod inputs;
 mod noise;
 mod normals;
 pub mod plant;
+pub mod recorder;
 pub mod sensors;
 mod simulation;
 pub mod time;

@@ -81,9 +81,7 @@ impl Vehicle for StampFly {
             if options.mission.is_some() || options.pilot.is_some() {
                 return Err("other programs fly it: it has neither a mission nor a pilot".into());
             }
-            setup.mission = Mission { steps: Vec::new() };
-            setup.limit = live.limit;
-            setup.live = Some(live.clone());
+            setup = setup.flown_by(live.clone());
         }
         if let Some(vibration) = options.vibration {
             setup.simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;

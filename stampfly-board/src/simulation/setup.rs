@@ -54,4 +54,10 @@ impl Setup {
             simulation,
         }
     }
+
+    /// The same, flown by other programs instead of a mission.
+    #[must_use]
+    pub fn flown_by(self, live: Live) -> Self {
+        Self { mission: Mission { steps: Vec::new() }, limit: live.limit, live: Some(live), ..self }
+    }
 }

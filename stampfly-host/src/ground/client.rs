@@ -4,10 +4,10 @@
 //! left out and counted until it does, and asks are still heard. Answers and events are not left out: a client that takes
 //! nothing for too long is cut off.
 
-use super::ask::{AskError, Asked, Incoming, Reply};
-use super::feed::Feed;
-use super::hub::{Connection, Hub};
 use super::limits::Limits;
+use stampfly_ground::Feed;
+use stampfly_ground::ask::{AskError, Asked, Incoming, Reply};
+use stampfly_ground::{Connection, Hub};
 use std::io::{self, ErrorKind};
 use std::net::TcpStream;
 use std::sync::Arc;
@@ -35,8 +35,8 @@ struct Page {
 /// Serves a client whose handshake has been answered; `rest` are the bytes that came behind it.
 pub(super) fn serve(hub: Arc<Hub>, stream: TcpStream, rest: Vec<u8>, limits: &Limits, is_over: &dyn Fn() -> bool) {
     let config = WebSocketConfig::default()
-        .max_message_size(Some(2 * super::ask::LONGEST))
-        .max_frame_size(Some(2 * super::ask::LONGEST))
+        .max_message_size(Some(2 * stampfly_ground::ask::LONGEST))
+        .max_frame_size(Some(2 * stampfly_ground::ask::LONGEST))
         .read_buffer_size(16 << 10)
         .write_buffer_size(0)
         .max_write_buffer_size(WAITING);

@@ -5,9 +5,9 @@
 
 use super::client;
 use super::http::{self, Hosts, Refusal, Request, Wanted};
-use super::hub::Hub;
 use super::limits::Limits;
 use super::page;
+use stampfly_ground::Hub;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;

@@ -1,12 +1,12 @@
 //! Records a flight on a PC: the hash always, the log, wall times and inputs when asked for.
 
 use crate::inputs::{Event, Inputs};
+use crate::vehicle::{Vehicle, Witness};
 use stampfly_bus::{Activation, Schedule};
 use stampfly_flight::key_frame::{self, KeyFrameError};
 use stampfly_flight::{FlightLoop, LogSchema, Observer};
 use stampfly_log::FlightHash;
 use stampfly_log::ulog::{Definitions, ParameterValue, Sink, WriteError};
-use stampfly_sim::vehicle::{Vehicle, Witness};
 use stampfly_types::{Duration, Instant};
 use std::convert::Infallible;
 
@@ -119,6 +119,12 @@ impl<V: Vehicle, S: Sink> Recorder<V, S> {
         let head = head::<V, _>(sink, V::options(setup).start, V::config(setup), facts)?;
         let log = head.data(LogSchema::new(V::BESIDE))?;
         Ok(Self::on(Some(stampfly_flight::Recorder::new(log))))
+    }
+
+    /// The sink with the log so far, during the flight.
+    #[must_use]
+    pub fn so_far(&self) -> Option<&S> {
+        self.log.as_ref().map(stampfly_flight::Recorder::sink).or(self.written.as_ref())
     }
 
     /// The sink with the log, once the flight is over.

@@ -9,33 +9,33 @@
 //! Vehicle, its clock in s, then per topic its place in the card, how many samples it has had, the newest one's instant in s and
 //! its numbers in the order of the card's fields. What is no number is `null`; truth values, names and flags are numbers.
 
-use super::card::TopicCard;
-use super::hub::Hub;
-use super::newest::Newest;
+use crate::card::TopicCard;
+use crate::hub::Hub;
+use crate::newest::Newest;
 use stampfly_types::schema::Value;
 use std::fmt::Write;
 use std::sync::Arc;
 
 /// What a page wants to be told, and what it has been told.
 #[derive(Debug)]
-pub(super) struct Feed {
+pub struct Feed {
     hub: Arc<Hub>,
     topics: Vec<String>,
     /// Of each vehicle: topic and number of its last sample that was told.
     told: Vec<Vec<(usize, u64)>>,
     words: Vec<u32>,
     /// Texts left out because the page did not keep up.
-    pub(super) dropped: u64,
+    pub dropped: u64,
 }
 
 impl Feed {
     /// No topic yet: only clocks.
-    pub(super) fn new(hub: Arc<Hub>) -> Self {
+    pub fn new(hub: Arc<Hub>) -> Self {
         Self { hub, topics: Vec::new(), told: Vec::new(), words: Vec::new(), dropped: 0 }
     }
 
     /// From now on these topics. Names that a vehicle does not have are nothing to it.
-    pub(super) fn subscribe(&mut self, topics: Vec<String>) {
+    pub fn subscribe(&mut self, topics: Vec<String>) {
         self.topics = topics;
         let wanted = |topic: &TopicCard| self.topics.iter().any(|name| name == topic.name);
         let of_vehicle = |topics: &[TopicCard]| {
@@ -45,7 +45,7 @@ impl Feed {
     }
 
     /// What is new.
-    pub(super) fn text(&mut self) -> String {
+    pub fn text(&mut self) -> String {
         let mut text = String::with_capacity(4096);
         text.push_str("{\"state\":[");
         self.told.resize(self.hub.vehicles(), Vec::new());
@@ -91,8 +91,8 @@ fn put(text: &mut String, what: std::fmt::Arguments<'_>) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::card::VehicleCard;
     use super::*;
+    use crate::card::VehicleCard;
     use stampfly_board::simulation::StampFly;
     use stampfly_board::topics::Id;
     use stampfly_sim::vehicle::Vehicle;

@@ -22,7 +22,7 @@ struct Slot {
 
 /// See the module.
 #[derive(Debug)]
-pub(super) struct Newest {
+pub struct Newest {
     slots: Vec<Mutex<Slot>>,
     /// Topics of the bus: those beside it come after them.
     bus: usize,
@@ -32,7 +32,7 @@ pub(super) struct Newest {
 
 impl Newest {
     /// Nothing yet, for topics of so many words, of which so many are on the bus.
-    pub(super) fn new(words: impl Iterator<Item = usize>, bus: usize) -> Self {
+    pub fn new(words: impl Iterator<Item = usize>, bus: usize) -> Self {
         let slots = words.map(|words| Mutex::new(Slot { words: vec![0; words], ..Slot::default() })).collect();
         Self { slots, bus, clock: AtomicU64::new(0) }
     }
@@ -45,12 +45,12 @@ impl Newest {
         slot.words.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
     }
 
-    pub(super) fn clock(&self) -> Instant {
+    pub fn clock(&self) -> Instant {
         Instant::from_micros(self.clock.load(Ordering::Relaxed))
     }
 
     /// The newest sample of a topic, if more than `seen` have come: its instant and number. Its words are put into `words`.
-    pub(super) fn after(&self, topic: usize, seen: u64, words: &mut Vec<u32>) -> Option<(Instant, u64)> {
+    pub fn after(&self, topic: usize, seen: u64, words: &mut Vec<u32>) -> Option<(Instant, u64)> {
         let slot = self.slots.get(topic)?.lock().unwrap_or_else(PoisonError::into_inner);
         if slot.count == seen {
             return None;
@@ -62,7 +62,7 @@ impl Newest {
 
 /// Keeps the newest samples of one vehicle for the pages: a [`Witness`] of its flight, to be paired with a recorder.
 #[derive(Clone, Debug)]
-pub struct Watch(pub(super) Arc<Newest>);
+pub struct Watch(pub Arc<Newest>);
 
 impl Watch {
     /// Takes a sample from elsewhere than a flight, such as a log: the topic's place in the card.

@@ -3,7 +3,7 @@
 //! [`VehicleCard::of`] fills in what every [`Vehicle`] says of itself. What only the flight knows (which asks it carries out,
 //! how a calibration is asked for) its owner adds.
 
-use super::ask::Ask;
+use crate::ask::Ask;
 use serde_json::{Value, json};
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
 use stampfly_sim::fault::FaultKind;
@@ -37,7 +37,7 @@ pub struct VehicleCard {
     /// drawn on top of each other.
     pub place: [f32; 2],
     /// How many of the topics are on the bus.
-    pub(super) on_bus: usize,
+    pub on_bus: usize,
 }
 
 /// One topic, for pages.
@@ -105,7 +105,7 @@ impl VehicleCard {
     ///
     /// ```
     /// use stampfly_board::simulation::StampFly;
-    /// use stampfly_host::ground::VehicleCard;
+    /// use stampfly_ground::VehicleCard;
     /// use stampfly_sim::vehicle::Vehicle;
     ///
     /// let card = VehicleCard::of::<StampFly>("StampFly 1", &StampFly::default_config());
@@ -136,7 +136,7 @@ impl VehicleCard {
         }
     }
 
-    /// The same, carrying out these asks, see [`Ask::name`]; [`ask::NAMES`](super::ask::NAMES) are all of them.
+    /// The same, carrying out these asks, see [`Ask::name`]; [`ask::NAMES`](crate::ask::NAMES) are all of them.
     #[must_use]
     pub fn offering(self, offers: &[&'static str]) -> Self {
         Self { offers: offers.to_vec(), ..self }
@@ -148,7 +148,7 @@ impl VehicleCard {
         self.offers.contains(&ask.name())
     }
 
-    pub(super) fn json(&self, number: usize) -> Value {
+    pub(crate) fn json(&self, number: usize) -> Value {
         json!({
             "number": number, "name": self.name, "kind": self.kind,
             "topics": self.topics.iter().map(TopicCard::json).collect::<Vec<_>>(),
@@ -177,7 +177,7 @@ impl TopicCard {
     }
 
     /// The numbers in these words, in the order of the schema's leaves.
-    pub(super) fn numbers<'w>(&'w self, words: &'w [u32]) -> impl Iterator<Item = stampfly_types::schema::Value> + 'w {
+    pub fn numbers<'w>(&'w self, words: &'w [u32]) -> impl Iterator<Item = stampfly_types::schema::Value> + 'w {
         self.leaves.iter().flat_map(|leaf| (0..leaf.count).filter_map(|element| leaf.value(words, element)))
     }
 
@@ -235,7 +235,7 @@ fn page(page: &Page) -> Value {
 }
 
 /// What the flags of alerts and arming say, in words, by the flag's name.
-pub(super) fn words() -> Value {
+pub fn words() -> Value {
     let words = |meanings: &[(&str, &str)]| {
         let words = meanings.iter().map(|(name, meaning)| ((*name).to_owned(), Value::from(plain(meaning))));
         Value::Object(words.collect())

@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use stampfly_board::simulation::StampFly;
-//! use stampfly_host::ground::{Hub, Reply, VehicleCard, ask::Asked};
+//! use stampfly_ground::{Hub, Reply, VehicleCard, ask::Asked};
 //! use stampfly_sim::vehicle::Vehicle;
 //!
 //! let hub = Hub::new(vec![VehicleCard::of::<StampFly>("StampFly 1", &StampFly::default_config()).offering(&["guided"])]);
@@ -21,9 +21,9 @@
 //! assert!(page.take()[0].contains("on its way"));
 //! ```
 
-use super::ask::{Ask, Asked, Guided, Reply, reply_text};
-use super::card::{self, TopicCard, VehicleCard};
-use super::newest::{Newest, Watch};
+use crate::ask::{Ask, Asked, Guided, Reply, reply_text};
+use crate::card::{self, TopicCard, VehicleCard};
+use crate::newest::{Newest, Watch};
 use serde::Serialize;
 use serde_json::{Value, json};
 use stampfly_types::Instant;
@@ -189,7 +189,8 @@ impl Hub {
         self.answer_to(client, Some(asked.vehicle), asked.id, answer);
     }
 
-    pub(super) fn answer_to(&self, client: Client, vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) {
+    /// Answers what came with this id; without a vehicle, whoever connects the page answers.
+    pub fn answer_to(&self, client: Client, vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) {
         self.send(client, &reply_text(vehicle, id, answer));
     }
 
@@ -288,7 +289,8 @@ impl Hub {
     }
 
     /// The first thing a page is told.
-    pub(super) fn hello(&self) -> String {
+    #[must_use]
+    pub fn hello(&self) -> String {
         let cards = self.vehicles.iter().enumerate().map(|(number, shared)| lock(&shared.card).json(number));
         let cards: Vec<Value> = cards.collect();
         json!({ "hello": { "version": env!("CARGO_PKG_VERSION"), "vehicles": cards, "words": card::words() } })
@@ -296,7 +298,7 @@ impl Hub {
     }
 
     /// Of each vehicle: its newest samples, and what their words mean.
-    pub(super) fn samples(&self) -> impl Iterator<Item = (&Newest, &[TopicCard])> {
+    pub fn samples(&self) -> impl Iterator<Item = (&Newest, &[TopicCard])> {
         self.vehicles.iter().map(|shared| (&*shared.newest, &*shared.topics))
     }
 }
@@ -359,8 +361,8 @@ impl Drop for Connection {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ask::NAMES;
     use super::*;
+    use crate::ask::NAMES;
     use stampfly_board::simulation::StampFly;
     use stampfly_sim::vehicle::Vehicle;
 
