@@ -13,7 +13,7 @@ use stampfly_types::Instant;
 use std::sync::Arc;
 
 /// What a simulated vehicle in a page does not do.
-const NOT_HERE: [&str; 2] = ["param_save", "speed"];
+const NOT_HERE: [&str; 1] = ["param_save"];
 
 /// Flights, and what the page is told of them.
 pub struct Demo {

@@ -34,6 +34,8 @@ pub enum Command {
     Fly(FlyOptions),
     /// Simulate a vehicle in real time for other programs, which fly it over UDP.
     Serve(ServeOptions),
+    /// Write a page that has a vehicle and its world inside: one file, no server (`cargo xtask demo` does all of it).
+    Demo(DemoOptions),
     /// Fly a log again, bit for bit, from what came from outside.
     Replay(ReplayOptions),
     /// Look into a log, cut it, write it in other formats.
@@ -213,6 +215,16 @@ pub struct ServeOptions {
     /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,
+}
+
+/// Options of `demo`.
+#[derive(Clone, Debug, Args)]
+pub struct DemoOptions {
+    /// The flight stack as WebAssembly: `stampfly-board/browser`, built.
+    pub module: PathBuf,
+    /// The file to write.
+    #[arg(long, value_name = "FILE", default_value = "demo.html")]
+    pub out: PathBuf,
 }
 
 /// What to do with a log.

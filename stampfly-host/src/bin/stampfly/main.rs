@@ -7,6 +7,7 @@ macro_rules! outln {
 
 mod arguments;
 mod campaign;
+mod demo;
 mod doctor;
 mod engine;
 mod estimate;
@@ -31,6 +32,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
+        Command::Demo(options) => demo::run(&options),
         Command::Log(command) => log::run(&command),
         Command::Fly(options) => fly::run(&options),
         Command::Serve(options) => serve::run(&options),

@@ -45,7 +45,7 @@ const heard = (text) => {
 };
 
 const connect = () => {
-  const socket = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/ws`);
+  const socket = openSocket();
   link.socket = socket;
   socket.addEventListener('open', () => { link.isOpen = true; tell('link', true); });
   socket.addEventListener('message', (event) => heard(event.data));

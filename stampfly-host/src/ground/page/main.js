@@ -27,7 +27,7 @@ const choose = (number) => {
   element('key-main').style.color = `var(${colorOf(vehicle)})`;
   const download = element('download');
   download.hidden = vehicle.isLog;
-  download.href = `/log/${vehicle.number}`;
+  download.href = logAddress(vehicle.number);
   download.download = `${vehicle.card.name.replaceAll(/\W+/g, '-').toLowerCase()}.ulg`;
 };
 
