@@ -79,6 +79,8 @@ const STEPS: &[Step] = &[
     Step::new("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run).beside(),
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("ground", "Fly from the ground station's page in a real browser", steps::ground::run).accepting(&[Rest]),
+    Step::new("demo", "Make the page with a vehicle inside, and fly it in a real browser", steps::demo::run)
+        .accepting(&[Rest]),
     Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
     Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).alone(),
     Step::new("shards", "Fly a campaign on a HyperQueue server that loses a worker", steps::shards::run),

@@ -8,7 +8,7 @@ use crate::arguments::Arguments;
 use crate::machine::{BROWSER, provide};
 use crate::repository::{Failure, Repository, python_tool, run as run_program};
 
-const PLAYWRIGHT: &str = "playwright==1.65.2";
+pub const PLAYWRIGHT: &str = "playwright==1.65.2";
 const SCRIPT: &str = "xtask/ground/page.py";
 /// Any free port for the page; nobody else is to be found here.
 const PORTS: [&str; 8] = [

@@ -12,6 +12,7 @@ pub mod clippy;
 pub mod constants;
 pub mod cortex_m4f;
 pub mod coverage;
+pub mod demo;
 pub mod determinism;
 pub mod doc;
 pub mod docs;
