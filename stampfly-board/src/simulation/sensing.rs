@@ -38,14 +38,13 @@ pub static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(stand_in_image);
 /// How the sensors do, in the order in which they were started.
 pub type Healths = [SensorHealth; 8];
 
+/// What each sensor measures: the topics' names without `sensor_`. There is no model of the one that looks ahead.
+pub const NAMES: [&str; 7] = ["imu", "tof", "tof_front", "flow", "mag", "baro", "power"];
+
 impl Sensing {
     /// What each sensor measures, in the order in which they are started: the topics' names without `sensor_`.
-    #[must_use]
-    pub const fn names(self) -> &'static [&'static str] {
-        match self {
-            Self::Models => &["imu", "tof", "flow", "mag", "baro", "power"],
-            Self::Chips => &["imu", "tof", "tof_front", "flow", "mag", "baro", "power"],
-        }
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        NAMES.into_iter().filter(move |name| self == Self::Chips || *name != "tof_front")
     }
 }
 

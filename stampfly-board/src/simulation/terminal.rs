@@ -71,7 +71,7 @@ impl Terminal {
 
     fn obey(&mut self, now: Instant, line: &str, desk: &Desk<'_>, config: &mut VehicleConfig) -> Request<Command> {
         let errors: Vec<_> = desk.health.iter().map(|health| health.last_error()).collect();
-        let each = desk.sensing.names().iter().zip(desk.health).zip(&errors);
+        let each = desk.sensing.names().zip(desk.health).zip(&errors);
         let sensors: Vec<_> = each
             .map(|((name, health), error)| SensorLine {
                 name,

@@ -2,7 +2,7 @@
 //!
 //! From the protocol's description, [Packet Serialization](https://mavlink.io/en/guide/serialization.html).
 
-use super::signing::Signature;
+use super::signature::Signature;
 use crate::heard::Heard;
 use core::marker::PhantomData;
 use mavlink::error::ParserError;

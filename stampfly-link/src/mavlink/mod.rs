@@ -14,9 +14,11 @@
 //! Frames without a signature authenticate nobody. Speak MAVLink without one only where nobody else can: on a cable, on one machine.
 
 mod frame;
+mod signature;
 pub mod signing;
 mod writer;
 
 pub use frame::{LONGEST, MavlinkDecoder, MavlinkFrame};
 pub use mavlink::{MavHeader, MavlinkVersion, Message, dialects, error::ParserError};
+pub use signature::Signature;
 pub use writer::MavlinkWriter;

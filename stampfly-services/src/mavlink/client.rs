@@ -1,10 +1,14 @@
 //! One client: what it was heard to send, what it wants and how often.
 
-use super::Put;
+use super::identity::{AUTOPILOT, Identity};
 use super::streams::STREAMS;
+use crate::view::View;
 use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use stampfly_types::{Duration, Instant};
+
+/// Where frames go.
+pub(super) type Put<'p, C> = &'p mut dyn FnMut(&C, &[u8]);
 
 /// When a stream's next message is due.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +43,7 @@ impl<C> Client<C> {
             heard: now,
             stays,
             decoder: MavlinkDecoder::new(),
-            writer: MavlinkWriter::new(system, super::AUTOPILOT),
+            writer: MavlinkWriter::new(system, AUTOPILOT),
             due,
             next_parameter: None,
             target: None,
@@ -58,6 +62,20 @@ impl<C> Client<C> {
         let mut buffer = [0; LONGEST];
         if let Some(frame) = self.writer.write(MavlinkVersion::V2, message, &mut buffer) {
             put(&self.id, frame);
+        }
+    }
+
+    /// Sends what is due.
+    pub fn send_due(&mut self, now: Instant, identity: &Identity, view: &View<'_>, put: Put<'_, C>) {
+        for (index, stream) in STREAMS.iter().enumerate() {
+            let Some(due) = self.due.get_mut(index) else { continue };
+            let Some(period) = due.every.filter(|_| now >= due.next) else { continue };
+            // From the plan, so that late calls do not add up; but never two at once.
+            let planned = due.next + period;
+            due.next = if planned > now { planned } else { now + period };
+            if let Some(message) = (stream.make)(now, identity, view) {
+                self.send(&message, put);
+            }
         }
     }
 }

@@ -4,9 +4,9 @@
 //! denied at once, with the reasons as texts. What a program may ask for while another one commands is the
 //! [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
 
-use super::client::Client;
+use super::client::{Client, Put};
+use super::identity::Identity;
 use super::streams::{STREAMS, make, text};
-use super::{Identity, Put};
 use crate::cockpit::{Cockpit, Refusal, Request, Seat};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};

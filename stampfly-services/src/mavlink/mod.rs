@@ -2,6 +2,7 @@
 //!
 //! | file | what it does |
 //! |---|---|
+//! | `identity.rs` | what a vehicle is, and which messages are for it |
 //! | `client.rs` | one client: what it was heard to send, what it wants and how often |
 //! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`] |
 //! | `commands.rs` | commands, and what becomes of each |
@@ -16,15 +17,18 @@
 
 mod client;
 mod commands;
+mod identity;
 mod parameters;
 mod streams;
 
 use crate::cockpit::{Cockpit, Seat};
-use client::Client;
+use client::{Client, Put};
 use heapless::Vec;
+pub use identity::Identity;
+use identity::{AUTOPILOT, is_ours};
 pub use parameters::short_name;
 use stampfly_link::mavlink::dialects::common::{
-    MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult, MavType, TIMESYNC_DATA,
+    MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult, TIMESYNC_DATA,
 };
 use stampfly_types::messages::{FlightMode, PilotInput};
 use stampfly_types::{Duration, Instant};
@@ -33,21 +37,6 @@ use stampfly_types::{Duration, Instant};
 pub const CLIENTS: usize = 8;
 /// A client of datagrams that was not heard for this long is forgotten, unless the vehicle was told to send to it.
 const FORGOTTEN: Duration = Duration::from_secs(30);
-/// An autopilot, in MAVLink's numbering.
-const AUTOPILOT: u8 = 1;
-
-/// What a vehicle is in MAVLink.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Identity {
-    /// Its system number, from 1.
-    pub system: u8,
-    /// What kind of vehicle: a ground station decides by it what it shows.
-    pub kind: MavType,
-    /// Height that a take-off without one climbs to, m.
-    pub take_off_height: f32,
-    /// What a number without a name is worth in a version: major, minor, patch.
-    pub version: [u8; 3],
-}
 
 /// The vehicle's end of MAVLink. `C` tells its clients apart: an address, a number.
 ///
@@ -60,9 +49,6 @@ pub struct Mavlink<C> {
     notices: streams::Notices,
     refused: u32,
 }
-
-/// Where frames go.
-type Put<'p, C> = &'p mut dyn FnMut(&C, &[u8]);
 
 impl<C: Copy + PartialEq> Mavlink<C> {
     /// A vehicle with this identity.
@@ -111,15 +97,10 @@ impl<C: Copy + PartialEq> Mavlink<C> {
             for notice in &notices {
                 client.send(notice, put);
             }
-            streams::send_due(now, &self.identity, client, &cockpit.view(), put);
+            client.send_due(now, &self.identity, &cockpit.view(), put);
             parameters::send_next(client, cockpit.parameters(), put);
         }
     }
-}
-
-/// Is it for this vehicle? Zero is everybody.
-const fn is_ours(identity: &Identity, system: u8, component: u8) -> bool {
-    (system == 0 || system == identity.system) && matches!(component, 0 | AUTOPILOT)
 }
 
 /// Answers one message of a client's system.

@@ -3,8 +3,7 @@
 //! MAVLink's names have at most 16 characters; a longer one is [shortened](short_name). A parameter that is set answers with the
 //! value that it has then, which is how a client learns that it was refused.
 
-use super::Put;
-use super::client::Client;
+use super::client::{Client, Put};
 use super::streams::text;
 use crate::cockpit::Cockpit;
 use core::fmt::Write;

@@ -1,7 +1,6 @@
 //! What is sent by itself: the messages that are made of a view, and how often.
 
-use super::client::Client;
-use super::{Identity, Put};
+use super::identity::Identity;
 use crate::view::View;
 use heapless::Vec;
 use stampfly_link::mavlink::dialects::common::*;
@@ -16,7 +15,7 @@ pub(super) struct Stream {
     /// Between two, unless the client wants another time; `None` for only when asked for.
     pub every: Option<Duration>,
     /// The message, if there is anything to say.
-    make: fn(Instant, &Identity, &View<'_>) -> Option<MavMessage>,
+    pub make: fn(Instant, &Identity, &View<'_>) -> Option<MavMessage>,
 }
 
 const fn every(id: u32, period_ms: u64, make: fn(Instant, &Identity, &View<'_>) -> Option<MavMessage>) -> Stream {
@@ -43,20 +42,6 @@ pub(super) const STREAMS: [Stream; 13] = [
     every(245, 500, extended_state),
     asked(141, altitude),
 ];
-
-/// Sends a client what is due.
-pub(super) fn send_due<C>(now: Instant, identity: &Identity, client: &mut Client<C>, view: &View<'_>, put: Put<'_, C>) {
-    for (index, stream) in STREAMS.iter().enumerate() {
-        let Some(due) = client.due.get_mut(index) else { continue };
-        let Some(period) = due.every.filter(|_| now >= due.next) else { continue };
-        // From the plan, so that late calls do not add up; but never two at once.
-        let planned = due.next + period;
-        due.next = if planned > now { planned } else { now + period };
-        if let Some(message) = (stream.make)(now, identity, view) {
-            client.send(&message, put);
-        }
-    }
-}
 
 /// The message with this number, now.
 pub(super) fn make(id: u32, now: Instant, identity: &Identity, view: &View<'_>) -> Option<MavMessage> {

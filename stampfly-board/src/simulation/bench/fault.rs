@@ -78,7 +78,7 @@ pub struct Fault {
 }
 
 /// Chips on the board.
-const CHIPS: &[&str] = crate::simulation::sensing::Sensing::Chips.names();
+const CHIPS: [&str; 7] = crate::simulation::sensing::NAMES;
 /// On SPI, where a chip's start is some hundred transfers, and a bad joint has to let them pass now and then.
 const ON_SPI: [&str; 2] = [CHIPS[0], CHIPS[3]];
 /// Share of the transfers that fail.
