@@ -5,7 +5,7 @@
 //! silent, the lease is over: the vehicle's own failsafe does the rest, and another program may take it up again.
 //! What a pilot's sticks do to a program's commands is the mode machine's business (`stampfly-mode`): they win.
 
-use crate::cockpit::{Refusal, Seat};
+use crate::refusal::{Refusal, Seat};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant};
 
@@ -16,6 +16,13 @@ pub const SILENCE: Duration = Duration::from_secs(3);
 pub const LIFE: Duration = Duration::from_millis(100);
 /// Largest number in a command: metres, metres a second, radians, seconds. A vehicle of this kind does not go farther.
 const LARGEST: f32 = 1_000.0;
+
+/// Are all its numbers such that a vehicle can mean something by them?
+pub(crate) fn is_sane(command: &GuidedCommand) -> bool {
+    let GuidedCommand { position, yaw, speed, dwell, .. } = command;
+    let mut numbers = position.iter().chain([yaw, speed, dwell]);
+    numbers.all(|number| number.is_finite() && number.abs() <= LARGEST)
+}
 
 /// Who commands.
 ///
@@ -58,17 +65,15 @@ impl Lease {
     /// # Errors
     /// When another program has it, or a number is none.
     pub fn ask(&mut self, now: Instant, seat: Seat, command: &GuidedCommand) -> Result<(), Refusal> {
-        let GuidedCommand { kind, position, yaw, speed, dwell } = command;
-        if matches!(kind, GuidedKind::Kill) {
+        if matches!(command.kind, GuidedKind::Kill) {
             return Ok(());
         }
-        let sane = |number: f32| number.is_finite() && number.abs() <= LARGEST;
-        if !position.iter().chain([yaw, speed, dwell]).all(|number| sane(*number)) {
+        if !is_sane(command) {
             return Err(Refusal::Range);
         }
         match self.holder(now).filter(|holder| *holder != seat) {
             // Whoever has it goes on commanding, to a vehicle that lands.
-            Some(_) if matches!(kind, GuidedKind::Land | GuidedKind::Disarm) => Ok(()),
+            Some(_) if matches!(command.kind, GuidedKind::Land | GuidedKind::Disarm) => Ok(()),
             Some(holder) => Err(Refusal::Occupied(holder)),
             None => {
                 (self.holder, self.heard) = (Some(seat), Some(now));

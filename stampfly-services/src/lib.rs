@@ -23,13 +23,15 @@ pub mod data_stream;
 pub mod lease;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
+mod refusal;
 pub mod telemetry;
 pub mod tello;
 pub mod view;
 
-pub use cockpit::{Cockpit, Refusal, Request, Seat};
+pub use cockpit::{Cockpit, Request};
 pub use data_stream::DataStream;
 pub use lease::Lease;
+pub use refusal::{Refusal, Seat};
 pub use telemetry::Telemetry;
 pub use tello::Tello;
 pub use view::{Places, Samples, View};

@@ -7,7 +7,8 @@
 use super::client::{Client, Put};
 use super::identity::Identity;
 use super::streams::{STREAMS, make, text};
-use crate::cockpit::{Cockpit, Refusal, Request, Seat};
+use crate::cockpit::{Cockpit, Request};
+use crate::refusal::{Refusal, Seat};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant, Vec3, frame};

@@ -21,7 +21,8 @@ mod identity;
 mod parameters;
 mod streams;
 
-use crate::cockpit::{Cockpit, Seat};
+use crate::cockpit::Cockpit;
+use crate::refusal::Seat;
 use client::{Client, Put};
 use heapless::Vec;
 pub use identity::Identity;

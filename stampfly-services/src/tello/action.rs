@@ -1,6 +1,7 @@
 //! What takes its time: taking off, landing, moving, turning, turning over.
 
-use crate::cockpit::{Cockpit, Refusal, Seat};
+use crate::cockpit::Cockpit;
+use crate::refusal::{Refusal, Seat};
 use crate::view::View;
 use stampfly_link::tello::{TelloAxis, TelloCommand, TelloDirection};
 use stampfly_types::messages::{FlightPhase, FlipDirection, GuidedCommand, GuidedKind, SetpointAxes};

@@ -14,7 +14,8 @@
 mod action;
 mod answers;
 
-use crate::cockpit::{Cockpit, Seat};
+use crate::cockpit::Cockpit;
+use crate::refusal::Seat;
 use action::{Action, Outcome};
 use stampfly_link::tello::{TelloCommand, TelloReply, TelloState};
 use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
