@@ -76,6 +76,9 @@ const STEPS: &[Step] = &[
     Step::new("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run).beside(),
     Step::new("msrv-build", "Build the libraries with the oldest Rust they promise", steps::msrv::build).manual(),
     Step::new("semver", "Compare each library's interface with the last release's", steps::semver::run).beside(),
+    Step::new("soak", "Watch ten vehicles for half an hour, or for SECONDS", steps::soak::run)
+        .manual()
+        .accepting(&[Rest]),
     Step::new("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run).beside(),
     Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
     Step::new("ground", "Fly from the ground station's page in a real browser", steps::ground::run).accepting(&[Rest]),

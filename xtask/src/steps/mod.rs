@@ -45,6 +45,7 @@ pub mod qemu;
 pub mod s3_memory;
 pub mod semver;
 pub mod shards;
+pub mod soak;
 pub mod test;
 pub mod ulog;
 pub mod vectors;

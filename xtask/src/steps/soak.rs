@@ -1,0 +1,25 @@
+//! `soak`: ten vehicles in one world at real time, watched for half an hour, or for so many seconds: `-- 300`.
+//!
+//! No state may be missing at twenty texts a second, every vehicle has to keep up with the wall's time, and memory must not grow
+//! (`xtask/ground/soak.py`). Not in `ci`, because it takes its time and wants the machine for itself.
+
+use crate::arguments::Arguments;
+use crate::repository::{Failure, Repository, python_tool, run as run_program};
+
+const WEBSOCKETS: &str = "websockets==17.4";
+const SCRIPT: &str = "xtask/ground/soak.py";
+const SECONDS: &str = "1800";
+/// Only the page is watched.
+const OFF: [&str; 7] = ["mavlink-udp", "mavlink-tcp", "tello", "tello-state", "telemetry", "stream", "console"];
+
+pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
+    let mut script = python_tool(repository, WEBSOCKETS, "python3")?;
+    script.arg("-B").arg(repository.root.join(SCRIPT));
+    script.arg(arguments.rest.first().map_or(SECONDS, String::as_str));
+    script.arg(repository.target("release/stampfly")).args(["serve", "--count", "10", "--port", "http=0"]);
+    for port in OFF {
+        script.args(["--port", &format!("{port}=off")]);
+    }
+    run_program(script.arg("--out").arg(repository.target("soak")))
+}
