@@ -2,7 +2,7 @@
 //!
 //! A vehicle implements [`Cockpit`] on a struct that borrows what is needed: where the newest samples are kept, the
 //! publishers of its commands, its parameters. Whether a command is obeyed is the mode machine's decision, and seen in the
-//! [`view`](Cockpit::view); a [`Refusal`](crate::Refusal) says that it did not even get there.
+//! [`view`](Cockpit::view); a [`Refusal`] says that it did not even get there.
 
 use crate::lease::is_sane;
 use crate::refusal::{Refusal, Seat};
@@ -26,6 +26,8 @@ pub enum Request {
     },
     /// Stop a motor test.
     StopMotor,
+    /// Restart, with the parameters that were kept.
+    Restart,
 }
 
 /// A vehicle, as services see it.

@@ -12,9 +12,6 @@ use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
 use stampfly_types::Instant;
 use std::sync::Arc;
 
-/// What a simulated vehicle in a page does not do.
-const NOT_HERE: [&str; 1] = ["param_save"];
-
 /// Flights, and what the page is told of them.
 pub struct Demo {
     seed: u64,
@@ -42,11 +39,10 @@ impl Demo {
     fn with(seed: u64, parameters: Vec<Vec<(String, f32)>>, again: Vec<(Instant, Vec<u8>)>) -> Self {
         let setups: Vec<_> = parameters.iter().map(|changed| setup(seed, changed)).collect();
         let names = ["StampFly", "as it flew before"];
-        let offers: Vec<_> = NAMES.iter().copied().filter(|name| !NOT_HERE.contains(name)).collect();
         let cards = setups
             .iter()
             .zip(names)
-            .map(|(setup, name)| VehicleCard::of::<StampFly>(name, StampFly::config(setup)).offering(&offers));
+            .map(|(setup, name)| VehicleCard::of::<StampFly>(name, StampFly::config(setup)).offering(NAMES));
         let hub = Hub::new(cards.collect());
         let (page, feed) = (hub.connect(), Feed::new(hub.clone()));
         let flights = setups
@@ -116,9 +112,14 @@ impl Demo {
             });
             self.asked.push((at, text));
         }
-        self.flights.iter_mut().for_each(|flight| flight.go_on(until));
-        for flight in &self.flights {
+        for (number, flight) in self.flights.iter_mut().enumerate() {
+            flight.go_on(until);
             flight.answers().iter().for_each(|(client, text)| self.hub.send(Client::of(*client), text));
+            if let (Some(setup), Some(watch)) = (flight.again(), self.hub.witness(number)) {
+                *flight = Flight::new(&setup, number, watch);
+                // What was asked before belongs to a flight that is over.
+                self.asked.clear();
+            }
         }
     }
 

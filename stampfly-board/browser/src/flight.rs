@@ -51,7 +51,11 @@ impl Ports for PagePort {
 
 /// One vehicle. Its bus and its world live until the page is closed: a flight borrows them.
 pub struct Flight {
-    flying: Flying<'static, Runnables, Surroundings>,
+    /// `None` once it is over.
+    flying: Option<Flying<'static, Runnables, Surroundings>>,
+    now: Instant,
+    setup: Setup,
+    again: Option<Setup>,
     witnesses: (Recorder<StampFly>, Watch),
     port: Arc<PagePort>,
 }
@@ -68,7 +72,8 @@ impl Flight {
         let (bus, around) = (Box::leak(Box::new(Bus::new())), Box::leak(Box::new(Surroundings::new(&setup))));
         let options = StampFly::options(&setup);
         let flying = Flying::begin(bus, &setup.vehicle, &options, around, &mut witnesses);
-        Self { flying, witnesses, port }
+        let now = flying.now();
+        Self { flying: Some(flying), now, setup, again: None, witnesses, port }
     }
 
     /// Gives it what a page has asked.
@@ -77,14 +82,25 @@ impl Flight {
         self.port.mail.lock().unwrap_or_else(PoisonError::into_inner).asks.push_back((address, text));
     }
 
-    /// Flies up to then.
+    /// Flies up to then, or until somebody asks for a restart.
     pub fn go_on(&mut self, until: Instant) {
-        self.flying.go_on(until, &mut self.witnesses);
+        let Some(flying) = &mut self.flying else { return };
+        let goes_on = flying.go_on(until, &mut self.witnesses);
+        self.now = flying.now();
+        if !goes_on && let Some(flying) = self.flying.take() {
+            let ended = flying.end(&mut self.witnesses);
+            self.again = StampFly::again(&self.setup, &ended.outcome);
+        }
+    }
+
+    /// The flight after this one, when it was ended by a restart.
+    pub fn again(&mut self) -> Option<Setup> {
+        self.again.take()
     }
 
     /// What its clock shows.
     pub fn now(&self) -> Instant {
-        self.flying.now()
+        self.now
     }
 
     /// What it has answered, and to whom.

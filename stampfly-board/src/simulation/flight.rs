@@ -245,7 +245,7 @@ impl vehicle::Around for Around<'_> {
 
     fn is_over(&mut self, now: Instant) -> bool {
         if let Some(live) = self.live {
-            return live.ports.are_closed();
+            return live.ports.are_closed() || self.seen.restarts.get();
         }
         if self.judge.is_over(now) {
             return true;
@@ -263,10 +263,12 @@ impl vehicle::Around for Around<'_> {
             metrics: watch.collector.finish(),
             phases: watch.phases,
             tuned: watch.tuned,
-            finished: self.progress.finished.get() || self.live.is_some(),
+            finished: self.progress.finished.get(),
+            live: self.live.is_some(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),
             judgement: self.judge.finish(),
+            restart: self.seen.restarts.get().then(|| self.seen.kept.borrow().clone()),
         }
     }
 }

@@ -113,6 +113,11 @@ impl Vehicle for StampFly {
         Ok(setup)
     }
 
+    fn again(setup: &Setup, outcome: &Outcome) -> Option<Setup> {
+        let kept = outcome.restart.as_ref()?;
+        Some(Setup { vehicle: kept.as_ref().unwrap_or(&setup.vehicle).clone(), ..setup.clone() })
+    }
+
     fn options(setup: &Setup) -> FlightOptions {
         FlightOptions { start: setup.simulation.start, limit: setup.limit, jitter: setup.jitter }
     }

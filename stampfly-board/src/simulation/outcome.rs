@@ -2,6 +2,7 @@
 
 use super::judge::Judgement;
 use super::metrics::{FIGURES, Metrics};
+use crate::VehicleConfig;
 use serde::Serialize;
 use stampfly_control::autotune::AutotuneStatus;
 use stampfly_sim::vehicle::{Figure, Verdict};
@@ -39,6 +40,10 @@ pub struct Outcome {
     pub battery: [f32; 2],
     /// What came of faults, and what never may happen.
     pub judgement: Judgement,
+    /// Other programs flew it: it had nothing to finish.
+    pub live: bool,
+    /// Somebody has asked for a restart, with these parameters if any were kept.
+    pub restart: Option<Option<VehicleConfig>>,
 }
 
 impl Verdict for Outcome {
@@ -47,6 +52,10 @@ impl Verdict for Outcome {
     fn succeeded(&self) -> bool {
         let flown = self.facts().iter().all(|(_, holds)| *holds);
         let Judgement { faults, as_expected, violations, .. } = &self.judgement;
+        if self.live {
+            // Other programs may do what no mission does: only the motors are judged.
+            return flown;
+        }
         violations.is_empty() && if faults.is_empty() { flown } else { *as_expected }
     }
 
@@ -55,11 +64,15 @@ impl Verdict for Outcome {
     }
 
     fn facts(&self) -> Vec<(&'static str, bool)> {
+        let motors_sane = ("motors_sane", !self.judgement.violations.iter().any(|name| ["I1", "I2"].contains(name)));
+        if self.live {
+            return vec![motors_sane];
+        }
         vec![
             ("landed", self.metrics.landed),
             ("disarmed", self.metrics.disarmed),
             ("finished", self.finished),
-            ("motors_sane", !self.judgement.violations.iter().any(|name| ["I1", "I2"].contains(name))),
+            motors_sane,
         ]
     }
 
@@ -96,6 +109,10 @@ impl Verdict for Outcome {
         if !self.judgement.faults.is_empty() {
             let word = if self.succeeded() { "as expected" } else { "NOT ACCEPTABLE" };
             return format!("{}, {word}", self.judgement.outcome);
+        }
+        if self.live {
+            let phase = self.phases.last().map_or(FlightPhase::Init, |change| change.phase);
+            return format!("flown by other programs, ended as {}", phase.name());
         }
         let sentence = match (self.metrics.landed, self.metrics.disarmed) {
             (true, true) => "landed and disarmed",

@@ -42,16 +42,15 @@ impl Terminal {
         _ = write!(self.screen, "{version}, type help\r\n{PROMPT}");
     }
 
-    /// Takes keys as they are sent, and carries out what is asked. Returns what only a board can do.
+    /// Takes keys as they are sent, and carries out what is asked. What only a board can do is `board`'s, which says what comes of it.
     pub fn send(
         &mut self,
         now: Instant,
         keys: &[u8],
         desk: &Desk<'_>,
-        config: &mut VehicleConfig,
-        ends: &mut ConsoleEnds<'_>,
-    ) -> Vec<Request<Command>> {
-        let mut requests = Vec::new();
+        (config, ends): (&mut VehicleConfig, &mut ConsoleEnds<'_>),
+        board: impl Fn(&Request<Command>, &VehicleConfig) -> &'static str,
+    ) {
         for key in keys {
             let Some(line) = self.editor.feed(*key, &mut self.screen).map(String::from) else { continue };
             match self.obey(now, &line, desk, config) {
@@ -62,11 +61,10 @@ impl Terminal {
                         _ = write!(self.screen, "motor {motor} turns for {} s\r\n", console::TEST_TIME.seconds());
                     }
                 }
-                request => requests.push(request),
+                request => _ = write!(self.screen, "{}\r\n", board(&request, config)),
             }
             self.screen.push_str(PROMPT);
         }
-        requests
     }
 
     fn obey(&mut self, now: Instant, line: &str, desk: &Desk<'_>, config: &mut VehicleConfig) -> Request<Command> {

@@ -66,6 +66,11 @@ impl Connections {
         });
     }
 
+    /// Who is connected.
+    pub fn all(&self) -> Vec<Client> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).keys().copied().collect()
+    }
+
     fn has(&self, client: &Client) -> bool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).contains_key(client)
     }

@@ -129,6 +129,16 @@ impl OpenPorts {
         &self.places
     }
 
+    /// The vehicle was restarted, and knows nobody: it is told again who is connected.
+    pub fn reopen(&self) {
+        let targets = self.places.iter().filter(|(spec, _)| spec.transport == Transport::UdpTo);
+        let targets = targets.filter_map(|(spec, address)| {
+            let port = self.specs.iter().position(|other| other.name == spec.name)?;
+            Some(Client { port, address: *address })
+        });
+        targets.chain(self.connections.all()).for_each(|client| self.events.offer(client, Heard::Opened));
+    }
+
     /// Asks for the end of the flight.
     pub fn close(&self) {
         self.events.close();

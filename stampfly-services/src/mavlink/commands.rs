@@ -103,6 +103,7 @@ fn outcome<C>(
         }
         MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => set_interval(now, client, *p1, *p2),
         MavCmd::MAV_CMD_PREFLIGHT_STORAGE if *p1 == 1.0 => result(cockpit.request(now, Request::SaveParameters)),
+        MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN if *p1 == 1.0 => result(cockpit.request(now, Request::Restart)),
         // Type 0 is a throttle in per cent.
         MavCmd::MAV_CMD_DO_MOTOR_TEST if *p2 == 0.0 && (0.0..=100.0).contains(p3) => {
             let motor = whole(*p1).and_then(|motor| u8::try_from(motor).ok()).unwrap_or(0);

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `identity.rs` | what a vehicle is, and which messages are for it |
 //! | `client.rs` | one client: what it was heard to send, what it wants and how often |
-//! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`] |
+//! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`](crate::View) |
 //! | `commands.rs` | commands, and what becomes of each |
 //! | `parameters.rs` | the parameter protocol; names of at most 16 characters |
 //!

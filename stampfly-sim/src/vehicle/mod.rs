@@ -283,6 +283,12 @@ pub trait Vehicle: 'static {
     /// When an option is wrong, or of no use to this vehicle.
     fn setup(options: &Options, seed: u64) -> Result<Self::Setup, SetupError>;
 
+    /// The flight after this one, when somebody has asked the vehicle to restart. Never by default.
+    #[must_use]
+    fn again(_setup: &Self::Setup, _outcome: &Self::Outcome) -> Option<Self::Setup> {
+        None
+    }
+
     /// How the executor flies it.
     fn options(setup: &Self::Setup) -> FlightOptions;
 

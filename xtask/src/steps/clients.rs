@@ -32,19 +32,33 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let program = repository.target("release").join("stampfly");
     for (place, (script, arguments)) in SCRIPTS.iter().enumerate() {
         let out = repository.target("clients").join(place.to_string());
+        _ = std::fs::remove_dir_all(&out);
         let mut vehicle = Vehicle::start(&program, &out)?;
         let said = script_with(repository, &python, script, arguments, &vehicle)?;
         print!("{script}\n{}", indented(&said));
         vehicle.end()?;
-        let (replayed, _) = capture(Command::new(&program).arg("replay").arg(out.join("flight.ulg")))?;
-        if !replayed.contains("identical") {
-            return Err(format!("{script}: the flight does not replay:\n{replayed}"));
+        for log in logs(&out)? {
+            let (replayed, _) = capture(Command::new(&program).arg("replay").arg(log))?;
+            if !replayed.contains("identical") {
+                return Err(format!("{script}: the flight does not replay:\n{replayed}"));
+            }
         }
         if script_with(repository, &python, script, arguments, &vehicle).is_ok() {
             return Err(format!("{script} succeeds without a vehicle"));
         }
     }
     Ok(())
+}
+
+/// One for each time the vehicle was switched on.
+fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let files = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let logs: Vec<_> = files
+        .flatten()
+        .map(|file| file.path())
+        .filter(|path| path.extension().is_some_and(|kind| kind == "ulg"))
+        .collect();
+    if logs.is_empty() { Err(format!("no log in {}", folder.display())) } else { Ok(logs) }
 }
 
 fn indented(text: &str) -> String {
@@ -120,12 +134,11 @@ impl Vehicle {
         })
     }
 
-    /// Ends it as Ctrl-C does, and hears whether all was well. One that never took off did not land, which is said by its exit code,
-    /// too: what counts is that it ends by itself.
+    /// Ends it as Ctrl-C does, and hears whether all was well.
     fn end(&mut self) -> Result<(), Failure> {
         run_program(Command::new("kill").args(["-INT", &self.process.id().to_string()]))?;
         let ended = self.process.wait().map_err(|error| error.to_string())?;
-        if matches!(ended.code(), Some(0 | 1)) { Ok(()) } else { Err(format!("stampfly serve: {ended}")) }
+        if ended.success() { Ok(()) } else { Err(format!("stampfly serve: {ended}")) }
     }
 }
 

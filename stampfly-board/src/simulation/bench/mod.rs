@@ -243,10 +243,8 @@ impl Bench<'_> {
             profile: self.profile,
             facts: &facts,
         };
-        let (now, terminal) = (self.clock.now(), &mut self.terminal);
-        for _ in terminal.send(now, keys, &desk, &mut self.config, &mut self.console) {
-            terminal.screen.push_str("not on this bench\r\n");
-        }
+        let ends = (&mut self.config, &mut self.console);
+        self.terminal.send(self.clock.now(), keys, &desk, ends, |_, _| "not on this bench");
     }
 
     /// What the serial port has written since the last call.

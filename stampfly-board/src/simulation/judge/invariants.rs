@@ -3,7 +3,7 @@
 //! | invariant | what is checked at every step |
 //! |---|---|
 //! | `I1` | every duty is a number from 0 to 1 |
-//! | `I2` | not armed: every duty is 0 |
+//! | `I2` | not armed: every duty is 0, but for the motor of a motor test |
 //! | `I3` | the vehicle is armed while nothing blocks arming |
 //! | `I4` | the estimate's numbers are finite, and its quaternion is a rotation within 1e-4 |
 //! | `I5` | phases change as [`transitions`] say |
@@ -14,6 +14,7 @@
 //!
 //! `I12` is the judge's, who knows the faults.
 
+use crate::messages::MotorTest;
 use crate::topics::{COUNT, Id};
 use stampfly_flight::newest::message;
 use stampfly_mode::transitions;
@@ -43,6 +44,8 @@ pub struct Invariants {
     comm_lost_since: Option<Instant>,
     /// Until when the motors must be off, since an alert that demands landing.
     must_be_off: Option<Instant>,
+    /// The motor test that was asked for last.
+    test: Option<MotorTest>,
 }
 
 impl Invariants {
@@ -58,6 +61,7 @@ impl Invariants {
             clearance: 0.0,
             comm_lost_since: None,
             must_be_off: None,
+            test: None,
         }
     }
 
@@ -86,11 +90,14 @@ impl Invariants {
             Id::actuator_motor => {
                 if let Some(output) = message::<MotorOutput>(words) {
                     self.require("I1", output.duty.iter().all(|duty| (0.0..=1.0).contains(duty)));
-                    self.require("I2", self.status.armed || output.duty.iter().all(|duty| *duty == 0.0));
+                    let tested = self.test.filter(|test| at <= test.end()).map(|test| test.motor as usize);
+                    let is_off = |(place, duty): (usize, &f32)| *duty == 0.0 || tested == Some(place + 1);
+                    self.require("I2", self.status.armed || output.duty.iter().enumerate().all(is_off));
                 } else {
                     self.require("I1", false);
                 }
             }
+            Id::motor_test => self.test = message(words),
             Id::estimate_state => {
                 let estimate = message::<StateEstimate>(words);
                 self.require("I4", estimate.is_some_and(|estimate| is_sound(&estimate, words)));

@@ -16,13 +16,14 @@ mod services;
 
 pub(super) use services::Services;
 
+use crate::VehicleConfig;
 use crate::console::Newest;
 use crate::topics::{Id, TOPICS};
 use stampfly_drivers::chip::pmw3901;
 use stampfly_services::{DataStream, Places, Telemetry, View};
 use stampfly_sim::vehicle::{Client, PortSpec, Transport};
 use stampfly_types::{Duration, Instant};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 /// Where programs find it. The places in this table are the constants below.
 pub const PORTS: &[PortSpec] = &[
@@ -55,6 +56,10 @@ pub(super) struct Seen {
     pub newest: RefCell<Newest>,
     pub telemetry: RefCell<Telemetry>,
     pub stream: RefCell<DataStream<Client>>,
+    /// Parameters that were kept for the next start.
+    pub kept: RefCell<Option<VehicleConfig>>,
+    /// Somebody has asked for a restart.
+    pub restarts: Cell<bool>,
 }
 
 impl Default for Seen {
@@ -65,6 +70,8 @@ impl Default for Seen {
             newest: RefCell::new(Newest::new()),
             telemetry: RefCell::new(Telemetry::new(count)),
             stream: RefCell::new(DataStream::new(count)),
+            kept: RefCell::default(),
+            restarts: Cell::new(false),
         }
     }
 }

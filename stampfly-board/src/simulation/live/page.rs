@@ -1,7 +1,7 @@
 //! What the ground station's page asks of a vehicle.
 
 use super::seats::{Controls, Seats};
-use super::services::{NOT_SIMULATED, Services};
+use super::services::{Services, obey};
 use crate::simulation::faults::FAULTS;
 use crate::simulation::terminal::Terminal;
 use stampfly_flight::parameters;
@@ -16,7 +16,7 @@ impl Services<'_> {
     pub(super) fn page(&mut self, now: Instant, ask: &Ask) -> Result<Reply, String> {
         let seen = self.seen;
         let newest = seen.newest.borrow();
-        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest, seen };
         cockpit.alive(now, Seat::Page);
         let said = |result: Result<(), Refusal>| match result {
             Ok(()) => Ok(Reply::text("")),
@@ -50,10 +50,8 @@ impl Services<'_> {
                 let mut terminal = Terminal::new();
                 let Controls { config, console, .. } = &mut self.controls;
                 let keys = std::format!("{line}\r");
-                let requests = terminal.send(now, keys.as_bytes(), &desk, config, console);
-                if !requests.is_empty() {
-                    return Err(NOT_SIMULATED.into());
-                }
+                let board = |request: &_, config: &_| obey(request, seen, config);
+                terminal.send(now, keys.as_bytes(), &desk, (config, console), board);
                 // Without the echo and the prompt.
                 let screen = terminal.screen.strip_prefix(line.as_str()).unwrap_or(&terminal.screen);
                 Ok(Reply::text(screen.trim_end_matches("> ").trim()))
@@ -69,7 +67,7 @@ impl Services<'_> {
                 Ok(Reply::value((*factor).into()))
             }
             Ask::Alive {} => Ok(Reply::default()),
-            Ask::ParamSave {} => Err(NOT_SIMULATED.into()),
+            Ask::ParamSave {} => said(cockpit.request(now, Request::SaveParameters)),
         }
     }
 

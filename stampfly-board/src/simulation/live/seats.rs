@@ -1,5 +1,6 @@
 //! What services see of the simulated StampFly, and what they may ask of it.
 
+use super::Seen;
 use crate::VehicleConfig;
 use crate::console::{Command, Newest, TEST_DUTY};
 use crate::simulation::radio::Radio;
@@ -41,6 +42,7 @@ impl Controls<'_> {
 pub(super) struct Seats<'s, 'b> {
     pub controls: &'s mut Controls<'b>,
     pub newest: &'s Newest,
+    pub seen: &'s Seen,
 }
 
 impl Cockpit for Seats<'_, '_> {
@@ -82,6 +84,14 @@ impl Cockpit for Seats<'_, '_> {
                 Command::TestMotor { motor, duty }
             }
             Request::TestMotor { .. } => return Err(Refusal::Range),
+            Request::SaveParameters => {
+                self.seen.kept.replace(Some(self.controls.config.clone()));
+                return Ok(());
+            }
+            Request::Restart => {
+                self.seen.restarts.set(true);
+                return Ok(());
+            }
             _ => return Err(Refusal::Unsupported),
         };
         command.publish(now, &mut self.controls.console);

@@ -4,11 +4,12 @@ use super::seats::{Controls, Seats};
 use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
 use crate::VehicleConfig;
 use crate::console::Newest;
-use crate::console::Profile;
+use crate::console::{Command, Profile};
 use crate::simulation::radio::Radio;
 use crate::simulation::sensing::{Healths, Sensing};
 use crate::simulation::terminal::{Desk, Terminal};
 use crate::topics::ConsoleEnds;
+use stampfly_flight::console::Request;
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_services::mavlink::{Identity, Mavlink};
 use stampfly_services::tello::Destination;
@@ -83,22 +84,32 @@ impl<'b> Services<'b> {
     }
 
     fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
-        let newest = self.seen.newest.borrow();
-        let desk = Desk {
-            version: VERSION,
-            newest: &newest,
-            sensing: self.sensing,
-            health: self.health,
-            profile: self.profile,
-            facts: &[],
-        };
+        let seen = self.seen;
+        let newest = seen.newest.borrow();
+        let desk = self.desk(&newest);
         let Some((_, terminal)) = self.terminals.iter_mut().find(|(client, _)| *client == from) else { return };
         let Controls { config, console, .. } = &mut self.controls;
-        for _ in terminal.send(now, keys, &desk, config, console) {
-            terminal.screen.push_str(NOT_SIMULATED);
-            terminal.screen.push_str("\r\n");
-        }
+        terminal.send(now, keys, &desk, (config, console), |request, config| obey(request, seen, config));
         put(&from, core::mem::take(&mut terminal.screen).as_bytes());
+    }
+}
+
+/// What a board would do, as far as a simulated one does it. The console hands it out only while the vehicle is disarmed.
+pub(super) fn obey(request: &Request<Command>, seen: &Seen, config: &VehicleConfig) -> &'static str {
+    match request {
+        Request::SaveParameters => {
+            seen.kept.replace(Some(config.clone()));
+            "saved, for the next start"
+        }
+        Request::ResetParameters => {
+            seen.kept.replace(Some(VehicleConfig::default()));
+            "erased; the next start has the vehicle's own"
+        }
+        Request::Reboot => {
+            seen.restarts.set(true);
+            "restarting"
+        }
+        _ => NOT_SIMULATED,
     }
 }
 
@@ -114,7 +125,7 @@ impl Services<'_> {
 impl Link for Services<'_> {
     fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
         let newest = self.seen.newest.borrow();
-        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest, seen: self.seen };
         match (from.port, heard) {
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) => self.mavlink.open(now, from, true),
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => self.mavlink.hear(now, from, bytes, &mut cockpit, put),
@@ -164,7 +175,7 @@ impl Link for Services<'_> {
         if !tick.is_multiple_of(TURN) {
             return;
         }
-        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest };
+        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest, seen: self.seen };
         self.mavlink.poll(now, &mut cockpit, put);
         let tello_state = self.tello_state;
         self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| put(&destination(*to, what, tello_state), bytes));

@@ -61,17 +61,18 @@ impl ForVehicle for Serve<'_> {
         let flights: Vec<_> = ports
             .iter()
             .enumerate()
-            .map(|(number, ports)| Flight::<V>::prepare(options, number, ports, &hub))
+            .map(|(number, ports)| Flight::<V>::first(options, number, ports, &hub))
             .collect::<Result<_, _>>()?;
         let ended: Vec<_> = thread::scope(|scope| {
-            let threads: Vec<_> = flights.into_iter().map(|flight| scope.spawn(move || flight.fly())).collect();
+            let threads: Vec<_> = flights.into_iter().map(|flight| scope.spawn(move || flight.fly_all())).collect();
             threads.into_iter().map(thread::ScopedJoinHandle::join).collect()
         });
         let mut all_well = true;
         for ended in ended {
-            let (flown, hash, log) = ended.map_err(|_| "a vehicle's thread has failed")?;
-            all_well &= flown.outcome.succeeded();
-            report::<V>(options, &flown, hash, &log)?;
+            for (flown, hash, log) in ended.map_err(|_| "a vehicle's thread has failed")?? {
+                all_well &= flown.outcome.succeeded();
+                report::<V>(options, &flown, hash, &log)?;
+            }
         }
         Ok(if all_well { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
@@ -80,11 +81,10 @@ impl ForVehicle for Serve<'_> {
 /// What a page is told of every vehicle, and what it shares with their flights.
 fn hub<V: Vehicle>(options: &ServeOptions) -> Result<Arc<Hub>, Failure> {
     let mut cards = Vec::new();
-    let offers: Vec<_> = ask::NAMES.iter().copied().filter(|name| *name != "param_save").collect();
     for number in 0..options.count {
         let setup = options.scene.setup::<V>(options.seed + u64::from(number), None, None)?;
         let name = format!("{} {}", V::NAME, number + 1);
-        let mut card = VehicleCard::of::<V>(&name, V::config(&setup)).offering(&offers);
+        let mut card = VehicleCard::of::<V>(&name, V::config(&setup)).offering(ask::NAMES);
         let [column, row] = [number % COLUMNS, number / COLUMNS].map(|place| f32::from(place) * APART);
         card.place = [-row, column];
         cards.push(card);
@@ -169,29 +169,54 @@ impl Sink for LogFile {
     }
 }
 
+/// A flight that is over: how it went, its hash, its log.
+type Over<V> = (Flown<<V as Vehicle>::Outcome>, u64, PathBuf);
+
 /// One vehicle, ready to be switched on.
-struct Flight<V: Vehicle> {
+struct Flight<'s, V: Vehicle> {
+    options: &'s ServeOptions,
+    number: usize,
+    ports: &'s Arc<OpenPorts>,
+    hub: &'s Hub,
     setup: V::Setup,
     recorder: Recorder<V, LogFile>,
     log: PathBuf,
     watch: Watch,
 }
 
-impl<V: Vehicle> Flight<V> {
-    fn prepare(options: &ServeOptions, number: usize, ports: &Arc<OpenPorts>, hub: &Hub) -> Result<Self, Failure> {
-        let ServeOptions { scene, seed, out, count, speed, seconds, .. } = options;
+impl<'s, V: Vehicle> Flight<'s, V> {
+    /// The first of a vehicle.
+    fn first(
+        options: &'s ServeOptions,
+        number: usize,
+        ports: &'s Arc<OpenPorts>,
+        hub: &'s Hub,
+    ) -> Result<Self, Failure> {
+        let ServeOptions { scene, seed, speed, seconds, .. } = options;
         let limit = seconds.map_or(Duration::from_secs(FOR_EVER), Duration::from_seconds);
         let live = Live { ports: ports.clone(), number, limit, speed: Some(Speed::new(*speed)) };
-        let seed = seed + number as u64;
         let typed = Options { live: Some(live), ..scene.options(scene.jitter) };
-        let setup = V::setup(&typed, seed)?;
-        let name = if *count == 1 { "flight.ulg".into() } else { format!("flight-{}.ulg", number + 1) };
-        let log = out.join(name);
+        let setup = V::setup(&typed, seed + number as u64)?;
+        Ok(Self::prepare(options, number, ports, hub, setup, 0)?)
+    }
+
+    /// The one after so many restarts. Each has a log of its own, because each begins at power-on.
+    fn prepare(
+        options: &'s ServeOptions,
+        number: usize,
+        ports: &'s Arc<OpenPorts>,
+        hub: &'s Hub,
+        setup: V::Setup,
+        restarts: usize,
+    ) -> Result<Self, String> {
+        let which = if options.count == 1 { String::new() } else { format!("-{}", number + 1) };
+        let again = if restarts == 0 { String::new() } else { format!("-restart-{restarts}") };
+        let log = options.out.join(format!("flight{which}{again}.ulg"));
         let failed = |error| format!("{}: {error}", log.display());
         let file = LogFile(Arc::new(Mutex::new(BufWriter::new(File::create(&log).map_err(failed)?))));
         let facts = [
             ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-            ("seed".to_owned(), seed.to_string()),
+            ("seed".to_owned(), (options.seed + number as u64).to_string()),
             ("mission".to_owned(), "other programs".to_owned()),
         ];
         let (so_far, path) = (file.clone(), log.clone());
@@ -203,17 +228,26 @@ impl<V: Vehicle> Flight<V> {
         let watch = hub.witness(number).ok_or("the ground station does not know this vehicle")?;
         let recorder =
             Recorder::with_sink(file, &setup, &facts).map_err(|error| format!("{}: {error:?}", log.display()))?;
-        Ok(Self { setup, recorder, log, watch })
+        Ok(Self { options, number, ports, hub, setup, recorder, log, watch })
     }
 
-    fn fly(self) -> (Flown<V::Outcome>, u64, PathBuf) {
-        let Self { setup, recorder, log, watch } = self;
-        let mut witnesses = (recorder, watch);
-        let flown = fly::<V>(&setup, &mut witnesses, &mut |_, _| {});
-        let (recorder, _) = witnesses;
-        // The page may still hold the file.
-        _ = recorder.written().map(|file| file.lock().flush());
-        (flown, recorder.hash(), log)
+    /// Flies, again after each restart that somebody asks the vehicle for.
+    fn fly_all(self) -> Result<Vec<Over<V>>, String> {
+        let (mut over, mut next) = (Vec::new(), Some(self));
+        while let Some(flight) = next.take() {
+            let Self { options, number, ports, hub, setup, recorder, log, watch } = flight;
+            let mut witnesses = (recorder, watch);
+            let flown = fly::<V>(&setup, &mut witnesses, &mut |_, _| {});
+            let (recorder, _) = witnesses;
+            // The page may still hold the file.
+            _ = recorder.written().map(|file| file.lock().flush());
+            if let Some(setup) = V::again(&setup, &flown.outcome) {
+                next = Some(Self::prepare(options, number, ports, hub, setup, over.len() + 1)?);
+                ports.reopen();
+            }
+            over.push((flown, recorder.hash(), log));
+        }
+        Ok(over)
     }
 }
 
