@@ -3,8 +3,7 @@
 use super::seats::{Controls, Seats};
 use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
 use crate::VehicleConfig;
-use crate::console::Newest;
-use crate::console::{Command, Profile};
+use crate::console::{Command, Newest, Profile};
 use crate::simulation::radio::Radio;
 use crate::simulation::sensing::{Healths, Sensing};
 use crate::simulation::terminal::{Desk, Terminal};
@@ -20,8 +19,9 @@ use stampfly_sim::vehicle::{Client, Heard, Link, Live, Put, Speed};
 use stampfly_types::Instant;
 use std::vec::Vec;
 
+/// What is answered to what only a board can do.
+const NOT_SIMULATED: &str = "not of a simulated vehicle";
 /// What the simulated vehicle calls itself.
-pub(super) const NOT_SIMULATED: &str = "not of a simulated vehicle";
 const VERSION: &str = concat!("stampfly ", env!("CARGO_PKG_VERSION"), ", simulated");
 /// Ticks between two turns of the services that send by themselves: 20 ms.
 const TURN: u32 = 4;
@@ -83,6 +83,14 @@ impl<'b> Services<'b> {
         }
     }
 
+    /// What every command line of the vehicle shares.
+    pub(super) fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
+    where
+        Self: 'd,
+    {
+        Desk { version: VERSION, newest, sensing: self.sensing, health: self.health, profile: self.profile, facts: &[] }
+    }
+
     fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
         let seen = self.seen;
         let newest = seen.newest.borrow();
@@ -110,15 +118,6 @@ pub(super) fn obey(request: &Request<Command>, seen: &Seen, config: &VehicleConf
             "restarting"
         }
         _ => NOT_SIMULATED,
-    }
-}
-
-impl Services<'_> {
-    pub(super) fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
-    where
-        Self: 'd,
-    {
-        Desk { version: VERSION, newest, sensing: self.sensing, health: self.health, profile: self.profile, facts: &[] }
     }
 }
 

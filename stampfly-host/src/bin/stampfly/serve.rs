@@ -20,6 +20,7 @@ use std::io::{BufWriter, Write};
 use std::net::{Ipv6Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
@@ -51,11 +52,15 @@ impl ForVehicle for Serve<'_> {
         let hub = hub::<V>(options)?;
         let ports = open::<V>(options, &hub)?;
         let _server = ground(&ports, &hub)?;
-        let closing = ports.clone();
+        let (closing, over) = (ports.clone(), Arc::new(AtomicBool::new(false)));
+        let are_over = over.clone();
         ctrlc::set_handler(move || {
             closing.iter().for_each(|ports| ports.close());
             thread::sleep(PATIENCE);
-            std::process::exit(130);
+            // A report of a long flight takes longer than that to write.
+            if !are_over.load(Ordering::Relaxed) {
+                std::process::exit(130);
+            }
         })?;
         std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
         let flights: Vec<_> = ports
@@ -67,6 +72,7 @@ impl ForVehicle for Serve<'_> {
             let threads: Vec<_> = flights.into_iter().map(|flight| scope.spawn(move || flight.fly_all())).collect();
             threads.into_iter().map(thread::ScopedJoinHandle::join).collect()
         });
+        over.store(true, Ordering::Relaxed);
         let mut all_well = true;
         for ended in ended {
             for (flown, hash, log) in ended.map_err(|_| "a vehicle's thread has failed")?? {
