@@ -74,7 +74,7 @@ fn main() {
     let mut bus = topics::Bus::new();
     let stampfly_bus::Split { runnables: mut ends, mut outside, heads, .. } = bus.split(None);
     let mut vehicle = Runnables::new(&());
-    let mut scheduler = Scheduler::new(Runnables::ACTIVATIONS, Runnables::states(Instant::ZERO));
+    let mut scheduler = Scheduler::<Runnables>::new(Instant::ZERO);
 
     // The executor: here a loop over a simulated clock, on a vehicle a task that the bus's hook wakes. It is
     // `stampfly_flight::FlightLoop` in short.
@@ -83,9 +83,8 @@ fn main() {
         let distance = 0.5 + 0.2 * math::sin(clock.since(Instant::ZERO).seconds());
         outside.tof.range.publish(clock, &TofData { distance, valid: true, ..Default::default() });
         for band in [Band::Flight, Band::Background] {
-            while let Some((index, now)) = scheduler.due(band, 0, clock, heads.as_ref()) {
+            while let Some((index, now)) = scheduler.start_first(band, clock, heads.as_ref()) {
                 let mut activation = Activation::live(index as u8, now);
-                scheduler.started(index, now, clock, heads.as_ref());
                 Runnables::read(&mut ends, index, &mut activation);
                 vehicle.run(&mut ends, index, &mut activation);
                 scheduler.finished(index);

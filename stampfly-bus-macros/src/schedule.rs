@@ -287,7 +287,13 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
                 [::stampfly_bus::ActivationState::new(start); COUNT]
             }
 
-            #[inline]
+            #[inline(always)]
+            fn visit<V: ::stampfly_bus::VisitLines>(visitor: &mut V) {
+                #(visitor.line::<{ Id::#names as usize }>();)*
+            }
+
+            // Where the line is known while compiling, this is its own reading alone.
+            #[inline(always)]
             fn read(
                 ends: &mut <Self::Topics as ::stampfly_bus::TopicTable>::Ends<'_>,
                 index: usize,
@@ -299,7 +305,7 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
                 }
             }
 
-            #[inline]
+            #[inline(always)]
             fn run(
                 &mut self,
                 ends: &mut <Self::Topics as ::stampfly_bus::TopicTable>::Ends<'_>,

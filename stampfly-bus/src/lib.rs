@@ -57,7 +57,7 @@ pub use input::{NewestPort, SamplesPort};
 pub use line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 pub use output::NewestOutput;
 pub use response::{JITTER, Unbounded, response_time};
-pub use schedule::Schedule;
+pub use schedule::{Schedule, VisitLines};
 pub use scheduler::{ActivationState, Scheduler};
 /// For [`topics!`] and [`schedule!`].
 #[doc(hidden)]

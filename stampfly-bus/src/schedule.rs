@@ -33,6 +33,15 @@ pub trait Schedule: Sized + 'static {
     /// Reads the inputs of one runnable. A line that does not exist reads nothing.
     fn read(ends: &mut <Self::Topics as TopicTable>::Ends<'_>, index: usize, activation: &mut Activation);
 
+    /// Shows every line to a visitor, in the table's order.
+    fn visit<V: VisitLines>(visitor: &mut V);
+
     /// Steps one runnable on the inputs it has read.
     fn run(&mut self, ends: &mut <Self::Topics as TopicTable>::Ends<'_>, index: usize, activation: &mut Activation);
+}
+
+/// Is shown the lines of a table, one by one, each as a constant: what depends on the line is then decided while compiling.
+pub trait VisitLines {
+    /// Is shown the line with this index.
+    fn line<const INDEX: usize>(&mut self);
 }

@@ -1,6 +1,7 @@
 //! Which activation is due: the one decision that firmware, simulation and replay share.
 
 use crate::line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
+use crate::schedule::Schedule;
 use crate::topic::AnyTopic;
 use stampfly_types::Instant;
 
@@ -42,7 +43,7 @@ impl ActivationState {
     }
 
     /// Its `now`, if it is due at `clock`. `before`: of the line that it runs after.
-    #[inline]
+    #[inline(always)]
     fn due(
         &self,
         info: &ActivationInfo,
@@ -68,7 +69,7 @@ impl ActivationState {
     }
 
     /// It is about to read its inputs.
-    #[inline]
+    #[inline(always)]
     fn start(
         &mut self,
         info: &ActivationInfo,
@@ -89,7 +90,7 @@ impl ActivationState {
     }
 }
 
-/// Decides which activation is due. Holds no clock and runs nothing: executors on a microcontroller, on a host and in a
+/// Decides which activation of a table is due. Holds no clock and runs nothing: executors on a microcontroller, on a host and in a
 /// replay share it, so they agree on `now`.
 ///
 /// `now` of an activation is the newest stamp of its topics for `on`, the predecessor's `now` for `after`, and the
@@ -97,75 +98,46 @@ impl ActivationState {
 ///
 /// `or at latest` counts from when the activation last ran, by the clock, not from its `now`: a stamp is as old as the
 /// sensor's delay, and a deadline that counted from it would pass while everything is in order.
-#[derive(Clone, Debug)]
-pub struct Scheduler<S> {
-    table: &'static [ActivationInfo],
-    states: S,
+pub struct Scheduler<R: Schedule> {
+    states: R::States,
 }
 
-impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
-    /// A scheduler at power-on: one state a line of the table.
+impl<R: Schedule> Scheduler<R> {
+    /// A scheduler at power-on.
     #[must_use]
-    pub const fn new(table: &'static [ActivationInfo], states: S) -> Self {
-        Self { table, states }
+    pub fn new(start: Instant) -> Self {
+        Self { states: R::states(start) }
     }
 
-    /// The first activation of this band from line `first` on that is due at `clock`: its line and its `now`. `heads` are
-    /// the topics in the topic table's order.
+    /// The `now` of this line, if it is due at `clock`. `heads` are the topics in the topic table's order.
+    #[inline]
+    #[must_use]
+    pub fn due(&self, index: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<Instant> {
+        let info = R::ACTIVATIONS.get(index)?;
+        self.states.as_ref().get(index)?.due(info, self.before(info), clock, heads)
+    }
+
+    /// As [`due`](Self::due), and notes that the activation is about to read its inputs.
     ///
-    /// An executor that goes through the table once, from each activation to the next, runs a whole chain of `after`s in
-    /// one pass, because `after` only names lines above.
-    #[inline]
+    /// Inlined where the line is known while compiling, it is as short as the line: what its trigger is, is then no question.
+    #[inline(always)]
+    pub fn start(&mut self, index: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<Instant> {
+        let info = R::ACTIVATIONS.get(index)?;
+        let before = self.before(info);
+        let state = self.states.as_mut().get_mut(index)?;
+        let now = state.due(info, before, clock, heads)?;
+        state.start(info, before, now, clock, heads);
+        Some(now)
+    }
+
+    /// The first activation of this band that is due at `clock`, which starts: its line and its `now`.
+    ///
+    /// An executor that starts each line once, in the table's order, runs a whole chain of `after`s in one pass, because `after`
+    /// only names lines above.
     #[must_use]
-    pub fn due(&self, band: Band, first: usize, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<(usize, Instant)> {
-        let states = self.states.as_ref();
-        let mut index = first;
-        loop {
-            let (info, state) = (self.table.get(index)?, states.get(index)?);
-            if info.band == band {
-                let before = info.trigger.before().and_then(|before| states.get(before)).map(ActivationState::ended);
-                if let Some(now) = state.due(info, before, clock, heads) {
-                    return Some((index, now));
-                }
-            }
-            index += 1;
-        }
-    }
-
-    /// As [`due`](Self::due), and notes that this activation is about to read its inputs, as [`started`](Self::started) does.
-    #[inline]
-    pub fn start(
-        &mut self,
-        band: Band,
-        first: usize,
-        clock: Instant,
-        heads: &[&dyn AnyTopic],
-    ) -> Option<(usize, Instant)> {
-        let states = self.states.as_mut();
-        let mut index = first;
-        loop {
-            let info = self.table.get(index)?;
-            if info.band == band {
-                let before = info.trigger.before().and_then(|before| states.get(before)).map(ActivationState::ended);
-                let state = states.get_mut(index)?;
-                if let Some(now) = state.due(info, before, clock, heads) {
-                    state.start(info, before, now, clock, heads);
-                    return Some((index, now));
-                }
-            }
-            index += 1;
-        }
-    }
-
-    /// Notes that an activation is about to read its inputs, at `clock`.
-    #[inline]
-    pub fn started(&mut self, index: usize, now: Instant, clock: Instant, heads: &[&dyn AnyTopic]) {
-        let states = self.states.as_mut();
-        let Some(info) = self.table.get(index) else { return };
-        let before = info.trigger.before().and_then(|before| states.get(before)).map(ActivationState::ended);
-        if let Some(state) = states.get_mut(index) {
-            state.start(info, before, now, clock, heads);
-        }
+    pub fn start_first(&mut self, band: Band, clock: Instant, heads: &[&dyn AnyTopic]) -> Option<(usize, Instant)> {
+        let mut lines = R::ACTIVATIONS.iter().enumerate().filter(|(_, info)| info.band == band);
+        lines.find_map(|(index, _)| Some((index, self.start(index, clock, heads)?)))
     }
 
     /// Notes that an activation has published: releases the ones that run after it.
@@ -179,6 +151,12 @@ impl<S: AsRef<[ActivationState]> + AsMut<[ActivationState]>> Scheduler<S> {
     /// The next instant at which a period or a deadline makes something due.
     #[must_use]
     pub fn next_tick(&self) -> Option<Instant> {
-        self.table.iter().zip(self.states.as_ref()).filter_map(|(info, state)| state.tick(info)).min()
+        R::ACTIVATIONS.iter().zip(self.states.as_ref()).filter_map(|(info, state)| state.tick(info)).min()
+    }
+
+    /// Of the line that this one runs after.
+    #[inline(always)]
+    fn before(&self, info: &ActivationInfo) -> Option<(u32, Instant)> {
+        info.trigger.before().and_then(|before| self.states.as_ref().get(before)).map(ActivationState::ended)
     }
 }

@@ -114,7 +114,7 @@ struct Rig<'b> {
     ends: topics::Ends<'b>,
     imu: topics::SensorImuTx<'b>,
     command: topics::CommandTx<'b>,
-    scheduler: Scheduler<[stampfly_bus::ActivationState; COUNT]>,
+    scheduler: Scheduler<Runnables>,
     heads: [&'b dyn AnyTopic; topics::COUNT],
     taps: topics::Taps<'b>,
     log: Vec<(usize, Instant, u32, Vec<u32>)>,
@@ -130,7 +130,7 @@ impl<'b> Rig<'b> {
             ends,
             imu: imu.sensor_imu,
             command: link.command,
-            scheduler: Scheduler::new(&ACTIVATIONS, Runnables::states(Instant::ZERO)),
+            scheduler: Scheduler::new(Instant::ZERO),
             heads,
             taps,
             log: Vec::new(),
@@ -145,9 +145,8 @@ impl<'b> Rig<'b> {
 
     fn run_due(&mut self, clock: Instant) {
         for band in [Band::Flight, Band::Background] {
-            while let Some((index, now)) = self.scheduler.due(band, 0, clock, &self.heads) {
+            while let Some((index, now)) = self.scheduler.start_first(band, clock, &self.heads) {
                 let mut activation = Activation::live(index as u8, now);
-                self.scheduler.started(index, now, clock, &self.heads);
                 self.activate(index, &mut activation);
                 self.scheduler.finished(index);
                 self.trace.push(activation);

@@ -5,7 +5,9 @@
 //! time it is.
 
 use core::mem::MaybeUninit;
-use stampfly_bus::{Activation, AnyTopic, Band, Hook, PublishWords, Schedule, Scheduler, Split, TopicTable};
+use stampfly_bus::{
+    Activation, AnyTopic, Band, Hook, PublishWords, Schedule, Scheduler, Split, TopicTable, VisitLines,
+};
 use stampfly_types::{ActivationRecord, Instant};
 
 /// Is told of activations: a log, a profiler.
@@ -73,7 +75,7 @@ pub struct FlightLoop<'b, R: Schedule> {
 struct Lines<'b, R: Schedule> {
     runnables: R,
     ends: <R::Topics as TopicTable>::Ends<'b>,
-    scheduler: Scheduler<R::States>,
+    scheduler: Scheduler<R>,
     heads: <R::Topics as TopicTable>::Heads<'b>,
 }
 
@@ -105,7 +107,7 @@ impl<'b, R: Schedule> Assembled<'b, R> {
     #[must_use]
     pub fn new(bus: &'b mut R::Topics, hook: Option<Hook>, config: &R::Config, start: Instant) -> Self {
         let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
-        let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
+        let scheduler = Scheduler::new(start);
         let lines = Lines { runnables: R::new(config), ends, scheduler, heads };
         Self { flight_loop: FlightLoop { lines, activation: Activation::live(0, start) }, outside, taps }
     }
@@ -121,7 +123,7 @@ impl<'b, R: Schedule> Assembled<'b, R> {
         start: Instant,
     ) -> InPlace<'b, R> {
         let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
-        let scheduler = Scheduler::new(R::ACTIVATIONS, R::states(start));
+        let scheduler = Scheduler::new(start);
         let flight_loop = slot.write(FlightLoop {
             lines: Lines { runnables: R::new(config), ends, scheduler, heads },
             activation: Activation::live(0, start),
@@ -151,38 +153,24 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     /// Is anything due in this band?
     #[must_use]
     pub fn is_due(&self, band: Band, clock: Instant) -> bool {
-        self.lines.due(band, 0, clock).is_some()
+        let mut lines = R::ACTIVATIONS.iter().enumerate().filter(|(_, info)| info.band == band);
+        lines.any(|(index, _)| self.lines.scheduler.due(index, clock, self.heads()).is_some())
     }
 
     /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
+    #[inline]
     pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
-        let mut next = 0;
-        while let Some(index) = self.run_from(band, next, clock, observer) {
-            next = index + 1;
-        }
-        next > 0
+        let mut pass = Pass { flight_loop: self, band, clock, observer, ran: false };
+        R::visit(&mut pass);
+        pass.ran
     }
 
     /// Runs the first line of this band that is due. Returns whether there was one.
     pub fn run_next(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
-        self.run_from(band, 0, clock, observer).is_some()
-    }
-
-    /// Runs the first line that is due from this one on.
-    #[inline(always)]
-    fn run_from(
-        &mut self,
-        band: Band,
-        first: usize,
-        clock: Instant,
-        observer: &mut (impl Observer + ?Sized),
-    ) -> Option<usize> {
         let Self { lines, activation } = self;
-        let (index, now) = lines.start(band, first, clock)?;
-        activation.begin(index as u8, now);
-        lines.read(index, activation, observer);
-        lines.complete(index, activation, observer);
-        Some(index)
+        let Some((index, now)) = lines.start_first(band, clock) else { return false };
+        lines.run(index, now, activation, observer);
+        true
     }
 
     /// Lets the next due activation of this band read its inputs. What is published before [`finish`](Self::finish)
@@ -193,7 +181,7 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         clock: Instant,
         observer: &mut (impl Observer + ?Sized),
     ) -> Option<Pending> {
-        let (index, now) = self.lines.start(band, 0, clock)?;
+        let (index, now) = self.lines.start_first(band, clock)?;
         let mut activation = Activation::live(index as u8, now);
         self.lines.read(index, &mut activation, observer);
         Some(Pending(activation))
@@ -250,25 +238,32 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
 }
 
 impl<R: Schedule> Lines<'_, R> {
-    #[inline]
-    fn due(&self, band: Band, first: usize, clock: Instant) -> Option<(usize, Instant)> {
-        self.scheduler.due(band, first, clock, self.heads.as_ref())
+    fn start_first(&mut self, band: Band, clock: Instant) -> Option<(usize, Instant)> {
+        self.scheduler.start_first(band, clock, self.heads.as_ref())
     }
 
-    /// The first line from this one on that is due, which starts.
-    #[inline]
-    fn start(&mut self, band: Band, first: usize, clock: Instant) -> Option<(usize, Instant)> {
-        self.scheduler.start(band, first, clock, self.heads.as_ref())
+    /// Runs a line that has started.
+    #[inline(always)]
+    fn run(
+        &mut self,
+        index: usize,
+        now: Instant,
+        activation: &mut Activation,
+        observer: &mut (impl Observer + ?Sized),
+    ) {
+        activation.begin(index as u8, now);
+        self.read(index, activation, observer);
+        self.complete(index, activation, observer);
     }
 
-    #[inline]
+    #[inline(always)]
     fn read(&mut self, index: usize, activation: &mut Activation, observer: &mut (impl Observer + ?Sized)) {
         observer.starts(index);
         R::read(&mut self.ends, index, activation);
         observer.has_read(activation);
     }
 
-    #[inline]
+    #[inline(always)]
     fn complete(&mut self, index: usize, activation: &mut Activation, observer: &mut (impl Observer + ?Sized)) {
         self.runnables.run(&mut self.ends, index, activation);
         self.scheduler.finished(index);
@@ -279,5 +274,27 @@ impl<R: Schedule> Lines<'_, R> {
     fn activate(&mut self, index: usize, activation: &mut Activation) {
         R::read(&mut self.ends, index, activation);
         self.runnables.run(&mut self.ends, index, activation);
+    }
+}
+
+/// One pass of a band through the table.
+struct Pass<'p, 'b, R: Schedule, O: ?Sized> {
+    flight_loop: &'p mut FlightLoop<'b, R>,
+    band: Band,
+    clock: Instant,
+    observer: &'p mut O,
+    /// Did anything run?
+    ran: bool,
+}
+
+impl<R: Schedule, O: Observer + ?Sized> VisitLines for Pass<'_, '_, R, O> {
+    #[inline(always)]
+    fn line<const INDEX: usize>(&mut self) {
+        let FlightLoop { lines, activation } = &mut *self.flight_loop;
+        let is_of_band = R::ACTIVATIONS.get(INDEX).is_some_and(|info| info.band == self.band);
+        if is_of_band && let Some(now) = lines.scheduler.start(INDEX, self.clock, lines.heads.as_ref()) {
+            lines.run(INDEX, now, activation, self.observer);
+            self.ran = true;
+        }
     }
 }

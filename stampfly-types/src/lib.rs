@@ -49,6 +49,8 @@ mod named;
 pub mod schema;
 #[doc(hidden)]
 pub mod serial;
+#[cfg(feature = "math")]
+mod square_root;
 pub mod stamped;
 pub mod text;
 pub mod time;

@@ -55,7 +55,13 @@ pub fn atan2(y: f32, x: f32) -> f32 {
 /// Square root; negative arguments give zero.
 #[must_use]
 pub fn sqrt(value: f32) -> f32 {
-    libm::sqrtf(if value < 0.0 { 0.0 } else { value })
+    let value = if value < 0.0 { 0.0 } else { value };
+    // Where `libm` has the machine's instruction. The bits are the same.
+    if cfg!(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
+        libm::sqrtf(value)
+    } else {
+        crate::square_root::sqrt(value)
+    }
 }
 
 /// Cube root.
