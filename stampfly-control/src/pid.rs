@@ -87,9 +87,11 @@ impl<T: FloatCore> Discrete<T> {
         let two = T::one() + T::one();
         let integral = if gains.ti > T::zero() { gains.kp * dt / (two * gains.ti) } else { T::zero() };
         let (derivative_decay, derivative_gain) = if gains.td > T::zero() {
-            let alpha = two * gains.eta * gains.td / dt;
-            let scale = T::one() / (alpha + T::one());
-            ((alpha - T::one()) * scale, two * gains.td / dt * scale)
+            // Numerator and denominator times the step: one division for both.
+            let double = two * gains.td;
+            let smooth = gains.eta * double;
+            let scale = T::one() / (smooth + dt);
+            ((smooth - dt) * scale, double * scale)
         } else {
             (T::zero(), T::zero())
         };

@@ -30,6 +30,7 @@ mod estimator;
 pub mod filter;
 mod level;
 mod measurements;
+mod pacer;
 mod tally;
 
 pub use complementary::{Complementary, ComplementaryConfig};
@@ -40,6 +41,7 @@ pub use level::attitude_from_specific_force;
 pub use measurements::{Aiding, Measurements, feed};
 /// Its matrices are in signatures here.
 pub use nalgebra;
+pub use pacer::Pacer;
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;
 pub use tally::Tally;

@@ -3,7 +3,7 @@
 use crate::config::{EstimatorKind, VehicleConfig};
 use crate::topics::EstimationEnds;
 use stampfly_bus::{Activation, Runnable};
-use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, feed};
+use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, Pacer};
 
 /// The estimators this vehicle can be told to use (`estimator.type`).
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +19,16 @@ enum Choice {
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimation {
     estimator: Choice,
+    feeding: Feeding,
+}
+
+/// What is known of the estimator's input.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
+struct Feeding {
     /// Has the still-calibration been used?
     started: bool,
+    pacer: Pacer,
 }
 
 impl Estimation {
@@ -30,12 +38,11 @@ impl Estimation {
     #[inline(never)]
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        match config.estimator {
-            EstimatorKind::Complementary => {
-                Self { estimator: Choice::Complementary(Complementary::new(config.complementary)), started: false }
-            }
-            EstimatorKind::Eskf => Self { estimator: Choice::Eskf(Eskf::new(config.eskf)), started: false },
-        }
+        let estimator = match config.estimator {
+            EstimatorKind::Complementary => Choice::Complementary(Complementary::new(config.complementary)),
+            EstimatorKind::Eskf => Choice::Eskf(Eskf::new(config.eskf)),
+        };
+        Self { estimator, feeding: Feeding::default() }
     }
 }
 
@@ -44,17 +51,17 @@ impl Runnable for Estimation {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
         match &mut self.estimator {
-            Choice::Eskf(estimator) => step(estimator, &mut self.started, activation, ends),
-            Choice::Complementary(estimator) => step(estimator, &mut self.started, activation, ends),
+            Choice::Eskf(estimator) => step(estimator, &mut self.feeding, activation, ends),
+            Choice::Complementary(estimator) => step(estimator, &mut self.feeding, activation, ends),
         }
     }
 }
 
-fn step(estimator: &mut impl Estimator, started: &mut bool, activation: &Activation, ends: &mut EstimationEnds<'_>) {
+fn step(estimator: &mut impl Estimator, feeding: &mut Feeding, activation: &Activation, ends: &mut EstimationEnds<'_>) {
     let now = activation.now();
     let calibration = ends.calibration.get();
-    if calibration.complete && !*started {
-        *started = true;
+    if calibration.complete && !feeding.started {
+        feeding.started = true;
         estimator.initialize(now, calibration);
     }
     if ends.estimator_command.sample().is_some() {
@@ -68,7 +75,7 @@ fn step(estimator: &mut impl Estimator, started: &mut bool, activation: &Activat
         baro: &ends.sensor_baro,
         pose: &ends.external_pose,
     };
-    feed(estimator, &measurements, |_, _, _| {});
+    feeding.pacer.feed(estimator, &measurements, |_, _, _| {});
     ends.estimate_state.publish(now, &estimator.estimate());
     ends.estimate_status.publish(now, &estimator.status());
 }
