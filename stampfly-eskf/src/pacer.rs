@@ -1,21 +1,22 @@
-//! One aiding measurement a step: what a step may cost does not depend on how many sensors answer at once.
+//! Field and pressure wait for a step with time: what a step may cost does not depend on how many sensors answer at once.
 //!
-//! Range finder, magnetometer and barometer are much slower than the loop, and now and then all of them have something new in the same
-//! step. An estimator that is given all of it takes twice as long as usual for that step, and the worst step is what a loop's
-//! period has to hold. A [`Pacer`] lets the slow ones wait, for steps in which nothing else is fused: 5 ms at most at the StampFly's
-//! rates. They are compared with the state of their own time then, as late samples are.
+//! Aiding sensors are slower than the loop, and now and then all of them have something new in the same step. An estimator that is given
+//! all of it takes three times as long as usual for that step, and the worst step is what a loop's period has to hold. A [`Pacer`]
+//! lets the magnetometer and the barometer wait for a step in which nothing else is fused: 5 ms at most at the StampFly's rates. Their
+//! samples are compared with the state of their own time then, as late samples are. Range and flow do not wait, for they hold
+//! the vehicle: with ranges that came 2.5 ms later, one of two thousand faulted flights ended elsewhere.
 //!
 //! For a loop with a deadline. Not for replays that compare estimators, or where nobody waits: [`feed`] is simpler.
 
 use crate::estimator::{Estimator, Fusion};
 use crate::measurements::{Aiding, Measurements, feed};
-use stampfly_types::messages::{BaroData, MagData, TofData};
+use stampfly_types::messages::{BaroData, MagData};
 use stampfly_types::{Instant, Stamped};
 
-/// Feeds an estimator so that a step fuses one aiding measurement, as a rule.
+/// Feeds an estimator so that the slow measurements have steps of their own.
 ///
-/// Inertial samples, optical flow and poses from outside go in at once. Each of the others waits for a step without any of these, or until
-/// the next sample of its own kind comes: none is left out, and those of a sensor stay in order.
+/// Inertial samples, ranges, optical flow and poses from outside go in at once. A field or a pressure waits for a step without any
+/// aiding, or until the next sample of its own kind comes: none is left out, and those of a sensor stay in order.
 ///
 /// ```
 /// use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Measurements, Pacer};
@@ -31,13 +32,13 @@ use stampfly_types::{Instant, Stamped};
 /// let mut told = Vec::new();
 /// pacer.feed(&mut estimator, &Measurements { tof: &tof, baro: &baro, ..Default::default() }, |from, _, _| told.push(from));
 /// assert_eq!(told, [Aiding::Tof]);
+/// // In the next step there is time.
 /// pacer.feed(&mut estimator, &Measurements::default(), |from, _, _| told.push(from));
 /// assert_eq!(told, [Aiding::Tof, Aiding::Baro]);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pacer {
-    tof: Option<Stamped<TofData>>,
     mag: Option<Stamped<MagData>>,
     baro: Option<Stamped<BaroData>>,
 }
@@ -51,12 +52,8 @@ impl Pacer {
         mut fused: impl FnMut(Aiding, Instant, Fusion),
     ) {
         let Measurements { imu, tof, flow, mag, baro, pose } = *measurements;
-        feed(estimator, &Measurements { imu, flow, pose, ..Measurements::default() }, &mut fused);
-        let mut has_time = flow.is_empty() && pose.is_empty();
-        // The range first: it ages fastest.
-        next(&mut self.tof, tof, &mut has_time, |Stamped { at, data, .. }| {
-            fused(Aiding::Tof, at, estimator.fuse_tof(at, &data));
-        });
+        feed(estimator, &Measurements { imu, tof, flow, pose, ..Measurements::default() }, &mut fused);
+        let mut has_time = tof.is_empty() && flow.is_empty() && pose.is_empty();
         next(&mut self.mag, mag, &mut has_time, |Stamped { at, data, .. }| {
             fused(Aiding::Mag, at, estimator.fuse_mag(at, &data));
         });
@@ -134,7 +131,9 @@ mod tests {
     }
 
     fn samples<T: Default + Copy>(at: Instant, count: usize) -> Vec<Stamped<T>> {
-        (0..count).map(|n| Stamped { at: at + stampfly_types::Duration::from_micros(n as u64), ..Default::default() }).collect()
+        (0..count)
+            .map(|n| Stamped { at: at + stampfly_types::Duration::from_micros(n as u64), ..Default::default() })
+            .collect()
     }
 
     /// One step, with so many new samples of each sensor. Returns what is fused in it.
@@ -150,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn at_a_vehicles_rates_a_step_fuses_one_and_nothing_waits_longer_than_two_others() {
+    fn at_a_vehicles_rates_field_and_pressure_have_steps_of_their_own_within_5_ms() {
         let mut pacer = Pacer::default();
         let mut fused = 0;
         for n in 0..4_000u64 {
@@ -158,8 +157,11 @@ mod tests {
             // Flow at 100 Hz, range at 33, field and pressure at 25: all of them together every 48 steps.
             let new = [12, 4, 16, 16].map(|period| usize::from(n.is_multiple_of(period)));
             let told = step(&mut pacer, now, new);
-            assert!(told.len() <= 1, "{told:?}");
-            assert!(told.iter().all(|(_, at)| now.since(*at).as_micros() <= 7_500), "{told:?} at {now:?}");
+            let waits = |from: &Aiding| matches!(from, Aiding::Mag | Aiding::Baro);
+            assert!(told.len() == 1 || told.iter().all(|(from, _)| !waits(from)), "{told:?}");
+            let longest = |from: &Aiding| if waits(from) { 5_000 } else { 0 };
+            let late = |(from, at): &(Aiding, Instant)| now.since(*at).as_micros() > longest(from);
+            assert!(!told.iter().any(late), "{told:?} at {now:?}");
             fused += told.len();
         }
         assert_eq!(fused, 1_000 + 334 + 250 + 250);
