@@ -178,6 +178,8 @@ impl GeometricController {
 }
 
 impl Controller for GeometricController {
+    // A vehicle that can choose has another one in its place most of the time.
+    #[inline(never)]
     fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.flight_status.control_resets != self.resets {

@@ -158,7 +158,8 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     }
 
     /// Runs everything that is due in this band, in one pass through the table. Returns whether anything ran.
-    #[inline]
+    // By itself, so that firmware can keep it in RAM: every pass goes through all of it once.
+    #[inline(never)]
     pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
         let mut pass = Pass { flight_loop: self, band, clock, observer, ran: false };
         R::visit(&mut pass);

@@ -1,7 +1,7 @@
 //! Estimation: every sensor in, the vehicle's state out.
 
 use crate::config::{EstimatorKind, VehicleConfig};
-use crate::topics::EstimationEnds;
+use crate::topics::EstimationEnds as Ends;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, Pacer};
 
@@ -19,13 +19,6 @@ enum Choice {
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimation {
     estimator: Choice,
-    feeding: Feeding,
-}
-
-/// What is known of the estimator's input.
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
-struct Feeding {
     /// Has the still-calibration been used?
     started: bool,
     pacer: Pacer,
@@ -42,30 +35,30 @@ impl Estimation {
             EstimatorKind::Complementary => Choice::Complementary(Complementary::new(config.complementary)),
             EstimatorKind::Eskf => Choice::Eskf(Eskf::new(config.eskf)),
         };
-        Self { estimator, feeding: Feeding::default() }
+        Self { estimator, started: false, pacer: Pacer::default() }
     }
 }
 
 impl Runnable for Estimation {
-    type Ends<'b> = EstimationEnds<'b>;
+    type Ends<'b> = Ends<'b>;
 
-    fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
+    fn run(&mut self, activation: &mut Activation, ends: &mut Ends<'_>) {
+        let feeding = (&mut self.started, &mut self.pacer);
         match &mut self.estimator {
-            Choice::Eskf(estimator) => step(estimator, &mut self.feeding, activation, ends),
-            Choice::Complementary(estimator) => step(estimator, &mut self.feeding, activation, ends),
+            Choice::Eskf(estimator) => step(estimator, feeding, activation, ends),
+            Choice::Complementary(estimator) => step(estimator, feeding, activation, ends),
         }
     }
 }
 
-fn step(estimator: &mut impl Estimator, feeding: &mut Feeding, activation: &Activation, ends: &mut EstimationEnds<'_>) {
-    let now = activation.now();
-    let calibration = ends.calibration.get();
-    if calibration.complete && !feeding.started {
-        feeding.started = true;
-        estimator.initialize(now, calibration);
+fn step(of: &mut impl Estimator, (started, pacer): (&mut bool, &mut Pacer), on: &Activation, ends: &mut Ends<'_>) {
+    let (now, calibration) = (on.now(), ends.calibration.get());
+    if calibration.complete && !*started {
+        *started = true;
+        of.initialize(now, calibration);
     }
     if ends.estimator_command.sample().is_some() {
-        estimator.command(now, ends.estimator_command.get());
+        of.command(now, ends.estimator_command.get());
     }
     let measurements = Measurements {
         imu: &ends.sensor_imu,
@@ -75,7 +68,7 @@ fn step(estimator: &mut impl Estimator, feeding: &mut Feeding, activation: &Acti
         baro: &ends.sensor_baro,
         pose: &ends.external_pose,
     };
-    feeding.pacer.feed(estimator, &measurements, |_, _, _| {});
-    ends.estimate_state.publish(now, &estimator.estimate());
-    ends.estimate_status.publish(now, &estimator.status());
+    pacer.feed(of, &measurements, |_, _, _| {});
+    ends.estimate_state.publish(now, &of.estimate());
+    ends.estimate_status.publish(now, &of.status());
 }

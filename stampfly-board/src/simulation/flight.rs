@@ -76,6 +76,12 @@ impl Surroundings {
     pub fn world(&self) -> World {
         self.world.clone()
     }
+
+    /// The SPI of the emulated chips, to look at what goes over it. `None` once the flight has begun.
+    #[must_use]
+    pub fn spi(&self) -> Option<chips::SpiBus> {
+        self.board.as_ref().map(|board| board.imu.bus())
+    }
 }
 
 impl vehicle::Surroundings for Surroundings {

@@ -166,12 +166,15 @@ impl Autotune {
     /// * The result differs from `torque` about the axis that is tuned only, by at most [`AutotuneConfig::amplitude`], and not at all
     ///   from the step on in which something goes wrong, whatever the input.
     /// * The excitation never takes the torque beyond [`AutotuneConfig::torque_max`].
+    #[inline]
     pub fn step(&mut self, now: Instant, input: &AutotuneInput<'_>, torque: &Vec3) -> Vec3 {
+        // Nearly never: this question is what a vehicle that tunes nothing pays for it.
+        if self.is_active() { self.tune(now, input, torque) } else { *torque }
+    }
+
+    #[inline(never)]
+    fn tune(&mut self, now: Instant, input: &AutotuneInput<'_>, torque: &Vec3) -> Vec3 {
         let mut result = *torque;
-        // Nearly always: what a vehicle that tunes nothing pays for it.
-        if !self.is_active() {
-            return result;
-        }
         let config = *self.config(self.axis);
         let next = match &mut self.state {
             State::Exciting(measurement) => match excite(measurement, &config, self.axis, now, input, torque) {
@@ -213,15 +216,21 @@ impl Autotune {
     ) -> Vec3 {
         let asked = AutotuneAxis::asked(axes);
         if core::mem::replace(&mut self.asked, asked) != asked {
-            self.cancel();
-            if let Some(axis) = asked
-                && let Err(stop) = self.start(now, axis, present(axis), input)
-            {
-                self.axis = axis;
-                self.turn_to(State::Stopped(stop));
-            }
+            self.ask(now, asked.map(|axis| (axis, present(axis))), input);
         }
         self.step(now, input, torque)
+    }
+
+    /// Another axis is asked for, whose loop has these gains, or none.
+    #[inline(never)]
+    fn ask(&mut self, now: Instant, asked: Option<(AutotuneAxis, PidGains)>, input: &AutotuneInput<'_>) {
+        self.cancel();
+        if let Some((axis, present)) = asked
+            && let Err(stop) = self.start(now, axis, present, input)
+        {
+            self.axis = axis;
+            self.turn_to(State::Stopped(stop));
+        }
     }
 
     /// Ends it, wherever it is. A result that is there already stays.

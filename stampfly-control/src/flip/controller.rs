@@ -102,6 +102,7 @@ impl FlipController {
     /// One control period of a vehicle whose mode machine knows [`FlightPhase::Flip`]: a flip begins with the phase, in the
     /// direction that the set-point has, and ends with it. `None` while the vehicle's controller flies; so it does, hovering, in
     /// the phase of a flip that is refused. The mode machine has looked at the battery.
+    #[inline]
     pub fn follow(
         &mut self,
         now: Instant,
@@ -111,12 +112,25 @@ impl FlipController {
         unmet: [f32; 4],
     ) -> Option<ControlOutput> {
         let before = core::mem::replace(&mut self.phase, phase);
-        if phase != FlightPhase::Flip {
-            if before == FlightPhase::Flip {
-                self.cancel(now);
-            }
-            return None;
+        if phase == FlightPhase::Flip {
+            return self.turn_over(now, before, setpoint, estimate, unmet);
         }
+        if before == FlightPhase::Flip {
+            self.cancel(now);
+        }
+        None
+    }
+
+    /// In the phase of a flip. Apart, because a vehicle is seldom in it.
+    #[inline(never)]
+    fn turn_over(
+        &mut self,
+        now: Instant,
+        before: FlightPhase,
+        setpoint: &Setpoint,
+        estimate: &StateEstimate,
+        unmet: [f32; 4],
+    ) -> Option<ControlOutput> {
         if before != FlightPhase::Flip
             && let Some(direction) = setpoint.axes.flip()
         {

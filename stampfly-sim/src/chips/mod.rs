@@ -54,7 +54,7 @@ pub use ina3221::Ina3221;
 pub use latency::Latency;
 pub use lines::{ClockLine, DataLine};
 pub use pmw3901::Pmw3901;
-pub use spi::{BitOrder, Controller, SpiBus, SpiPort};
+pub use spi::{Analyser, BitOrder, Controller, Seen, SpiBus, SpiPort};
 pub use vl53l3cx::{ShutdownPin, Vl53l3cx};
 
 use core::cell::Cell;

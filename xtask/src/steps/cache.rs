@@ -3,10 +3,16 @@
 //! Code that is not in the cache is fetched from flash, a line at a time, and the core waits. A pass runs through more code than the cache
 //! holds, so that is most of its time; `cargo xtask qemu`, which counts instructions, does not see it. Here the golden flight is played
 //! once more, with a plug-in of QEMU (`stampfly-board/qemu/cache`) that follows every instruction through the caches. Its counts are
-//! exact for the model. Each runnable's longest activation is held to its budget, which the analysis of the schedule takes for granted. The
-//! model is: caches as esp-hal sets them up, both of them this core's alone, and this replay in place of the
-//! firmware, without drivers, executor and interrupts.
+//! exact for the model. Each runnable's longest activation is held to its budget, which the analysis of the schedule takes for granted.
+//!
+//! That is the flight stack alone. What the core does besides, a second program shows: the firmware's flight task with both drivers of
+//! the SPI and embassy's executor, over a script of what the chips answered ([`core1`]). There, a pass is everything from one inertial
+//! sample to the next, and to its time is added for how long the core itself waits for short transfers.
+//!
+//! The model is: caches as esp-hal sets them up, both of them this core's alone. Not in it are the HAL's registers, the entry of interrupts
+//! and what the other core, which has the radio, takes of the bus to the flash.
 
+use super::core1;
 use super::qemu::{CLOCK, Count, MACHINES, Machine, PACKAGE, counts, inside, program};
 use crate::arguments::Arguments;
 use crate::elf::Names;
@@ -32,31 +38,53 @@ const CLOCKS_A_LINE: f64 = 84.0;
 const FLASH_CLOCK: f64 = 80.0;
 /// Functions shown with what they miss.
 const SHOWN: usize = 12;
+/// What all that the flight core does in a period with motors that may turn may take, us: the mean, and the most, half of the period.
+const BAR: [f64; 2] = [500.0, 1_250.0];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&EMULATED_OTHERS])?;
     let plugin = plugin(repository)?;
     let in_ram = in_ram(repository)?;
     let in_ram: Vec<&str> = in_ram.iter().map(String::as_str).collect();
+    let (script, here) = core1::record(repository)?;
     let mut budget = Budget::read(repository, BUDGET)?;
     let mut failures = Vec::new();
     // Where compilers inline a function differs.
     let mut unmatched = in_ram.clone();
     // An ARM core's code is another one's again; these two stand for the S3's.
     for machine in MACHINES.iter().filter(|machine| machine.stands_for_s3) {
-        let program = program(repository, machine)?;
-        let names = Names::read(&program)?;
-        let ram = names.fitting(&in_ram);
-        unmatched.retain(|pattern| names.fitting(&[pattern]).is_empty());
-        println!("{}: {} bytes of code in RAM", machine.name, ram.iter().map(|it| it.end - it.start).sum::<u64>());
-        let (said, counted) = follow(repository, machine, &plugin, &program, &names, &ram)?;
-        let found = Found::read(&said)?;
-        found.print(machine, &names);
-        failures.extend(found.beyond_budget(machine, &counts(&counted)?)?);
-        for (figure, measured, unit) in found.figures() {
+        let mut figures = Vec::new();
+        let mut follow = |what: &str, program: &Path| -> Result<(Found, String), Failure> {
+            let names = Names::read(program)?;
+            let ram = names.fitting(&in_ram);
+            unmatched.retain(|pattern| names.fitting(&[pattern]).is_empty());
+            println!(
+                "{}, {what}: {} bytes of code in RAM",
+                machine.name,
+                ram.iter().map(|it| it.end - it.start).sum::<u64>()
+            );
+            let (found, said) = follow(repository, machine, &plugin, program, &names, &ram)?;
+            let found = Found::read(&found)?;
+            found.print(machine, &names);
+            Ok((found, said))
+        };
+        let (found, said) = follow("flight stack", &program(repository, machine)?)?;
+        failures.extend(found.beyond_budget(machine, &counts(&said)?)?);
+        figures.extend(found.figures("", "an armed pass"));
+        let (found, said) = follow("flight core", &core1::program(repository, machine, &script)?)?;
+        if core1::bits(&said) != core1::bits(&here) {
+            failures.push(format!(
+                "{}: the flight core does something else than on this PC:\n{said}\n{here}",
+                machine.name
+            ));
+        }
+        let with_core = found.figures("core_", "an armed period of the flight core");
+        failures.extend(beyond_bar(machine, &with_core, core1::waits(&here)?));
+        figures.extend(with_core);
+        for (figure, measured, unit) in figures {
             if arguments.fix {
-                budget.set(&[machine.name, figure], measured)?;
-            } else if let Err(failure) = budget.hold(&[machine.name, figure], measured, unit) {
+                budget.set(&[machine.name, &figure], measured)?;
+            } else if let Err(failure) = budget.hold(&[machine.name, &figure], measured, &unit) {
                 failures.push(failure);
             }
         }
@@ -72,6 +100,23 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
 pub fn in_ram(repository: &Repository) -> Result<Vec<String>, Failure> {
     let list = fs::read_to_string(repository.root.join(IN_RAM)).map_err(|e| format!("{IN_RAM}: {e}"))?;
     Ok(list.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned).collect())
+}
+
+/// Is all that the flight core does within what it may never take? Its longest waiting need not be in its longest period.
+fn beyond_bar(machine: &Machine, figures: &[Figure], waits: [f64; 2]) -> Vec<Failure> {
+    let times = figures.iter().filter(|(name, ..)| name.contains("_us_")).map(|(_, time, _)| time);
+    let mut failures = Vec::new();
+    for (((time, waits), bar), what) in times.zip(waits).zip(BAR).zip(["mean", "most"]) {
+        println!("{}: flight core, {what}: {time:.0} us, and {waits:.0} us of waiting for transfers", machine.name);
+        if time + waits > bar {
+            failures.push(format!(
+                "{}: the flight core takes {:.0} us; {bar} us is the bar",
+                machine.name,
+                time + waits
+            ));
+        }
+    }
+    failures
 }
 
 /// Checks and builds the plug-in.
@@ -99,20 +144,24 @@ fn follow(
     names: &Names,
     ram: &[Range<u64>],
 ) -> Result<(String, String), Failure> {
-    let out = repository.target("qemu-cache").join(format!("{}.txt", machine.name));
+    let name = program.file_name().unwrap_or_default().to_string_lossy().replace('-', "_");
+    let out = repository.target("qemu-cache").join(format!("{}_{name}.txt", machine.name));
     // Of an earlier run.
     let _ = fs::remove_file(&out);
-    let mark = |name: &str| names.address(&format!("stampfly_qemu::marks::{name}"));
+    let mark = |mark: &str| names.address(&format!("{name}::marks::{mark}"));
     let mut words = format!("{},out={}", plugin.display(), out.display());
-    for (word, name) in [
+    for (word, at) in [
         ("begins", "pass_begins"),
         ("ground", "pass_ends_on_ground"),
         ("armed", "pass_ends_armed"),
         ("aside", "aside_begins"),
         ("back", "aside_ends"),
-        ("counts", "counts"),
     ] {
-        words += &format!(",{word}={:x}", mark(name)?);
+        words += &format!(",{word}={:x}", mark(at)?);
+    }
+    // The flight core counts no activations.
+    if let Ok(counts) = mark("counts") {
+        words += &format!(",counts={counts:x}");
     }
     for (word, section) in [("code", ".text"), ("constants", ".rodata")] {
         let range = names.section(section)?;
@@ -152,6 +201,9 @@ impl Cost {
         self.instructions / CLOCK + self.lines * CLOCKS_A_LINE / FLASH_CLOCK
     }
 }
+
+/// Name, figure and unit of what is held.
+type Figure = (String, f64, String);
 
 /// What the plug-in has found.
 struct Found {
@@ -213,16 +265,17 @@ impl Found {
         Ok(failures)
     }
 
-    /// Name, figure and unit of what is held.
-    fn figures(&self) -> [(&'static str, f64, &'static str); 4] {
+    /// What is held of these passes; names begin so.
+    fn figures(&self, name: &str, of: &str) -> [Figure; 4] {
         let mean = |of: fn(&Cost) -> f64| self.passes.iter().map(of).sum::<f64>() / self.passes.len() as f64;
         let most = |of: fn(&Cost) -> f64| self.passes.iter().map(of).fold(0.0, f64::max);
         [
-            ("lines_mean", mean(|cost| cost.lines), "lines fetched in an armed pass"),
-            ("lines_most", most(|cost| cost.lines), "lines fetched in an armed pass"),
-            ("us_mean", mean(Cost::time), "us an armed pass"),
-            ("us_most", most(Cost::time), "us an armed pass"),
+            ("lines_mean", mean(|cost| cost.lines), "lines fetched in"),
+            ("lines_most", most(|cost| cost.lines), "lines fetched in"),
+            ("us_mean", mean(Cost::time), "us"),
+            ("us_most", most(Cost::time), "us"),
         ]
+        .map(|(figure, measured, unit)| (format!("{name}{figure}"), measured, format!("{unit} {of}")))
     }
 
     fn print(&self, machine: &Machine, names: &Names) {
@@ -252,7 +305,7 @@ mod tests {
     #[test]
     fn armed_passes_are_what_is_held() {
         let found = Found::read(&said(199)).expect("understood");
-        let [(_, mean, _), (_, most, _), (_, _, _), (_, longest, _)] = found.figures();
+        let [(_, mean, _), (_, most, _), (_, _, _), (_, longest, _)] = found.figures("", "a pass");
         assert_eq!((mean, most), (10.45, 100.0));
         assert_eq!(longest, 20.0 + 105.0);
         assert_eq!(found.lines, BTreeMap::from([(0x8000_1000, 7.0)]));
@@ -270,6 +323,14 @@ mod tests {
         // A third one never ran.
         let three = [count("a", Some(200.0)), count("b", Some(9.0)), count("c", Some(9.0))];
         assert!(found.beyond_budget(&MACHINES[1], &three).is_err());
+    }
+
+    #[test]
+    fn the_flight_core_has_bars() {
+        let figures = Found::read(&said(199)).expect("understood").figures("core_", "a period");
+        assert!(beyond_bar(&MACHINES[1], &figures, [478.0, 1_125.0]).is_empty());
+        assert_eq!(beyond_bar(&MACHINES[1], &figures, [480.0, 1_125.0]).len(), 1);
+        assert_eq!(beyond_bar(&MACHINES[1], &figures, [0.0, 1_126.0]).len(), 1);
     }
 
     #[test]

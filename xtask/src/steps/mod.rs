@@ -10,6 +10,7 @@ pub mod campaign;
 pub mod clients;
 pub mod clippy;
 pub mod constants;
+mod core1;
 pub mod cortex_m4f;
 pub mod coverage;
 pub mod demo;

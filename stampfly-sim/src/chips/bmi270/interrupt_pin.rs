@@ -7,7 +7,7 @@
 
 use super::Bmi270;
 use super::interrupt::Interrupt;
-use crate::chips::SpiPort;
+use crate::chips::{Seen, SpiBus, SpiPort};
 use crate::time::Clock;
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -42,6 +42,7 @@ use std::rc::Rc;
 #[derive(Clone, Debug)]
 pub struct InterruptPin {
     clock: Clock,
+    bus: SpiBus,
     chip: Rc<RefCell<Bmi270>>,
 }
 
@@ -50,7 +51,7 @@ impl SpiPort<Bmi270> {
     #[must_use]
     pub fn interrupt_pin(&self) -> InterruptPin {
         let (clock, chip) = self.chip();
-        InterruptPin { clock, chip }
+        InterruptPin { clock, bus: self.bus(), chip }
     }
 }
 
@@ -98,7 +99,9 @@ impl InputPin for InterruptPin {
 
 impl Wait for InterruptPin {
     async fn wait_for_high(&mut self) -> Result<(), Infallible> {
-        self.until(|pin| pin.high).await
+        self.until(|pin| pin.high).await?;
+        self.bus.note(Seen::PinHigh(self.clock.now()));
+        Ok(())
     }
 
     async fn wait_for_low(&mut self) -> Result<(), Infallible> {

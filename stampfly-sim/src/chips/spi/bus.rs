@@ -1,6 +1,7 @@
 //! The wires of an SPI bus and the processor's end of them: controller, levels, software, and what may go wrong for all chips
 //! alike. A chip's place on it is [`SpiPort`](super::SpiPort).
 
+use super::analyser::{Analyser, Seen};
 use super::wire::{BitOrder, Controller, Levels};
 use crate::chips::Latency;
 use crate::noise::Noise;
@@ -26,6 +27,9 @@ pub(super) struct State {
     /// No transfer moves whole bytes.
     pub edge_by_edge: Cell<bool>,
     pub latency: Cell<Latency>,
+    /// Chips soldered so far.
+    pub chips: Cell<usize>,
+    pub analyser: RefCell<Option<Analyser>>,
 }
 
 /// The wires that all chips share.
@@ -54,6 +58,8 @@ impl SpiBus {
             levels: Cell::default(),
             edge_by_edge: Cell::new(false),
             latency: Cell::default(),
+            chips: Cell::default(),
+            analyser: RefCell::default(),
         }))
     }
 
@@ -65,6 +71,19 @@ impl SpiBus {
     /// From now on the software takes so long.
     pub fn set_latency(&self, latency: Latency) {
         self.0.latency.set(latency);
+    }
+
+    /// From now on an analyser writes down what goes over the bus.
+    #[must_use]
+    pub fn analyse(&self) -> Analyser {
+        self.0.analyser.borrow_mut().get_or_insert_default().clone()
+    }
+
+    /// Shows something to the analyser, if there is one.
+    pub(in crate::chips) fn note(&self, seen: Seen) {
+        if let Some(analyser) = &*self.0.analyser.borrow() {
+            analyser.note(seen);
+        }
     }
 
     /// Sends a zero in this mode while no chip is selected. Afterwards the clock idles at the level of that mode, whatever the controller.

@@ -1,5 +1,6 @@
 //! One chip on an SPI bus: what a transfer of its driver costs, and what goes through it.
 
+use super::analyser::Seen;
 use super::bus::SpiBus;
 use super::wire::{self, BitOrder, Controller, Levels, Wire};
 use crate::chips::fault::{Attached, carry};
@@ -18,6 +19,8 @@ const TOO_FAST: f64 = 0.05;
 /// One chip's place on the bus. Implements the `SpiDevice` traits of embedded-hal, `async` and blocking.
 pub struct SpiPort<C> {
     bus: SpiBus,
+    /// On the bus, in the order of soldering.
+    number: usize,
     chip: Rc<RefCell<C>>,
     attached: Attached,
     /// Nanoseconds per byte.
@@ -69,6 +72,7 @@ impl SpiBus {
         (
             SpiPort {
                 bus: self.clone(),
+                number: self.0.chips.replace(self.0.chips.get() + 1),
                 chip,
                 attached: attached.clone(),
                 byte,
@@ -205,6 +209,28 @@ impl<C: SpiChip> SpiPort<C> {
         chip.release(end);
     }
 
+    /// Shows a transfer that is over to the analyser.
+    fn show(&self, operations: &[Operation<'_, u8>], transfer: &Transfer) {
+        if self.bus.0.analyser.borrow().is_none() {
+            return;
+        }
+        let (mut wrote, mut read) = (Vec::new(), Vec::new());
+        for operation in operations {
+            match operation {
+                Operation::Write(bytes) => wrote.extend_from_slice(bytes),
+                Operation::Read(bytes) => read.extend_from_slice(bytes),
+                Operation::TransferInPlace(bytes) => read.extend_from_slice(bytes),
+                Operation::Transfer(into, from) => {
+                    wrote.extend_from_slice(from);
+                    read.extend_from_slice(into);
+                }
+                Operation::DelayNs(_) => {}
+            }
+        }
+        let Transfer { start: begun, end: ended, blocks: blocked, .. } = *transfer;
+        self.bus.note(Seen::Transfer { chip: self.number, begun, ended, blocked, wrote, read });
+    }
+
     /// Calls `byte` for every byte of a transfer, with its number, what is sent, and at how many nanoseconds after the start it begins. What
     /// that gives is read.
     fn each(
@@ -281,6 +307,7 @@ impl<C: SpiChip> embedded_hal_async::spi::SpiDevice for SpiPort<C> {
         }
         transfer.outcome?;
         self.exchange(operations, &transfer);
+        self.show(operations, &transfer);
         Ok(())
     }
 }
@@ -293,6 +320,7 @@ impl<C: SpiChip> embedded_hal::spi::SpiDevice for SpiPort<C> {
         state.clock.advance_to(transfer.end);
         transfer.outcome?;
         self.exchange(operations, &transfer);
+        self.show(operations, &transfer);
         Ok(())
     }
 }
