@@ -22,10 +22,16 @@
 //! Strict on purpose: a field that is not known, a number that is not finite or out of its range, a text that is too long
 //! refuse the whole ask.
 
+mod guided;
+mod incoming;
+mod reply;
+
+pub use guided::{Axis, Direction, FARTHEST, Guided, HIGHEST, Mode, Sticks};
+pub use incoming::{FASTEST_RATE, Incoming, MOST_TOPICS};
+pub use reply::{Reply, reply_text};
+
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
-use stampfly_types::Vec3;
-use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
+use serde_json::{Map, Value};
 use std::fmt;
 
 /// Longest ask, bytes.
@@ -102,169 +108,6 @@ pub enum Ask {
 
 /// Most virtual seconds in a second of the wall.
 pub const FASTEST: f32 = 100.0;
-
-/// A guided command: what programs ask of a vehicle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Guided {
-    /// Allow the motors.
-    Arm {},
-    /// Land if flying, then stop the motors.
-    Disarm {},
-    /// Rise.
-    TakeOff {
-        /// Above the present place, m, above 0 and at most [`HIGHEST`].
-        height: f32,
-    },
-    /// Forget the route, and go there.
-    GoTo {
-        /// Relative to the origin, m.
-        north: f32,
-        /// Relative to the origin, m.
-        east: f32,
-        /// Above the origin, m.
-        up: f32,
-        /// Heading at the goal, rad from north, clockwise.
-        yaw: f32,
-        /// Highest speed, m/s; 0, or left out, is the vehicle's default.
-        #[serde(default)]
-        speed: f32,
-        /// Time to stay there, s.
-        #[serde(default)]
-        dwell: f32,
-    },
-    /// Forget the route and stay here.
-    Hold {},
-    /// Land here.
-    Land {},
-    /// Motors off now.
-    Kill {},
-    /// Turn over once.
-    Flip {
-        /// Which way.
-        direction: Direction,
-    },
-    /// Tune one rate loop, from a hover; any other command ends it.
-    Autotune {
-        /// Which one.
-        axis: Axis,
-    },
-}
-
-/// Highest take-off, m.
-pub const HIGHEST: f32 = 100.0;
-/// Farthest way-point along each axis, m.
-pub const FARTHEST: f32 = 1000.0;
-
-/// Which way to turn over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Direction {
-    /// Left wing down.
-    Left,
-    /// Right wing down.
-    Right,
-    /// Nose down.
-    Forward,
-    /// Nose up.
-    Back,
-}
-
-/// An axis of the body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Axis {
-    /// Forward.
-    Roll,
-    /// Right.
-    Pitch,
-    /// Down.
-    Yaw,
-}
-
-/// Sticks and switches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sticks {
-    /// −1 to 1, right positive.
-    pub roll: f32,
-    /// −1 to 1, forward positive.
-    pub pitch: f32,
-    /// −1 to 1, clockwise seen from above positive.
-    pub yaw: f32,
-    /// −1 to 1, up positive, spring centred.
-    pub throttle: f32,
-    /// The flight mode.
-    pub mode: Mode,
-    /// Arm switch.
-    pub arm: bool,
-    /// Motors off now.
-    pub kill: bool,
-}
-
-/// A flight mode, as sticks name it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mode {
-    /// Sticks command rates.
-    Acro,
-    /// Sticks command angles.
-    Stabilize,
-    /// Throttle commands climb rate.
-    AltHold,
-    /// Sticks command velocities.
-    #[default]
-    PosHold,
-}
-
-impl From<Mode> for FlightMode {
-    fn from(mode: Mode) -> Self {
-        match mode {
-            Mode::Acro => Self::Acro,
-            Mode::Stabilize => Self::Stabilize,
-            Mode::AltHold => Self::AltHold,
-            Mode::PosHold => Self::PosHold,
-        }
-    }
-}
-
-impl From<Sticks> for PilotInput {
-    fn from(sticks: Sticks) -> Self {
-        let Sticks { roll, pitch, yaw, throttle, mode, arm, kill } = sticks;
-        Self { roll, pitch, yaw, throttle, mode: mode.into(), arm, kill }
-    }
-}
-
-/// ```
-/// use stampfly_sim::ask::Guided;
-/// use stampfly_types::messages::{GuidedCommand, GuidedKind};
-///
-/// let command = GuidedCommand::from(Guided::TakeOff { height: 0.5 });
-/// assert_eq!((command.kind, command.position.z), (GuidedKind::TakeOff, -0.5));
-/// ```
-impl From<Guided> for GuidedCommand {
-    fn from(guided: Guided) -> Self {
-        let plain = |kind| Self { kind, ..Self::default() };
-        match guided {
-            Guided::Arm {} => plain(GuidedKind::Arm),
-            Guided::Disarm {} => plain(GuidedKind::Disarm),
-            Guided::TakeOff { height } => Self { position: Vec3::new(0.0, 0.0, -height), ..plain(GuidedKind::TakeOff) },
-            Guided::GoTo { north, east, up, yaw, speed, dwell } => {
-                Self { kind: GuidedKind::WayPoint, position: Vec3::new(north, east, -up), yaw, speed, dwell }
-            }
-            Guided::Hold {} => plain(GuidedKind::Hold),
-            Guided::Land {} => plain(GuidedKind::Land),
-            Guided::Kill {} => plain(GuidedKind::Kill),
-            Guided::Flip { direction: Direction::Left } => plain(GuidedKind::FlipLeft),
-            Guided::Flip { direction: Direction::Right } => plain(GuidedKind::FlipRight),
-            Guided::Flip { direction: Direction::Forward } => plain(GuidedKind::FlipForward),
-            Guided::Flip { direction: Direction::Back } => plain(GuidedKind::FlipBack),
-            Guided::Autotune { axis: Axis::Roll } => plain(GuidedKind::AutotuneRoll),
-            Guided::Autotune { axis: Axis::Pitch } => plain(GuidedKind::AutotunePitch),
-            Guided::Autotune { axis: Axis::Yaw } => plain(GuidedKind::AutotuneYaw),
-        }
-    }
-}
 
 /// Why an ask was refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -345,106 +188,6 @@ pub const NAMES: &[&str] = &[
     "speed",
 ];
 
-/// What a vehicle answers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reply {
-    /// For people.
-    pub text: String,
-    /// The number that was asked for.
-    pub value: Option<f64>,
-}
-
-impl Reply {
-    /// Only words.
-    pub fn text(text: impl Into<String>) -> Self {
-        Self { text: text.into(), value: None }
-    }
-
-    /// A number.
-    #[must_use]
-    pub fn value(value: f64) -> Self {
-        Self { text: value.to_string(), value: Some(value) }
-    }
-}
-
-impl Asked {
-    /// The text that answers it: `{"reply":{"vehicle":0,"id":17,"ok":true,"text":"armed","value":null}}`.
-    #[must_use]
-    pub fn answered(&self, answer: Result<Reply, String>) -> String {
-        reply_text(Some(self.vehicle), self.id, answer)
-    }
-}
-
-/// The text that answers what came with this id. Without a vehicle, the server answers.
-#[must_use]
-pub fn reply_text(vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) -> String {
-    let (ok, Reply { text, value }) = match answer {
-        Ok(reply) => (true, reply),
-        Err(text) => (false, Reply::text(text)),
-    };
-    json!({ "reply": { "vehicle": vehicle, "id": id, "ok": ok, "text": text, "value": value } }).to_string()
-}
-
-/// Any text of a client: an ask of a vehicle, or of the server itself.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Incoming {
-    /// From now on, send the state of these topics this often: `{"id":1,"do":"subscribe","topics":["estimate_state"],"rate":50}`.
-    Subscribe {
-        /// The answer carries it.
-        id: u32,
-        /// Names of topics, at most [`MOST_TOPICS`].
-        topics: Vec<String>,
-        /// Texts a second, 1 to [`FASTEST_RATE`].
-        rate: u8,
-    },
-    /// Of a vehicle.
-    Ask(Asked),
-}
-
-/// Most topics a client can subscribe to.
-pub const MOST_TOPICS: usize = 64;
-/// Most state texts a second.
-pub const FASTEST_RATE: u8 = 50;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Subscribe {
-    #[allow(dead_code, reason = "known, and read before")]
-    r#do: String,
-    topics: Vec<String>,
-    rate: u8,
-}
-
-impl Incoming {
-    /// Reads a text.
-    ///
-    /// # Errors
-    /// The id, as far as there is one, and why it is refused.
-    pub fn parse(text: &str) -> Result<Self, (u32, AskError)> {
-        let mut object = object(text).map_err(|error| (0, error))?;
-        let id = object.get("id").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());
-        if object.get("do").is_some_and(|name| name == "subscribe") {
-            let id = id.ok_or((0, AskError::Missing("id")))?;
-            object.remove("id");
-            return Self::subscribe(id, object).map_err(|error| (id, error));
-        }
-        Asked::from_object(object).map(Self::Ask).map_err(|error| (id.unwrap_or_default(), error))
-    }
-
-    fn subscribe(id: u32, object: Map<String, Value>) -> Result<Self, AskError> {
-        let Subscribe { topics, rate, .. } =
-            serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
-        if topics.len() > MOST_TOPICS {
-            return Err(AskError::OutOfRange("topics"));
-        }
-        topics.iter().try_for_each(|topic| printable(topic))?;
-        if !(1..=FASTEST_RATE).contains(&rate) {
-            return Err(AskError::OutOfRange("rate"));
-        }
-        Ok(Self::Subscribe { id, topics, rate })
-    }
-}
-
 impl Ask {
     /// Its name: the value of `do`.
     ///
@@ -497,23 +240,6 @@ impl Ask {
     }
 }
 
-impl Guided {
-    fn check(&self, within: &dyn Fn(&'static str, f32, f32, f32) -> Result<(), AskError>) -> Result<(), AskError> {
-        match *self {
-            Self::TakeOff { height } => within("height", height, 0.05, HIGHEST),
-            Self::GoTo { north, east, up, yaw, speed, dwell } => {
-                within("north", north, -FARTHEST, FARTHEST)?;
-                within("east", east, -FARTHEST, FARTHEST)?;
-                within("up", up, -HIGHEST, HIGHEST)?;
-                within("yaw", yaw, -7.0, 7.0)?;
-                within("speed", speed, 0.0, 100.0)?;
-                within("dwell", dwell, 0.0, 3600.0)
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
 fn printable(text: &str) -> Result<(), AskError> {
     if text.len() > LONGEST_TEXT {
         return Err(AskError::TooLong);
@@ -525,6 +251,8 @@ fn printable(text: &str) -> Result<(), AskError> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use stampfly_types::Vec3;
+    use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
 
     fn with(rest: &str) -> Result<Ask, AskError> {
         Asked::parse(&format!(r#"{{"vehicle":2,"id":7,{rest}}}"#)).map(|asked| asked.ask)

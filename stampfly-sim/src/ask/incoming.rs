@@ -1,0 +1,65 @@
+//! What a client may send: an ask of a vehicle, or one of the server itself.
+
+use super::{AskError, Asked, object, printable};
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+/// Any text of a client: an ask of a vehicle, or of the server itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Incoming {
+    /// From now on, send the state of these topics this often: `{"id":1,"do":"subscribe","topics":["estimate_state"],"rate":50}`.
+    Subscribe {
+        /// The answer carries it.
+        id: u32,
+        /// Names of topics, at most [`MOST_TOPICS`].
+        topics: Vec<String>,
+        /// Texts a second, 1 to [`FASTEST_RATE`].
+        rate: u8,
+    },
+    /// Of a vehicle.
+    Ask(Asked),
+}
+
+/// Most topics a client can subscribe to.
+pub const MOST_TOPICS: usize = 64;
+/// Most state texts a second.
+pub const FASTEST_RATE: u8 = 50;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Subscribe {
+    #[allow(dead_code, reason = "known, and read before")]
+    r#do: String,
+    topics: Vec<String>,
+    rate: u8,
+}
+
+impl Incoming {
+    /// Reads a text.
+    ///
+    /// # Errors
+    /// The id, as far as there is one, and why it is refused.
+    pub fn parse(text: &str) -> Result<Self, (u32, AskError)> {
+        let mut object = object(text).map_err(|error| (0, error))?;
+        let id = object.get("id").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());
+        if object.get("do").is_some_and(|name| name == "subscribe") {
+            let id = id.ok_or((0, AskError::Missing("id")))?;
+            object.remove("id");
+            return Self::subscribe(id, object).map_err(|error| (id, error));
+        }
+        Asked::from_object(object).map(Self::Ask).map_err(|error| (id.unwrap_or_default(), error))
+    }
+
+    fn subscribe(id: u32, object: Map<String, Value>) -> Result<Self, AskError> {
+        let Subscribe { topics, rate, .. } =
+            serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
+        if topics.len() > MOST_TOPICS {
+            return Err(AskError::OutOfRange("topics"));
+        }
+        topics.iter().try_for_each(|topic| printable(topic))?;
+        if !(1..=FASTEST_RATE).contains(&rate) {
+            return Err(AskError::OutOfRange("rate"));
+        }
+        Ok(Self::Subscribe { id, topics, rate })
+    }
+}
