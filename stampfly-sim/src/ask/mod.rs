@@ -252,7 +252,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use stampfly_types::Vec3;
-    use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
+    use stampfly_types::messages::{GuidedCommand, GuidedKind};
 
     fn with(rest: &str) -> Result<Ask, AskError> {
         Asked::parse(&format!(r#"{{"vehicle":2,"id":7,{rest}}}"#)).map(|asked| asked.ask)
