@@ -227,7 +227,8 @@ impl<R> CascadeController<R> {
 }
 
 impl<R: RateLaw> Controller for CascadeController<R> {
-    #[inline]
+    // By itself for each rate law: a vehicle that can choose keeps the one it flies with in fast memory.
+    #[inline(never)]
     fn follow(&mut self, now: Instant, intent: Option<Intent>, input: &ControlInput<'_>) -> ControlOutput {
         let dt = self.timer.step(now);
         if input.flight_status.control_resets != self.resets {

@@ -134,8 +134,7 @@ impl IndiRate {
 }
 
 impl RateLaw for IndiRate {
-    // As the geometric controller: a vehicle that can choose seldom has it.
-    #[inline(never)]
+    #[inline]
     fn step(&mut self, target: &Vec3, measured: &Vec3, dt: f32, unmet: [f32; 4], held: [bool; 3]) -> Vec3 {
         let config = &self.config;
         let [roll, pitch, yaw, _] = unmet;

@@ -434,6 +434,8 @@ impl Eskf {
     }
 
     /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.
+    // Once in four steps or more: apart, so that the code of every step is short and can be kept in fast memory.
+    #[inline(never)]
     fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
         if self.anchor.is_some() {
             if let Some(shift) = self.standing.step(dt, &accel, &self.rate) {

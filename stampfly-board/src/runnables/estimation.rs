@@ -51,6 +51,7 @@ impl Runnable for Estimation {
     }
 }
 
+#[inline(never)]
 fn step(of: &mut impl Estimator, (started, pacer): (&mut bool, &mut Pacer), on: &Activation, ends: &mut Ends<'_>) {
     let (now, calibration) = (on.now(), ends.calibration.get());
     if calibration.complete && !*started {

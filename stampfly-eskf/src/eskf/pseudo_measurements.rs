@@ -22,6 +22,8 @@ const HEADING_SIGMA: f32 = 1e-3;
 impl Eskf {
     /// Zero-velocity and zero-displacement update (ZUPT) of a stationary vehicle, which makes the accelerometer's bias
     /// observable.
+    // On the ground only.
+    #[inline(never)]
     pub(super) fn constrain_stationary(&mut self, anchor: Vec3) {
         let sigma = self.config.stationary_velocity_sigma;
         self.constrain(aid::velocity::world(&self.state), [0.0; 3], sigma);

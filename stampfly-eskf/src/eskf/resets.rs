@@ -85,6 +85,8 @@ impl Eskf {
     }
 
     /// Takes a jump that was the gyro's own out of bias, attitude and velocity.
+    // Hardly ever.
+    #[inline(never)]
     pub(super) fn correct_gyro(&mut self, jump: &GyroJump) {
         let turned = jump.rate.map(|rate| rate * jump.age);
         let mut correction = [0.0; N];
@@ -248,6 +250,8 @@ impl Eskf {
     }
 
     /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
+    // As the pseudo-measurements, not in every step.
+    #[inline(never)]
     pub(super) fn judge_range(&mut self) {
         if let Some(Correction { climb, bias, higher }) = self.vertical.judge(self.now, self.height()) {
             self.state.velocity.z = -climb;
