@@ -29,6 +29,8 @@ pub struct Flash {
     words_left: Option<usize>,
     /// What the word under way becomes when the power fails: none of its zeros, or some of them.
     torn: bool,
+    /// Bytes of the word under way that are complete when the power fails.
+    complete: usize,
     /// Says that it has written, and has not.
     pub deaf: bool,
     pub words_written: usize,
@@ -42,12 +44,18 @@ impl Flash {
 
     /// What somebody else has left.
     pub fn with(bytes: Vec<u8>) -> Self {
-        Self { bytes, words_left: None, torn: false, deaf: false, words_written: 0 }
+        Self { bytes, words_left: None, torn: false, complete: 0, deaf: false, words_written: 0 }
     }
 
     /// Fails after so many words, in the middle of the next one if `torn`.
     pub fn cut_after(mut self, words: usize, torn: bool) -> Self {
         (self.words_left, self.torn) = (Some(words), torn);
+        self
+    }
+
+    /// Fails after so many bytes, in the middle of the next one if `torn`.
+    pub fn cut_after_bytes(mut self, bytes: usize, torn: bool) -> Self {
+        (self.words_left, self.complete, self.torn) = (Some(bytes / 4), bytes % 4, torn);
         self
     }
 
@@ -60,12 +68,14 @@ impl Flash {
         let word = &mut self.bytes[offset..offset + 4];
         match &mut self.words_left {
             Some(0) => {
-                if self.torn {
-                    // Some bits have changed and some have not.
-                    for (index, byte) in word.iter_mut().enumerate() {
+                let (complete, torn) = (core::mem::take(&mut self.complete), core::mem::take(&mut self.torn));
+                for (index, byte) in word.iter_mut().enumerate() {
+                    if index < complete {
+                        *byte = change(*byte, index);
+                    } else if torn {
+                        // Some bits have changed and some have not.
                         *byte = (*byte & 0x55) | (change(*byte, index) & 0xAA);
                     }
-                    self.torn = false;
                 }
                 return Err(FlashError::PowerCut);
             }
