@@ -9,7 +9,7 @@ use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, calculate_crc};
 
 const STX_1: u8 = 0xFE;
-const STX_2: u8 = 0xFD;
+pub(super) const STX_2: u8 = 0xFD;
 /// From the start to the payload.
 const HEADER_1: usize = 6;
 const HEADER_2: usize = 10;
