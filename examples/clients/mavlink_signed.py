@@ -1,10 +1,14 @@
 """Signs with pymavlink, and shows that others are ignored: python mavlink_signed.py tcp:192.0.2.7:5760 KEY_FILE"""
 
+import os
 import sys
 import time
 
-from pymavlink import mavutil
-from pymavlink.dialects.v20 import common as mavlink
+# From the first message on: version 1 has no signatures.
+os.environ["MAVLINK20"] = "1"
+
+from pymavlink import mavutil  # noqa: E402
+from pymavlink.dialects.v20 import common as mavlink  # noqa: E402
 
 
 def connect(address, key=None):
