@@ -347,6 +347,12 @@ impl Eskf {
         let innovation = self.innovation(&self.current_state(), rows, values, [sigma * sigma; M]);
         let ratio = self.test_ratio(&innovation);
         _ = self.update(&innovation, ratio);
+        // Much less nearly all of it may be less than nothing, by its last digit: what is left then is the constraint's own.
+        for state in (VELOCITY..VELOCITY + 3).chain(POSITION..POSITION + 3) {
+            if self.covariance.get(state, state) <= 0.0 {
+                self.covariance.reset(state, sigma * sigma);
+            }
+        }
     }
 
     /// What became of a sensor's measurements since this filter was made, restarts included.

@@ -3,10 +3,11 @@
 //! From the protocol's description, [Packet Serialization](https://mavlink.io/en/guide/serialization.html).
 
 use super::signature::Signature;
+use crate::crc16::crc16;
 use crate::heard::Heard;
 use core::marker::PhantomData;
 use mavlink::error::ParserError;
-use mavlink::{MavlinkVersion, Message, calculate_crc};
+use mavlink::{MavlinkVersion, Message};
 
 const STX_1: u8 = 0xFE;
 pub(super) const STX_2: u8 = 0xFD;
@@ -118,9 +119,9 @@ impl Outline {
             _ => return Begun::Nothing,
         };
         let (checked, after) = bytes.split_at_checked(crc_at).unwrap_or_default();
-        let sound = checked.get(1..).is_some_and(|checked| {
-            after.first_chunk() == Some(&calculate_crc(checked, M::extra_crc(id)).to_le_bytes())
-        });
+        let sound = checked
+            .get(1..)
+            .is_some_and(|checked| after.first_chunk() == Some(&crc16(checked, M::extra_crc(id)).to_le_bytes()));
         if sound { Begun::Frame(Self { version, header, crc_at, end }) } else { Begun::Nothing }
     }
 }

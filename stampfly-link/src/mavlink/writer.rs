@@ -2,7 +2,8 @@
 
 use super::frame::{LONGEST, SIGNED, STX_2};
 use super::signing::Signer;
-use mavlink::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message, calculate_crc};
+use crate::crc16::crc16;
+use mavlink::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
 use stampfly_types::Instant;
 
 /// Writes the frames of one sender, and counts them.
@@ -72,7 +73,7 @@ impl MavlinkWriter {
         let checked = header.len() + length;
         put(buffer, &header)?;
         put(buffer.get_mut(header.len()..)?, payload.get(..length)?)?;
-        let crc = calculate_crc(buffer.get(1..checked)?, M::extra_crc(id)).to_le_bytes();
+        let crc = crc16(buffer.get(1..checked)?, M::extra_crc(id)).to_le_bytes();
         put(buffer.get_mut(checked..)?, &crc)?;
         self.sequence = self.sequence.wrapping_add(1);
         buffer.get(..checked + crc.len())
@@ -114,7 +115,7 @@ fn sign<'b, M: Message>(
 ) -> Option<&'b [u8]> {
     // The checksum is over the flag that says that a signature follows.
     *buffer.get_mut(2)? |= SIGNED;
-    let crc = calculate_crc(buffer.get(1..length.checked_sub(2)?)?, M::extra_crc(id));
+    let crc = crc16(buffer.get(1..length.checked_sub(2)?)?, M::extra_crc(id));
     *buffer.get_mut(..length)?.last_chunk_mut()? = crc.to_le_bytes();
     let signature = signer.sign(now, buffer.get(..length)?).to_bytes();
     let end = length + signature.len();
