@@ -20,6 +20,11 @@ def main():
         config = board.CONFIG
         print(f"{config['flightControllerIdentifier']} {config['flightControllerVersion']}, named {config['name']}")
 
+        # Its battery monitor needs a moment after power-on.
+        until = time.monotonic() + 10
+        while board.ANALOG.get("voltage", 0) == 0 and time.monotonic() < until:
+            time.sleep(0.2)
+            ask(board, "MSP_ANALOG")
         for name in ["MSP_STATUS_EX", "MSP_ATTITUDE", "MSP_ALTITUDE", "MSP_RAW_IMU", "MSP_ANALOG", "MSP_RC", "MSP_MOTOR"]:
             ask(board, name)
         roll, pitch, heading = board.SENSOR_DATA["kinematics"]

@@ -3,6 +3,7 @@
 //! | file | what it does |
 //! |---|---|
 //! | `origin.rs` | where on Earth the local frame begins, and what follows for a place |
+//! | `step.rs` | what a mission is made of, and what happens in it |
 //! | `runner.rs` | which step it is, and the commands that it takes |
 //!
 //! A mission is flown with the same guided commands that any program has, one step at a time, through a [`Cockpit`](crate::Cockpit): what flies is
@@ -11,6 +12,8 @@
 
 mod origin;
 mod runner;
+mod step;
 
 pub use origin::Origin;
-pub use runner::{Event, Halt, Runner, Step, Steps};
+pub use runner::Runner;
+pub use step::{Event, Halt, Step, Steps};

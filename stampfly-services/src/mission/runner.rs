@@ -3,10 +3,10 @@
 //! One step at a time is asked of the vehicle, and the next one when the first is seen to be done. The runner never insists: when the pilot takes the sticks,
 //! another program lands, the failsafe acts or whoever started the mission falls silent, it stops asking, and says why. It can be continued at the same step.
 
+use super::step::{Event, Halt, Step, Steps};
 use crate::cockpit::Cockpit;
 use crate::lease::SILENCE;
 use crate::refusal::{Refusal, Seat};
-use core::fmt;
 use stampfly_types::messages::{CommandSource, FlightPhase, GuidedCommand, GuidedKind, StateEstimate, Validity};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
@@ -15,82 +15,6 @@ use stampfly_types::{Duration, Instant, Vec3, frame};
 const NEAR: f32 = 0.25;
 /// So long a command may take to be seen in the vehicle's state.
 const SEEN: Duration = Duration::from_millis(500);
-
-/// One step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Step {
-    /// Rise to this height above the ground, m. Done at once by a vehicle that flies.
-    TakeOff(f32),
-    /// Fly to a place. From the ground, take off first.
-    GoTo {
-        /// World frame, relative to the origin, m.
-        place: Vec3,
-        /// Heading there, rad; `None` keeps the present one.
-        yaw: Option<f32>,
-        /// Reached within this distance, m.
-        radius: Option<f32>,
-        /// Stay for so long; `None` for ever.
-        stay: Option<Duration>,
-    },
-    /// Fly to this place at the present height, north and east, m, if there is one, and land.
-    Land(Option<[f32; 2]>),
-    /// Stay where it is.
-    Wait(Duration),
-    /// From now on this fast, m/s; zero for the vehicle's own speed.
-    Speed(f32),
-}
-
-/// A mission: the step at each place from zero, `None` behind the last.
-pub type Steps<'s> = &'s dyn Fn(usize) -> Option<Step>;
-
-/// Why a mission does not go on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Halt {
-    /// Somebody asked for that, or for something else.
-    Asked,
-    /// The motors are off.
-    Disarmed,
-    /// A pilot flies.
-    Pilot,
-    /// The failsafe flies.
-    Failsafe,
-    /// Somebody else lands it.
-    Landing,
-    /// Whoever started it is not heard any more.
-    Silent,
-    /// The vehicle does not take a command.
-    Refused(Refusal),
-}
-
-impl fmt::Display for Halt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Asked => f.write_str("asked to"),
-            Self::Disarmed => f.write_str("motors are off"),
-            Self::Pilot => f.write_str("a pilot flies"),
-            Self::Failsafe => f.write_str("the failsafe flies"),
-            Self::Landing => f.write_str("it lands"),
-            Self::Silent => f.write_str("nobody is heard"),
-            Self::Refused(refusal) => refusal.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for Halt {}
-
-/// What has happened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Event {
-    /// The step at this place is done.
-    Reached(usize),
-    /// The last one is done.
-    Finished,
-    /// It does not go on by itself.
-    Halted(Halt),
-}
 
 /// Where in a step the vehicle is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,6 +43,12 @@ enum State {
 /// Flies a mission.
 ///
 /// Call [`poll`](Self::poll) about fifty times a second. The steps are the caller's; they must stay the same while it [runs](Self::is_running).
+///
+/// ```
+/// use stampfly_services::mission::Runner;
+/// let runner = Runner::new(0.5);
+/// assert_eq!((runner.current(), runner.is_running(), runner.is_finished()), (0, false, false));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Runner {
     /// Height that it takes off to when the mission does not say one, m.
