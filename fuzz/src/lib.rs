@@ -20,11 +20,14 @@
 //! | [`receiver_bytes`] | a radio receiver or a configurator at a UART | frames mean the same when sent again, every byte is accounted for |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
 //! | [`tello_text`] | any program on the network | what is accepted is within limits, every answer is text that can be read |
+//! | [`services_mavlink`] | ground stations, three at once, with a key and without | what is sent is sound, a command is acknowledged, strangers are not obeyed |
+//! | [`services_msp`] | a configurator | what is sent is sound, an armed vehicle changes nothing |
+//! | [`services_tello`] | programs that speak a Tello's text, three at once | every answer is text, what is asked of the vehicle is within limits |
 //! | [`secure_session`] | the radio, from strangers and from whoever has the key | what was changed or heard before is refused, and is no sign of life |
 //! | [`whole_stack`] | edits of all that a flying vehicle is given | every invariant that an open loop can keep |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |
 //!
-//! With a nightly compiler and cargo-fuzz: `cargo +nightly fuzz run console_line`. A file that fails goes into
+//! With cargo-fuzz: `cargo fuzz run --sanitizer none console_line`, or all of them with `cargo xtask fuzz SECONDS`. A file that fails goes into
 //! `fuzz/corpus/TARGET`, so that the test keeps it.
 
 mod console;
@@ -40,6 +43,7 @@ mod packets;
 mod parameters;
 mod receivers;
 mod secured;
+mod services;
 mod stack;
 mod stream;
 mod tello;
@@ -57,6 +61,7 @@ pub use packets::radio_packets;
 pub use parameters::parameter_image;
 pub use receivers::receiver_bytes;
 pub use secured::secure_session;
+pub use services::{services_mavlink, services_msp, services_tello};
 pub use stack::whole_stack;
 pub use stream::data_stream;
 pub use tello::tello_text;

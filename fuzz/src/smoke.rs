@@ -2,8 +2,8 @@
 
 use crate::{
     console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, hisky,
-    mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session, tello_text, ulog,
-    whole_stack,
+    mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session, services_mavlink,
+    services_msp, services_tello, tello_text, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -150,6 +150,13 @@ fn log_stream() {
 #[test]
 fn secured() {
     smoke("secure_session", secure_session, 100_000);
+}
+
+#[test]
+fn services() {
+    smoke("services_mavlink", services_mavlink, 100_000);
+    smoke("services_msp", services_msp, 100_000);
+    smoke("services_tello", services_tello, 100_000);
 }
 
 #[test]

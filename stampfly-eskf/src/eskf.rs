@@ -347,6 +347,17 @@ impl Eskf {
         let innovation = self.innovation(&self.current_state(), rows, values, [sigma * sigma; M]);
         let ratio = self.test_ratio(&innovation);
         _ = self.update(&innovation, ratio);
+        self.leave_some_variance(sigma * sigma);
+    }
+
+    /// Much less nearly all of it may be less than nothing, by its last digit: what is left of a position or velocity then is the variance of
+    /// what has measured it.
+    fn leave_some_variance(&mut self, measured: f32) {
+        for state in (VELOCITY..VELOCITY + 3).chain(POSITION..POSITION + 3) {
+            if self.covariance.get(state, state) <= 0.0 {
+                self.covariance.reset(state, measured);
+            }
+        }
     }
 
     /// What became of a sensor's measurements since this filter was made, restarts included.

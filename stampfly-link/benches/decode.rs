@@ -1,4 +1,4 @@
-//! A byte of a receiver's stream: our decoders beside the crates `sbus-rs` and `uf-crsf`, over the same bytes, interleaved in one run.
+//! A byte of a stream: our decoders beside the crates `sbus-rs`, `uf-crsf` and `mavlink`, over the same bytes, interleaved in one run.
 //!
 //! Two streams of each protocol: frames one after the other, and frames with three stray bytes before each and every tenth one broken. Every
 //! contender takes a byte at a time, as from a UART, or all that a buffer holds at once, and gives sticks. All of them go into a black box, so
@@ -6,6 +6,8 @@
 //! of 31 interleaved rounds, which is the figure to quote: whatever else the machine does can only slow a round down.
 
 use criterion::{Criterion, Throughput, criterion_group};
+use stampfly_link::mavlink::dialects::common::{ATTITUDE_DATA, MavMessage};
+use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use stampfly_link::msp::{Direction, MspDecoder, MspFrame};
 use stampfly_link::serial::Channels;
 use stampfly_link::serial::crsf::{CrsfDecoder, Message};
@@ -68,6 +70,55 @@ fn msp() -> [Stream; 2] {
         let length = asked.answer(Direction::Reply, &payload).write(&mut bytes).expect("there is room");
         bytes[..length].to_vec()
     })
+}
+
+fn mavlink() -> [Stream; 2] {
+    streams(["MAVLink 2", "MAVLink, disturbed"], |frame| {
+        let roll = frame as f32;
+        let message = MavMessage::ATTITUDE(ATTITUDE_DATA {
+            time_boot_ms: 20 * frame as u32,
+            roll,
+            yawspeed: 0.5,
+            ..Default::default()
+        });
+        let mut bytes = [0; LONGEST];
+        MavlinkWriter::new(1, 1).write(MavlinkVersion::V2, &message, &mut bytes).expect("there is room").to_vec()
+    })
+}
+
+fn roll(message: &MavMessage) -> u32 {
+    if let MavMessage::ATTITUDE(attitude) = black_box(message) { attitude.roll as u32 } else { 0 }
+}
+
+/// Gives a reader of the crate `mavlink` so many bytes at once.
+struct Pieces<'b> {
+    bytes: &'b [u8],
+    most: usize,
+}
+
+impl embedded_io::ErrorType for Pieces<'_> {
+    type Error = core::convert::Infallible;
+}
+
+impl embedded_io::Read for Pieces<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
+        let count = self.bytes.len().min(buffer.len()).min(self.most);
+        let (taken, rest) = self.bytes.split_at(count);
+        buffer[..count].copy_from_slice(taken);
+        self.bytes = rest;
+        Ok(count)
+    }
+}
+
+/// All messages that the crate `mavlink` finds when it is given so many bytes at once.
+fn theirs(bytes: &[u8], most: usize) -> u32 {
+    let mut reader = mavlink::MavlinkReader::new(Pieces { bytes, most });
+    let mut sum = 0;
+    // At the end of the bytes there is an error.
+    while let Ok((_, message)) = reader.read_any_message::<MavMessage>() {
+        sum += roll(&message);
+    }
+    sum
 }
 
 fn contenders(measure: &mut impl Measure) {
@@ -151,6 +202,30 @@ fn contenders(measure: &mut impl Measure) {
             sum
         });
     }
+    for stream in &mavlink() {
+        let mut ours = MavlinkDecoder::<MavMessage>::new();
+        measure.contender(stream, "ours, by byte", |bytes| {
+            let mut sum = 0;
+            for byte in bytes {
+                if let Some(Ok(message)) = ours.feed(*byte).map(|frame| frame.message::<MavMessage>()) {
+                    sum += roll(&message);
+                }
+            }
+            sum
+        });
+        let mut ours = MavlinkDecoder::<MavMessage>::new();
+        measure.contender(stream, "ours, by buffer", |bytes| {
+            let mut sum = 0;
+            for mut buffer in bytes.chunks(64) {
+                while let Some(frame) = ours.read(&mut buffer) {
+                    sum += frame.message::<MavMessage>().map_or(0, |message| roll(&message));
+                }
+            }
+            sum
+        });
+        measure.contender(stream, "mavlink, by byte", |bytes| theirs(bytes, 1));
+        measure.contender(stream, "mavlink, by buffer", |bytes| theirs(bytes, 64));
+    }
     for stream in &msp() {
         let mut ours = MspDecoder::<64>::new();
         measure.contender(stream, "ours, by byte", |bytes| {
@@ -227,7 +302,7 @@ fn ratios() {
             ours = best;
         }
         let ratio = best / ours;
-        println!("{stream:<16} {name:<18} {best:>6.2} ns a byte, sum {found:>7}; this / ours, by byte = {ratio:.2}");
+        println!("{stream:<18} {name:<18} {best:>6.2} ns a byte, sum {found:>7}; this / ours, by byte = {ratio:.2}");
     }
 }
 

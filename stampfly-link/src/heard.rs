@@ -52,6 +52,17 @@ impl<const N: usize> Heard<N> {
         self.length == N
     }
 
+    /// One more, unless it is the first or fills the room: says whether it was neither. Most bytes are, for one comparison.
+    #[inline]
+    pub fn put_inside(&mut self, byte: u8) -> bool {
+        let is_inside = self.length.wrapping_sub(1) < N - 2;
+        if let Some(place) = self.bytes.get_mut(self.length).filter(|_| is_inside) {
+            *place = byte;
+            self.length += 1;
+        }
+        is_inside
+    }
+
     /// As many as there is room for, of `count` at most, off the front of `bytes`.
     pub fn fill(&mut self, count: usize, bytes: &mut &[u8]) {
         let room = self.bytes.get_mut(self.length..).unwrap_or_default();
@@ -77,6 +88,19 @@ impl<const N: usize> Heard<N> {
             self.bytes.copy_within(count..end, 0);
         }
         self.length = self.length.saturating_sub(count);
+    }
+
+    /// All of them were a frame.
+    #[inline]
+    pub const fn take_all(&mut self) {
+        self.length = 0;
+    }
+
+    /// All of them are part of no frame.
+    #[inline]
+    pub const fn discard_all(&mut self) {
+        self.skip(self.length);
+        self.length = 0;
     }
 
     /// The oldest are part of no frame.

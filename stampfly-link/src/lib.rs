@@ -53,6 +53,8 @@ extern crate std;
 mod address;
 mod broadcast;
 mod control;
+#[cfg(feature = "mavlink")]
+mod crc16;
 mod crc8;
 pub mod datagram;
 mod fields;

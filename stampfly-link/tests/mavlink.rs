@@ -173,3 +173,35 @@ proptest! {
         }
     }
 }
+
+proptest! {
+    /// However a stream is cut into buffers, whatever stands between its frames, and whichever of them are broken.
+    #[test]
+    fn a_buffer_has_the_frames_that_its_bytes_have(
+        parts in prop::collection::vec((any::<prop::sample::Index>(), prop::collection::vec(prop_oneof![Just(0xFD), Just(0xFE), Just(0), any::<u8>()], 0..12), 0..4_u8), 0..12),
+        cut in 1..80_usize,
+    ) {
+        let frames = plain();
+        let mut bytes = Vec::new();
+        for (which, noise, broken) in parts {
+            let mut frame = which.get(&frames).clone();
+            if broken == 0 {
+                let middle = frame.len() / 2;
+                frame.remove(middle);
+            }
+            bytes.extend(noise);
+            bytes.extend(frame);
+        }
+        let (mut by_byte, mut by_buffer) = (Decoder::new(), Decoder::new());
+        let mut read = Vec::new();
+        for mut buffer in bytes.chunks(cut) {
+            while let Some(frame) = by_buffer.read(&mut buffer) {
+                read.push(frame.bytes().to_vec());
+            }
+            prop_assert!(buffer.is_empty());
+        }
+        let fed = found(&mut by_byte, &bytes, |frame| frame.bytes().to_vec());
+        prop_assert_eq!(read, fed);
+        prop_assert_eq!(by_buffer.discarded(), by_byte.discarded());
+    }
+}

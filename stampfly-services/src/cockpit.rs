@@ -5,6 +5,7 @@
 //! [`view`](Cockpit::view); a [`Refusal`] says that it did not even get there.
 
 use crate::lease::is_sane;
+use crate::mission::Origin;
 use crate::refusal::{Refusal, Seat};
 use crate::view::View;
 use stampfly_flight::parameters::Parameters;
@@ -65,6 +66,11 @@ pub trait Cockpit {
 
     /// Its parameters.
     fn parameters(&mut self) -> &mut dyn Parameters;
+
+    /// Where on Earth its local frame begins, if the vehicle itself knows.
+    fn origin(&self) -> Option<Origin> {
+        None
+    }
 
     /// Asks the board for something. A vehicle does none of it unless it says so.
     ///

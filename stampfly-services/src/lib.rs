@@ -6,10 +6,12 @@
 //! | [`cockpit`] | what a service sees of a vehicle, and what it may ask for |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`lease`] | one program at a time commands; whoever flies by hand comes first |
+//! | [`mission`] | steps that a vehicle flies one after the other |
 //! | [`telemetry`] | a packet for whoever listens, fifty times a second |
 //! | [`data_stream`] | every control cycle, for whoever asked for it |
 //! | [`tello`] | the text commands of a Tello, and its state |
 //! | [`mavlink`] | the vehicle's end of MAVLink (feature `mavlink`) |
+//! | [`msp`] | the vehicle's end of MSP, for configurators |
 //!
 //! A service takes bytes and the time and gives bytes. It does no input or output, allocates nothing, and every client costs it a
 //! bounded time; sockets in a simulation and a radio on a board are equally good at the other end.
@@ -23,6 +25,8 @@ pub mod data_stream;
 pub mod lease;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
+pub mod mission;
+pub mod msp;
 mod refusal;
 pub mod telemetry;
 pub mod tello;

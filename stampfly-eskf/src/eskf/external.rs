@@ -90,7 +90,9 @@ impl Eskf {
         match self.test_external(Sensor::Velocity, ratio) {
             GateResult::Fuse => {
                 self.aided(&axes.given);
-                Ok(self.update(&innovation, ratio))
+                let fusion = self.update(&innovation, ratio);
+                self.leave_some_variance(LEAST_VELOCITY);
+                Ok(fusion)
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {

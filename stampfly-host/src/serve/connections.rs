@@ -29,6 +29,13 @@ impl Connections {
         }
     }
 
+    /// One that is no TCP connection: what is sent to it waits in this queue.
+    pub fn join(&self, client: Client) -> Receiver<Vec<u8>> {
+        let (queue, waiting) = sync_channel(WAITING);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(client, queue);
+        waiting
+    }
+
     /// Takes connections until the ports are closed.
     pub fn accept(self: &Arc<Self>, port: usize, listener: &TcpListener, events: &Events) {
         if listener.set_nonblocking(true).is_err() {

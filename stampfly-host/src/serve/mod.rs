@@ -9,8 +9,11 @@
 
 mod connections;
 mod events;
+mod key;
 mod option;
 mod ports;
+mod terminal;
 
+pub use key::{Key, KeyError};
 pub use option::{PortOption, PortOptionError};
 pub use ports::{OpenError, OpenPorts, Page};

@@ -5,8 +5,10 @@
 
 use super::connections::Connections;
 use super::events::{self, Event, Events, POLL};
+use super::key::Key;
 use super::option::PortOption;
-use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports, Transport};
+use super::terminal;
+use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports, Signing, Transport};
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::sync::mpsc::Receiver;
@@ -23,22 +25,39 @@ const LONGEST: usize = 2048;
 pub struct OpenError {
     name: &'static str,
     address: SocketAddr,
-    error: std::io::Error,
+    why: Why,
+}
+
+#[derive(Debug)]
+enum Why {
+    Failed(std::io::Error),
+    /// Others could reach it, and there is no key.
+    NoKey,
 }
 
 impl fmt::Display for OpenError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, address, error } = self;
-        write!(
-            f,
-            "port '{name}' at {address}: {error}; '--port {name}=NUMBER' chooses another, '--port {name}=off' none"
-        )
+        let Self { name, address, why } = self;
+        match why {
+            Why::Failed(error) => write!(
+                f,
+                "port '{name}' at {address}: {error}; '--port {name}=NUMBER' chooses another, '--port {name}=off' none"
+            ),
+            Why::NoKey => write!(
+                f,
+                "port '{name}' at {address}: others than programs on this machine reach it, so what is said there must be \
+                 signed; '--key FILE' names the key, '--port {name}=NUMBER' leaves the port on this machine"
+            ),
+        }
     }
 }
 
 impl std::error::Error for OpenError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        Some(&self.error)
+        match &self.why {
+            Why::Failed(error) => Some(error),
+            Why::NoKey => None,
+        }
     }
 }
 
@@ -60,6 +79,8 @@ pub struct OpenPorts {
     connections: Arc<Connections>,
     page: Option<(usize, Box<dyn Page>)>,
     places: Vec<(&'static PortSpec, SocketAddr)>,
+    terminals: Vec<(&'static PortSpec, String)>,
+    key: Option<Key>,
     specs: &'static [PortSpec],
 }
 
@@ -70,11 +91,16 @@ impl fmt::Debug for OpenPorts {
 }
 
 impl OpenPorts {
-    /// Opens those of the `number`-th vehicle, from zero, where the options want them.
+    /// Opens those of the `number`-th vehicle, from zero, where the options want them. What is said at ports that others can reach is signed with the key.
     ///
     /// # Errors
-    /// When one cannot be opened: another program has it.
-    pub fn open(ports: &'static [PortSpec], options: &[PortOption], number: usize) -> Result<Self, OpenError> {
+    /// When one cannot be opened: another program has it, or it must be signed and there is no key.
+    pub fn open(
+        ports: &'static [PortSpec],
+        options: &[PortOption],
+        number: usize,
+        key: Option<Key>,
+    ) -> Result<Self, OpenError> {
         let (events, heard) = events::queue();
         let connections = Arc::new(Connections::default());
         let mut opened = Self {
@@ -83,13 +109,18 @@ impl OpenPorts {
             connections: Arc::clone(&connections),
             page: None,
             places: Vec::new(),
+            terminals: Vec::new(),
+            key,
             specs: ports,
             events: events.clone(),
         };
         for (port, spec) in ports.iter().enumerate() {
             let mut socket = None;
             if let Some(address) = PortOption::place(options, spec, number) {
-                let failed = |error| OpenError { name: spec.name, address, error };
+                let failed = |error| OpenError { name: spec.name, address, why: Why::Failed(error) };
+                if spec.signed && !address.ip().is_loopback() && opened.key.is_none() {
+                    return Err(OpenError { name: spec.name, address, why: Why::NoKey });
+                }
                 let place = match spec.transport {
                     Transport::Udp => {
                         socket = Some(UdpSocket::bind(address).map_err(failed)?);
@@ -107,6 +138,12 @@ impl OpenPorts {
                         let (connections, events) = (Arc::clone(&connections), events.clone());
                         std::thread::spawn(move || connections.accept(port, &listener, &events));
                         place
+                    }
+                    Transport::Terminal => {
+                        let name = terminal::open(Client { port, address }, &connections, &events).map_err(failed)?;
+                        opened.terminals.push((spec, name));
+                        opened.sockets.push(None);
+                        continue;
                     }
                     // Served for all vehicles together.
                     Transport::Page => address,
@@ -127,6 +164,12 @@ impl OpenPorts {
     #[must_use]
     pub fn places(&self) -> &[(&'static PortSpec, SocketAddr)] {
         &self.places
+    }
+
+    /// The name of each port that is a pseudo-terminal.
+    #[must_use]
+    pub fn terminals(&self) -> &[(&'static PortSpec, String)] {
+        &self.terminals
     }
 
     /// The vehicle was restarted, and knows nobody: it is told again who is connected.
@@ -200,6 +243,17 @@ impl Ports for OpenPorts {
         } else {
             self.connections.send(to, bytes);
         }
+    }
+
+    fn is_local(&self, port: usize) -> bool {
+        let name = self.specs.get(port).map(|spec| spec.name);
+        let place = self.places.iter().find(|(spec, _)| Some(spec.name) == name);
+        let everywhere = self.key.as_ref().is_some_and(Key::is_everywhere);
+        place.is_none_or(|(_, address)| address.ip().is_loopback() && !everywhere)
+    }
+
+    fn signing(&self) -> Option<Signing> {
+        self.key.as_ref().map(Key::signing)
     }
 
     fn are_closed(&self) -> bool {

@@ -19,6 +19,6 @@ pub mod signing;
 mod writer;
 
 pub use frame::{LONGEST, MavlinkDecoder, MavlinkFrame};
-pub use mavlink::{MavHeader, MavlinkVersion, Message, dialects, error::ParserError};
+pub use mavlink::{MavHeader, MavlinkVersion, Message, MessageData, dialects, error::ParserError};
 pub use signature::Signature;
 pub use writer::MavlinkWriter;

@@ -169,6 +169,9 @@ impl SbusDecoder {
     #[inline]
     pub fn feed(&mut self, at: Instant, byte: u8) -> Option<SbusFrame> {
         self.pause(at);
+        if self.heard.put_inside(byte) {
+            return None;
+        }
         // What does not begin as a frame is none.
         if self.heard.is_empty() && byte != START {
             self.heard.skip(1);
@@ -213,23 +216,37 @@ impl SbusDecoder {
     /// A pause ends what was not whole.
     #[inline]
     fn pause(&mut self, at: Instant) {
-        if at.since(self.newest) >= PAUSE {
-            self.heard.discard(self.heard.len());
+        // Bytes that came together have one time.
+        if at != self.newest {
+            if at.since(self.newest) >= PAUSE {
+                self.heard.discard_all();
+            }
+            self.newest = at;
         }
-        self.newest = at;
     }
 
     /// The frame that all bytes are, or those from the next one on that may begin one.
     #[inline]
     fn ended(&mut self) -> Option<SbusFrame> {
-        if let Some(Ok(frame)) = self.heard.whole().map(SbusFrame::decode) {
-            self.heard.take(SbusFrame::LENGTH);
+        let whole = self.heard.whole()?;
+        if let Ok(frame) = SbusFrame::decode(whole) {
+            self.heard.take_all();
             return Some(frame);
         }
-        let later = self.heard.bytes().iter().skip(1).position(|byte| *byte == START);
-        self.heard.discard(later.map_or(self.heard.len(), |later| later + 1));
+        self.heard.discard(begins_later(whole));
         None
     }
+}
+
+/// Where the next frame may begin, behind the first byte.
+// Most often it is near: not worth the instructions that compare sixteen bytes at once, nor their place among others.
+#[inline(never)]
+fn begins_later(bytes: &[u8; SbusFrame::LENGTH]) -> usize {
+    let mut place = 1;
+    while bytes.get(place).is_some_and(|byte| *byte != START) {
+        place += 1;
+    }
+    place
 }
 
 #[cfg(test)]

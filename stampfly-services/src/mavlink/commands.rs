@@ -5,10 +5,13 @@
 //! [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
 
 use super::client::{Client, Put};
-use super::identity::Identity;
+use super::identity::Own;
+use super::missions::Missions;
 use super::streams::{STREAMS, make, text};
 use crate::cockpit::{Cockpit, Request};
 use crate::refusal::{Refusal, Seat};
+use core::fmt::Write;
+use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant, Vec3, frame};
@@ -40,81 +43,174 @@ fn whole(number: f32) -> Option<u32> {
     (number.is_finite() && (0.0..=16_777_215.0).contains(&number)).then_some(number as u32)
 }
 
-/// Does what is asked, and acknowledges it.
-pub(super) fn obey<C>(
-    now: Instant,
-    identity: &Identity,
-    client: &mut Client<C>,
-    seat: Seat,
-    command: &Command,
-    cockpit: &mut dyn Cockpit,
-    put: Put<'_, C>,
-) {
-    let result = outcome(now, identity, client, seat, command, cockpit, put);
-    client.send(&MavMessage::COMMAND_ACK(COMMAND_ACK_DATA { command: command.kind, result }), put);
+/// What a command meets: the vehicle, who asks, and where answers go.
+pub(super) struct Turn<'t, 'p, C> {
+    pub now: Instant,
+    pub own: &'t Own,
+    pub client: &'t mut Client<C>,
+    pub missions: &'t mut Missions<C>,
+    pub seat: Seat,
+    pub cockpit: &'t mut dyn Cockpit,
+    pub put: Put<'p, C>,
 }
 
-fn outcome<C>(
-    now: Instant,
-    identity: &Identity,
-    client: &mut Client<C>,
-    seat: Seat,
-    Command { kind, parameters: [p1, p2, p3, .., p7] }: &Command,
-    cockpit: &mut dyn Cockpit,
-    put: Put<'_, C>,
-) -> MavResult {
-    let status = cockpit.view().state();
-    let mut guide = |command| result(cockpit.guide(now, seat, command));
-    let simple = |kind| GuidedCommand { kind, ..Default::default() };
-    match kind {
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => {
-            if !status.armed && !status.blocks.is_empty() {
-                for name in status.blocks.names() {
-                    client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "not armed: ", name), put);
+/// Does what is asked, and acknowledges it.
+pub(super) fn obey<C: Copy + PartialEq>(mut turn: Turn<'_, '_, C>, command: &Command) {
+    let result = turn.outcome(command);
+    let ack = COMMAND_ACK_DATA { command: command.kind, result, ..Default::default() };
+    turn.client.send(&MavMessage::COMMAND_ACK(ack), turn.put);
+}
+
+/// Says that a command that this dialect does not have is not supported.
+pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, put: Put<'_, C>) {
+    let [low, high] = number.to_le_bytes();
+    let payload = [low, high, MavResult::MAV_RESULT_UNSUPPORTED as u8, 0, 0, 0, 0, 0, 0, 0];
+    client.send_payload(COMMAND_ACK_DATA::ID, &payload, put);
+}
+
+impl<C: Copy + PartialEq> Turn<'_, '_, C> {
+    fn outcome(&mut self, Command { kind, parameters: [p1, p2, p3, .., p7] }: &Command) -> MavResult {
+        let status = self.cockpit.view().state();
+        match kind {
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => {
+                if !status.armed && !status.blocks.is_empty() {
+                    for name in status.blocks.names() {
+                        self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "not armed: ", name), self.put);
+                    }
+                    return MavResult::MAV_RESULT_DENIED;
                 }
-                return MavResult::MAV_RESULT_DENIED;
+                self.guide(simple(GuidedKind::Arm))
             }
-            guide(simple(GuidedKind::Arm))
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 0.0 => {
+                // 21196 says "whatever it does": motors off.
+                let force = *p2 == 21_196.0;
+                self.guide(simple(if force { GuidedKind::Kill } else { GuidedKind::Disarm }))
+            }
+            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => self.guide(simple(GuidedKind::Kill)),
+            MavCmd::MAV_CMD_NAV_TAKEOFF if !status.armed => MavResult::MAV_RESULT_DENIED,
+            MavCmd::MAV_CMD_NAV_TAKEOFF => {
+                let height = if p7.is_finite() && *p7 > 0.0 { *p7 } else { self.own.identity.take_off_height };
+                let position = Vec3::new(0.0, 0.0, -height);
+                self.guide(GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() })
+            }
+            MavCmd::MAV_CMD_NAV_LAND => self.guide(simple(GuidedKind::Land)),
+            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => self.guide(simple(GuidedKind::Hold)),
+            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => self.come_back(),
+            MavCmd::MAV_CMD_DO_SET_MODE => self.set_mode(*p1, *p2, *p3),
+            MavCmd::MAV_CMD_MISSION_START => match whole(*p1) {
+                Some(0) => self.start_mission(),
+                // Another first item than the first.
+                Some(place) if self.missions.set_current(place as usize) => self.start_mission(),
+                _ => MavResult::MAV_RESULT_DENIED,
+            },
+            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => self.guide(simple(GuidedKind::Hold)),
+            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 1.0 => self.start_mission(),
+            MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT => {
+                match whole(*p1).is_some_and(|place| self.missions.set_current(place as usize)) {
+                    true => MavResult::MAV_RESULT_ACCEPTED,
+                    false => MavResult::MAV_RESULT_DENIED,
+                }
+            }
+            MavCmd::MAV_CMD_REQUEST_MESSAGE => whole(*p1).map_or(MavResult::MAV_RESULT_UNSUPPORTED, |id| self.show(id)),
+            MavCmd::MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES => self.show(AUTOPILOT_VERSION_DATA::ID),
+            MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => set_interval(self.now, self.client, *p1, *p2),
+            MavCmd::MAV_CMD_PREFLIGHT_STORAGE if *p1 == 1.0 => self.request(Request::SaveParameters),
+            MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN if *p1 == 1.0 => self.request(Request::Restart),
+            // Type 0 is a throttle in per cent.
+            MavCmd::MAV_CMD_DO_MOTOR_TEST if *p2 == 0.0 && (0.0..=100.0).contains(p3) => {
+                let motor = whole(*p1).and_then(|motor| u8::try_from(motor).ok()).unwrap_or(0);
+                self.request(match *p3 > 0.0 {
+                    true => Request::TestMotor { motor, duty: p3 / 100.0 },
+                    false => Request::StopMotor,
+                })
+            }
+            _ => MavResult::MAV_RESULT_UNSUPPORTED,
         }
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 0.0 => {
-            // 21196 says "whatever it does": motors off.
-            let force = *p2 == 21_196.0;
-            guide(simple(if force { GuidedKind::Kill } else { GuidedKind::Disarm }))
-        }
-        MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => guide(simple(GuidedKind::Kill)),
-        MavCmd::MAV_CMD_NAV_TAKEOFF if !status.armed => MavResult::MAV_RESULT_DENIED,
-        MavCmd::MAV_CMD_NAV_TAKEOFF => {
-            let height = if p7.is_finite() && *p7 > 0.0 { *p7 } else { identity.take_off_height };
-            let position = Vec3::new(0.0, 0.0, -height);
-            guide(GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() })
-        }
-        MavCmd::MAV_CMD_NAV_LAND => guide(simple(GuidedKind::Land)),
-        MavCmd::MAV_CMD_NAV_LOITER_UNLIM => guide(simple(GuidedKind::Hold)),
-        MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH if status.phase == FlightPhase::Flying => {
-            let down = cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
-            let position = Vec3::new(0.0, 0.0, down);
-            result(cockpit.fly_to(now, seat, GuidedCommand { position, ..Default::default() }))
-        }
-        MavCmd::MAV_CMD_REQUEST_MESSAGE => {
-            let message = whole(*p1).and_then(|id| make(id, now, identity, &cockpit.view()));
-            let Some(message) = message else { return MavResult::MAV_RESULT_UNSUPPORTED };
-            client.send(&message, put);
-            MavResult::MAV_RESULT_ACCEPTED
-        }
-        MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => set_interval(now, client, *p1, *p2),
-        MavCmd::MAV_CMD_PREFLIGHT_STORAGE if *p1 == 1.0 => result(cockpit.request(now, Request::SaveParameters)),
-        MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN if *p1 == 1.0 => result(cockpit.request(now, Request::Restart)),
-        // Type 0 is a throttle in per cent.
-        MavCmd::MAV_CMD_DO_MOTOR_TEST if *p2 == 0.0 && (0.0..=100.0).contains(p3) => {
-            let motor = whole(*p1).and_then(|motor| u8::try_from(motor).ok()).unwrap_or(0);
-            let request = match *p3 > 0.0 {
-                true => Request::TestMotor { motor, duty: p3 / 100.0 },
-                false => Request::StopMotor,
-            };
-            result(cockpit.request(now, request))
-        }
-        _ => MavResult::MAV_RESULT_UNSUPPORTED,
     }
+
+    /// Asks the vehicle for something. Whatever else was asked of it, a mission included, is over then.
+    fn guide(&mut self, command: GuidedCommand) -> MavResult {
+        let asked = self.cockpit.guide(self.now, self.seat, command);
+        match command.kind {
+            _ if asked.is_err() => {}
+            GuidedKind::Arm => self.missions.runner.arms(self.now),
+            _ => _ = self.missions.runner.halt(),
+        }
+        result(asked)
+    }
+
+    fn request(&mut self, request: Request) -> MavResult {
+        result(self.cockpit.request(self.now, request))
+    }
+
+    fn come_back(&mut self) -> MavResult {
+        if self.cockpit.view().state().phase != FlightPhase::Flying {
+            return MavResult::MAV_RESULT_UNSUPPORTED;
+        }
+        let down = self.cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
+        let place = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..Default::default() };
+        let asked = self.cockpit.fly_to(self.now, self.seat, place);
+        if asked.is_ok() {
+            self.missions.runner.halt();
+        }
+        result(asked)
+    }
+
+    fn start_mission(&mut self) -> MavResult {
+        if self.missions.is_empty() {
+            return MavResult::MAV_RESULT_DENIED;
+        }
+        // Takes the lease, or says who has it.
+        let asked = self.cockpit.guide(self.now, self.seat, GuidedCommand::default());
+        if asked.is_err() {
+            return result(asked);
+        }
+        match self.missions.runner.start(self.now, self.seat, self.cockpit) {
+            Ok(()) => {
+                self.client.send(&self.missions.state(), self.put);
+                MavResult::MAV_RESULT_ACCEPTED
+            }
+            Err(why) => {
+                let mut words = heapless::String::<50>::new();
+                _ = write!(words, "{why}");
+                self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "mission not started: ", &words), self.put);
+                MavResult::MAV_RESULT_DENIED
+            }
+        }
+    }
+
+    /// Modes have numbers of their own in every autopilot. Understood are MAVLink's own flags, "auto" for a mission and "guided" for staying in place, and
+    /// the numbers of PX4 (main mode 4, "auto"), which programs send to whatever is not ArduPilot.
+    fn set_mode(&mut self, flags: f32, main: f32, sub: f32) -> MavResult {
+        let flags = whole(flags).and_then(|flags| u8::try_from(flags).ok()).map(MavModeFlag::from_bits_truncate);
+        let Some(flags) = flags else { return MavResult::MAV_RESULT_DENIED };
+        let custom = flags.contains(MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED);
+        match (whole(main), whole(sub)) {
+            (Some(4), Some(3)) if custom => self.guide(simple(GuidedKind::Hold)),
+            (Some(4), Some(4)) if custom => self.start_mission(),
+            (Some(4), Some(5)) if custom => self.come_back(),
+            (Some(4), Some(6)) if custom => self.guide(simple(GuidedKind::Land)),
+            _ if custom => MavResult::MAV_RESULT_UNSUPPORTED,
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => self.start_mission(),
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.guide(simple(GuidedKind::Hold)),
+            _ => MavResult::MAV_RESULT_UNSUPPORTED,
+        }
+    }
+
+    /// Sends one message.
+    fn show(&mut self, id: u32) -> MavResult {
+        let message = match id {
+            MISSION_CURRENT_DATA::ID => Some(self.missions.state()),
+            _ => make(id, self.now, self.own, &self.cockpit.view()),
+        };
+        let Some(message) = message else { return MavResult::MAV_RESULT_UNSUPPORTED };
+        self.client.send(&message, self.put);
+        MavResult::MAV_RESULT_ACCEPTED
+    }
+}
+
+fn simple(kind: GuidedKind) -> GuidedCommand {
+    GuidedCommand { kind, ..Default::default() }
 }
 
 fn result(asked: Result<(), Refusal>) -> MavResult {
@@ -145,13 +241,8 @@ fn set_interval<C>(now: Instant, client: &mut Client<C>, id: f32, interval_us: f
 }
 
 /// Sends the vehicle to a place. Programs repeat the same target many times a second: only a new one is passed on.
-pub(super) fn go_to<C>(
-    now: Instant,
-    client: &mut Client<C>,
-    seat: Seat,
-    target: &SET_POSITION_TARGET_LOCAL_NED_DATA,
-    cockpit: &mut dyn Cockpit,
-) {
+pub(super) fn go_to<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, target: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
+    let Turn { now, client, missions, seat, cockpit, .. } = turn;
     type Mask = PositionTargetTypemask;
     let place = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE
         | Mask::POSITION_TARGET_TYPEMASK_Y_IGNORE
@@ -175,10 +266,12 @@ pub(super) fn go_to<C>(
     let [x, y, z] = asked.to_array();
     // Without a heading of its own, the present one must not make the target look new.
     let new = [x, y, z, if turns { yaw } else { 0.0 }];
-    if client.target == Some(new) {
+    // What a mission has done since makes an old target a new one.
+    if client.target == Some(new) && !missions.runner.is_running() {
         return;
     }
     if cockpit.fly_to(now, seat, GuidedCommand { position, yaw, ..Default::default() }).is_ok() {
         client.target = Some(new);
+        missions.runner.halt();
     }
 }

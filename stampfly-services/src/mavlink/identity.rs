@@ -1,5 +1,6 @@
 //! What a vehicle is in MAVLink, and which messages are for it.
 
+use crate::mission::Origin;
 use stampfly_link::mavlink::dialects::common::MavType;
 
 /// An autopilot, in MAVLink's numbering.
@@ -18,7 +19,17 @@ pub struct Identity {
     pub version: [u8; 3],
 }
 
-/// Is it for this vehicle? Zero is everybody.
-pub(super) const fn is_ours(identity: &Identity, system: u8, component: u8) -> bool {
-    (system == 0 || system == identity.system) && matches!(component, 0 | AUTOPILOT)
+/// What messages about the vehicle are made of besides what it publishes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Own {
+    pub identity: Identity,
+    /// Where on Earth it is, if anybody knows.
+    pub origin: Option<Origin>,
+}
+
+impl Own {
+    /// Is it for this vehicle? Zero is everybody.
+    pub const fn is_meant(&self, system: u8, component: u8) -> bool {
+        (system == 0 || system == self.identity.system) && matches!(component, 0 | AUTOPILOT)
+    }
 }

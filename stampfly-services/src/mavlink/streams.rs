@@ -1,6 +1,7 @@
 //! What is sent by itself: the messages that are made of a view, and how often.
 
-use super::identity::Identity;
+use super::identity::Own;
+use crate::mission::Origin;
 use crate::view::View;
 use heapless::Vec;
 use stampfly_link::mavlink::dialects::common::*;
@@ -15,44 +16,47 @@ pub(super) struct Stream {
     /// Between two, unless the client wants another time; `None` for only when asked for.
     pub every: Option<Duration>,
     /// The message, if there is anything to say.
-    pub make: fn(Instant, &Identity, &View<'_>) -> Option<MavMessage>,
+    pub make: fn(Instant, &Own, &View<'_>) -> Option<MavMessage>,
 }
 
-const fn every(id: u32, period_ms: u64, make: fn(Instant, &Identity, &View<'_>) -> Option<MavMessage>) -> Stream {
+const fn every(id: u32, period_ms: u64, make: fn(Instant, &Own, &View<'_>) -> Option<MavMessage>) -> Stream {
     Stream { id, every: Some(Duration::from_millis(period_ms)), make }
 }
 
-const fn asked(id: u32, make: fn(Instant, &Identity, &View<'_>) -> Option<MavMessage>) -> Stream {
+const fn asked(id: u32, make: fn(Instant, &Own, &View<'_>) -> Option<MavMessage>) -> Stream {
     Stream { id, every: None, make }
 }
 
 /// Every one that there is: number, period in milliseconds, what it is made of.
-pub(super) const STREAMS: [Stream; 13] = [
+pub(super) const STREAMS: [Stream; 16] = [
     every(0, 1_000, heartbeat),
     every(1, 1_000, sys_status),
     every(30, 50, attitude),
     asked(31, attitude_quaternion),
     every(32, 50, local_position),
+    every(33, 200, global_position),
     every(36, 200, motors),
+    asked(49, global_origin),
     every(74, 200, hud),
     asked(105, imu),
     every(132, 200, distance),
     every(147, 1_000, battery),
     asked(148, version),
+    every(242, 1_000, home),
     every(245, 500, extended_state),
     asked(141, altitude),
 ];
 
 /// The message with this number, now.
-pub(super) fn make(id: u32, now: Instant, identity: &Identity, view: &View<'_>) -> Option<MavMessage> {
-    STREAMS.iter().find(|stream| stream.id == id).and_then(|stream| (stream.make)(now, identity, view))
+pub(super) fn make(id: u32, now: Instant, own: &Own, view: &View<'_>) -> Option<MavMessage> {
+    STREAMS.iter().find(|stream| stream.id == id).and_then(|stream| (stream.make)(now, own, view))
 }
 
 fn ms(now: Instant) -> u32 {
     (now.as_micros() / 1_000) as u32
 }
 
-fn heartbeat(_: Instant, identity: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn heartbeat(_: Instant, own: &Own, view: &View<'_>) -> Option<MavMessage> {
     let status = view.state();
     let alerts = view.alert().map(|(_, alert)| alert.active).unwrap_or_default();
     let mut base = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | MavModeFlag::MAV_MODE_FLAG_STABILIZE_ENABLED;
@@ -71,7 +75,7 @@ fn heartbeat(_: Instant, identity: &Identity, view: &View<'_>) -> Option<MavMess
     };
     Some(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         custom_mode: status.mode as u32,
-        mavtype: identity.kind,
+        mavtype: own.identity.kind,
         autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
         base_mode: base,
         system_status,
@@ -79,7 +83,7 @@ fn heartbeat(_: Instant, identity: &Identity, view: &View<'_>) -> Option<MavMess
     }))
 }
 
-fn sys_status(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn sys_status(_: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let alerts = view.alert().map(|(_, alert)| alert.active).unwrap_or_default();
     let sensors = [
         (
@@ -118,7 +122,7 @@ fn sys_status(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     }))
 }
 
-fn attitude(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn attitude(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, estimate) = view.estimate().filter(|(_, estimate)| estimate.valid.contains(Validity::TILT))?;
     let [roll, pitch, yaw] = frame::roll_pitch_yaw(&estimate.attitude);
     let [rollspeed, pitchspeed, yawspeed] = estimate.angular_rate.into();
@@ -126,7 +130,7 @@ fn attitude(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     Some(MavMessage::ATTITUDE(data))
 }
 
-fn attitude_quaternion(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn attitude_quaternion(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, estimate) = view.estimate().filter(|(_, estimate)| estimate.valid.contains(Validity::TILT))?;
     let [q1, q2, q3, q4] = estimate.attitude.wxyz();
     let [rollspeed, pitchspeed, yawspeed] = estimate.angular_rate.into();
@@ -139,10 +143,11 @@ fn attitude_quaternion(now: Instant, _: &Identity, view: &View<'_>) -> Option<Ma
         rollspeed,
         pitchspeed,
         yawspeed,
+        ..Default::default()
     }))
 }
 
-fn local_position(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn local_position(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, estimate) = view.estimate()?;
     let usable = Validity::POSITION_XY | Validity::POSITION_Z;
     if !estimate.valid.contains(usable) {
@@ -153,7 +158,46 @@ fn local_position(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMess
     Some(MavMessage::LOCAL_POSITION_NED(data))
 }
 
-fn motors(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+/// Only of a vehicle that knows, or was told, where on Earth it is.
+fn global_position(now: Instant, own: &Own, view: &View<'_>) -> Option<MavMessage> {
+    let origin = own.origin?;
+    let (_, estimate) = view.estimate()?;
+    if !estimate.valid.contains(Validity::POSITION_XY | Validity::POSITION_Z) {
+        return None;
+    }
+    let ([north, east, down], [vx, vy, vz]): ([f32; 3], [f32; 3]) =
+        (estimate.position.into(), estimate.velocity.into());
+    let (lat, lon) = origin.global([north, east]);
+    let up = (-down * 1e3) as i32;
+    let degrees = frame::yaw(&estimate.attitude).to_degrees();
+    let heading = if degrees < 0.0 { degrees + 360.0 } else { degrees };
+    Some(MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        time_boot_ms: ms(now),
+        lat,
+        lon,
+        alt: origin.altitude.saturating_add(up),
+        relative_alt: up,
+        vx: (vx * 1e2) as i16,
+        vy: (vy * 1e2) as i16,
+        vz: (vz * 1e2) as i16,
+        hdg: (heading * 1e2) as u16,
+    }))
+}
+
+fn global_origin(_: Instant, own: &Own, _: &View<'_>) -> Option<MavMessage> {
+    let Origin { latitude, longitude, altitude } = own.origin?;
+    let data = GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude, ..Default::default() };
+    Some(MavMessage::GPS_GLOBAL_ORIGIN(data))
+}
+
+/// Home is where the vehicle was switched on: the origin.
+fn home(_: Instant, own: &Own, _: &View<'_>) -> Option<MavMessage> {
+    let Origin { latitude, longitude, altitude } = own.origin?;
+    let q = [1.0, 0.0, 0.0, 0.0];
+    Some(MavMessage::HOME_POSITION(HOME_POSITION_DATA { latitude, longitude, altitude, q, ..Default::default() }))
+}
+
+fn motors(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, motors) = view.motors()?;
     // As pulses of a servo, which is what the message holds.
     let [a, b, c, d, ..] = motors.duty.map(|duty| 1_000 + (duty.clamp(0.0, 1.0) * 1e3) as u16);
@@ -167,7 +211,7 @@ fn motors(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     }))
 }
 
-fn hud(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn hud(_: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, estimate) = view.estimate()?;
     let degrees = frame::yaw(&estimate.attitude).to_degrees();
     let heading = if degrees < 0.0 { degrees + 360.0 } else { degrees };
@@ -182,7 +226,7 @@ fn hud(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     }))
 }
 
-fn imu(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn imu(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, imu) = view.imu()?;
     let ([xacc, yacc, zacc], [xgyro, ygyro, zgyro]): ([f32; 3], [f32; 3]) = (imu.accel.into(), imu.gyro.into());
     let field = view.mag().map(|(_, mag)| mag.field).unwrap_or_default();
@@ -206,7 +250,7 @@ fn imu(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     }))
 }
 
-fn distance(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn distance(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, tof) = view.tof().filter(|(_, tof)| tof.valid)?;
     Some(MavMessage::DISTANCE_SENSOR(DISTANCE_SENSOR_DATA {
         time_boot_ms: ms(now),
@@ -221,7 +265,7 @@ fn distance(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     }))
 }
 
-fn battery(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn battery(_: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, power) = view.power()?;
     let mut voltages = [u16::MAX; 10];
     if let Some(first) = voltages.first_mut() {
@@ -239,19 +283,21 @@ fn battery(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
     }))
 }
 
-fn version(_: Instant, identity: &Identity, _: &View<'_>) -> Option<MavMessage> {
-    let [major, minor, patch] = identity.version;
+fn version(_: Instant, own: &Own, _: &View<'_>) -> Option<MavMessage> {
+    let [major, minor, patch] = own.identity.version;
     Some(MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED,
         flight_sw_version: u32::from_be_bytes([major, minor, patch, 255]),
-        uid: identity.system.into(),
+        uid: own.identity.system.into(),
         ..Default::default()
     }))
 }
 
-fn extended_state(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn extended_state(_: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let landed_state = match view.state().phase {
         FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Armed => {
             MavLandedState::MAV_LANDED_STATE_ON_GROUND
@@ -264,7 +310,7 @@ fn extended_state(_: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessag
     Some(MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA { vtol_state, landed_state }))
 }
 
-fn altitude(now: Instant, _: &Identity, view: &View<'_>) -> Option<MavMessage> {
+fn altitude(now: Instant, _: &Own, view: &View<'_>) -> Option<MavMessage> {
     let (_, estimate) = view.estimate()?;
     Some(MavMessage::ALTITUDE(ALTITUDE_DATA {
         time_usec: now.as_micros(),
@@ -321,5 +367,5 @@ pub(super) fn text(severity: MavSeverity, kind: &str, words: &str) -> MavMessage
     for (to, from) in bytes.iter_mut().zip(kind.bytes().chain(words.bytes())) {
         *to = from;
     }
-    MavMessage::STATUSTEXT(STATUSTEXT_DATA { severity, text: bytes.into() })
+    MavMessage::STATUSTEXT(STATUSTEXT_DATA { severity, text: bytes.into(), ..Default::default() })
 }

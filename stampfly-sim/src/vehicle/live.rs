@@ -29,6 +29,8 @@ pub enum Transport {
     UdpTo,
     /// Programs connect to it.
     Tcp,
+    /// A serial port that exists in this machine alone: a pseudo-terminal.
+    Terminal,
     /// A page in a browser, which the program that flies the vehicle serves for all vehicles together.
     Page,
 }
@@ -45,19 +47,36 @@ pub struct PortSpec {
     pub number: u16,
     /// What is spoken there.
     pub meaning: &'static str,
+    /// Where others than programs on this machine reach it, what is said there must be signed: it is not opened there without a key.
+    pub signed: bool,
+}
+
+/// What is said at ports that others can reach is signed with this.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Signing {
+    /// The key that both ends share.
+    pub key: [u8; 32],
+    /// The time at which it is asked for, in MAVLink's units: 10 µs since 2015 began.
+    pub time: u64,
+}
+
+impl fmt::Debug for Signing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Signing")
+    }
 }
 
 impl PortSpec {
     /// A port that datagrams come to.
     #[must_use]
     pub const fn udp(name: &'static str, number: u16, meaning: &'static str) -> Self {
-        Self { name, transport: Transport::Udp, number, meaning }
+        Self { name, transport: Transport::Udp, number, meaning, signed: false }
     }
 
     /// A port that programs connect to.
     #[must_use]
     pub const fn tcp(name: &'static str, number: u16, meaning: &'static str) -> Self {
-        Self { name, transport: Transport::Tcp, number, meaning }
+        Self { name, transport: Transport::Tcp, number, meaning, signed: false }
     }
 }
 
@@ -89,6 +108,16 @@ pub trait Ports: fmt::Debug + Send + Sync {
 
     /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes nothing is closed.
     fn send(&self, to: &Client, bytes: &[u8]);
+
+    /// Do only programs on this machine reach that port?
+    fn is_local(&self, _port: usize) -> bool {
+        true
+    }
+
+    /// What is said at the other ports is signed with, if with anything.
+    fn signing(&self) -> Option<Signing> {
+        None
+    }
 
     /// Has somebody asked for the end of the flight?
     fn are_closed(&self) -> bool;

@@ -25,7 +25,7 @@ mod scripted;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, Flying, fly, fly_remote};
-pub use live::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed, Transport};
+pub use live::{Client, Heard, Link, Live, PortSpec, Ports, Put, Signing, Speed, Transport};
 pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
 pub use remote::{Figures, Port, Remote, RemoteError, Settings};
 pub use scenario::Scenario;

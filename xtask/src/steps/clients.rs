@@ -11,29 +11,35 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 const FOLDER: &str = "examples/clients";
-const PACKAGES: [&str; 2] = ["pymavlink==2.4.50", "djitellopy==2.5.0"];
+const PACKAGES: [&str; 4] = ["pymavlink==2.4.50", "djitellopy==2.5.0", "mavsdk==4.1.0", "yamspy==0.3.3"];
 /// A script that takes longer hangs.
 const SECONDS: &str = "120";
 /// djitellopy cannot be told to take any port that is free: these are asked for first.
 const FREE: usize = 3;
 
-/// A script, and its arguments with the names of ports in braces.
-const SCRIPTS: [(&str, &[&str]); 5] = [
-    ("mavlink_square.py", &["tcp:{mavlink-tcp}"]),
-    ("mavlink_square.py", &["udpin:{mavlink-udp}"]),
-    ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"]),
-    ("read_streams.py", &["{telemetry#}", "{stream}"]),
-    ("console.py", &["{console}"]),
+/// A script, its arguments with the names of ports in braces, and options of `serve`.
+const SCRIPTS: [(&str, &[&str], &[&str]); 8] = [
+    ("mavlink_square.py", &["tcp:{mavlink-tcp}"], &[]),
+    ("mavlink_square.py", &["udpin:{mavlink-udp}"], &[]),
+    ("mavsdk_mission.py", &["udpin://{mavlink-udp}"], &[]),
+    ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{key}"], &["--key", "{key}", "--sign-all"]),
+    ("yamspy_tune.py", &["{msp-serial}"], &[]),
+    ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"], &[]),
+    ("read_streams.py", &["{telemetry#}", "{stream}"], &[]),
+    ("console.py", &["{console}"], &[]),
 ];
+/// As `openssl rand -hex 32` makes one. Not a secret: it is good for the vehicle of a test.
+const KEY: &str = "5f1d2c8e90b34a67f8e0c1b2a39485760718293a4b5c6d7e8f90a1b2c3d4e5f6\n";
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let python = environment(repository)?;
     run_program(repository.cargo().args(["build", "--quiet", "--release", "-p", "stampfly-host"]))?;
     let program = repository.target("release").join("stampfly");
-    for (place, (script, arguments)) in SCRIPTS.iter().enumerate() {
+    refuses_strangers(&program)?;
+    for (place, (script, arguments, options)) in SCRIPTS.iter().enumerate() {
         let out = repository.target("clients").join(place.to_string());
         _ = std::fs::remove_dir_all(&out);
-        let mut vehicle = Vehicle::start(&program, &out)?;
+        let mut vehicle = Vehicle::start(&program, &out, options)?;
         let said = script_with(repository, &python, script, arguments, &vehicle)?;
         print!("{script}\n{}", indented(&said));
         vehicle.end()?;
@@ -48,6 +54,18 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// Where others can reach it, MAVLink is not opened without a key.
+fn refuses_strangers(program: &Path) -> Result<(), Failure> {
+    let output = Command::new(program).args(["serve", "--for", "1", "--port", "mavlink-tcp=0.0.0.0:0"]).output();
+    let output = output.map_err(|error| format!("{program:?}: {error}"))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    print!("serve --port mavlink-tcp=0.0.0.0:0\n{}", indented(&said));
+    match !output.status.success() && said.contains("--key") {
+        true => Ok(()),
+        false => Err("MAVLink is open to everybody without a key".into()),
+    }
 }
 
 /// One for each time the vehicle was switched on.
@@ -100,20 +118,26 @@ struct Vehicle {
 }
 
 impl Vehicle {
-    fn start(program: &Path, out: &Path) -> Result<Self, Failure> {
+    fn start(program: &Path, out: &Path, options: &[&str]) -> Result<Self, Failure> {
+        std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+        let key = out.join("key");
+        std::fs::write(&key, KEY).map_err(|error| format!("{}: {error}", key.display()))?;
+        let key = key.to_string_lossy().into_owned();
         let free = free_ports()?;
         let [state, telemetry, mavlink] = free;
         let mut command = Command::new(program);
         command.args(["serve", "--for", SECONDS, "--out"]).arg(out);
-        for name in ["http", "mavlink-tcp", "tello", "stream", "console"] {
+        for name in ["http", "mavlink-tcp", "tello", "stream", "console", "msp"] {
             command.args(["--port", &format!("{name}=0")]);
         }
         for (name, number) in [("tello-state", state), ("telemetry", telemetry), ("mavlink-udp", mavlink)] {
             command.args(["--port", &format!("{name}={number}")]);
         }
+        command.args(options.iter().map(|option| option.replace("{key}", &key)));
         let mut process = command.stdout(Stdio::piped()).spawn().map_err(|error| format!("{program:?}: {error}"))?;
         let stdout = process.stdout.take().ok_or("no standard output")?;
-        let mut vehicle = Self { process, ports: vec![("free".into(), free_ports()?[0].to_string())] };
+        let mut vehicle =
+            Self { process, ports: vec![("free".into(), free_ports()?[0].to_string()), ("key".into(), key)] };
         for line in BufReader::new(stdout).lines() {
             let line = line.map_err(|error| error.to_string())?;
             let mut words = line.split_whitespace();

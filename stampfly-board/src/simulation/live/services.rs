@@ -1,7 +1,8 @@
 //! The services of the simulated StampFly, each at its port.
 
+use super::configurator::CARD;
 use super::seats::{Controls, Seats};
-use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
+use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, MSP, MSP_SERIAL, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
 use crate::VehicleConfig;
 use crate::console::{Command, Newest, Profile};
 use crate::simulation::radio::Radio;
@@ -10,13 +11,16 @@ use crate::simulation::terminal::{Desk, Terminal};
 use crate::topics::ConsoleEnds;
 use stampfly_flight::console::Request;
 use stampfly_link::mavlink::dialects::common::MavType;
+use stampfly_link::mavlink::signing::SigningKey;
 use stampfly_services::mavlink::{Identity, Mavlink};
+use stampfly_services::msp::Msp;
 use stampfly_services::tello::Destination;
 use stampfly_services::{Lease, Tello, View};
 use stampfly_sim::ask::{Ask, Asked};
 use stampfly_sim::fault::Injector;
-use stampfly_sim::vehicle::{Client, Heard, Link, Live, Put, Speed};
+use stampfly_sim::vehicle::{Client, Heard, Link, Live, Ports, Put, Speed};
 use stampfly_types::Instant;
+use std::sync::Arc;
 use std::vec::Vec;
 
 /// What is answered to what only a board can do.
@@ -34,6 +38,9 @@ pub struct Services<'b> {
     health: &'b Healths,
     profile: &'b Profile,
     mavlink: Mavlink<Client>,
+    /// Tells which ports are this machine's alone.
+    ports: Arc<dyn Ports>,
+    msp: Vec<(Client, Msp)>,
     tello: Tello<Client>,
     /// Number of the port that a Tello's state is sent to.
     tello_state: Option<u16>,
@@ -73,7 +80,12 @@ impl<'b> Services<'b> {
             sensing,
             health,
             profile,
-            mavlink: Mavlink::new(identity),
+            mavlink: match live.ports.signing() {
+                Some(signing) => Mavlink::new(identity).with_key(SigningKey::new(signing.key), signing.time),
+                None => Mavlink::new(identity),
+            },
+            ports: live.ports.clone(),
+            msp: Vec::new(),
             tello: Tello::new(),
             tello_state: None,
             telemetry: None,
@@ -126,8 +138,16 @@ impl Link for Services<'_> {
         let newest = self.seen.newest.borrow();
         let mut cockpit = Seats { controls: &mut self.controls, newest: &newest, seen: self.seen };
         match (from.port, heard) {
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) if self.ports.is_local(from.port) => {
+                self.mavlink.open_local(now, from, true);
+            }
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) => self.mavlink.open(now, from, true),
-            (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => self.mavlink.hear(now, from, bytes, &mut cockpit, put),
+            (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => {
+                if self.ports.is_local(from.port) {
+                    self.mavlink.open_local(now, from, false);
+                }
+                self.mavlink.hear(now, from, bytes, &mut cockpit, put);
+            }
             (MAVLINK_UDP | MAVLINK_TCP, Heard::Closed) => self.mavlink.close(from),
             (TELLO, Heard::Bytes(text)) => {
                 let tello_state = self.tello_state;
@@ -158,6 +178,13 @@ impl Link for Services<'_> {
                     put(&from, asked.answered(answer).as_bytes());
                 }
             }
+            (MSP | MSP_SERIAL, Heard::Opened) => self.msp.push((from, Msp::new(&CARD))),
+            (MSP | MSP_SERIAL, Heard::Bytes(bytes)) => {
+                if let Some((_, msp)) = self.msp.iter_mut().find(|(client, _)| *client == from) {
+                    msp.hear(now, bytes, &mut cockpit, &mut |frame| put(&from, frame));
+                }
+            }
+            (MSP | MSP_SERIAL, Heard::Closed) => self.msp.retain(|(client, _)| *client != from),
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
             _ => {}
         }

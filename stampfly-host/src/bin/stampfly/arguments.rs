@@ -203,9 +203,17 @@ pub struct ServeOptions {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=32))]
     pub count: u8,
     /// Where a port is to be, or not at all: `mavlink-tcp=5760`, `console=0.0.0.0:2323`, `mavlink-udp=off`; may be repeated. Number
-    /// 0 is any that is free. Who is heard there is not authenticated: leave it on this machine, or in a network of your own.
+    /// 0 is any that is free. Who is heard there is not authenticated, but at MAVLink's ports, see `--key`: leave the others on this
+    /// machine, or in a network of your own.
     #[arg(long, value_name = "NAME=ADDRESS")]
     pub port: Vec<PortOption>,
+    /// A file with a key of 64 hexadecimal digits, as `openssl rand -hex 32` makes one. MAVLink's ports that others than programs on this
+    /// machine reach sign with it and believe nothing that is not signed with it; without it they are not opened.
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// Ask for the key at ports that only programs on this machine reach, too: others may have an account there.
+    #[arg(long, requires = "key")]
+    pub sign_all: bool,
     /// The same as `--port listen=ADDRESS`.
     #[arg(long, value_name = "ADDRESS")]
     pub listen: Option<SocketAddr>,

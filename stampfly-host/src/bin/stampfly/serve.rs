@@ -10,7 +10,7 @@ use serde_json::Value;
 use stampfly_host::flown::{Flown, fly};
 use stampfly_host::ground::{Client, Hub, Limits, Server, VehicleCard, Watch, ask};
 use stampfly_host::recorder::Recorder;
-use stampfly_host::serve::{OpenPorts, Page, PortOption};
+use stampfly_host::serve::{Key, OpenPorts, Page, PortOption};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_log::ulog::Sink;
 use stampfly_sim::vehicle::{Live, Options, Speed, Transport, Vehicle, Verdict};
@@ -144,13 +144,17 @@ fn open<V: Vehicle>(options: &ServeOptions, hub: &Arc<Hub>) -> Result<Vec<Arc<Op
         let names: Vec<_> = V::PORTS.iter().map(|port| port.name).collect();
         return Err(format!("{} has no port '{}'; it has {}", V::NAME, unknown.name, names.join(", ")).into());
     }
+    let which = |number: usize| if options.count == 1 { String::new() } else { format!("vehicle {}  ", number + 1) };
+    let key = options.key.as_deref().map(Key::read).transpose()?.map(|key| key.everywhere(options.sign_all));
     let mut all = Vec::new();
     for number in 0..usize::from(options.count) {
-        let opened = OpenPorts::open(V::PORTS, &wanted, number)?;
+        let opened = OpenPorts::open(V::PORTS, &wanted, number, key.clone())?;
         for (port, place) in opened.places().iter().filter(|(port, _)| port.transport != Transport::Page) {
             let does = if port.transport == Transport::UdpTo { "sending to" } else { "listening on" };
-            let which = if options.count == 1 { String::new() } else { format!("vehicle {}  ", number + 1) };
-            outln!("{which}{:<12} {:<42} {does} {place}", port.name, port.meaning);
+            outln!("{}{:<12} {:<42} {does} {place}", which(number), port.name, port.meaning);
+        }
+        for (port, place) in opened.terminals() {
+            outln!("{}{:<12} {:<42} is {place}", which(number), port.name, port.meaning);
         }
         all.push(Arc::new(opened.with_page(PageOf { hub: hub.clone(), vehicle: number })));
     }

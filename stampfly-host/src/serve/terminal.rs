@@ -1,0 +1,53 @@
+//! A pseudo-terminal: a serial port that exists in this machine alone, for programs that speak through one.
+//!
+//! Its name is given when it is opened, `/dev/pts/3` or so. There is one line, whoever opens it, and nobody can tell whether somebody does: bytes that nobody reads
+//! are lost. Unix only.
+
+use super::connections::Connections;
+use super::events::Events;
+use stampfly_sim::vehicle::{Client, Heard};
+use std::io;
+use std::sync::Arc;
+
+/// Opens one, and returns its name.
+#[cfg(unix)]
+pub(super) fn open(client: Client, connections: &Arc<Connections>, events: &Events) -> io::Result<String> {
+    use serialport::{SerialPort as _, TTYPort};
+    use std::io::{ErrorKind, Read, Write};
+
+    let (mut ours, mut theirs) = TTYPort::pair()?;
+    // Whoever opens it by its name is not the one who holds it here.
+    theirs.set_exclusive(false)?;
+    let name = theirs.name().ok_or_else(|| io::Error::from(ErrorKind::NotFound))?;
+    let mut writer = ours.try_clone_native()?;
+    ours.set_timeout(super::events::POLL)?;
+    writer.set_timeout(super::events::POLL)?;
+    let waiting = connections.join(client);
+    let events = events.clone();
+    std::thread::spawn(move || {
+        while let Ok(bytes) = waiting.recv() {
+            // Nobody reads: it is lost.
+            _ = writer.write_all(&bytes);
+        }
+    });
+    std::thread::spawn(move || {
+        events.put(client, Heard::Opened);
+        let mut part = [0; 512];
+        while events.are_open() {
+            match ours.read(&mut part) {
+                Ok(length) => events.put(client, Heard::Bytes(part.get(..length).unwrap_or_default())),
+                Err(error) if error.kind() == ErrorKind::TimedOut => {}
+                Err(_) => break,
+            }
+        }
+        // Until here, so that the line does not end with each program that closes it.
+        drop(theirs);
+    });
+    Ok(name)
+}
+
+/// There are none.
+#[cfg(not(unix))]
+pub(super) fn open(_: Client, _: &Arc<Connections>, _: &Events) -> io::Result<String> {
+    Err(io::ErrorKind::Unsupported.into())
+}
