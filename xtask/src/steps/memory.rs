@@ -16,11 +16,9 @@ use crate::repository::{Failure, Repository};
 use std::collections::{BTreeMap, BTreeSet};
 
 const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
-/// What is called through pointers, by whom: estimation reaches the estimator that the parameters chose, the scheduler
-/// asks topics for their newest, a drained bus hands messages to a closure, formatted text asks each value to write
+/// What is called through pointers, by whom: the scheduler asks topics for their newest, a drained bus hands messages to a closure, formatted text asks each value to write
 /// itself, executors run tasks, all other callers wake them or run the scheduler.
 const POINTERS: &[Behind<'_>] = &[
-    Behind { callers: "runnables::estimation::Estimation", targets: ESTIMATOR, nests: None },
     Behind { callers: "drain", targets: &["FnOnce<(usize, stampfly_types::time::Instant"], nests: None },
     // The deepest: the console's text has a storage error (1) whose text has the flash driver's error (2), whose number (3)
     // goes to the writer (4). A topic's fields are one less.
@@ -29,7 +27,6 @@ const POINTERS: &[Behind<'_>] = &[
     // Tasks, and whatever the compiler puts the flight loop with its scheduler into.
     Behind { callers: "", targets: &["raw::waker::", "AnyTopic>::head", "AnyTopic>::newest_at"], nests: None },
 ];
-const ESTIMATOR: &[&str] = &[" as stampfly_eskf::estimator::Estimator>::", "AnyTopic>::"];
 /// Bytes of stack assumed for a function in ROM, whose code is not in the program. These compute with floating point, copy
 /// memory, wait, or access the flash chip, and call little.
 const ROM: u64 = 512;
