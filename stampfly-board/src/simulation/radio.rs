@@ -74,10 +74,10 @@ impl<'b> Radio<'b> {
     pub fn telemetry(&mut self) -> TelemetryFrame {
         let newest = self.ends.telemetry.latest();
         let now = self.clock.now();
-        if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data)) {
-            if self.air.as_ref().is_none_or(|air| air.borrow_mut().telemetry(now, &frame)) {
-                self.frame = frame;
-            }
+        if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data))
+            && self.air.as_ref().is_none_or(|air| air.borrow_mut().telemetry(now, &frame))
+        {
+            self.frame = frame;
         }
         self.frame
     }
