@@ -93,7 +93,7 @@ impl<'b> Link<'b> {
     }
 }
 
-fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
+pub(crate) fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
     TelemetryPacket {
         counter,
         battery: frame.battery,

@@ -1,5 +1,6 @@
 //! One flight of the StampFly: what is started around it, and what the executor calls while it flies.
 
+use super::air::{self, AirReport, Ends};
 use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
@@ -26,6 +27,8 @@ use stampfly_sim::vehicle::{self, Live};
 use stampfly_sim::{Simulation, Truth, World};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 
 /// After the mission the vehicle is watched for this long.
 const TAIL: Duration = Duration::from_secs(1);
@@ -44,6 +47,7 @@ pub struct Surroundings {
     watchdog: Watchdog,
     seen: Seen,
     profile: Profile,
+    air: Cell<AirReport>,
 }
 
 impl Surroundings {
@@ -68,6 +72,7 @@ impl Surroundings {
             watchdog: Watchdog::new(CUT_OFF),
             seen: Seen::default(),
             profile: Profile::new(&ACTIVATIONS),
+            air: Cell::default(),
         }
     }
 
@@ -94,7 +99,7 @@ impl vehicle::Surroundings for Surroundings {
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
-        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog, seen, profile } =
+        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog, seen, profile, air } =
             self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
         let wrong = wrong.take().expect("surroundings are started once");
@@ -108,7 +113,13 @@ impl vehicle::Surroundings for Surroundings {
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
         let home = Home::new(&world.truth_at(setup.simulation.start));
-        let radio = Radio::new(clock, link, &wrong);
+        let mut radio = Radio::new(clock, link, &wrong);
+        if let Some(what) = setup.air {
+            let ends = Ends::new(setup.simulation.seed).expect("a key of random bytes");
+            let ends = Rc::new(RefCell::new(ends));
+            tasks.spawn(air::flood(clock.clone(), ends.clone(), what.flood, air));
+            radio = radio.over(ends);
+        }
         let waits = wrong.injector.wants(Moment::Ground);
         match (&setup.live, setup.pilot) {
             (Some(live), _) => {
@@ -138,6 +149,7 @@ impl vehicle::Surroundings for Surroundings {
             watch: Watch::new(home),
             live: setup.live.as_ref(),
             seen,
+            air,
             judge,
             wrong,
             chips,
@@ -169,6 +181,7 @@ pub struct Around<'a> {
     /// The programs that fly it, if there are.
     live: Option<&'a Live>,
     seen: &'a Seen,
+    air: &'a Cell<AirReport>,
     judge: Judge,
     wrong: Wrong,
     chips: Option<chips::AttachedChips>,
@@ -271,6 +284,7 @@ impl vehicle::Around for Around<'_> {
             tuned: watch.tuned,
             finished: self.progress.finished.get(),
             live: self.live.is_some(),
+            air: self.air.get(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),
             judgement: self.judge.finish(),

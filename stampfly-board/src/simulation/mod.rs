@@ -6,6 +6,7 @@
 //! | [`sensing`] | what feeds the bus: models of the sensors, or the drivers over emulated chips |
 //! | [`mission`], [`ground_station`] | what to fly, and the program that asks the vehicle for it |
 //! | [`pilot`], [`radio`] | a person with a transmitter instead; what carries commands and telemetry |
+//! | [`Air`] | the secure session as real bytes on that radio, and a flood of a stranger's |
 //! | [`faults`], [`judge`] | what can go wrong, and what came of it |
 //! | [`bench`](mod@bench) | a vehicle on a bench, with somebody who holds it, looks, listens and presses its button |
 //! | [`metrics`] | how good a flight was |
@@ -15,6 +16,7 @@
 //!
 //! For programs on a PC (feature `simulation`); nothing of it is in the firmware.
 
+mod air;
 pub mod bench;
 pub mod faults;
 pub mod flight;
@@ -34,6 +36,7 @@ mod setup;
 mod terminal;
 mod watch;
 
+pub use air::{Air, AirReport};
 pub use outcome::{Outcome, PhaseChange};
 pub use page::PAGE;
 pub use plant::PLANT;

@@ -1,5 +1,6 @@
 //! How a flight of the StampFly went, for people and for scripts.
 
+use super::air::AirReport;
 use super::judge::Judgement;
 use super::metrics::{FIGURES, Metrics};
 use crate::VehicleConfig;
@@ -40,6 +41,8 @@ pub struct Outcome {
     pub battery: [f32; 2],
     /// What came of faults, and what never may happen.
     pub judgement: Judgement,
+    /// What the secure session has done, if there was one.
+    pub air: AirReport,
     /// Other programs flew it: it had nothing to finish.
     pub live: bool,
     /// Somebody has asked for a restart, with these parameters if any were kept.

@@ -1,5 +1,6 @@
 //! The radio between the vehicle and whoever flies it, with what can go wrong on it.
 
+use super::air;
 use super::faults::Wrong;
 use crate::messages::TelemetryFrame;
 use crate::topics::{self, Id};
@@ -15,6 +16,8 @@ pub struct Radio<'b> {
     guided: Line<GuidedCommand>,
     telemetry: Line<TelemetryFrame>,
     frame: TelemetryFrame,
+    /// The secure session, if the pilot's frames and telemetry go as its bytes.
+    air: Option<air::Shared>,
 }
 
 impl<'b> Radio<'b> {
@@ -32,7 +35,13 @@ impl<'b> Radio<'b> {
             guided: wrong.line(Id::command_guided),
             telemetry: wrong.line(Id::telemetry),
             frame: TelemetryFrame::default(),
+            air: None,
         }
+    }
+
+    /// The same, with the secure session on it.
+    pub(super) fn over(self, air: air::Shared) -> Self {
+        Self { air: Some(air), ..self }
     }
 
     /// Virtual time.
@@ -51,7 +60,12 @@ impl<'b> Radio<'b> {
     /// Sends a frame of the transmitter.
     pub fn sticks(&mut self, input: &PilotInput) {
         let now = self.clock.now();
-        if let Some(input) = self.pilot.pass(now, input) {
+        let mut arrived = self.pilot.pass(now, input);
+        if let Some(air) = &self.air {
+            let armed = self.ends.flight_status.latest().is_some_and(|status| status.data.armed);
+            arrived = air.borrow_mut().sticks(now, &arrived.unwrap_or(*input), armed, arrived.is_some());
+        }
+        if let Some(input) = arrived {
             self.ends.command_pilot.publish(now, &input);
         }
     }
@@ -59,7 +73,10 @@ impl<'b> Radio<'b> {
     /// The newest telemetry that has arrived.
     pub fn telemetry(&mut self) -> TelemetryFrame {
         let newest = self.ends.telemetry.latest();
-        if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(self.clock.now(), &frame.data)) {
+        let now = self.clock.now();
+        if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data))
+            && self.air.as_ref().is_none_or(|air| air.borrow_mut().telemetry(now, &frame))
+        {
             self.frame = frame;
         }
         self.frame

@@ -1,5 +1,6 @@
 //! All that decides a flight of the StampFly.
 
+use super::air::Air;
 use super::mission::{self, Mission};
 use super::plant::PLANT;
 use super::sensing::Sensing;
@@ -26,6 +27,8 @@ pub struct Setup {
     pub faults: Vec<Fault>,
     /// The mission is flown by a pilot in this mode; `None` for a ground station.
     pub pilot: Option<FlightMode>,
+    /// Frames of the pilot and telemetry go as bytes of the secure session, with this on the air; `None`: as messages.
+    pub air: Option<Air>,
     /// Is the vehicle watched by a motion capture system?
     pub cameras: bool,
     /// Seed of the executor's delays; `None` for an executor that is never late.
@@ -47,6 +50,7 @@ impl Setup {
             sensing: Sensing::Models,
             faults: Vec::new(),
             pilot: None,
+            air: None,
             cameras: false,
             jitter: None,
             live: None,

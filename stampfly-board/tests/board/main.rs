@@ -1,6 +1,8 @@
 //! The vehicle's flight stack, joined as the firmware joins it. One binary, because each would build the stack again:
 //! `cargo test -p stampfly-board --test board pairing` runs one file.
 
+#[cfg(feature = "simulation")]
+mod air;
 mod bench;
 mod configuration;
 mod console;
