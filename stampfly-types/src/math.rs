@@ -53,6 +53,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
 }
 
 /// Square root; negative arguments give zero.
+#[inline]
 #[must_use]
 pub fn sqrt(value: f32) -> f32 {
     let value = if value < 0.0 { 0.0 } else { value };

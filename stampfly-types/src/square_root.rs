@@ -17,6 +17,8 @@ const FRACTION: u32 = (1 << 23) - 1;
 const HIDDEN: u32 = 1 << 23;
 
 /// Square root, rounded to the nearest. NaN for negative numbers.
+// Forty instructions that are wanted in many places, some of them in fast memory.
+#[inline(never)]
 #[must_use]
 pub fn sqrt(value: f32) -> f32 {
     let bits = value.to_bits();
