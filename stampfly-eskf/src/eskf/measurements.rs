@@ -72,7 +72,7 @@ impl Eskf {
         // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the
         // axis and the one straight down.
         let cone = tof.distance * (1.0 - cos_tilt);
-        let sigma = self.config.tof_sigma.max(tof.sigma) + cone;
+        let sigma = math::larger(self.config.tof_sigma, tof.sigma) + cone;
         let variance = sigma * sigma;
         let innovation = self.innovation(delayed, [row], [tof.distance], [variance]);
         let ratio = self.test_ratio(&innovation);

@@ -26,7 +26,7 @@
 mod rise;
 
 use rise::Rise;
-use stampfly_types::{Duration, Instant};
+use stampfly_types::{Duration, Instant, math};
 
 /// Difference of the paths, which fades with [`FADING`], m. A slope of 20° at 0.5 m/s makes 0.7.
 pub(super) const HEIGHT: f32 = 0.8;
@@ -267,7 +267,7 @@ impl VerticalMonitor {
 
     /// Takes a range before the filter does. `rejecting`: the filter rejected the one before.
     pub(super) fn range(&mut self, at: Instant, distance: f32, expected: f32, rejecting: bool) -> Use {
-        let dt = at.since(self.range_at).seconds().min(0.2);
+        let dt = math::smaller(at.since(self.range_at).seconds(), 0.2);
         let change = (distance - self.range).abs();
         let jumps = change > JUMP && self.range > 0.0;
         let leaps = change > LEAP && self.range > 0.0 && (distance - expected).abs() > LEAP;
@@ -282,7 +282,7 @@ impl VerticalMonitor {
             self.stood = 0;
         }
         (self.range, self.range_at) = (distance, at);
-        self.jumps = (self.jumps - dt / JUMP_FADING).max(0.0) + f32::from(u8::from(jumps));
+        self.jumps = math::larger(self.jumps - dt / JUMP_FADING, 0.0) + f32::from(u8::from(jumps));
         if self.implausible {
             let agrees = (distance - expected).abs() < AGREES && !jumps && self.repeats < REPEATED;
             self.agrees = if agrees { self.agrees + dt } else { 0.0 };

@@ -9,7 +9,7 @@
 //! It accuses and does not judge, since a shift of the gyro's zero looks the same for a second: [`gyro`](super::gyro) tells them
 //! apart. Not for lies that begin in flight: the comparison over half a second, and jumps.
 
-use stampfly_types::GRAVITY;
+use stampfly_types::{GRAVITY, math};
 
 /// For so long it is compared, s.
 const LASTS: f32 = 3.0;
@@ -53,7 +53,7 @@ pub(super) struct Departure {
 impl Departure {
     /// The vehicle stands, for another `dt` seconds.
     pub(super) fn stand(&mut self, dt: f32) {
-        let unsure = (self.unsure - dt).max(0.0);
+        let unsure = math::larger(self.unsure - dt, 0.0);
         *self = Self { time: (unsure == 0.0).then_some(0.0), unsure, ..Self::default() };
     }
 

@@ -30,7 +30,7 @@ pub(super) use gyro::GyroShift;
 use gyro::Record;
 use jump::Jump;
 use picture::Picture;
-use stampfly_types::{GRAVITY, Vec3};
+use stampfly_types::{GRAVITY, Vec3, math};
 
 /// Time constant over which velocities are compared, s, and of the low-pass on their difference.
 const OVER: f32 = 0.5;
@@ -171,7 +171,7 @@ impl FlowMonitor {
         // Nothing but a fast turn begins it.
         let limit = if self.settles > 0.0 { CALM } else { FAST };
         let fast = x * x + y * y > limit * limit;
-        self.settles = if fast { SETTLES } else { (self.settles - interval).max(0.0) };
+        self.settles = if fast { SETTLES } else { math::larger(self.settles - interval, 0.0) };
         let unusable = self.settles > 0.0;
         if unusable {
             self.last = None;
@@ -288,7 +288,7 @@ impl FlowMonitor {
             self.implausible = self.agrees < AGREES_FOR || self.jump.has_jumped() || self.departure.is_convicted();
             return Verdict::Unchanged;
         }
-        self.waits = (self.waits - interval).max(0.0);
+        self.waits = math::larger(self.waits - interval, 0.0);
         let mut apart = (self.differs > LASTS && self.waits == 0.0) || self.jump.has_jumped();
         let unmoved = self.picture.is_frozen() || self.picture.is_blind(distance);
         let shift = if apart && !unmoved { self.record.shift() } else { None };
