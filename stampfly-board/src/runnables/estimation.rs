@@ -31,11 +31,11 @@ impl Estimation {
     #[inline(never)]
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let estimator = match config.estimator {
-            EstimatorKind::Complementary => Choice::Complementary(Complementary::new(config.complementary)),
-            EstimatorKind::Eskf => Choice::Eskf(Eskf::new(config.eskf)),
-        };
-        Self { estimator, started: false, pacer: Pacer::default() }
+        let of = |estimator| Self { estimator, started: false, pacer: Pacer::default() };
+        match config.estimator {
+            EstimatorKind::Complementary => of(Choice::Complementary(Complementary::new(config.complementary))),
+            EstimatorKind::Eskf => of(Choice::Eskf(Eskf::new(config.eskf))),
+        }
     }
 }
 

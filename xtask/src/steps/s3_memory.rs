@@ -11,7 +11,7 @@
 
 use super::cache::in_ram;
 use super::esp32_link::S3Scripts;
-use super::{esp32_link, qemu};
+use super::{core1, esp32_link, qemu};
 use crate::elf::{C, Names, Place, Program};
 use crate::repository::{Failure, Repository};
 use object::{Object, ObjectSection};
@@ -45,7 +45,8 @@ pub fn stack(repository: &Repository, c6: &Path, scripts: &S3Scripts) -> Result<
 
     let wanted: Vec<&str> = of_c().map(|symbol| symbol.name.as_str()).collect();
     let s3_radio = esp32_link::radio(repository, scripts, &wanted)?;
-    let xtensa = Names::read(&qemu::program(repository, &qemu::XTENSA)?)?;
+    let (script, _) = core1::record(repository)?;
+    let xtensa = Names::read(&core1::program(repository, &qemu::XTENSA, &script)?)?;
     let s3_code = listed(&xtensa, 0..u64::MAX);
 
     let stack = sizes::FLIGHT_STACK as u64;
