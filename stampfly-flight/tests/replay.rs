@@ -183,11 +183,11 @@ fn a_wrong_gain_is_found() {
 fn a_replay_starts_in_the_middle() {
     let log = record(&ranges(200), 0..0);
     let from = Some(Instant::from_millis(1_000));
-    let outcome = again(&log, ReplayOptions { from }).expect("replays");
+    let outcome = again(&log, ReplayOptions { from, ..Default::default() }).expect("replays");
     assert_eq!((&outcome.difference, outcome.gaps), (&None, 0));
     assert!(outcome.skipped > 100 && outcome.activations > 100 && outcome.activations < 150);
     let from = Some(Instant::from_secs(60));
-    assert_eq!(again(&log, ReplayOptions { from }), Err(ReplayError::NoKeyFrame));
+    assert_eq!(again(&log, ReplayOptions { from, ..Default::default() }), Err(ReplayError::NoKeyFrame));
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn samples_and_deadlines_reach_the_motors_at_once() {
         }
         pending().await
     };
-    let write = |now| {
+    let write = |now, _: &_| {
         let output = motors.actuator_motor.latest().expect("the flight band has just published");
         duties.borrow_mut().push((now, output.data.duty[0]));
     };
@@ -97,7 +97,7 @@ fn a_task_that_was_dropped_can_be_started_again() {
     let mut bus = topics::Bus::new();
     let Assembled { mut flight_loop, .. } = Assembled::<Rover>::new(&mut bus, None, &0.5, Instant::ZERO);
     for until in [75, 120].map(Instant::from_millis) {
-        let task = fly(pending(), &mut flight_loop, || clock.now(), Delay(&clock), Ran(&ran), |_| {});
+        let task = fly(pending(), &mut flight_loop, || clock.now(), Delay(&clock), Ran(&ran), |_, _| {});
         clock.run(pin!(task), until);
     }
     let at = Instant::from_millis;

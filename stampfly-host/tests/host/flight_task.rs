@@ -85,7 +85,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
         to_imu.publish(at, data);
     };
     let sensing = run_sensor(async || imu.next().await, publish, clock.clone(), Backoff::CRITICAL, imu_health);
-    let write_motors = |_| {
+    let write_motors = |_, _: &_| {
         if duties.has_new()
             && let Some(output) = duties.latest()
         {

@@ -1,0 +1,147 @@
+//! What both ends of a compact record know already: the record holds only what differs from it.
+//!
+//! A sample is expected as long after the one before it as that one was after its own predecessor, with the same words. An
+//! activation is expected to have read as much further in each of its inputs as it did the last time. Both ends forget all of
+//! it at a key frame, so that a reader may begin at each.
+
+use stampfly_types::activation::MAX_INPUTS;
+use stampfly_types::{ActivationRecord, InputRecord, Instant};
+
+/// Words of a message that are compared with those of the sample before; those behind them are stored against zero. No sensor of
+/// a vehicle at hand has more.
+pub(super) const WORDS: usize = 16;
+
+/// What an entry is, in its first byte: this bit an activation, else a sample of the topic in the low bits.
+pub(super) const ACTIVATION: u8 = 0x80;
+/// An activation was told another instant than the one before it.
+pub(super) const NOW: u8 = 0x40;
+/// An activation has read its inputs in another way than expected.
+pub(super) const INPUTS: u8 = 0x20;
+/// The line of an activation.
+pub(super) const LINE: u8 = 0x1f;
+/// The last activation of the line that follows has been refused something.
+pub(super) const REFUSED: u8 = 0x7d;
+/// All samples that a pass has seen are in the record.
+pub(super) const PASS: u8 = 0x7e;
+/// A key frame, with its length.
+pub(super) const FRAME: u8 = 0x7f;
+/// Topics there may be at most.
+pub(super) const TOPICS: usize = REFUSED as usize;
+
+/// A topic so far.
+#[derive(Clone, Copy)]
+pub(super) struct Topic {
+    pub at: u64,
+    pub step: u64,
+    pub generation: u32,
+    pub words: [u32; WORDS],
+}
+
+impl Topic {
+    pub const NEW: Self = Self { at: 0, step: 0, generation: 0, words: [0; WORDS] };
+
+    /// The instant that is expected.
+    pub const fn expected(&self) -> u64 {
+        self.at.wrapping_add(self.step)
+    }
+
+    /// The word that is expected.
+    pub fn word(&self, index: usize) -> u32 {
+        self.words.get(index).copied().unwrap_or_default()
+    }
+
+    /// There is a sample.
+    pub fn set(&mut self, at: u64, generation: u32) {
+        self.step = at.wrapping_sub(self.at);
+        (self.at, self.generation) = (at, generation);
+    }
+
+    /// With this word.
+    pub fn set_word(&mut self, index: usize, word: u32) {
+        if let Some(place) = self.words.get_mut(index) {
+            *place = word;
+        }
+    }
+}
+
+/// A line of the activation table so far.
+#[derive(Clone, Copy)]
+pub(super) struct Line {
+    inputs: [InputRecord; MAX_INPUTS],
+    steps: [u32; MAX_INPUTS],
+}
+
+impl Line {
+    pub const NEW: Self =
+        Self { inputs: [InputRecord { generation: 0, taken: 0 }; MAX_INPUTS], steps: [0; MAX_INPUTS] };
+
+    /// What is expected of an input.
+    pub fn expected(&self, input: usize) -> InputRecord {
+        let (last, step) = (self.inputs.get(input), self.steps.get(input));
+        let (last, step) = (last.copied().unwrap_or_default(), step.copied().unwrap_or_default());
+        InputRecord { generation: last.generation.wrapping_add(step), taken: last.taken }
+    }
+
+    /// An activation of this line has read its inputs. Returns a bit for each that was not expected.
+    pub fn take(&mut self, record: &ActivationRecord) -> u16 {
+        let mut unexpected = 0;
+        let places = self.inputs.iter_mut().zip(&mut self.steps);
+        for (bit, (input, (last, step))) in record.inputs().iter().zip(places).enumerate() {
+            let moved = input.generation.wrapping_sub(last.generation);
+            if moved != *step || input.taken != last.taken {
+                unexpected |= 1 << bit;
+            }
+            (*step, *last) = (moved, *input);
+        }
+        unexpected
+    }
+}
+
+/// Instants that activations are told.
+#[derive(Clone, Copy)]
+pub(super) struct Now {
+    last: u64,
+    step: u64,
+}
+
+impl Now {
+    pub const NEW: Self = Self { last: 0, step: 0 };
+
+    /// The one that the last activation was told.
+    pub const fn last(&self) -> u64 {
+        self.last
+    }
+
+    /// The next one that is expected, when it is another.
+    pub const fn expected(&self) -> u64 {
+        self.last.wrapping_add(self.step)
+    }
+
+    /// It is another.
+    pub const fn set(&mut self, now: Instant) {
+        self.step = now.as_micros().wrapping_sub(self.last);
+        self.last = now.as_micros();
+    }
+}
+
+/// A signed difference as an unsigned number, small when the difference is.
+pub(super) const fn zigzag(difference: u64) -> u64 {
+    (difference << 1) ^ ((difference as i64 >> 63) as u64)
+}
+
+/// The way back.
+pub(super) const fn unzigzag(number: u64) -> u64 {
+    (number >> 1) ^ (number & 1).wrapping_neg()
+}
+
+/// How many bytes a word takes against the one expected, as a nibble: 0 to 4 low bytes of the difference.
+pub(super) const fn width(difference: u32) -> u8 {
+    let signed = difference as i32;
+    match signed {
+        0 => 0,
+        -0x80..=0x7f => 1,
+        -0x8000..=0x7fff => 2,
+        -0x80_0000..=0x7f_ffff => 3,
+        _ => 4,
+    }
+}
