@@ -25,6 +25,6 @@ mod tests;
 mod write;
 
 #[cfg(feature = "replay")]
-pub use read::{ReadError, read};
+pub use read::{ReadError, read, shares};
 pub use ring::{Ring, Store};
 pub use write::{Compact, Watching};

@@ -130,6 +130,7 @@ pub(super) const fn zigzag(difference: u64) -> u64 {
 }
 
 /// The way back.
+#[cfg(any(test, feature = "replay"))]
 pub(super) const fn unzigzag(number: u64) -> u64 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }

@@ -2,12 +2,14 @@
 
 use super::model::{ACTIVATION, FRAME, INPUTS, LINE, Line, NOW, Now, PASS, REFUSED, Topic, unzigzag};
 use crate::flight_loop::Observer;
+use crate::log_schema::LogSchema;
 use crate::recorder::Recorder;
+use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 use stampfly_bus::{Activation, Schedule, TopicTable};
-use stampfly_log::ulog::Sink;
+use stampfly_log::ulog::{Definitions, Sink};
 use stampfly_types::activation::MAX_INPUTS;
 use stampfly_types::{ActivationRecord, InputRecord, Instant};
 
@@ -82,6 +84,43 @@ struct Sample {
 /// # Errors
 /// When the record is damaged, or the log takes no more. What came before is in the log.
 pub fn read<R: Schedule, S: Sink>(record: &[u8], log: &mut Recorder<R, S>) -> Result<(), ReadError> {
+    decode(record, log, &mut |_, _| {})
+}
+
+/// How many bytes of a record each topic, each line of the activation table, and key frames take, by their names.
+#[must_use]
+pub fn shares<R: Schedule>(record: &[u8]) -> Vec<(&'static str, usize)> {
+    struct Nowhere;
+    impl Sink for Nowhere {
+        type Error = core::convert::Infallible;
+        fn write(&mut self, _: &[u8]) -> Result<(), Self::Error> {
+            Ok(())
+        }
+    }
+    let mut shares = BTreeMap::new();
+    let head = Definitions::start(Nowhere, Instant::ZERO).and_then(|head| head.data(LogSchema::<R>::new(&[])));
+    if let Ok(log) = head {
+        // What comes before damage counts.
+        let _ = decode::<R, _>(record, &mut Recorder::new(log), &mut |tag, bytes| {
+            let line = R::ACTIVATIONS.get(usize::from(tag & LINE)).map(|info| info.name);
+            let topic = <R::Topics as TopicTable>::TOPICS.get(usize::from(tag)).map(|info| info.name);
+            let name = match tag {
+                FRAME => Some("key frames"),
+                PASS | REFUSED => Some("marks"),
+                _ if tag & ACTIVATION != 0 => line,
+                _ => topic,
+            };
+            *shares.entry(name.unwrap_or("unknown")).or_default() += bytes;
+        });
+    }
+    shares.into_iter().collect()
+}
+
+fn decode<R: Schedule, S: Sink>(
+    record: &[u8],
+    log: &mut Recorder<R, S>,
+    took: &mut dyn FnMut(u8, usize),
+) -> Result<(), ReadError> {
     let topics = <R::Topics as TopicTable>::TOPICS;
     let mut take = Take { rest: record, whole: record.len() };
     let (mut seen, mut lines) = (vec![Topic::NEW; topics.len()], vec![Line::NEW; R::ACTIVATIONS.len()]);
@@ -89,7 +128,8 @@ pub fn read<R: Schedule, S: Sink>(record: &[u8], log: &mut Recorder<R, S>) -> Re
     let (mut activations, mut samples): (Vec<ActivationRecord>, Vec<Sample>) = (Vec::new(), Vec::new());
     while !take.rest.is_empty() {
         let damaged = take.damaged();
-        match take.byte()? {
+        let (tag, before) = (take.byte()?, take.rest.len() + 1);
+        match tag {
             PASS => {
                 let mut write = |sample: &Sample| log.sample(sample.topic, sample.at, sample.generation, &sample.words);
                 let is_outside = |sample: &&Sample| topics.get(sample.topic).is_some_and(|info| info.is_outside);
@@ -117,7 +157,7 @@ pub fn read<R: Schedule, S: Sink>(record: &[u8], log: &mut Recorder<R, S>) -> Re
                 again.refused = u32::try_from(refused).map_err(|_| damaged)?;
                 activations.push(again);
             }
-            tag if tag & ACTIVATION != 0 => {
+            _ if tag & ACTIVATION != 0 => {
                 let index = tag & LINE;
                 let line = lines.get_mut(usize::from(index)).ok_or(damaged)?;
                 let count = *R::INPUTS.get(usize::from(index)).ok_or(damaged)?;
@@ -137,8 +177,8 @@ pub fn read<R: Schedule, S: Sink>(record: &[u8], log: &mut Recorder<R, S>) -> Re
                 line.take(&record);
                 activations.push(record);
             }
-            topic => {
-                let topic = usize::from(topic);
+            _ => {
+                let topic = usize::from(tag);
                 let (seen, info) = seen.get_mut(topic).zip(topics.get(topic)).ok_or(damaged)?;
                 let at = seen.expected().wrapping_add(unzigzag(take.number()?));
                 let generation = seen.generation.wrapping_add(take.number()? as u32).wrapping_add(1);
@@ -159,6 +199,7 @@ pub fn read<R: Schedule, S: Sink>(record: &[u8], log: &mut Recorder<R, S>) -> Re
                 samples.push(Sample { topic, at: Instant::from_micros(at), generation, words });
             }
         }
+        took(tag, before - take.rest.len());
     }
     Ok(())
 }

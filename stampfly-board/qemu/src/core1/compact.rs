@@ -9,7 +9,7 @@ use stampfly_types::{Duration, Instant};
 use static_cell::StaticCell;
 
 /// Bytes that the emulated board has for it.
-const MEMORY: usize = 512 * 1024;
+const MEMORY: usize = 1024 * 1024;
 /// Room for a key frame.
 const FRAME: usize = 64 * 1024;
 /// Between two key frames.

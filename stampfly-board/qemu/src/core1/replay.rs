@@ -69,9 +69,15 @@ fn change(log: &mut [u8], topic: Id, share: f64) -> Option<Instant> {
     Some(at)
 }
 
+/// Bytes of each kind of entry.
+fn shares(record: &[u8]) -> String {
+    compact::shares::<Runnables>(record).iter().map(|(name, bytes)| format!("{name} {bytes}; ")).collect()
+}
+
 fn run(path: &str) -> Result<(), String> {
     let said = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
     let record = record(&said).filter(|record| !record.is_empty()).ok_or("no record")?;
+    println!("{}", shares(&record));
     let log = log(&record)?;
     let replayed = again(&log)?;
     println!("{replayed:?}");
