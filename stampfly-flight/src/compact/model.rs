@@ -82,18 +82,23 @@ impl Line {
         InputRecord { generation: last.generation.wrapping_add(step), taken: last.taken }
     }
 
-    /// An activation of this line has read its inputs. Returns a bit for each that was not expected.
-    pub fn take(&mut self, record: &ActivationRecord) -> u16 {
-        let mut unexpected = 0;
-        let places = self.inputs.iter_mut().zip(&mut self.steps);
-        for (bit, (input, (last, step))) in record.inputs().iter().zip(places).enumerate() {
-            let moved = input.generation.wrapping_sub(last.generation);
-            if moved != *step || input.taken != last.taken {
-                unexpected |= 1 << bit;
-            }
-            (*step, *last) = (moved, *input);
+    /// A bit for each input that was not read as expected.
+    #[inline]
+    pub fn unexpected(&self, record: &ActivationRecord) -> u16 {
+        let places = self.inputs.iter().zip(&self.steps).zip(record.inputs());
+        places.enumerate().fold(0, |bits, (bit, ((last, step), input))| {
+            let same = input.generation.wrapping_sub(last.generation) == *step && input.taken == last.taken;
+            bits | u16::from(!same) << bit
+        })
+    }
+
+    /// An activation of this line has read its inputs.
+    #[inline]
+    pub fn set(&mut self, record: &ActivationRecord) {
+        for ((last, step), input) in self.inputs.iter_mut().zip(&mut self.steps).zip(record.inputs()) {
+            *step = input.generation.wrapping_sub(last.generation);
+            *last = *input;
         }
-        unexpected
     }
 }
 

@@ -174,7 +174,7 @@ fn decode<R: Schedule, S: Sink>(
                     }
                     record.push(input).map_err(|_| damaged)?;
                 }
-                line.take(&record);
+                line.set(&record);
                 activations.push(record);
             }
             _ => {

@@ -9,16 +9,18 @@ use stampfly_types::{ActivationRecord, Instant};
 
 /// Longest entry but a key frame: a message of 64 words, or an activation with all of its inputs.
 const ENTRY: usize = 384;
+/// Entries that go to the store at once, as long as there is room for one more: those of a pass, most often.
+const ENTRIES: usize = 3 * ENTRY;
 
-/// An entry that is being made.
+/// Entries that are being made.
 struct Entry {
-    bytes: [u8; ENTRY],
+    bytes: [u8; ENTRIES],
     length: usize,
 }
 
 impl Entry {
     const fn new() -> Self {
-        Self { bytes: [0; ENTRY], length: 0 }
+        Self { bytes: [0; ENTRIES], length: 0 }
     }
 
     #[inline]
@@ -38,6 +40,15 @@ impl Entry {
         self.byte(number as u8);
     }
 
+    /// The low bytes of a difference: all are written, and those that are too many overwritten.
+    #[inline]
+    fn difference(&mut self, difference: u32, width: u8) {
+        if let Some(place) = self.bytes.get_mut(self.length..).and_then(<[u8]>::first_chunk_mut) {
+            *place = difference.to_le_bytes();
+        }
+        self.length += usize::from(width);
+    }
+
     /// `None` when it was too long.
     fn written(&self) -> Option<&[u8]> {
         self.bytes.get(..self.length)
@@ -51,9 +62,8 @@ impl Entry {
 /// frame.
 pub struct Compact<S, const COUNT: usize, const LINES: usize> {
     store: S,
-    topics: &'static [TopicInfo],
-    /// Every how many samples of a topic that runnables publish one is kept; zero for none.
-    every: fn(usize) -> u32,
+    /// Every how many samples of a topic one is kept; zero for none.
+    every: [u32; COUNT],
     seen: [Topic; COUNT],
     /// The newest generation of each topic that was looked at.
     heads: [u32; COUNT],
@@ -67,12 +77,15 @@ pub struct Compact<S, const COUNT: usize, const LINES: usize> {
 impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> {
     /// Records nothing before the first key frame. `every` says of a topic that runnables publish every how many samples one
     /// is kept for comparison; all from outside are.
-    pub const fn new(store: S, topics: &'static [TopicInfo], every: fn(usize) -> u32) -> Self {
+    pub fn new(store: S, topics: &'static [TopicInfo], every: fn(usize) -> u32) -> Self {
         const { assert!(COUNT < TOPICS && LINES <= LINE as usize + 1, "more topics or lines than an entry can name") };
         Self {
             store,
-            topics,
-            every,
+            every: core::array::from_fn(|place| match topics.get(place) {
+                Some(info) if info.is_outside => 1,
+                Some(_) => every(place),
+                None => 0,
+            }),
             seen: [Topic::NEW; COUNT],
             heads: [0; COUNT],
             lines: [Line::NEW; LINES],
@@ -83,7 +96,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
         }
     }
 
-    /// Entries and samples that are missing: refused by the store, or overwritten on the bus before they were looked at.
+    /// Passes and samples that are missing: refused by the store, or overwritten on the bus before they were looked at.
     #[must_use]
     pub const fn lost(&self) -> u32 {
         self.lost
@@ -95,7 +108,15 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
         &self.store
     }
 
+    /// An entry is complete.
+    #[inline]
     fn put(&mut self) {
+        if self.entry.length > ENTRIES - ENTRY {
+            self.flush();
+        }
+    }
+
+    fn flush(&mut self) {
         let taken = self.is_on && self.entry.written().is_some_and(|bytes| self.store.put(bytes));
         if !taken {
             self.lost += 1;
@@ -108,8 +129,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
     pub fn activation(&mut self, record: &ActivationRecord) {
         let Self { lines, now, entry, is_on: true, .. } = self else { return };
         let Some(line) = lines.get_mut(usize::from(record.index)) else { return };
-        let before = *line;
-        let unexpected = line.take(record);
+        let unexpected = line.unexpected(record);
         let is_other = record.now.as_micros() != now.last();
         let flags = if is_other { NOW } else { 0 } | if unexpected != 0 { INPUTS } else { 0 };
         entry.byte(ACTIVATION | flags | record.index & LINE);
@@ -121,12 +141,13 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
             entry.number(unexpected.into());
             for (place, input) in record.inputs().iter().enumerate() {
                 if unexpected >> place & 1 == 1 {
-                    let expected = before.expected(place);
+                    let expected = line.expected(place);
                     entry.number(zigzag(i64::from(input.generation.wrapping_sub(expected.generation) as i32) as u64));
                     entry.number(input.taken.into());
                 }
             }
         }
+        line.set(record);
         self.put();
     }
 
@@ -142,17 +163,20 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
 
     /// A pass is over: takes the samples that have come since the last one.
     pub fn pass(&mut self, heads: &[&dyn AnyTopic]) {
-        let (topics, every) = (self.topics, self.every);
-        for (place, (topic, info)) in heads.iter().zip(topics).enumerate() {
+        for (place, topic) in heads.iter().enumerate() {
+            let Some((every, looked_at)) = self.every.get(place).copied().zip(self.heads.get_mut(place)) else {
+                return;
+            };
+            if every == 0 {
+                continue;
+            }
             let head = topic.head();
-            let Some(looked_at) = self.heads.get_mut(place) else { return };
             let from = core::mem::replace(looked_at, head);
             if from == head || !self.is_on {
                 continue;
             }
-            let every = if info.is_outside { 1 } else { every(place) };
             let mut generation = from.wrapping_add(1);
-            while every != 0 && generation != head.wrapping_add(1) {
+            while generation != head.wrapping_add(1) {
                 if every == 1 || generation % every == 0 {
                     let is_there = topic.copy(generation, &mut |at, words| self.sample(place, at, generation, words));
                     self.lost += u32::from(!is_there);
@@ -162,7 +186,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
         }
         if self.is_on {
             self.entry.byte(PASS);
-            self.put();
+            self.flush();
         }
     }
 
@@ -182,7 +206,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
             let [low, high] = differences.map(width);
             entry.byte(low | high << 4);
             for (difference, width) in differences.into_iter().zip([low, high]) {
-                difference.to_le_bytes().into_iter().take(usize::from(width)).for_each(|byte| entry.byte(byte));
+                entry.difference(difference, width);
             }
         }
         self.put();
@@ -195,7 +219,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
         self.entry.byte(FRAME);
         self.entry.number(frame.len() as u64);
         self.is_on = self.store.begin(self.entry.length + frame.len());
-        self.put();
+        self.flush();
         self.is_on = self.is_on && self.store.put(frame);
         self.seen.fill(Topic::NEW);
         self.lines.fill(Line::NEW);

@@ -119,7 +119,7 @@ async fn flight(parts: Parts) {
     };
     let observer = Stopwatch::new(profile, clock);
     #[cfg(feature = "core1-compact")]
-    let observer = (observer, stampfly_flight::compact::Watching(record));
+    let observer = (observer, compact::Counted(record));
     let flying = fly(sensing, flight_loop, clock, time, observer, write);
     join(flying, looking_down).await;
 }

@@ -5,9 +5,9 @@
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics::{Id, TOPICS};
 use stampfly_board::{VehicleConfig, black_box};
+use stampfly_flight::Recorder;
 use stampfly_flight::compact;
 use stampfly_flight::replay::{Replay, ReplayOptions, replay};
-use stampfly_flight::Recorder;
 use stampfly_log::ulog::{Message, Reader, Sink};
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
@@ -52,8 +52,7 @@ fn change(log: &mut [u8], topic: Id, share: f64) -> Option<Instant> {
     let name = TOPICS[topic as usize].name;
     let (mut places, mut ids) = (Vec::new(), BTreeMap::new());
     let mut reader = Reader::new(log).ok()?;
-    loop {
-        let Some(message) = reader.next() else { break };
+    while let Some(message) = reader.next() {
         match message.ok()? {
             Message::Subscription { id, topic, .. } => _ = ids.insert(id, topic.to_owned()),
             Message::Data { id, payload } if ids.get(&id).is_some_and(|known| known == name) => {
