@@ -76,29 +76,31 @@ impl Line {
         Self { inputs: [InputRecord { generation: 0, taken: 0 }; MAX_INPUTS], steps: [0; MAX_INPUTS] };
 
     /// What is expected of an input.
+    #[cfg(feature = "replay")]
     pub fn expected(&self, input: usize) -> InputRecord {
         let (last, step) = (self.inputs.get(input), self.steps.get(input));
         let (last, step) = (last.copied().unwrap_or_default(), step.copied().unwrap_or_default());
         InputRecord { generation: last.generation.wrapping_add(step), taken: last.taken }
     }
 
-    /// A bit for each input that was not read as expected.
+    /// An activation of this line has read its inputs. Returns a bit for each that was not read as expected; how much farther
+    /// than that it was read is in `beyond` then.
     #[inline]
-    pub fn unexpected(&self, record: &ActivationRecord) -> u16 {
-        let places = self.inputs.iter().zip(&self.steps).zip(record.inputs());
-        places.enumerate().fold(0, |bits, (bit, ((last, step), input))| {
-            let same = input.generation.wrapping_sub(last.generation) == *step && input.taken == last.taken;
-            bits | u16::from(!same) << bit
-        })
-    }
-
-    /// An activation of this line has read its inputs.
-    #[inline]
-    pub fn set(&mut self, record: &ActivationRecord) {
-        for ((last, step), input) in self.inputs.iter_mut().zip(&mut self.steps).zip(record.inputs()) {
-            *step = input.generation.wrapping_sub(last.generation);
-            *last = *input;
+    pub fn set(&mut self, record: &ActivationRecord, beyond: &mut [u32; MAX_INPUTS]) -> u16 {
+        let (mut unexpected, mut bit) = (0, 1);
+        let places = self.inputs.iter_mut().zip(&mut self.steps).zip(beyond);
+        for (input, ((last, step), beyond)) in record.inputs().iter().zip(places) {
+            let moved = input.generation.wrapping_sub(last.generation);
+            last.generation = input.generation;
+            if moved != *step || input.taken != last.taken {
+                unexpected |= bit;
+                *beyond = moved.wrapping_sub(*step);
+                *step = moved;
+                last.taken = input.taken;
+            }
+            bit <<= 1;
         }
+        unexpected
     }
 }
 
@@ -132,6 +134,11 @@ impl Now {
 /// A signed difference as an unsigned number, small when the difference is.
 pub(super) const fn zigzag(difference: u64) -> u64 {
     (difference << 1) ^ ((difference as i64 >> 63) as u64)
+}
+
+/// The same, of 32 bits: [`unzigzag`] gives it back as a difference of 64.
+pub(super) const fn zigzag32(difference: u32) -> u32 {
+    (difference << 1) ^ ((difference as i32 >> 31) as u32)
 }
 
 /// The way back.

@@ -174,7 +174,7 @@ fn decode<R: Schedule, S: Sink>(
                     }
                     record.push(input).map_err(|_| damaged)?;
                 }
-                line.set(&record);
+                line.set(&record, &mut [0; MAX_INPUTS]);
                 activations.push(record);
             }
             _ => {

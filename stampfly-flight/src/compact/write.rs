@@ -1,10 +1,13 @@
 //! Writes a compact record while the vehicle flies.
 
-use super::model::{ACTIVATION, FRAME, INPUTS, LINE, Line, NOW, Now, PASS, REFUSED, TOPICS, Topic, width, zigzag};
+use super::model::{
+    ACTIVATION, FRAME, INPUTS, LINE, Line, NOW, Now, PASS, REFUSED, TOPICS, Topic, width, zigzag, zigzag32,
+};
 use super::ring::Store;
 use crate::flight_loop::Observer;
 use core::cell::RefCell;
 use stampfly_bus::{Activation, AnyTopic, TopicInfo};
+use stampfly_types::activation::MAX_INPUTS;
 use stampfly_types::{ActivationRecord, Instant};
 
 /// Longest entry but a key frame: a message of 64 words, or an activation with all of its inputs.
@@ -40,6 +43,28 @@ impl Entry {
         self.byte(number as u8);
     }
 
+    /// The same, for less: most numbers have one byte.
+    #[inline]
+    fn number32(&mut self, number: u32) {
+        if number < 0x80 { self.byte(number as u8) } else { self.number(number.into()) }
+    }
+
+    /// A difference of instants, which is mostly less than a minute.
+    #[inline]
+    fn difference64(&mut self, difference: u64) {
+        match i32::try_from(difference as i64) {
+            Ok(short) if short.unsigned_abs() < 0x4000_0000 => {
+                let mut number = zigzag32(short as u32);
+                while number >= 0x80 {
+                    self.byte(number as u8 | 0x80);
+                    number >>= 7;
+                }
+                self.byte(number as u8);
+            }
+            _ => self.number(zigzag(difference)),
+        }
+    }
+
     /// The low bytes of a difference: all are written, and those that are too many overwritten.
     #[inline]
     fn difference(&mut self, difference: u32, width: u8) {
@@ -71,6 +96,7 @@ pub struct Compact<S, const COUNT: usize, const LINES: usize> {
     now: Now,
     is_on: bool,
     lost: u32,
+    beyond: [u32; MAX_INPUTS],
     entry: Entry,
 }
 
@@ -92,6 +118,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
             now: Now::NEW,
             is_on: false,
             lost: 0,
+            beyond: [0; MAX_INPUTS],
             entry: Entry::new(),
         }
     }
@@ -127,27 +154,25 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
 
     /// A runnable has read its inputs.
     pub fn activation(&mut self, record: &ActivationRecord) {
-        let Self { lines, now, entry, is_on: true, .. } = self else { return };
+        let Self { lines, now, entry, beyond, is_on: true, .. } = self else { return };
         let Some(line) = lines.get_mut(usize::from(record.index)) else { return };
-        let unexpected = line.unexpected(record);
+        let unexpected = line.set(record, beyond);
         let is_other = record.now.as_micros() != now.last();
         let flags = if is_other { NOW } else { 0 } | if unexpected != 0 { INPUTS } else { 0 };
         entry.byte(ACTIVATION | flags | record.index & LINE);
         if is_other {
-            entry.number(zigzag(record.now.as_micros().wrapping_sub(now.expected())));
+            entry.difference64(record.now.as_micros().wrapping_sub(now.expected()));
             now.set(record.now);
         }
         if unexpected != 0 {
-            entry.number(unexpected.into());
-            for (place, input) in record.inputs().iter().enumerate() {
+            entry.number32(unexpected.into());
+            for (place, (input, beyond)) in record.inputs().iter().zip(beyond).enumerate() {
                 if unexpected >> place & 1 == 1 {
-                    let expected = line.expected(place);
-                    entry.number(zigzag(i64::from(input.generation.wrapping_sub(expected.generation) as i32) as u64));
-                    entry.number(input.taken.into());
+                    entry.number32(zigzag32(*beyond));
+                    entry.number32(input.taken.into());
                 }
             }
         }
-        line.set(record);
         self.put();
     }
 
@@ -194,8 +219,8 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
         let Self { seen, entry, is_on: true, .. } = self else { return };
         let Some(seen) = seen.get_mut(topic) else { return };
         entry.byte(topic as u8);
-        entry.number(zigzag(at.as_micros().wrapping_sub(seen.expected())));
-        entry.number(u64::from(generation.wrapping_sub(seen.generation).wrapping_sub(1)));
+        entry.difference64(at.as_micros().wrapping_sub(seen.expected()));
+        entry.number32(generation.wrapping_sub(seen.generation).wrapping_sub(1));
         seen.set(at.as_micros(), generation);
         for (pair, words) in words.chunks(2).enumerate() {
             let mut differences = [0; 2];
