@@ -12,6 +12,7 @@
 //! | activation | line, and whether instant and inputs are as expected; if not, a bit for each input, and what it is |
 //! | refused | line; what its last activation was refused |
 //! | end of a pass | 1. The samples before it were there when its activations, before them, read |
+//! | loss | 1. Something is missing before the next key frame |
 //! | key frame | length, and as many bytes; everything expected is forgotten |
 //!
 //! Numbers are variable-length, seven bits a byte, the lowest first. Differences are between bit patterns: nothing is rounded.

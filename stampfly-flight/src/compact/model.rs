@@ -25,8 +25,10 @@ pub(super) const REFUSED: u8 = 0x7d;
 pub(super) const PASS: u8 = 0x7e;
 /// A key frame, with its length.
 pub(super) const FRAME: u8 = 0x7f;
+/// Something is missing before the key frame that comes next.
+pub(super) const LOST: u8 = 0x7c;
 /// Topics there may be at most.
-pub(super) const TOPICS: usize = REFUSED as usize;
+pub(super) const TOPICS: usize = LOST as usize;
 
 /// A topic so far.
 #[derive(Clone, Copy)]

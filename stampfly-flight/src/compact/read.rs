@@ -1,6 +1,6 @@
 //! Reads a compact record, on a PC, as the log that a recorder would have written of the same.
 
-use super::model::{ACTIVATION, FRAME, INPUTS, LINE, Line, NOW, Now, PASS, REFUSED, Topic, unzigzag};
+use super::model::{ACTIVATION, FRAME, INPUTS, LINE, LOST, Line, NOW, Now, PASS, REFUSED, Topic, unzigzag};
 use crate::flight_loop::Observer;
 use crate::log_schema::LogSchema;
 use crate::recorder::Recorder;
@@ -106,7 +106,7 @@ pub fn shares<R: Schedule>(record: &[u8]) -> Vec<(&'static str, usize)> {
             let topic = <R::Topics as TopicTable>::TOPICS.get(usize::from(tag)).map(|info| info.name);
             let name = match tag {
                 FRAME => Some("key frames"),
-                PASS | REFUSED => Some("marks"),
+                PASS | REFUSED | LOST => Some("marks"),
                 _ if tag & ACTIVATION != 0 => line,
                 _ => topic,
             };
@@ -124,7 +124,7 @@ fn decode<R: Schedule, S: Sink>(
     let topics = <R::Topics as TopicTable>::TOPICS;
     let mut take = Take { rest: record, whole: record.len() };
     let (mut seen, mut lines) = (vec![Topic::NEW; topics.len()], vec![Line::NEW; R::ACTIVATIONS.len()]);
-    let mut now = Now::NEW;
+    let (mut now, mut losses) = (Now::NEW, 0);
     let (mut activations, mut samples): (Vec<ActivationRecord>, Vec<Sample>) = (Vec::new(), Vec::new());
     while !take.rest.is_empty() {
         let damaged = take.damaged();
@@ -149,6 +149,12 @@ fn decode<R: Schedule, S: Sink>(
                 seen.fill(Topic::NEW);
                 lines.fill(Line::NEW);
                 now = Now::NEW;
+            }
+            LOST => {
+                losses += 1;
+                log.taps_lost(Instant::from_micros(now.last()), losses);
+                activations.clear();
+                samples.clear();
             }
             REFUSED => {
                 let (index, refused) = (take.byte()?, take.number()?);

@@ -1,7 +1,7 @@
 //! Writes a compact record while the vehicle flies.
 
 use super::model::{
-    ACTIVATION, FRAME, INPUTS, LINE, Line, NOW, Now, PASS, REFUSED, TOPICS, Topic, width, zigzag, zigzag32,
+    ACTIVATION, FRAME, INPUTS, LINE, LOST, Line, NOW, Now, PASS, REFUSED, TOPICS, Topic, width, zigzag, zigzag32,
 };
 use super::ring::Store;
 use crate::flight_loop::Observer;
@@ -96,6 +96,8 @@ pub struct Compact<S, const COUNT: usize, const LINES: usize> {
     now: Now,
     is_on: bool,
     lost: u32,
+    /// How many of them a reader knows of.
+    told: u32,
     beyond: [u32; MAX_INPUTS],
     entry: Entry,
 }
@@ -118,6 +120,7 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
             now: Now::NEW,
             is_on: false,
             lost: 0,
+            told: 0,
             beyond: [0; MAX_INPUTS],
             entry: Entry::new(),
         }
@@ -241,11 +244,20 @@ impl<S: Store, const COUNT: usize, const LINES: usize> Compact<S, COUNT, LINES> 
     /// begins, or goes on, here.
     pub fn key_frame(&mut self, frame: &[u8]) {
         self.entry.length = 0;
+        if self.lost != self.told {
+            self.entry.byte(LOST);
+        }
         self.entry.byte(FRAME);
         self.entry.number(frame.len() as u64);
         self.is_on = self.store.begin(self.entry.length + frame.len());
         self.flush();
-        self.is_on = self.is_on && self.store.put(frame);
+        let has_begun = self.is_on;
+        self.is_on = has_begun && self.store.put(frame);
+        if self.is_on {
+            self.told = self.lost;
+        } else if has_begun {
+            self.lost += 1;
+        }
         self.seen.fill(Topic::NEW);
         self.lines.fill(Line::NEW);
         self.now = Now::NEW;
