@@ -47,7 +47,8 @@ fn again(log: &[u8]) -> Result<Replay, String> {
     replay::<Runnables>(log, VehicleConfig::default(), |_, _, _| true, options).map_err(|error| error.to_string())
 }
 
-/// Flips the lowest bit of the first field of a sample of this topic, so far into its samples. Returns its instant.
+/// Flips a bit of the first field of a sample of this topic, so far into its samples: the value changes by less than a hundredth.
+/// One in the last place of an acceleration would be rounded away, and nothing would differ. Returns its instant.
 fn change(log: &mut [u8], topic: Id, share: f64) -> Option<Instant> {
     let name = TOPICS[topic as usize].name;
     let (mut places, mut ids) = (Vec::new(), BTreeMap::new());
@@ -63,8 +64,8 @@ fn change(log: &mut [u8], topic: Id, share: f64) -> Option<Instant> {
         }
     }
     let (at, begin) = *places.get((share * places.len() as f64) as usize)?;
-    // Behind time stamp and generation.
-    *log.get_mut(begin + 12)? ^= 1;
+    // Behind time stamp and generation, and two bytes of the number.
+    *log.get_mut(begin + 14)? ^= 1;
     Some(at)
 }
 
