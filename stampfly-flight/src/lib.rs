@@ -13,6 +13,7 @@
 //! | [`doctor`] | a vehicle examines itself, one line a check |
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
 //! | [`recorder`] | writes a flight as a log that can be flown again |
+//! | [`compact`] | everything a replay needs, in few bytes |
 //! | [`key_frame`] | the whole state of a vehicle as bytes (feature `key-frame`) |
 //! | [`replay`](mod@replay) | the flight again, compared bit for bit (feature `replay`) |
 //! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
@@ -32,6 +33,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod black_box;
+pub mod compact;
 pub mod console;
 pub mod doctor;
 pub mod flight_loop;

@@ -35,7 +35,7 @@ const IDLE: Duration = Duration::from_millis(10);
 /// ```
 /// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
 /// use rover::{Rover, topics}; // the rover of `tests/common`
-/// use stampfly_flight::{Assembled, task::fly};
+/// use stampfly_flight::{Assembled, FlightLoop, task::fly};
 /// use stampfly_types::{Instant, messages::TofData};
 /// # use embedded_hal_async::delay::DelayNs;
 /// # struct Delay;
@@ -53,7 +53,7 @@ const IDLE: Duration = Duration::from_millis(10);
 ///     std::future::pending().await
 /// };
 /// let mut duty = 0.0;
-/// let write_motors = |_| if let Some(output) = motors.actuator_motor.latest() { duty = output.data.duty[0] };
+/// let write_motors = |_, _: &FlightLoop<'_, Rover>| if let Some(output) = motors.actuator_motor.latest() { duty = output.data.duty[0] };
 /// let flying = fly(sensing, &mut flight_loop, clock, Delay, (), write_motors);
 /// // On an executor: `flying.await`.
 /// # use std::{pin::pin, task::{Context, Waker}};
@@ -71,7 +71,7 @@ pub async fn fly<R: Schedule>(
     clock: impl Fn() -> Instant,
     mut delay: impl DelayNs,
     mut observer: impl Observer,
-    mut after_flight_band: impl FnMut(Instant),
+    mut after_flight_band: impl FnMut(Instant, &FlightLoop<'_, R>),
 ) -> Infallible {
     let mut sensing = pin!(sensing);
     loop {
@@ -94,7 +94,7 @@ pub async fn fly<R: Schedule>(
         }
         let now = clock();
         if flight_loop.run_band(Band::Flight, now, &mut observer) {
-            after_flight_band(now);
+            after_flight_band(now, flight_loop);
         } else if flight_loop.run_next(Band::Background, now, &mut observer) {
             yield_now().await;
         }

@@ -7,7 +7,7 @@ use common::{Id, Rover, topics};
 use embedded_hal_async::delay::DelayNs;
 use stampfly_bus::Activation;
 use stampfly_flight::task::fly;
-use stampfly_flight::{Assembled, Observer};
+use stampfly_flight::{Assembled, FlightLoop, Observer};
 use stampfly_types::messages::TofData;
 use stampfly_types::{Duration, Instant};
 use std::cell::{Cell, RefCell};
@@ -70,7 +70,7 @@ fn samples_and_deadlines_reach_the_motors_at_once() {
         }
         pending().await
     };
-    let write = |now| {
+    let write = |now, _: &FlightLoop<'_, Rover>| {
         let output = motors.actuator_motor.latest().expect("the flight band has just published");
         duties.borrow_mut().push((now, output.data.duty[0]));
     };
@@ -97,7 +97,14 @@ fn a_task_that_was_dropped_can_be_started_again() {
     let mut bus = topics::Bus::new();
     let Assembled { mut flight_loop, .. } = Assembled::<Rover>::new(&mut bus, None, &0.5, Instant::ZERO);
     for until in [75, 120].map(Instant::from_millis) {
-        let task = fly(pending(), &mut flight_loop, || clock.now(), Delay(&clock), Ran(&ran), |_| {});
+        let task = fly(
+            pending(),
+            &mut flight_loop,
+            || clock.now(),
+            Delay(&clock),
+            Ran(&ran),
+            |_, _: &FlightLoop<'_, Rover>| {},
+        );
         clock.run(pin!(task), until);
     }
     let at = Instant::from_millis;

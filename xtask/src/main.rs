@@ -92,6 +92,8 @@ const STEPS: &[Step] = &[
         .beside()
         .accepting(&[Fix]),
     Step::new("hil", "Fly a mission with the vehicle on an emulated core: the same bits", steps::hil::run),
+    Step::new("record", "Replay what the emulated board recorded of a flight, bit for bit", steps::record::run)
+        .beside(),
     Step::new("cache", "Count what a pass of the flight band would fetch from flash", steps::cache::run)
         .beside()
         .accepting(&[Fix]),

@@ -55,7 +55,7 @@ pub async fn run(parts: Box<Parts>) {
         &health.flow,
     );
     let clock = || Clock.now();
-    let write = |_| {
+    let write = |_, _: &FlightLoop<'_, Runnables>| {
         if duties.actuator_motor.has_new()
             && let Some(output) = duties.actuator_motor.latest()
         {

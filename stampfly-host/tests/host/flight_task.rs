@@ -10,7 +10,7 @@ use stampfly_board::topics::{self, Bus};
 use stampfly_bus::{Activation, Taps};
 use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder};
-use stampfly_flight::{Assembled, Observer, task};
+use stampfly_flight::{Assembled, FlightLoop, Observer, task};
 use stampfly_host::flown;
 use stampfly_host::recorder::Recorder;
 use stampfly_log::FlightHash;
@@ -85,7 +85,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
         to_imu.publish(at, data);
     };
     let sensing = run_sensor(async || imu.next().await, publish, clock.clone(), Backoff::CRITICAL, imu_health);
-    let write_motors = |_| {
+    let write_motors = |_, _: &FlightLoop<'_, Runnables>| {
         if duties.has_new()
             && let Some(output) = duties.latest()
         {

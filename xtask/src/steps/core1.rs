@@ -13,18 +13,48 @@ const VARIABLE: &str = "STAMPFLY_CORE1";
 /// Flies over emulated chips on this PC. Returns the file with what the core was given, and what the program says of it here.
 pub fn record(repository: &Repository) -> Result<(PathBuf, String), Failure> {
     let target = repository.target("qemu");
-    let script = target.join("core1.bin");
+    let script = script(repository, "core1.bin", None)?;
     let cargo = |command: &str, (name, feature): (&str, &str)| {
         let mut cargo = inside(repository, repository.cargo());
         cargo.args([command, "--quiet", "--release", "--locked", "--target-dir"]).arg(&target);
         cargo.args(["--features", feature, "--bin", name]).env(VARIABLE, &script);
         cargo
     };
-    run_program(cargo("clippy", RECORDER).args(["--", "-D", "warnings"]))?;
-    run_program(cargo("run", RECORDER).arg("--").arg(&script))?;
     run_program(cargo("clippy", PROGRAM).args(["--", "-D", "warnings"]))?;
     let (said, _) = capture(&mut cargo("run", PROGRAM))?;
     Ok((script, said))
+}
+
+/// Flies a mission, or the usual one, over emulated chips on this PC. Returns the file with what the core was given.
+pub fn script(repository: &Repository, name: &str, mission: Option<&str>) -> Result<PathBuf, Failure> {
+    let target = repository.target("qemu");
+    let script = target.join(name);
+    let cargo = |command: &str| {
+        let mut cargo = inside(repository, repository.cargo());
+        cargo.args([command, "--quiet", "--release", "--locked", "--target-dir"]).arg(&target);
+        cargo.args(["--features", RECORDER.1, "--bin", RECORDER.0]);
+        cargo
+    };
+    run_program(cargo("clippy").args(["--", "-D", "warnings"]))?;
+    run_program(cargo("run").arg("--").arg(&script).args(mission))?;
+    Ok(script)
+}
+
+/// Builds the program for a machine with this feature as well, runs it there and returns what it says.
+pub fn emulate(
+    repository: &Repository,
+    machine: &Machine,
+    script: &Path,
+    feature: &str,
+    seconds: &str,
+) -> Result<String, Failure> {
+    let (mut build, options) = toolchain(repository, machine)?;
+    build.arg("build").args(&options).args(["--features", feature, "--bin", PROGRAM.0]).env(VARIABLE, script);
+    run_program(&mut build)?;
+    let mut limited = inside(repository, repository.command("timeout"));
+    limited.envs(build.get_envs().filter_map(|(key, value)| Some((key, value?))));
+    limited.arg(seconds).arg(build.get_program()).arg("run").args(&options);
+    Ok(capture(limited.args(["--features", feature, "--bin", PROGRAM.0]))?.0)
 }
 
 /// Builds the program for a machine.

@@ -43,6 +43,7 @@ pub mod panic_proof;
 pub mod peers;
 pub mod python;
 pub mod qemu;
+pub mod record;
 pub mod s3_memory;
 pub mod semver;
 pub mod shards;

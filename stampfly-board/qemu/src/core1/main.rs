@@ -20,6 +20,8 @@ macro_rules! outln {
     ($($text:tt)*) => { crate::machine::line(format_args!($($text)*)) };
 }
 
+#[cfg(feature = "core1-compact")]
+mod compact;
 mod hardware;
 #[path = "../marks.rs"]
 #[allow(dead_code, reason = "this program counts nothing")]
@@ -101,7 +103,13 @@ async fn flight(parts: Parts) {
         &health[1],
     );
     let clock = || time.now();
-    let write = |_| {
+    #[cfg(feature = "core1-compact")]
+    let mut compact_writer = compact::begin();
+    #[cfg(feature = "core1-compact")]
+    let record = compact_writer.shared();
+    let write = |_now, _flight_loop: &FlightLoop<'_, Runnables>| {
+        #[cfg(feature = "core1-compact")]
+        compact_writer.pass(_now, _flight_loop);
         if duties.actuator_motor.has_new()
             && let Some(output) = duties.actuator_motor.latest()
         {
@@ -109,7 +117,10 @@ async fn flight(parts: Parts) {
             watchdog.feed(time.now(), output.data.armed);
         }
     };
-    let flying = fly(sensing, flight_loop, clock, time, Stopwatch::new(profile, clock), write);
+    let observer = Stopwatch::new(profile, clock);
+    #[cfg(feature = "core1-compact")]
+    let observer = (observer, compact::Counted(record));
+    let flying = fly(sensing, flight_loop, clock, time, observer, write);
     join(flying, looking_down).await;
 }
 
@@ -193,6 +204,8 @@ fn run() -> bool {
         waits.most.as_micros(),
         waits.periods
     );
+    #[cfg(feature = "core1-compact")]
+    compact::print();
     if hardware.was_left() {
         outln!("a driver says something else than on the PC");
     }

@@ -1,4 +1,4 @@
-//! Writes the script of a flight for the flight core: `stampfly-core1-script FILE`. Flies it over emulated chips on this PC.
+//! Writes the script of a flight for the flight core: `stampfly-core1-script FILE [MISSION]`. Flies it over emulated chips on this PC.
 
 #[allow(dead_code, reason = "the other program reads")]
 mod script;
@@ -46,10 +46,17 @@ impl Witness<Runnables> for Collector {
 
 fn main() -> ExitCode {
     let Some(path) = std::env::args().nth(1) else {
-        eprintln!("usage: stampfly-core1-script FILE");
+        eprintln!("usage: stampfly-core1-script FILE [MISSION]");
         return ExitCode::from(2);
     };
-    let mission = Mission::parse(MISSION).expect("a mission");
+    let mission = std::env::args().nth(2).unwrap_or_else(|| MISSION.to_owned());
+    let mission = match Mission::parse(&mission) {
+        Ok(mission) => mission,
+        Err(error) => {
+            eprintln!("{error}");
+            return ExitCode::from(2);
+        }
+    };
     let setup = Setup { mission, sensing: Sensing::Chips, ..Setup::reference(1) };
     let mut surroundings = Surroundings::new(&setup);
     let bus = surroundings.spi().expect("the flight has not begun");

@@ -14,7 +14,7 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
     let bytes = std::fs::read(&options.file).map_err(|error| format!("{path}: {error}"))?;
     let named = options.vehicle.as_deref().or_else(|| replay::vehicle_name(&bytes)).unwrap_or(vehicles::DEFAULT);
     let from = options.from.map(|seconds| Instant::from_micros((seconds.max(0.0) * 1e6) as u64));
-    let task = Again { bytes: &bytes, options: replay::ReplayOptions { from } };
+    let task = Again { bytes: &bytes, options: replay::ReplayOptions { from, ..Default::default() } };
     let result = vehicles::with(named, task)?.map_err(|error| format!("{path}: {error}"))?;
     if options.json {
         let difference = result.difference.as_ref().map(|difference| {

@@ -37,7 +37,7 @@ pub fn replay(log: &[u8]) -> Result<Replay, ReplayError> {
 
 fn replay_from(log: &[u8], from: Option<Instant>) -> Result<Replay, ReplayError> {
     let set = |config: &mut VehicleConfig, name: &str, value| StampFly::set_parameter(config, name, value).is_ok();
-    replay::replay::<Runnables>(log, VehicleConfig::default(), set, ReplayOptions { from })
+    replay::replay::<Runnables>(log, VehicleConfig::default(), set, ReplayOptions { from, ..Default::default() })
 }
 
 /// A flight that landed, once for all tests that damage it.
