@@ -162,7 +162,8 @@ impl Console {
                 let outcome = self.storage.reset(busy, mode).await;
                 self.unstored = self.unstored.filter(|_| outcome.is_err());
                 self.key = self.key.take().filter(|_| outcome.is_err());
-                self.report(outcome, "erased, transmitter and key, too; defaults and a new key apply after a reboot").await;
+                self.report(outcome, "erased, transmitter and key, too; defaults and a new key apply after a reboot")
+                    .await;
             }
             Request::Vehicle(Command::ShowKey) => self.show_key().await,
             Request::Vehicle(command) => {
