@@ -4,7 +4,7 @@
 //! [`Link::transmit`] returns. Stations with the vehicle's key speak in sealed frames, others, where the configuration lets
 //! them, in the ecosystem's packets. The link follows `flight_status`, and publishes the transmitter it is paired with.
 
-use crate::messages::{LinkPeer, TelemetryFrame};
+use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
 use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample};
 use stampfly_link::{Address, TelemetryPacket};
@@ -18,7 +18,7 @@ pub const PERIOD: Duration = Duration::from_millis(20);
 const SENSOR_ERROR: Alerts =
     Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::TOF_LOST).with(Alerts::POWER_LOST);
 
-/// The vehicle's end of the radio. `tests/board/pairing.rs` and `secured.rs` fly with it.
+/// The vehicle's end of the radio. `tests/board` has `pairing.rs`, `secured.rs` and `air.rs`.
 pub struct Link<'b> {
     guarded: Guarded,
     ends: LinkEnds<'b>,

@@ -8,7 +8,7 @@ use stampfly_board::topics::{self, Id};
 use stampfly_board::{VehicleConfig, console::Command};
 use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
-use stampfly_link::secure::{Guarded, MAX_FRAME, NotTaken, Policy};
+use stampfly_link::secure::{Guarded, MAX_FRAME, NotTaken, Policy, Vehicle};
 use stampfly_link::{Address, ControlPacket, Session};
 use stampfly_types::messages::{
     ArmBlocks, BaroData, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput,
@@ -39,6 +39,9 @@ pub struct Bench<'b> {
     flight: FlightLoop<'b, Runnables>,
     pub ends: Ends<'b>,
     pub link: Link<'b>,
+    randoms: u64,
+    /// What the vehicle has sent.
+    pub said: Vec<Vec<u8>>,
     taps: topics::Taps<'b>,
     newest: Newest,
     /// Does the battery monitor answer?
@@ -54,19 +57,26 @@ pub struct Bench<'b> {
 
 impl<'b> Bench<'b> {
     pub fn new(bus: &'b mut topics::Bus, peer: Option<Address>) -> Self {
+        Self::with_key(bus, peer, None)
+    }
+
+    /// One that has a key, if it has.
+    pub fn with_key(bus: &'b mut topics::Bus, peer: Option<Address>, vehicle: Option<Vehicle>) -> Self {
         let Assembled { flight_loop: flight, outside, taps } =
             Assembled::new(bus, None, &VehicleConfig::default(), Instant::ZERO);
         let topics::Outside {
             imu, tof, flow, baro, power, link, button_pin, console, storage, cutoff, supervisor, ..
         } = outside;
         let policy = Policy { accept_unauthenticated: VehicleConfig::default().accept_unauthenticated };
-        let link = Link::new(Guarded::new(None, Session::new(VEHICLE, 1, peer), policy), link);
+        let link = Link::new(Guarded::new(vehicle, Session::new(VEHICLE, 1, peer), policy), link);
         let ends = Ends { imu, tof, flow, baro, power, button: button_pin, console, storage, cutoff, supervisor };
         let newest = Newest::new();
         Self {
             flight,
             ends,
             link,
+            randoms: 0,
+            said: Vec::new(),
             taps,
             newest,
             monitor: true,
@@ -100,7 +110,9 @@ impl<'b> Bench<'b> {
 
     /// What the vehicle sends now, and where.
     pub fn say(&mut self, now: Instant, what: Outgoing) -> Option<(Address, Vec<u8>)> {
-        self.link.transmit(now, what, [0; 8], &mut [0; MAX_FRAME]).map(|(to, bytes)| (to, bytes.to_vec()))
+        self.randoms += 1;
+        let random = self.randoms.wrapping_mul(0x9E37_79B9_7F4A_7C15).to_le_bytes();
+        self.link.transmit(now, what, random, &mut [0; MAX_FRAME]).map(|(to, bytes)| (to, bytes.to_vec()))
     }
 
     /// At the console.
@@ -140,7 +152,10 @@ impl<'b> Bench<'b> {
                     let mut bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
                     last = Some(self.link.receive(now, *source, &mut bytes).map(drop));
                 }
-                Outgoing::ALL.into_iter().for_each(|what| drop(self.say(now, what)));
+                for what in Outgoing::ALL {
+                    let said = self.say(now, what);
+                    self.said.extend(said.map(|(_, bytes)| bytes));
+                }
             }
             for band in [Band::Flight, Band::Background].into_iter().take(1 + usize::from(self.background)) {
                 self.flight.run_band(band, now, &mut ());
