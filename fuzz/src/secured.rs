@@ -57,7 +57,7 @@ impl Scene {
                 let Some(payload) = Payload::decode(kind, input.bytes(length)) else { return };
                 let from_vehicle = kind.is_from_vehicle();
                 let sealed = match from_vehicle {
-                    true => self.vehicle.vehicle().seal(self.now, &payload, &mut room),
+                    true => self.vehicle.vehicle_mut().expect("it has a key").seal(self.now, &payload, &mut room),
                     false => self.station.seal(self.now, &payload, &mut room),
                 };
                 let sealed = sealed.ok().map(<[u8]>::to_vec);
@@ -85,7 +85,7 @@ impl Scene {
             7 => {
                 let to = u32::from_le_bytes([input.byte(), input.byte(), input.byte(), input.byte()]);
                 if event & 0x80 != 0 {
-                    self.vehicle.vehicle().skip_counters(to)
+                    self.vehicle.vehicle_mut().expect("it has a key").skip_counters(to)
                 } else {
                     self.station.skip_counters(to)
                 }
@@ -127,7 +127,7 @@ impl Scene {
             assert_eq!(counted, 1);
             return;
         }
-        let (before, age) = (*self.vehicle.vehicle().tally(), self.vehicle.age(self.now));
+        let (before, age) = (*self.vehicle.vehicle_mut().expect("it has a key").tally(), self.vehicle.age(self.now));
         match self.vehicle.receive(self.now, Address([2; 6]), &mut frame) {
             Ok(Heard::Authentic(received)) => {
                 check(&Some(received.payload), changed);
@@ -135,14 +135,14 @@ impl Scene {
                 assert!(!self.armed || !changes, "an armed vehicle takes no such thing");
                 assert!(received.age <= stampfly_link::secure::MAX_AGE || received.payload.is_kill());
                 assert_eq!(self.vehicle.age(self.now), Some(Duration::ZERO));
-                let old = self.vehicle.vehicle().receive(self.now, &mut again);
+                let old = self.vehicle.vehicle_mut().expect("it has a key").receive(self.now, &mut again);
                 assert_eq!(old, Err(Refused::Old), "once and never again");
             }
             Ok(Heard::Handshake) => assert!(!changed && self.vehicle.age(self.now) == age),
             Ok(Heard::Unauthenticated(_)) => assert!(frame.len() < stampfly_link::secure::MIN_FRAME),
             Err(_) => {
                 assert_eq!(self.vehicle.age(self.now), age, "no sign of life");
-                let after = self.vehicle.vehicle().tally();
+                let after = self.vehicle.vehicle_mut().expect("it has a key").tally();
                 assert_eq!((after.accepted, after.handshakes), (before.accepted, before.handshakes));
             }
         }

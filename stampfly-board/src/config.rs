@@ -67,6 +67,8 @@ pub struct VehicleConfig {
     pub authority: AuthorityConfig,
     /// Gestures on the button.
     pub button: ButtonConfig,
+    /// May packets that authenticate nobody fly it?
+    pub accept_unauthenticated: bool,
 }
 
 impl Default for VehicleConfig {
@@ -96,6 +98,7 @@ impl Default for VehicleConfig {
             landing: LandingConfig { hover_thrust: AIRFRAME.hover_thrust(), ..LandingConfig::default() },
             authority: AuthorityConfig::default(),
             button: ButtonConfig::default(),
+            accept_unauthenticated: true,
         }
     }
 }

@@ -45,6 +45,8 @@ pub enum Command {
     StopMotor,
     /// Take the gains that were found as parameters.
     AcceptGains,
+    /// Show the vehicle's key: at the USB port alone, which is the firmware's to know.
+    ShowKey,
 }
 
 impl Command {
@@ -61,7 +63,7 @@ impl Command {
             Self::StopMotor => {
                 ends.motor_test.publish(now, &MotorTest::default());
             }
-            Self::AcceptGains => {}
+            Self::AcceptGains | Self::ShowKey => {}
         }
     }
 }
@@ -110,6 +112,7 @@ impl Vehicle for Console<'_> {
         ("motor test N PERCENT", "turn motor N (1 front right, 2 rear right, 3 rear left, 4 front left) for 2 s"),
         ("motor stop", "stop it"),
         (AUTOTUNE, "take the gains that were found as parameters"),
+        ("key", "the key for stations, at the USB port"),
     ];
     const TOPICS: &'static [TopicInfo] = &TOPICS;
 
@@ -185,6 +188,7 @@ impl Vehicle for Console<'_> {
             ["motor", "stop"] => Ok(Command::StopMotor),
             ["motor", ..] => Err(CommandError::Usage(MOTOR)),
             ["autotune", "accept"] => Ok(Command::AcceptGains),
+            ["key"] => Ok(Command::ShowKey),
             ["autotune", ..] => Err(CommandError::Usage(AUTOTUNE)),
             _ => Err(CommandError::Unknown),
         }

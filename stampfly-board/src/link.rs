@@ -1,99 +1,150 @@
-//! The vehicle's end of the pilot's radio: packets in, the pilot's frames on the bus; telemetry and calls out.
+//! The vehicle's end of the radio: frames in, sticks and commands on the bus; telemetry and calls out.
 //!
 //! Everything but moving the bytes: firmware, which has the radio, gives [`Link`] what it has received and sends what
-//! [`Link::transmit`] returns. The mode machine decides whether the vehicle looks for a transmitter; the link follows
-//! `flight_status`, and publishes the transmitter it is paired with, to be stored.
+//! [`Link::transmit`] returns. Stations with the vehicle's key speak in sealed frames, others, where the configuration lets
+//! them, in the ecosystem's packets. The link follows `flight_status`, and publishes the transmitter it is paired with.
 
-use crate::messages::{LinkPeer, TelemetryFrame};
-use crate::topics::{CommandPilotTx, FlightStatusRx, LinkPeerTx, TelemetryRx};
-use stampfly_link::{Address, PairingPacket, Rejected, Session, TelemetryPacket};
-use stampfly_types::messages::{Alerts, ArmBlocks};
-use stampfly_types::{Duration, Instant};
+use crate::messages::TelemetryFrame;
+use crate::topics::{Id, LinkEnds};
+use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample};
+use stampfly_link::{Address, TelemetryPacket};
+use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind};
+use stampfly_types::{Duration, Instant, Message};
 
-/// How often [`Link::transmit`] is called: the rate of telemetry, and how late a call for a transmitter may be.
+/// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
 pub const PERIOD: Duration = Duration::from_millis(20);
 
 /// What the transmitter shows as a sensor's error.
 const SENSOR_ERROR: Alerts =
     Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::TOF_LOST).with(Alerts::POWER_LOST);
 
-/// The vehicle's end of the pilot's radio. `tests/pairing.rs` flies with it.
+/// The vehicle's end of the radio. `tests/board` has `pairing.rs`, `secured.rs` and `air.rs`.
 pub struct Link<'b> {
-    session: Session,
-    pilot: CommandPilotTx<'b>,
-    peer: LinkPeerTx<'b>,
-    mode: FlightStatusRx<'b>,
-    telemetry: TelemetryRx<'b>,
-    /// What the mode machine wanted last.
-    pairing: bool,
+    guarded: Guarded,
+    ends: LinkEnds<'b>,
+    /// The newest command's frame, and whether it was taken: to be acknowledged.
+    commanded: Option<(u32, bool)>,
     counter: u8,
 }
 
-/// What is to be sent now.
+/// What there may be to send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outgoing {
-    /// A call for a transmitter, to every station.
-    pub call: Option<[u8; PairingPacket::LENGTH]>,
-    /// Telemetry, to the vehicle's transmitter.
-    pub telemetry: Option<(Address, [u8; TelemetryPacket::LENGTH])>,
+pub enum Outgoing {
+    /// A call for an unauthenticated transmitter, to everybody.
+    Call,
+    /// A part of the secure session's handshake, to everybody.
+    Handshake,
+    /// What became of a command, to the station that sent it.
+    Acknowledgement,
+    /// Telemetry, to who flies: sealed, by turns for a display and for a program.
+    Telemetry,
+}
+
+impl Outgoing {
+    /// All of it, in the order to be asked for.
+    pub const ALL: [Self; 4] = [Self::Call, Self::Handshake, Self::Acknowledgement, Self::Telemetry];
 }
 
 impl<'b> Link<'b> {
-    /// A link whose session is at its beginning.
+    /// A link whose sessions are at their beginning.
     #[must_use]
-    pub const fn new(
-        session: Session,
-        pilot: CommandPilotTx<'b>,
-        peer: LinkPeerTx<'b>,
-        mode: FlightStatusRx<'b>,
-        telemetry: TelemetryRx<'b>,
-    ) -> Self {
-        Self { session, pilot, peer, mode, telemetry, pairing: false, counter: 0 }
+    pub const fn new(guarded: Guarded, ends: LinkEnds<'b>) -> Self {
+        Self { guarded, ends, commanded: None, counter: 0 }
     }
 
     /// Whom it listens to, and what it has refused.
     #[must_use]
-    pub const fn session(&self) -> &Session {
-        &self.session
+    pub const fn guarded(&self) -> &Guarded {
+        &self.guarded
     }
 
-    /// Takes what a station has sent, `at` the instant it came in, and publishes the pilot's frame.
+    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands. What else a station with
+    /// the key has sent is returned, for services.
     ///
     /// # Errors
-    /// When the packet is refused. The session has counted it; nothing is published.
-    pub fn receive(&mut self, at: Instant, source: Address, bytes: &[u8]) -> Result<(), Rejected> {
-        let before = self.session.peer();
-        let input = self.session.receive(at, source, bytes)?;
-        self.pilot.publish(at, &input);
-        if let Some(peer) = self.session.peer().filter(|peer| Some(*peer) != before) {
-            self.peer.publish(at, &peer.into());
-        }
-        Ok(())
+    /// When it is refused. The session has counted it; nothing is published.
+    pub fn receive<'f>(
+        &mut self,
+        at: Instant,
+        source: Address,
+        bytes: &'f mut [u8],
+    ) -> Result<Option<Received<'f>>, NotTaken> {
+        let before = self.guarded.session().peer();
+        let received = match self.guarded.receive(at, source, bytes)? {
+            Heard::Authentic(received) => received,
+            Heard::Unauthenticated(input) => {
+                self.ends.command_pilot.publish(at, &input);
+                if let Some(peer) = self.guarded.session().peer().filter(|peer| Some(*peer) != before) {
+                    self.ends.link_peer.publish(at, &peer.into());
+                }
+                return Ok(None);
+            }
+            Heard::Handshake => return Ok(None),
+        };
+        let command = match received.payload {
+            Payload::Guided(command) => command,
+            Payload::Kill => GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() },
+            Payload::Sticks(input) => {
+                self.ends.command_pilot.publish(at, &input);
+                return Ok(None);
+            }
+            _ => return Ok(Some(received)),
+        };
+        self.commanded = Some((received.counter, self.command(at, command)));
+        Ok(None)
     }
 
-    /// Follows the mode machine, and returns what is to be sent. Call it every [`PERIOD`].
-    pub fn transmit(&mut self, now: Instant) -> Outgoing {
-        let mode = self.mode.latest().map(|sample| sample.data).unwrap_or_default();
-        self.session.set_armed(mode.armed);
-        match (self.pairing, mode.pairing) {
-            // Refused with motors armed: then the session keeps its transmitter.
-            (false, true) => drop(self.session.start_pairing(now)),
-            (true, false) => self.session.stop_pairing(),
-            _ => {}
+    /// Publishes a command, of a station with the key or of a service. Was there room for it?
+    pub fn command(&mut self, at: Instant, command: GuidedCommand) -> bool {
+        self.ends.command_guided.publish(at, command).is_ok()
+    }
+
+    /// Follows the mode machine, and returns what is to be sent now, and where. `random` are eight new bytes of a generator.
+    pub fn transmit<'r>(
+        &mut self,
+        now: Instant,
+        what: Outgoing,
+        random: [u8; 8],
+        room: &'r mut [u8; MAX_FRAME],
+    ) -> Option<(Address, &'r [u8])> {
+        match what {
+            Outgoing::Call => {
+                let mode = self.ends.flight_status.latest().map(|sample| sample.data).unwrap_or_default();
+                self.guarded.follow(now, mode.armed, mode.pairing);
+                Some((Address::BROADCAST, put(room, &self.guarded.beacon(now)?)?))
+            }
+            Outgoing::Handshake => Some((Address::BROADCAST, self.guarded.transmit(now, random, room)?)),
+            Outgoing::Acknowledgement => {
+                let (counter, taken) = self.commanded.take()?;
+                self.guarded.seal(now, &Payload::Acknowledgement { counter, taken }, room)
+            }
+            Outgoing::Telemetry => {
+                self.counter = self.counter.wrapping_add(1);
+                let (at, frame) =
+                    self.ends.telemetry.latest().map(|sample| (sample.at, sample.data)).unwrap_or_default();
+                let packet = packet(self.counter, &frame);
+                if let Some(peer) = self.guarded.open_peer(now) {
+                    return Some((peer, put(room, &packet.to_bytes())?));
+                }
+                if self.counter.is_multiple_of(2) {
+                    return self.guarded.seal(now, &Payload::Telemetry(packet), room);
+                }
+                let words = frame.to_words().map(u32::to_le_bytes);
+                self.guarded.seal(now, &Payload::Sample(Sample::new(Id::telemetry as u16, at, &words)), room)
+            }
         }
-        self.pairing = mode.pairing;
-        let call = self.session.beacon(now);
-        let peer = self.session.peer().filter(|_| !self.session.is_pairing());
-        let telemetry = peer.map(|peer| {
-            self.counter = self.counter.wrapping_add(1);
-            let frame = self.telemetry.latest().map(|sample| sample.data).unwrap_or_default();
-            (peer, packet(self.counter, &frame).to_bytes())
-        });
-        Outgoing { call, telemetry }
     }
 }
 
-pub(crate) fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
+/// Copies a packet to the front of the room.
+fn put<'r>(room: &'r mut [u8; MAX_FRAME], packet: &[u8]) -> Option<&'r [u8]> {
+    let place = room.get_mut(..packet.len())?;
+    // As long as the packet; spelled so that no panic is linked for other lengths.
+    place.iter_mut().zip(packet).for_each(|(to, from)| *to = *from);
+    Some(place)
+}
+
+fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
     TelemetryPacket {
         counter,
         battery: frame.battery,
@@ -105,18 +156,5 @@ pub(crate) fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {
         sensor_error: frame.alerts.intersects(SENSOR_ERROR),
         link_lost: frame.alerts.intersects(Alerts::COMM_LOST),
         calibrating: frame.blocks.contains(ArmBlocks::CALIBRATING),
-    }
-}
-
-impl From<Address> for LinkPeer {
-    fn from(Address([a, b, c, d, e, f]): Address) -> Self {
-        Self { address: u64::from_be_bytes([0, 0, a, b, c, d, e, f]) }
-    }
-}
-
-impl From<LinkPeer> for Address {
-    fn from(peer: LinkPeer) -> Self {
-        let [_, _, a, b, c, d, e, f] = peer.address.to_be_bytes();
-        Self([a, b, c, d, e, f])
     }
 }

@@ -9,6 +9,8 @@ use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters, Val
 
 /// The name in flash of the transmitter the vehicle is paired with: all of its address is one value, which no power cut can halve.
 pub const PEER: &str = "link.peer";
+/// The name in flash of the vehicle's key. It is no parameter: nothing lists or logs it.
+pub const KEY: &str = "link.key";
 
 /// A line of the table.
 struct Line {
@@ -183,6 +185,7 @@ parameters! {
     "authority.switch.debounce" [0.04, 0.5] "s" mode.switch_debounce => "a switch counts after this long";
     "authority.pilot.back" [0.2, 10.0] "s" authority.back => "after a silence, sticks count when heard for this long";
     "authority.pilot.timeout" [0.1, 5.0] "s" authority.stale => "a pilot's frame as old as this counts as none";
+    "link.unauthenticated" [0.0, 1.0] "1" accept_unauthenticated => "1: packets without a key may fly it, 0: they are refused";
 }
 
 /// Every parameter, in the order of their numbers.
@@ -279,7 +282,7 @@ mod tests {
 
     #[test]
     fn no_two_names_share_a_key_in_flash() {
-        let names: Vec<&str> = all().map(|info| info.name).chain([PEER]).collect();
+        let names: Vec<&str> = all().map(|info| info.name).chain([PEER, KEY]).collect();
         for (index, name) in names.iter().enumerate() {
             let key = stampfly_param::key(name);
             let twin = names[..index].iter().find(|other| stampfly_param::key(other) == key);

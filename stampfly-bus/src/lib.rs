@@ -30,6 +30,7 @@ extern crate std;
 extern crate self as stampfly_bus;
 
 mod activation;
+mod activation_state;
 #[cfg(feature = "async")]
 pub mod bell;
 mod input;
@@ -47,6 +48,7 @@ mod topic;
 #[doc(hidden)]
 pub use activation::__run;
 pub use activation::{Activation, ReadInputs, Runnable};
+pub use activation_state::ActivationState;
 #[cfg(feature = "async")]
 pub use bell::Bell;
 /// Its vectors are in signatures here.
@@ -58,7 +60,7 @@ pub use line::{ActivationInfo, Band, MAX_TRIGGERS, Trigger};
 pub use output::NewestOutput;
 pub use response::{JITTER, Unbounded, response_time};
 pub use schedule::{Schedule, VisitLines};
-pub use scheduler::{ActivationState, Scheduler};
+pub use scheduler::Scheduler;
 /// For [`topics!`] and [`schedule!`].
 #[doc(hidden)]
 pub use stampfly_bus_macros::{schedule as __schedule, topics as __topics};

@@ -5,8 +5,8 @@
 //! lines what is due.
 
 use crate::activation::Activation;
+use crate::activation_state::ActivationState;
 use crate::line::ActivationInfo;
-use crate::scheduler::ActivationState;
 use crate::table::TopicTable;
 use stampfly_types::Instant;
 

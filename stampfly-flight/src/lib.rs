@@ -42,6 +42,7 @@ pub mod hil;
 #[cfg(feature = "key-frame")]
 pub mod key_frame;
 pub mod log_schema;
+pub mod messages;
 pub mod mock;
 pub mod newest;
 pub mod parameters;

@@ -86,6 +86,16 @@ impl Value for f32 {
     }
 }
 
+/// 1 for yes, 0 for no.
+impl Value for bool {
+    fn number(self) -> f32 {
+        f32::from(u8::from(self))
+    }
+    fn from_number(number: f32) -> Option<Self> {
+        [false, true].into_iter().find(|truth| truth.number() == number)
+    }
+}
+
 /// Whole microseconds. A time comes back exactly: up to 16 seconds every microsecond has a number of its own, and above that
 /// a number is always the same time.
 impl Value for Duration {

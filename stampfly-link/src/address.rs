@@ -1,6 +1,7 @@
 //! The hardware address of a station.
 
 use core::fmt;
+use stampfly_types::message;
 
 /// A station's 48-bit hardware address, first byte on the air first.
 ///
@@ -37,5 +38,26 @@ impl fmt::Display for Address {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [a, b, c, d, e, f] = self.0;
         write!(formatter, "{a:02X}:{b:02X}:{c:02X}:{d:02X}:{e:02X}:{f:02X}")
+    }
+}
+
+message! {
+    /// A transmitter's address.
+    pub struct LinkPeer {
+        /// Its six bytes, the first one highest.
+        address: u64,
+    }
+}
+
+impl From<Address> for LinkPeer {
+    fn from(Address([a, b, c, d, e, f]): Address) -> Self {
+        Self { address: u64::from_be_bytes([0, 0, a, b, c, d, e, f]) }
+    }
+}
+
+impl From<LinkPeer> for Address {
+    fn from(peer: LinkPeer) -> Self {
+        let [_, _, a, b, c, d, e, f] = peer.address.to_be_bytes();
+        Self([a, b, c, d, e, f])
     }
 }

@@ -76,7 +76,7 @@ pub mod stream;
 mod telemetry;
 pub mod tello;
 
-pub use address::Address;
+pub use address::{Address, LinkPeer};
 pub use broadcast::{BroadcastError, BroadcastPacket, BroadcastSensors};
 pub use control::{ControlError, ControlPacket};
 pub use datagram::{Datagram, DatagramError};

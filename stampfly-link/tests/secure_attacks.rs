@@ -424,6 +424,43 @@ fn l09_nobody_joins_an_armed_vehicle_that_hears_its_station_and_no_key_is_handed
 }
 
 #[test]
+fn l9_who_jams_the_station_does_not_get_the_vehicle_that_it_flies() {
+    let mut air = Air::joined(9);
+    let (address, transmitter) = (Address([1; 6]), Address([2; 6]));
+    let policy = Policy { accept_unauthenticated: true };
+    let session = Session::new(address, 1, Some(transmitter));
+    let mut link = Guarded::new(air.vehicle.clone(), session, policy);
+    link.follow(air.now, true, false);
+    let mut frame = air.seal(&Payload::Sticks(PilotInput::default()));
+    assert!(matches!(link.receive(air.now, transmitter, &mut frame), Ok(Heard::Authentic(_))));
+    // Silence, and packets that the session without keys would take.
+    let mut packet = ControlPacket::centred(address).to_bytes();
+    for seconds in [1, 10, 100] {
+        let later = air.now + Duration::from_secs(seconds);
+        assert_eq!(link.receive(later, transmitter, &mut packet), Err(NotTaken::Forbidden));
+        assert_eq!(link.open_peer(later), None);
+    }
+    let later = air.now + Duration::from_secs(100);
+    link.follow(later, false, false);
+    assert!(matches!(link.receive(later, transmitter, &mut packet), Ok(Heard::Unauthenticated(_))));
+    assert_eq!(link.open_peer(later), Some(transmitter));
+}
+
+#[test]
+fn a_vehicle_without_a_key_has_no_secure_session() {
+    let mut air = Air::joined(9);
+    let (address, stranger) = (Address([1; 6]), Address([2; 6]));
+    let policy = Policy { accept_unauthenticated: true };
+    let mut link = Guarded::new(None, Session::new(address, 1, Some(stranger)), policy);
+    let mut frame = air.seal(&Payload::Kill);
+    assert!(matches!(link.receive(air.now, stranger, &mut frame), Err(NotTaken::Unauthenticated(_))));
+    assert!(link.transmit(air.now, [3; 8], &mut [0; MAX_FRAME]).is_none());
+    assert!(link.seal(air.now, &Payload::Line("no"), &mut [0; MAX_FRAME]).is_none());
+    let mut packet = ControlPacket::centred(address).to_bytes();
+    assert!(matches!(link.receive(air.now, stranger, &mut packet), Ok(Heard::Unauthenticated(_))));
+}
+
+#[test]
 fn l10_an_authentic_frame_with_a_value_that_must_not_be_used_is_refused_whole() {
     let mut air = Air::joined(10);
     let sticks_body = |value: f32| [&value.to_le_bytes()[..], &[0; 12], &[0, 0]].concat();

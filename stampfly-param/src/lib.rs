@@ -8,7 +8,7 @@
 //! | [`parameters!`] | declares a vehicle's parameters: name, default, range, unit |
 //! | [`ParameterSet`] | applies a change as a whole at the next period, and rolls it back |
 //! | [`ParameterStore`] | loads and saves values by name, on any NOR flash; [`blocking::ParameterStore`] without `async` |
-//! | [`Storable`], [`AnyValue`] | what can be saved: numbers, yes or no, up to 16 bytes |
+//! | [`Storable`], [`AnyValue`] | what can be saved: numbers, yes or no, up to 32 bytes |
 //! | [`RamFlash`] | a flash that forgets, for desktop programs and tests |
 //! | [`Disarmed`] | the proof without which nothing is written |
 //! | [`key`] | the number a name has in flash |

@@ -1,4 +1,4 @@
-//! What a store can keep: numbers of every size, yes or no, and up to sixteen bytes of anything.
+//! What a store can keep: numbers of every size, yes or no, and up to 32 bytes of anything.
 //!
 //! Each value lies in flash with its kind and its name, so that it is never read as something it is not, and a store can be listed
 //! by who does not know what was saved. Enumerations are stored as the number that the program gives them; text as bytes.
@@ -7,7 +7,7 @@ use core::fmt;
 use sequential_storage::map::{SerializationError, Value};
 
 /// The longest value, bytes.
-pub(crate) const LONGEST: usize = 16;
+pub(crate) const LONGEST: usize = 32;
 /// The longest name, bytes.
 pub const LONGEST_NAME: usize = 48;
 
@@ -75,7 +75,7 @@ impl Kind {
     }
 }
 
-/// A type that a store can keep: `bool`, integers and floating-point numbers of up to 64 bits, `[u8; N]` of up to 16.
+/// A type that a store can keep: `bool`, integers and floating-point numbers of up to 64 bits, `[u8; N]` of up to 32.
 pub trait Storable: Copy + sealed::Sealed {
     /// Its kind.
     const KIND: Kind;

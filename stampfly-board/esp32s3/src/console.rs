@@ -6,6 +6,7 @@ use crate::facts::Facts;
 #[cfg(feature = "hil")]
 use crate::hil;
 use crate::memory::{Memory, restart};
+use crate::radio::MADE;
 use crate::sensors::Healths;
 use crate::storage::{Storage, StorageError};
 use alloc::boxed::Box;
@@ -27,6 +28,7 @@ use stampfly_flight::console::{LineEditor, Piece, Request, SensorLine, answer};
 #[cfg(feature = "hil")]
 use stampfly_flight::hil::COMMAND;
 use stampfly_link::Address;
+use stampfly_link::secure::Key;
 
 const PROMPT: &str = "> ";
 /// Replies are made and sent in pieces of this many bytes. Only lists are longer.
@@ -53,12 +55,14 @@ pub struct Parts {
     pub tested: Outcome,
     /// What the board says of itself.
     pub facts: Facts,
+    /// The vehicle's key, if it has one yet.
+    pub key: Option<Key>,
 }
 
 /// Answers until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Box<Parts>) {
-    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested, facts } = *parts;
+    let Parts { usb, memory, health, profile, ends, storage, storage_ends, config, tested, facts, key } = *parts;
     let (mut keys, screen) = UsbSerialJtag::new(usb).into_async().split();
     let mut version = String::new();
     // A version that is too long ends early.
@@ -77,6 +81,8 @@ pub async fn run(parts: Box<Parts>) {
         version,
         facts,
         unstored: None,
+        key,
+        unstored_key: None,
     };
     let mut editor = LineEditor::<80>::new();
     let mut typed = [0; 64];
@@ -86,6 +92,7 @@ pub async fn run(parts: Box<Parts>) {
             Either::First(count) => count.unwrap_or_default(),
             Either::Second(()) => {
                 console.store_peer().await;
+                console.store_key().await;
                 continue;
             }
         };
@@ -125,6 +132,10 @@ struct Console {
     facts: Facts,
     /// A transmitter that was paired and is still to be stored.
     unstored: Option<Address>,
+    /// The vehicle's key, once it is stored.
+    key: Option<Key>,
+    /// One that was made and is still to be stored.
+    unstored_key: Option<Key>,
 }
 
 impl Console {
@@ -150,8 +161,11 @@ impl Console {
             Request::ResetParameters => {
                 let outcome = self.storage.reset(busy, mode).await;
                 self.unstored = self.unstored.filter(|_| outcome.is_err());
-                self.report(outcome, "erased, the transmitter, too; defaults apply after a reboot").await;
+                self.key = self.key.take().filter(|_| outcome.is_err());
+                self.report(outcome, "erased, transmitter and key, too; defaults and a new key apply after a reboot")
+                    .await;
             }
+            Request::Vehicle(Command::ShowKey) => self.show_key().await,
             Request::Vehicle(command) => {
                 command.publish(Clock.now(), &mut self.ends);
                 self.screen
@@ -160,7 +174,7 @@ impl Console {
                         Command::TestMotor { .. } => "turning for two seconds\r\n",
                         Command::Pair(false) | Command::StopMotor => "stopped\r\n",
                         // Its answer has been given.
-                        Command::AcceptGains => "",
+                        Command::AcceptGains | Command::ShowKey => "",
                     })
                     .await;
             }
@@ -168,6 +182,31 @@ impl Console {
             #[cfg(feature = "hil")]
             Request::Reboot if line.trim() == COMMAND => hil::restart_into(),
             Request::Reboot => restart(),
+        }
+    }
+
+    /// Shows the key to whoever has the vehicle on a cable.
+    async fn show_key(&mut self) {
+        let mut said = String::<128>::new();
+        let _ = match &self.key {
+            Some(key) => write!(said, "{}\r\n", key.uri()),
+            None => write!(said, "no key is stored yet\r\n"),
+        };
+        self.screen.show(&said).await;
+    }
+
+    /// Stores a key that was made, as soon as that may be.
+    async fn store_key(&mut self) {
+        if let Some(made) = MADE.try_take() {
+            self.unstored_key = Some(made);
+        }
+        let Some(key) = &self.unstored_key else { return };
+        let memory = self.memory;
+        let busy = &mut self.storage_ends.storage_busy;
+        let outcome = self.storage.save_key(key, busy, || newest_mode(memory)).await;
+        if !matches!(outcome, Err(StorageError::Armed)) {
+            self.key = self.unstored_key.take().filter(|_| outcome.is_ok());
+            self.report(outcome, "a key was made and stored: `key` shows it").await;
         }
     }
 

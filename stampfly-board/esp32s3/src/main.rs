@@ -55,6 +55,7 @@ use stampfly_board::{VehicleConfig, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::{Assembled, FlightLoop, InPlace};
 use stampfly_link::Address;
+use stampfly_link::secure::{Key, Policy};
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -110,6 +111,7 @@ struct Stored {
     /// Parameters that cannot be used.
     unusable: usize,
     peer: Option<Address>,
+    key: Option<Key>,
 }
 
 /// What the tasks of the first core are given. Boxed, because a task keeps its arguments as long as what it makes of them.
@@ -132,7 +134,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
     let stored = stored(chip.FLASH);
     let vehicle = assemble(&stored.config);
     let (flight, ground) = in_a_frame_of_its_own(move || {
-        let Stored { storage, config, unusable, peer } = *stored;
+        let Stored { storage, config, unusable, peer, key } = *stored;
         let InPlace { flight_loop, mut outside, taps } = *vehicle;
         let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
         outside.self_test.self_test.publish(Clock.now(), &tested.message());
@@ -168,7 +170,8 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             indicator: outside.indicator,
             button: outside.button_pin,
         });
-        let radio = Box::new(radio::Parts { unit: chip.WIFI, peer, ends: outside.link });
+        let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
+        let radio = Box::new(radio::Parts { unit: chip.WIFI, peer, key: key.clone(), policy, ends: outside.link });
         let console = Box::new(console::Parts {
             usb: chip.USB_DEVICE,
             memory,
@@ -180,6 +183,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             config,
             tested,
             facts: facts::Facts::read(unusable),
+            key,
         });
         let ground = Ground { sensors, people, memory: (memory, outside.supervisor), console, radio };
         (flight, ground)
@@ -225,7 +229,8 @@ fn stored(flash: FLASH<'static>) -> Box<Stored> {
         esp_println::println!("{unusable} stored parameters cannot be used; their defaults apply");
     }
     let peer = block_on(storage.load_peer());
-    Box::new(Stored { storage, config, unusable, peer })
+    let key = block_on(storage.load_key());
+    Box::new(Stored { storage, config, unusable, peer, key })
 }
 
 /// Makes the bus and the vehicle on it.

@@ -1,4 +1,4 @@
-//! What survives a power cut: parameters and the transmitter the vehicle belongs to, in the partition `nvs`.
+//! What survives a power cut: parameters, the transmitter the vehicle belongs to and the vehicle's key, in the partition `nvs`.
 //!
 //! A write stops both cores for up to 200 ms. It needs the mode machine's word that the vehicle is disarmed. From before
 //! that word is asked for until the write is done, `storage_busy` keeps the motors still, even if the vehicle is armed in
@@ -16,16 +16,20 @@ use esp_hal::peripherals::FLASH;
 use esp_storage::{FlashStorage, FlashStorageError};
 use stampfly_board::VehicleConfig;
 use stampfly_board::messages::StorageBusy;
-use stampfly_board::parameters::{self, PEER};
+use stampfly_board::parameters::{self, KEY, PEER};
 use stampfly_board::topics::StorageBusyTx;
 use stampfly_drivers::Timebase;
 use stampfly_flight::parameters::Parameters;
 use stampfly_link::Address;
+use stampfly_link::secure::Key;
 use stampfly_param::{Disarmed, EraseError, ParameterStore, SaveError};
 use stampfly_types::messages::FlightStatus;
 
 /// Several periods of the motors' duties.
 const NOTICE: Duration = Duration::from_millis(20);
+
+/// The number of the vehicle's key: it has one.
+pub const KEY_ID: u8 = 1;
 
 /// Flash is being written as long as this lives, and the bus knows.
 struct Writing<'t>(&'t mut StorageBusyTx<'static>);
@@ -106,6 +110,24 @@ impl Storage {
         stored.map(Address).filter(|address| address.is_station())
     }
 
+    /// The vehicle's key, if it has one. All of it is one record, which no power cut can halve.
+    pub async fn load_key(&mut self) -> Option<Key> {
+        let bytes = self.store.as_mut()?.load(KEY).await.ok()??;
+        Key::generate(KEY_ID, bytes).ok()
+    }
+
+    /// Keeps the vehicle's key.
+    pub async fn save_key(
+        &mut self,
+        key: &Key,
+        busy: &mut StorageBusyTx<'static>,
+        mut mode: impl FnMut() -> Option<FlightStatus>,
+    ) -> Result<(), StorageError> {
+        let _still = Writing::begin(busy, &mut mode).await?;
+        let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
+        store.save(proven(&mut mode)?, KEY, *key.bytes()).await.map_err(StorageError::Save)
+    }
+
     /// Keeps the parameters. `mode` tells the newest decision of the mode machine; it is asked before every value.
     pub async fn save(
         &mut self,
@@ -135,7 +157,7 @@ impl Storage {
         store.save(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
     }
 
-    /// Forgets everything that was kept, the transmitter included.
+    /// Forgets everything that was kept, transmitter and key included.
     pub async fn reset(
         &mut self,
         busy: &mut StorageBusyTx<'static>,

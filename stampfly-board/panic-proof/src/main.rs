@@ -16,7 +16,7 @@ use core::hint::black_box;
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use stampfly_board::black_box::{BlackBox, RETENTION};
-use stampfly_board::link::Link;
+use stampfly_board::link::{Link, Outgoing};
 use stampfly_board::schedule::Runnables;
 use stampfly_board::{VehicleConfig, golden, topics};
 use stampfly_bus::{Band, Taps};
@@ -56,10 +56,10 @@ fn vehicle() {
     let mut bus = topics::Bus::new();
     let vehicle = Assembled::<Runnables>::new(&mut bus, None, &config, black_box(Instant::ZERO));
     let Assembled { mut flight_loop, mut outside, mut taps } = vehicle;
-    let topics::LinkEnds { command_pilot, command_guided: mut guided, flight_status, telemetry, link_peer } =
-        outside.link;
     let session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
-    let mut link = Link::new(session, command_pilot, link_peer, flight_status, telemetry);
+    let vehicle = Key::generate(black_box(1), black_box([0; 32])).ok().map(Vehicle::new);
+    let mut link = Link::new(Guarded::new(vehicle, session, black_box(Policy::default())), outside.link);
+    let mut room = [0; MAX_FRAME];
     let mut memory = BlackBox::<1024>::new(RETENTION);
     while black_box(true) {
         let at: Instant = black_box(Instant::ZERO);
@@ -71,16 +71,19 @@ fn vehicle() {
         outside.cameras.external_pose.publish(at, &black_box(Default::default()));
         outside.power.sensor_power.publish(at, &black_box(Default::default()));
         outside.button_pin.button_contact.publish(at, &black_box(Default::default()));
-        let _ = guided.publish(at, black_box(Default::default()));
         outside.console.motor_test.publish(at, &black_box(Default::default()));
         outside.console.pairing_request.publish(at, &black_box(Default::default()));
         outside.storage.storage_busy.publish(at, &black_box(Default::default()));
         outside.cutoff.cutoff_state.publish(at, &black_box(Default::default()));
         // Every byte that strangers can send.
-        let bytes = black_box(&[0u8; 32][..]);
-        let _ = black_box(link.receive(at, black_box(Address([0; 6])), bytes));
+        let mut bytes = black_box([0; MAX_FRAME]);
+        let Some(bytes) = bytes.get_mut(..black_box(0)) else { continue };
         let _ = black_box((PairingPacket::decode(bytes), TelemetryPacket::decode(bytes)));
-        black_box((link.transmit(at), link.session().age(at)));
+        let _ = black_box(link.receive(at, black_box(Address([0; 6])), bytes));
+        for what in Outgoing::ALL {
+            black_box(link.transmit(at, what, black_box([0; 8]), &mut room));
+        }
+        black_box(link.guarded().session().age(at));
         flight_loop.run_band(Band::Flight, black_box(at), &mut ());
         flight_loop.run_band(Band::Background, black_box(at), &mut ());
         black_box(outside.motors.actuator_motor.latest());
@@ -109,9 +112,9 @@ fn sealed() {
         black_box(guarded.transmit(at, random, &mut room));
         black_box(station.transmit(at, random, &mut room));
         let payload: Payload<'_> = black_box(Payload::Kill);
-        let _ = black_box(guarded.vehicle().seal(at, &payload, &mut room));
+        let _ = black_box(guarded.seal(at, &payload, &mut room));
         let _ = black_box(station.seal(at, &payload, &mut room));
-        black_box((guarded.age(at), guarded.vehicle().tally().refused(), station.tally()));
+        black_box((guarded.age(at), guarded.vehicle().map(|vehicle| vehicle.tally().refused()), station.tally()));
     }
 }
 

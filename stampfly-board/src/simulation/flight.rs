@@ -48,6 +48,8 @@ pub struct Surroundings {
     seen: Seen,
     profile: Profile,
     air: Cell<AirReport>,
+    /// Until when the radio's frames keep the processor.
+    busy: Cell<Instant>,
 }
 
 impl Surroundings {
@@ -73,6 +75,7 @@ impl Surroundings {
             seen: Seen::default(),
             profile: Profile::new(&ACTIVATIONS),
             air: Cell::default(),
+            busy: Cell::new(Instant::ZERO),
         }
     }
 
@@ -99,8 +102,22 @@ impl vehicle::Surroundings for Surroundings {
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
-        let Self { setup, clock, world, sensors, shared, board, progress, health, wrong, watchdog, seen, profile, air } =
-            self;
+        let Self {
+            setup,
+            clock,
+            world,
+            sensors,
+            shared,
+            board,
+            progress,
+            health,
+            wrong,
+            watchdog,
+            seen,
+            profile,
+            air,
+            busy,
+        } = self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
         let wrong = wrong.take().expect("surroundings are started once");
         let cameras = setup.cameras;
@@ -113,13 +130,15 @@ impl vehicle::Surroundings for Surroundings {
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
         let home = Home::new(&world.truth_at(setup.simulation.start));
-        let mut radio = Radio::new(clock, link, &wrong);
-        if let Some(what) = setup.air {
-            let ends = Ends::new(setup.simulation.seed).expect("a key of random bytes");
-            let ends = Rc::new(RefCell::new(ends));
-            tasks.spawn(air::flood(clock.clone(), ends.clone(), what.flood, air));
-            radio = radio.over(ends);
-        }
+        let radio = match setup.air {
+            None => Radio::new(clock, link, &wrong),
+            Some(what) => {
+                let ends = Ends::new(setup.simulation.seed, &setup.vehicle, link).expect("a key of random bytes");
+                let ends = Rc::new(RefCell::new(ends));
+                tasks.spawn(air::flood(clock.clone(), ends.clone(), what.flood, air, busy));
+                Radio::sealed(clock, ends, &wrong)
+            }
+        };
         let waits = wrong.injector.wants(Moment::Ground);
         match (&setup.live, setup.pilot) {
             (Some(live), _) => {
@@ -150,6 +169,7 @@ impl vehicle::Surroundings for Surroundings {
             live: setup.live.as_ref(),
             seen,
             air,
+            busy,
             judge,
             wrong,
             chips,
@@ -182,6 +202,7 @@ pub struct Around<'a> {
     live: Option<&'a Live>,
     seen: &'a Seen,
     air: &'a Cell<AirReport>,
+    busy: &'a Cell<Instant>,
     judge: Judge,
     wrong: Wrong,
     chips: Option<chips::AttachedChips>,
@@ -214,7 +235,7 @@ impl vehicle::Around for Around<'_> {
     }
 
     fn is_held_up(&mut self, band: Band, now: Instant) -> bool {
-        self.wrong.is_held_up(band, now)
+        self.wrong.is_held_up(band, now) || now < self.busy.get()
     }
 
     fn show(&mut self, now: Instant) {

@@ -4,20 +4,27 @@ use super::air;
 use super::faults::Wrong;
 use crate::messages::TelemetryFrame;
 use crate::topics::{self, Id};
+use stampfly_link::secure::Payload;
 use stampfly_sim::fault::Line;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 
+/// How a station's words come to the vehicle.
+enum Way<'b> {
+    /// As messages, straight to the bus.
+    Direct(topics::LinkEnds<'b>),
+    /// As bytes of the secure session.
+    Sealed(air::Shared<'b>),
+}
+
 /// A station's end of the radio.
 pub struct Radio<'b> {
     clock: Clock,
-    ends: topics::LinkEnds<'b>,
+    way: Way<'b>,
     pilot: Line<PilotInput>,
     guided: Line<GuidedCommand>,
     telemetry: Line<TelemetryFrame>,
     frame: TelemetryFrame,
-    /// The secure session, if the pilot's frames and telemetry go as its bytes.
-    air: Option<air::Shared>,
 }
 
 impl<'b> Radio<'b> {
@@ -28,20 +35,23 @@ impl<'b> Radio<'b> {
     }
 
     pub(super) fn new(clock: &Clock, ends: topics::LinkEnds<'b>, wrong: &Wrong) -> Self {
+        Self::by(clock, Way::Direct(ends), wrong)
+    }
+
+    /// One that carries the bytes of the secure session.
+    pub(super) fn sealed(clock: &Clock, air: air::Shared<'b>, wrong: &Wrong) -> Self {
+        Self::by(clock, Way::Sealed(air), wrong)
+    }
+
+    fn by(clock: &Clock, way: Way<'b>, wrong: &Wrong) -> Self {
         Self {
             clock: clock.clone(),
-            ends,
+            way,
             pilot: wrong.line(Id::command_pilot),
             guided: wrong.line(Id::command_guided),
             telemetry: wrong.line(Id::telemetry),
             frame: TelemetryFrame::default(),
-            air: None,
         }
-    }
-
-    /// The same, with the secure session on it.
-    pub(super) fn over(self, air: air::Shared) -> Self {
-        Self { air: Some(air), ..self }
     }
 
     /// Virtual time.
@@ -50,34 +60,51 @@ impl<'b> Radio<'b> {
         &self.clock
     }
 
-    /// Sends a program's command. `false` when the vehicle's queue is full; one that is lost on the way is not noticed.
+    /// Sends a program's command. `false` when it cannot be sent, or the vehicle's queue is full; one that is lost on the way
+    /// is not noticed.
     pub fn command(&mut self, command: GuidedCommand) -> bool {
         let now = self.clock.now();
         let arrived = self.guided.pass(now, &command);
-        arrived.is_none_or(|command| self.ends.command_guided.publish(now, command).is_ok())
+        match &mut self.way {
+            Way::Direct(ends) => arrived.is_none_or(|command| ends.command_guided.publish(now, command).is_ok()),
+            Way::Sealed(air) => {
+                let sent = Payload::Guided(arrived.unwrap_or(command));
+                air.borrow_mut().say(now, &sent, arrived.is_some())
+            }
+        }
     }
 
     /// Sends a frame of the transmitter.
     pub fn sticks(&mut self, input: &PilotInput) {
         let now = self.clock.now();
-        let mut arrived = self.pilot.pass(now, input);
-        if let Some(air) = &self.air {
-            let armed = self.ends.flight_status.latest().is_some_and(|status| status.data.armed);
-            arrived = air.borrow_mut().sticks(now, &arrived.unwrap_or(*input), armed, arrived.is_some());
-        }
-        if let Some(input) = arrived {
-            self.ends.command_pilot.publish(now, &input);
+        let arrived = self.pilot.pass(now, input);
+        match &mut self.way {
+            Way::Direct(ends) => {
+                if let Some(input) = arrived {
+                    ends.command_pilot.publish(now, &input);
+                }
+            }
+            Way::Sealed(air) => {
+                // Before there is a session nothing is sent.
+                air.borrow_mut().say(now, &Payload::Sticks(arrived.unwrap_or(*input)), arrived.is_some());
+            }
         }
     }
 
-    /// The newest telemetry that has arrived.
+    /// The newest telemetry that has arrived. Whoever flies asks for it every 20 ms.
     pub fn telemetry(&mut self) -> TelemetryFrame {
-        let newest = self.ends.telemetry.latest();
         let now = self.clock.now();
-        if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data))
-            && self.air.as_ref().is_none_or(|air| air.borrow_mut().telemetry(now, &frame))
-        {
-            self.frame = frame;
+        match &mut self.way {
+            Way::Direct(ends) => {
+                let newest = ends.telemetry.latest();
+                if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data)) {
+                    self.frame = frame;
+                }
+            }
+            Way::Sealed(air) => {
+                let is_open = self.telemetry.pass(now, &self.frame).is_some();
+                self.frame = air.borrow_mut().exchange(now, is_open);
+            }
         }
         self.frame
     }

@@ -60,6 +60,9 @@ impl Terminal {
                     if let Command::TestMotor { motor, .. } = command {
                         _ = write!(self.screen, "motor {motor} turns for {} s\r\n", console::TEST_TIME.seconds());
                     }
+                    if command == Command::ShowKey {
+                        self.screen.push_str("a vehicle shows it at its USB port alone\r\n");
+                    }
                 }
                 request => _ = write!(self.screen, "{}\r\n", board(&request, config)),
             }

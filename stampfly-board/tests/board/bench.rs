@@ -1,14 +1,15 @@
 //! A vehicle on a table, with its end of the radio and stations in the air, as the firmware joins them.
 
 use stampfly_board::console::Newest;
-use stampfly_board::link::{self, Link};
+use stampfly_board::link::{self, Link, Outgoing};
 use stampfly_board::messages::ButtonContact;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics::{self, Id};
 use stampfly_board::{VehicleConfig, console::Command};
 use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
-use stampfly_link::{Address, ControlPacket, Rejected, Session};
+use stampfly_link::secure::{Guarded, MAX_FRAME, NotTaken, Policy, Vehicle};
+use stampfly_link::{Address, ControlPacket, Session};
 use stampfly_types::messages::{
     ArmBlocks, BaroData, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput,
     PowerData, TofData,
@@ -27,7 +28,6 @@ pub struct Ends<'b> {
     baro: topics::BaroEnds<'b>,
     power: topics::PowerEnds<'b>,
     button: topics::ButtonPinEnds<'b>,
-    guided: topics::CommandGuidedTx<'b>,
     pub console: topics::ConsoleEnds<'b>,
     pub storage: topics::StorageEnds<'b>,
     pub cutoff: topics::CutoffEnds<'b>,
@@ -39,6 +39,9 @@ pub struct Bench<'b> {
     flight: FlightLoop<'b, Runnables>,
     pub ends: Ends<'b>,
     pub link: Link<'b>,
+    randoms: u64,
+    /// What the vehicle has sent.
+    pub said: Vec<Vec<u8>>,
     taps: topics::Taps<'b>,
     newest: Newest,
     /// Does the battery monitor answer?
@@ -54,20 +57,26 @@ pub struct Bench<'b> {
 
 impl<'b> Bench<'b> {
     pub fn new(bus: &'b mut topics::Bus, peer: Option<Address>) -> Self {
+        Self::with_key(bus, peer, None)
+    }
+
+    /// One that has a key, if it has.
+    pub fn with_key(bus: &'b mut topics::Bus, peer: Option<Address>, vehicle: Option<Vehicle>) -> Self {
         let Assembled { flight_loop: flight, outside, taps } =
             Assembled::new(bus, None, &VehicleConfig::default(), Instant::ZERO);
         let topics::Outside {
             imu, tof, flow, baro, power, link, button_pin, console, storage, cutoff, supervisor, ..
         } = outside;
-        let topics::LinkEnds { command_pilot, command_guided: guided, flight_status, telemetry, link_peer } = link;
-        let link = Link::new(Session::new(VEHICLE, 1, peer), command_pilot, link_peer, flight_status, telemetry);
-        let ends =
-            Ends { imu, tof, flow, baro, power, button: button_pin, guided, console, storage, cutoff, supervisor };
+        let policy = Policy { accept_unauthenticated: VehicleConfig::default().accept_unauthenticated };
+        let link = Link::new(Guarded::new(vehicle, Session::new(VEHICLE, 1, peer), policy), link);
+        let ends = Ends { imu, tof, flow, baro, power, button: button_pin, console, storage, cutoff, supervisor };
         let newest = Newest::new();
         Self {
             flight,
             ends,
             link,
+            randoms: 0,
+            said: Vec::new(),
             taps,
             newest,
             monitor: true,
@@ -96,8 +105,14 @@ impl<'b> Bench<'b> {
     }
 
     pub fn command(&mut self, kind: GuidedKind) {
-        let command = GuidedCommand { kind, ..Default::default() };
-        self.ends.guided.publish(self.now, command).expect("room in the queue");
+        assert!(self.link.command(self.now, GuidedCommand { kind, ..Default::default() }), "room in the queue");
+    }
+
+    /// What the vehicle sends now, and where.
+    pub fn say(&mut self, now: Instant, what: Outgoing) -> Option<(Address, Vec<u8>)> {
+        self.randoms += 1;
+        let random = self.randoms.wrapping_mul(0x9E37_79B9_7F4A_7C15).to_le_bytes();
+        self.link.transmit(now, what, random, &mut [0; MAX_FRAME]).map(|(to, bytes)| (to, bytes.to_vec()))
     }
 
     /// At the console.
@@ -106,7 +121,7 @@ impl<'b> Bench<'b> {
     }
 
     /// Lets time pass. Every transmitter sends its packet every 20 ms; returns what became of the last one's.
-    pub fn pass(&mut self, millis: u64, pressed: bool, air: &[(Address, bool)]) -> Option<Result<(), Rejected>> {
+    pub fn pass(&mut self, millis: u64, pressed: bool, air: &[(Address, bool)]) -> Option<Result<(), NotTaken>> {
         let mut last = None;
         let end = self.now + Duration::from_millis(millis);
         while self.now < end {
@@ -134,10 +149,13 @@ impl<'b> Bench<'b> {
                 }
                 for (source, arm) in air {
                     let sticks = PilotInput { arm: *arm, ..Default::default() };
-                    let bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
-                    last = Some(self.link.receive(now, *source, &bytes));
+                    let mut bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
+                    last = Some(self.link.receive(now, *source, &mut bytes).map(drop));
                 }
-                self.link.transmit(now);
+                for what in Outgoing::ALL {
+                    let said = self.say(now, what);
+                    self.said.extend(said.map(|(_, bytes)| bytes));
+                }
             }
             for band in [Band::Flight, Band::Background].into_iter().take(1 + usize::from(self.background)) {
                 self.flight.run_band(band, now, &mut ());

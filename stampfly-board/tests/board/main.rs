@@ -9,6 +9,7 @@ mod console;
 mod exchange;
 mod golden;
 mod pairing;
+mod secured;
 mod self_test;
 #[cfg(feature = "simulation")]
 mod software_time;

@@ -1,9 +1,10 @@
 //! Both links of a vehicle behind one door: the secure one, and the ecosystem's packets that authenticate nobody.
 //!
-//! For a vehicle that is to be flown with stock transmitters as well. What came over which is marked in what is handed out.
-//! A vehicle whose own transmitters all have keys needs [`Vehicle`] alone.
+//! For a vehicle that is to be flown with stock transmitters as well, or that has no key yet. What came over which is
+//! marked in what is handed out. A vehicle whose own transmitters all have keys needs [`Vehicle`] alone.
 
 use super::frame::{MAX_FRAME, MIN_FRAME};
+use super::payload::Payload;
 use super::received::Received;
 use super::refused::Refused;
 use super::vehicle::Vehicle;
@@ -15,7 +16,8 @@ use stampfly_types::{Duration, Instant};
 /// What may be used of what authenticates nobody.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Policy {
-    /// May control packets without a tag fly the vehicle? Even then, not while an authentic station is heard.
+    /// May control packets without a tag fly the vehicle? Even then, not while an authentic station is heard, and not for the rest of a
+    /// flight in which one was.
     pub accept_unauthenticated: bool,
 }
 
@@ -73,17 +75,33 @@ impl core::error::Error for NotTaken {}
 /// ```
 #[derive(Clone, Debug)]
 pub struct Guarded {
-    vehicle: Vehicle,
+    vehicle: Option<Vehicle>,
     session: Session,
     policy: Policy,
     forbidden: u32,
+    /// Where the newest authentic frame came from.
+    station: Option<Address>,
+    /// Was a transmitter looked for, when it was said last?
+    pairing: bool,
+    armed: bool,
+    /// Has a station with the key been heard since the motors may turn? Then nobody else takes over when it falls silent.
+    is_claimed: bool,
 }
 
 impl Guarded {
-    /// Both sessions, and what may be used of the second.
+    /// Both sessions, and what may be used of the second. A vehicle that has no key has no secure session: `None`.
     #[must_use]
-    pub const fn new(vehicle: Vehicle, session: Session, policy: Policy) -> Self {
-        Self { vehicle, session, policy, forbidden: 0 }
+    pub fn new(vehicle: impl Into<Option<Vehicle>>, session: Session, policy: Policy) -> Self {
+        Self {
+            vehicle: vehicle.into(),
+            session,
+            policy,
+            forbidden: 0,
+            station: None,
+            pairing: false,
+            armed: false,
+            is_claimed: false,
+        }
     }
 
     /// What may be used from now on.
@@ -93,29 +111,55 @@ impl Guarded {
 
     /// Says whether the motors may turn, see [`Vehicle::set_armed`] and [`Session::set_armed`].
     pub fn set_armed(&mut self, armed: bool) {
-        self.vehicle.set_armed(armed);
+        if let Some(vehicle) = &mut self.vehicle {
+            vehicle.set_armed(armed);
+        }
         self.session.set_armed(armed);
+        self.armed = armed;
+        self.is_claimed &= armed;
     }
 
-    /// Takes what a station has sent. What is shorter than any frame of the secure link is a packet of the other.
+    /// Follows whoever decides whether the motors may turn and whether an unauthenticated transmitter is looked for. Call it
+    /// every 20 ms or so; with motors armed, none is looked for.
+    pub fn follow(&mut self, now: Instant, armed: bool, pairing: bool) {
+        self.set_armed(armed);
+        match (self.pairing, pairing) {
+            // Refused with motors armed: then the session keeps its transmitter.
+            (false, true) => drop(self.session.start_pairing(now)),
+            (true, false) => self.session.stop_pairing(),
+            _ => {}
+        }
+        self.pairing = pairing;
+    }
+
+    /// Takes what a station has sent. What is shorter than any frame of the secure link is a packet of the other, and so is
+    /// everything on a vehicle without a key.
     ///
     /// # Errors
     /// When it is refused; the link that it is for has counted it.
     pub fn receive<'f>(&mut self, at: Instant, source: Address, bytes: &'f mut [u8]) -> Result<Heard<'f>, NotTaken> {
-        if bytes.len() >= MIN_FRAME {
-            let received = self.vehicle.receive(at, bytes).map_err(NotTaken::Secure)?;
+        if let Some(vehicle) = self.vehicle.as_mut().filter(|_| bytes.len() >= MIN_FRAME) {
+            let received = vehicle.receive(at, bytes).map_err(NotTaken::Secure)?;
+            self.station = Some(source);
+            self.is_claimed |= self.armed && received.is_some();
             return Ok(received.map_or(Heard::Handshake, Heard::Authentic));
         }
-        if !self.policy.accept_unauthenticated || self.vehicle.is_joined(at) {
+        if !self.is_open(at) {
             self.forbidden = self.forbidden.wrapping_add(1);
             return Err(NotTaken::Forbidden);
         }
         self.session.receive(at, source, bytes).map(Heard::Unauthenticated).map_err(NotTaken::Unauthenticated)
     }
 
+    /// May packets that authenticate nobody be used now?
+    fn is_open(&self, now: Instant) -> bool {
+        let is_joined = self.vehicle.as_ref().is_some_and(|vehicle| vehicle.is_joined(now));
+        self.policy.accept_unauthenticated && !is_joined && !self.is_claimed
+    }
+
     /// What is to be sent to every station now, see [`Vehicle::transmit`].
     pub fn transmit<'r>(&mut self, now: Instant, random: [u8; 8], room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]> {
-        self.vehicle.transmit(now, random, room)
+        self.vehicle.as_mut()?.transmit(now, random, room)
     }
 
     /// The call for an unauthenticated transmitter, if one is wanted and due.
@@ -123,25 +167,49 @@ impl Guarded {
         if self.policy.accept_unauthenticated { self.session.beacon(now) } else { None }
     }
 
+    /// Seals what the vehicle says to the station with the key, and says where that is. `None` when there is none, or it must
+    /// not be sent.
+    pub fn seal<'r>(
+        &mut self,
+        now: Instant,
+        payload: &Payload<'_>,
+        room: &'r mut [u8; MAX_FRAME],
+    ) -> Option<(Address, &'r [u8])> {
+        let station = self.station?;
+        Some((station, self.vehicle.as_mut()?.seal(now, payload, room).ok()?))
+    }
+
+    /// To whom telemetry goes in the clear: the unauthenticated transmitter, while it may fly the vehicle.
+    #[must_use]
+    pub fn open_peer(&self, now: Instant) -> Option<Address> {
+        self.session.peer().filter(|_| self.is_open(now) && !self.session.is_pairing())
+    }
+
     /// How long ago the newest was taken, over either link.
     #[must_use]
     pub fn age(&self, now: Instant) -> Option<Duration> {
-        match (self.vehicle.age(now), self.session.age(now)) {
+        match (self.vehicle.as_ref().and_then(|vehicle| vehicle.age(now)), self.session.age(now)) {
             (Some(secure), Some(open)) => Some(secure.min(open)),
             (secure, open) => secure.or(open),
         }
     }
 
-    /// The secure session.
+    /// The secure session, if the vehicle has a key.
     #[must_use]
-    pub const fn vehicle(&mut self) -> &mut Vehicle {
-        &mut self.vehicle
+    pub const fn vehicle(&self) -> Option<&Vehicle> {
+        self.vehicle.as_ref()
+    }
+
+    /// The same, to be used by itself.
+    #[must_use]
+    pub const fn vehicle_mut(&mut self) -> Option<&mut Vehicle> {
+        self.vehicle.as_mut()
     }
 
     /// The unauthenticated session.
     #[must_use]
-    pub const fn session(&mut self) -> &mut Session {
-        &mut self.session
+    pub const fn session(&self) -> &Session {
+        &self.session
     }
 
     /// Packets that authenticate nobody and were not looked at because of it.

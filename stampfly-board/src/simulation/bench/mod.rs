@@ -20,7 +20,7 @@ use super::terminal::{Desk, Terminal};
 use crate::VehicleConfig;
 use crate::console::{Newest, Profile};
 use crate::golden;
-use crate::link::{self, Link};
+use crate::link::{self, Link, Outgoing};
 use crate::messages::ButtonContact;
 use crate::schedule::{ACTIVATIONS, Runnables};
 use crate::topics::{self, Id};
@@ -31,6 +31,7 @@ use stampfly_bus::{Band, Taps as _};
 use stampfly_drivers::{Button, Buzzer, Indicator, Lights, MotorOutputs};
 use stampfly_flight::doctor::{Fact, FlashAccess, Restart};
 use stampfly_flight::{Assembled, FlightLoop};
+use stampfly_link::secure::{Guarded, MAX_FRAME, Policy};
 use stampfly_link::{Address, ControlPacket, Session};
 use stampfly_sim::plant::{Hand, Pose};
 use stampfly_sim::sensors::{ButtonModel, MotorModel};
@@ -111,7 +112,6 @@ pub fn with_vehicle<T>(defect: Option<&Defect>, seed: u64, examine: impl FnOnce(
         sensing::start_drivers(&mut tasks, &clock, (board, &mut shared), (sensors, &wrong), outside, false, &health);
     let mut publisher = self_test.self_test;
     publisher.publish(clock.now(), &tested.message());
-    let topics::LinkEnds { command_pilot, flight_status, telemetry, link_peer, .. } = link;
     let session = Session::new(VEHICLE, 1, Some(TRANSMITTER));
     let (flash, restart) = (fault::flash(defect), fault::restart(defect));
     let mut bench = Bench {
@@ -133,7 +133,7 @@ pub fn with_vehicle<T>(defect: Option<&Defect>, seed: u64, examine: impl FnOnce(
         status: Lights::status(Lamp::new(&clock, fault::is_dark(defect))),
         buzzer: Buzzer::new(Loudspeaker::new(&clock, fault::is_silent(defect))),
         button: (button.0, button.1.button_contact),
-        link: Link::new(session, command_pilot, link_peer, flight_status, telemetry),
+        link: Link::new(Guarded::new(None, session, Policy { accept_unauthenticated: true }), link),
         sticks: None,
         hand: None,
         next: [clock.now(); 3],
@@ -209,11 +209,13 @@ impl Bench<'_> {
 
     fn exchange(&mut self, now: Instant) {
         if let Some(sticks) = self.sticks.and_then(|sticks| self.wiring.transmit(sticks)) {
-            let bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
+            let mut bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
             // What is refused is counted in the session.
-            let _ = self.link.receive(now, TRANSMITTER, &bytes);
+            let _ = self.link.receive(now, TRANSMITTER, &mut bytes);
         }
-        let _ = self.link.transmit(now);
+        for what in Outgoing::ALL {
+            let _ = self.link.transmit(now, what, [0; 8], &mut [0; MAX_FRAME]);
+        }
     }
 
     fn hold(&mut self, now: Instant) {
