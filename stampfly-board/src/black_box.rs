@@ -13,8 +13,8 @@ use stampfly_flight::{LogSchema, parameters::Parameters};
 use stampfly_log::ulog::{Definitions, Level, ParameterValue, Sink, WriteError, Writer};
 use stampfly_types::{Instant, messages::FlightStatus};
 
-/// Memory that the firmware has for it, words: 36 kB.
-pub const WORDS: usize = 9 * 1024 - 256;
+/// Memory that the firmware has for it, words: 39 kB.
+pub const WORDS: usize = 10 * 1024 - 512;
 
 /// A black box for this vehicle.
 pub type BlackBox<const WORDS: usize> = stampfly_flight::BlackBox<WORDS, COUNT>;

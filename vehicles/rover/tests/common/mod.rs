@@ -1,6 +1,6 @@
 //! The assembled vehicle: its tables under the flight loop, tick by tick, with components that can die.
 
-use stampfly_bus::{Activation, ActivationInfo, Band, Schedule, TopicTable};
+use stampfly_bus::{Activation, ActivationInfo, Band, Schedule, TopicTable, VisitLines};
 use stampfly_flight::Assembled;
 use stampfly_rover::messages::*;
 use stampfly_rover::schedule::{Id, TICK};
@@ -43,6 +43,10 @@ impl Schedule for Mortal {
 
     fn states(start: Instant) -> Self::States {
         Runnables::states(start)
+    }
+
+    fn visit<V: VisitLines>(visitor: &mut V) {
+        Runnables::visit(visitor);
     }
 
     fn read(ends: &mut <Bus as TopicTable>::Ends<'_>, index: usize, activation: &mut Activation) {
