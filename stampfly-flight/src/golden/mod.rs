@@ -18,7 +18,7 @@ pub use format::{Writer, tables};
 use crate::newest::MAX_MESSAGE;
 use crate::{Assembled, FlightLoop, InPlace, Observer};
 use core::mem::MaybeUninit;
-use format::Entry;
+use format::{Entry, Header, Reader};
 use heapless::Vec;
 use stampfly_bus::{Band, PublishWords, Schedule, Taps, TopicTable};
 use stampfly_log::FlightHash;
@@ -138,7 +138,20 @@ pub fn play_in<'b, R: Schedule>(
     observer: &mut impl PlayObserver,
 ) -> Result<Report, GoldenError> {
     let (header, entries) = format::open::<R>(record)?;
-    let InPlace { flight_loop, mut outside, mut taps } = Assembled::in_place(place, bus, None, config, header.start);
+    let vehicle = Assembled::in_place(place, bus, None, config, header.start);
+    play_entries(vehicle, header, entries, tolerance, observer)
+}
+
+/// Plays the entries on a vehicle. Apart, so that what they need is not on the stack while the vehicle is made, which needs most.
+#[inline(never)]
+fn play_entries<R: Schedule>(
+    vehicle: InPlace<'_, R>,
+    header: Header,
+    entries: Reader<'_>,
+    tolerance: f32,
+    observer: &mut impl PlayObserver,
+) -> Result<Report, GoldenError> {
+    let InPlace { flight_loop, mut outside, mut taps } = vehicle;
     let (mut hash, mut output) = (FlightHash::new(), Vec::<u32, MAX_MESSAGE>::new());
     let mut drain = |observer: &mut _, hash: &mut FlightHash, output: &mut Vec<u32, MAX_MESSAGE>| {
         taps.drain(&mut |topic, at, generation, words| {
