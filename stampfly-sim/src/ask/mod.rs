@@ -2,7 +2,8 @@
 //!
 //! Use it on both sides: a server makes an [`Asked`] of every text that arrives, the vehicle carries it out and answers with a
 //! [`Reply`].
-//! Nothing here knows a particular vehicle. [`Guided`] becomes the [`GuidedCommand`] and [`Sticks`] the [`PilotInput`] that
+//! Nothing here knows a particular vehicle. [`Guided`] becomes the
+//! [`GuidedCommand`](stampfly_types::messages::GuidedCommand) and [`Sticks`] the [`PilotInput`](stampfly_types::messages::PilotInput) that
 //! every radio link of the project ends in.
 //!
 //! An ask is a JSON object with `vehicle` (its number), `id` (whatever the page likes; the answer repeats it), `do`, and what
