@@ -5,7 +5,7 @@
 //! the executor was. Its estimates must be the flight's, bit for bit; [`Shadow::is_identical`] says whether they were.
 
 use stampfly_board::{schedule, topics};
-use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Fusion, Measurements, feed};
+use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Fusion, Measurements, Pacer};
 use stampfly_types::messages::{
     BaroData, CalibrationResult, EstimatorCommand, ExternalPose, FlowData, ImuData, MagData, TofData,
 };
@@ -64,6 +64,7 @@ pub enum Sensor {
 pub struct Shadow {
     estimator: Eskf,
     started: bool,
+    pacer: Pacer,
     identical: bool,
     imu: Recent<ImuData>,
     tof: Recent<TofData>,
@@ -85,6 +86,7 @@ impl Shadow {
         Self {
             estimator: Eskf::new(config),
             started: false,
+            pacer: Pacer::default(),
             identical: true,
             imu: Recent::default(),
             tof: Recent::default(),
@@ -161,7 +163,7 @@ impl Shadow {
         let (mag, baro, pose) = (self.mag.taken(mag), self.baro.taken(baro), self.pose.taken(pose));
         self.last_imu = imu.last().map(|sample| (sample.at, sample.data)).or(self.last_imu);
         let measurements = Measurements { imu: &imu, tof: &tof, flow: &flow, mag: &mag, baro: &baro, pose: &pose };
-        feed(estimator, &measurements, |aiding, _, fusion| match aiding {
+        self.pacer.feed(estimator, &measurements, |aiding, _, fusion| match aiding {
             Aiding::Tof => seen(Sensor::Tof, now, fusion),
             Aiding::Flow => seen(Sensor::Flow, now, fusion),
             Aiding::Baro => seen(Sensor::Baro, now, fusion),
