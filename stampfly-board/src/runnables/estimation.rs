@@ -1,9 +1,10 @@
 //! Estimation: every sensor in, the vehicle's state out.
 
 use crate::config::{EstimatorKind, VehicleConfig};
-use crate::topics::EstimationEnds as Ends;
+use crate::topics::EstimationEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, Pacer};
+use stampfly_types::Instant;
 
 /// The estimators this vehicle can be told to use (`estimator.type`).
 #[derive(Clone, Debug, PartialEq)]
@@ -31,35 +32,41 @@ impl Estimation {
     #[inline(never)]
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let of = |estimator| Self { estimator, started: false, pacer: Pacer::default() };
+        let new = |estimator| Self { estimator, started: false, pacer: Pacer::default() };
         match config.estimator {
-            EstimatorKind::Complementary => of(Choice::Complementary(Complementary::new(config.complementary))),
-            EstimatorKind::Eskf => of(Choice::Eskf(Eskf::new(config.eskf))),
+            EstimatorKind::Complementary => new(Choice::Complementary(Complementary::new(config.complementary))),
+            EstimatorKind::Eskf => new(Choice::Eskf(Eskf::new(config.eskf))),
         }
     }
 }
 
 impl Runnable for Estimation {
-    type Ends<'b> = Ends<'b>;
+    type Ends<'b> = EstimationEnds<'b>;
 
-    fn run(&mut self, activation: &mut Activation, ends: &mut Ends<'_>) {
+    fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
         let feeding = (&mut self.started, &mut self.pacer);
         match &mut self.estimator {
-            Choice::Eskf(estimator) => step(estimator, feeding, activation, ends),
-            Choice::Complementary(estimator) => step(estimator, feeding, activation, ends),
+            Choice::Eskf(estimator) => step(estimator, feeding, activation.now(), ends),
+            Choice::Complementary(estimator) => step(estimator, feeding, activation.now(), ends),
         }
     }
 }
 
+// By itself for each estimator: the one that flies is kept in fast memory.
 #[inline(never)]
-fn step(of: &mut impl Estimator, (started, pacer): (&mut bool, &mut Pacer), on: &Activation, ends: &mut Ends<'_>) {
-    let (now, calibration) = (on.now(), ends.calibration.get());
+fn step(
+    estimator: &mut impl Estimator,
+    (started, pacer): (&mut bool, &mut Pacer),
+    now: Instant,
+    ends: &mut EstimationEnds<'_>,
+) {
+    let calibration = ends.calibration.get();
     if calibration.complete && !*started {
         *started = true;
-        of.initialize(now, calibration);
+        estimator.initialize(now, calibration);
     }
     if ends.estimator_command.sample().is_some() {
-        of.command(now, ends.estimator_command.get());
+        estimator.command(now, ends.estimator_command.get());
     }
     let measurements = Measurements {
         imu: &ends.sensor_imu,
@@ -69,7 +76,7 @@ fn step(of: &mut impl Estimator, (started, pacer): (&mut bool, &mut Pacer), on: 
         baro: &ends.sensor_baro,
         pose: &ends.external_pose,
     };
-    pacer.feed(of, &measurements, |_, _, _| {});
-    ends.estimate_state.publish(now, &of.estimate());
-    ends.estimate_status.publish(now, &of.status());
+    pacer.feed(estimator, &measurements, |_, _, _| {});
+    ends.estimate_state.publish(now, &estimator.estimate());
+    ends.estimate_status.publish(now, &estimator.status());
 }

@@ -13,6 +13,7 @@ use stampfly_link::secure::{
     Guarded, Key, KeyError, MAX_FRAME, NotTaken, Payload, Policy, Refused, Station, Tally, Vehicle,
 };
 use stampfly_link::{Address, ControlPacket, Session};
+use stampfly_sim::Noise;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::PilotInput;
 use stampfly_types::{Duration, Instant, Message};
@@ -22,6 +23,8 @@ use std::vec::Vec;
 
 const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
 const TRANSMITTER: Address = Address([2, 0, 0, 0, 0, 1]);
+/// Stream of the random numbers on the air; no model has this number.
+const STREAM: u64 = 105;
 /// The period of the flight band, in which the session's budget for bad frames counts.
 const TICK: u64 = 2_500;
 /// What it takes to look at a frame's tag, and what at anything that is refused before. *Unverified*: 450 bytes of two ciphers at 60 cycles
@@ -65,7 +68,7 @@ pub struct AirReport {
 pub(super) struct Ends<'b> {
     link: Link<'b>,
     station: Station,
-    noise: u64,
+    noise: Noise,
     /// The newest of the station's frames, which a stranger has recorded.
     recorded: Vec<u8>,
     number: u32,
@@ -82,8 +85,8 @@ pub(super) type Shared<'b> = Rc<RefCell<Ends<'b>>>;
 
 impl<'b> Ends<'b> {
     pub(super) fn new(seed: u64, config: &VehicleConfig, ends: LinkEnds<'b>) -> Result<Self, KeyError> {
-        let mut noise = seed ^ 0x5EED_0A17;
-        let key = Key::generate(1, core::array::from_fn(|_| random(&mut noise) as u8))?;
+        let mut noise = Noise::new(seed, STREAM);
+        let key = Key::generate(1, random(&mut noise))?;
         let session = Session::new(VEHICLE, 1, Some(TRANSMITTER));
         let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
         Ok(Self {
@@ -116,13 +119,13 @@ impl<'b> Ends<'b> {
     pub(super) fn exchange(&mut self, now: Instant, is_open: bool) -> TelemetryFrame {
         let mut room = [0; MAX_FRAME];
         for what in Outgoing::ALL {
-            let fresh = random(&mut self.noise).to_le_bytes();
+            let fresh = random(&mut self.noise);
             let sent = self.link.transmit(now, what, fresh, &mut room).map(|(_, bytes)| bytes.to_vec());
             if let Some(mut bytes) = sent.filter(|_| is_open) {
                 self.answer(now, &mut bytes);
             }
         }
-        let fresh = random(&mut self.noise).to_le_bytes();
+        let fresh = random(&mut self.noise);
         let sent = self.station.transmit(now, fresh, &mut room).map(<[u8]>::to_vec);
         if let Some(mut bytes) = sent.filter(|_| is_open) {
             self.hear(now, &mut bytes);
@@ -151,8 +154,8 @@ impl<'b> Ends<'b> {
         self.number = self.number.wrapping_add(1);
         let mut bytes = match self.number % 4 {
             0 => {
-                let length = random(&mut self.noise) as usize % (MAX_FRAME + 1);
-                (0..length).map(|_| random(&mut self.noise) as u8).collect()
+                let length = (self.noise.unit() * (MAX_FRAME + 1) as f64) as usize;
+                (0..length).map(|_| byte(&mut self.noise)).collect()
             }
             1 => self.recorded.clone(),
             2 => {
@@ -219,11 +222,11 @@ pub(super) async fn flood(clock: Clock, air: Shared<'_>, rate: u32, report: &Cel
     }
 }
 
-/// The next number of a sequence that is the same in every flight with the same seed (splitmix64).
-fn random(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
+/// So many random bytes.
+fn random<const N: usize>(noise: &mut Noise) -> [u8; N] {
+    core::array::from_fn(|_| byte(noise))
+}
+
+fn byte(noise: &mut Noise) -> u8 {
+    (noise.unit() * 256.0) as u8
 }

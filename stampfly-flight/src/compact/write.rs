@@ -43,24 +43,21 @@ impl Entry {
         self.byte(number as u8);
     }
 
-    /// The same, for less: most numbers have one byte.
+    /// The same, for less: a register holds it.
     #[inline]
-    fn number32(&mut self, number: u32) {
-        if number < 0x80 { self.byte(number as u8) } else { self.number(number.into()) }
+    fn number32(&mut self, mut number: u32) {
+        while number >= 0x80 {
+            self.byte(number as u8 | 0x80);
+            number >>= 7;
+        }
+        self.byte(number as u8);
     }
 
     /// A difference of instants, which is mostly less than a minute.
     #[inline]
     fn difference64(&mut self, difference: u64) {
         match i32::try_from(difference as i64) {
-            Ok(short) if short.unsigned_abs() < 0x4000_0000 => {
-                let mut number = zigzag32(short as u32);
-                while number >= 0x80 {
-                    self.byte(number as u8 | 0x80);
-                    number >>= 7;
-                }
-                self.byte(number as u8);
-            }
+            Ok(short) if short.unsigned_abs() < 0x4000_0000 => self.number32(zigzag32(short as u32)),
             _ => self.number(zigzag(difference)),
         }
     }

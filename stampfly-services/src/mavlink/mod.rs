@@ -153,37 +153,27 @@ impl<C: Copy + PartialEq> Mavlink<C> {
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now);
         for byte in bytes {
-            match client.feed(*byte, guard.as_mut()) {
-                None => {}
-                Some(Fed::Untrusted) => *untrusted = untrusted.wrapping_add(1),
-                Some(Fed::Message(system, message)) => {
-                    let seat = Seat::Mavlink(system);
-                    let turn = Turn {
-                        now,
-                        own: &*own,
-                        client: &mut *client,
-                        missions: &mut *missions,
-                        seat,
-                        cockpit: &mut *cockpit,
-                        put: &mut *put,
-                    };
-                    if let Some(origin) = answer::message(turn, system, &message) {
-                        own.origin = Some(origin);
-                    }
+            let (system, said) = match client.feed(*byte, guard.as_mut()) {
+                None => continue,
+                Some(Fed::Untrusted) => {
+                    *untrusted = untrusted.wrapping_add(1);
+                    continue;
                 }
-                Some(Fed::Unreadable(system, message)) => {
-                    let seat = Seat::Mavlink(system);
-                    let turn = Turn {
-                        now,
-                        own: &*own,
-                        client: &mut *client,
-                        missions: &mut *missions,
-                        seat,
-                        cockpit: &mut *cockpit,
-                        put: &mut *put,
-                    };
-                    answer::unreadable(turn, system, message);
-                }
+                Some(Fed::Message(system, message)) => (system, Ok(message)),
+                Some(Fed::Unreadable(system, message)) => (system, Err(message)),
+            };
+            let turn = Turn {
+                now,
+                own: &*own,
+                client: &mut *client,
+                missions: &mut *missions,
+                seat: Seat::Mavlink(system),
+                cockpit: &mut *cockpit,
+                put: &mut *put,
+            };
+            match said {
+                Ok(message) => own.origin = answer::message(turn, system, &message).or(own.origin),
+                Err(message) => answer::unreadable(turn, system, message),
             }
         }
     }

@@ -287,9 +287,10 @@ impl Runner {
         let yaw = yaw.unwrap_or(present);
         let command = GuidedCommand { kind: GuidedKind::WayPoint, position, yaw, speed: self.speed, dwell };
         // What was asked before the mission is forgotten; then one follows the other without a halt.
-        match self.routed {
-            true => cockpit.guide(now, self.seat, command)?,
-            false => cockpit.fly_to(now, self.seat, command)?,
+        if self.routed {
+            cockpit.guide(now, self.seat, command)?;
+        } else {
+            cockpit.fly_to(now, self.seat, command)?;
         }
         self.routed = true;
         Ok(())

@@ -54,7 +54,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     // An ARM core's code is another one's again; these two stand for the S3's.
     for machine in MACHINES.iter().filter(|machine| machine.stands_for_s3) {
         let mut figures = Vec::new();
-        let mut follow = |what: &str, program: &Path| -> Result<(Found, String), Failure> {
+        let mut examine = |what: &str, program: &Path| -> Result<(Found, String), Failure> {
             let names = Names::read(program)?;
             let ram = names.fitting(&in_ram);
             unmatched.retain(|pattern| names.fitting(&[pattern]).is_empty());
@@ -68,10 +68,10 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
             found.print(machine, &names);
             Ok((found, said))
         };
-        let (found, said) = follow("flight stack", &program(repository, machine)?)?;
+        let (found, said) = examine("flight stack", &program(repository, machine)?)?;
         failures.extend(found.beyond_budget(machine, &counts(&said)?)?);
         figures.extend(found.figures("", "an armed pass"));
-        let (found, said) = follow("flight core", &core1::program(repository, machine, &script)?)?;
+        let (found, said) = examine("flight core", &core1::program(repository, machine, &script)?)?;
         if core1::bits(&said) != core1::bits(&here) {
             failures.push(format!(
                 "{}: the flight core does something else than on this PC:\n{said}\n{here}",

@@ -8,25 +8,14 @@ use stampfly_board::{VehicleConfig, black_box};
 use stampfly_flight::Recorder;
 use stampfly_flight::compact;
 use stampfly_flight::replay::{Replay, ReplayOptions, replay};
-use stampfly_log::ulog::{Message, Reader, Sink};
+use stampfly_log::ulog::{Message, Reader};
+use stampfly_sim::recorder::Memory;
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 /// The least that has to be replayed.
 const LEAST: Duration = Duration::from_secs(20);
-
-/// A log in memory.
-#[derive(Default)]
-struct Bytes(Vec<u8>);
-
-impl Sink for Bytes {
-    type Error = core::convert::Infallible;
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.extend_from_slice(bytes);
-        Ok(())
-    }
-}
 
 /// The bytes of the record in what was printed.
 fn record(said: &str) -> Option<Vec<u8>> {
@@ -36,7 +25,7 @@ fn record(said: &str) -> Option<Vec<u8>> {
 
 /// The record as a log.
 fn log(record: &[u8]) -> Result<Vec<u8>, String> {
-    let log = black_box::open(Bytes::default(), Instant::ZERO, &VehicleConfig::default(), "emulated board");
+    let log = black_box::open(Memory::default(), Instant::ZERO, &VehicleConfig::default(), "emulated board");
     let mut log = Recorder::<Runnables, _>::new(log.map_err(|_| "no head")?);
     compact::read(record, &mut log).map_err(|error| error.to_string())?;
     Ok(log.into_sink().0)
