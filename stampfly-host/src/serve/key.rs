@@ -16,7 +16,7 @@ const EPOCH: Duration = Duration::from_secs(1_420_070_400);
 /// let file = folder.join("stampfly-example-key");
 /// std::fs::write(&file, "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f\n")?;
 /// let key = Key::read(&file)?;
-/// assert_eq!(key.signing().key.iter().sum::<u8>(), 240);
+/// assert_eq!(key.signing().key, core::array::from_fn(|index| index as u8));
 /// assert_eq!(format!("{key:?}"), "Key");
 /// # std::fs::remove_file(&file)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
