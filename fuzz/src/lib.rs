@@ -27,7 +27,7 @@
 //! | [`whole_stack`] | edits of all that a flying vehicle is given | every invariant that an open loop can keep |
 //! | [`ulog`] | log files | the reader moves on, offsets lie in the file, values lie in their payload |
 //!
-//! With cargo-fuzz: `cargo fuzz run --sanitizer none console_line`, or all of them with `cargo xtask fuzz SECONDS`. A file that fails goes into
+//! With cargo-fuzz: `cargo fuzz run --sanitizer none console_line`, or all of them with `cargo xtask search SECONDS`. A file that fails goes into
 //! `fuzz/corpus/TARGET`, so that the test keeps it.
 
 mod console;

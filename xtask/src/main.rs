@@ -45,8 +45,14 @@ const STEPS: &[Step] = &[
     Step::new("features", "Check each library with each of its features alone", steps::features::run).beside(),
     Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
-    Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
-        .accepting(&[Seconds]),
+    Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run),
+    Step::new(
+        "search",
+        "Search with libFuzzer and the address sanitizer, each target for SECONDS (20)",
+        steps::search::run,
+    )
+    .accepting(&[Seconds])
+    .manual(),
     Step::new("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run).accepting(&[File]),
     Step::new("budget", "Count the instructions of a 400 Hz step on this PC", steps::budget::run),
     Step::new(

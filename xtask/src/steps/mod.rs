@@ -45,6 +45,7 @@ pub mod python;
 pub mod qemu;
 pub mod record;
 pub mod s3_memory;
+pub mod search;
 pub mod semver;
 pub mod shards;
 pub mod soak;
