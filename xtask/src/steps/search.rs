@@ -11,7 +11,7 @@ use crate::cargo_tool::cargo_tool;
 use crate::repository::{Failure, Repository, run as run_program};
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Output};
 
 const CARGO_FUZZ: &str = "0.13.2";
 /// How long a target is searched with unless a time is given.
@@ -22,13 +22,14 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     run_program(&mut cargo_fuzz(repository, "build")?)?;
     let (mut failed, mut total) = (Vec::new(), 0);
     for target in targets(repository)? {
-        let said = search(repository, &target, seconds)?;
-        let executions = executions(&said.text);
+        let output = search(repository, &target, seconds)?;
+        let said = String::from_utf8_lossy(&output.stderr);
+        let executions = executions(&said);
         total += executions;
         println!("{target:<18} {executions:>12} executions");
         // A search that did nothing found nothing either.
-        if !said.success || executions == 0 {
-            eprintln!("{}", said.text);
+        if !output.status.success() || executions == 0 {
+            eprintln!("{said}");
             failed.push(target);
         }
     }
@@ -60,22 +61,15 @@ fn targets(repository: &Repository) -> Result<Vec<String>, Failure> {
     if names.is_empty() { Err(format!("no target in {}", folder.display())) } else { Ok(names) }
 }
 
-/// What libFuzzer said of a search.
-struct Said {
-    text: String,
-    success: bool,
-}
-
 /// Searches with one target.
-fn search(repository: &Repository, target: &str, seconds: u64) -> Result<Said, Failure> {
+fn search(repository: &Repository, target: &str, seconds: u64) -> Result<Output, Failure> {
     // The first folder takes what is found, the others are read.
     let found = place(repository).join("corpus").join(target);
     fs::create_dir_all(&found).map_err(|error| format!("{}: {error}", found.display()))?;
     let mut run = cargo_fuzz(repository, "run")?;
     run.arg(target).arg(&found).arg(repository.root.join(PACKAGE).join("corpus").join(target));
     run.args(["--", "-max_len=4096", "-timeout=10", "-print_final_stats=1"]).arg(format!("-max_total_time={seconds}"));
-    let output = run.output().map_err(|error| format!("cargo fuzz: {error}"))?;
-    Ok(Said { text: String::from_utf8_lossy(&output.stderr).into_owned(), success: output.status.success() })
+    run.output().map_err(|error| format!("cargo fuzz: {error}"))
 }
 
 /// What libFuzzer counts at its end.
