@@ -1,4 +1,4 @@
-"""Signs with pymavlink, and shows that others are ignored: python mavlink_signed.py tcp:192.0.2.7:5760 KEY_FILE"""
+"""Signs with pymavlink, and shows that others are ignored: python mavlink_signed.py tcp:192.0.2.7:5760 KEY_FILE [PARAMETER]"""
 
 import os
 import sys
@@ -9,6 +9,9 @@ os.environ["MAVLINK20"] = "1"
 
 from pymavlink import mavutil  # noqa: E402
 from pymavlink.dialects.v20 import common as mavlink  # noqa: E402
+
+# One that the vehicle has.
+NAME = sys.argv[3] if len(sys.argv) > 3 else "rate.roll.kp"
 
 
 def connect(address, key=None):
@@ -27,7 +30,7 @@ def parameter(line, seconds):
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         beat(line)
-        line.mav.param_request_read_send(1, 1, b"rate.roll.kp", -1)
+        line.mav.param_request_read_send(1, 1, NAME.encode(), -1)
         value = line.recv_match(type="PARAM_VALUE", blocking=True, timeout=0.5)
         if value is not None:
             return value.param_value
@@ -42,7 +45,7 @@ def main():
     assert own.wait_heartbeat(timeout=10) is not None, "no heartbeat that is signed with the key"
     value = parameter(own, 5)
     assert value is not None, "a signed question is not answered"
-    print(f"signed: rate.roll.kp is {value:.6f}")
+    print(f"signed: {NAME} is {value:.6f}")
 
     stranger = connect(sys.argv[1])
     assert parameter(stranger, 3) is None, "an unsigned question is answered"

@@ -1,6 +1,7 @@
 """Flies a square with djitellopy: python tello_square.py 127.0.0.1:8889 [port of djitellopy] [port for the state]"""
 
 import sys
+import time
 
 from djitellopy import Tello
 
@@ -37,6 +38,10 @@ def main():
     for corner in range(1, 5):
         tello.move_forward(SIDE)
         tello.rotate_clockwise(90)
+        # Its state comes ten times a second, and what has just turned swings a little.
+        until = time.monotonic() + 3
+        while not near(tello.get_yaw(), 90 * corner, 8) and time.monotonic() < until:
+            time.sleep(0.1)
         print(f"corner {corner}: heading {tello.get_yaw()} degrees, height {tello.get_height()} cm")
         assert near(tello.get_yaw(), 90 * corner, 8), tello.get_yaw()
     tello.move_up(30)

@@ -4,7 +4,7 @@
 //! flown again from the log, bit for bit.
 
 use serde::{Deserialize, Serialize};
-use stampfly_bus::{Activation, Band, Duration, Instant, Runnable, Taps};
+use stampfly_bus::{Activation, Duration, Instant, Runnable};
 use stampfly_control::{
     Airframe, CascadeConfig, CascadeController, ControlInput, Controller, Mixer, MotorConfig, MotorCurve, MotorStage,
     MultirotorMixer, Rotor,
@@ -12,8 +12,7 @@ use stampfly_control::{
 use stampfly_drivers::{Imu, MotorOutputs, OpticalFlow, RangeFinder};
 use stampfly_eskf::calibration::StillCalibration;
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Measurements, feed};
-use stampfly_flight::{Assembled, LogSchema, Recorder, ReplayOptions, key_frame, replay::replay};
-use stampfly_log::ulog::{Definitions, Sink};
+use stampfly_flight::{Assembled, Recorder, ReplayOptions, key_frame, replay::Memory, replay::replay};
 use stampfly_sim::{Simulation, SimulationConfig, time::Tasks};
 use stampfly_types::Vec3;
 use stampfly_types::messages::*;
@@ -201,17 +200,6 @@ impl Runnable for Control {
 }
 // ANCHOR_END: control
 
-/// The log, in memory.
-struct Memory(Vec<u8>);
-
-impl Sink for Memory {
-    type Error = core::convert::Infallible;
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.extend_from_slice(bytes);
-        Ok(())
-    }
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // ANCHOR: assemble
     let mut bus = topics::Bus::new();
@@ -246,17 +234,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // ANCHOR_END: simulation
 
     // ANCHOR: fly
-    let mut head = Definitions::start(Memory(Vec::new()), Instant::ZERO)?;
-    head.info("sys_name", "first vehicle")?;
-    let mut recorder = Recorder::<Vehicle, _>::new(head.data(LogSchema::new(&[]))?);
+    let mut recorder = Recorder::<Vehicle, _>::start(Memory::default(), "first vehicle", Instant::ZERO)?;
     let mut now = Instant::ZERO;
     println!("   time    north     east   height");
     while now < Instant::from_secs(12) {
         now += Duration::from_micros(2_500);
         tasks.run_until(now);
-        taps.drain(&mut |topic, at, generation, words| recorder.sample(topic, at, generation, words));
-        flight_loop.run_band(Band::Flight, now, &mut recorder);
-        taps.drain(&mut |topic, at, generation, words| recorder.sample(topic, at, generation, words));
+        recorder.pass(&mut flight_loop, &mut taps, now);
         if let Some(output) = motors.actuator_motor.latest() {
             let Ok(()) = rotors.write(&output.data);
         }

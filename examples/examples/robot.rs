@@ -5,9 +5,8 @@
 //! steps are refused. What was refused is recorded, and the replay refuses the same.
 
 use serde::{Deserialize, Serialize};
-use stampfly_bus::{Activation, Band, Duration, Full, Instant, Runnable, Taps, message};
-use stampfly_flight::{Assembled, LogSchema, Recorder, ReplayOptions, key_frame, replay::replay};
-use stampfly_log::ulog::{Definitions, Sink};
+use stampfly_bus::{Activation, Duration, Full, Instant, Runnable, message};
+use stampfly_flight::{Assembled, Recorder, ReplayOptions, key_frame, replay::Memory, replay::replay};
 
 message! {
     /// What the range finder sees.
@@ -101,35 +100,18 @@ stampfly_bus::schedule! {
     wheels = Wheels: every 100 ms, background, 50 us;
 }
 
-/// The log, in memory.
-struct Memory(Vec<u8>);
-
-impl Sink for Memory {
-    type Error = core::convert::Infallible;
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.extend_from_slice(bytes);
-        Ok(())
-    }
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut bus = topics::Bus::new();
     let Assembled { mut flight_loop, mut outside, mut taps } =
         Assembled::<Robot>::new(&mut bus, None, &0.5, Instant::ZERO);
-    let mut head = Definitions::start(Memory(Vec::new()), Instant::ZERO)?;
-    head.info("sys_name", "wall follower")?;
-    let mut recorder = Recorder::<Robot, _>::new(head.data(LogSchema::new(&[]))?);
+    let mut recorder = Recorder::<Robot, _>::start(Memory::default(), "wall follower", Instant::ZERO)?;
 
     // Ten seconds along a wall. The virtual clock steps by 20 ms; on a microcontroller a timer would.
     let (mut now, mut offset) = (Instant::ZERO, 1.0f32);
     for _ in 0..500 {
         now += Duration::from_millis(20);
         outside.range_finder.wall.publish(now, &Wall { distance: offset });
-        taps.drain(&mut |topic, at, generation, words| recorder.sample(topic, at, generation, words));
-        for band in [Band::Flight, Band::Background] {
-            flight_loop.run_band(band, now, &mut recorder);
-        }
-        taps.drain(&mut |topic, at, generation, words| recorder.sample(topic, at, generation, words));
+        recorder.pass(&mut flight_loop, &mut taps, now);
         offset -= 0.01 * outside.motors.heading.latest().map_or(0.0, |sample| sample.data.turn);
     }
     let mut frame = [0; 4096];

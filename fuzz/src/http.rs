@@ -1,7 +1,7 @@
 //! What browsers and programs send to the ground station: requests as bytes, asks as text.
 
-use stampfly_host::ground::ask::{Ask, Asked, Incoming, LONGEST};
-use stampfly_host::ground::http::{Hosts, LONGEST_HEAD, Request, Wanted, refuse, request, upgrade};
+use stampfly_ground::ask::{Ask, Asked, Incoming, LONGEST};
+use stampfly_ground::http::{Hosts, LONGEST_HEAD, Request, Wanted, refuse, request, upgrade};
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 
 /// Bytes of a connection.

@@ -6,6 +6,7 @@
 //!
 //! | target | bytes from | checked besides panics |
 //! |---|---|---|
+//! | [`compact_record`] | flight records in files | damage is an error or a gap, a whole chunk is read as it was written |
 //! | [`console_line`] | the serial port | lines stay short and printable, parameters in range, an armed vehicle does nothing |
 //! | [`data_stream`] | UDP, and a vehicle that fills packets | packets mean the same when sent again, are never too long, hold what was taken |
 //! | [`estimator_stream`] | a stream of samples and times | numbers stay finite, the covariance symmetric with a diagonal of variances |
@@ -20,6 +21,7 @@
 //! | [`receiver_bytes`] | a radio receiver or a configurator at a UART | frames mean the same when sent again, every byte is accounted for |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
 //! | [`tello_text`] | any program on the network | what is accepted is within limits, every answer is text that can be read |
+//! | [`services_cable`] | a person and programs on one serial line | a line that is typed comes whole, what is sent is sound, an armed vehicle changes nothing |
 //! | [`services_mavlink`] | ground stations, three at once, with a key and without | what is sent is sound, a command is acknowledged, strangers are not obeyed |
 //! | [`services_msp`] | a configurator | what is sent is sound, an armed vehicle changes nothing |
 //! | [`services_tello`] | programs that speak a Tello's text, three at once | every answer is text, what is asked of the vehicle is within limits |
@@ -30,6 +32,7 @@
 //! With cargo-fuzz: `cargo fuzz run --sanitizer none console_line`, or all of them with `cargo xtask search SECONDS`. A file that fails goes into
 //! `fuzz/corpus/TARGET`, so that the test keeps it.
 
+mod compact_record;
 mod console;
 mod datagrams;
 mod estimator;
@@ -49,6 +52,7 @@ mod stream;
 mod tello;
 mod ulog_file;
 
+pub use compact_record::compact_record;
 pub use console::console_line;
 pub use datagrams::rover_datagrams;
 pub use estimator::estimator_stream;
@@ -61,7 +65,7 @@ pub use packets::radio_packets;
 pub use parameters::parameter_image;
 pub use receivers::receiver_bytes;
 pub use secured::secure_session;
-pub use services::{services_mavlink, services_msp, services_tello};
+pub use services::{services_cable, services_mavlink, services_msp, services_tello};
 pub use stack::whole_stack;
 pub use stream::data_stream;
 pub use tello::tello_text;

@@ -1,9 +1,9 @@
 //! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a failure repeats.
 
 use crate::{
-    console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames, hisky,
-    mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session, services_mavlink,
-    services_msp, services_tello, tello_text, ulog, whole_stack,
+    compact_record, console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames,
+    hisky, mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session,
+    services_cable, services_mavlink, services_msp, services_tello, tello_text, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -118,6 +118,11 @@ fn hil() {
 }
 
 #[test]
+fn compact_records() {
+    smoke("compact_record", compact_record, 20_000);
+}
+
+#[test]
 fn machine() {
     smoke("mode_machine", mode_machine, 10_000);
 }
@@ -154,6 +159,7 @@ fn secured() {
 
 #[test]
 fn services() {
+    smoke("services_cable", services_cable, 100_000);
     smoke("services_mavlink", services_mavlink, 100_000);
     smoke("services_msp", services_msp, 100_000);
     smoke("services_tello", services_tello, 100_000);

@@ -6,6 +6,7 @@
 use crate::airframe::{AIRFRAME, DRAG, GROUND_HEIGHT, MASS};
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, FlipConfig, GeometricConfig, IndiConfig, MotorConfig};
+use stampfly_eskf::calibration::Corrections;
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 use stampfly_mode::failsafe::WEAK_SHARE;
 use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
@@ -67,6 +68,8 @@ pub struct VehicleConfig {
     pub authority: AuthorityConfig,
     /// Gestures on the button.
     pub button: ButtonConfig,
+    /// What calibrations have found of its sensors; applied where samples come from the drivers, from the next start on.
+    pub corrections: Corrections,
     /// May packets that authenticate nobody fly it?
     pub accept_unauthenticated: bool,
 }
@@ -98,6 +101,7 @@ impl Default for VehicleConfig {
             landing: LandingConfig { hover_thrust: AIRFRAME.hover_thrust(), ..LandingConfig::default() },
             authority: AuthorityConfig::default(),
             button: ButtonConfig::default(),
+            corrections: Corrections::default(),
             accept_unauthenticated: true,
         }
     }

@@ -10,12 +10,14 @@ use crate::{VehicleConfig, schedule};
 use core::fmt;
 use stampfly_bus::TopicInfo;
 use stampfly_control::autotune::AutotuneStatus;
+use stampfly_flight::console::calibrate::{self, Calibrate};
 use stampfly_flight::console::{CommandError, SensorLine, Vehicle, list, refused};
 use stampfly_flight::doctor::Fact;
 use stampfly_flight::newest::longest_message;
 use stampfly_flight::parameters::Parameters;
 use stampfly_flight::profile::Rows;
 use stampfly_types::messages::{ArmRefusals, FlightStatus, PilotInput, PowerData, StateEstimate, SystemAlert};
+use stampfly_types::messages::{CalibrationKind, CalibrationReport, CalibrationRequest};
 use stampfly_types::{Duration, Instant};
 
 /// How long a motor turns in a test.
@@ -45,11 +47,19 @@ pub enum Command {
     StopMotor,
     /// Take the gains that were found as parameters.
     AcceptGains,
+    /// Calibrate, or take what was found.
+    Calibrate(Calibrate),
     /// Show the vehicle's key: at the USB port alone, which is the firmware's to know.
     ShowKey,
 }
 
 impl Command {
+    /// A motor test, if the vehicle has this motor and may turn it so fast.
+    #[must_use]
+    pub fn test(motor: u8, duty: f32) -> Option<Self> {
+        ((1..=4).contains(&motor) && (0.0..=TEST_DUTY).contains(&duty)).then_some(Self::TestMotor { motor, duty })
+    }
+
     /// Carries it out, by topic. A test ends [`TEST_TIME`] after `now`.
     pub fn publish(self, now: Instant, ends: &mut ConsoleEnds<'_>) {
         match self {
@@ -63,7 +73,10 @@ impl Command {
             Self::StopMotor => {
                 ends.motor_test.publish(now, &MotorTest::default());
             }
-            Self::AcceptGains | Self::ShowKey => {}
+            Self::Calibrate(Calibrate::Begin(kind)) => {
+                ends.calibration_request.publish(now, &CalibrationRequest { kind });
+            }
+            Self::Calibrate(_) | Self::AcceptGains | Self::ShowKey => {}
         }
     }
 }
@@ -112,6 +125,7 @@ impl Vehicle for Console<'_> {
         ("motor test N PERCENT", "turn motor N (1 front right, 2 rear right, 3 rear left, 4 front left) for 2 s"),
         ("motor stop", "stop it"),
         (AUTOTUNE, "take the gains that were found as parameters"),
+        calibrate::COMMAND,
         ("key", "the key for stations, at the USB port"),
     ];
     const TOPICS: &'static [TopicInfo] = &TOPICS;
@@ -188,6 +202,7 @@ impl Vehicle for Console<'_> {
             ["motor", "stop"] => Ok(Command::StopMotor),
             ["motor", ..] => Err(CommandError::Usage(MOTOR)),
             ["autotune", "accept"] => Ok(Command::AcceptGains),
+            ["calibrate", of @ ..] => calibrate::parse(of).map(Command::Calibrate),
             ["key"] => Ok(Command::ShowKey),
             ["autotune", ..] => Err(CommandError::Usage(AUTOTUNE)),
             _ => Err(CommandError::Unknown),
@@ -214,10 +229,20 @@ impl Vehicle for Console<'_> {
             let taken = landed && tuned.is_some_and(|tuned| tuned.accept(&mut self.config.cascade.rate));
             return reply.write_str(if taken { "taken\r\n" } else { "nothing found, or armed\r\n" }).map(|()| None);
         }
+        if let Command::Calibrate(asked) = command {
+            let found = self.newest.get::<CalibrationReport>(Id::calibration_report as usize).unwrap_or_default().1;
+            let (is_disarmed, corrections) = (self.is_armed() == Some(false), &mut self.config.corrections);
+            let goes_on = calibrate::answer(asked, is_disarmed, &found, |report| corrections.accept(report), reply)?;
+            return Ok(goes_on.then_some(command));
+        }
         Ok(Some(command))
     }
 
     fn needs_disarmed(request: &Command) -> bool {
-        *request != Command::StopMotor
+        !matches!(request, Command::StopMotor | Command::Calibrate(Calibrate::Begin(CalibrationKind::None)))
+    }
+
+    fn is_save(request: &Command) -> bool {
+        *request == Command::Calibrate(Calibrate::Accept)
     }
 }

@@ -7,9 +7,8 @@
 use crate::VehicleConfig;
 use crate::schedule::Runnables;
 use crate::topics::{self, Id};
-use core::fmt;
-use stampfly_flight::golden::{self, GoldenError, Place, PlayObserver, Report, Verdict};
-use stampfly_types::messages::{SelfTest, SelfTestVerdict};
+pub use stampfly_flight::golden::Outcome;
+use stampfly_flight::golden::{self, GoldenError, Place, PlayObserver, Report};
 
 /// The golden flight of this version.
 pub const FLIGHT: &[u8] = include_bytes!("../golden/flight.bin");
@@ -31,10 +30,6 @@ pub fn play(bus: &mut topics::Bus, observer: &mut impl PlayObserver) -> Result<R
     golden::play::<Runnables>(bus, FLIGHT, &VehicleConfig::default(), TOLERANCE, observer)
 }
 
-/// How the self test went.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome(pub Result<Report, GoldenError>);
-
 /// Plays the golden flight on a fresh bus, before anything can turn, with a vehicle made in `place`: the stack should not hold it.
 ///
 /// ```
@@ -48,40 +43,4 @@ pub struct Outcome(pub Result<Report, GoldenError>);
 #[must_use]
 pub fn self_test<'b>(place: &'b mut Place<'b, Runnables>, bus: &'b mut topics::Bus) -> Outcome {
     Outcome(golden::play_in(place, bus, FLIGHT, &VehicleConfig::default(), TOLERANCE, &mut ()))
-}
-
-impl Outcome {
-    /// For the topic `self_test`: a failure blocks arming, different bits are an alert, and both are logged.
-    #[must_use]
-    pub const fn message(&self) -> SelfTest {
-        let (verdict, worst) = match self.0 {
-            Ok(Report { verdict: Verdict::Identical, .. }) => (SelfTestVerdict::Identical, 0.0),
-            Ok(Report { verdict: Verdict::WithinTolerance { worst }, .. }) => (SelfTestVerdict::WithinTolerance, worst),
-            Ok(Report { verdict: Verdict::Beyond { worst, .. }, .. }) => (SelfTestVerdict::Failed, worst),
-            Err(_) => (SelfTestVerdict::Failed, f32::INFINITY),
-        };
-        SelfTest { verdict, worst }
-    }
-
-    /// May the motors turn?
-    #[must_use]
-    pub const fn may_fly(&self) -> bool {
-        matches!(self.0, Ok(Report { verdict: Verdict::Identical | Verdict::WithinTolerance { .. }, .. }))
-    }
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("self test: ")?;
-        match self.0 {
-            Ok(Report { verdict: Verdict::Identical, .. }) => f.write_str("every bit as recorded"),
-            Ok(Report { verdict: Verdict::WithinTolerance { worst }, .. }) => {
-                write!(f, "other bits than recorded, motors within {worst}")
-            }
-            Ok(Report { verdict: Verdict::Beyond { worst, since }, .. }) => {
-                write!(f, "FAILED, motors off by {worst} from {since} on; the vehicle cannot be armed")
-            }
-            Err(error) => write!(f, "FAILED, {error}; the vehicle cannot be armed"),
-        }
-    }
 }

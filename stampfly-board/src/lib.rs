@@ -16,12 +16,17 @@ pub mod golden;
 pub mod link;
 pub mod messages;
 pub mod parameters;
+pub mod rules;
 pub mod runnables;
 pub mod schedule;
 #[cfg(feature = "simulation")]
 pub mod simulation;
 pub mod topics;
 
+/// Of this package: what the vehicle calls its version, on the board and in simulation.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 pub use config::{ControllerKind, EstimatorKind, VehicleConfig};
+pub use stampfly_eskf::calibration::Corrector;
 /// The crates that signatures here are written in.
 pub use {stampfly_bus as bus, stampfly_flight as flight, stampfly_types as types};

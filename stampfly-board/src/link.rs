@@ -1,14 +1,13 @@
 //! The vehicle's end of the radio: frames in, sticks and commands on the bus; telemetry and calls out.
 //!
-//! Everything but moving the bytes: firmware, which has the radio, gives [`Link`] what it has received and sends what
-//! [`Link::transmit`] returns. Stations with the vehicle's key speak in sealed frames, others, where the configuration lets
-//! them, in the ecosystem's packets. The link follows `flight_status`, and publishes the transmitter it is paired with.
+//! Everything but moving the bytes: firmware, which has the radio, gives [`Link`] what it has received and sends what [`Link::transmit`] returns. Stations with the vehicle's key speak in sealed frames,
+//! others, where the configuration lets them, in the ecosystem's packets. The link follows `flight_status`, and publishes the transmitter it is paired with.
 
 use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
-use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample};
+use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
-use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind};
+use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 
 /// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
@@ -20,7 +19,8 @@ const SENSOR_ERROR: Alerts =
 
 /// The vehicle's end of the radio. `tests/board` has `pairing.rs`, `secured.rs` and `air.rs`.
 pub struct Link<'b> {
-    guarded: Guarded,
+    /// Whom it listens to, and what it has refused.
+    pub guarded: Guarded,
     ends: LinkEnds<'b>,
     /// The newest command's frame, and whether it was taken: to be acknowledged.
     commanded: Option<(u32, bool)>,
@@ -52,14 +52,8 @@ impl<'b> Link<'b> {
         Self { guarded, ends, commanded: None, counter: 0 }
     }
 
-    /// Whom it listens to, and what it has refused.
-    #[must_use]
-    pub const fn guarded(&self) -> &Guarded {
-        &self.guarded
-    }
-
-    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands. What else a station with
-    /// the key has sent is returned, for services.
+    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands. What else a station with the key has sent is returned,
+    /// for a `Desk` of `stampfly-services`, whose answers `guarded` seals.
     ///
     /// # Errors
     /// When it is refused. The session has counted it; nothing is published.
@@ -70,33 +64,42 @@ impl<'b> Link<'b> {
         bytes: &'f mut [u8],
     ) -> Result<Option<Received<'f>>, NotTaken> {
         let before = self.guarded.session().peer();
-        let received = match self.guarded.receive(at, source, bytes)? {
-            Heard::Authentic(received) => received,
+        match self.guarded.receive(at, source, bytes)? {
+            Heard::Authentic(received) => Ok(self.obey(at, received)),
             Heard::Unauthenticated(input) => {
                 self.ends.command_pilot.publish(at, &input);
                 if let Some(peer) = self.guarded.session().peer().filter(|peer| Some(*peer) != before) {
                     self.ends.link_peer.publish(at, &peer.into());
                 }
-                return Ok(None);
+                Ok(None)
             }
-            Heard::Handshake => return Ok(None),
-        };
+            Heard::Handshake => Ok(None),
+        }
+    }
+
+    /// Publishes what a station with the key has sent, whichever way it came, and returns what is no command.
+    pub fn obey<'f>(&mut self, at: Instant, received: Received<'f>) -> Option<Received<'f>> {
         let command = match received.payload {
             Payload::Guided(command) => command,
             Payload::Kill => GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() },
             Payload::Sticks(input) => {
-                self.ends.command_pilot.publish(at, &input);
-                return Ok(None);
+                self.sticks(at, &input);
+                return None;
             }
-            _ => return Ok(Some(received)),
+            _ => return Some(received),
         };
         self.commanded = Some((received.counter, self.command(at, command)));
-        Ok(None)
+        None
     }
 
     /// Publishes a command, of a station with the key or of a service. Was there room for it?
     pub fn command(&mut self, at: Instant, command: GuidedCommand) -> bool {
         self.ends.command_guided.publish(at, command).is_ok()
+    }
+
+    /// Publishes sticks, of a station with the key or of a service.
+    pub fn sticks(&mut self, at: Instant, input: &PilotInput) {
+        self.ends.command_pilot.publish(at, input);
     }
 
     /// Follows the mode machine, and returns what is to be sent now, and where. `random` are eight new bytes of a generator.
@@ -120,8 +123,7 @@ impl<'b> Link<'b> {
             }
             Outgoing::Telemetry => {
                 self.counter = self.counter.wrapping_add(1);
-                let (at, frame) =
-                    self.ends.telemetry.latest().map(|sample| (sample.at, sample.data)).unwrap_or_default();
+                let (at, frame) = self.ends.telemetry.latest().map(|new| (new.at, new.data)).unwrap_or_default();
                 let packet = packet(self.counter, &frame);
                 if let Some(peer) = self.guarded.open_peer(now) {
                     return Some((peer, put(room, &packet.to_bytes())?));
@@ -134,14 +136,6 @@ impl<'b> Link<'b> {
             }
         }
     }
-}
-
-/// Copies a packet to the front of the room.
-fn put<'r>(room: &'r mut [u8; MAX_FRAME], packet: &[u8]) -> Option<&'r [u8]> {
-    let place = room.get_mut(..packet.len())?;
-    // As long as the packet; spelled so that no panic is linked for other lengths.
-    place.iter_mut().zip(packet).for_each(|(to, from)| *to = *from);
-    Some(place)
 }
 
 fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {

@@ -1,6 +1,8 @@
 //! Messages of this vehicle alone, declared beside its topic table.
 
-pub use stampfly_flight::messages::{CutoffState, MotorTest, PairingRequest, RestartRequest, StorageBusy};
+pub use stampfly_flight::messages::{
+    CutoffState, MotorTest, PairingRequest, ParameterChange, RestartRequest, StorageBusy,
+};
 pub use stampfly_link::LinkPeer;
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase};
 use stampfly_types::{Vec3, message};

@@ -1,97 +1,78 @@
 //! The StampFly's parameters, by name.
 //!
-//! One line per parameter: name, range, unit, field, meaning. Ranges exclude what no vehicle could fly with, and where one
-//! value has to stay below another their ranges do not overlap. Defaults are the fields' own. The log stores every
+//! One line per parameter: name, range, unit, field, meaning. Ranges exclude what no vehicle could fly with alone, and
+//! [`rules`](crate::rules) what it could not fly with together. Defaults are the fields' own. The log stores every
 //! value, so a replay flies with the parameters of the flight. [`stampfly_flight::parameters`] finds and changes them by name.
+//! Those marked `in_flight` are factors that a loop applies afresh in every step: none is part of a state, a limit or what protects the vehicle.
+//!
+//! ```
+//! let mut config = stampfly_board::VehicleConfig::default();
+//! assert!(stampfly_flight::parameters::set(&mut config, "eskf.obs.flow_noise", 0.2).is_ok());
+//! let refused = stampfly_flight::parameters::set(&mut config, "position.tilt.max", 0.7).unwrap_err().to_string();
+//! assert!(refused.starts_with("position.tilt.max with failsafe.tip.tilt: a tilt that the position loop asks for"));
+//! ```
 
 use crate::config::{ControllerKind, EstimatorKind, VehicleConfig};
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters, Value};
+use crate::rules::RULES;
+use crate::schedule::Id;
+use stampfly_flight::parameters::ParameterError;
+use stampfly_param::{Conflict, rules};
 
 /// The name in flash of the transmitter the vehicle is paired with: all of its address is one value, which no power cut can halve.
 pub const PEER: &str = "link.peer";
 /// The name in flash of the vehicle's key. It is no parameter: nothing lists or logs it.
 pub const KEY: &str = "link.key";
 
-/// A line of the table.
-struct Line {
-    info: ParameterInfo<'static>,
-    get: fn(&VehicleConfig) -> f32,
-    /// Refuses a number that is no value of the field.
-    set: fn(&mut VehicleConfig, f32) -> Option<()>,
-}
+stampfly_flight::parameter_kinds!(EstimatorKind ControllerKind);
 
-macro_rules! kinds {
-    ($($Kind:ident)+) => { $(
-        impl Value for $Kind {
-            fn number(self) -> f32 {
-                self as u8 as f32
-            }
-            fn from_number(number: f32) -> Option<Self> {
-                Self::ALL.iter().copied().find(|kind| kind.number() == number)
-            }
-        }
-    )+ };
-}
-
-kinds!(EstimatorKind ControllerKind);
-
-macro_rules! parameters {
-    ($($name:literal [$min:literal, $max:literal] $unit:literal $($field:ident).+ => $meaning:literal;)+) => {
-        const TABLE: &[Line] = &[$(Line {
-            info: ParameterInfo { name: $name, min: $min, max: $max, unit: $unit, meaning: $meaning },
-            get: |config| config.$($field).+.number(),
-            set: |config, number| {
-                config.$($field).+ = Value::from_number(number)?;
-                Some(())
-            },
-        }),+];
-    };
-}
-
-parameters! {
+stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
+        let name = about.map(|index| TABLE.get(index).map_or("", |line| line.info.name));
+        let refused = |Conflict { parameters, reason }| ParameterError::Conflict { parameters, reason };
+        rules::check(RULES, config, name).map_err(refused)
+    }, corrections = corrections;
     "estimator.type" [0.0, 1.0] "1" estimator => "0: error-state Kalman filter, 1: complementary filter";
     "controller.type" [0.0, 2.0] "1" controller => "0: cascade, 1: geometric, 2: cascade with incremental inner loop";
 
-    "rate.roll.kp" [0.0, 0.01] "N*m/(rad/s)" cascade.rate.roll.kp => "roll rate gain";
-    "rate.roll.ti" [0.01, 100.0] "s" cascade.rate.roll.ti => "roll rate integral time";
-    "rate.roll.td" [0.0, 1.0] "s" cascade.rate.roll.td => "roll rate derivative time";
-    "rate.pitch.kp" [0.0, 0.01] "N*m/(rad/s)" cascade.rate.pitch.kp => "pitch rate gain";
-    "rate.pitch.ti" [0.01, 100.0] "s" cascade.rate.pitch.ti => "pitch rate integral time";
-    "rate.pitch.td" [0.0, 1.0] "s" cascade.rate.pitch.td => "pitch rate derivative time";
-    "rate.yaw.kp" [0.0, 0.01] "N*m/(rad/s)" cascade.rate.yaw.kp => "yaw rate gain";
-    "rate.yaw.ti" [0.01, 100.0] "s" cascade.rate.yaw.ti => "yaw rate integral time";
-    "rate.yaw.td" [0.0, 1.0] "s" cascade.rate.yaw.td => "yaw rate derivative time";
-    "indi.roll.bandwidth" [5.0, 100.0] "1/s" indi.bandwidth.x => "incremental loop: roll acceleration per rate error";
-    "indi.pitch.bandwidth" [5.0, 100.0] "1/s" indi.bandwidth.y => "incremental loop: pitch acceleration per rate error";
-    "indi.yaw.bandwidth" [2.0, 50.0] "1/s" indi.bandwidth.z => "incremental loop: yaw acceleration per rate error";
-    "indi.roll.smoothing" [0.01, 10.0] "s" indi.smoothing.x => "incremental loop: roll, filter of the increment";
-    "indi.pitch.smoothing" [0.01, 10.0] "s" indi.smoothing.y => "incremental loop: pitch, filter of the increment";
-    "indi.yaw.smoothing" [0.01, 10.0] "s" indi.smoothing.z => "incremental loop: yaw, filter of the increment";
-    "attitude.tilt.kp" [0.5, 20.0] "1/s" cascade.attitude.tilt_gain => "tilt gain";
-    "attitude.heading.kp" [0.1, 20.0] "1/s" cascade.attitude.heading_gain => "heading gain";
-    "position.pos.kp" [0.1, 5.0] "1/s" cascade.position.position_gain => "position gain";
-    "position.vel.kp" [0.1, 20.0] "1/s" cascade.position.velocity.kp => "horizontal velocity gain";
-    "position.vel.ti" [0.1, 100.0] "s" cascade.position.velocity.ti => "horizontal velocity integral time";
+    "rate.roll.kp" [0.0002, 0.01] "N*m/(rad/s)" cascade.rate.roll.kp => "roll rate gain", in_flight;
+    "rate.roll.ti" [0.01, 100.0] "s" cascade.rate.roll.ti => "roll rate integral time", in_flight;
+    "rate.roll.td" [0.0, 0.2] "s" cascade.rate.roll.td => "roll rate derivative time", in_flight;
+    "rate.pitch.kp" [0.00025, 0.01] "N*m/(rad/s)" cascade.rate.pitch.kp => "pitch rate gain", in_flight;
+    "rate.pitch.ti" [0.01, 100.0] "s" cascade.rate.pitch.ti => "pitch rate integral time", in_flight;
+    "rate.pitch.td" [0.0, 0.2] "s" cascade.rate.pitch.td => "pitch rate derivative time", in_flight;
+    "rate.yaw.kp" [0.0, 0.002] "N*m/(rad/s)" cascade.rate.yaw.kp => "yaw rate gain", in_flight;
+    "rate.yaw.ti" [0.01, 100.0] "s" cascade.rate.yaw.ti => "yaw rate integral time", in_flight;
+    "rate.yaw.td" [0.0, 1.0] "s" cascade.rate.yaw.td => "yaw rate derivative time", in_flight;
+    "indi.roll.bandwidth" [5.0, 100.0] "1/s" indi.bandwidth.x => "incremental loop: roll acceleration per rate error", in_flight;
+    "indi.pitch.bandwidth" [5.0, 100.0] "1/s" indi.bandwidth.y => "incremental loop: pitch acceleration per rate error", in_flight;
+    "indi.yaw.bandwidth" [2.0, 50.0] "1/s" indi.bandwidth.z => "incremental loop: yaw acceleration per rate error", in_flight;
+    "indi.roll.smoothing" [0.01, 10.0] "s" indi.smoothing.x => "incremental loop: roll, filter of the increment", in_flight;
+    "indi.pitch.smoothing" [0.01, 10.0] "s" indi.smoothing.y => "incremental loop: pitch, filter of the increment", in_flight;
+    "indi.yaw.smoothing" [0.01, 10.0] "s" indi.smoothing.z => "incremental loop: yaw, filter of the increment", in_flight;
+    "attitude.tilt.kp" [2.0, 20.0] "1/s" cascade.attitude.tilt_gain => "tilt gain", in_flight;
+    "attitude.heading.kp" [0.1, 20.0] "1/s" cascade.attitude.heading_gain => "heading gain", in_flight;
+    "position.pos.kp" [0.1, 5.0] "1/s" cascade.position.position_gain => "position gain", in_flight;
+    "position.vel.kp" [0.5, 20.0] "1/s" cascade.position.velocity.kp => "horizontal velocity gain", in_flight;
+    "position.vel.ti" [0.1, 100.0] "s" cascade.position.velocity.ti => "horizontal velocity integral time", in_flight;
     "position.tilt.max" [0.05, 0.7] "rad" cascade.position.tilt_max => "largest tilt the position loop asks for";
-    "altitude.alt.kp" [0.1, 5.0] "1/s" cascade.altitude.height_gain => "height gain";
-    "altitude.vel.kp" [0.1, 20.0] "1/s" cascade.altitude.velocity.kp => "climb gain";
-    "altitude.vel.ti" [0.1, 100.0] "s" cascade.altitude.velocity.ti => "climb integral time";
-    "hover.thrust" [0.1, 0.6] "N" cascade.altitude.hover_thrust => "hover thrust before it is learned";
+    "altitude.alt.kp" [0.1, 5.0] "1/s" cascade.altitude.height_gain => "height gain", in_flight;
+    "altitude.vel.kp" [1.0, 20.0] "1/s" cascade.altitude.velocity.kp => "climb gain", in_flight;
+    "altitude.vel.ti" [0.1, 100.0] "s" cascade.altitude.velocity.ti => "climb integral time", in_flight;
+    "hover.thrust" [0.3, 0.6] "N" cascade.altitude.hover_thrust => "hover thrust before it is learned";
 
-    "eskf.process.gyro_noise" [1e-5, 1.0] "rad/s/sqrt(Hz)" eskf.gyro_noise => "gyro noise density";
+    "eskf.process.gyro_noise" [1e-5, 0.03] "rad/s/sqrt(Hz)" eskf.gyro_noise => "gyro noise density";
     "eskf.process.accel_noise" [1e-4, 10.0] "m/s^2/sqrt(Hz)" eskf.accel_noise => "accelerometer noise density";
     "eskf.process.gyro_bias_walk" [0.0, 0.1] "rad/s/sqrt(s)" eskf.gyro_bias_walk => "gyro bias random walk";
-    "eskf.process.accel_bias_walk" [0.0, 1.0] "m/s^2/sqrt(s)" eskf.accel_bias_walk => "accelerometer bias random walk";
-    "eskf.obs.tof_noise" [1e-3, 1.0] "m" eskf.tof_sigma => "range noise";
-    "eskf.obs.flow_noise" [1e-3, 10.0] "rad/s" eskf.flow_sigma => "flow noise";
+    "eskf.process.accel_bias_walk" [0.0, 0.3] "m/s^2/sqrt(s)" eskf.accel_bias_walk => "accelerometer bias random walk";
+    "eskf.obs.tof_noise" [1e-3, 0.3] "m" eskf.tof_sigma => "range noise";
+    "eskf.obs.flow_noise" [1e-3, 3.0] "rad/s" eskf.flow_sigma => "flow noise";
     "eskf.obs.baro_noise" [1e-2, 10.0] "m" eskf.baro_sigma => "barometer noise";
     "eskf.obs.mag_noise" [1e-3, 3.0] "rad" eskf.mag_sigma => "magnetic heading noise";
     "eskf.obs.gravity_noise" [1e-2, 20.0] "m/s^2" eskf.gravity_sigma => "noise of the accelerometer as an inclinometer";
     "eskf.gate" [1.0, 20.0] "1" eskf.gate => "innovation gate, standard deviations";
     "eskf.lockout" [0.05, 10.0] "s" eskf.lockout => "after this long at the gate the state moves to the sensor";
 
-    "motor.duty.max" [0.1, 1.0] "1" motor.duty_max => "largest duty";
-    "motor.slew.max" [1.0, 1000.0] "1/s" motor.slew_max => "largest change of duty";
+    "motor.duty.max" [0.7, 1.0] "1" motor.duty_max => "largest duty";
+    "motor.slew.max" [5.0, 1000.0] "1/s" motor.slew_max => "largest change of duty";
 
     "mode.arming.tilt" [0.05, 0.7] "rad" mode.arming_tilt => "largest tilt that allows arming";
     "mode.arming.throttle" [0.01, 0.09] "1" mode.throttle_rest => "largest throttle that allows arming in a manual mode";
@@ -120,8 +101,8 @@ parameters! {
     "failsafe.tip.tilt" [0.3, 1.3] "rad" failsafe.tip_tilt => "tilt of a vehicle that tips over while it takes off";
     "failsafe.tip.time" [0.02, 1.0] "s" failsafe.tip_time => "tilted for this long it tips over";
     "failsafe.lift.tilt" [0.1, 1.3] "rad" failsafe.lift_tilt => "tilt of a vehicle that tips on a leg while it takes off";
-    "failsafe.lift.height" [0.0, 0.5] "m" failsafe.lift_height => "below this a leg may still touch the ground";
-    "failsafe.lift.lead" [0.0, 0.5] "s" failsafe.lift_lead => "that tilt is the one in so many seconds, if it goes on turning";
+    "failsafe.lift.height" [0.0, 0.2] "m" failsafe.lift_height => "below this a leg may still touch the ground";
+    "failsafe.lift.lead" [0.0, 0.2] "s" failsafe.lift_lead => "that tilt is the one in so many seconds, if it goes on turning";
     "failsafe.weak.roll" [0.0001, 0.1] "N*m" failsafe.weak_roll => "torque about roll that betrays a weak motor";
     "failsafe.weak.pitch" [0.0001, 0.1] "N*m" failsafe.weak_pitch => "torque about pitch that betrays a weak motor";
     "failsafe.weak.time" [0.02, 2.0] "s" failsafe.weak_motor_time => "for this long it is a weak motor";
@@ -130,7 +111,7 @@ parameters! {
     "failsafe.link.timeout" [0.1, 5.0] "s" failsafe.link_silence => "silence of a lost link";
     "failsafe.battery.low" [3.2, 4.0] "V" failsafe.battery_low => "low battery: warns, no arming";
     "failsafe.battery.critical" [2.5, 3.2] "V" failsafe.battery_critical => "critical battery: lands";
-    "failsafe.battery.idle" [0.05, 10.0] "A" failsafe.idle_current => "a disarmed vehicle that takes more has a motor that turns";
+    "failsafe.battery.idle" [0.2, 10.0] "A" failsafe.idle_current => "a disarmed vehicle that takes more has a motor that turns";
     "failsafe.battery.usb" [2.5, 3.6] "V" failsafe.usb => "disarmed below this it has no battery, no arming";
     "failsafe.battery.hysteresis" [0.0, 0.3] "V" failsafe.battery_hysteresis => "an alert of the battery clears this much higher";
     "failsafe.battery.time" [0.1, 20.0] "s" failsafe.battery_time => "time constant of the voltage's low-pass";
@@ -188,42 +169,32 @@ parameters! {
     "link.unauthenticated" [0.0, 1.0] "1" accept_unauthenticated => "1: packets without a key may fly it, 0: they are refused";
 }
 
-/// Every parameter, in the order of their numbers.
-pub fn all() -> impl ExactSizeIterator<Item = ParameterInfo<'static>> {
-    TABLE.iter().map(|line| line.info)
-}
+/// Which runnables hold the parameters whose names begin so. Those of link and sensors apply from the next start.
+const HOLDERS: &[(&[&str], &[Id])] = &[
+    (&["estimator.", "eskf."], &[Id::estimation]),
+    (&["failsafe."], &[Id::failsafe]),
+    (&["landing.", "takeoff."], &[Id::landing]),
+    (&["authority.stick.dead_band", "authority.pilot.back"], &[Id::command]),
+    (&["authority.pilot.timeout"], &[Id::mode, Id::command]),
+    (&["mode.", "authority."], &[Id::mode]),
+    (&["navigator."], &[Id::navigation]),
+    (&["motor."], &[Id::actuation]),
+    (&["button."], &[Id::button]),
+    (&["link.", "calibration."], &[]),
+    (&[""], &[Id::control]),
+];
 
-/// ```
-/// use stampfly_board::VehicleConfig;
-/// use stampfly_flight::parameters;
-/// let mut config = VehicleConfig::default();
-/// parameters::set(&mut config, "eskf.obs.flow_noise", 0.2)?;
-/// assert!(parameters::set(&mut config, "eskf.obs.flow_noise", f32::NAN).is_err());
-/// assert_eq!(config.eskf.flow_sigma, 0.2);
-/// # Ok::<(), parameters::ParameterError>(())
-/// ```
-impl Parameters for VehicleConfig {
-    fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
-        TABLE.get(index).map(|line| line.info)
-    }
-
-    fn get(&self, index: usize) -> Option<f32> {
-        TABLE.get(index).map(|line| (line.get)(self))
-    }
-
-    fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
-        let Line { info: ParameterInfo { min, max, .. }, set, .. } = TABLE.get(index).ok_or(ParameterError::Unknown)?;
-        if !(*min..=*max).contains(&value) {
-            return Err(ParameterError::OutOfRange { min: *min, max: *max });
-        }
-        set(self, value).ok_or(ParameterError::OutOfRange { min: *min, max: *max })?;
-        Ok(())
-    }
+/// The runnables that hold the parameter of this name.
+#[must_use]
+pub fn holders(name: &str) -> &'static [Id] {
+    let begins = |(beginnings, _): &&(&[&str], _)| beginnings.iter().any(|beginning| name.starts_with(beginning));
+    HOLDERS.iter().find(begins).map_or(&[], |(_, holders)| *holders)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_flight::parameters::{Parameters, Value};
     use stampfly_types::Duration;
     use std::vec::Vec;
 

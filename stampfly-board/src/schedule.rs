@@ -6,6 +6,7 @@
 
 use crate::config::VehicleConfig;
 use crate::runnables::*;
+use stampfly_flight::live::Adjust;
 
 stampfly_bus::schedule! {
     /// The StampFly's runnables: the state of the vehicle.
@@ -38,4 +39,17 @@ stampfly_bus::schedule! {
     notification = Notification: every 33 ms, background, 86 us;
     /// Downlink.
     telemetry = Telemetry: every 20 ms, background, 88 us;
+}
+
+/// The controller's gains change in flight. The estimator, of 6 kB, begins again in its place.
+impl Adjust for Runnables {
+    fn adjust(&mut self, config: &VehicleConfig) {
+        self.control.set_gains(config);
+    }
+
+    const IN_PLACE: u64 = 1 << Id::estimation as usize;
+
+    fn begin_again(&mut self, _: usize, config: &VehicleConfig) {
+        self.estimation.begin_again(config);
+    }
 }

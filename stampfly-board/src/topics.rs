@@ -58,7 +58,7 @@ stampfly_bus::topics! {
     /// Conditions the failsafe has found.
     system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, command, control, notification, telemetry];
     /// State, mode, armed.
-    flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, notification, telemetry, link];
+    flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, calibration, notification, telemetry, link];
     /// Why the vehicle did not arm when it was asked to; for people.
     arm_refusals: ArmRefusals = latest @ on event from mode => [];
     /// Contact with the ground, and what take-off and landing ask for.
@@ -93,4 +93,10 @@ stampfly_bus::topics! {
     cutoff_state: CutoffState = latest @ on event from cutoff => [mode];
     /// What tuning a rate loop has found.
     autotune: AutotuneStatus = latest @ on event from control => [];
+    /// A parameter was changed.
+    parameter_change: ParameterChange = ring(4) @ on event from console => [];
+    /// A calibration that somebody asks for.
+    calibration_request: CalibrationRequest = ring(2) @ on event from console => [calibration];
+    /// How far it is, and what was found.
+    calibration_report: CalibrationReport = ring(2) @ on event from calibration => [];
 }

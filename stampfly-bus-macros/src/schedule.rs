@@ -2,7 +2,7 @@
 
 use crate::input::{Attributes, Error, Input, Result, located, once};
 use proc_macro2::{Ident, Span, TokenStream, TokenTree};
-use quote::{quote, quote_spanned};
+use quote::{format_ident, quote, quote_spanned};
 
 enum Trigger {
     On(Vec<Ident>),
@@ -198,9 +198,11 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
     let docs: Vec<_> = rows.iter().map(Row::doc).collect();
     let infos = rows.iter().map(|row| row.info(topics));
     let in_time = rows.iter().map(Row::in_time);
-    let new = rows.iter().map(|row| {
+    // One place for each, so that a wrong constructor is reported once.
+    let makers: Vec<_> = names.iter().map(|name| format_ident!("__new_{name}")).collect();
+    let make = rows.iter().zip(&makers).map(|(row, maker)| {
         let (name, runnable) = (&row.name, &row.runnable);
-        quote_spanned!(located(name) => #name: <#runnable>::new(config))
+        quote_spanned!(located(name) => #[inline(always)] fn #maker(config: &#config) -> #runnable { <#runnable>::new(config) })
     });
     let places: Vec<_> = names.iter().map(|name| quote!(index if index == Id::#name as usize)).collect();
     let reads = names.iter().map(|name| {
@@ -268,8 +270,10 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
             /// Every runnable at power-on.
             #[must_use]
             pub fn new(config: &#config) -> Self {
-                Self { #(#new),* }
+                Self { #(#names: Self::#makers(config)),* }
             }
+
+            #(#make)*
         }
 
         impl ::stampfly_bus::Schedule for #all {
@@ -281,6 +285,14 @@ fn generate(head: &Head, rows: &[Row]) -> TokenStream {
 
             fn new(config: &#config) -> Self {
                 Self::new(config)
+            }
+
+            #[inline(always)]
+            fn renew(&mut self, index: usize, config: &#config) {
+                match index {
+                    #(#places => self.#names = Self::#makers(config),)*
+                    _ => {}
+                }
             }
 
             fn states(start: ::stampfly_bus::Instant) -> Self::States {

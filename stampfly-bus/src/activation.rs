@@ -72,6 +72,10 @@ enum Way {
     Look,
     /// What has been recorded.
     Replay,
+    /// Nothing: they say how far they have read.
+    Note,
+    /// Nothing: they are told how far they have read.
+    Seek,
 }
 
 impl Activation {
@@ -87,6 +91,33 @@ impl Activation {
     #[must_use]
     pub const fn replay(record: ActivationRecord) -> Self {
         Self { record, read: 0, offered: 0, way: Way::Replay, missing: false }
+    }
+
+    /// Reads nothing. Afterwards its record says of each input how far it has been read.
+    #[must_use]
+    pub const fn note(index: u8) -> Self {
+        Self {
+            record: ActivationRecord::new(index, Instant::ZERO),
+            read: 0,
+            offered: 0,
+            way: Way::Note,
+            missing: false,
+        }
+    }
+
+    /// Reads nothing: from now on every input has been read as far as this record of [`note`](Self::note) says. An input that cannot have been
+    /// read as far stays where it is, and [is missing](Self::is_missing_input).
+    #[must_use]
+    pub const fn seek(record: ActivationRecord) -> Self {
+        Self { record, read: 0, offered: 0, way: Way::Seek, missing: false }
+    }
+
+    /// The same activation, which has read its inputs in flight, with what queues refused it when it was recorded.
+    #[must_use]
+    pub const fn with_refusals(self, refused: u32) -> Self {
+        let mut again = Self { way: Way::Replay, ..self };
+        again.record.refused = refused;
+        again
     }
 
     /// Begins another activation in flight in the same memory, of a runnable that runs as soon as it has read: the newest samples of
@@ -127,6 +158,24 @@ impl Activation {
     #[inline]
     const fn is_replay(&self) -> bool {
         matches!(self.way, Way::Replay)
+    }
+
+    /// Is it one that reads nothing, and where is an input at `position` then? `None` for one that reads.
+    #[inline]
+    pub(crate) fn position(&mut self, position: InputRecord) -> Option<u32> {
+        match self.way {
+            Way::Note => {
+                self.has_read(position);
+                Some(position.generation)
+            }
+            Way::Seek => {
+                let input = self.record.inputs().get(self.read).copied();
+                self.read += 1;
+                self.missing |= input.is_none();
+                Some(input.unwrap_or(position).generation)
+            }
+            _ => None,
+        }
     }
 
     /// In a replay: what the next input read in flight.

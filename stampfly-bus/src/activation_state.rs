@@ -26,6 +26,25 @@ impl ActivationState {
         Self { seen: [0; MAX_TRIGGERS], last: start, ran: start, runs: 0, followed: 0 }
     }
 
+    /// Words of [`to_words`](Self::to_words).
+    pub const WORDS: usize = MAX_TRIGGERS + 6;
+
+    /// Everything, for a record of a flight.
+    #[must_use]
+    pub fn to_words(&self) -> [u32; Self::WORDS] {
+        let [a, b, c, d] = self.seen;
+        let [last, ran] = [self.last, self.ran].map(Instant::as_micros);
+        [a, b, c, d, last as u32, (last >> 32) as u32, ran as u32, (ran >> 32) as u32, self.runs, self.followed]
+    }
+
+    /// The way back.
+    #[must_use]
+    pub fn from_words(words: [u32; Self::WORDS]) -> Self {
+        let [a, b, c, d, last, last_high, ran, ran_high, runs, followed] = words;
+        let instant = |low: u32, high: u32| Instant::from_micros(u64::from(low) | u64::from(high) << 32);
+        Self { seen: [a, b, c, d], last: instant(last, last_high), ran: instant(ran, ran_high), runs, followed }
+    }
+
     /// When the line is due even if nothing triggers it.
     #[inline]
     pub(crate) fn tick(&self, info: &ActivationInfo) -> Option<Instant> {

@@ -118,6 +118,10 @@ where
     /// Reads, as part of an activation, what stays as it is until the next one.
     #[inline]
     pub fn read(&mut self, activation: &mut Activation) {
+        if let Some(generation) = activation.position(self.port.record()) {
+            self.port.seek(self.ring, generation);
+            return;
+        }
         let Some(input) = activation.recorded() else {
             match self.lender {
                 Some(newest) => self.port.copy(newest),
@@ -127,8 +131,9 @@ where
             return;
         };
         let is_held = !core::mem::take(&mut self.port.is_lent) || input.generation == 0;
-        self.port.is_new = input.generation != self.port.sample.generation;
-        if (self.port.is_new || !is_held)
+        // Recorded, because a replay that begins at a key frame has read nothing yet.
+        self.port.is_new = input.taken != 0;
+        if (input.generation != self.port.sample.generation || !is_held)
             && !end::<T, N, W>(self.ring).generation_into(input.generation, &mut self.port.sample)
         {
             activation.misses();
@@ -168,6 +173,20 @@ impl<T> NewestPort<T> {
         T: Message<Words = [u32; W]>,
     {
         end::<T, N, W>(ring).latest_into(&mut self.sample)
+    }
+
+    /// The newest sample read is this one.
+    #[inline(never)]
+    fn seek<const N: usize, const W: usize>(&mut self, ring: &Ring<N, W>, generation: u32)
+    where
+        T: Message<Words = [u32; W]>,
+    {
+        if generation != self.sample.generation {
+            // What is not on the bus any more is not the newest, so nobody will look at it.
+            let _ = end::<T, N, W>(ring).generation_into(generation, &mut self.sample);
+            self.sample.generation = generation;
+            self.is_lent = false;
+        }
     }
 
     #[inline(always)]
@@ -253,6 +272,19 @@ where
     /// Reads, as part of an activation. More samples than the topic's depth stay for the next one.
     #[inline]
     pub fn read(&mut self, activation: &mut Activation) {
+        let (position, lost) = self.port.position;
+        if let Some(sought) = activation.position(InputRecord { generation: position, taken: 0 }) {
+            let is_possible = self.ring.has_published(sought);
+            if !is_possible {
+                activation.misses();
+            }
+            let generation = if is_possible { sought } else { position };
+            self.port.position = (generation, lost);
+            if let Some(shared) = self.shared {
+                shared.store(generation, crate::sync::Ordering::Release);
+            }
+            return;
+        }
         let Some(input) = activation.recorded() else {
             activation.has_read(self.__look());
             return;

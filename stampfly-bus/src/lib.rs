@@ -70,7 +70,8 @@ pub use stampfly_types::activation::MAX_INPUTS;
 pub use stampfly_types::{Duration, Instant, Message, Stamped, message, message_enum, message_flags};
 pub use table::{LATEST_DEPTH, PublishWords, Split, Taps, TopicInfo, TopicTable};
 pub use topic::{
-    AnyTopic, Every, Full, Hook, Latest, Lossless, Overwriting, Publisher, Sequential, Subscriber, Tap, Topic,
+    AnyTopic, Every, Full, Head, Hook, InPlace, Latest, Lossless, Overwriting, Publisher, Sequential, Subscriber, Tap,
+    Topic,
 };
 
 #[cfg(loom)]

@@ -54,6 +54,59 @@ pub(crate) struct Ring<const N: usize, const W: usize> {
     slots: [Slot<W>; N],
 }
 
+/// A sample where it lies on the bus, which may be overwritten while it is read: ask [`is_whole`](Self::is_whole) afterwards.
+#[derive(Clone, Copy)]
+pub struct InPlace<'b> {
+    sequence: &'b AtomicU32,
+    complete: u32,
+    at: &'b [AtomicU32; 2],
+    words: &'b [AtomicU32],
+}
+
+impl InPlace<'_> {
+    /// The instant it is valid for, in two words, the lower one first.
+    #[inline(always)]
+    #[must_use]
+    pub fn at(&self) -> [u32; 2] {
+        self.at.each_ref().map(|half| half.load(Ordering::Relaxed))
+    }
+
+    /// The lower one of these words.
+    #[inline(always)]
+    #[must_use]
+    pub fn at_low(&self) -> u32 {
+        let [low, _] = self.at;
+        low.load(Ordering::Relaxed)
+    }
+
+    /// Its words.
+    #[inline(always)]
+    pub fn words(&self) -> impl ExactSizeIterator<Item = u32> {
+        self.words.iter().map(|word| word.load(Ordering::Relaxed))
+    }
+
+    /// Copies its words to as many places: four at a time, which halves the instructions.
+    #[inline(always)]
+    pub fn copy_to(&self, places: &[core::sync::atomic::AtomicU32]) {
+        let store = |place: &core::sync::atomic::AtomicU32, word: &AtomicU32| {
+            place.store(word.load(Ordering::Relaxed), core::sync::atomic::Ordering::Relaxed);
+        };
+        let ((words, last_words), (places, last_places)) = (self.words.as_chunks::<4>(), places.as_chunks::<4>());
+        for (places, words) in places.iter().zip(words) {
+            places.iter().zip(words).for_each(|(place, word)| store(place, word));
+        }
+        last_places.iter().zip(last_words).for_each(|(place, word)| store(place, word));
+    }
+
+    /// Was everything that has been read of it still there?
+    #[inline(always)]
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        fence(Ordering::Acquire);
+        self.sequence.load(Ordering::Relaxed) == self.complete
+    }
+}
+
 /// A copy of a slot.
 pub(crate) struct Copied<const W: usize> {
     pub(crate) at: Instant,
@@ -80,6 +133,17 @@ impl<const N: usize, const W: usize> Ring<N, W> {
     #[inline]
     pub(crate) fn head(&self) -> u32 {
         self.head.load(Ordering::Acquire)
+    }
+
+    /// Can a reader have read as far as this generation? One that is ahead of the newest would look for it for ever.
+    pub(crate) fn has_published(&self, generation: u32) -> bool {
+        let head = self.head();
+        generation == head || head != 0 && head.wrapping_sub(generation) < 1 << 31
+    }
+
+    /// Where the newest complete generation is counted.
+    pub(crate) const fn counter(&self) -> &AtomicU32 {
+        &self.head
     }
 
     #[inline]
@@ -119,6 +183,19 @@ impl<const N: usize, const W: usize> Ring<N, W> {
         let at = slot.stamp();
         fence(Ordering::Acquire);
         (slot.sequence.load(Ordering::Relaxed) == complete).then_some(at)
+    }
+
+    /// The sample of this generation where it lies; `None` when it is not there (any more, or yet).
+    #[inline]
+    pub(crate) fn in_place(&self, generation: u32) -> Option<InPlace<'_>> {
+        let slot = self.slot(generation)?;
+        let complete = generation.wrapping_mul(2);
+        (generation != 0 && slot.sequence.load(Ordering::Acquire) == complete).then_some(InPlace {
+            sequence: &slot.sequence,
+            complete,
+            at: &slot.at,
+            words: &slot.words,
+        })
     }
 
     /// Copies the sample of this generation; `None` when it is not there (any more, or yet).

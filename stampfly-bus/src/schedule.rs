@@ -27,6 +27,9 @@ pub trait Schedule: Sized + 'static {
     /// Every runnable at power-on.
     fn new(config: &Self::Config) -> Self;
 
+    /// Puts one runnable back to power-on, with this configuration. A line that does not exist is none.
+    fn renew(&mut self, index: usize, config: &Self::Config);
+
     /// What the scheduler keeps, at power-on.
     fn states(start: Instant) -> Self::States;
 

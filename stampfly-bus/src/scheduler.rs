@@ -64,6 +64,19 @@ impl<R: Schedule> Scheduler<R> {
         }
     }
 
+    /// What it keeps of this line.
+    #[must_use]
+    pub fn state(&self, index: usize) -> Option<&ActivationState> {
+        self.states.as_ref().get(index)
+    }
+
+    /// Goes on with this line where another scheduler was. A line that does not exist is ignored.
+    pub fn set_state(&mut self, index: usize, state: ActivationState) {
+        if let Some(place) = self.states.as_mut().get_mut(index) {
+            *place = state;
+        }
+    }
+
     /// The next instant at which a period or a deadline makes something due.
     #[must_use]
     pub fn next_tick(&self) -> Option<Instant> {

@@ -9,6 +9,7 @@
 //! One publisher and any number of readers a topic; nobody waits for anybody. Declare topics with
 //! [`topics!`](crate::topics!), which hands out every end exactly once.
 
+pub use crate::ring::InPlace;
 use crate::ring::{Copied, Ring, next};
 use crate::sync::{AtomicU32, Ordering, spin_loop, unless_loom_const};
 use core::marker::PhantomData;
@@ -120,10 +121,14 @@ pub trait AnyTopic: Sync {
     fn head(&self) -> u32;
     /// The instant the newest sample is valid for; `None` before the first.
     fn newest_at(&self) -> Option<Instant>;
+    /// The same, to be looked at again and again.
+    fn counter(&self) -> Head<'_>;
     /// Number of slots.
     fn depth(&self) -> usize;
     /// Hands the words of this sample to `take`. Returns whether the topic still holds it.
     fn copy(&self, generation: u32, take: &mut dyn FnMut(Instant, &[u32])) -> bool;
+    /// This sample where it lies, for whoever copies it himself. `None` when the topic does not hold it.
+    fn in_place(&self, generation: u32) -> Option<InPlace<'_>>;
 }
 
 impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T, P, N, W, R> {
@@ -133,6 +138,10 @@ impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T,
 
     fn newest_at(&self) -> Option<Instant> {
         retry_at_head(&self.ring, Ring::stamp).map(|(_, at)| at)
+    }
+
+    fn counter(&self) -> Head<'_> {
+        Head(self.ring.counter())
     }
 
     fn depth(&self) -> usize {
@@ -145,6 +154,37 @@ impl<T, P, const N: usize, const W: usize, const R: usize> AnyTopic for Topic<T,
             take(copied.at, &copied.words);
             true
         })
+    }
+
+    fn in_place(&self, generation: u32) -> Option<InPlace<'_>> {
+        self.ring.in_place(generation)
+    }
+}
+
+/// Newest generation of a topic, for whoever looks very often: a load, where [`AnyTopic::head`] is a call.
+#[derive(Clone, Copy)]
+pub struct Head<'b>(&'b AtomicU32);
+
+impl Head<'_> {
+    /// Newest generation, zero before the first.
+    #[inline]
+    #[must_use]
+    pub fn newest(self) -> u32 {
+        self.0.load(Ordering::Acquire)
+    }
+
+    /// Is another generation than this one the newest? Orders nothing: ask [`newest`](Self::newest) before reading the sample.
+    #[inline(always)]
+    #[must_use]
+    pub fn has_moved(self, from: u32) -> bool {
+        self.0.load(Ordering::Relaxed) != from
+    }
+
+    /// The generation that comes after this one: zero is none.
+    #[inline(always)]
+    #[must_use]
+    pub const fn after(generation: u32) -> u32 {
+        next(generation)
     }
 }
 

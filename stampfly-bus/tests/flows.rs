@@ -275,6 +275,35 @@ fn what_a_runnable_hands_over_is_what_the_bus_holds() {
     assert_eq!(control_reads(&mut ends).2, InputRecord { generation: 20, taken: 0 }, "nothing new");
 }
 
+/// Puts the inputs of `estimation` where they have read as far as these generations. Was that possible?
+fn seek(ends: &mut topics::Ends<'_>, generations: [u32; 2]) -> bool {
+    let mut record = ActivationRecord::new(Id::estimation as u8, Instant::ZERO);
+    for generation in generations {
+        record.push(InputRecord { generation, taken: 0 }).expect("room");
+    }
+    let mut sought = Activation::seek(record);
+    Runnables::read(ends, Id::estimation as usize, &mut sought);
+    !sought.is_missing_input()
+}
+
+#[test]
+fn nobody_has_read_what_was_never_published() {
+    let mut bus = topics::Bus::new();
+    let mut split = bus.split(None);
+    // Before anything was published, a reader that is ahead would never meet the newest sample.
+    assert!(!seek(&mut split.runnables, [5, 0]));
+    for instant in 1..=3 {
+        split.outside.imu.sensor_imu.publish(Instant::from_millis(instant), &ImuData::default());
+    }
+    assert!(!seek(&mut split.runnables, [4, 0]));
+    for (read, left) in [(3, 0), (2, 1), (0, 3)] {
+        assert!(seek(&mut split.runnables, [read, 0]));
+        let mut activation = Activation::live(Id::estimation as u8, Instant::ZERO);
+        Runnables::read(&mut split.runnables, Id::estimation as usize, &mut activation);
+        assert_eq!(split.runnables.estimation().sensor_imu.len(), left);
+    }
+}
+
 #[test]
 fn what_is_published_after_reading_belongs_to_the_next_activation() {
     let mut bus = topics::Bus::new();

@@ -127,6 +127,12 @@ impl AltitudeController {
         }
     }
 
+    /// Changes the gains in flight. The integral, the hover thrust as learned and the limits stay.
+    pub fn set_gains(&mut self, config: &AltitudeConfig) {
+        (self.config.height_gain, self.config.velocity) = (config.height_gain, config.velocity);
+        self.climb.set_gains(config.velocity);
+    }
+
     /// Collective thrust, N, that follows the path.
     #[inline]
     pub fn step(&mut self, climb: &Climb, limits: &ThrustLimits, dt: f32) -> f32 {

@@ -128,6 +128,13 @@ impl CascadeController {
     pub fn new(config: &CascadeConfig) -> Self {
         Self::with_rate_law(config, RateController::new(&config.rate))
     }
+
+    /// Changes all gains in flight: between two steps, in bounded time. Integrals, filters, the hover thrust as learned and every limit stay as they are,
+    /// so the output moves only by what the gains change, and the same gains change nothing, bit for bit.
+    pub fn set_gains(&mut self, config: &CascadeConfig) {
+        self.set_outer_gains(config);
+        self.rate.set_gains(&config.rate);
+    }
 }
 
 impl<R> CascadeController<R> {
@@ -148,6 +155,19 @@ impl<R> CascadeController<R> {
             place: None,
             answer: Answer::default(),
         }
+    }
+
+    /// Changes the gains around the innermost loop in flight, as [`set_gains`](CascadeController::set_gains) does.
+    pub fn set_outer_gains(&mut self, config: &CascadeConfig) {
+        self.attitude.tilt_gain = config.attitude.tilt_gain;
+        self.attitude.heading_gain = config.attitude.heading_gain;
+        self.position.set_gains(&config.position);
+        self.altitude.set_gains(&config.altitude);
+    }
+
+    /// The innermost loop, to change its gains.
+    pub const fn rate_law_mut(&mut self) -> &mut R {
+        &mut self.rate
     }
 
     /// Thrust at hover as learned so far, N.

@@ -28,7 +28,7 @@ use stampfly_types::Vec3;
 
 use crate::airframe::Airframe;
 use crate::bound::symmetric;
-use crate::cascade::CascadeController;
+use crate::cascade::{CascadeConfig, CascadeController};
 use crate::rate::{RateConfig, RateLaw, TILT_BANDWIDTH, TILT_LEAD, YAW_BANDWIDTH};
 
 /// Corner of the increment's filter over the bandwidth. The estimate of the disturbance has to be slower than the loop it corrects: at
@@ -126,6 +126,11 @@ impl IndiRate {
         Self { config: *config, rate: None, acceleration: zero, delivered: zero, commanded: [zero; 2], against: zero }
     }
 
+    /// Changes bandwidth and smoothing in flight. What was estimated of everything else, and what was measured, stays.
+    pub fn set_gains(&mut self, config: &IndiConfig) {
+        (self.config.bandwidth, self.config.smoothing) = (config.bandwidth, config.smoothing);
+    }
+
     /// The torque that is held against what else turns the vehicle, N·m.
     #[must_use]
     pub fn against(&self) -> Vec3 {
@@ -191,6 +196,14 @@ fn finite_within(value: f32, limit: f32) -> f32 {
 /// controller.reset();
 /// ```
 pub type IndiController = CascadeController<IndiRate>;
+
+impl IndiController {
+    /// Changes all gains in flight, as [`CascadeController::set_gains`] does.
+    pub fn set_gains(&mut self, config: &CascadeConfig, rate: &IndiConfig) {
+        self.set_outer_gains(config);
+        self.rate_law_mut().set_gains(rate);
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -17,9 +17,10 @@
 //! * [`flip`]: turning over once, for as long as it takes in place of the controller;
 //! * [`autotune`]: measuring the vehicle in flight, and the rate loop's gains that follow;
 //! * [`airframe`]: the vehicle as a value, from which mixer, controllers and motor stage are configured;
+//! * [`fixed_wing`]: way-points, tracks, energy and attitude of an aeroplane;
 //! * [`mixer`]: force and torque to thrust per motor, for any rotor geometry, [`layout`] for the usual ones; [`surfaces`] of an aeroplane
 //!   and [`drive`] for wheels;
-//! * [`motor`] and [`curve`]: thrust to duty;
+//! * [`motor`] and [`curve`]: thrust to duty; [`esc`]: pulses for speed controllers;
 //! * [`filter`], [`pid`] and [`timing`]: building blocks.
 //!
 //! Units are SI, the body frame is FRD, the world NED (see [`stampfly_types::frame`]). Numbers that are not finite
@@ -37,7 +38,9 @@ pub mod cascade;
 pub mod controller;
 pub mod curve;
 pub mod drive;
+pub mod esc;
 pub mod filter;
+pub mod fixed_wing;
 pub mod flip;
 pub mod geometric;
 pub mod guidance;

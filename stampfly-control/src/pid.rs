@@ -183,10 +183,13 @@ impl<T: FloatCore> Pid<T> {
         self.integral = if integral.is_finite() { clamp(integral, self.integral_limit) } else { T::zero() };
     }
 
-    /// Changes the gains in flight. The integral stays, so the output moves only by what the gains change.
+    /// Changes the gains in flight. The integral and the filtered derivative stay, so the output moves only by what the gains change; the same gains
+    /// change nothing, bit for bit.
     pub fn set_gains(&mut self, gains: PidGains<T>) {
-        self.gains = gains;
-        self.discrete.dt = T::zero();
+        if gains != self.gains {
+            self.gains = gains;
+            self.discrete.dt = T::zero();
+        }
     }
 
     /// Bound of the output and of the integral.

@@ -93,6 +93,12 @@ impl PositionController {
         }
     }
 
+    /// Changes the gains in flight. Integrals and limits stay.
+    pub fn set_gains(&mut self, config: &PositionConfig) {
+        self.position_gain = config.position_gain;
+        [&mut self.north, &mut self.east].into_iter().for_each(|axis| axis.set_gains(config.velocity));
+    }
+
     /// Acceleration asked for, north and east, m/s²; z is zero.
     ///
     /// `error` is where to be minus where we are (zero when the position is unknown), `target` and

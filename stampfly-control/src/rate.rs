@@ -115,6 +115,12 @@ impl RateController {
         }
     }
 
+    /// Changes the gains in flight. Integrals, derivatives and limits stay.
+    pub fn set_gains(&mut self, config: &RateConfig) {
+        let gains = [config.roll, config.pitch, config.yaw];
+        self.axes.iter_mut().zip(gains).for_each(|(axis, gains)| axis.set_gains(gains));
+    }
+
     /// Torque for a rate, body axes, rad/s in and N·m out. `unmet` is the mixer's report of the last step;
     /// `held` keeps the integrators of these axes where they are.
     #[inline]

@@ -3,11 +3,13 @@
 //! | module | part | measures | bus | implements |
 //! |---|---|---|---|---|
 //! | [`bmi270`] | Bosch BMI270 | acceleration and angular rate | SPI, I2C | [`Imu`](crate::Imu) |
+//! | [`mpu6000`] | InvenSense MPU-6000 | acceleration and angular rate | SPI | [`Imu`](crate::Imu) |
 //! | [`pmw3901`] | PixArt PMW3901 | optical flow | SPI | [`OpticalFlow`](crate::OpticalFlow) |
 //! | [`bmp280`] | Bosch BMP280 | air pressure | SPI, I2C | [`Barometer`](crate::Barometer) |
 //! | [`ina3221`] | TI INA3221 | battery voltage and current | I2C | [`PowerMonitor`](crate::PowerMonitor) |
 //! | [`bmm150`] | Bosch BMM150 | magnetic field | SPI, I2C | [`Magnetometer`](crate::Magnetometer) |
 //! | [`vl53l3cx`] | ST VL53L3CX | distance | I2C | [`RangeFinder`](crate::RangeFinder) |
+//! | [`nrf24l01`] | Nordic nRF24L01+ | nothing: a radio | SPI | |
 //!
 //! # How every one of them is built
 //! * A **codec** of registers, scales and formulas: pure functions and plain structs, each with its data sheet section.
@@ -21,7 +23,8 @@
 //!   and so is a chip that makes no new sample in time ([`ChipError::NoSample`]): by the last look at it that began after that time, so that
 //!   waiting for a shared bus is not the chip's.
 //! * A chip that lost its configuration (brown-out, ESD) is [`ChipError::Restarted`] once, and the next call sets it up
-//!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s do not, and it is asked once a second.
+//!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s and the [`mpu6000`]'s do not, and
+//!   they are asked once a second.
 //! * No conversion is delivered twice, also not when a command to the chip is garbled on its way.
 //! * A start may fail or be dropped at any point; the next one begins from whatever state that left.
 //! * `self_test` says whether the chip measures at all: by the chip's own test, or else by its identity, its settings read
@@ -47,5 +50,6 @@ pub use stampfly_driver_core::chip::{
 };
 pub use {
     stampfly_bmi270 as bmi270, stampfly_bmm150 as bmm150, stampfly_bmp280 as bmp280, stampfly_ina3221 as ina3221,
-    stampfly_pmw3901 as pmw3901, stampfly_vl53l3cx as vl53l3cx,
+    stampfly_mpu6000 as mpu6000, stampfly_nrf24l01 as nrf24l01, stampfly_pmw3901 as pmw3901,
+    stampfly_vl53l3cx as vl53l3cx,
 };

@@ -8,6 +8,8 @@ use stampfly_drivers::chip::bmi270::{self, Bmi270};
 use stampfly_drivers::chip::bmm150::{self, Bmm150};
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
 use stampfly_drivers::chip::ina3221::{self, Ina3221};
+use stampfly_drivers::chip::mpu6000::{self, Mpu6000};
+use stampfly_drivers::chip::nrf24l01::{self, Nrf24l01};
 use stampfly_drivers::chip::pmw3901::{self, Pmw3901};
 use stampfly_drivers::chip::vl53l3cx::{self, BootAddress, Vl53l3cx};
 use stampfly_drivers::chip::{AxisMap, ChipError, TransferLimit};
@@ -133,9 +135,24 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
                 Vl53l3cx::new(bus(), Pin::default(), &boot, 0x30, clock.clone(), vl53l3cx::Config::default())
                     .with_transfer_limit(sensors)
             ),
+            worst!(
+                clock,
+                Mpu6000::new(bus(), clock.clone(), AxisMap::IDENTITY, mpu6000::Config::default())
+                    .with_transfer_limit(TransferLimit::SPI_GUEST)
+            ),
+            {
+                let radio =
+                    Nrf24l01::<_, _, _, _, 10>::new(bus(), Pin::default(), clock.clone(), nrf24l01::Config::default());
+                let mut radio = radio.with_transfer_limit(alone);
+                let begun = clock.now();
+                for _ in 0..100 {
+                    assert!(block_on(radio.listen(nrf24l01::Tuning { channel: 1, address: [1; 5] })).is_err());
+                }
+                clock.now().since(begun)
+            },
         ];
-        // The last two first leave their chips the time to start up.
-        let milliseconds = [1, 1, 11, 11, 11, 15, 4, 60, 125];
+        // The flow and the range sensor first leave their chips the time to start up. The radio: a hundred calls.
+        let milliseconds = [1, 1, 11, 11, 11, 15, 4, 60, 125, 10, 40];
         let limits = milliseconds.map(Duration::from_millis);
         for (worst, limit) in worst.into_iter().zip(limits) {
             assert!(worst > Duration::ZERO && worst < limit, "{worst} with {fault:?}");

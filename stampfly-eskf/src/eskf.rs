@@ -251,6 +251,97 @@ impl Eskf {
         }
     }
 
+    /// Begins again with this configuration, in its place: afterwards it is what [`new`](Self::new) makes, bit for bit. For a vehicle that is given other parameters on
+    /// a small stack, where a second filter of 6 kB has no room.
+    ///
+    /// ```
+    /// use stampfly_eskf::{Eskf, EskfConfig};
+    /// let mut filter = Eskf::new(EskfConfig::indoors());
+    /// let other = EskfConfig { gate: 4.0, ..EskfConfig::indoors() };
+    /// filter.begin_again(&other);
+    /// assert_eq!(filter, Eskf::new(other));
+    /// ```
+    // Each field by itself: whatever is added has to be added here, too, and none is copied whole that is large.
+    #[inline(never)]
+    pub fn begin_again(&mut self, config: &EskfConfig) {
+        let Self {
+            noise,
+            covariance,
+            config: own,
+            state,
+            pending_step,
+            pending_rotation,
+            history,
+            vibration,
+            now,
+            initialized,
+            calibration,
+            command,
+            anchor,
+            rests,
+            surface,
+            baro_offset,
+            baro_updated,
+            field,
+            acceleration,
+            steps,
+            bridge,
+            rate,
+            force,
+            accels,
+            felt,
+            gates,
+            flow_innovation_bias,
+            flow_monitor,
+            flow_influence,
+            gyro_monitor,
+            standing,
+            vertical,
+            status,
+            alignment,
+            aiding_timeout,
+            tallies,
+            wander,
+        } = self;
+        *noise = process_noise(config);
+        covariance.set_sigmas(initial_sigmas(config));
+        *own = *config;
+        *state = NominalState::default();
+        *pending_step = PropagationStep::default();
+        *pending_rotation = NominalState::default().rotation();
+        history.reach(config.horizon);
+        *vibration = [Vibration::default(); 2];
+        *now = Instant::ZERO;
+        *initialized = false;
+        *calibration = CalibrationResult::default();
+        *command = EstimatorCommand::default();
+        *anchor = None;
+        *rests = false;
+        *surface = None;
+        *baro_offset = None;
+        *baro_updated = Instant::ZERO;
+        *field = None;
+        *acceleration = Acceleration::default();
+        *steps = 0;
+        *bridge = Bridge::default();
+        *rate = Vec3::zeros();
+        *force = Vec3::zeros();
+        *accels = Mean::default();
+        *felt = Mean::default();
+        *gates = Gates::default();
+        *flow_innovation_bias = InnovationBiasMonitor::default();
+        *flow_monitor = FlowMonitor::airborne();
+        *flow_influence = Influence::default();
+        *gyro_monitor = GyroMonitor::default();
+        *standing = Standing::default();
+        *vertical = VerticalMonitor::airborne();
+        *status = EstimatorStatus::default();
+        *alignment = Alignment::KNOWN;
+        *aiding_timeout = Duration::from_seconds(config.aiding_timeout);
+        *tallies = Tallies::default();
+        *wander = Wander::default();
+    }
+
     /// The covariance of the error state, for consistency checks and plots.
     #[must_use]
     pub fn covariance(&self) -> &Covariance {
@@ -477,11 +568,16 @@ fn process_noise(config: &EskfConfig) -> ProcessNoise {
 }
 
 fn initial_covariance(config: &EskfConfig) -> Covariance {
-    Covariance::from_sigmas([
+    Covariance::from_sigmas(initial_sigmas(config))
+}
+
+/// Of position, velocity, attitude and both biases.
+const fn initial_sigmas(config: &EskfConfig) -> [f32; 5] {
+    [
         config.initial_position,
         config.initial_velocity,
         config.initial_attitude,
         config.initial_gyro_bias,
         config.initial_accel_bias,
-    ])
+    ]
 }

@@ -1,9 +1,16 @@
 //! What every estimator of the family offers, and what it answers when it is given a measurement.
 
+use crate::aid::airspeed::Wind;
 use stampfly_types::messages::{
-    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, StateEstimate, TofData,
+    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, GnssData, GnssFix, ImuData, MagData,
+    StateEstimate, TofData,
 };
-use stampfly_types::{Instant, Quat, Vec3};
+use stampfly_types::{Instant, Origin, Quat, Vec3};
+
+/// A receiver's position is not better than this along an axis, m, whatever it says of it, and its velocity not than this, m/s: the errors of its
+/// satellites' clocks and orbits are in no accuracy that it states. EKF2 takes 0.5 and 0.3.
+const LEAST_POSITION: f32 = 0.5;
+const LEAST_SPEED: f32 = 0.15;
 
 /// What became of a measurement.
 ///
@@ -111,6 +118,41 @@ pub trait Estimator {
     /// Uses an attitude measured from outside, body → world, with one standard deviation for all axes, rad. An estimator
     /// without a use for it refuses.
     fn fuse_attitude(&mut self, _at: Instant, _attitude: &Quat, _sigma: f32) -> Fusion {
+        Fusion::Refused(Refusal::NotUsed)
+    }
+
+    /// Uses a fix of a satellite receiver: its position relative to `origin`, and its velocity, each with the accuracy that the receiver
+    /// states, though not with a better one than receivers have. What became of the two, in this order.
+    ///
+    /// ```
+    /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
+    /// use stampfly_types::{Instant, Origin, messages::GnssData};
+    /// let mut eskf = Eskf::new(EskfConfig::outdoors());
+    /// let nothing = GnssData::default();
+    /// let fusions = eskf.fuse_gnss(Instant::ZERO, &nothing, &Origin::default());
+    /// assert_eq!(fusions, [Fusion::Refused(Refusal::Quality); 2], "without satellites");
+    /// ```
+    fn fuse_gnss(&mut self, at: Instant, gnss: &GnssData, origin: &Origin) -> [Fusion; 2] {
+        let accuracy = [gnss.horizontal_accuracy, gnss.vertical_accuracy, gnss.speed_accuracy];
+        if gnss.fix == GnssFix::None || !accuracy.iter().all(|deviation| *deviation > 0.0) {
+            return [Fusion::Refused(Refusal::Quality); 2];
+        }
+        let [horizontal, vertical, speed] = accuracy;
+        let [horizontal, speed] = [horizontal.max(LEAST_POSITION), speed.max(LEAST_SPEED)];
+        let is_high = gnss.fix == GnssFix::ThreeDimensional;
+        let [vertical, sink] =
+            if is_high { [vertical.max(LEAST_POSITION), speed] } else { [f32::INFINITY, f32::INFINITY] };
+        let [north, east] = origin.local(gnss.latitude, gnss.longitude);
+        let position = Vec3::new(north, east, origin.down(gnss.altitude));
+        [
+            self.fuse_position(at, &position, &Vec3::new(horizontal, horizontal, vertical)),
+            self.fuse_velocity(at, &gnss.velocity, &Vec3::new(speed, speed, sink)),
+        ]
+    }
+
+    /// Uses an airspeed along the nose, m/s, with its standard deviation, m/s, and the wind that goes with it, which whoever has the sensor
+    /// keeps. An estimator without a use for it refuses.
+    fn fuse_airspeed(&mut self, _at: Instant, _speed: f32, _sigma: f32, _wind: &mut Wind) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
 

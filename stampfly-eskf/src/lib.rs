@@ -21,6 +21,7 @@
 extern crate std;
 
 pub mod aid;
+mod air;
 pub mod attitude;
 pub mod calibration;
 mod complementary;
@@ -33,6 +34,7 @@ mod measurements;
 mod pacer;
 mod tally;
 
+pub use air::Air;
 pub use complementary::{Complementary, ComplementaryConfig};
 pub use config::{EskfConfig, GravityUse, MagModel, StartHeading};
 pub use eskf::Eskf;

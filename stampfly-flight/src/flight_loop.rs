@@ -6,12 +6,41 @@
 
 use core::mem::MaybeUninit;
 use stampfly_bus::{
-    Activation, AnyTopic, Band, Hook, PublishWords, Schedule, Scheduler, Split, TopicTable, VisitLines,
+    Activation, ActivationState, AnyTopic, Band, Hook, PublishWords, Schedule, Scheduler, Split, TopicTable, VisitLines,
 };
 use stampfly_types::{ActivationRecord, Instant};
 
+/// Where each line of the activation table is between two activations.
+pub trait Positions {
+    /// How far a line has read each of its inputs.
+    fn inputs(&mut self, line: usize) -> ActivationRecord;
+
+    /// What the scheduler keeps of it. `None` for a line that does not exist.
+    fn state(&self, line: usize) -> Option<ActivationState>;
+}
+
+/// How a pass ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// Every line of the band that was due has published.
+    Band,
+    /// This line has published.
+    Line(usize),
+    /// This line has read its inputs, and will [resume](Observer::resumes).
+    HasRead(usize),
+}
+
 /// Is told of activations: a log, a profiler.
 pub trait Observer {
+    /// This band is about to look what is due at `clock`.
+    fn pass_begins(&mut self, _band: Band, _clock: Instant) {}
+
+    /// It has looked, and something ran.
+    fn pass_ends(&mut self, _band: Band, _ended: Ended, _positions: &mut dyn Positions) {}
+
+    /// What had read its inputs is about to run.
+    fn resumes(&mut self, _index: usize) {}
+
     /// A runnable is about to read its inputs.
     fn starts(&mut self, _index: usize) {}
 
@@ -20,6 +49,9 @@ pub trait Observer {
 
     /// A runnable has published. Only now it is known what a full queue has refused.
     fn finished(&mut self, _activation: &Activation) {}
+
+    /// Between two passes, a runnable [began again](FlightLoop::renew) or took [other parameters](crate::live): a record goes on from a key frame.
+    fn renewed(&mut self) {}
 }
 
 /// Nothing to report to.
@@ -27,6 +59,21 @@ impl Observer for () {}
 
 /// Two observers.
 impl<A: Observer, B: Observer> Observer for (A, B) {
+    fn pass_begins(&mut self, band: Band, clock: Instant) {
+        self.0.pass_begins(band, clock);
+        self.1.pass_begins(band, clock);
+    }
+
+    fn pass_ends(&mut self, band: Band, ended: Ended, positions: &mut dyn Positions) {
+        self.0.pass_ends(band, ended, positions);
+        self.1.pass_ends(band, ended, positions);
+    }
+
+    fn resumes(&mut self, index: usize) {
+        self.0.resumes(index);
+        self.1.resumes(index);
+    }
+
     fn starts(&mut self, index: usize) {
         self.0.starts(index);
         self.1.starts(index);
@@ -42,9 +89,71 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
         self.1.finished(activation);
         self.0.finished(activation);
     }
+
+    fn renewed(&mut self) {
+        self.0.renewed();
+        self.1.renewed();
+    }
+}
+
+/// An observer, if there is one.
+impl<O: Observer> Observer for Option<O> {
+    fn pass_begins(&mut self, band: Band, clock: Instant) {
+        if let Some(observer) = self {
+            observer.pass_begins(band, clock);
+        }
+    }
+
+    fn pass_ends(&mut self, band: Band, ended: Ended, positions: &mut dyn Positions) {
+        if let Some(observer) = self {
+            observer.pass_ends(band, ended, positions);
+        }
+    }
+
+    fn resumes(&mut self, index: usize) {
+        if let Some(observer) = self {
+            observer.resumes(index);
+        }
+    }
+
+    fn starts(&mut self, index: usize) {
+        if let Some(observer) = self {
+            observer.starts(index);
+        }
+    }
+
+    fn has_read(&mut self, activation: &Activation) {
+        if let Some(observer) = self {
+            observer.has_read(activation);
+        }
+    }
+
+    fn finished(&mut self, activation: &Activation) {
+        if let Some(observer) = self {
+            observer.finished(activation);
+        }
+    }
+
+    fn renewed(&mut self) {
+        if let Some(observer) = self {
+            observer.renewed();
+        }
+    }
 }
 
 impl<O: Observer + ?Sized> Observer for &mut O {
+    fn pass_begins(&mut self, band: Band, clock: Instant) {
+        (**self).pass_begins(band, clock);
+    }
+
+    fn pass_ends(&mut self, band: Band, ended: Ended, positions: &mut dyn Positions) {
+        (**self).pass_ends(band, ended, positions);
+    }
+
+    fn resumes(&mut self, index: usize) {
+        (**self).resumes(index);
+    }
+
     fn starts(&mut self, index: usize) {
         (**self).starts(index);
     }
@@ -55,6 +164,10 @@ impl<O: Observer + ?Sized> Observer for &mut O {
 
     fn finished(&mut self, activation: &Activation) {
         (**self).finished(activation);
+    }
+
+    fn renewed(&mut self) {
+        (**self).renewed();
     }
 }
 
@@ -124,6 +237,7 @@ impl<'b, R: Schedule> Assembled<'b, R> {
     ) -> InPlace<'b, R> {
         let Split { runnables: ends, outside, taps, heads } = bus.split(hook);
         let scheduler = Scheduler::new(start);
+        // Nothing large has a name here: it would be made on the stack, and copied.
         let flight_loop = slot.write(FlightLoop {
             lines: Lines { runnables: R::new(config), ends, scheduler, heads },
             activation: Activation::live(0, start),
@@ -144,6 +258,25 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         self.lines.runnables = runnables;
     }
 
+    /// Puts one runnable back to power-on, with this configuration: between two passes, and only where nothing depends on what it
+    /// has learned, as on a vehicle that is disarmed. A log has to say so: mark a loss, and take a key frame.
+    // By itself: no pass needs it.
+    #[inline(never)]
+    pub fn renew(&mut self, index: usize, config: &R::Config) {
+        self.lines.runnables.renew(index, config);
+    }
+
+    /// The same for a line that is known here: no other's new state takes stack.
+    #[inline(never)]
+    pub(crate) fn renew_line<const INDEX: usize>(&mut self, config: &R::Config) {
+        self.lines.runnables.renew(INDEX, config);
+    }
+
+    /// The runnables, to give them other parameters.
+    pub(crate) const fn runnables_mut(&mut self) -> &mut R {
+        &mut self.lines.runnables
+    }
+
     /// Every topic without its type, in the table's order.
     #[must_use]
     pub fn heads(&self) -> &[&'b dyn AnyTopic] {
@@ -151,6 +284,8 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     }
 
     /// Is anything due in this band?
+    // One copy for both bands: what is fetched for the second is there already.
+    #[inline(never)]
     #[must_use]
     pub fn is_due(&self, band: Band, clock: Instant) -> bool {
         let mut lines = R::ACTIVATIONS.iter().enumerate().filter(|(_, info)| info.band == band);
@@ -161,16 +296,23 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     // By itself, so that firmware can keep it in RAM: every pass goes through all of it once.
     #[inline(never)]
     pub fn run_band(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
-        let mut pass = Pass { flight_loop: self, band, clock, observer, ran: false };
+        observer.pass_begins(band, clock);
+        let mut pass = Pass { flight_loop: &mut *self, band, clock, observer: &mut *observer, ran: false };
         R::visit(&mut pass);
-        pass.ran
+        let ran = pass.ran;
+        if ran {
+            observer.pass_ends(band, Ended::Band, &mut self.lines);
+        }
+        ran
     }
 
     /// Runs the first line of this band that is due. Returns whether there was one.
     pub fn run_next(&mut self, band: Band, clock: Instant, observer: &mut (impl Observer + ?Sized)) -> bool {
+        observer.pass_begins(band, clock);
         let Self { lines, activation } = self;
         let Some((index, now)) = lines.start_first(band, clock) else { return false };
         lines.run(index, now, activation, observer);
+        observer.pass_ends(band, Ended::Line(index), lines);
         true
     }
 
@@ -182,15 +324,52 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
         clock: Instant,
         observer: &mut (impl Observer + ?Sized),
     ) -> Option<Pending> {
+        observer.pass_begins(band, clock);
         let (index, now) = self.lines.start_first(band, clock)?;
         let mut activation = Activation::live(index as u8, now);
         self.lines.read(index, &mut activation, observer);
+        observer.pass_ends(band, Ended::HasRead(index), &mut self.lines);
         Some(Pending(activation))
     }
 
     /// Runs what has read its inputs.
     pub fn finish(&mut self, Pending(mut activation): Pending, observer: &mut (impl Observer + ?Sized)) {
-        self.lines.complete(usize::from(activation.record().index), &mut activation, observer);
+        let index = usize::from(activation.record().index);
+        observer.resumes(index);
+        self.lines.complete(index, &mut activation, observer);
+    }
+
+    /// Lets one line read its inputs if it is due, for a replay that decides again what is.
+    #[cfg(feature = "replay")]
+    pub(crate) fn start_line(&mut self, index: usize, clock: Instant, observer: &mut impl Observer) -> Option<Pending> {
+        let now = self.lines.scheduler.start(index, clock, self.lines.heads.as_ref())?;
+        let mut activation = Activation::live(index as u8, now);
+        self.lines.read(index, &mut activation, observer);
+        Some(Pending(activation))
+    }
+
+    /// The first line of this band that is due.
+    #[cfg(feature = "replay")]
+    pub(crate) fn first_due(&self, band: Band, clock: Instant) -> Option<usize> {
+        let mut lines = R::ACTIVATIONS.iter().enumerate().filter(|(_, info)| info.band == band);
+        let due = |index| self.lines.scheduler.due(index, clock, self.lines.heads.as_ref()).is_some();
+        lines.find_map(|(index, _)| due(index).then_some(index))
+    }
+
+    /// Runs what has read its inputs, with what queues refused it when it was recorded.
+    #[cfg(feature = "replay")]
+    pub(crate) fn finish_with(&mut self, Pending(activation): Pending, refused: u32, observer: &mut impl Observer) {
+        self.finish(Pending(activation.with_refusals(refused)), observer);
+    }
+
+    /// Puts a line where it was. `false` when it cannot have been there.
+    #[cfg(feature = "replay")]
+    pub(crate) fn set_position(&mut self, record: ActivationRecord, state: ActivationState) -> bool {
+        let index = usize::from(record.index);
+        let mut sought = Activation::seek(record);
+        R::read(&mut self.lines.ends, index, &mut sought);
+        self.lines.scheduler.set_state(index, state);
+        !sought.is_missing_input()
     }
 
     /// Runs one line, due or not.
@@ -235,6 +414,18 @@ impl<'b, R: Schedule> FlightLoop<'b, R> {
     #[must_use]
     pub fn next_tick(&self) -> Option<Instant> {
         self.lines.scheduler.next_tick()
+    }
+}
+
+impl<R: Schedule> Positions for Lines<'_, R> {
+    fn inputs(&mut self, line: usize) -> ActivationRecord {
+        let mut note = Activation::note(line as u8);
+        R::read(&mut self.ends, line, &mut note);
+        *note.record()
+    }
+
+    fn state(&self, line: usize) -> Option<ActivationState> {
+        self.scheduler.state(line).copied()
     }
 }
 

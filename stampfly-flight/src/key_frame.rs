@@ -1,6 +1,7 @@
 //! Key frames: the whole state of a vehicle as bytes, so that a replay can start in the middle of a log.
 //!
-//! A key frame holds the state of every runnable and the samples on the bus that a runnable may still read. It is made
+//! A key frame holds the state of every runnable and the samples on the bus that a runnable may still read: of a topic whose
+//! readers see the newest alone, that one. It is made
 //! between two passes of the flight loop, when nothing is half done; from there on the log's samples and activations say
 //! the rest.
 //!
@@ -19,10 +20,12 @@
 use crate::flight_loop::FlightLoop;
 use crate::golden::tables;
 use serde::{Serialize, de::DeserializeOwned};
-use stampfly_bus::{PublishWords, Schedule, TopicTable};
+use stampfly_bus::{AnyTopic, PublishWords, Schedule, TopicTable};
 use stampfly_types::Instant;
 
 const MAGIC: [u8; 4] = *b"SFK1";
+/// The policy of topics of which readers see the newest sample alone, as the topic table says it.
+const LATEST: &str = "latest";
 /// Bytes of the length.
 const LENGTH: usize = 4;
 
@@ -50,19 +53,61 @@ impl core::fmt::Display for KeyFrameError {
 
 impl core::error::Error for KeyFrameError {}
 
+/// Where the bytes of a key frame go.
+pub(crate) trait Place {
+    /// Adds bytes, if there is room for all of them.
+    fn put(&mut self, bytes: &[u8]) -> Result<(), KeyFrameError>;
+
+    /// Bytes so far.
+    fn length(&self) -> usize;
+
+    /// Writes the length behind the magic, once it is known.
+    fn set_length(&mut self, length: u32);
+}
+
 /// Writes from the front of a buffer.
-struct Put<'a> {
-    rest: &'a mut [u8],
+struct Buffer<'a> {
+    bytes: &'a mut [u8],
     written: usize,
 }
 
-impl Put<'_> {
-    fn bytes(&mut self, bytes: &[u8]) -> Result<(), KeyFrameError> {
-        let (place, rest) =
-            core::mem::take(&mut self.rest).split_at_mut_checked(bytes.len()).ok_or(KeyFrameError::NoRoom)?;
-        place.copy_from_slice(bytes);
-        self.rest = rest;
-        self.written += bytes.len();
+impl Place for Buffer<'_> {
+    #[inline]
+    fn put(&mut self, bytes: &[u8]) -> Result<(), KeyFrameError> {
+        let end = self.written + bytes.len();
+        self.bytes.get_mut(self.written..end).ok_or(KeyFrameError::NoRoom)?.copy_from_slice(bytes);
+        self.written = end;
+        Ok(())
+    }
+
+    fn length(&self) -> usize {
+        self.written
+    }
+
+    fn set_length(&mut self, length: u32) {
+        if let Some(place) = self.bytes.get_mut(MAGIC.len()..MAGIC.len() + LENGTH) {
+            place.copy_from_slice(&length.to_le_bytes());
+        }
+    }
+}
+
+/// What serde writes of the runnables goes there.
+struct Through<'p, P>(&'p mut P);
+
+impl<P: Place> postcard::ser_flavors::Flavor for Through<'_, P> {
+    type Output = ();
+
+    #[inline]
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        self.0.put(bytes).map_err(|_| postcard::Error::SerializeBufferFull)
+    }
+
+    #[inline]
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.try_extend(&[byte])
+    }
+
+    fn finalize(self) -> postcard::Result<()> {
         Ok(())
     }
 }
@@ -76,34 +121,42 @@ pub fn encode<R: Schedule + Serialize>(
     clock: Instant,
     buffer: &mut [u8],
 ) -> Result<usize, KeyFrameError> {
-    let mut put = Put { rest: &mut *buffer, written: 0 };
-    put.bytes(&MAGIC)?;
-    put.bytes(&[0; LENGTH])?;
-    put.bytes(&tables::<R>().to_le_bytes())?;
-    put.bytes(&clock.as_micros().to_le_bytes())?;
-    for topic in flight_loop.heads() {
-        let head = topic.head();
-        let oldest = head.saturating_sub(topic.depth() as u32);
-        put.bytes(&head.to_le_bytes())?;
-        put.bytes(&((head - oldest) as u16).to_le_bytes())?;
+    encode_up_to(flight_loop, clock, |_, topic| topic.head(), &mut Buffer { bytes: buffer, written: 0 })
+}
+
+/// The same to any place, where `head` says of each topic up to which generation: what was published since is none of the key frame's.
+pub(crate) fn encode_up_to<R: Schedule + Serialize>(
+    flight_loop: &FlightLoop<'_, R>,
+    clock: Instant,
+    head: impl Fn(usize, &dyn AnyTopic) -> u32,
+    to: &mut impl Place,
+) -> Result<usize, KeyFrameError> {
+    let table = <R::Topics as TopicTable>::TOPICS;
+    to.put(&MAGIC)?;
+    to.put(&[0; LENGTH])?;
+    to.put(&tables::<R>().to_le_bytes())?;
+    to.put(&clock.as_micros().to_le_bytes())?;
+    for (place, topic) in flight_loop.heads().iter().enumerate() {
+        let head = head(place, *topic);
+        // Of a topic of which readers see the newest sample alone, the others will never be read.
+        let is_latest = table.get(place).is_some_and(|info| info.policy == LATEST);
+        let oldest = head.saturating_sub(if is_latest { 1 } else { topic.depth() as u32 });
+        to.put(&head.to_le_bytes())?;
+        to.put(&((head - oldest) as u16).to_le_bytes())?;
         for generation in oldest + 1..=head {
-            let mut outcome = Err(KeyFrameError::NotAKeyFrame);
-            topic.copy(generation, &mut |at, words| {
-                outcome = put
-                    .bytes(&generation.to_le_bytes())
-                    .and_then(|()| put.bytes(&at.as_micros().to_le_bytes()))
-                    .and_then(|()| words.iter().try_for_each(|word| put.bytes(&word.to_le_bytes())));
-            });
-            outcome?;
+            let sample = topic.in_place(generation).ok_or(KeyFrameError::NotAKeyFrame)?;
+            let words = sample.words();
+            let [low, high] = sample.at();
+            let mut all = [generation, low, high].into_iter().chain(words);
+            all.try_for_each(|word| to.put(&word.to_le_bytes()))?;
+            if !sample.is_whole() {
+                return Err(KeyFrameError::NotAKeyFrame);
+            }
         }
     }
-    let Put { rest, written } = put;
-    let state = postcard::to_slice(flight_loop.runnables(), rest).map_err(|_| KeyFrameError::NoRoom)?;
-    let length = written + state.len();
-    // Known only now.
-    if let Some(place) = buffer.get_mut(MAGIC.len()..MAGIC.len() + LENGTH) {
-        place.copy_from_slice(&(length as u32).to_le_bytes());
-    }
+    postcard::serialize_with_flavor(flight_loop.runnables(), Through(to)).map_err(|_| KeyFrameError::NoRoom)?;
+    let length = to.length();
+    to.set_length(length as u32);
     Ok(length)
 }
 

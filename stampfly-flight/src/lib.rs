@@ -14,6 +14,7 @@
 //! | [`flight_loop`] | runs what is due, in table order, and reports it to an observer |
 //! | [`recorder`] | writes a flight as a log that can be flown again |
 //! | [`compact`] | everything a replay needs, in few bytes |
+//! | [`live`] | parameters that change while the vehicle is on |
 //! | [`key_frame`] | the whole state of a vehicle as bytes (feature `key-frame`) |
 //! | [`replay`](mod@replay) | the flight again, compared bit for bit (feature `replay`) |
 //! | [`black_box`] | the last seconds of a flight in memory, read out after landing |
@@ -35,12 +36,14 @@ extern crate std;
 pub mod black_box;
 pub mod compact;
 pub mod console;
+mod crc;
 pub mod doctor;
 pub mod flight_loop;
 pub mod golden;
 pub mod hil;
 #[cfg(feature = "key-frame")]
 pub mod key_frame;
+pub mod live;
 pub mod log_schema;
 pub mod messages;
 pub mod mock;

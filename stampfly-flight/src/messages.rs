@@ -37,6 +37,16 @@ message! {
 }
 
 message! {
+    /// A parameter was changed. A gain is flown at once; with any other, each runnable that holds it begins again when the vehicle is disarmed.
+    pub struct ParameterChange {
+        /// Its place in the vehicle's table.
+        index: u32,
+        /// What it is now, in its unit.
+        value: f32 ["SI"],
+    }
+}
+
+message! {
     /// One motor to turn. Ignored while the vehicle is armed, and over when it has been armed since.
     pub struct MotorTest {
         /// 1 to 4; 0 for none.

@@ -14,10 +14,10 @@
 //!
 //! For a log of the last seconds in memory, see the black box.
 
-use crate::flight_loop::Observer;
+use crate::flight_loop::{FlightLoop, Observer};
 use crate::log_schema::LogSchema;
-use stampfly_bus::{Activation, Schedule};
-use stampfly_log::ulog::{Sample, Sink, WriteError, Writer};
+use stampfly_bus::{Activation, Band, Schedule, Taps};
+use stampfly_log::ulog::{Definitions, Sample, Sink, WriteError, Writer};
 use stampfly_types::Instant;
 
 /// The key under which a log holds key frames.
@@ -35,10 +35,32 @@ impl<R: Schedule, S: Sink> Recorder<R, S> {
         Self { log, taps_lost: 0 }
     }
 
+    /// Begins a log of a vehicle of this name. One that has parameters begins with [`Definitions`], which takes them, and [`new`](Self::new).
+    ///
+    /// # Errors
+    /// When the sink refuses the head.
+    pub fn start(sink: S, vehicle: &str, now: Instant) -> Result<Self, WriteError<S::Error>> {
+        let mut head = Definitions::start(sink, now)?;
+        head.info("sys_name", vehicle)?;
+        Ok(Self::new(head.data(LogSchema::new(&[]))?))
+    }
+
     /// Records one sample of the topic in this line of the table, or of a topic beside the bus.
     pub fn sample(&mut self, topic: usize, at: Instant, generation: u32, words: &[u32]) {
         // The writer counts what the sink refuses, and marks it.
         let _ = self.log.sample(topic, &Sample { at, generation, words });
+    }
+
+    /// Runs what is due at `now` in both bands and records it in order: what came from outside, the activations, what they published.
+    ///
+    /// For programs with one thread, which call it whenever their clock has moved. Firmware runs each band in a task of its own.
+    pub fn pass(&mut self, flight_loop: &mut FlightLoop<'_, R>, taps: &mut impl Taps, now: Instant) {
+        taps.drain(&mut |topic, at, generation, words| self.sample(topic, at, generation, words));
+        for band in [Band::Flight, Band::Background] {
+            flight_loop.run_band(band, now, self);
+        }
+        taps.drain(&mut |topic, at, generation, words| self.sample(topic, at, generation, words));
+        self.taps_lost(now, taps.lost());
     }
 
     /// Notes how many samples the taps have lost so far. A loss is marked in the log: a replay goes on after it only from

@@ -26,7 +26,7 @@ const IDLE: Duration = Duration::from_millis(10);
 /// * `clock` and `delay` tell the same time: the instants of samples, and how long to sleep.
 /// * `after_flight_band` is called after each pass through the flight band in which something ran, with the instant at
 ///   which the pass began: write to the motors there, and feed a [`Watchdog`](crate::Watchdog) that cuts them off when
-///   this task stops.
+///   this task stops. Nothing is pending then, so a disarmed vehicle may be given [other parameters](crate::live), and a record its key frame.
 ///
 /// The flight loop is borrowed because it is large and a future holds its arguments more than once; firmware keeps it in
 /// a `static`. A topic that activates a runnable and is not published by `sensing` is to be published by a task of the same
@@ -53,7 +53,7 @@ const IDLE: Duration = Duration::from_millis(10);
 ///     std::future::pending().await
 /// };
 /// let mut duty = 0.0;
-/// let write_motors = |_, _: &FlightLoop<'_, Rover>| if let Some(output) = motors.actuator_motor.latest() { duty = output.data.duty[0] };
+/// let write_motors = |_, _: &mut FlightLoop<'_, Rover>| if let Some(output) = motors.actuator_motor.latest() { duty = output.data.duty[0] };
 /// let flying = fly(sensing, &mut flight_loop, clock, Delay, (), write_motors);
 /// // On an executor: `flying.await`.
 /// # use std::{pin::pin, task::{Context, Waker}};
@@ -71,32 +71,43 @@ pub async fn fly<R: Schedule>(
     clock: impl Fn() -> Instant,
     mut delay: impl DelayNs,
     mut observer: impl Observer,
-    mut after_flight_band: impl FnMut(Instant, &FlightLoop<'_, R>),
+    mut after_flight_band: impl FnMut(Instant, &mut FlightLoop<'_, R>),
 ) -> Infallible {
     let mut sensing = pin!(sensing);
     loop {
         let now = clock();
         let deadline = flight_loop.next_tick().unwrap_or(now + IDLE);
         let left = u32::try_from(deadline.since(now).as_micros()).unwrap_or(u32::MAX);
-        {
+        let due = {
             let mut alarm = pin!(delay.delay_us(left));
             poll_fn(|context| {
                 if let Poll::Ready(never) = sensing.as_mut().poll(context) {
                     match never {}
                 }
                 let now = clock();
-                if flight_loop.is_due(Band::Flight, now) || flight_loop.is_due(Band::Background, now) {
-                    return Poll::Ready(());
+                if flight_loop.is_due(Band::Flight, now) {
+                    return Poll::Ready(Some(Band::Flight));
                 }
-                alarm.as_mut().poll(context)
+                if flight_loop.is_due(Band::Background, now) {
+                    return Poll::Ready(Some(Band::Background));
+                }
+                alarm.as_mut().poll(context).map(|()| None)
             })
-            .await;
-        }
+            .await
+        };
         let now = clock();
-        if flight_loop.run_band(Band::Flight, now, &mut observer) {
-            after_flight_band(now, flight_loop);
-        } else if flight_loop.run_next(Band::Background, now, &mut observer) {
-            yield_now().await;
+        match due {
+            Some(Band::Background) => {
+                if flight_loop.run_next(Band::Background, now, &mut observer) {
+                    yield_now().await;
+                }
+            }
+            // By the clock: something may be due now that was not then.
+            _ => {
+                if flight_loop.run_band(Band::Flight, now, &mut observer) {
+                    after_flight_band(now, flight_loop);
+                }
+            }
         }
     }
 }

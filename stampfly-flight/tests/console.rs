@@ -22,7 +22,7 @@ impl Parameters for Gains {
     fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
         let [near, far, turn] = ["drive.near", "drive.far", "turn.rate"];
         let (name, unit) = *[(near, "1/m"), (far, "1/m"), (turn, "1")].get(index)?;
-        Some(ParameterInfo { name, unit, min: 0.25, max: 2.0, meaning: "duty per metre" })
+        Some(ParameterInfo { name, unit, min: 0.25, max: 2.0, meaning: "duty per metre", in_flight: name == far })
     }
 
     fn get(&self, index: usize) -> Option<f32> {
@@ -154,7 +154,11 @@ fn parameters_can_be_listed_changed_and_not_broken() {
         rover.says(&format!("param set drive.far {hopeless}"));
         assert_eq!(rover.gains.0, [0.5, 0.75, 1.5], "after {hopeless}");
     }
-    assert!(rover.says("param get drive.far").ends_with("0.25 to 2 1/m\r\nduty per metre\r\n"));
+    let said = rover.says("param get drive.far");
+    assert!(said.ends_with("0.25 to 2 1/m\r\nduty per metre, may change in flight\r\n"), "{said}");
+    let said = rover.says("param set drive.near 0.75");
+    assert!(said.ends_with("0.25 to 2 1/m\r\nnot in flight: waits until the vehicle is disarmed\r\n"), "{said}");
+    assert!(!Rover::new(Some(false)).says("param set drive.near 0.75").contains("waits"));
     assert!(rover.says("param get drive.fra").contains("no such parameter"));
 }
 

@@ -1,12 +1,10 @@
 //! Recording and replay on a robot whose planner publishes on a queue that is too short: refusals, gaps, key frames.
 #![cfg(feature = "replay")]
 
-use core::cell::RefCell;
 use core::convert::Infallible;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 use stampfly_bus::{Activation, Band, Duration, Instant, Runnable, Taps, message};
-use stampfly_flight::compact;
 use stampfly_flight::{Assembled, LogSchema, Recorder, Replay, ReplayError, ReplayOptions, key_frame, replay::replay};
 use stampfly_log::ulog::{Definitions, Sink};
 
@@ -258,108 +256,4 @@ fn time_is_an_argument() {
     let log = log.data(LogSchema::<Robot>::new(&[])).expect("memory").into_sink().0;
     assert_eq!(again(&log, ReplayOptions::default()), Err(ReplayError::NoActivations));
     assert_eq!(Duration::from_millis(5).as_micros(), 5_000);
-}
-
-/// Takes everything, until it is told to refuse.
-#[derive(Default)]
-struct Bytes {
-    bytes: Vec<u8>,
-    is_full: bool,
-}
-
-impl compact::Store for Bytes {
-    fn begin(&mut self, _: usize) -> bool {
-        !self.is_full
-    }
-
-    fn put(&mut self, bytes: &[u8]) -> bool {
-        if !self.is_full {
-            self.bytes.extend_from_slice(bytes);
-        }
-        !self.is_full
-    }
-}
-
-/// Drives as [`record`] does, with a compact record. The store is full during `outage`. Returns it with what was lost.
-fn record_compactly(ranges: &[f32], outage: core::ops::Range<usize>) -> (Vec<u8>, u32) {
-    let mut bus = topics::Bus::new();
-    let Assembled { mut flight_loop, mut outside, .. } = Assembled::<Robot>::new(&mut bus, None, &GAIN, Instant::ZERO);
-    let store = std::rc::Rc::new(RefCell::new(Bytes::default()));
-    struct Shared(std::rc::Rc<RefCell<Bytes>>);
-    impl compact::Store for Shared {
-        fn begin(&mut self, bytes: usize) -> bool {
-            self.0.borrow_mut().begin(bytes)
-        }
-        fn put(&mut self, bytes: &[u8]) -> bool {
-            self.0.borrow_mut().put(bytes)
-        }
-    }
-    const TOPICS: &[stampfly_bus::TopicInfo] = &topics::TOPICS;
-    let record = RefCell::new(compact::Compact::<_, { TOPICS.len() }, 2>::new(Shared(store.clone()), TOPICS, |_| 3));
-    for (place, distance) in ranges.iter().enumerate() {
-        store.borrow_mut().is_full = outage.contains(&place);
-        let now = Instant::from_millis(10 * place as u64 + 10);
-        if place % 20 == 0 {
-            let mut frame = [0; 4096];
-            let length = key_frame::encode(&flight_loop, now, &mut frame).expect("room");
-            record.borrow_mut().key_frame(&frame[..length]);
-        }
-        outside.eye.range.publish(now, &Range { distance: *distance });
-        for band in [Band::Flight, Band::Background] {
-            flight_loop.run_band(band, now, &mut compact::Watching(&record));
-        }
-        record.borrow_mut().pass(flight_loop.heads());
-    }
-    let lost = record.borrow().lost();
-    (store.take().bytes, lost)
-}
-
-fn as_log(record: &[u8]) -> Result<Vec<u8>, compact::ReadError> {
-    let head = Definitions::start(Disk::default(), Instant::ZERO).expect("room");
-    let mut log = Recorder::<Robot, _>::new(head.data(LogSchema::new(&[])).expect("room"));
-    compact::read(record, &mut log).map(|()| log.into_sink().bytes)
-}
-
-const THINNED: ReplayOptions = ReplayOptions { from: Some(Instant::ZERO), is_thinned: true };
-
-proptest! {
-    /// Whatever the eye sees, refusals among it: every bit again, every activation, every key frame.
-    #[test]
-    fn a_compact_record_replays_bit_for_bit(ranges in prop::collection::vec(any::<f32>(), 41..200)) {
-        let (record, lost) = record_compactly(&ranges, 0..0);
-        prop_assert_eq!(lost, 0);
-        let outcome = again(&as_log(&record).expect("reads"), THINNED).expect("replays");
-        prop_assert_eq!(outcome.difference, None);
-        prop_assert!(outcome.activations >= ranges.len() as u64 && outcome.key_frames >= 2 && outcome.samples > 10);
-    }
-
-    /// Damage is an error, or another flight, and never a panic.
-    #[test]
-    fn a_damaged_record_is_read_to_its_damage(place in any::<prop::sample::Index>(), byte in any::<u8>()) {
-        let (mut record, _) = record_compactly(&[1.0, 2.0, 3.0, 4.0], 0..0);
-        let place = place.index(record.len());
-        record[place] = byte;
-        let _ = as_log(&record).map(|log| again(&log, THINNED));
-    }
-}
-
-#[test]
-fn a_value_that_is_changed_in_a_compact_record_is_named() {
-    let mut ranges: Vec<f32> = (0..100u16).map(|place| f32::from(place * place % 37)).collect();
-    ranges[50] = 1234.5;
-    let (record, _) = record_compactly(&ranges, 0..0);
-    let mut log = as_log(&record).expect("reads");
-    let place = log.windows(4).position(|bytes| bytes == ranges[50].to_le_bytes()).expect("it is there");
-    log[place] ^= 1;
-    let difference = again(&log, THINNED).expect("replays").difference.expect("it differs");
-    assert!(difference.activation == "planner" || difference.activation == "driver", "{difference}");
-}
-
-#[test]
-fn a_compact_record_goes_on_at_the_next_key_frame_after_a_loss() {
-    let ranges: Vec<f32> = (0..100u16).map(|place| f32::from(place * place % 37)).collect();
-    let (record, lost) = record_compactly(&ranges, 25..30);
-    assert!(lost > 0);
-    let outcome = again(&as_log(&record).expect("reads"), THINNED);
-    assert!(outcome.as_ref().is_ok_and(|outcome| outcome.difference.is_none()), "{outcome:?}");
 }

@@ -70,7 +70,7 @@ fn samples_and_deadlines_reach_the_motors_at_once() {
         }
         pending().await
     };
-    let write = |now, _: &FlightLoop<'_, Rover>| {
+    let write = |now, _: &mut FlightLoop<'_, Rover>| {
         let output = motors.actuator_motor.latest().expect("the flight band has just published");
         duties.borrow_mut().push((now, output.data.duty[0]));
     };
@@ -103,7 +103,7 @@ fn a_task_that_was_dropped_can_be_started_again() {
             || clock.now(),
             Delay(&clock),
             Ran(&ran),
-            |_, _: &FlightLoop<'_, Rover>| {},
+            |_, _: &mut FlightLoop<'_, Rover>| {},
         );
         clock.run(pin!(task), until);
     }

@@ -1,14 +1,14 @@
 //! What a page is told of a vehicle once: its topics, parameters, faults, missions, looks, and what it can be asked.
 //!
-//! [`VehicleCard::of`] fills in what every [`Vehicle`] says of itself. What only the flight knows (which asks it carries out,
-//! how a calibration is asked for) its owner adds.
+//! [`VehicleCard::of`] fills in what every [`Vehicle`] says of itself. What only the flight knows, which asks it carries out,
+//! its owner adds.
 
 use crate::ask::Ask;
 use serde_json::{Value, json};
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
 use stampfly_sim::fault::FaultKind;
 use stampfly_sim::vehicle::{Motion, Page, Setting, Vehicle};
-use stampfly_types::messages::{Alerts, ArmBlocks};
+use stampfly_types::messages::{Alerts, ArmBlocks, CalibrationKind};
 use stampfly_types::schema::{FieldKind, Leaf};
 use stampfly_types::{FieldInfo, leaves};
 
@@ -70,33 +70,18 @@ pub struct ParameterCard {
 pub struct Calibration {
     /// What is calibrated.
     pub kind: CalibrationKind,
-    /// The console line that begins it. `{side}` stands for the side that is up: `+x`, `-x`, `+y`, `-y`, `+z`, `-z`.
+    /// The console line that begins it.
     pub line: String,
 }
 
-/// What can be calibrated, so that a page can show how.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CalibrationKind {
-    /// The gyro: keep it still.
-    Gyro,
-    /// The accelerometer, lying on each of its six sides.
-    SixPositions,
-    /// The level: standing on level ground.
-    Level,
-    /// The magnetometer: turn it through every attitude.
-    Compass,
-}
-
-impl CalibrationKind {
-    /// Its name in JSON.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Gyro => "gyro",
-            Self::SixPositions => "six_positions",
-            Self::Level => "level",
-            Self::Compass => "compass",
-        }
+/// Its name in JSON.
+const fn name(kind: CalibrationKind) -> &'static str {
+    match kind {
+        CalibrationKind::None => "none",
+        CalibrationKind::Level => "level",
+        CalibrationKind::SixPositions => "six_positions",
+        CalibrationKind::Magnetometer => "compass",
+        CalibrationKind::Temperature => "temperature",
     }
 }
 
@@ -129,7 +114,11 @@ impl VehicleCard {
             faults: V::FAULTS,
             missions: V::VARIETY.missions.iter().map(|mission| (*mission).to_owned()).collect(),
             offers: Vec::new(),
-            calibrations: Vec::new(),
+            calibrations: V::PAGE
+                .calibrations
+                .iter()
+                .map(|(kind, line)| Calibration { kind: *kind, line: (*line).into() })
+                .collect(),
             page: const { &V::PAGE },
             place: [0.0; 2],
             on_bus: <<V::Runnables as Schedule>::Topics as TopicTable>::TOPICS.len(),
@@ -156,7 +145,7 @@ impl VehicleCard {
             "faults": self.faults.iter().map(fault).collect::<Vec<_>>(),
             "place": self.place, "missions": self.missions, "offers": self.offers,
             "calibrations": self.calibrations.iter()
-                .map(|calibration| json!({ "kind": calibration.kind.name(), "line": calibration.line }))
+                .map(|calibration| json!({ "kind": name(calibration.kind), "line": calibration.line }))
                 .collect::<Vec<_>>(),
             "page": page(self.page),
         })
@@ -269,6 +258,7 @@ mod tests {
         let gate = gate.expect("a parameter");
         assert_eq!(gate["value"], gate["default"]);
         assert!(gate["range"][0].as_f64() < gate["value"].as_f64(), "{gate}");
+        assert_eq!(card["calibrations"][1], json!({ "kind": "six_positions", "line": "calibrate six" }));
         let card = VehicleCard::of::<Rover>("two", &Rover::default_config()).json(0);
         assert_eq!(card["page"]["observers"][0]["plane"], json!(true));
     }

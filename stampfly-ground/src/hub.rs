@@ -75,6 +75,13 @@ pub enum Event {
         /// Its value now.
         value: f64,
     },
+    /// The vehicle is heard, or is not any more. Nothing is over: it may come again.
+    Link {
+        /// Is it heard?
+        up: bool,
+        /// What has happened.
+        text: String,
+    },
     /// Virtual time runs this much faster than the wall's.
     Speed {
         /// 0 while it stands.
@@ -175,6 +182,12 @@ impl Hub {
     #[must_use]
     pub fn witness(&self, vehicle: usize) -> Option<Watch> {
         Some(Watch(self.vehicles.get(vehicle)?.newest.clone()))
+    }
+
+    /// The topics of this vehicle, by their places in its card, that pages have looked for since the last call.
+    #[must_use]
+    pub fn looked_at(&self, vehicle: usize) -> Vec<usize> {
+        self.vehicles.get(vehicle).map(|shared| shared.newest.looked()).unwrap_or_default()
     }
 
     /// What this vehicle has been asked since the last call, oldest first, with who asked. Of a client's sticks only the

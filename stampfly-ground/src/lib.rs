@@ -10,13 +10,15 @@
 //! | [`VehicleCard`] | what a page is told of a vehicle once |
 //! | [`Hub`] | what flights and pages share |
 //! | [`Feed`] | the state that one page has subscribed to, as texts |
+//! | [`http`] | the little HTTP that a server of the page needs, over bytes |
 
 mod card;
 mod feed;
+pub mod http;
 mod hub;
 mod newest;
 
-pub use card::{Calibration, CalibrationKind, ParameterCard, TopicCard, VehicleCard};
+pub use card::{Calibration, ParameterCard, TopicCard, VehicleCard};
 pub use feed::Feed;
 pub use hub::{Client, Connection, Event, Hub, NotAsked};
 pub use newest::Watch;

@@ -8,7 +8,7 @@ use stampfly_bus::Schedule;
 use stampfly_flight::Observer;
 use stampfly_sim::vehicle::Witness;
 use stampfly_types::Instant;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A topic's newest sample.
@@ -24,6 +24,8 @@ struct Slot {
 #[derive(Debug)]
 pub struct Newest {
     slots: Vec<Mutex<Slot>>,
+    /// Of each topic: has somebody looked for a new sample?
+    looked: Vec<AtomicBool>,
     /// Topics of the bus: those beside it come after them.
     bus: usize,
     /// The vehicle's clock, µs.
@@ -33,8 +35,9 @@ pub struct Newest {
 impl Newest {
     /// Nothing yet, for topics of so many words, of which so many are on the bus.
     pub fn new(words: impl Iterator<Item = usize>, bus: usize) -> Self {
-        let slots = words.map(|words| Mutex::new(Slot { words: vec![0; words], ..Slot::default() })).collect();
-        Self { slots, bus, clock: AtomicU64::new(0) }
+        let slots: Vec<_> = words.map(|words| Mutex::new(Slot { words: vec![0; words], ..Slot::default() })).collect();
+        let looked = slots.iter().map(|_| AtomicBool::new(false)).collect();
+        Self { slots, looked, bus, clock: AtomicU64::new(0) }
     }
 
     fn note(&self, topic: usize, at: Instant, words: &[u32]) {
@@ -45,12 +48,19 @@ impl Newest {
         slot.words.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
     }
 
+    /// The topics for which somebody has looked since the last call.
+    pub fn looked(&self) -> Vec<usize> {
+        let all = self.looked.iter().enumerate();
+        all.filter(|(_, looked)| looked.swap(false, Ordering::Relaxed)).map(|(topic, _)| topic).collect()
+    }
+
     pub fn clock(&self) -> Instant {
         Instant::from_micros(self.clock.load(Ordering::Relaxed))
     }
 
     /// The newest sample of a topic, if more than `seen` have come: its instant and number. Its words are put into `words`.
     pub fn after(&self, topic: usize, seen: u64, words: &mut Vec<u32>) -> Option<(Instant, u64)> {
+        self.looked.get(topic)?.store(true, Ordering::Relaxed);
         let slot = self.slots.get(topic)?.lock().unwrap_or_else(PoisonError::into_inner);
         if slot.count == seen {
             return None;
@@ -65,6 +75,11 @@ impl Newest {
 pub struct Watch(pub Arc<Newest>);
 
 impl Watch {
+    /// The vehicle has started anew, and its clock with it.
+    pub fn restarted(&self) {
+        self.0.clock.store(0, Ordering::Relaxed);
+    }
+
     /// Takes a sample from elsewhere than a flight, such as a log: the topic's place in the card.
     pub fn note(&self, topic: usize, at: Instant, words: &[u32]) {
         self.0.clock.fetch_max(at.as_micros(), Ordering::Relaxed);

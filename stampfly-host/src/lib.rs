@@ -8,8 +8,10 @@
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
 //! | [`log`] | tools for logs: info, tables, MCAP, a part of one |
+//! | [`log_file`] | a log that grows while others read it |
 //! | [`serve`] | the ports at which other programs fly a simulated vehicle |
 //! | [`doctor`] | walks a newcomer through a vehicle before its first flight |
+//! | [`connect`] | the ground station of a real vehicle, at a serial port or behind TCP |
 //! | [`ground`] | a page that shows vehicles as they fly, and asks them for things |
 //! | [`report`] | one self-contained HTML page of a flight: path in space, plots, events, figures |
 //!
@@ -17,12 +19,14 @@
 //! [`Vehicle`](stampfly_sim::vehicle::Vehicle).
 
 pub mod campaign;
+pub mod connect;
 pub mod doctor;
 pub mod flown;
 pub mod golden;
 pub mod ground;
 pub mod hil;
 pub mod log;
+pub mod log_file;
 mod page;
 pub mod report;
 pub mod serve;

@@ -1,15 +1,17 @@
 //! The vehicles there are. This list is the only place in the programs that names one.
 
 use stampfly_board::simulation::StampFly;
+use stampfly_plane::simulation::Plane;
 use stampfly_rover::simulation::Rover;
 use stampfly_sim::vehicle::Vehicle;
+use stampfly_stm32_quad::simulation::Stm32Quad;
 use std::fmt;
 
 /// The vehicle that is meant when none is named.
 pub const DEFAULT: &str = StampFly::NAME;
 
 /// Names of all vehicles, as `--vehicle` takes them.
-pub const NAMES: &[&str] = &[StampFly::NAME, Rover::NAME];
+pub const NAMES: &[&str] = &[StampFly::NAME, Rover::NAME, Stm32Quad::NAME, Plane::NAME];
 
 /// Something to do for one vehicle, whichever it is.
 pub trait ForVehicle {
@@ -28,6 +30,8 @@ pub fn with<T: ForVehicle>(name: &str, task: T) -> Result<T::Output, UnknownVehi
     match name {
         StampFly::NAME => Ok(task.run::<StampFly>()),
         Rover::NAME => Ok(task.run::<Rover>()),
+        Stm32Quad::NAME => Ok(task.run::<Stm32Quad>()),
+        Plane::NAME => Ok(task.run::<Plane>()),
         _ => Err(UnknownVehicle(name.to_owned())),
     }
 }

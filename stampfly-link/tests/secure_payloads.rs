@@ -51,6 +51,8 @@ fn payload() -> impl Strategy<Value = Payload<'static>> {
     let value = any::<f32>().prop_filter("finite", |value| value.is_finite()).prop_map(normal);
     let words = prop::collection::vec(any::<[u8; 4]>(), 0..=Sample::MAX_WORDS).prop_map(|words| &*words.leak());
     prop_oneof![
+        any::<bool>().prop_map(|wanted| Payload::Record { wanted }),
+        prop::collection::vec(any::<u8>(), 0..=MAX_BODY).prop_map(|chunk| Payload::Chunk(chunk.leak())),
         sticks.prop_map(|([roll, pitch, yaw, throttle], mode, [arm, kill])| {
             Payload::Sticks(PilotInput { roll, pitch, yaw, throttle, mode, arm, kill })
         }),
@@ -62,6 +64,7 @@ fn payload() -> impl Strategy<Value = Payload<'static>> {
         any::<u16>().prop_map(|index| Payload::ReadParameter { index }),
         (any::<u16>(), value.clone()).prop_map(|(index, value)| Payload::WriteParameter { index, value }),
         text(MAX_BODY).prop_map(Payload::Line),
+        (any::<u16>(), any::<u16>()).prop_map(|(topic, period)| Payload::Watch { topic, period }),
         telemetry().prop_map(Payload::Telemetry),
         (any::<u16>(), value, any::<bool>()).prop_map(|(index, value, taken)| Payload::Parameter {
             index,

@@ -14,6 +14,7 @@
 //! | [`stage`] | what comes next: modes and their stages, for any vehicle | by its user |
 //! | [`authority`] | the sticks of the commander | 50 Hz |
 //! | [`button`] | what a press meant | 50 Hz |
+//! | [`gestures`] | arming by sticks, without a switch | by its user |
 //! | [`signal`] | what people see and hear | 30 Hz |
 //!
 //! Detection and decision are apart: the failsafe reports conditions, the machine acts on them. All of it is plain
@@ -30,6 +31,7 @@ mod config;
 pub mod decision;
 mod facts;
 pub mod failsafe;
+pub mod gestures;
 mod input;
 pub mod landing;
 mod lasting;
@@ -47,6 +49,7 @@ pub use button::{ButtonConfig, ButtonDecoder};
 pub use config::ModeConfig;
 pub use facts::{Asked, Facts};
 pub use failsafe::{Failsafe, FailsafeConfig, FailsafeInput};
+pub use gestures::Gestures;
 pub use landing::{LandingConfig, LandingInput, TakeoffLanding};
 pub use machine::{Command, ModeInput, ModeMachine, ModeOutput};
 pub use pilot::{Heard, Switched};

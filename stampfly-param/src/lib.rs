@@ -6,6 +6,7 @@
 //! | type | what it is |
 //! |---|---|
 //! | [`parameters!`] | declares a vehicle's parameters: name, default, range, unit |
+//! | [`rules!`], [`rules::check`] | which two values cannot be together, and why |
 //! | [`ParameterSet`] | applies a change as a whole at the next period, and rolls it back |
 //! | [`ParameterStore`] | loads and saves values by name, on any NOR flash; [`blocking::ParameterStore`] without `async` |
 //! | [`Storable`], [`AnyValue`] | what can be saved: numbers, yes or no, up to 32 bytes |
@@ -36,6 +37,7 @@ mod disarmed;
 mod error;
 mod pages;
 mod ram;
+pub mod rules;
 mod set;
 mod store;
 mod table;
@@ -44,6 +46,7 @@ mod value;
 pub use disarmed::Disarmed;
 pub use error::{EraseError, LoadError, OpenError, SaveError};
 pub use ram::RamFlash;
+pub use rules::Conflict;
 pub use set::{ParameterAction, ParameterRequest, ParameterSet, ParameterStatus};
 pub use store::{ParameterStore, key};
 pub use table::{Parameter, ParameterError, ParameterTable};

@@ -54,7 +54,7 @@ message! {
 ///
 /// parameters! {
 ///     /// A lamp.
-///     pub struct Lamp, consistent if |_lamp| true;
+///     pub struct Lamp, where lamp:
 ///     /// Light.
 ///     light: Light {
 ///         /// Brightness.
@@ -79,6 +79,8 @@ pub struct ParameterSet<P> {
     on_probation: bool,
     probation: Duration,
     status: ParameterStatus,
+    /// What was told of the parameters last.
+    told: Option<ParameterStatus>,
 }
 
 /// The values of the table, without probation.
@@ -101,7 +103,7 @@ impl<P: ParameterTable> ParameterSet<P> {
     fn holding(parameters: P, probation: Duration) -> Self {
         let [active, previous, candidate] = [parameters; 3];
         let status = ParameterStatus::default();
-        Self { active, previous, candidate, pending: false, on_probation: false, probation, status }
+        Self { active, previous, candidate, pending: false, on_probation: false, probation, status, told: None }
     }
 
     /// Changes one value of the candidate.
@@ -110,6 +112,15 @@ impl<P: ParameterTable> ParameterSet<P> {
     /// When there is no such parameter, or the value is out of range.
     pub fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
         P::TABLE.get(index).ok_or(ParameterError::Unknown)?.set(&mut self.candidate, value)
+    }
+
+    /// Changes the candidate, and applies it at once.
+    ///
+    /// # Errors
+    /// As [`apply`](Self::apply).
+    pub fn change(&mut self, change: impl FnOnce(&mut P)) -> Result<(), ParameterError> {
+        change(&mut self.candidate);
+        self.apply()
     }
 
     /// Validates the candidate; the next [`step`](Self::step) uses it.
@@ -165,6 +176,41 @@ impl<P: ParameterTable> ParameterSet<P> {
             self.status.applied_at = now;
         }
         self.active
+    }
+
+    /// A whole period: does what these requests ask for, [steps](Self::step), and says what is in use if that or its status is not what it said last.
+    ///
+    /// ```
+    /// # stampfly_param::parameters! {
+    /// #     /// A lamp.
+    /// #     pub struct Lamp, where lamp:
+    /// #     /// Light.
+    /// #     light: Light {
+    /// #         /// Brightness.
+    /// #         level = 0.5 in [0.0, 1.0] "1";
+    /// #     }
+    /// # }
+    /// use stampfly_param::{ParameterAction, ParameterRequest, ParameterSet};
+    /// use stampfly_types::Instant;
+    /// let mut set = ParameterSet::<Lamp>::default();
+    /// assert!(set.period(Instant::from_millis(10), true, []).is_some(), "the first time");
+    /// assert_eq!(set.period(Instant::from_millis(20), true, []), None);
+    /// let wild = ParameterRequest { index: 0, value: 7.0, ..ParameterRequest::default() };
+    /// let (in_use, status) = set.period(Instant::from_millis(30), true, [wild]).unwrap();
+    /// assert_eq!((in_use.light.level, status.refused), (0.5, 1));
+    /// ```
+    pub fn period(
+        &mut self,
+        now: Instant,
+        healthy: bool,
+        requests: impl IntoIterator<Item = ParameterRequest>,
+    ) -> Option<(P, ParameterStatus)> {
+        for request in requests {
+            // A refusal is in the status.
+            let _ = self.request(&request);
+        }
+        let in_use = self.step(now, healthy);
+        (self.told.replace(self.status) != Some(self.status)).then_some((in_use, self.status))
     }
 
     /// Version, time of the last change, requests refused.

@@ -7,6 +7,7 @@
 //!
 //! Only `f32`. A choice between two components is not a number: make it an enumeration of the vehicle's configuration.
 
+use crate::rules::{self, Conflict, Rule};
 use core::fmt;
 
 /// One parameter of the set `P`: a line of the table.
@@ -34,17 +35,17 @@ pub enum ParameterError {
     Unknown,
     /// The value is outside its range, or not a number.
     OutOfRange,
-    /// Each value is in its range, but they contradict one another.
-    Inconsistent,
+    /// Each value is in its range, but with these two the vehicle cannot do its work.
+    Conflict(Conflict),
 }
 
 impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Unknown => "there is no such parameter",
-            Self::OutOfRange => "the value is out of range",
-            Self::Inconsistent => "the values contradict one another",
-        })
+        match self {
+            Self::Unknown => f.write_str("there is no such parameter"),
+            Self::OutOfRange => f.write_str("the value is out of range"),
+            Self::Conflict(conflict) => conflict.fmt(f),
+        }
     }
 }
 
@@ -76,8 +77,8 @@ pub trait ParameterTable: Copy + Default + 'static {
     /// [`ParameterRequest`](crate::ParameterRequest).
     const TABLE: &'static [Parameter<Self>];
 
-    /// Do the values agree with one another, each being in its range?
-    fn is_consistent(&self) -> bool;
+    /// Which values, each being in its range, cannot be together.
+    const RULES: &'static [Rule<Self>];
 
     /// The parameter of this name.
     ///
@@ -90,12 +91,12 @@ pub trait ParameterTable: Copy + Default + 'static {
     /// Checks the set as a whole.
     ///
     /// # Errors
-    /// When a value is outside its range, or they contradict one another.
+    /// When a value is outside its range, or two break a rule.
     fn validate(&self) -> Result<(), ParameterError> {
         if !Self::TABLE.iter().all(|row| (row.min..=row.max).contains(&row.get(self))) {
             return Err(ParameterError::OutOfRange);
         }
-        if self.is_consistent() { Ok(()) } else { Err(ParameterError::Inconsistent) }
+        rules::check(Self::RULES, self, None).map_err(ParameterError::Conflict)
     }
 }
 
@@ -106,7 +107,8 @@ pub trait ParameterTable: Copy + Default + 'static {
 ///
 /// parameters! {
 ///     /// The parameters of a boat.
-///     pub struct BoatParameters, consistent if |p| p.motor.idle < p.motor.full;
+///     pub struct BoatParameters, where p:
+///     "motor.idle" "motor.full" p.motor.idle < p.motor.full => "the throttle would do nothing";
 ///
 ///     /// Motor.
 ///     motor: MotorParameters {
@@ -126,14 +128,16 @@ pub trait ParameterTable: Copy + Default + 'static {
 /// assert_eq!(parameters.motor.full, 0.9);
 /// BoatParameters::find("motor.idle")?.set(&mut parameters, 0.5)?;
 /// BoatParameters::find("motor.full")?.set(&mut parameters, 0.4)?;
-/// assert_eq!(parameters.validate(), Err(ParameterError::Inconsistent));
+/// let refused = parameters.validate().unwrap_err();
+/// assert_eq!(refused.to_string(), "motor.idle with motor.full: the throttle would do nothing");
 /// assert_eq!(BoatParameters::find("rudder.max_angle")?.set(&mut parameters, f32::NAN), Err(ParameterError::OutOfRange));
 /// # Ok::<(), ParameterError>(())
 /// ```
 #[macro_export]
 macro_rules! parameters {
     (
-        $(#[$set_doc:meta])* $vis:vis struct $Set:ident, consistent if |$set:ident| $consistent:expr;
+        $(#[$set_doc:meta])* $vis:vis struct $Set:ident, where $set:ident:
+        $($first:literal $second:literal $holds:expr => $reason:literal;)*
         $($(#[$group_doc:meta])* $group:ident: $Group:ident {
             $($(#[doc = $doc:literal])* $name:ident = $default:literal in [$min:literal, $max:literal] $unit:literal;)+
         })+
@@ -176,10 +180,8 @@ macro_rules! parameters {
                 min: $min, max: $max, unit: $unit, meaning: concat!($($doc),*).trim_ascii(), __field: |parameters| &mut parameters.$group.$name,
             }),+),+];
 
-            fn is_consistent(&self) -> bool {
-                let $set = self;
-                $consistent
-            }
+            const RULES: &'static [$crate::rules::Rule<Self>] =
+                $crate::rules! { $set: $($first $second $holds => $reason;)* };
         }
     };
 }

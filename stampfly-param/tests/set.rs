@@ -8,7 +8,8 @@ use stampfly_types::{Duration, Instant, Message};
 
 parameters! {
     /// A crane.
-    pub struct Crane, consistent if |crane| crane.hoist.slow <= crane.hoist.fast;
+    pub struct Crane, where crane:
+    "hoist.slow" "hoist.fast" crane.hoist.slow <= crane.hoist.fast => "slow would be faster than fast";
 
     /// Hoist.
     hoist: Hoist {
@@ -79,7 +80,8 @@ fn what_is_not_valid_changes_nothing() {
     assert_eq!(set.set(0, 1.1), Err(ParameterError::OutOfRange));
     assert_eq!(set.set(0, f32::NAN), Err(ParameterError::OutOfRange));
     set.set(0, 0.9).expect("in range");
-    assert_eq!(set.apply(), Err(ParameterError::Inconsistent), "slow is faster than fast");
+    let refused = set.apply().expect_err("slow is faster than fast");
+    assert_eq!(refused.to_string(), "hoist.slow with hoist.fast: slow would be faster than fast");
     set.set(1, 0.4).expect("in range");
     set.apply().expect("the candidate started again, without the 0.9");
     assert_eq!(set.step(at(0), true).hoist, Hoist { slow: 0.1, fast: 0.4 });

@@ -5,12 +5,12 @@
 //! [`view`](Cockpit::view); a [`Refusal`] says that it did not even get there.
 
 use crate::lease::is_sane;
-use crate::mission::Origin;
 use crate::refusal::{Refusal, Seat};
 use crate::view::View;
 use stampfly_flight::parameters::Parameters;
 use stampfly_types::Instant;
-use stampfly_types::messages::{GuidedCommand, GuidedKind, PilotInput};
+use stampfly_types::Origin;
+use stampfly_types::messages::{CalibrationKind, CalibrationReport, GuidedCommand, GuidedKind, PilotInput};
 
 /// What a board does for a disarmed vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +18,10 @@ use stampfly_types::messages::{GuidedCommand, GuidedKind, PilotInput};
 pub enum Request {
     /// Keep the parameters over a restart.
     SaveParameters,
+    /// Give every parameter its default.
+    ResetParameters,
+    /// Look for a transmitter that binds.
+    Bind,
     /// Turn one motor for a moment.
     TestMotor {
         /// From 1.
@@ -29,6 +33,10 @@ pub enum Request {
     StopMotor,
     /// Restart, with the parameters that were kept.
     Restart,
+    /// Begin a calibration; [`CalibrationKind::None`] ends the one that is under way.
+    Calibrate(CalibrationKind),
+    /// Take what a calibration has found as parameters, and keep them.
+    AcceptCalibration(CalibrationReport),
 }
 
 /// A vehicle, as services see it.

@@ -4,13 +4,20 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`cockpit`] | what a service sees of a vehicle, and what it may ask for |
+//! | [`helm`] | the part of a cockpit that is the same for every vehicle |
+//! | [`desk`] | a station's questions for parameters, and its lines of the console |
+//! | [`Requested`] | parameters of a vehicle that takes requests for them |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`lease`] | one program at a time commands; whoever flies by hand comes first |
 //! | [`mission`] | steps that a vehicle flies one after the other |
+//! | [`tape`] | who is sent the flight record |
 //! | [`telemetry`] | a packet for whoever listens, fifty times a second |
 //! | [`data_stream`] | every control cycle, for whoever asked for it |
 //! | [`tello`] | the text commands of a Tello, and its state |
 //! | [`mavlink`] | the vehicle's end of MAVLink (feature `mavlink`) |
+//! | [`cable`] | everything that is spoken on a serial line (feature `mavlink`) |
+//! | [`association`] | when a board's radio joins an access point, and what it is told to |
+//! | [`network`] | what is spoken at ports that others can reach (feature `mavlink`), and a stack of fixed size (feature `network`) |
 //! | [`msp`] | the vehicle's end of MSP, for configurators |
 //!
 //! A service takes bytes and the time and gives bytes. It does no input or output, allocates nothing, and every client costs it a
@@ -20,24 +27,39 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod association;
+#[cfg(feature = "mavlink")]
+pub mod cable;
 pub mod cockpit;
 pub mod data_stream;
+pub mod desk;
+pub mod helm;
 pub mod lease;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
 pub mod mission;
 pub mod msp;
+#[cfg(feature = "mavlink")]
+pub mod network;
 mod refusal;
+mod requested;
+pub mod tape;
 pub mod telemetry;
 pub mod tello;
+mod version;
 pub mod view;
 
 pub use cockpit::{Cockpit, Request};
 pub use data_stream::DataStream;
+pub use desk::Desk;
+pub use helm::{Hands, Helm, Seated};
 pub use lease::Lease;
 pub use refusal::{Refusal, Seat};
+pub use requested::Requested;
+pub use tape::Tape;
 pub use telemetry::Telemetry;
 pub use tello::Tello;
+pub use version::version;
 pub use view::{Places, Samples, View};
 
 /// The wire formats.

@@ -81,24 +81,43 @@ pub struct Card {
     /// The PID table, at most [`ROWS`]; configurators that know no names expect roll, pitch, yaw, altitude, position, position rate, navigation, level, magnetometer,
     /// velocity.
     pub rows: &'static [PidRow],
+    /// What else programs of MultiWii change; `None` where they cannot.
+    pub misc: Option<Misc>,
+}
+
+/// The four numbers of MultiWii's `MISC` that a vehicle may have as parameters. A program that sends less than all changes what it sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misc {
+    /// The least command, a number of two bytes.
+    pub least_command: PidTerm,
+    /// Scale of the battery's voltage.
+    pub battery_scale: PidTerm,
+    /// The level at which it warns.
+    pub battery_warning: PidTerm,
+    /// The level at which it is empty.
+    pub battery_critical: PidTerm,
 }
 
 impl Scale {
-    fn byte(self, value: f32) -> u8 {
+    fn number(self, value: f32, most: u16) -> u16 {
         let scaled = match self {
             Self::Times(factor) => value * factor,
             Self::Over(factor) => factor / value,
         };
         // Rounds; no number becomes zero.
-        (scaled + 0.5).clamp(0.0, 255.0) as u8
+        (scaled + 0.5).clamp(0.0, most.into()) as u16
+    }
+
+    fn byte(self, value: f32) -> u8 {
+        self.number(value, u8::MAX.into()) as u8
     }
 
     /// What a parameter that goes up to `most` is then.
-    fn value(self, byte: u8, most: f32) -> f32 {
+    fn value(self, number: u16, most: f32) -> f32 {
         match self {
-            Self::Times(factor) => f32::from(byte) / factor,
-            Self::Over(_) if byte == 0 => most,
-            Self::Over(factor) => factor / f32::from(byte),
+            Self::Times(factor) => f32::from(number) / factor,
+            Self::Over(_) if number == 0 => most,
+            Self::Over(factor) => factor / f32::from(number),
         }
     }
 }
@@ -146,6 +165,7 @@ fn pulse(stick: f32) -> u16 {
 /// use stampfly_services::msp::{Card, Msp};
 /// const CARD: Card = Card {
 ///     variant: *b"SFLY", board: *b"SFLY", version: [0, 2, 0], name: "stampfly", kind: 3, motors: 4, cycle: 2_500, long_analog: true, rows: &[],
+///     misc: None,
 /// };
 /// assert_eq!(Msp::new(&CARD).discarded(), 0);
 /// ```
@@ -197,12 +217,16 @@ fn answer(now: Instant, card: &Card, asked: &MspFrame<'_>, cockpit: &mut dyn Coc
     let status = cockpit.view().state();
     let disarmed = !status.armed;
     match asked.id {
-        // SET_PID, SET_REBOOT, EEPROM_WRITE, SELECT_SETTING of the only profile.
+        // SET_PID, SET_MISC, RESET_CONF, BIND of MultiWii, SET_REBOOT, EEPROM_WRITE, SELECT_SETTING of the only profile.
         202 if disarmed => set_pids(card, asked.payload, cockpit.parameters()).then_some(empty),
+        207 if disarmed => set_misc(&card.misc?, asked.payload, cockpit.parameters()).then_some(empty),
+        208 if disarmed => cockpit.request(now, Request::ResetParameters).is_ok().then_some(empty),
+        241 if disarmed => cockpit.request(now, Request::Bind).is_ok().then_some(empty),
         68 if disarmed => cockpit.request(now, Request::Restart).is_ok().then_some(empty),
         250 if disarmed => cockpit.request(now, Request::SaveParameters).is_ok().then_some(empty),
         210 if disarmed && asked.payload == [0] => Some(empty),
         112 => Some(pids(card, cockpit.parameters())),
+        114 if card.misc.is_some() => Some(misc(&card.misc?, cockpit.parameters())),
         _ => identity(card, asked.id).or_else(|| state(card, asked.id, &status, cockpit)),
     }
 }
@@ -310,17 +334,48 @@ fn pids(card: &Card, parameters: &dyn Parameters) -> Payload {
     bytes.fold(Payload::new(), Payload::u8)
 }
 
-fn byte(term: PidTerm, parameters: &dyn Parameters) -> u8 {
-    let value = parameters::find(parameters, term.parameter).ok().and_then(|index| parameters.get(index));
-    value.map_or(0, |value| term.scale.byte(value))
+/// `MISC`: power trigger, least and largest throttle, least command, failsafe throttle, flights, life time, declination, then the battery's scale, first
+/// warning, warning and critical level. What a vehicle does not have is zero.
+fn misc(of: &Misc, parameters: &dyn Parameters) -> Payload {
+    let [scale, warning, critical] =
+        [of.battery_scale, of.battery_warning, of.battery_critical].map(|term| shown(term, u8::MAX.into(), parameters));
+    let empty = Payload::new().u16(0).u16(0).u16(0).u16(shown(of.least_command, u16::MAX, parameters));
+    empty.u16(0).u16(0).u32(0).u16(0).u8(scale as u8).u8(0).u8(warning as u8).u8(critical as u8)
 }
 
-/// Changes all or nothing. A byte that is what was shown leaves its parameter alone, which it stands for only roughly.
+/// Where they are in the payload. Old programs send its first two bytes alone.
+fn set_misc(of: &Misc, payload: &[u8], parameters: &mut dyn Parameters) -> bool {
+    let word = payload.get(6..8).and_then(|bytes| bytes.first_chunk()).map(|bytes| u16::from_le_bytes(*bytes));
+    let byte = |at: usize| payload.get(at).map(|byte| u16::from(*byte));
+    let sent = [
+        (of.least_command, word, u16::MAX),
+        (of.battery_scale, byte(18), u8::MAX.into()),
+        (of.battery_warning, byte(20), u8::MAX.into()),
+        (of.battery_critical, byte(21), u8::MAX.into()),
+    ];
+    change(sent.into_iter().filter_map(|(term, number, most)| Some((term, number?, most))), parameters)
+}
+
+/// The number that stands for a parameter; 0 for one that there is not.
+fn shown(term: PidTerm, most: u16, parameters: &dyn Parameters) -> u16 {
+    let value = parameters::find(parameters, term.parameter).ok().and_then(|index| parameters.get(index));
+    value.map_or(0, |value| term.scale.number(value, most))
+}
+
+fn byte(term: PidTerm, parameters: &dyn Parameters) -> u8 {
+    shown(term, u8::MAX.into(), parameters) as u8
+}
+
 fn set_pids(card: &Card, payload: &[u8], parameters: &mut dyn Parameters) -> bool {
     let terms = card.rows.iter().take(ROWS).flat_map(|row| row.terms);
+    change(terms.zip(payload).filter_map(|(term, new)| Some((term?, u16::from(*new), u8::MAX.into()))), parameters)
+}
+
+/// Changes all or nothing: parameters, numbers, and the most that fits there. A number that is what was shown leaves its parameter alone, which it stands for only roughly.
+fn change(numbers: impl Iterator<Item = (PidTerm, u16, u16)>, parameters: &mut dyn Parameters) -> bool {
     let mut wanted: Vec<(usize, f32), { 3 * ROWS }> = Vec::new();
-    for (term, new) in terms.zip(payload).filter_map(|(term, new)| Some((term?, *new))) {
-        if byte(term, parameters) == new {
+    for (term, new, most) in numbers {
+        if shown(term, most, parameters) == new {
             continue;
         }
         let Ok(index) = parameters::find(parameters, term.parameter) else { return false };
@@ -330,5 +385,17 @@ fn set_pids(card: &Card, payload: &[u8], parameters: &mut dyn Parameters) -> boo
             return false;
         }
     }
-    wanted.iter().all(|(index, value)| parameters.set(*index, *value).is_ok())
+    // Each value before, so that a combination that cannot fly changes nothing.
+    let mut before: Vec<(usize, f32), { 3 * ROWS }> = Vec::new();
+    let taken = wanted.iter().all(|(index, value)| {
+        let _ = parameters.get(*index).map(|value| before.push((*index, value)));
+        parameters.set(*index, *value).is_ok()
+    });
+    let flies = taken && before.iter().all(|(index, _)| parameters.check(Some(*index)).is_ok());
+    if !flies {
+        for (index, value) in before {
+            let _ = parameters.set(index, value);
+        }
+    }
+    flies
 }

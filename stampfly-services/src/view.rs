@@ -91,6 +91,8 @@ views! {
     estimate: StateEstimate = "estimate_state";
     /// The still-calibration.
     calibration: CalibrationResult = "calibration";
+    /// How far a calibration is that somebody has asked for, and what it has found.
+    calibration_report: CalibrationReport = "calibration_report";
     /// Phase, mode, armed, why it would not arm.
     status: FlightStatus = "flight_status";
     /// What the failsafe has found.

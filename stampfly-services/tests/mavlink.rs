@@ -8,11 +8,13 @@ use stampfly_link::mavlink::dialects::common::*;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use stampfly_services::mavlink::{CLIENTS, Identity, Mavlink, short_name};
 use stampfly_services::{Request, Seat};
-use stampfly_types::messages::{Alerts, ArmBlocks, GuidedKind, SystemAlert};
+use stampfly_types::messages::{
+    Alerts, ArmBlocks, CalibrationKind, CalibrationReport, CalibrationStage, GuidedKind, SystemAlert,
+};
 use stampfly_types::{Instant, Vec3};
 
 const IDENTITY: Identity =
-    Identity { system: 7, kind: MavType::MAV_TYPE_QUADROTOR, take_off_height: 0.5, version: [1, 2, 3] };
+    Identity { system: 7, kind: MavType::MAV_TYPE_QUADROTOR, take_off_height: 0.5, reach: 0.25, version: [1, 2, 3] };
 
 /// A ground station at a line of its own.
 struct Station {
@@ -229,8 +231,63 @@ fn parameters_are_listed_read_and_set_within_their_range_on_the_ground() {
     assert_eq!(set(&mut vehicle, &long, 4.0), Some(4.0));
     assert_eq!(set(&mut vehicle, "nonsense", 4.0), None);
     vehicle.status(|status| status.armed = true);
-    assert_eq!(set(&mut vehicle, "gain", 5.0), Some(3.0), "armed");
-    assert_eq!(vehicle.parameters.0, [3.0, 4.0]);
+    assert_eq!(set(&mut vehicle, "gain", 5.0), Some(5.0), "may change in flight");
+    assert_eq!(set(&mut vehicle, "gain", 11.0), Some(5.0), "as far as its range goes");
+    assert_eq!(vehicle.parameters.0, [5.0, 4.0]);
+}
+
+#[test]
+fn what_may_not_change_in_flight_is_taken_and_said_to_wait() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let set = |name: &str, value| {
+        let mut param_id = [0; 16];
+        param_id.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
+        MavMessage::PARAM_SET(PARAM_SET_DATA {
+            param_value: value,
+            target_system: 7,
+            target_component: 1,
+            param_id: param_id.into(),
+            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+        })
+    };
+    let mut texts = |vehicle: &mut Vehicle, message: &MavMessage| {
+        let answers = station.asks(Instant::from_millis(10), &mut mavlink, vehicle, message);
+        answers.iter().fold(String::new(), |said, answer| match answer {
+            MavMessage::STATUSTEXT(text) => said + text.text.to_str().expect("UTF-8"),
+            _ => said,
+        })
+    };
+    let long = "a.name.that.is.longer.than.sixteen";
+    let said = texts(&mut vehicle, &set(&short_name(long), 4.0));
+    assert_eq!(said, format!("{long}: not in flight: waits until the vehicle is disarmed"));
+    assert_eq!(texts(&mut vehicle, &set("gain", 4.0)), "");
+    assert_eq!(vehicle.parameters.0, [4.0, 4.0]);
+}
+
+#[test]
+fn a_combination_that_cannot_fly_keeps_the_old_value_and_says_why_in_pieces() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    vehicle.parameters.0 = [3.0, 9.0];
+    let set = PARAM_SET_DATA {
+        param_value: 7.0,
+        target_system: 7,
+        target_component: 1,
+        param_id: "gain".into(),
+        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+    };
+    let (mut values, mut pieces) = (Vec::new(), Vec::new());
+    for answer in station.asks(Instant::from_millis(10), &mut mavlink, &mut vehicle, &MavMessage::PARAM_SET(set)) {
+        match answer {
+            MavMessage::PARAM_VALUE(value) => values.push(value.param_value),
+            MavMessage::STATUSTEXT(piece) => pieces.push(piece),
+            _ => {}
+        }
+    }
+    assert_eq!((values, vehicle.parameters.0), (vec![3.0], [3.0, 9.0]));
+    let text: String = pieces.iter().map(|piece| piece.text.to_str().expect("text")).collect();
+    assert_eq!(text, "gain with a.name.that.is.longer.than.sixteen: seven and nine never fly together, on no day");
+    let places: Vec<_> = pieces.iter().map(|piece| (piece.id, piece.chunk_seq)).collect();
+    assert!(places[0].0 != 0 && places == [(places[0].0, 0), (places[0].0, 1)], "{places:?}");
 }
 
 #[test]
@@ -321,4 +378,116 @@ fn bytes_of_strangers_are_answered_by_nothing() {
         mavlink.hear(Instant::ZERO, 1, part, &mut vehicle, &mut |_, frame| panic!("{frame:02x?}"));
     }
     assert!(vehicle.guided.is_empty() && vehicle.steered.is_empty() && vehicle.alive.is_empty());
+}
+
+/// Texts of a station, and results of the calibration command with their progress.
+fn calibration_of(of: u8, sent: &[(u8, MavMessage)]) -> (Vec<String>, Vec<(MavResult, u8)>) {
+    let (mut texts, mut results) = (Vec::new(), Vec::new());
+    for (_, message) in sent.iter().filter(|(to, _)| *to == of) {
+        match message {
+            MavMessage::STATUSTEXT(text) if text.chunk_seq == 0 => {
+                texts.push(text.text.to_str().expect("UTF-8").to_owned())
+            }
+            MavMessage::COMMAND_ACK(ack) if ack.command == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION => {
+                results.push((ack.result, ack.progress));
+            }
+            _ => {}
+        }
+    }
+    (texts, results)
+}
+
+/// A vehicle whose level is being calibrated for station 1, with a second station beside it.
+fn calibrating() -> (Mavlink<u8>, Vehicle, Station) {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    let level = command(MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION, [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
+    let now = Instant::from_millis(20);
+    let answers = station.asks(now, &mut mavlink, &mut vehicle, &level);
+    let (texts, results) =
+        calibration_of(1, &answers.into_iter().map(|answer| (1, answer)).collect::<Vec<(u8, MavMessage)>>());
+    assert_eq!(results, [(MavResult::MAV_RESULT_IN_PROGRESS, u8::MAX)]);
+    assert_eq!(texts[0], "[cal] calibration started: 2 level");
+    assert_eq!(vehicle.requests, [Request::Calibrate(CalibrationKind::Level)]);
+    // Asked again, because the acknowledgement was lost: it goes on.
+    assert_eq!(result(&station.asks(now, &mut mavlink, &mut vehicle, &level)), Some(MavResult::MAV_RESULT_IN_PROGRESS));
+    let mut other = Station::new(2);
+    let answers = other.asks(now, &mut mavlink, &mut vehicle, &level);
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
+    assert_eq!(vehicle.requests.len(), 1);
+    (mavlink, vehicle, station)
+}
+
+fn report(stage: CalibrationStage, progress: f32) -> CalibrationReport {
+    CalibrationReport { kind: CalibrationKind::Level, stage, progress, ..Default::default() }
+}
+
+#[test]
+fn a_calibration_is_in_progress_until_it_is_done_and_is_then_taken() {
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    // What an earlier one has found is none of this one's.
+    vehicle.publish_at(Instant::from_millis(10), Id::calibration_report, &report(CalibrationStage::Done, 1.0));
+    let (_, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 40, 200));
+    assert_eq!((results, vehicle.requests.len()), (vec![], 1));
+    vehicle.publish_at(Instant::from_millis(200), Id::calibration_report, &report(CalibrationStage::Running, 0.4));
+    let sent = polled(&mut mavlink, &mut vehicle, 200, 2_220);
+    let (texts, results) = calibration_of(1, &sent);
+    assert_eq!(results, [(MavResult::MAV_RESULT_IN_PROGRESS, 40); 5], "twice a second, and at once");
+    assert_eq!(texts[1], "[cal] progress <40>");
+    assert!(texts[0].starts_with("[cal] level: 40 %"), "{texts:?}");
+    assert_eq!(calibration_of(2, &sent), (vec![], vec![]), "nothing of that is for others");
+    let found = report(CalibrationStage::Done, 1.0);
+    vehicle.publish_at(Instant::from_millis(2_300), Id::calibration_report, &found);
+    let (texts, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 2_300, 4_000));
+    assert_eq!(results, [(MavResult::MAV_RESULT_ACCEPTED, 100)]);
+    assert_eq!(texts.last().expect("a text"), "[cal] calibration done: level");
+    assert_eq!(vehicle.requests[1..], [Request::AcceptCalibration(found)]);
+}
+
+#[test]
+fn a_calibration_that_ends_otherwise_is_not_taken_and_says_so() {
+    for (stage, expected, text) in [
+        (CalibrationStage::Cancelled, MavResult::MAV_RESULT_CANCELLED, "[cal] calibration cancelled"),
+        (CalibrationStage::Armed, MavResult::MAV_RESULT_FAILED, "[cal] calibration failed: level"),
+        (CalibrationStage::TimedOut, MavResult::MAV_RESULT_FAILED, "[cal] calibration failed: level"),
+        (CalibrationStage::Implausible, MavResult::MAV_RESULT_FAILED, "[cal] calibration failed: level"),
+    ] {
+        let (mut mavlink, mut vehicle, _) = calibrating();
+        vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &report(stage, 0.5));
+        let (texts, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000));
+        assert_eq!((results, vehicle.requests.len()), (vec![(expected, 100)], 1), "{stage:?}");
+        assert_eq!(texts.last().expect("a text"), text);
+    }
+    // Somebody at the command line has begun another one.
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    let other = CalibrationReport { kind: CalibrationKind::Magnetometer, ..report(CalibrationStage::Running, 0.1) };
+    vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &other);
+    let (_, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000));
+    assert_eq!(results, [(MavResult::MAV_RESULT_CANCELLED, 100)]);
+    // A vehicle that says nothing.
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    let (_, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 5_000));
+    assert_eq!(results, [(MavResult::MAV_RESULT_FAILED, 0)]);
+    // Whoever has asked is gone: nothing is taken.
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    mavlink.close(1);
+    vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &report(CalibrationStage::Done, 1.0));
+    assert_eq!(calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000)), (vec![], vec![]));
+    assert_eq!(vehicle.requests.len(), 1);
+}
+
+#[test]
+fn what_cannot_be_calibrated_is_said_in_words_and_nothing_cancels_everything() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    let mut ask = |vehicle: &mut Vehicle, parameters| {
+        let command = command(MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION, parameters);
+        let answers = station.asks(Instant::from_millis(20), &mut mavlink, vehicle, &command);
+        (result(&answers).expect("an answer"), answers.len() > 1)
+    };
+    let gyro = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert_eq!(ask(&mut vehicle, gyro), (MavResult::MAV_RESULT_UNSUPPORTED, true));
+    let both = [0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0];
+    assert_eq!(ask(&mut vehicle, both), (MavResult::MAV_RESULT_DENIED, false));
+    assert_eq!(vehicle.requests, []);
+    assert_eq!(ask(&mut vehicle, [0.0; 7]), (MavResult::MAV_RESULT_ACCEPTED, false));
+    assert_eq!(vehicle.requests, [Request::Calibrate(CalibrationKind::None)]);
 }

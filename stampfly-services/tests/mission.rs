@@ -13,7 +13,7 @@ use stampfly_types::messages::*;
 use stampfly_types::{Instant, Vec3};
 
 const IDENTITY: Identity =
-    Identity { system: 7, kind: MavType::MAV_TYPE_QUADROTOR, take_off_height: 0.5, version: [1, 2, 3] };
+    Identity { system: 7, kind: MavType::MAV_TYPE_QUADROTOR, take_off_height: 0.5, reach: 0.25, version: [1, 2, 3] };
 const NO: MavMissionType = MavMissionType::MAV_MISSION_TYPE_MISSION;
 
 type Answers = Vec<MavMessage>;
@@ -493,4 +493,35 @@ fn strangers_do_not_keep_a_station_with_the_key_out() {
     });
     let frame = MavlinkWriter::new(255, 190).write_signed(Instant::ZERO, &message, &mut signer, &mut bytes);
     assert_ne!(scene.hear(1, frame.expect("a frame")), []);
+}
+
+#[test]
+fn a_vehicle_with_less_memory_says_that_there_is_no_space_and_takes_what_there_is_space_for() {
+    let mut mavlink = Mavlink::<u8, 1, 4>::for_clients(IDENTITY);
+    let mut vehicle = Vehicle::standing();
+    let mut says = |message: MavMessage| {
+        let (mut bytes, mut sent) = ([0; LONGEST], Vec::new());
+        let frame = MavlinkWriter::new(255, 190).write(MavlinkVersion::V2, &message, &mut bytes).expect("a frame");
+        mavlink.hear(Instant::ZERO, 1, frame, &mut vehicle, &mut |_, frame| sent.extend(frame));
+        Scene::read(&sent)
+    };
+    match &says(count(5))[..] {
+        [MavMessage::MISSION_ACK(ack)] => assert_eq!(ack.mavtype, MavMissionResult::MAV_MISSION_NO_SPACE),
+        other => panic!("{other:?}"),
+    }
+    let mut answers = says(count(4));
+    for seq in 0..4 {
+        assert!(
+            matches!(&answers[..], [MavMessage::MISSION_REQUEST_INT(request)] if request.seq == seq),
+            "{answers:?}"
+        );
+        answers =
+            says(MavMessage::MISSION_ITEM_INT(MISSION_ITEM_INT_DATA { seq, ..way_point([f32::from(seq), 0.0, -1.0]) }));
+    }
+    match &answers[..] {
+        [MavMessage::MISSION_ACK(ack), MavMessage::MISSION_CURRENT(state)] => {
+            assert_eq!((ack.mavtype, state.total), (MavMissionResult::MAV_MISSION_ACCEPTED, 4));
+        }
+        other => panic!("{other:?}"),
+    }
 }

@@ -5,7 +5,7 @@ mod common;
 use common::{Id, Vehicle};
 use serde_json::Value;
 use stampfly_services::Request;
-use stampfly_services::msp::{Card, Msp, PidRow, PidTerm, Scale};
+use stampfly_services::msp::{Card, Misc, Msp, PidRow, PidTerm, Scale};
 use stampfly_types::messages::*;
 use stampfly_types::{Instant, Quat, Vec3};
 
@@ -29,6 +29,12 @@ const CARD: Card = Card {
         },
         PidRow { name: "YAW", terms: [Some(PidTerm { parameter: "not there", scale: Scale::Times(1.0) }), None, None] },
     ],
+    misc: Some(Misc {
+        least_command: PidTerm { parameter: "gain", scale: Scale::Times(1000.0) },
+        battery_scale: PidTerm { parameter: "a.name.that.is.longer.than.sixteen", scale: Scale::Times(70.0) },
+        battery_warning: PidTerm { parameter: "a.name.that.is.longer.than.sixteen", scale: Scale::Times(10.0) },
+        battery_critical: PidTerm { parameter: "not there", scale: Scale::Times(10.0) },
+    }),
 };
 
 fn framed(direction: u8, id: u8, payload: &[u8]) -> Vec<u8> {
@@ -165,4 +171,31 @@ fn a_question_that_was_cut_short_is_forgotten_after_a_silence() {
     msp.hear(Instant::ZERO, b"$M<\x20\xCA", &mut vehicle, &mut |frame| answer.extend(frame));
     msp.hear(Instant::from_millis(600), &framed(b'<', 2, &[]), &mut vehicle, &mut |frame| answer.extend(frame));
     assert_eq!(answer, framed(b'>', 2, b"TEST"));
+}
+
+#[test]
+fn of_misc_only_what_is_sent_changes() {
+    let mut vehicle = Vehicle::standing();
+    vehicle.parameters.0 = [1.013, 3.0];
+    let mut payload = [0; 22];
+    payload[6..8].copy_from_slice(&1013_u16.to_le_bytes());
+    (payload[18], payload[20]) = (210, 30);
+    assert_eq!(asked(&mut vehicle, 114, &[]), framed(b'>', 114, &payload));
+    // Older programs send the power trigger alone.
+    assert_eq!(asked(&mut vehicle, 207, &payload[..2]), framed(b'>', 207, &[]));
+    assert_eq!(vehicle.parameters.0, [1.013, 3.0]);
+    payload[6..8].copy_from_slice(&1500_u16.to_le_bytes());
+    assert_eq!(asked(&mut vehicle, 207, &payload[..8]), framed(b'>', 207, &[]));
+    assert_eq!(vehicle.parameters.0, [1.5, 3.0]);
+    // A parameter that there is not cannot be changed, so nothing is.
+    (payload[18], payload[21]) = (140, 1);
+    assert_eq!(asked(&mut vehicle, 207, &payload), framed(b'!', 207, &[]));
+    assert_eq!(vehicle.parameters.0, [1.5, 3.0]);
+    assert_eq!(asked(&mut vehicle, 208, &[]), framed(b'>', 208, &[]));
+    assert_eq!(asked(&mut vehicle, 241, &[]), framed(b'>', 241, &[]));
+    assert_eq!(vehicle.requests, [Request::ResetParameters, Request::Bind]);
+    vehicle.status(|status| status.armed = true);
+    for id in [207, 208, 241] {
+        assert_eq!(asked(&mut vehicle, id, &[]), framed(b'!', id, &[]), "armed");
+    }
 }

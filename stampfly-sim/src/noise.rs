@@ -24,6 +24,10 @@ pub(crate) enum Stream {
     Baro = 9,
     Power = 10,
     Cameras = 11,
+    Drift = 12,
+    SoftIron = 13,
+    Gnss = 14,
+    Airspeed = 15,
 }
 
 /// A seeded stream of random numbers.

@@ -67,6 +67,9 @@ pub struct Recorder<V: Vehicle, S: Sink = Memory> {
     started: Option<std::time::Instant>,
     inputs: Option<Inputs>,
     key_frame_due: Instant,
+    /// Samples that the taps have lost, and how often the state was replaced.
+    samples_lost: u32,
+    replaced: u32,
     frame: Vec<u8>,
 }
 
@@ -107,6 +110,8 @@ impl<V: Vehicle, S: Sink> Recorder<V, S> {
             started: None,
             inputs: None,
             key_frame_due: Instant::ZERO,
+            samples_lost: 0,
+            replaced: 0,
             frame: Vec::new(),
         }
     }
@@ -222,7 +227,7 @@ impl<V: Vehicle, S: Sink> Witness<V::Runnables> for Recorder<V, S> {
         }
     }
 
-    fn at_rest(&mut self, clock: Instant, flight_loop: &FlightLoop<'_, V::Runnables>) {
+    fn at_rest(&mut self, clock: Instant, flight_loop: &mut FlightLoop<'_, V::Runnables>) {
         let Some(log) = self.log.as_mut().filter(|_| clock >= self.key_frame_due) else { return };
         self.key_frame_due = clock + KEY_FRAME_PERIOD;
         loop {
@@ -238,9 +243,17 @@ impl<V: Vehicle, S: Sink> Witness<V::Runnables> for Recorder<V, S> {
         }
     }
 
+    fn replaced(&mut self, clock: Instant) {
+        // Marked like a loss, and the key frame that a replay goes on from comes right behind it.
+        self.replaced += 1;
+        self.key_frame_due = clock;
+        self.lost(clock, self.samples_lost);
+    }
+
     fn lost(&mut self, clock: Instant, samples: u32) {
+        self.samples_lost = samples;
         if let Some(log) = &mut self.log {
-            log.taps_lost(clock, samples);
+            log.taps_lost(clock, samples.wrapping_add(self.replaced));
         }
     }
 

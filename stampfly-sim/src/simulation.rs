@@ -1,6 +1,6 @@
 //! A vehicle ready to fly: the world, the clock and the chips, made from one configuration and one seed.
 
-use crate::plant::{Plant, PlantParameters, Pose, WindConfig};
+use crate::plant::{Airframe, Body, PlantParameters, Pose, WindConfig};
 use crate::sensors::Sensors;
 use crate::time::Clock;
 use crate::world::{Truth, World};
@@ -8,28 +8,41 @@ use stampfly_types::Instant;
 
 /// All that decides a simulation. The same configuration gives the same bits on every machine.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SimulationConfig {
+pub struct SimulationConfig<A = PlantParameters> {
     /// Seed of everything random: specimens, noise, gusts.
     pub seed: u64,
     /// What the clock shows at the start.
     pub start: Instant,
     /// The vehicle and its surroundings.
-    pub plant: PlantParameters,
+    pub plant: A,
     /// The air.
     pub wind: WindConfig,
     /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
     pub vibration: f64,
+    /// Strength of what the sensors of the recorded flights do not show: drift with temperature, and soft iron. 1 is what data sheets
+    /// allow, 0 is none.
+    pub imperfections: f64,
     /// Where it starts; `None` stands it on the floor at the origin, facing north.
     pub pose: Option<Pose>,
 }
 
-impl SimulationConfig {
+impl<A: Airframe> SimulationConfig<A> {
     /// This vehicle with seed 1, standing on the floor of a room with people in it.
     #[must_use]
-    pub fn new(plant: PlantParameters) -> Self {
-        Self { seed: 1, start: Instant::ZERO, plant, wind: WindConfig::default(), vibration: 1.0, pose: None }
+    pub fn new(plant: A) -> Self {
+        Self {
+            seed: 1,
+            start: Instant::ZERO,
+            plant,
+            wind: WindConfig::default(),
+            vibration: 1.0,
+            imperfections: 0.0,
+            pose: None,
+        }
     }
+}
 
+impl SimulationConfig {
     /// [`PlantParameters::EXAMPLE`], a vehicle that nobody built: for examples and tests.
     #[must_use]
     pub fn example() -> Self {
@@ -75,11 +88,40 @@ pub struct Simulation {
 impl Simulation {
     /// A vehicle at the start.
     #[must_use]
-    pub fn new(config: &SimulationConfig) -> Self {
+    pub fn new<A: Airframe>(config: &SimulationConfig<A>) -> Self {
         let clock = Clock::new(config.start);
-        let plant = Plant::new(&config.plant, &config.wind, config.pose.as_ref(), config.seed);
-        let world = World::new(plant, config.start);
+        let body = config.plant.body(&config.wind, config.pose.as_ref(), config.seed);
+        let world = World::new(body, config.start).with_imperfections(config.imperfections);
         let sensors = Sensors::new(&world, &clock, config.seed, config.vibration);
+        Self { clock, world, sensors }
+    }
+
+    /// A body of one's own at the start, with all the chips, on a clock that shows zero. `seed` is of everything random in the chips. The
+    /// body says by itself where it stands and what shakes it.
+    ///
+    /// ```
+    /// use stampfly_sim::plant::{Body, Motion};
+    /// use stampfly_sim::{Simulation, drivers::Imu, time::block_on};
+    ///
+    /// #[derive(Debug, Default)]
+    /// struct Stone(Motion);
+    ///
+    /// impl Body for Stone {
+    ///     fn step(&mut self) {}
+    ///     fn motion(&self) -> &Motion {
+    ///         &self.0
+    ///     }
+    /// }
+    ///
+    /// let Simulation { clock, mut sensors, .. } = Simulation::of(Stone::default(), 1);
+    /// let Ok(sample) = block_on(&clock, sensors.imu.next());
+    /// assert!((sample.data.accel.z + 9.81).abs() < 0.5);
+    /// ```
+    #[must_use]
+    pub fn of(body: impl Body, seed: u64) -> Self {
+        let clock = Clock::new(Instant::ZERO);
+        let world = World::new(body, Instant::ZERO);
+        let sensors = Sensors::new(&world, &clock, seed, 0.0);
         Self { clock, world, sensors }
     }
 

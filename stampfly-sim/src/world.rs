@@ -4,10 +4,12 @@
 //! and the recent past is kept, so a sensor may report what was true in the middle of its exposure although another
 //! one has already been read later. Many worlds fit in one process; none knows of another.
 
-use crate::plant::{DT, Motion, Plant, ROTORS, RotorFault, STEP, Scene};
+use crate::plant::{Body, DT, Motion, Plant, ROTORS, RotorFault, STEP, Scene};
+use crate::specimen::Specimen;
+use core::any::Any;
 use core::cell::RefCell;
 use nalgebra::Vector3;
-use stampfly_types::{Instant, Quat, Vec3, message};
+use stampfly_types::{Duration, Instant, Quat, Vec3, message};
 use std::rc::Rc;
 
 message! {
@@ -15,7 +17,7 @@ message! {
     pub struct Truth {
         /// Body FRD → world NED.
         attitude: Quat,
-        /// World NED, floor at zero.
+        /// World NED, ground at zero.
         position: Vec3 ["m"],
         /// World NED.
         velocity: Vec3 ["m/s"],
@@ -25,13 +27,13 @@ message! {
         specific_force: Vec3 ["m/s^2"],
         /// Velocity of the air at the vehicle, world NED.
         wind: Vec3 ["m/s"],
-        /// Rotor speeds: front right, rear right, rear left, front left.
+        /// Rotor speeds: front right, rear right, rear left, front left; of an aeroplane the propeller, and nothing else.
         rotor_speed: [f32; 4] ["rad/s"],
         /// Battery voltage under load.
         battery_voltage: f32 ["V"],
         /// Battery current.
         battery_current: f32 ["A"],
-        /// Does anything touch the floor?
+        /// Does anything touch the ground?
         contact: bool,
     }
 }
@@ -39,23 +41,33 @@ message! {
 /// Steps of the past that are kept: 80 ms, longer than any sensor's exposure and read-out.
 const HISTORY: usize = 128;
 
+/// The Earth's field in Kanazawa, world NED, µT (World Magnetic Model, rounded): 49° of dip, 8° west.
+const KANAZAWA: [f64; 3] = [30.8, -4.3, 36.4];
+
 #[derive(Debug)]
 struct State {
-    plant: Plant,
+    body: Box<dyn Body>,
+    gravity: f64,
+    field: Vector3<f64>,
     start: Instant,
     /// Steps done since the start.
     steps: u64,
-    /// Motion after step k at index k modulo its length, for all but the last step, whose motion is the plant's: it is copied
+    /// Motion after step k at index k modulo its length, for all but the last step, whose motion is the body's: it is copied
     /// when it has come to rest in memory.
     history: Box<[Motion; HISTORY]>,
+    /// Of the sensors.
+    imperfections: f64,
+    specimen: Specimen,
+    /// Warmer than it is by itself: from what to what, K, from when on and for how long.
+    warmth: (f64, f64, Instant, Duration),
 }
 
 impl State {
     fn advance_to(&mut self, instant: Instant) {
         let wanted = instant.since(self.start).as_micros() / STEP.as_micros();
         while self.steps < wanted {
-            self.history[self.steps as usize % HISTORY] = *self.plant.motion();
-            self.plant.step();
+            self.history[self.steps as usize % HISTORY] = *self.body.motion();
+            self.body.step();
             self.steps += 1;
         }
     }
@@ -67,13 +79,13 @@ impl State {
         let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
         let step = (since_start / STEP.as_micros()).max(oldest);
         let rest = since_start.saturating_sub(step * STEP.as_micros()) as f64 * 1e-6;
-        let motion = if step == self.steps { self.plant.motion() } else { &self.history[step as usize % HISTORY] };
+        let motion = if step == self.steps { self.body.motion() } else { &self.history[step as usize % HISTORY] };
         (motion, rest.min(DT))
     }
 
     #[inline]
     fn motion_at(&mut self, instant: Instant) -> Motion {
-        let gravity = self.plant.parameters().gravity;
+        let gravity = self.gravity;
         let (motion, rest) = self.before(instant);
         motion.after(rest, gravity)
     }
@@ -106,9 +118,66 @@ pub struct World(Rc<RefCell<State>>);
 impl World {
     /// A world whose time begins at `start`.
     #[must_use]
-    pub fn new(plant: Plant, start: Instant) -> Self {
-        let history = Box::new([*plant.motion(); HISTORY]);
-        Self(Rc::new(RefCell::new(State { plant, start, steps: 0, history })))
+    pub fn new(body: impl Body, start: Instant) -> Self {
+        let history = Box::new([*body.motion(); HISTORY]);
+        Self(Rc::new(RefCell::new(State {
+            gravity: body.gravity(),
+            field: KANAZAWA.into(),
+            body: Box::new(body),
+            start,
+            steps: 0,
+            history,
+            imperfections: 0.0,
+            specimen: Specimen::default(),
+            warmth: (0.0, 0.0, start, Duration::ZERO),
+        })))
+    }
+
+    /// The same, with sensors of this strength of imperfection, [`SimulationConfig::imperfections`](crate::SimulationConfig::imperfections).
+    #[must_use]
+    pub fn with_imperfections(self, strength: f64) -> Self {
+        self.0.borrow_mut().imperfections = strength;
+        self
+    }
+
+    /// The same in another magnetic field than Kanazawa's, world NED, µT.
+    #[must_use]
+    pub fn with_field(self, field: [f64; 3]) -> Self {
+        self.0.borrow_mut().field = field.into();
+        self
+    }
+
+    pub(crate) fn field(&self) -> Vector3<f64> {
+        self.0.borrow().field
+    }
+
+    pub(crate) fn imperfections(&self) -> f64 {
+        self.0.borrow().imperfections
+    }
+
+    /// What is wrong with the sensors.
+    #[must_use]
+    pub fn specimen(&self) -> Specimen {
+        self.0.borrow().specimen
+    }
+
+    pub(crate) fn note_specimen(&self, note: impl FnOnce(&mut Specimen)) {
+        note(&mut self.0.borrow_mut().specimen);
+    }
+
+    /// Warms the vehicle by so many kelvins above what it is by itself, evenly within this time from `instant` on; cools it when it
+    /// is warmer.
+    pub fn warm(&self, instant: Instant, by: f64, within: Duration) {
+        let now = self.warmth_at(instant);
+        self.0.borrow_mut().warmth = (now, by, instant, within);
+    }
+
+    /// How much warmer it is than by itself, K.
+    #[must_use]
+    pub fn warmth_at(&self, instant: Instant) -> f64 {
+        let (from, to, begun, length) = self.0.borrow().warmth;
+        let share = instant.since(begun).seconds_f64() / length.seconds_f64().max(1e-6);
+        from + (to - from) * share.clamp(0.0, 1.0)
     }
 
     /// Runs the physics up to `instant`. The past does not change.
@@ -129,31 +198,38 @@ impl World {
     pub fn set_duty(&self, instant: Instant, duty: [f64; ROTORS]) {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
-        state.plant.set_duty(duty);
+        state.body.set_duty(duty);
     }
 
     /// Breaks or mends a rotor, in motor order from 0, from `instant` on.
     pub fn set_rotor_fault(&self, instant: Instant, rotor: usize, fault: RotorFault) {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
-        state.plant.set_rotor_fault(rotor, fault);
+        state.body.set_rotor_fault(rotor, fault);
     }
 
-    /// Changes what stands around the vehicle, from `instant` on. `change` gets the motion there.
+    /// Changes what stands around a multirotor, from `instant` on. `change` gets the motion there. Nothing can stand around other bodies.
     pub fn change_scene(&self, instant: Instant, change: impl FnOnce(&mut Scene, &Motion)) {
-        let mut state = self.0.borrow_mut();
-        let motion = state.motion_at(instant);
-        change(state.plant.scene_mut(), &motion);
+        let motion = self.motion_at(instant);
+        self.change(instant, |plant: &mut Plant| change(plant.scene_mut(), &motion));
     }
 
-    /// Height above the floor below the vehicle at `instant`, m.
+    /// Changes a body of this kind from `instant` on; `None` when it is of another kind.
+    pub fn change<B: Body, T>(&self, instant: Instant, change: impl FnOnce(&mut B) -> T) -> Option<T> {
+        let mut state = self.0.borrow_mut();
+        state.advance_to(instant);
+        let body: &mut dyn Any = &mut *state.body;
+        body.downcast_mut().map(change)
+    }
+
+    /// Height above the ground below the vehicle at `instant`, m.
     #[must_use]
     pub fn height_at(&self, instant: Instant) -> f64 {
         let mut state = self.0.borrow_mut();
-        let gravity = state.plant.parameters().gravity;
+        let gravity = state.gravity;
         let (motion, rest) = state.before(instant);
         let position = motion.position_after(rest, gravity);
-        state.plant.scene().floor(&position) - position.z
+        state.body.scene().floor(&position) - position.z
     }
 
     /// What shakes and turns an inertial sensor at `instant`, as in [`motion_at`](Self::motion_at) without the rest.
@@ -167,9 +243,16 @@ impl World {
         }
     }
 
-    /// Looks at the plant as it is after the last step.
-    pub fn inspect<T>(&self, look: impl FnOnce(&Plant) -> T) -> T {
-        look(&self.0.borrow().plant)
+    /// Looks at the body as it is after the last step.
+    pub fn inspect<T>(&self, look: impl FnOnce(&dyn Body) -> T) -> T {
+        look(&*self.0.borrow().body)
+    }
+
+    /// Looks at a body of this kind as it is after the last step; `None` when it is of another kind.
+    pub fn inspect_as<B: Body, T>(&self, look: impl FnOnce(&B) -> T) -> Option<T> {
+        let state = self.0.borrow();
+        let body: &dyn Any = &*state.body;
+        body.downcast_ref().map(look)
     }
 
     /// The truth at `instant`.
@@ -183,11 +266,11 @@ impl World {
             velocity: motion.velocity.cast::<f32>().into(),
             angular_rate: motion.rate.cast::<f32>().into(),
             specific_force: motion.specific_force.cast::<f32>().into(),
-            wind: state.plant.wind().velocity(-motion.position.z).cast::<f32>().into(),
+            wind: state.body.air(-motion.position.z).cast::<f32>().into(),
             rotor_speed: motion.rotor_speed.map(|speed| speed as f32),
-            battery_voltage: state.plant.battery().voltage() as f32,
+            battery_voltage: state.body.battery().voltage() as f32,
             battery_current: motion.current as f32,
-            contact: state.plant.ground().contact(),
+            contact: state.body.contact(),
         }
     }
 }

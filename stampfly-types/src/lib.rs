@@ -46,6 +46,8 @@ pub mod math;
 pub mod message;
 pub mod messages;
 mod named;
+#[cfg(feature = "math")]
+mod origin;
 pub mod schema;
 #[doc(hidden)]
 pub mod serial;
@@ -61,6 +63,8 @@ pub use atmosphere::pressure_altitude;
 pub use field::Field;
 pub use frame::{GRAVITY, Quat, Vec3};
 pub use message::Message;
+#[cfg(feature = "math")]
+pub use origin::Origin;
 pub use schema::{FieldInfo, FieldKind, Leaf, Value, leaves};
 pub use stamped::Stamped;
 pub use time::{Duration, Instant};

@@ -28,6 +28,12 @@ pub fn sin_cos(angle: f32) -> (f32, f32) {
     libm::sincosf(angle)
 }
 
+/// Sine and cosine of an angle in radians, in double precision: for degrees of latitude, of which an `f32` resolves a metre.
+#[must_use]
+pub fn sin_cos_f64(angle: f64) -> (f64, f64) {
+    libm::sincos(angle)
+}
+
 /// Tangent of an angle in radians.
 #[must_use]
 pub fn tan(angle: f32) -> f32 {

@@ -239,6 +239,39 @@ def asks_the_console(page: Page) -> None:
     page.fill("#console-line", "")
 
 
+def calibrates(page: Page, picture) -> None:
+    """The six positions, by the pictures, which turn a simulated vehicle; then the level, and what was found is taken."""
+    page.click("#tab-calibrate")
+    six = page.locator("#calibrations section[data-kind=six_positions]")
+    said, take = six.locator(".said"), six.get_by_role("button", name="Take and keep")
+    assert six.locator("svg.picture").count() == 6 and page.locator("#calibrations svg.picture").count() == 9
+    six.get_by_role("button", name="Begin").click()
+    until("it says what to do", lambda: "still to lie on its nose" in said.inner_text())
+    for place, name in enumerate(("nose down", "nose up", "left side up", "right side up", "upright", "upside down")):
+        assert not take.is_visible()
+        six.get_by_role("button", name=name).first.click()
+        until(f"{name} is done", lambda place=place: "done" in six.locator(".step").nth(place).get_attribute("class"))
+        if place == 3:
+            picture("six-positions")
+    until("the seventh checks", lambda: "once more on any side" in said.inner_text())
+    six.get_by_role("button", name="upright").click()
+    until("there is a result", lambda: take.is_visible() and "scale" in said.inner_text())
+    take.click()
+    until("it is taken and saved", lambda: "saved, for the next start" in text(page, "messages"))
+    level = page.locator("#calibrations section[data-kind=level]")
+    level.get_by_role("button", name="Standing level").click()
+    level.get_by_role("button", name="Begin").click()
+    until("the level is found", lambda: level.get_by_role("button", name="Take and keep").is_visible())
+    picture("level")
+    level.get_by_role("button", name="Take and keep").click()
+    until("and saved", lambda: text(page, "messages").count("saved, for the next start") == 2)
+    page.click("#tab-parameters")
+    page.fill("#parameter-search", "calibration.accel.bias_z")
+    bias = page.locator("#parameters tr[data-name='calibration.accel.bias_z'] input")
+    until("the parameter has it", lambda: abs(float(bias.input_value())) > 0.01)
+    page.fill("#parameter-search", "")
+
+
 def duty(page: Page) -> float:
     shown = page.locator("#strips figure", has_text="Motor duty").locator("b").nth(1).inner_text()
     return float(shown) if shown != "–" else 0.0
@@ -354,6 +387,7 @@ def look(browser, address: str, options, folder: Path) -> None:
     opens_the_log(page, folder, picture)
     shows_every_topic(page, picture)
     asks_the_console(page)
+    calibrates(page, picture)
     turns_a_motor(page, picture)
     flies_by_hand(page, picture)
     slows_time(page)

@@ -42,6 +42,9 @@ const STEPS: &[Step] = &[
     Step::new("hals", "Build the drivers' examples for Linux, RP2350, STM32 and ESP32", steps::hals::run)
         .beside()
         .accepting(&[Debian]),
+    Step::new("stm32", "Build the STM32 quadcopter's firmware, hold it to flash and memory", steps::stm32::run)
+        .beside()
+        .accepting(&[Debian]),
     Step::new("features", "Check each library with each of its features alone", steps::features::run).beside(),
     Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
     Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
@@ -52,7 +55,7 @@ const STEPS: &[Step] = &[
         steps::search::run,
     )
     .accepting(&[Seconds])
-    .manual(),
+    .beside(),
     Step::new("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run).accepting(&[File]),
     Step::new("budget", "Count the instructions of a 400 Hz step on this PC", steps::budget::run),
     Step::new(

@@ -13,12 +13,15 @@
 extern crate alloc;
 
 mod buzzer;
+mod changes;
+mod channel;
 mod clock;
 mod console;
 mod cutoff;
 mod facts;
 mod flash;
 mod flight;
+mod hands;
 #[cfg(feature = "hil")]
 mod hil;
 mod i2c;
@@ -29,12 +32,15 @@ mod panic;
 mod people;
 mod pins;
 mod radio;
+mod record;
 mod safe_state;
 mod sensors;
 #[cfg_attr(feature = "esp32c6", allow(dead_code, reason = "it has one core"))]
 mod sizes;
 mod spi;
 mod storage;
+#[cfg(feature = "wifi")]
+mod wifi;
 
 use alloc::boxed::Box;
 use clock::Clock;
@@ -51,11 +57,12 @@ use sensors::Healths;
 use stampfly_board::console::Profile;
 use stampfly_board::golden::{Outcome, self_test};
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
-use stampfly_board::{VehicleConfig, topics};
+use stampfly_board::{Corrector, VehicleConfig, topics};
 use stampfly_drivers::Timebase;
 use stampfly_flight::{Assembled, FlightLoop, InPlace};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, Policy};
+use stampfly_services::Desk;
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -112,6 +119,9 @@ struct Stored {
     unusable: usize,
     peer: Option<Address>,
     key: Option<Key>,
+    /// A network, and the time up to which signatures are reserved.
+    #[cfg(feature = "wifi")]
+    network: (Option<stampfly_services::association::Credentials>, Option<u64>),
 }
 
 /// What the tasks of the first core are given. Boxed, because a task keeps its arguments as long as what it makes of them.
@@ -119,7 +129,7 @@ struct Ground {
     sensors: Box<sensors::Parts>,
     people: Box<people::Parts>,
     memory: (&'static RefCell<Memory>, topics::SupervisorEnds<'static>),
-    console: Box<console::Parts>,
+    console: (&'static mut console::Console, console::Keys),
     radio: Box<radio::Parts>,
 }
 
@@ -133,8 +143,18 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
     esp_rtos::start(TimerGroup::new(chip.TIMG0).timer0, chip.FROM_CPU_INTR0);
     let stored = stored(chip.FLASH);
     let vehicle = assemble(&stored.config);
-    let (flight, ground) = in_a_frame_of_its_own(move || {
-        let Stored { storage, config, unusable, peer, key } = *stored;
+    let (flight, sensors, people, memory, radio, console) = in_a_frame_of_its_own(move || {
+        let Stored {
+            storage,
+            config,
+            unusable,
+            peer,
+            key,
+            #[cfg(feature = "wifi")]
+            network,
+        } = *stored;
+        #[cfg(feature = "wifi")]
+        let (network, reserved) = (wifi::Network::new(network.0), network.1);
         let InPlace { flight_loop, mut outside, taps } = *vehicle;
         let watchdog = cutoff::start(chip.TIMG1, Some(outside.cutoff.cutoff_state));
         outside.self_test.self_test.publish(Clock.now(), &tested.message());
@@ -142,6 +162,8 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         static HEALTH: Healths = Healths::new();
         static PROFILE: Profile = Profile::new(&ACTIVATIONS);
         let pins: Pins<'static> = split_resources!(chip);
+        let (ring, reader) = record::ring();
+        let taken: &'static _ = Box::leak(Box::new(record::Taken::new(reader)));
         let flight = Box::new(flight::Parts {
             flight_loop,
             imu: outside.imu,
@@ -152,6 +174,8 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             watchdog,
             health: &HEALTH,
             profile: &PROFILE,
+            corrector: Corrector::new(&config.corrections),
+            ring,
         });
         let sensors = Box::new(sensors::Parts {
             unit: chip.I2C0,
@@ -163,6 +187,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             baro: outside.baro,
             power: outside.power,
             health: &HEALTH,
+            corrector: Corrector::new(&config.corrections),
         });
         let people = Box::new(people::Parts {
             pulses: chip.RMT,
@@ -171,9 +196,18 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             button: outside.button_pin,
         });
         let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
-        let radio = Box::new(radio::Parts { unit: chip.WIFI, peer, key: key.clone(), policy, ends: outside.link });
+        static DESK: StaticCell<RefCell<Desk>> = StaticCell::new();
+        let desk: &'static _ = DESK.init_with(RefCell::default);
+        let link = radio::link(peer, key.clone(), policy, outside.link);
+        let radio = Box::new(radio::Parts {
+            unit: chip.WIFI,
+            link,
+            desk,
+            taken,
+            #[cfg(feature = "wifi")]
+            network: (network, memory),
+        });
         let console = Box::new(console::Parts {
-            usb: chip.USB_DEVICE,
             memory,
             health: &HEALTH,
             profile: &PROFILE,
@@ -184,10 +218,17 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             tested,
             facts: facts::Facts::read(unusable),
             key,
+            link,
+            desk,
+            taken,
+            #[cfg(feature = "wifi")]
+            network: (network, reserved),
         });
-        let ground = Ground { sensors, people, memory: (memory, outside.supervisor), console, radio };
-        (flight, ground)
+        (flight, sensors, people, (memory, outside.supervisor), radio, console)
     });
+    // It is made on the stack, and large.
+    let console = console::assemble(chip.USB_DEVICE, console);
+    let ground = Ground { sensors, people, memory, console, radio };
     let fly = move |spawner: Spawner| spawner.spawn(flight::run(flight).expect("spawned once"));
 
     #[cfg(feature = "esp32s3")]
@@ -215,7 +256,7 @@ fn spawn(spawner: Spawner, ground: Ground) {
     spawner.spawn(sensors::run(sensors).expect("spawned once"));
     spawner.spawn(people::run(people).expect("spawned once"));
     spawner.spawn(memory::run(memory.0, memory.1).expect("spawned once"));
-    spawner.spawn(console::run(console).expect("spawned once"));
+    spawner.spawn(console::run(console.0, console.1).expect("spawned once"));
     spawner.spawn(radio::run(radio).expect("spawned once"));
 }
 
@@ -230,7 +271,17 @@ fn stored(flash: FLASH<'static>) -> Box<Stored> {
     }
     let peer = block_on(storage.load_peer());
     let key = block_on(storage.load_key());
-    Box::new(Stored { storage, config, unusable, peer, key })
+    #[cfg(feature = "wifi")]
+    let network = block_on(storage.load_network());
+    Box::new(Stored {
+        storage,
+        config,
+        unusable,
+        peer,
+        key,
+        #[cfg(feature = "wifi")]
+        network,
+    })
 }
 
 /// Makes the bus and the vehicle on it.

@@ -4,7 +4,7 @@ use crate::safe_state;
 use core::cell::RefCell;
 use embassy_time::{Duration, Ticker};
 use esp_hal::system::software_reset;
-use stampfly_board::black_box::{BlackBox, RETENTION, WORDS};
+use stampfly_board::black_box::{self, BlackBox, RETENTION};
 use stampfly_board::console::Newest;
 use stampfly_board::topics::{self, Id};
 use stampfly_bus::Taps;
@@ -13,6 +13,12 @@ use static_cell::ConstStaticCell;
 
 /// Two periods of the fastest topic: every topic has room for at least that many samples.
 const PERIOD: Duration = Duration::from_millis(5);
+
+#[cfg(all(feature = "record", feature = "wifi"))]
+compile_error!("the features `record` and `wifi` do not fit into the StampFly's memory together");
+
+/// Of the black box. Beside the flight record or the network there is room for three seconds of a flight.
+const WORDS: usize = if cfg!(any(feature = "record", feature = "wifi")) { 6 * 1024 } else { black_box::WORDS };
 
 /// What the vehicle remembers.
 pub struct Memory {

@@ -3,30 +3,41 @@
 //! A vehicle without a key makes one as soon as its radio is on, for only then the chip's random numbers are random, and hands
 //! it to the console's task to be stored. From then on it is offered to stations with that key.
 //!
+//! With the feature `wifi` the same radio is in a network (`wifi.rs`): a station there is answered there.
+//!
 //! Receiving and sending do not wait for each other: a packet that the air does not take must not keep the pilot's next
 //! one from being received.
 
+use crate::channel::CHANNEL;
 use crate::clock::Clock;
+#[cfg(feature = "wifi")]
+use crate::memory::Memory;
+use crate::record::{Line, Taken};
 use crate::storage::KEY_ID;
+#[cfg(feature = "wifi")]
+use crate::wifi::{self, Network};
 use alloc::boxed::Box;
 use core::cell::RefCell;
 use embassy_futures::join::join;
+#[cfg(feature = "wifi")]
+use embassy_futures::join::join3;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Ticker};
 use esp_hal::efuse::{InterfaceMacAddress, interface_mac_address};
 use esp_hal::peripherals::WIFI;
 use esp_hal::rng::Trng;
-use esp_radio::esp_now::{EspNowManager, EspNowReceiver, EspNowSender, EspNowWifiInterface, PeerInfo};
+use esp_radio::esp_now::{EspNowError, EspNowManager, EspNowReceiver, EspNowSender, EspNowWifiInterface, PeerInfo};
 use esp_radio::wifi::{ControllerConfig, WifiController};
 use stampfly_board::link::{self, Link, Outgoing};
 use stampfly_board::topics;
 use stampfly_drivers::Timebase;
-use stampfly_link::secure::{Guarded, Key, MAX_FRAME, Policy, Vehicle};
+use stampfly_link::secure::{Guarded, Key, MAX_BODY, MAX_FRAME, Payload, Policy, Vehicle};
 use stampfly_link::{Address, Session};
-
-/// The channel the vehicle listens on.
-const CHANNEL: u8 = 1;
+use stampfly_services::desk::{Desk, Letter};
+use stampfly_services::tape::RADIO_CHUNKS;
+use static_cell::StaticCell;
 
 /// A key that was made and is to be stored.
 pub static MADE: Signal<CriticalSectionRawMutex, Key> = Signal::new();
@@ -34,31 +45,73 @@ pub static MADE: Signal<CriticalSectionRawMutex, Key> = Signal::new();
 /// What the radio needs.
 pub struct Parts {
     pub unit: WIFI<'static>,
-    /// The transmitter the vehicle is paired with.
-    pub peer: Option<Address>,
-    /// The vehicle's key, if it has one yet.
-    pub key: Option<Key>,
-    /// What may be used of what authenticates nobody.
-    pub policy: Policy,
-    pub ends: topics::LinkEnds<'static>,
+    pub link: &'static RefCell<Link<'static>>,
+    /// What a station with the key asks besides flying.
+    pub desk: &'static RefCell<Desk>,
+    /// The flight record.
+    pub taken: &'static RefCell<Taken>,
+    /// What the radio joins while disarmed, and what says whether it is.
+    #[cfg(feature = "wifi")]
+    pub network: (&'static RefCell<Network>, &'static RefCell<Memory>),
+}
+
+/// Answers of the desk, which the console's task makes: sealed right before they are sent, so that no frame overtakes another.
+pub static LETTERS: Channel<CriticalSectionRawMutex, Letter, LETTERS_AT_ONCE> = Channel::new();
+const LETTERS_AT_ONCE: usize = 2;
+/// A packet that is nearly full.
+const LEAST_CHUNK: usize = MAX_BODY - 32;
+
+/// A link of a vehicle with this transmitter and key, as far as it has them.
+pub fn link(
+    peer: Option<Address>,
+    key: Option<Key>,
+    policy: Policy,
+    ends: topics::LinkEnds<'static>,
+) -> &'static RefCell<Link<'static>> {
+    static LINK: StaticCell<RefCell<Link<'static>>> = StaticCell::new();
+    let mut vehicle = Address::default();
+    vehicle.0.copy_from_slice(interface_mac_address(InterfaceMacAddress::Station).as_bytes());
+    let session = Session::new(vehicle, CHANNEL, peer);
+    LINK.init_with(|| RefCell::new(Link::new(Guarded::new(key.map(Vehicle::new), session, policy), ends)))
 }
 
 /// Receives and sends until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Box<Parts>) {
-    let Parts { unit, peer, key, policy, ends } = *parts;
+    let Parts {
+        unit,
+        link,
+        desk,
+        taken,
+        #[cfg(feature = "wifi")]
+        network,
+    } = *parts;
     // A station without an access point would sleep between packets and miss the pilot's.
     let config = ControllerConfig::default().with_sta_disconnected_pm(false);
+    #[cfg(feature = "wifi")]
+    let config = wifi::config(config);
     let controller = WifiController::new(unit, config).expect("the radio starts");
     let random = Trng::try_new().expect("its radio is on");
     let (manager, sender, receiver) = controller.esp_now().split();
     manager.set_channel(CHANNEL).expect("a channel there is");
-    let mut vehicle = Address::default();
-    vehicle.0.copy_from_slice(interface_mac_address(InterfaceMacAddress::Station).as_bytes());
-    let session = Session::new(vehicle, CHANNEL, peer);
-    let key = key.or_else(|| make(&random));
-    let link = RefCell::new(Link::new(Guarded::new(key.map(Vehicle::new), session, policy), ends));
-    join(receive(receiver, &link), send(sender, &manager, &random, &link)).await;
+    if link.borrow().guarded.vehicle().is_none()
+        && let Some(key) = make(&random)
+    {
+        link.borrow_mut().guarded.set_vehicle(Vehicle::new(key));
+    }
+    #[cfg(feature = "wifi")]
+    {
+        let (network, memory) = network;
+        let mut seed = [0; 8];
+        random.read(&mut seed);
+        let air = wifi::start(network, u64::from_le_bytes(seed));
+        let say = Say { sender, manager: &manager, network };
+        let in_the_network =
+            join(wifi::carry(air, network, link, desk), wifi::associate(controller, &manager, network, memory));
+        join3(receive(receiver, link, desk), send(say, &random, (link, taken)), in_the_network).await;
+    }
+    #[cfg(not(feature = "wifi"))]
+    join(receive(receiver, link, desk), send(Say { sender, manager: &manager }, &random, (link, taken))).await;
 }
 
 /// A new key, which is also handed on to be stored.
@@ -70,20 +123,23 @@ fn make(random: &Trng) -> Option<Key> {
     Some(key)
 }
 
-async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>) {
+async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &RefCell<Desk>) {
     let mut room = [0; MAX_FRAME];
     loop {
         let received = receiver.receive_async().await;
         let source = Address(received.info.src_address);
-        // What is longer is no frame of anybody's. What is refused is counted there; what only services could answer is not answered.
+        // What is longer is no frame of anybody's. What is refused is counted there.
         if let Some(frame) = room.get_mut(..received.data().len()) {
             frame.copy_from_slice(received.data());
-            let _ = link.borrow_mut().receive(Clock.now(), source, frame);
+            if let Ok(Some(received)) = link.borrow_mut().receive(Clock.now(), source, frame) {
+                // A station asks again for what there is no room for.
+                let _ = desk.borrow_mut().ask(0, &received.payload);
+            }
         }
     }
 }
 
-async fn send(mut sender: EspNowSender, manager: &EspNowManager, random: &Trng, link: &RefCell<Link<'_>>) {
+async fn send(mut say: Say<'_>, random: &Trng, (link, taken): (&RefCell<Link<'_>>, &RefCell<Taken>)) {
     let mut ticker = Ticker::every(Duration::from_micros(link::PERIOD.as_micros()));
     let mut room = [0; MAX_FRAME];
     loop {
@@ -94,26 +150,52 @@ async fn send(mut sender: EspNowSender, manager: &EspNowManager, random: &Trng, 
             let outgoing = link.borrow_mut().transmit(Clock.now(), what, fresh, &mut room);
             // A packet that is not taken is lost; the next one is newer anyway.
             if let Some((to, bytes)) = outgoing {
-                let _ = say(&mut sender, manager, to, bytes).await;
+                let _ = say.say(to, bytes).await;
+            }
+        }
+        for _ in 0..LETTERS_AT_ONCE {
+            let Ok(letter) = LETTERS.try_receive() else { break };
+            let sealed = link.borrow_mut().guarded.seal(Clock.now(), &letter.payload(), &mut room);
+            if let Some((to, bytes)) = sealed {
+                let _ = say.say(to, bytes).await;
+            }
+        }
+        for _ in 0..RADIO_CHUNKS {
+            let sealed = {
+                let (mut taken, mut chunk) = (taken.borrow_mut(), [0; MAX_BODY]);
+                let Some(chunk) = taken.chunk(Line::Radio, &mut chunk, LEAST_CHUNK) else { break };
+                link.borrow_mut().guarded.seal(Clock.now(), &Payload::Chunk(chunk), &mut room)
+            };
+            if let Some((to, bytes)) = sealed {
+                let _ = say.say(to, bytes).await;
             }
         }
     }
 }
 
-async fn say(
-    sender: &mut EspNowSender,
-    manager: &EspNowManager,
-    to: Address,
-    bytes: &[u8],
-) -> Result<(), esp_radio::esp_now::EspNowError> {
-    if !manager.peer_exists(&to.0) {
-        manager.add_peer(PeerInfo {
-            interface: EspNowWifiInterface::Station,
-            peer_address: to.0,
-            lmk: None,
-            channel: None,
-            encrypt: false,
-        })?;
+/// Where frames leave.
+struct Say<'s> {
+    sender: EspNowSender,
+    manager: &'s EspNowManager,
+    #[cfg(feature = "wifi")]
+    network: &'s RefCell<Network>,
+}
+
+impl Say<'_> {
+    async fn say(&mut self, to: Address, bytes: &[u8]) -> Result<(), EspNowError> {
+        #[cfg(feature = "wifi")]
+        if self.network.borrow_mut().send_sealed(to, bytes) {
+            return Ok(());
+        }
+        if !self.manager.peer_exists(&to.0) {
+            self.manager.add_peer(PeerInfo {
+                interface: EspNowWifiInterface::Station,
+                peer_address: to.0,
+                lmk: None,
+                channel: None,
+                encrypt: false,
+            })?;
+        }
+        self.sender.send_async(&to.0, bytes).await
     }
-    sender.send_async(&to.0, bytes).await
 }

@@ -10,8 +10,7 @@ use alloc::boxed::Box;
 use embassy_futures::join::join5;
 use esp_hal::gpio::{AnyPin, Level, Output, OutputConfig};
 use esp_hal::peripherals::I2C0;
-use stampfly_board::devices;
-use stampfly_board::topics;
+use stampfly_board::{Corrector, devices, topics};
 use stampfly_drivers::chip::vl53l3cx::BootAddress;
 use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
@@ -68,12 +67,14 @@ pub struct Parts {
     pub baro: topics::BaroEnds<'static>,
     pub power: topics::PowerEnds<'static>,
     pub health: &'static Healths,
+    /// Applies what calibrations have found.
+    pub corrector: Corrector,
 }
 
 /// Reads them until power-off.
 #[embassy_executor::task]
 pub async fn run(parts: Box<Parts>) {
-    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power, health } = *parts;
+    let Parts { unit, pins, range, mut tof, mut tof_front, mut mag, mut baro, mut power, health, corrector } = *parts;
     let mut bus = SharedI2c::new(i2c::Bus::start(unit, pins).await);
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = bus.split();
     let asleep = |pin: AnyPin<'static>| Output::new(pin, Level::Low, OutputConfig::default());
@@ -100,7 +101,11 @@ pub async fn run(parts: Box<Parts>) {
         ),
         run_sensor(
             async || mag_chip.next().await,
-            |at, sample| _ = mag.sensor_mag.publish(at, sample),
+            |at, sample| {
+                let mut sample = *sample;
+                corrector.mag(&mut sample);
+                mag.sensor_mag.publish(at, &sample);
+            },
             Clock,
             Backoff::SHARED,
             &health.mag,

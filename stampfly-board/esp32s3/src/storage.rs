@@ -19,10 +19,14 @@ use stampfly_board::messages::StorageBusy;
 use stampfly_board::parameters::{self, KEY, PEER};
 use stampfly_board::topics::StorageBusyTx;
 use stampfly_drivers::Timebase;
-use stampfly_flight::parameters::Parameters;
+use stampfly_flight::parameters::{Parameters, settle};
 use stampfly_link::Address;
 use stampfly_link::secure::Key;
 use stampfly_param::{Disarmed, EraseError, ParameterStore, SaveError};
+#[cfg(feature = "wifi")]
+use stampfly_services::association::{Credentials, NAMES, RECORD};
+#[cfg(feature = "wifi")]
+use stampfly_services::network::Reserved;
 use stampfly_types::messages::FlightStatus;
 
 /// Several periods of the motors' duties.
@@ -90,7 +94,8 @@ impl Storage {
         Self { store: find(FlashStorage::new(flash)) }
     }
 
-    /// Overlays the defaults with what was kept. Returns how many values were kept but cannot be used.
+    /// Overlays the defaults with what was kept. Returns how many values were kept but cannot be used. Two that cannot fly together, which an
+    /// earlier version may have kept, both get their defaults, as a value out of its range does; flash still has them.
     pub async fn load(&mut self, config: &mut VehicleConfig) -> usize {
         let Some(store) = &mut self.store else { return 0 };
         let mut unusable = 0;
@@ -101,7 +106,7 @@ impl Storage {
                 Err(_) => unusable += 1,
             }
         }
-        unusable
+        unusable + 2 * settle(config, &VehicleConfig::default(), &mut |conflict| esp_println::println!("{conflict}"))
     }
 
     /// The transmitter the vehicle belongs to, if it has one.
@@ -155,6 +160,49 @@ impl Storage {
         let _still = Writing::begin(busy, &mut mode).await?;
         let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
         store.save(proven(&mut mode)?, PEER, peer.0).await.map_err(StorageError::Save)
+    }
+
+    /// The network that the vehicle joins, and the time up to which signatures are reserved.
+    #[cfg(feature = "wifi")]
+    pub async fn load_network(&mut self) -> (Option<Credentials>, Option<u64>) {
+        let Some(store) = &mut self.store else { return (None, None) };
+        let mut records = [[0; RECORD]; NAMES.len()];
+        for (record, name) in records.iter_mut().zip(NAMES) {
+            *record = store.load(name).await.ok().flatten().unwrap_or_default();
+        }
+        (Credentials::from_records(&records), store.load(Reserved::NAME).await.ok().flatten())
+    }
+
+    /// Keeps the network that the vehicle joins, or none.
+    #[cfg(feature = "wifi")]
+    pub async fn save_network(
+        &mut self,
+        known: Option<&Credentials>,
+        busy: &mut StorageBusyTx<'static>,
+        mut mode: impl FnMut() -> Option<FlightStatus>,
+    ) -> Result<(), StorageError> {
+        let _still = Writing::begin(busy, &mut mode).await?;
+        let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
+        let [name, first, second] = known.map(Credentials::to_records).unwrap_or_default();
+        let [of_name, of_first, of_second] = NAMES;
+        // The name over nothing, and last: a power cut leaves no name with another network's pass-phrase.
+        for (of, record) in [(of_name, [0; RECORD]), (of_first, first), (of_second, second), (of_name, name)] {
+            store.save(proven(&mut mode)?, of, record).await.map_err(StorageError::Save)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps the time up to which signatures are reserved.
+    #[cfg(feature = "wifi")]
+    pub async fn save_reserved(
+        &mut self,
+        until: u64,
+        busy: &mut StorageBusyTx<'static>,
+        mut mode: impl FnMut() -> Option<FlightStatus>,
+    ) -> Result<(), StorageError> {
+        let _still = Writing::begin(busy, &mut mode).await?;
+        let store = self.store.as_mut().ok_or(StorageError::NoPartition)?;
+        store.save(proven(&mut mode)?, Reserved::NAME, until).await.map_err(StorageError::Save)
     }
 
     /// Forgets everything that was kept, transmitter and key included.

@@ -21,7 +21,7 @@ use stampfly_board::schedule::Runnables;
 use stampfly_board::{VehicleConfig, golden, topics};
 use stampfly_bus::{Band, Taps};
 use stampfly_drivers::Decimator;
-use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, pmw3901, vl53l3cx};
+use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, mpu6000, nrf24l01, pmw3901, vl53l3cx};
 use stampfly_flight::Assembled;
 use stampfly_link::secure::{Guarded, Key, MAX_FRAME, Payload, Policy, Station, Vehicle};
 use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
@@ -83,7 +83,7 @@ fn vehicle() {
         for what in Outgoing::ALL {
             black_box(link.transmit(at, what, black_box([0; 8]), &mut room));
         }
-        black_box(link.guarded().session().age(at));
+        black_box(link.guarded.session().age(at));
         flight_loop.run_band(Band::Flight, black_box(at), &mut ());
         flight_loop.run_band(Band::Background, black_box(at), &mut ());
         black_box(outside.motors.actuator_motor.latest());
@@ -136,6 +136,10 @@ fn chips() {
     }
     black_box(bmp280::codec::Reading::decode(&black_box([0; 10])));
     black_box((ina3221::codec::shunt_volts(black_box(0)), ina3221::codec::bus_volts(black_box(0))));
+    black_box(mpu6000::codec::Sample::decode(&black_box([0; 14])).map(|sample| sample.celsius()));
+    let factory = mpu6000::codec::factory_answers(black_box([0; 4]));
+    black_box(mpu6000::codec::passes_self_test(&black_box([0.0; 6]), &factory));
+    black_box(nrf24l01::codec::Status::decode(black_box(0)));
     black_box(pmw3901::codec::Motion::decode(&black_box([0; 12])).map(|motion| motion.is_valid()));
     black_box(vl53l3cx::codec::Reading::decode(&black_box([0; 17])).map(|reading| reading.status()));
     let exposure = vl53l3cx::bins::Exposure { oscillator: 48_333, macro_periods: [85, 71], laser_start: 9 };

@@ -1,8 +1,8 @@
 //! The flight record, as the vehicle writes it: a ULog with every sample of every topic and every activation.
 
+use stampfly_board::VehicleConfig;
 use stampfly_board::schedule::Runnables;
-use stampfly_board::{VehicleConfig, black_box};
-use stampfly_flight::Recorder;
+use stampfly_flight::{Recorder, black_box};
 use stampfly_log::ulog::Ram;
 use stampfly_types::Instant;
 
@@ -11,6 +11,6 @@ pub type Record<'t> = Recorder<Runnables, Ram<'t>>;
 
 /// Facts, parameters and formats. `None` when there is no room for them.
 pub fn begin(memory: &mut [u8]) -> Option<Record<'_>> {
-    let log = black_box::open(Ram::new(memory), Instant::ZERO, &VehicleConfig::default(), "golden flight");
+    let log = black_box::open(Ram::new(memory), Instant::ZERO, "stampfly", &VehicleConfig::default(), "golden flight");
     log.ok().map(Recorder::new)
 }

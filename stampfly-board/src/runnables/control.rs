@@ -57,6 +57,22 @@ impl Control {
     }
 }
 
+impl Control {
+    /// Takes the gains, and keeps every state. A rate loop that is being measured is another one then.
+    pub(crate) fn set_gains(&mut self, config: &VehicleConfig) {
+        match &mut self.controller {
+            Choice::Cascade(controller) => controller.set_gains(&config.cascade),
+            Choice::Indi(controller) => controller.set_gains(&config.cascade, &config.indi),
+            Choice::Geometric(_) => {}
+        }
+        self.flip.set_gains(&config.indi);
+        if self.rate != config.cascade.rate {
+            self.autotune.cancel();
+            self.rate = config.cascade.rate;
+        }
+    }
+}
+
 impl Runnable for Control {
     type Ends<'b> = ControlEnds<'b>;
 

@@ -6,20 +6,14 @@ use stampfly_bus::{Activation, Runnable};
 use stampfly_eskf::{Complementary, Eskf, Estimator, Measurements, Pacer};
 use stampfly_types::Instant;
 
-/// The estimators this vehicle can be told to use (`estimator.type`).
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
-#[allow(clippy::large_enum_variant, reason = "there is one of them, for as long as the vehicle is on")]
-enum Choice {
-    Eskf(Eskf),
-    Complementary(Complementary),
-}
-
 /// Estimation: every sensor in, the vehicle's state out.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimation {
-    estimator: Choice,
+    /// Which one flies. Each has its place, so that it can begin again there: the other one waits to be initialised.
+    kind: EstimatorKind,
+    eskf: Eskf,
+    complementary: Complementary,
     /// Has the still-calibration been used?
     started: bool,
     pacer: Pacer,
@@ -32,11 +26,20 @@ impl Estimation {
     #[inline(never)]
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let new = |estimator| Self { estimator, started: false, pacer: Pacer::default() };
-        match config.estimator {
-            EstimatorKind::Complementary => new(Choice::Complementary(Complementary::new(config.complementary))),
-            EstimatorKind::Eskf => new(Choice::Eskf(Eskf::new(config.eskf))),
+        Self {
+            kind: config.estimator,
+            eskf: Eskf::new(config.eskf),
+            complementary: Complementary::new(config.complementary),
+            started: false,
+            pacer: Pacer::default(),
         }
+    }
+
+    /// The same in its place, with little stack.
+    pub(crate) fn begin_again(&mut self, config: &VehicleConfig) {
+        (self.kind, self.started, self.pacer) = (config.estimator, false, Pacer::default());
+        self.eskf.begin_again(&config.eskf);
+        self.complementary = Complementary::new(config.complementary);
     }
 }
 
@@ -45,9 +48,9 @@ impl Runnable for Estimation {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
         let feeding = (&mut self.started, &mut self.pacer);
-        match &mut self.estimator {
-            Choice::Eskf(estimator) => step(estimator, feeding, activation.now(), ends),
-            Choice::Complementary(estimator) => step(estimator, feeding, activation.now(), ends),
+        match self.kind {
+            EstimatorKind::Eskf => step(&mut self.eskf, feeding, activation.now(), ends),
+            EstimatorKind::Complementary => step(&mut self.complementary, feeding, activation.now(), ends),
         }
     }
 }

@@ -5,14 +5,17 @@
 //! their recorded hashes.
 
 use crate::VehicleConfig;
-use crate::link::{Link, Outgoing};
+use crate::link::{Link, Outgoing, PERIOD};
 use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
 use core::cell::Cell;
+use stampfly_flight::compact::{Chunks, MAGIC};
 use stampfly_link::secure::{
-    Guarded, Key, KeyError, MAX_FRAME, NotTaken, Payload, Policy, Refused, Station, Tally, Vehicle,
+    Guarded, Key, KeyError, MAX_BODY, MAX_FRAME, NotTaken, Payload, Policy, Refused, Station, Tally, Vehicle,
 };
 use stampfly_link::{Address, ControlPacket, Session};
+use stampfly_services::tape::RADIO_CHUNKS;
+use stampfly_services::{Desk, Tape};
 use stampfly_sim::Noise;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::PilotInput;
@@ -31,12 +34,20 @@ const TICK: u64 = 2_500;
 /// of 240 MHz each, and a few comparisons; neither has been measured on the chip.
 const OPENING: Duration = Duration::from_micros(112);
 const LOOK: Duration = Duration::from_micros(5);
+/// A packet that is nearly full.
+const LEAST_CHUNK: usize = MAX_BODY - 32;
+/// Between two questions for the flight record.
+const ASKS: Duration = Duration::from_secs(1);
 
 /// What is on the air.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Air {
     /// Frames of a stranger a second: random bytes, replays, wrong tags, and packets of the right form that authenticate nobody.
     pub flood: u32,
+    /// The station wants the flight record.
+    pub record: bool,
+    /// So many frames of a thousand are lost, of both ends.
+    pub loss: u16,
 }
 
 /// What came of it.
@@ -60,6 +71,8 @@ pub struct AirReport {
     pub worst_tags: u32,
     /// Longest time for which frames kept the processor at a stretch.
     pub busiest: Duration,
+    /// Chunks of the flight record that were sealed, and those that the station has opened.
+    pub chunks: [u32; 2],
     /// What the session has counted.
     pub tally: Tally,
 }
@@ -78,13 +91,22 @@ pub(super) struct Ends<'b> {
     busy: (Instant, Instant),
     frame: TelemetryFrame,
     report: AirReport,
+    /// Share of the frames that are lost.
+    loss: f64,
+    /// What the station asks for, as the firmware keeps it.
+    desk: Desk,
+    /// Who has the flight record: the station, if it has asked.
+    tape: Tape<()>,
+    /// When chunks are sent again, and when the station asks again.
+    recording: [Instant; 2],
+    record: Vec<u8>,
 }
 
 /// One flight's air, for the radio and for the stranger.
 pub(super) type Shared<'b> = Rc<RefCell<Ends<'b>>>;
 
 impl<'b> Ends<'b> {
-    pub(super) fn new(seed: u64, config: &VehicleConfig, ends: LinkEnds<'b>) -> Result<Self, KeyError> {
+    pub(super) fn new(seed: u64, what: Air, config: &VehicleConfig, ends: LinkEnds<'b>) -> Result<Self, KeyError> {
         let mut noise = Noise::new(seed, STREAM);
         let key = Key::generate(1, random(&mut noise))?;
         let session = Session::new(VEHICLE, 1, Some(TRANSMITTER));
@@ -99,14 +121,56 @@ impl<'b> Ends<'b> {
             busy: (Instant::ZERO, Instant::ZERO),
             frame: TelemetryFrame::default(),
             report: AirReport::default(),
+            loss: f64::from(what.loss) / 1_000.0,
+            desk: Desk::new(),
+            tape: Tape::new(),
+            recording: [Instant::ZERO; 2],
+            record: MAGIC.to_vec(),
         })
+    }
+
+    /// Does a frame arrive? Of air that loses nothing no random number is taken.
+    fn arrives(&mut self) -> bool {
+        self.loss == 0.0 || self.noise.unit() >= self.loss
+    }
+
+    /// The flight record, as the firmware's radio sends it: the station asks again and again, and each chunk is a sealed frame. Call it after every turn.
+    pub(super) fn pass_on(&mut self, now: Instant, chunks: &mut dyn Chunks) {
+        let [send, ask] = self.recording;
+        if now < send {
+            return;
+        }
+        self.recording = [now + PERIOD, if now < ask { ask } else { now + ASKS }];
+        if now >= ask {
+            self.say(now, &Payload::Record { wanted: true }, true);
+        }
+        if let Some(wanted) = self.desk.record() {
+            self.tape.ask(now, (), wanted);
+        }
+        self.tape.poll(now, chunks);
+        for _ in 0..RADIO_CHUNKS {
+            let (mut body, mut room) = ([0; MAX_BODY], [0; MAX_FRAME]);
+            let Some(chunk) = self.tape.chunk((), chunks, &mut body, LEAST_CHUNK) else { break };
+            // Without a session it is gone, as on the air.
+            let Some((_, frame)) = self.link.guarded.seal(now, &Payload::Chunk(chunk), &mut room) else { continue };
+            let mut frame = frame.to_vec();
+            self.report.chunks[0] += 1;
+            if self.arrives() {
+                self.answer(now, &mut frame);
+            }
+        }
+    }
+
+    /// The file of what has arrived of the flight record.
+    pub(super) fn record(&mut self) -> Vec<u8> {
+        core::mem::take(&mut self.record)
     }
 
     /// The station says something. `is_open` says whether frames arrive at all. Could it be sealed?
     pub(super) fn say(&mut self, now: Instant, payload: &Payload<'_>, is_open: bool) -> bool {
         let mut room = [0; MAX_FRAME];
         let Ok(mut frame) = self.station.seal(now, payload, &mut room).map(<[u8]>::to_vec) else { return false };
-        if is_open {
+        if is_open && self.arrives() {
             self.recorded.clone_from(&frame);
             self.report.sent += 1;
             let is_taken = self.hear(now, &mut frame);
@@ -121,13 +185,13 @@ impl<'b> Ends<'b> {
         for what in Outgoing::ALL {
             let fresh = random(&mut self.noise);
             let sent = self.link.transmit(now, what, fresh, &mut room).map(|(_, bytes)| bytes.to_vec());
-            if let Some(mut bytes) = sent.filter(|_| is_open) {
+            if let Some(mut bytes) = sent.filter(|_| is_open && self.arrives()) {
                 self.answer(now, &mut bytes);
             }
         }
         let fresh = random(&mut self.noise);
         let sent = self.station.transmit(now, fresh, &mut room).map(<[u8]>::to_vec);
-        if let Some(mut bytes) = sent.filter(|_| is_open) {
+        if let Some(mut bytes) = sent.filter(|_| is_open && self.arrives()) {
             self.hear(now, &mut bytes);
         }
         self.frame
@@ -139,6 +203,12 @@ impl<'b> Ends<'b> {
         match received.payload {
             Payload::Acknowledgement { taken, .. } => self.report.acknowledged += u32::from(taken),
             Payload::Telemetry(_) => self.report.telemetry += 1,
+            Payload::Chunk(chunk) => {
+                self.report.chunks[1] += 1;
+                // In a file, a chunk's length goes before it.
+                self.record.extend((chunk.len() as u16).to_le_bytes());
+                self.record.extend(chunk);
+            }
             Payload::Sample(sample) if sample.topic == Id::telemetry as u16 => {
                 let mut words = TelemetryFrame::ZERO;
                 words.iter_mut().zip(sample.words()).for_each(|(to, from)| *to = from);
@@ -178,7 +248,7 @@ impl<'b> Ends<'b> {
     }
 
     fn tally(&self) -> Tally {
-        self.link.guarded().vehicle().map(|vehicle| *vehicle.tally()).unwrap_or_default()
+        self.link.guarded.vehicle().map(|vehicle| *vehicle.tally()).unwrap_or_default()
     }
 
     /// Does the vehicle take a frame?
@@ -187,7 +257,9 @@ impl<'b> Ends<'b> {
         if self.tick.0 != tick {
             self.tick = (tick, self.tally().tag);
         }
-        let heard = self.link.receive(now, TRANSMITTER, bytes).map(drop);
+        let heard = self.link.receive(now, TRANSMITTER, bytes).map(|received| {
+            received.map(|received| self.desk.ask(0, &received.payload));
+        });
         self.report.worst_tags = self.report.worst_tags.max(self.tally().tag - self.tick.1);
         let is_opened = !matches!(heard, Err(error) if error != NotTaken::Secure(Refused::Tag));
         if now >= self.busy.0 {
@@ -199,7 +271,7 @@ impl<'b> Ends<'b> {
     }
 
     fn report(&self) -> AirReport {
-        AirReport { forbidden: self.link.guarded().forbidden(), tally: self.tally(), ..self.report }
+        AirReport { forbidden: self.link.guarded.forbidden(), tally: self.tally(), ..self.report }
     }
 }
 

@@ -5,7 +5,7 @@ use super::faults::Wrong;
 use super::ground_station::{self, Progress};
 use super::home::Home;
 use super::judge::{Judge, Sight};
-use super::live::{self, Seen, Services};
+use super::live::{Seen, Services};
 use super::outcome::Outcome;
 use super::pilot::{Meaning, Pilot};
 use super::radio::Radio;
@@ -18,9 +18,12 @@ use crate::schedule::{ACTIVATIONS, Runnables};
 use crate::topics::{self, Id};
 use stampfly_bus::Band;
 use stampfly_drivers::{Button, Indicator, MotorOutputs};
-use stampfly_flight::Watchdog;
+use stampfly_flight::compact::Chunks;
+use stampfly_flight::{FlightLoop, Observer, Watchdog};
 use stampfly_sim::chips;
 use stampfly_sim::fault::{Injector, Moment};
+use stampfly_sim::ground;
+use stampfly_sim::plant::Plant;
 use stampfly_sim::sensors::{IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, Live};
@@ -101,6 +104,11 @@ impl vehicle::Surroundings for Surroundings {
         self.clock.clone()
     }
 
+    fn record_of(&self) -> Option<&'static str> {
+        let by_radio = self.setup.air.is_some_and(|air| air.record);
+        (by_radio || self.setup.live.is_some()).then_some("stampfly")
+    }
+
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
         let Self {
             setup,
@@ -120,32 +128,38 @@ impl vehicle::Surroundings for Surroundings {
         } = self;
         let (sensors, board) = sensors.take().zip(board.take()).expect("surroundings are started once");
         let wrong = wrong.take().expect("surroundings are started once");
-        let cameras = setup.cameras;
+        let with = (setup.cameras, &setup.vehicle.corrections);
         let chips = (setup.sensing == Sensing::Chips).then(|| board.attached.clone());
         let Others { motors, indicator, button, link, cutoff, console, .. } = match setup.sensing {
-            Sensing::Models => sensing::start_models(tasks, clock, (sensors, &wrong), outside, cameras, health),
+            Sensing::Models => sensing::start_models(tasks, clock, (sensors, &wrong), outside, with, health),
             Sensing::Chips => {
-                sensing::start_drivers(tasks, clock, (board, shared), (sensors, &wrong), outside, cameras, health)
+                sensing::start_drivers(tasks, clock, (board, shared), (sensors, &wrong), outside, with, health)
             }
         };
         tasks.spawn(watch_button(clock.clone(), button.0, button.1.button_contact));
         let home = Home::new(&world.truth_at(setup.simulation.start));
-        let radio = match setup.air {
-            None => Radio::new(clock, link, &wrong),
+        let (radio, sealed) = match setup.air {
+            None => (Radio::new(clock, link, &wrong), None),
             Some(what) => {
-                let ends = Ends::new(setup.simulation.seed, &setup.vehicle, link).expect("a key of random bytes");
+                let ends = Ends::new(setup.simulation.seed, what, &setup.vehicle, link).expect("a key of random bytes");
                 let ends = Rc::new(RefCell::new(ends));
                 tasks.spawn(air::flood(clock.clone(), ends.clone(), what.flood, air, busy));
-                Radio::sealed(clock, ends, &wrong)
+                (Radio::sealed(clock, ends.clone(), &wrong), Some(ends))
             }
         };
         let waits = wrong.injector.wants(Moment::Ground);
         match (&setup.live, setup.pilot) {
             (Some(live), _) => {
                 let shared = (&*seen, &*health, &*profile);
-                let services =
-                    Services::new(live, radio, console, (&setup.vehicle, setup.sensing), &wrong.injector, shared);
-                tasks.spawn(live.serve(clock.clone(), live::PERIOD, services));
+                let services = Services::new(
+                    live,
+                    radio,
+                    console,
+                    (&setup.vehicle, setup.sensing),
+                    (&wrong.injector, world),
+                    shared,
+                );
+                tasks.spawn(live.serve(clock.clone(), ground::PERIOD, services));
             }
             (None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
             (None, Some(mode)) => {
@@ -168,6 +182,7 @@ impl vehicle::Surroundings for Surroundings {
             watch: Watch::new(home),
             live: setup.live.as_ref(),
             seen,
+            sealed,
             air,
             busy,
             judge,
@@ -201,6 +216,8 @@ pub struct Around<'a> {
     /// The programs that fly it, if there are.
     live: Option<&'a Live>,
     seen: &'a Seen,
+    /// The secure session, if there is one.
+    sealed: Option<air::Shared<'a>>,
     air: &'a Cell<AirReport>,
     busy: &'a Cell<Instant>,
     judge: Judge,
@@ -221,7 +238,13 @@ pub struct Around<'a> {
 }
 
 impl vehicle::Around for Around<'_> {
+    type Runnables = Runnables;
     type Outcome = Outcome;
+
+    fn tend(&mut self, flight_loop: &mut FlightLoop<'_, Runnables>, observer: &mut dyn Observer) -> bool {
+        let mut waiting = self.seen.changed.borrow_mut();
+        waiting.as_mut().is_some_and(|change| change.apply(self.watch.mode.armed, flight_loop, observer))
+    }
 
     fn drive(&mut self, now: Instant) {
         if self.duties.has_new()
@@ -260,6 +283,13 @@ impl vehicle::Around for Around<'_> {
             if self.live.is_some() {
                 self.seen.note(*id, at, words);
             }
+        }
+    }
+
+    fn stream(&mut self, now: Instant, chunks: &mut dyn Chunks) {
+        match &self.sealed {
+            Some(air) => air.borrow_mut().pass_on(now, chunks),
+            None => self.seen.stream(now, chunks),
         }
     }
 
@@ -306,6 +336,7 @@ impl vehicle::Around for Around<'_> {
             finished: self.progress.finished.get(),
             live: self.live.is_some(),
             air: self.air.get(),
+            record: self.sealed.map(|air| air.borrow_mut().record()).unwrap_or_default(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),
             battery: watch.battery.unwrap_or_default(),
             judgement: self.judge.finish(),
@@ -325,7 +356,7 @@ impl Around<'_> {
     }
 
     fn strikes(&self) -> u64 {
-        self.world.inspect(|plant| plant.ground().strikes())
+        self.world.inspect_as(|plant: &Plant| plant.ground().strikes()).unwrap_or_default()
     }
 
     fn see(&mut self, now: Instant, truth: &Truth) {

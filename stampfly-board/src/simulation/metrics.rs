@@ -14,7 +14,7 @@
 //! Positions count from the take-off spot and directions from the heading there, truth included.
 
 use serde::Serialize;
-use stampfly_sim::Truth;
+use stampfly_sim::{Rms, Truth};
 use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, Setpoint, StateEstimate};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
@@ -72,24 +72,6 @@ pub const FIGURES: [Figure; 8] = [
     ("land_error_m", "m", |m| m.land_error_m),
     ("hover_drift_m", "m", |m| m.hover_drift_m),
 ];
-
-/// Root mean square of what is added.
-#[derive(Clone, Copy, Debug, Default)]
-struct Rms {
-    sum: f64,
-    count: u64,
-}
-
-impl Rms {
-    fn add(&mut self, square: f32) {
-        self.sum += f64::from(square);
-        self.count += 1;
-    }
-
-    fn get(self) -> Option<f64> {
-        (self.count > 0).then(|| (self.sum / self.count as f64).sqrt())
-    }
-}
 
 /// A stretch during which the set-point rested.
 #[derive(Clone, Copy, Debug)]
@@ -158,10 +140,10 @@ impl Collector {
         }
         self.was_in_contact = truth.contact;
         if holding {
-            self.position.add((truth.position - setpoint.position).norm_squared());
-            self.estimate.add((truth.position - estimate.position).norm_squared());
+            self.position.add_square((truth.position - setpoint.position).norm_squared().into());
+            self.estimate.add_square((truth.position - estimate.position).norm_squared().into());
             let height = truth.position.z - setpoint.position.z;
-            self.altitude.add(height * height);
+            self.altitude.add_square((height * height).into());
         }
         let resting = holding && setpoint.velocity.norm() < 1e-3 && setpoint.yaw_rate.abs() < 1e-3;
         if resting {
@@ -204,9 +186,9 @@ impl Collector {
         Metrics {
             landed,
             disarmed: self.last.is_none_or(|last| !last.armed),
-            pos_rms_m: self.position.get(),
-            est_pos_rms_m: self.estimate.get(),
-            alt_rms_m: self.altitude.get(),
+            pos_rms_m: self.position.value(),
+            est_pos_rms_m: self.estimate.value(),
+            alt_rms_m: self.altitude.value(),
             takeoff_overshoot_m: self.highest.and_then(overshoot).map(|o| o.max(0.0)),
             touchdown_speed_mps: self.touchdown.map(f64::from),
             hover_tilt_max_deg: self.tilt.map(f64::from),

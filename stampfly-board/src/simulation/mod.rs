@@ -48,7 +48,7 @@ use crate::schedule::Runnables;
 use crate::topics::Id;
 use mission::Mission;
 use sensing::Sensing;
-use stampfly_flight::parameters::{self, Parameters};
+use stampfly_flight::parameters::{self, ParameterError, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::FaultKind;
@@ -57,7 +57,6 @@ use stampfly_sim::vehicle::{
     Vehicle, Witness,
 };
 use stampfly_types::Message;
-use std::fmt::Display;
 use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -70,7 +69,8 @@ impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety = Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"] };
+    const VARIETY: Variety =
+        Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"], chips: true };
     const PORTS: &'static [PortSpec] = live::PORTS;
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
@@ -86,24 +86,12 @@ impl Vehicle for StampFly {
             }
             setup = setup.flown_by(live.clone());
         }
-        if let Some(vibration) = options.vibration {
-            setup.simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
-        }
-        if let Some(gust) = options.gust {
-            setup.simulation.wind.gust = within("--gust", gust, 0.0, 20.0)?;
-        }
-        if let Some([north, east]) = options.wind {
-            within("--wind north", north, -20.0, 20.0)?;
-            within("--wind east", east, -20.0, 20.0)?;
-            setup.simulation.wind.mean = [north, east, 0.0].into();
-        }
-        for text in &options.plant {
-            let (name, value) = assignment(text)?;
-            setup.simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
-        }
+        options.change(&mut setup.simulation)?;
+        // In any order, so combinations are looked at when all are there.
         for (name, value) in options.parameters()? {
-            parameters::set(&mut setup.vehicle, name, value).map_err(|error| format!("--param {name}: {error}"))?;
+            set_alone(&mut setup.vehicle, name, value).map_err(|error| format!("--param {name}: {error}"))?;
         }
+        setup.vehicle.check(None).map_err(|error| format!("--param {error}"))?;
         setup.faults = options.faults(faults::FAULTS)?;
         if let Some(name) = &options.pilot {
             let mode = pilot::mode_named(name);
@@ -114,6 +102,12 @@ impl Vehicle for StampFly {
         setup.cameras = options.cameras;
         setup.jitter = options.jitter;
         Ok(setup)
+    }
+
+    fn settled(options: &Options, seed: u64) -> Result<Options, SetupError> {
+        // The semicolon at the end says that it is a mission's text, and not a file.
+        let mission = format!("{};", mission_of(options, seed)?);
+        Ok(Options { mission: Some(mission), ..options.clone() })
     }
 
     fn again(setup: &Setup, outcome: &Outcome) -> Option<Setup> {
@@ -162,12 +156,17 @@ impl Vehicle for StampFly {
 
     fn set_parameter(config: &mut VehicleConfig, name: &str, value: ParameterValue) -> Result<(), SetupError> {
         let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
-        parameters::set(config, name, value).map(drop).map_err(|error| format!("{name}: {error}"))
+        // A log has what was flown, whatever may fly today.
+        set_alone(config, name, value).map_err(|error| format!("{name}: {error}"))
     }
 
     fn parameter_range(name: &str) -> Option<[f64; 2]> {
         let info = crate::parameters::all().find(|info| info.name == name)?;
         Some([info.min, info.max].map(f64::from))
+    }
+
+    fn has_same_components(one: &VehicleConfig, other: &VehicleConfig) -> bool {
+        one.estimator == other.estimator
     }
 
     fn golden() -> Option<Golden<Self>> {
@@ -199,6 +198,12 @@ impl Vehicle for StampFly {
     }
 }
 
+/// Sets a parameter of this name, whatever the others are.
+fn set_alone(config: &mut VehicleConfig, name: &str, value: f32) -> Result<(), ParameterError> {
+    let index = parameters::find(config, name)?;
+    parameters::set_alone(config, index, value)
+}
+
 /// The mission that options name: one that is built in, the text of one, or a file.
 fn mission_of(options: &Options, seed: u64) -> Result<Mission, SetupError> {
     let name = options.mission.as_deref().unwrap_or("square");
@@ -217,15 +222,3 @@ fn mission_of(options: &Options, seed: u64) -> Result<Mission, SetupError> {
 
 /// The mission of the golden flight.
 const GOLDEN: &str = "arm\ntakeoff 0.2\nhover 0.3\nland\n";
-
-/// The value, if it is a number in its range.
-fn within<T: PartialOrd + Display>(name: &str, value: T, low: T, high: T) -> Result<T, SetupError> {
-    if low <= value && value <= high { Ok(value) } else { Err(format!("{name} {value} is not from {low} to {high}")) }
-}
-
-/// Splits `name=value`.
-fn assignment(text: &str) -> Result<(&str, f64), SetupError> {
-    let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
-    let value = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
-    Ok((name.trim(), value))
-}

@@ -43,6 +43,8 @@ pub struct Outcome {
     pub judgement: Judgement,
     /// What the secure session has done, if there was one.
     pub air: AirReport,
+    /// The flight record that its station has received, as a file.
+    pub record: Vec<u8>,
     /// Other programs flew it: it had nothing to finish.
     pub live: bool,
     /// Somebody has asked for a restart, with these parameters if any were kept.

@@ -1,6 +1,7 @@
 //! What a page about a flight of the StampFly shows.
 
 use stampfly_sim::vehicle::{Body, Motion, Observer, Page, PanelSpec, Pick};
+use stampfly_types::messages::CalibrationKind;
 
 const DEGREES: f64 = 180.0 / core::f64::consts::PI;
 const XYZ: [&str; 3] = ["x", "y", "z"];
@@ -13,6 +14,12 @@ pub const PAGE: Page = Page {
         Observer { topic: "device", role: "device", name: "on board", motion: Motion::Space },
     ],
     setpoint: Some("setpoint"),
+    calibrations: &[
+        (CalibrationKind::Temperature, "calibrate temperature"),
+        (CalibrationKind::SixPositions, "calibrate six"),
+        (CalibrationKind::Level, "calibrate level"),
+        (CalibrationKind::Magnetometer, "calibrate mag"),
+    ],
     panels: &[
         PanelSpec::new(
             "Actuators",

@@ -8,6 +8,7 @@ use stampfly_drivers::shared::SharedI2c;
 use stampfly_drivers::slot::Slots;
 use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder};
+use stampfly_eskf::calibration::{Corrections, Corrector};
 use stampfly_sim::chips::{self, Controller, I2cBus, SpiSetup, stand_in_image};
 use stampfly_sim::sensors::{ButtonModel, IndicatorRecorder, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
@@ -50,12 +51,14 @@ impl Sensing {
 
 /// A task that publishes a sensor's samples, as far as they come through its line, for as long as the vehicle is on.
 macro_rules! spawn {
-    ($tasks:ident, $clock:ident, $health:ident, $wrong:ident, $backoff:ident, $sensor:expr => $ends:ident.$owner:ident.$topic:ident) => {{
+    ($tasks:ident, $clock:ident, $health:ident, $wrong:ident, $backoff:ident, $sensor:expr => $ends:ident.$owner:ident.$topic:ident $(, $correct:expr)?) => {{
         let (mut sensor, mut line, mut publisher) = ($sensor, $wrong.line(Id::$topic), $ends.$owner.$topic);
         let (clock, health): (_, &SensorHealth) = ($clock.clone(), $health.next().expect("one for each sensor"));
         $tasks.spawn(async move {
             let publish = |at, data: &_| {
-                if let Some(data) = line.pass(at, data) {
+                #[allow(unused_mut, reason = "not every sensor is corrected")]
+                if let Some(mut data) = line.pass(at, data) {
+                    $($correct(&mut data);)?
                     publisher.publish(at, &data);
                 }
             };
@@ -100,14 +103,15 @@ pub(super) fn start_models<'a>(
     clock: &Clock,
     (models, wrong): (Sensors, &Wrong),
     ends: topics::Outside<'a>,
-    cameras: bool,
+    (cameras, corrections): (bool, &Corrections),
     health: &'a Healths,
 ) -> Others<'a> {
     let mut health = health.iter();
-    spawn!(tasks, clock, health, wrong, CRITICAL, models.imu => ends.imu.sensor_imu);
+    let (mut inertial, magnetic) = (Corrector::new(corrections), Corrector::new(corrections));
+    spawn!(tasks, clock, health, wrong, CRITICAL, models.imu => ends.imu.sensor_imu, |imu: &mut _| inertial.imu(imu));
     spawn!(tasks, clock, health, wrong, SHARED, models.tof => ends.tof.sensor_tof);
     spawn!(tasks, clock, health, wrong, SHARED, models.flow => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, wrong, SHARED, models.mag => ends.mag.sensor_mag);
+    spawn!(tasks, clock, health, wrong, SHARED, models.mag => ends.mag.sensor_mag, |mag: &mut _| magnetic.mag(mag));
     spawn!(tasks, clock, health, wrong, SHARED, models.baro => ends.baro.sensor_baro);
     spawn!(tasks, clock, health, wrong, SHARED, models.power => ends.power.sensor_power);
     if cameras {
@@ -131,10 +135,11 @@ pub(super) fn start_drivers<'a>(
     (board, shared): (chips::Board, &'a mut Shared),
     (models, wrong): (Sensors, &Wrong),
     ends: topics::Outside<'a>,
-    cameras: bool,
+    (cameras, corrections): (bool, &Corrections),
     health: &'a Healths,
 ) -> Others<'a> {
     let mut health = health.iter();
+    let (mut inertial, magnetic) = (Corrector::new(corrections), Corrector::new(corrections));
     let ([to_down, to_ahead, to_mag, to_baro, to_power], _) = shared.i2c.split();
     let chips::Board { imu, flow, shutdown_bottom, shutdown_front, .. } = board;
     let time = || clock.clone();
@@ -143,11 +148,12 @@ pub(super) fn start_drivers<'a>(
     let down = devices::range_down(to_down, shutdown_bottom, &shared.boot, time());
     let ahead = devices::range_ahead(to_ahead, shutdown_front, &shared.boot, time());
     let imu = devices::imu(imu, time(), &IMAGE).with_interrupt(ready);
-    spawn!(tasks, clock, health, wrong, CRITICAL, imu => ends.imu.sensor_imu);
+    spawn!(tasks, clock, health, wrong, CRITICAL, imu => ends.imu.sensor_imu, |imu: &mut _| inertial.imu(imu));
     spawn!(tasks, clock, health, wrong, SHARED, down => ends.tof.sensor_tof);
     spawn!(tasks, clock, health, wrong, SHARED, ahead => ends.tof_front.sensor_tof_front);
     spawn!(tasks, clock, health, wrong, SHARED, devices::flow(flow, time()) => ends.flow.sensor_flow);
-    spawn!(tasks, clock, health, wrong, SHARED, devices::magnetometer(to_mag, time()) => ends.mag.sensor_mag);
+    let mag = devices::magnetometer(to_mag, time());
+    spawn!(tasks, clock, health, wrong, SHARED, mag => ends.mag.sensor_mag, |mag: &mut _| magnetic.mag(mag));
     spawn!(tasks, clock, health, wrong, SHARED, devices::barometer(to_baro, time()) => ends.baro.sensor_baro);
     spawn!(tasks, clock, health, wrong, SHARED, devices::power(to_power, time()) => ends.power.sensor_power);
     if cameras {

@@ -62,6 +62,8 @@ impl Setup {
     /// The same, flown by other programs instead of a mission.
     #[must_use]
     pub fn flown_by(self, live: Live) -> Self {
-        Self { mission: Mission { steps: Vec::new() }, limit: live.limit, live: Some(live), ..self }
+        // For people who calibrate: the recorded flights know nothing of it.
+        let simulation = SimulationConfig { imperfections: 1.0, ..self.simulation };
+        Self { simulation, mission: Mission { steps: Vec::new() }, limit: live.limit, live: Some(live), ..self }
     }
 }

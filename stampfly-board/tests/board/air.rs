@@ -68,7 +68,13 @@ fn fly_with(
 ) -> (Outcome, Deadlines) {
     let mission = Mission::parse(&format!("arm\ntakeoff 0.5\nhover {hover}\nland\n")).expect("a mission");
     let faults = faults.iter().map(|text| Fault::parse(text, StampFly::FAULTS).expect("a fault")).collect();
-    let mut setup = Setup { mission, faults, pilot, air: flood.map(|flood| Air { flood }), ..Setup::reference(1) };
+    let mut setup = Setup {
+        mission,
+        faults,
+        pilot,
+        air: flood.map(|flood| Air { flood, ..Air::default() }),
+        ..Setup::reference(1)
+    };
     let number = f32::from(u8::from(open));
     parameters::set(&mut setup.vehicle, "link.unauthenticated", number).expect("a parameter");
     let mut deadlines = Deadlines::default();

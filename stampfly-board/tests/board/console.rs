@@ -4,10 +4,12 @@ use stampfly_board::console::{Command, Console, Newest, Profile};
 use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_control::autotune::{AutotuneAxis, AutotuneStage, AutotuneStatus};
+use stampfly_flight::console::calibrate::Calibrate;
 use stampfly_flight::console::{Request, SensorLine, answer};
 use stampfly_flight::doctor::{Fact, Finding, Verdict};
 use stampfly_types::messages::{
-    Alerts, ArmBlocks, ArmRefusals, FlightMode, FlightPhase, FlightStatus, PilotInput, PowerData, SystemAlert, TofData,
+    Alerts, ArmBlocks, ArmRefusals, CalibrationKind, CalibrationReport, CalibrationStage, FlightMode, FlightPhase,
+    FlightStatus, PilotInput, PowerData, SystemAlert, TofData,
 };
 use stampfly_types::{Instant, Message};
 
@@ -140,7 +142,8 @@ fn everything_in_the_help_is_understood() {
     assert!(help.contains("motor stop") && help.contains("param save"));
     for line in help.lines() {
         let example = line.split_at(24).0.replace("[NAME]", "imu").replace("[PREFIX]", "rate").replace("PERCENT", "5");
-        let example = example.replace(" NAME", " eskf.gate").replace("VALUE", "4").replace(" N ", " 1 ");
+        let example =
+            example.replace(" NAME", " eskf.gate").replace("VALUE", "4").replace("KIND", "level").replace(" N ", " 1 ");
         let (said, _) = ask(&vehicle(Some(false)), &example);
         assert!(!said.contains("usage") && !said.contains("no such command"), "{example}: {said}");
     }
@@ -182,4 +185,39 @@ fn gains_that_were_found_are_taken_as_parameters_on_the_ground() {
     newest.note(Id::autotune as usize, Instant::ZERO, &stopped.to_words());
     assert_eq!(taken(&newest), default);
     assert!(ask(&newest, "autotune").0.contains("autotune accept"));
+}
+
+#[test]
+fn a_calibration_is_refused_while_it_is_armed_and_what_was_found_is_taken_to_be_saved() {
+    let found = CalibrationReport {
+        kind: CalibrationKind::SixPositions,
+        stage: CalibrationStage::Done,
+        values: [0.1, -0.2, 0.3, 1.01, 1.0, 0.99, 0.0, 0.0, 0.0],
+        ..CalibrationReport::default()
+    };
+    let taken = |newest: &Newest| {
+        let (profile, mut config) = (Profile::new(&schedule::ACTIVATIONS), VehicleConfig::default());
+        let mut console =
+            Console { version: "1", newest, sensors: &[], profile: &profile, facts: &[], config: &mut config };
+        let request = answer("calibrate accept", Instant::from_secs(5), &mut console, &mut String::new());
+        (request.expect("a String takes everything"), config.corrections)
+    };
+    for armed in [None, Some(true)] {
+        let mut newest = vehicle(armed);
+        newest.note(Id::calibration_report as usize, Instant::ZERO, &found.to_words());
+        let (said, request) = ask(&newest, "calibrate six");
+        assert!(said.contains("armed") && !said.contains("lay it"), "{said}");
+        assert_eq!((request, taken(&newest)), (Request::Nothing, (Request::Nothing, Default::default())), "{armed:?}");
+        // What makes it safer is not refused.
+        let cancel = Request::Vehicle(Command::Calibrate(Calibrate::Begin(CalibrationKind::None)));
+        assert_eq!(ask(&newest, "calibrate cancel").1, cancel);
+    }
+    let mut newest = vehicle(Some(false));
+    let begin = Request::Vehicle(Command::Calibrate(Calibrate::Begin(CalibrationKind::Level)));
+    assert_eq!(ask(&newest, "calibrate level").1, begin);
+    assert_eq!(taken(&newest), (Request::Nothing, Default::default()), "nothing was found");
+    newest.note(Id::calibration_report as usize, Instant::ZERO, &found.to_words());
+    let (request, corrections) = taken(&newest);
+    assert_eq!((request, corrections.accel.bias.z, corrections.accel.scale.x), (Request::SaveParameters, 0.3, 1.01));
+    assert!(ask(&newest, "calibrate status").0.contains("bias 0.100 -0.200 0.300 m/s^2"));
 }

@@ -17,7 +17,7 @@ fn a_vehicle_changes_its_transmitter() {
 
     // Three seconds on the button, with the old transmitter still on.
     bench.pass(3_500, true, &[(OLD, false)]);
-    assert!(bench.link.guarded().session().is_pairing() && bench.blocks().contains(ArmBlocks::PAIRING));
+    assert!(bench.link.guarded.session().is_pairing() && bench.blocks().contains(ArmBlocks::PAIRING));
     assert_eq!(
         bench.pass(1_000, false, &[(OLD, true)]),
         Some(Err(NotTaken::Unauthenticated(Rejected::Stranger))),
@@ -31,8 +31,8 @@ fn a_vehicle_changes_its_transmitter() {
         Some(Err(NotTaken::Unauthenticated(Rejected::ArmSwitch)))
     );
     assert_eq!(bench.pass(500, false, &[(OLD, false), (NEW, false)]), Some(Ok(())));
-    assert_eq!(bench.link.guarded().session().peer(), Some(NEW));
-    assert!(!bench.link.guarded().session().is_pairing());
+    assert_eq!(bench.link.guarded.session().peer(), Some(NEW));
+    assert!(!bench.link.guarded.session().is_pairing());
     assert_eq!(bench.blocks(), ArmBlocks::NONE, "pairing is over, without another touch of the button");
 
     bench.pass(200, false, &[(OLD, true), (NEW, false)]);
@@ -44,7 +44,7 @@ fn a_vehicle_changes_its_transmitter() {
     bench.pass(100, true, &[(NEW, true)]);
     assert!(!bench.armed());
     bench.pass(3_500, true, &[(NEW, true)]);
-    assert!(!bench.link.guarded().session().is_pairing() && bench.link.guarded().session().peer() == Some(NEW));
+    assert!(!bench.link.guarded.session().is_pairing() && bench.link.guarded.session().peer() == Some(NEW));
     bench.pass(1_000, false, &[(NEW, true)]);
     assert!(!bench.armed());
 }
@@ -60,10 +60,10 @@ fn a_vehicle_that_never_had_a_transmitter_takes_none_while_a_program_flies_it() 
     bench.pass(100, false, &[]);
     assert!(bench.armed());
     assert_eq!(bench.pass(2_000, false, &[(NEW, false)]), Some(Err(NotTaken::Unauthenticated(Rejected::Stranger))));
-    assert!(bench.armed() && bench.link.guarded().session().peer().is_none());
+    assert!(bench.armed() && bench.link.guarded.session().peer().is_none());
     bench.command(GuidedKind::Disarm);
     bench.pass(100, false, &[(NEW, false)]);
-    assert_eq!((bench.armed(), bench.link.guarded().session().peer()), (false, Some(NEW)), "on the ground it does");
+    assert_eq!((bench.armed(), bench.link.guarded.session().peer()), (false, Some(NEW)), "on the ground it does");
 }
 
 #[test]
@@ -74,13 +74,13 @@ fn at_the_console_pairing_is_asked_for_and_called_off() {
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.console(Command::Pair(true));
     bench.pass(100, false, &[(OLD, false)]);
-    assert!(bench.link.guarded().session().is_pairing());
+    assert!(bench.link.guarded.session().is_pairing());
     bench.command(GuidedKind::Arm);
     bench.pass(100, false, &[]);
     assert_eq!((bench.armed(), bench.blocks()), (false, ArmBlocks::PAIRING), "no program arms a vehicle that looks");
     bench.console(Command::Pair(false));
     assert_eq!(bench.pass(500, false, &[(OLD, false)]), Some(Ok(())));
-    assert_eq!((bench.blocks(), bench.link.guarded().session().peer()), (ArmBlocks::NONE, Some(OLD)));
+    assert_eq!((bench.blocks(), bench.link.guarded.session().peer()), (ArmBlocks::NONE, Some(OLD)));
 
     // In flight it keeps its transmitter, whatever is asked at the console, and does not look for one after landing.
     bench.command(GuidedKind::Arm);
@@ -90,7 +90,7 @@ fn at_the_console_pairing_is_asked_for_and_called_off() {
     assert!(bench.armed());
     bench.command(GuidedKind::Disarm);
     bench.pass(100, false, &[(OLD, false)]);
-    assert!(!bench.armed() && !bench.link.guarded().session().is_pairing());
+    assert!(!bench.armed() && !bench.link.guarded.session().is_pairing());
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn d16_pairing_ends_though_the_new_transmitter_talks_all_the_while() {
         // The new one is on while the button is still held: the session pairs with its next frame.
         bench.pass(3_500, true, before);
         bench.pass(500, false, before);
-        assert_eq!((bench.link.guarded().session().is_pairing(), bench.blocks()), (false, ArmBlocks::NONE));
+        assert_eq!((bench.link.guarded.session().is_pairing(), bench.blocks()), (false, ArmBlocks::NONE));
     }
 }
 
@@ -117,7 +117,7 @@ fn d16_pairing_that_finds_no_transmitter_ends_and_says_so_until_then() {
     assert_eq!(bench.blocks(), ArmBlocks::PAIRING, "not NO_LINK: no other transmitter is to be heard");
     bench.pass(2_000, false, &[(OLD, false)]);
     assert_eq!(
-        (bench.blocks(), bench.link.guarded().session().is_pairing()),
+        (bench.blocks(), bench.link.guarded.session().is_pairing()),
         (ArmBlocks::NONE, false),
         "the old one is back"
     );
@@ -192,10 +192,10 @@ fn who_changes_his_mind_keeps_his_transmitter() {
     let mut bench = Bench::new(&mut bus, Some(OLD));
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.pass(3_500, true, &[(OLD, false)]);
-    assert!(bench.link.guarded().session().is_pairing());
+    assert!(bench.link.guarded.session().is_pairing());
     bench.pass(300, false, &[(OLD, false)]);
     bench.pass(3_500, true, &[(OLD, false)]);
-    assert!(!bench.link.guarded().session().is_pairing());
+    assert!(!bench.link.guarded.session().is_pairing());
     assert_eq!(bench.pass(500, false, &[(OLD, false)]), Some(Ok(())));
     assert_eq!(bench.blocks(), ArmBlocks::NONE);
 }

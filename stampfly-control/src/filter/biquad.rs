@@ -159,12 +159,66 @@ impl<T: FloatCore, const N: usize> BiquadChain<T, N> {
         self.stages.iter_mut().fold(sample, |value, stage| stage.step(value))
     }
 
+    /// Changes the design of every section and keeps the states: for a corner that moves a little at a time.
+    pub fn retune(&mut self, coefficients: BiquadCoefficients<T>) {
+        self.stages.iter_mut().for_each(|stage| stage.retune(coefficients));
+    }
+
     /// Starts anew as if `value` had always been the input.
     pub fn reset(&mut self, value: T) {
         self.stages.iter_mut().fold(value, |value, stage| {
             stage.reset(value);
             stage.value()
         });
+    }
+}
+
+/// A [`BiquadChain`] for each of three axes, all of one design.
+///
+/// ```
+/// use stampfly_control::filter::{BiquadAxes, BiquadCoefficients};
+/// let design = BiquadCoefficients::low_pass(75.0, 4000.0, BiquadCoefficients::BUTTERWORTH)?;
+/// let mut rate: BiquadAxes<f32, 2> = BiquadAxes::new(design);
+/// rate.reset([0.1, 0.0, -0.1]);
+/// assert!((rate.step([0.1, 0.0, -0.1])[2] + 0.1).abs() < 1e-6);
+/// # Ok::<(), stampfly_control::filter::FilterError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "[Biquad<T>; N]: serde::Serialize",
+        deserialize = "[Biquad<T>; N]: serde::Deserialize<'de>"
+    ))
+)]
+pub struct BiquadAxes<T, const N: usize> {
+    axes: [BiquadChain<T, N>; 3],
+}
+
+impl<T: FloatCore, const N: usize> BiquadAxes<T, N> {
+    /// Sections at rest.
+    #[must_use]
+    pub fn new(coefficients: BiquadCoefficients<T>) -> Self {
+        Self { axes: [BiquadChain::new(coefficients); 3] }
+    }
+
+    /// Takes one sample and returns the filtered one.
+    #[inline]
+    pub fn step(&mut self, sample: [T; 3]) -> [T; 3] {
+        let [x, y, z] = &mut self.axes;
+        let [at_x, at_y, at_z] = sample;
+        [x.step(at_x), y.step(at_y), z.step(at_z)]
+    }
+
+    /// Changes the design of every section and keeps the states.
+    pub fn retune(&mut self, coefficients: BiquadCoefficients<T>) {
+        self.axes.iter_mut().for_each(|axis| axis.retune(coefficients));
+    }
+
+    /// Starts anew as if `value` had always been the input.
+    pub fn reset(&mut self, value: [T; 3]) {
+        self.axes.iter_mut().zip(value).for_each(|(axis, value)| axis.reset(value));
     }
 }
 

@@ -12,7 +12,7 @@ mod biquad;
 mod dynamic_notch;
 mod low_pass;
 
-pub use biquad::{Biquad, BiquadChain, BiquadCoefficients};
+pub use biquad::{Biquad, BiquadAxes, BiquadChain, BiquadCoefficients};
 pub use dynamic_notch::DynamicNotch;
 pub use low_pass::LowPass;
 

@@ -57,10 +57,15 @@ impl FlipController {
             rate: IndiRate::new(rate),
             timer: StepTimer::default(),
             phase: FlightPhase::Init,
-            // The damping takes λ of it off again.
-            ahead: rate.damping.zip_map(&rate.bandwidth, |damping, bandwidth| (1.0 + damping) / bandwidth),
+            ahead: ahead(rate),
             thrust_max: config.thrust_max,
         }
+    }
+
+    /// Changes the gains of the rate loop in flight, before, during or after a flip. Its state stays.
+    pub fn set_gains(&mut self, rate: &IndiConfig) {
+        self.rate.set_gains(rate);
+        self.ahead = ahead(rate);
     }
 
     /// The sequence.
@@ -143,4 +148,9 @@ impl FlipController {
     pub fn cancel(&mut self, now: Instant) {
         self.sequence.cancel(now);
     }
+}
+
+/// Rate asked for per angular acceleration: the damping takes λ of it off again.
+fn ahead(rate: &IndiConfig) -> Vec3 {
+    rate.damping.zip_map(&rate.bandwidth, |damping, bandwidth| (1.0 + damping) / bandwidth)
 }

@@ -10,9 +10,12 @@
 //! Motors can neither pull nor push without end. When a demand does not fit, it is given up in this order: yaw
 //! first, then thrust, roll and pitch last, because they decide about up and down. What was given up is reported, so
 //! that integrators can stop.
+//!
+//! [`shares`] is the other mixer, of vehicles whose gains are shares of a motor's range.
 
 mod geometry;
 mod multirotor;
+pub mod shares;
 #[cfg(test)]
 mod tests;
 

@@ -34,31 +34,45 @@ impl Peak {
         let [older, old] = core::mem::replace(&mut self.before, [third, fourth]);
         let runs = [[older, old, first], [old, first, second], [first, second, third], [second, third, fourth]];
         let largest = runs.iter().map(common_square).max().unwrap_or_default();
-        root(largest.unsigned_abs())
+        root(largest)
     }
 }
 
-/// The square root of an integer below 2³² that an `f32` holds, to the last bit; of another one, of the `f32` nearest to it.
+/// The square root of the `f32` nearest to this integer, to the last bit.
 ///
-/// In integers, so that the driver needs no library of mathematics.
-fn root(square: u64) -> f32 {
-    let square = square as f32 as u64;
-    // As many bits as there is room for, and an even number of them.
-    let shift = square.leading_zeros() & !1;
-    let shifted = square << shift.min(62);
-    let whole = shifted.isqrt();
-    // 32 bits are eight more than an `f32` has. The lowest also stands for what is behind it, and so rounding is right.
-    let sticky = whole | u64::from(whole * whole != shifted);
-    sticky as f32 * f32::from_bits((127 - shift.min(62) / 2) << 23)
+/// Digit by digit and in 32 bits, so that the driver needs no library of mathematics, and a small processor no division. With d the digit that
+/// is tried and r the root so far, r + d is kept while (r + d)² is not above the square; what is left of it, doubled for each digit, says so.
+fn root(square: u32) -> f32 {
+    if square == 0 {
+        return 0.0;
+    }
+    let bits = (square as f32).to_bits();
+    let exponent = (bits >> 23) - 127;
+    // The mantissa with its first bit, and an even exponent.
+    let mut left = (bits & 0x007F_FFFF | 0x0080_0000) << (1 + exponent % 2);
+    let (mut root, mut doubled, mut digit) = (0, 0, 1_u32 << 24);
+    while digit > 0 {
+        let tried = doubled + digit;
+        if tried <= left {
+            doubled = tried + digit;
+            left -= tried;
+            root += digit;
+        }
+        left <<= 1;
+        digit >>= 1;
+    }
+    // One digit more than an `f32` has: it rounds.
+    let rounded = (root + (root & 1)) >> 1;
+    f32::from_bits(rounded - 0x0080_0000 + ((127 + exponent / 2) << 23))
 }
 
-/// The square of what three samples have in common: of each axis what is nearest to zero, if all are on one side of it.
-fn common_square(run: &[[i16; 3]; AGREE]) -> i64 {
+/// The square of what three samples have in common: of each axis what is nearest to zero, if all are on one side of it. At most 3·2³⁰.
+fn common_square(run: &[[i16; 3]; AGREE]) -> u32 {
     let [a, b, c] = run;
     let axis = |axis: usize| {
-        let [a, b, c] = [a, b, c].map(|sample| i64::from(sample[axis]));
+        let [a, b, c] = [a, b, c].map(|sample| i32::from(sample[axis]));
         let common = a.min(b).min(c).max(0) + a.max(b).max(c).min(0);
-        common * common
+        (common * common).unsigned_abs()
     };
     axis(0) + axis(1) + axis(2)
 }
@@ -95,9 +109,9 @@ mod tests {
 
     #[test]
     fn roots_are_those_of_floating_point_to_the_last_bit() {
-        let largest = 3 * (1u64 << 30);
+        let largest = 3 * (1u32 << 30);
         let some =
-            (0..100_000).chain((0..100_000).map(|n| n * 32_212)).chain((0..56_000).map(|n| n * n)).chain([largest]);
+            (0..100_000).chain((0..100_000).map(|n| n * 32_212)).chain((0..56_000_u32).map(|n| n * n)).chain([largest]);
         for square in some.chain((0..100_000).map(|n| largest - n)) {
             assert_eq!(root(square).to_bits(), math::sqrt(square as f32).to_bits(), "{square}");
         }

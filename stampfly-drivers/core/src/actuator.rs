@@ -1,11 +1,11 @@
-//! Motors.
+//! Motors and servos.
 
 use crate::{ArmToken, Interlock};
 use core::error::Error;
 use core::fmt;
 use embedded_hal::pwm::SetDutyCycle;
 use stampfly_types::Duration;
-use stampfly_types::messages::MotorOutput;
+use stampfly_types::messages::{MotorOutput, ServoOutput};
 
 /// Motors that take a duty cycle.
 ///
@@ -23,6 +23,22 @@ pub trait MotorOutputs {
     /// # Errors
     /// When a motor could not be set. The others have been set nevertheless.
     fn write(&mut self, output: &MotorOutput) -> Result<(), Self::Error>;
+}
+
+/// Servos of control surfaces.
+///
+/// # Contract
+/// * A deflection that is not finite counts as zero; others are clamped to −1..=1.
+/// * Returns within microseconds; called once per control period.
+pub trait ServoOutputs {
+    /// The driver's error.
+    type Error: core::fmt::Debug;
+
+    /// Moves the servos.
+    ///
+    /// # Errors
+    /// When a servo could not be told. The others have been told nevertheless.
+    fn write(&mut self, output: &ServoOutput) -> Result<(), Self::Error>;
 }
 
 /// A motor channel refused its duty.

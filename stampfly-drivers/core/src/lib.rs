@@ -24,7 +24,7 @@ pub mod slot;
 pub mod task;
 pub mod time;
 
-pub use actuator::{MotorError, MotorOutputs, PwmMotors};
+pub use actuator::{MotorError, MotorOutputs, PwmMotors, ServoOutputs};
 pub use decimator::Decimator;
 #[cfg(feature = "embassy-time")]
 pub use embassy::EmbassyClock;
@@ -32,7 +32,9 @@ pub use error::{SensorError, SensorErrorKind};
 pub use interlock::{ArmToken, Interlock};
 pub use link::{Button, Command, CommandLink, PinButton};
 pub use recovery::{Recovery, RecoveryError, recover_i2c};
-pub use sensor::{Barometer, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample};
+pub use sensor::{
+    Airspeed, Barometer, Gnss, Imu, Magnetometer, MotionCapture, OpticalFlow, PowerMonitor, RangeFinder, Sample,
+};
 pub use time::Timebase;
 
 pub use {embedded_hal, embedded_hal_async, stampfly_types};

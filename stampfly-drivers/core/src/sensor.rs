@@ -1,7 +1,9 @@
 //! One trait per kind of sensor.
 
 use crate::SensorError;
-use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
+use stampfly_types::messages::{
+    AirspeedData, BaroData, ExternalPose, FlowData, GnssData, ImuData, MagData, PowerData, TofData,
+};
 use stampfly_types::{Duration, Instant};
 
 /// A measurement and the instant it is valid for. How good it is, is part of the measurement: `valid`, `sigma`, `quality`.
@@ -84,4 +86,13 @@ sensor_trait! {
 sensor_trait! {
     /// A battery monitor.
     PowerMonitor, PowerData
+}
+sensor_trait! {
+    /// A satellite receiver. A sample is stamped with the instant of its fix and arrives 50 to 300 ms later. Without satellites samples go
+    /// on, with [`GnssFix::None`](stampfly_types::messages::GnssFix::None).
+    Gnss, GnssData
+}
+sensor_trait! {
+    /// A pitot tube with its pressure sensor, zeroed.
+    Airspeed, AirspeedData
 }

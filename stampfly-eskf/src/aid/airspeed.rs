@@ -5,7 +5,7 @@
 //! pays nothing: while a receiver shows the velocity, airspeeds show the wind, and when it is silent the wind
 //! that was learnt shows the velocity, no better than it is known.
 //!
-//! | in [`Eskf::fuse_airspeed`](crate::Eskf::fuse_airspeed) | condition |
+//! | in [`Eskf::fuse_airspeed`](crate::Estimator::fuse_airspeed) | condition |
 //! |---|---|
 //! | start | north is known, at most `horizon` old, a speed that is finite |
 //! | learns the wind | a velocity from outside is younger than two seconds; that the nose has pointed elsewhere shows the other component |

@@ -9,7 +9,7 @@
 //! [`attitude_from_specific_force`](crate::attitude_from_specific_force).
 
 use super::{NotStill, StillAverage, StillnessConfig};
-use crate::filter::state::{rotate, rotation_matrix};
+use crate::filter::state::{rotate, rotate_back, rotation_matrix};
 use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{GRAVITY, Instant, Vec3, math};
@@ -58,8 +58,14 @@ impl Default for Trim {
 }
 
 impl Trim {
-    /// The trim that makes this specific force point straight up. None for a force of zero.
-    fn levelling(force: &Vec3) -> Self {
+    /// Of a sensor that is rolled and pitched so, rad.
+    pub(super) fn of(roll: f32, pitch: f32) -> Self {
+        let ((sr, cr), (sp, cp)) = (math::sin_cos(0.5 * roll), math::sin_cos(0.5 * pitch));
+        Self { roll, pitch, rotation: rotation_matrix([cr * cp, sr * cp, cr * sp, -sr * sp]) }
+    }
+
+    /// The trim that makes this specific force point straight up. Straight for a force of zero.
+    pub(super) fn levelling(force: &Vec3) -> Self {
         Self {
             roll: math::atan2(-force.y, -force.z),
             pitch: math::atan2(force.x, math::sqrt(force.y * force.y + force.z * force.z)),
@@ -73,6 +79,13 @@ impl Trim {
     #[must_use]
     pub fn correct(&self, measured: Vec3) -> Vec3 {
         rotate(&self.rotation, &measured)
+    }
+
+    /// A vector in the axes of the sensor, of one in the axes of the airframe.
+    #[inline]
+    #[must_use]
+    pub fn undo(&self, corrected: Vec3) -> Vec3 {
+        rotate_back(&self.rotation, &corrected)
     }
 }
 

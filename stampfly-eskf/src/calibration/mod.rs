@@ -7,25 +7,33 @@
 //! | [`EllipsoidFit`] | magnetometer hard and soft iron | be turned all ways, once per place | [`MagCorrection`] |
 //! | [`LevelTrim`] | tilt of the sensor in the airframe | stand on a level floor, once | [`Trim`] |
 //! | [`TemperatureTable`] | bias against temperature | lie still while it warms up | [`TemperatureBias`] |
+//! | [`DriftFit`] | the same as a straight line | lie still while it warms up | [`Drift`] |
 //!
 //! All are plain data stepped with the time as an argument. A sample that is of no use is refused with the reason; a
-//! result comes with its quality, or not at all. Four of them listen to [`StillAverage`], so all mean the same by still.
+//! result comes with its quality, or not at all. Five of them listen to [`StillAverage`], so all mean the same by still.
 //!
-//! Corrections apply in this order: temperature bias, accelerometer or magnetometer correction, trim.
+//! A [`CalibrationSession`] does all but the first as somebody asks for them, [`Corrections`] are what was found, and a [`Corrector`]
+//! applies it, in this order: temperature bias, accelerometer or magnetometer correction, trim.
 //!
 //! [`CalibrationResult`]: stampfly_types::messages::CalibrationResult
 
+mod corrections;
+mod drift;
 mod ellipsoid;
 mod least_squares;
 mod level_trim;
 mod principal_axes;
+mod session;
 mod six_position;
 mod still;
 mod stillness;
 mod temperature;
 
+pub use corrections::{Corrections, Corrector, DriftCorrection, IronCorrection, LevelCorrection};
+pub use drift::{Drift, DriftFit, DriftRefusal};
 pub use ellipsoid::{EllipsoidConfig, EllipsoidFailure, EllipsoidFit, EllipsoidQuality, MagCorrection, MagRefusal};
 pub use level_trim::{LevelTrim, LevelTrimQuality, LevelTrimRefusal, Trim};
+pub use session::CalibrationSession;
 pub use six_position::{
     AccelCorrection, Face, SixPosition, SixPositionFailure, SixPositionQuality, SixPositionRefusal,
 };

@@ -102,6 +102,13 @@ pub struct AccelCorrection {
     pub scale: Vec3,
 }
 
+impl Default for AccelCorrection {
+    /// An accelerometer that is right.
+    fn default() -> Self {
+        Self { bias: Vec3::zeros(), scale: Vec3::repeat(1.0) }
+    }
+}
+
 impl AccelCorrection {
     /// The specific force behind a measurement, body FRD, m/s².
     #[inline]
@@ -230,7 +237,7 @@ impl SixPosition {
         if let Some(missing) = Face::ALL.into_iter().find(|face| !self.has(*face)) {
             return Err(SixPositionFailure::Missing(missing));
         }
-        let none = AccelCorrection { bias: Vec3::zeros(), scale: Vec3::repeat(1.0) };
+        let none = AccelCorrection::default();
         let mut correction = none;
         // Converges to the last bit in four.
         for _ in 0..8 {

@@ -13,28 +13,15 @@ const SILENT: Duration = Duration::from_millis(2_000);
 const LEVEL_NOSE: f32 = 0.5;
 
 impl Eskf {
-    /// Uses an airspeed along the nose, m/s, with its standard deviation, m/s, and the wind that goes with it.
-    ///
     /// While a velocity from outside is younger than two seconds it only teaches the wind; then it holds the velocity, and with it the
-    /// outputs valid, no better than the wind is known. It is counted as [`Aiding::Own`].
-    ///
-    /// ```
-    /// use stampfly_eskf::{Eskf, EskfConfig, Fusion, Refusal, aid::airspeed::Wind};
-    /// use stampfly_types::Instant;
-    /// let (mut eskf, mut wind) = (Eskf::new(EskfConfig::outdoors()), Wind::default());
-    /// let fusion = eskf.fuse_airspeed(Instant::ZERO, 15.0, 0.5, &mut wind);
-    /// assert_eq!(fusion, Fusion::Refused(Refusal::NotInitialized));
-    /// ```
-    ///
-    /// # Errors
-    /// The answer says [`Fusion::Refused`] before the start, while north is not known, for a nose that points up or down, and when the sample is too old or
-    /// no number.
-    pub fn fuse_airspeed(&mut self, at: Instant, speed: f32, sigma: f32, wind: &mut Wind) -> Fusion {
-        let fusion = self.update_airspeed(at, speed, sigma, wind).unwrap_or_else(Fusion::Refused);
-        self.tallied(Aiding::Own, fusion)
-    }
-
-    fn update_airspeed(&mut self, at: Instant, speed: f32, sigma: f32, wind: &mut Wind) -> Result<Fusion, Refusal> {
+    /// outputs valid, no better than the wind is known.
+    pub(super) fn update_airspeed(
+        &mut self,
+        at: Instant,
+        speed: f32,
+        sigma: f32,
+        wind: &mut Wind,
+    ) -> Result<Fusion, Refusal> {
         let age = self.place_in_time(at, &[speed, sigma])?;
         if !self.is_north_known() {
             return Err(Refusal::Missing);
@@ -54,7 +41,9 @@ impl Eskf {
             let off = (row.predicted - speed) / level;
             let [north, east] = wind.velocity();
             let along = nose[0] * north + nose[1] * east;
-            wind.learn(0.0, nose, along + off, limited(wind.variance_along(nose), variance + known, known));
+            // A tube that shows too much does so in every sample: taken for noise, its error would be a wind from aside as soon as the nose moves a little.
+            let doubt = variance + known;
+            wind.learn(0.0, nose, along + off, limited(wind.variance_along(nose), doubt, doubt));
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
         let innovation = self.innovation(delayed, [row], [speed], [variance + wind.variance_along(nose)]);

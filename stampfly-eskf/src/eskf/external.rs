@@ -275,7 +275,7 @@ impl Eskf {
     /// is no check for repeated stamps, because many sensors may share this door. While the heading is not known, all that
     /// hangs on it is refused as [`Refusal::Missing`]: any horizontal position or velocity.
     ///
-    /// Wheel speed, and the range to a beacon; for an airspeed see [`fuse_airspeed`](Self::fuse_airspeed):
+    /// Wheel speed, and the range to a beacon; for an airspeed see [`fuse_airspeed`](Estimator::fuse_airspeed):
     ///
     /// ```
     /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, StartHeading, aid::{Row, velocity}, filter::{NominalState, POSITION}};

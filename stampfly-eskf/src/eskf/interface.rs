@@ -2,6 +2,7 @@
 
 use super::gate::Sensor;
 use super::*;
+use crate::aid::airspeed::Wind;
 
 /// A specific force, m/s², or rate, rad/s, beyond this is no measurement: a thousand g is more than any inertial sensor of a vehicle
 /// measures. The squares of much larger ones overflow, and make a covariance that is no number.
@@ -183,6 +184,24 @@ impl Estimator for Eskf {
     fn fuse_velocity(&mut self, at: Instant, velocity: &Vec3, sigma: &Vec3) -> Fusion {
         let fusion = self.update_velocity(at, velocity, sigma).unwrap_or_else(Fusion::Refused);
         self.tallied(Aiding::Velocity, fusion)
+    }
+
+    /// While a velocity from outside is younger than two seconds an airspeed only teaches the wind; then it holds the velocity, and with it
+    /// the outputs valid, no better than the wind is known. It is counted as [`Aiding::Own`].
+    ///
+    /// ```
+    /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal, aid::airspeed::Wind};
+    /// use stampfly_types::Instant;
+    /// let (mut eskf, mut wind) = (Eskf::new(EskfConfig::outdoors()), Wind::default());
+    /// let fusion = eskf.fuse_airspeed(Instant::ZERO, 15.0, 0.5, &mut wind);
+    /// assert_eq!(fusion, Fusion::Refused(Refusal::NotInitialized));
+    /// ```
+    ///
+    /// It is refused before the start, while north is not known, for a nose that points up or down, and when the sample is too old or no
+    /// number.
+    fn fuse_airspeed(&mut self, at: Instant, speed: f32, sigma: f32, wind: &mut Wind) -> Fusion {
+        let fusion = self.update_airspeed(at, speed, sigma, wind).unwrap_or_else(Fusion::Refused);
+        self.tallied(Aiding::Own, fusion)
     }
 
     fn fuse_position(&mut self, at: Instant, position: &Vec3, sigma: &Vec3) -> Fusion {

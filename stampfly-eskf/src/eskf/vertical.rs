@@ -357,7 +357,9 @@ impl VerticalMonitor {
         if self.rejected.is_some_and(|at| now.since(at) > REMEMBERED) {
             (self.rejected, self.moved, self.moves) = (None, 0.0, 0);
         }
-        if self.implausible || self.zero.is_none() {
+        // A vehicle that has no range finder has none that lies.
+        let has_range = self.range_at > Instant::ZERO;
+        if self.implausible || self.zero.is_none() || !has_range {
             return None;
         }
         // Until it has settled the observer may drift while the vehicle still stands, where ranges repeat themselves.

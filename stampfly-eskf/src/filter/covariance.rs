@@ -62,13 +62,19 @@ impl Covariance {
     #[inline]
     #[must_use]
     pub fn from_sigmas(sigmas: [f32; 5]) -> Self {
-        let mut rows = [[[Lanes::zero(); BLOCKS]; 3]; BLOCKS];
-        for (block, (rows, sigma)) in rows.iter_mut().zip(sigmas).enumerate() {
+        let mut covariance = Self { rows: [[[Lanes::zero(); BLOCKS]; 3]; BLOCKS] };
+        covariance.set_sigmas(sigmas);
+        covariance
+    }
+
+    /// The same in its place, whatever is in it.
+    pub(crate) fn set_sigmas(&mut self, sigmas: [f32; 5]) {
+        for (block, (rows, sigma)) in self.rows.iter_mut().zip(sigmas).enumerate() {
             for (axis, row) in rows.iter_mut().enumerate() {
+                row.fill(Lanes::zero());
                 row[block].set(axis, sigma * sigma);
             }
         }
-        Self { rows }
     }
 
     /// One element. Out of range is zero.

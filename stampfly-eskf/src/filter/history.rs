@@ -49,6 +49,11 @@ const EMPTY: Interval = Interval {
     delta_velocity: Vec3::new(0.0, 0.0, 0.0),
 };
 
+/// What is merged by a memory that reaches back so far, s. It holds one interval less than it could: the newest is being filled.
+fn merged(horizon: f32) -> f32 {
+    MIN_INTERVAL.max(horizon / (DEPTH - 2) as f32)
+}
+
 /// The last tenth of a second. See the [module](self) documentation.
 ///
 /// ```
@@ -99,13 +104,18 @@ impl History {
     /// ```
     #[must_use]
     pub fn reaching(horizon: f32) -> Self {
-        // A memory that holds one interval less than it could: the newest is being filled.
-        Self { merged: MIN_INTERVAL.max(horizon / (DEPTH - 2) as f32), ..Self::EMPTY }
+        Self { merged: merged(horizon), ..Self::EMPTY }
+    }
+
+    /// The same in its place.
+    pub(crate) fn reach(&mut self, horizon: f32) {
+        self.clear();
+        self.merged = merged(horizon);
     }
 
     /// Forgets all samples.
     pub fn clear(&mut self) {
-        self.intervals = [EMPTY; DEPTH];
+        self.intervals.fill(EMPTY);
         self.newest = 0;
     }
 

@@ -5,6 +5,7 @@
 mod garbage;
 mod inertial;
 mod magnetometer;
+mod session;
 mod temperature;
 
 use rand::{RngExt, SeedableRng};

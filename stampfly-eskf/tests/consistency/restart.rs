@@ -45,6 +45,39 @@ fn b1_a_reset_in_flight_keeps_attitude_heading_and_biases() {
     }
 }
 
+/// Every bit: what is written of a number tells it from every other one, the zeros' signs included.
+#[test]
+fn a_filter_that_begins_again_in_its_place_is_a_new_one_bit_for_bit() {
+    let indoors = EskfConfig::indoors();
+    let configs = [
+        EskfConfig::default(),
+        indoors,
+        EskfConfig::outdoors(),
+        EskfConfig { gate: 4.0, horizon: 0.5, gyro_noise: 0.01, ..indoors },
+    ];
+    for (seed, [before, after]) in
+        (0..).zip(configs.iter().flat_map(|one| configs.iter().map(move |other| [one, other])))
+    {
+        let (mut flight, mut eskf) = flown_with(*before, 3, seed);
+        let (mut told, mut new) = (eskf.clone(), Eskf::new(*after));
+        told.begin_again(after);
+        assert_eq!(format!("{told:?}"), format!("{new:?}"), "{seed}");
+        // And it flies as one.
+        for filter in [&mut told, &mut new] {
+            filter.initialize(flight.at(1_200), &flight.calibration());
+        }
+        let mut same = flight.clone();
+        for step in 1_201..=2_000 {
+            flight.feed(&mut told, step);
+            same.feed(&mut new, step);
+        }
+        assert_eq!(format!("{told:?}"), format!("{new:?}"), "{seed}");
+        // Control: a filter that did not begin again is another one.
+        flight.feed(&mut eskf, 2_001);
+        assert_ne!(format!("{eskf:?}"), format!("{new:?}"), "{seed}");
+    }
+}
+
 #[test]
 fn a_reset_on_the_ground_starts_from_the_calibration() {
     let (flight, mut eskf) = flown(8, 1);

@@ -115,20 +115,20 @@ pub async fn dump<T: Schema>(
     let bytes = RefCell::new(Vec::new());
     let mut made = 0;
     // The head of a log is much longer than a piece: it is made again for each piece, and what came before is skipped.
-    let mut log = loop {
-        let opened = open(DumpSink { skip: made, bytes: &bytes }, record.at);
+    // One place for it: a future keeps each that it has across a wait.
+    let mut log = None;
+    while log.is_none() {
+        begin(&mut open, DumpSink { skip: made, bytes: &bytes }, record.at, &mut log)?;
         let piece = bytes.take();
+        if log.is_none() && piece.is_empty() {
+            return Err(DumpError::Unwritable);
+        }
         made += piece.len();
         lines.send(&piece).await?;
-        match opened {
-            Ok(log) => break log,
-            Err(WriteError::Sink(Full)) if !piece.is_empty() => {}
-            Err(_) => return Err(DumpError::Unwritable),
-        }
-    };
+    }
     loop {
         let sample = Sample { at: record.at, generation: record.generation, words: &record.words };
-        if log.sample(record.topic, &sample).is_err() {
+        if log.as_mut().is_none_or(|log| log.sample(record.topic, &sample).is_err()) {
             lines.dumped.left_out += 1;
         }
         lines.send(&bytes.take()).await?;
@@ -138,6 +138,22 @@ pub async fn dump<T: Schema>(
             Err(Changed) => return Err(DumpError::Changed(lines.dumped)),
         }
     }
+}
+
+/// Makes a piece of the head of a log, or with the last piece the log. Apart, so that a log on its way to its place is on the stack no longer than that takes.
+#[inline(never)]
+fn begin<'b, T: Schema>(
+    open: &mut impl FnMut(DumpSink<'b>, Instant) -> Result<Writer<DumpSink<'b>, T>, WriteError<Full>>,
+    sink: DumpSink<'b>,
+    at: Instant,
+    log: &mut Option<Writer<DumpSink<'b>, T>>,
+) -> Result<(), DumpError> {
+    match open(sink, at) {
+        Ok(begun) => *log = Some(begun),
+        Err(WriteError::Sink(Full)) => {}
+        Err(_) => return Err(DumpError::Unwritable),
+    }
+    Ok(())
 }
 
 /// Collects one piece of a log: skips what was sent before, and refuses what does not fit.

@@ -4,16 +4,19 @@
 //! |---|---|
 //! | [`BlackBox`] | records samples while the vehicle is armed and for [`TAIL`] after |
 //! | [`Retention`] | which samples: a [`LogRate`] per topic |
-//! | [`dump`] | the recording as a log in text, for a terminal |
+//! | [`open`] | the head of the log as which it is read out |
+//! | [`dump`] | the recording as that log in text, for a terminal |
 //!
 //! For vehicles that cannot write a log in flight (flash writes stall a microcontroller) and read the recording out after
 //! landing. Samples are kept as the words that the bus moves; the oldest go when memory is full. Not for the analysis of a
 //! whole flight: stream a log, or record on a host.
 
 mod dump;
+mod head;
 mod retention;
 
 pub use dump::{DumpError, DumpSink, Dumped, Refused, dump};
+pub use head::open;
 pub use retention::{KEEP_ALIVE, LogRate, MIN_INTERVAL, Retention, TAIL};
 
 use crate::newest::{MAX_MESSAGE, longest_message};

@@ -1,31 +1,63 @@
-//! A flight in few bytes, losslessly: everything from outside, every activation and key frames, for a replay bit for bit.
+//! A flight in few bytes, losslessly: what came from outside and when passes ran, and now and then the state of the vehicle.
 //!
-//! Where a [`Recorder`](crate::Recorder) keeps every sample of every topic, this keeps what cannot be computed: samples from
-//! outside, how far each activation had read, now and then the state of the vehicle, and some samples of runnables by which a
-//! replay is judged. It needs no taps and no second task: it is an observer of the flight loop and looks at the topics between
-//! two passes. [`Ring`] holds the last seconds; whatever else takes bytes implements [`Store`]. On a PC, [`read`] makes
-//! a log of it, which is replayed, cut and exported like any other. Not for a look at the values: a log is.
+//! Where a [`Recorder`](crate::Recorder) keeps every sample and every activation, this keeps what cannot be computed. What runs in
+//! a pass follows from what the clock showed, from the topics and from what ran before, so a PC lets the [scheduler](stampfly_bus::Scheduler)
+//! decide again. The core that flies copies words into a [`Ring`], and neither compresses nor compares; whoever has time takes them
+//! out: a [`Streamer`] makes chunks for any carrier. On a PC, [`read`] runs the flight again and makes a log of it, which
+//! is replayed, cut and exported like any other. Not for a look at the values: a log is.
 //!
-//! | entry | bytes |
+//! | part | for |
 //! |---|---|
-//! | sample | topic; instant and generation against those expected; two words' widths in a byte, then each word's difference |
-//! | activation | line, and whether instant and inputs are as expected; if not, a bit for each input, and what it is |
-//! | refused | line; what its last activation was refused |
-//! | end of a pass | 1. The samples before it were there when its activations, before them, read |
-//! | loss | 1. Something is missing before the next key frame |
-//! | key frame | length, and as many bytes; everything expected is forgotten |
+//! | [`Compact`], [`Watching`] | the core that flies: an observer of the flight loop |
+//! | [`Ring`] | words from that core to another, or to another task |
+//! | [`Streamer`], [`Chunks`], [`Chunk`], [`Receiver`] | chunks with a number and a check sum, for datagrams, files and connections |
+//! | [`File`] | chunks behind each other, and the gaps between them (feature `replay`) |
+//! | [`read`] | the flight again, as a log (feature `replay`) |
 //!
-//! Numbers are variable-length, seven bits a byte, the lowest first. Differences are between bit patterns: nothing is rounded.
+//! # Words
+//! All are little-endian. The first of an entry is its kind in the highest four bits, then `a` in eight and `b` in twenty.
+//!
+//! | kind | entry | a | b | words behind it |
+//! |---|---|---|---|---|
+//! | 1 | sample from outside | topic | line that saw it first, or 63 for all of the pass; generation in 14 bits | instant, low half; the message |
+//! | 2 | pass: samples before it were there when it began | band | µs since the last pass | |
+//! | 3 | the same, later | band | | clock, two words |
+//! | 4 | a background activation has read its inputs, and runs later | band | | clock, two words |
+//! | 5 | it has run | line | | |
+//! | 6 | the next pass, or what has run, refused a line something | line | | bits, as in [`ActivationRecord::refused`](stampfly_types::ActivationRecord) |
+//! | 7 | a sample that a runnable published, for comparison | topic | | generation; instant, two words; the message |
+//! | 8 | a part begins, which can be read by itself | version | bytes of the vehicle's name | passes lost so far; the name |
+//! | 9 | where a line is | line | inputs | what the scheduler keeps, 10 words; how far each input was read |
+//! | 10 | [key frame](crate::key_frame) | | bytes | as many |
 
-mod model;
+mod chunk;
+#[cfg(feature = "replay")]
+mod contents;
+#[cfg(feature = "key-frame")]
+mod entry;
+#[cfg(feature = "replay")]
+mod file;
+#[cfg(feature = "key-frame")]
+mod packed;
 #[cfg(feature = "replay")]
 mod read;
+#[cfg(feature = "replay")]
+mod rerun;
 mod ring;
-#[cfg(test)]
-mod tests;
+#[cfg(feature = "key-frame")]
+mod watch;
+#[cfg(feature = "replay")]
+mod words;
+#[cfg(feature = "key-frame")]
 mod write;
 
+pub use chunk::{Chunk, ChunkError, Chunks, MAGIC, OVERHEAD, Receiver, Streamer};
 #[cfg(feature = "replay")]
-pub use read::{ReadError, read, shares};
-pub use ring::{Ring, Store};
-pub use write::{Compact, Watching};
+pub use contents::{Contents, ReadError, Samples};
+#[cfg(feature = "replay")]
+pub use file::{File, FileError, vehicle_name};
+#[cfg(feature = "replay")]
+pub use read::read;
+pub use ring::{Ring, RingReader, RingWriter};
+#[cfg(feature = "key-frame")]
+pub use write::{Compact, Kept, Watching};

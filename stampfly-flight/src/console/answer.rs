@@ -75,7 +75,8 @@ pub enum Request<R> {
 ///
 /// impl Parameters for Loudness {
 ///     fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
-///         let loudness = ParameterInfo { name: "horn.loudness", unit: "1", min: 0.0, max: 1.0, meaning: "duty" };
+///         let (name, meaning) = ("horn.loudness", "duty");
+///         let loudness = ParameterInfo { name, unit: "1", min: 0.0, max: 1.0, meaning, in_flight: false };
 ///         (index == 0).then_some(loudness)
 ///     }
 ///     fn get(&self, index: usize) -> Option<f32> { (index == 0).then_some(self.0) }
@@ -135,16 +136,24 @@ pub fn answer<V: Vehicle>(
             return match parameters::find(parameters, name) {
                 Ok(index) => {
                     show(parameters, index, reply)?;
-                    say(reply, &parameters.describe(index).map_or("", |info| info.meaning))
+                    let Some(info) = parameters.describe(index) else { return Ok(Request::Nothing) };
+                    let when = if info.in_flight { ", may change in flight" } else { "" };
+                    say(reply, &format_args!("{}{when}", info.meaning))
                 }
                 Err(error) => say(reply, &error),
             };
         }
         Command::ParameterSet(name, value) => {
+            let is_armed = vehicle.is_armed() == Some(true);
             let parameters = vehicle.parameters();
-            return match parameters::set(parameters, name, value) {
-                Ok(index) => show(parameters, index, reply).map(|()| Request::Nothing),
-                Err(error) => say(reply, &error),
+            let index = match parameters::set(parameters, name, value) {
+                Ok(index) => index,
+                Err(error) => return say(reply, &error),
+            };
+            show(parameters, index, reply)?;
+            return match parameters.describe(index) {
+                Some(info) if is_armed && !info.in_flight => say(reply, &parameters::WAITS),
+                _ => Ok(Request::Nothing),
             };
         }
         Command::Profile => {
@@ -163,6 +172,7 @@ pub fn answer<V: Vehicle>(
         Command::Reboot | Command::HardwareInTheLoop => Request::Reboot,
         Command::Vehicle(command) => match vehicle.answer(command, now, reply)? {
             Some(request) if !V::needs_disarmed(&request) => return Ok(Request::Vehicle(request)),
+            Some(request) if V::is_save(&request) => Request::SaveParameters,
             Some(request) => Request::Vehicle(request),
             None => return Ok(Request::Nothing),
         },

@@ -53,7 +53,7 @@ pub const COMMANDS: &[(&str, &str)] = &[
     (TOPIC, "the newest sample of any topic"),
     ("param list [PREFIX]", "parameters"),
     ("param get NAME", "one parameter and what it does"),
-    ("param set NAME VALUE", "change it; takes effect after save and reboot"),
+    ("param set NAME VALUE", "change it; param save keeps it"),
     ("param save", "save all parameters"),
     ("param reset", "erase the saved ones"),
     ("profile", "execution times against their budgets"),

@@ -12,6 +12,7 @@
 //! they have the radio link and the log.
 
 mod answer;
+pub mod calibrate;
 mod command;
 mod error;
 mod line_editor;

@@ -85,4 +85,9 @@ pub trait Vehicle {
     fn needs_disarmed(_request: &Self::Request) -> bool {
         true
     }
+
+    /// Does this ask for nothing but saving the parameters, which the answer has changed?
+    fn is_save(_request: &Self::Request) -> bool {
+        false
+    }
 }

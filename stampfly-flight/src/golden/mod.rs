@@ -11,9 +11,11 @@
 
 mod error;
 mod format;
+mod outcome;
 
 pub use error::GoldenError;
 pub use format::{Writer, tables};
+pub use outcome::Outcome;
 
 use crate::newest::MAX_MESSAGE;
 use crate::{Assembled, FlightLoop, InPlace, Observer};

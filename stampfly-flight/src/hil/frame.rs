@@ -15,6 +15,7 @@
 //! Numbers are little-endian. Only for a line with one speaker at each end. There is no cryptography in it: who can reach the
 //! line can fly the simulated vehicle.
 
+use crate::crc::Crc;
 use stampfly_types::Instant;
 
 /// Bytes around a payload: sequence, kind, length, checksum.
@@ -23,39 +24,6 @@ const OVERHEAD: usize = 9;
 const TRAILER: usize = 6;
 /// Longest stretch without a zero that one code of the stuffing covers.
 const STRETCH: u8 = 0xff;
-
-/// CRC-32, four bits at a time: sixteen words of table instead of a kilobyte.
-#[derive(Clone, Copy, Debug)]
-struct Crc(u32);
-
-impl Crc {
-    const START: Self = Self(u32::MAX);
-    const TABLE: [u32; 16] = {
-        let (mut table, mut nibble) = ([0; 16], 0);
-        while nibble < 16 {
-            let (mut value, mut bit) = (nibble as u32, 0);
-            while bit < 4 {
-                value = if value & 1 == 0 { value >> 1 } else { value >> 1 ^ 0xEDB8_8320 };
-                bit += 1;
-            }
-            table[nibble] = value;
-            nibble += 1;
-        }
-        table
-    };
-
-    fn add(&mut self, byte: u8) {
-        self.0 ^= u32::from(byte);
-        for _ in 0..2 {
-            let [entry, ..] = self.0.to_le_bytes();
-            self.0 = self.0 >> 4 ^ Self::TABLE.get(usize::from(entry & 0xf)).copied().unwrap_or_default();
-        }
-    }
-
-    fn finish(self) -> u32 {
-        !self.0
-    }
-}
 
 /// Writes one frame into a buffer. What does not fit makes [`finish`](Self::finish) fail.
 ///

@@ -111,8 +111,9 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
         (_, Turn::Again) => return Greeting::Answered,
         (Some(Request::Parameter { name, value }), Turn::New) => {
             *last = Some(body.sequence);
-            match parameters::set(config, name, value) {
-                Ok(_) => Reply::Taken,
+            // They come one by one in any order; which go together is the business of whoever flies it.
+            match parameters::find(config, name).and_then(|index| parameters::set_alone(config, index, value)) {
+                Ok(()) => Reply::Taken,
                 Err(ParameterError::Unknown) => Reply::Refused(Refusal::UnknownParameter),
                 Err(_) => Reply::Refused(Refusal::OutOfRange),
             }

@@ -11,9 +11,11 @@
 //! Needs a heap. Not for firmware: the golden flight is a replay without one.
 
 mod compare;
+mod memory;
 mod script;
 
 pub use compare::Difference;
+pub use memory::Memory;
 pub use script::{ReplayError, vehicle_name};
 
 use crate::flight_loop::Assembled;

@@ -10,7 +10,7 @@
 use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
 use stampfly_sim::fault::{Fault, FaultKind, FaultValue, Moment, When};
-use stampfly_sim::vehicle::{Options, Vehicle};
+use stampfly_sim::vehicle::{Options, Variety, Vehicle};
 use stampfly_types::Duration;
 
 /// Random number stream of campaigns; those of vehicles, missions and faults are others.
@@ -63,6 +63,7 @@ pub struct Cases {
     faults: &'static [FaultKind],
     modes: &'static [&'static str],
     missions: &'static [&'static str],
+    chips: bool,
     cells: Vec<Cell>,
 }
 
@@ -86,7 +87,8 @@ impl Cases {
                 cells.extend(walked.iter().enumerate().map(|(place, fault)| (fault.clone(), moment(place), mode)));
             }
         }
-        Self { cells, plan: plan.clone(), faults, modes, missions: V::VARIETY.missions }
+        let Variety { missions, chips, .. } = V::VARIETY;
+        Self { cells, plan: plan.clone(), faults, modes, missions, chips }
     }
 
     /// How many flights walk through the cells: every cell is flown in a campaign that has as many.
@@ -131,7 +133,7 @@ impl Cases {
             options.mission = dice.one(self.missions).map(|mission| (*mission).into());
         }
         options.gust = options.gust.or(Some(dice.round(0.0, GUST) as f32));
-        options.chips |= dice.0.chance(0.1);
+        options.chips |= dice.0.chance(0.1) && self.chips;
         options.jitter = options.jitter.or(dice.0.chance(0.25).then_some(seed));
     }
 }

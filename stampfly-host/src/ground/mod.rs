@@ -6,14 +6,12 @@
 //! | part | what it is |
 //! |---|---|
 //! | [`Server`] | serves the page and its WebSockets |
-//! | [`http`] | the little HTTP that needs, over bytes |
 //! | [`demo`] | the page with the whole simulation inside, as one file |
 //!
 //! The protocol is described in `docs/ground-station.md`.
 
 mod client;
 pub mod demo;
-pub mod http;
 mod limits;
 mod page;
 mod server;
@@ -21,6 +19,5 @@ mod server;
 pub use limits::Limits;
 pub use server::Server;
 pub use stampfly_ground::{
-    Calibration, CalibrationKind, Client, Connection, Event, Hub, NotAsked, ParameterCard, Reply, TopicCard,
-    VehicleCard, Watch, ask,
+    Calibration, Client, Connection, Event, Hub, NotAsked, ParameterCard, Reply, TopicCard, VehicleCard, Watch, ask,
 };

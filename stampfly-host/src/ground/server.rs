@@ -4,16 +4,17 @@
 //! there is no password.
 
 use super::client;
-use super::http::{self, Hosts, Refusal, Request, Wanted};
 use super::limits::Limits;
 use super::page;
 use stampfly_ground::Hub;
+use stampfly_ground::http::{self, Hosts, Refusal, Request, Wanted};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
+use tungstenite::handshake::derive_accept_key;
 
 /// A server that runs until it is dropped.
 ///
@@ -143,7 +144,7 @@ fn attend(common: &Common, mut stream: TcpStream) -> io::Result<()> {
             None => answer(&mut stream, http::refuse(Refusal::NotFound).as_bytes(), &[]),
         },
         Wanted::Socket(key) => {
-            stream.write_all(http::upgrade(&key).as_bytes())?;
+            stream.write_all(http::upgrade(&derive_accept_key(key.as_bytes())).as_bytes())?;
             let is_over = || common.is_over.load(Ordering::Relaxed);
             client::serve(common.hub.clone(), stream, bytes.split_off(length), &common.limits, &is_over);
             Ok(())

@@ -6,13 +6,18 @@
 //! | [`csv`] | `stampfly log csv` | a table a topic |
 //! | [`mcap`] | `stampfly log mcap` | for Foxglove and PlotJuggler, with every topic's units |
 //! | [`cut`] | `stampfly log cut` | a part of a flight, which still replays |
+//! | [`record`] | `stampfly log ulog` | a [compact record](stampfly_flight::compact) as a log |
+//! | [`refly`] | `stampfly log refly` | a simulated flight again, with other parameters from an instant on |
 //!
-//! They read any ULog. `stampfly replay` flies one of ours again.
+//! They read any ULog, and compact records of the vehicles here; `refly` reads logs of the simulator. `stampfly replay`
+//! repeats what the flight stack computed in one of ours.
 
 pub mod csv;
 pub mod cut;
 pub mod info;
 pub mod mcap;
+pub mod record;
+pub mod refly;
 
 /// A number with the digits that it needs: most in a log are single-precision.
 fn shown(value: f64) -> String {

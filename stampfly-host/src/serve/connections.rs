@@ -18,13 +18,21 @@ const PART: usize = 2048;
 
 /// The queue of every connection.
 #[derive(Debug, Default)]
-pub(super) struct Connections(Mutex<HashMap<Client, SyncSender<Vec<u8>>>>);
+pub(super) struct Connections(Mutex<HashMap<Client, Queue>>);
+
+/// What waits for one to take it.
+#[derive(Debug)]
+struct Queue {
+    bytes: SyncSender<Vec<u8>>,
+    /// Is what finds no room lost? A serial line stays, whoever reads there.
+    stays: bool,
+}
 
 impl Connections {
-    /// Sends to one. A connection whose queue is full is closed: it has not read for a long time.
+    /// Sends to one. A connection whose queue is full is closed: it has not read for a long time. A serial line loses what nobody reads.
     pub fn send(&self, to: &Client, bytes: &[u8]) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if all.get(to).is_some_and(|queue| queue.try_send(bytes.to_vec()).is_err()) {
+        if all.get(to).is_some_and(|queue| queue.bytes.try_send(bytes.to_vec()).is_err() && !queue.stays) {
             all.remove(to);
         }
     }
@@ -32,7 +40,7 @@ impl Connections {
     /// One that is no TCP connection: what is sent to it waits in this queue.
     pub fn join(&self, client: Client) -> Receiver<Vec<u8>> {
         let (queue, waiting) = sync_channel(WAITING);
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(client, queue);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(client, Queue { bytes: queue, stays: true });
         waiting
     }
 
@@ -61,7 +69,7 @@ impl Connections {
         let at_port = all.keys().filter(|other| other.port == client.port).count();
         // One that is refused sees its connection closed.
         let Some(writer) = prepared.ok().filter(|_| at_port < MOST) else { return };
-        all.insert(client, queue);
+        all.insert(client, Queue { bytes: queue, stays: false });
         drop(all);
         let (connections, events) = (Arc::clone(self), events.clone());
         std::thread::spawn(move || write(writer, &waiting));

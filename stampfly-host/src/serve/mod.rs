@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`PortOption`] | where a port is to be, as typed: `NAME=ADDRESS` or `NAME=off` |
 //! | [`OpenPorts`] | opens a vehicle's ports and carries bytes between sockets and the flight |
+//! | [`RecordOut`], [`receive`] | the [compact record](stampfly_flight::compact) of a flight, in datagrams |
 //!
 //! What the bytes mean is the vehicle's business ([`Link`](stampfly_sim::vehicle::Link)).
 
@@ -12,8 +13,11 @@ mod events;
 mod key;
 mod option;
 mod ports;
+mod record;
 mod terminal;
 
 pub use key::{Key, KeyError};
 pub use option::{PortOption, PortOptionError};
 pub use ports::{OpenError, OpenPorts, Page};
+pub(crate) use record::write_chunk;
+pub use record::{RecordOut, receive};

@@ -1,13 +1,13 @@
 //! What the firmware's black box tells of an accident, from the arming to the text on the terminal.
 
 use stampfly_board::VehicleConfig;
-use stampfly_board::black_box::{BlackBox, RETENTION, WORDS, open};
+use stampfly_board::black_box::{BlackBox, RETENTION, WORDS};
 use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_board::topics::{Bus, Id};
 use stampfly_bus::{Band, PublishWords, Taps};
 use stampfly_drivers::blocking::block_on;
-use stampfly_flight::black_box::{DumpError, MIN_INTERVAL, Refused, dump};
+use stampfly_flight::black_box::{DumpError, MIN_INTERVAL, Refused, dump, open};
 use stampfly_flight::{Assembled, parameters};
 use stampfly_host::flown::fly;
 use stampfly_host::golden::Event;
@@ -83,7 +83,11 @@ fn dumped(config: &VehicleConfig, takes: usize) -> (Vec<String>, Result<(), Dump
         lines.push(line.strip_suffix("\r\n").expect("a whole line").to_owned());
         Ok(())
     };
-    let outcome = block_on(dump(|| black_box.next(&mut cursor), |sink, at| open(sink, at, config, "the test"), show));
+    let outcome = block_on(dump(
+        || black_box.next(&mut cursor),
+        |sink, at| open::<Runnables, _>(sink, at, "stampfly", config, "the test"),
+        show,
+    ));
     (lines, outcome)
 }
 
@@ -171,8 +175,11 @@ fn a_flight_that_begins_while_the_last_is_told_ends_it() {
     let mut black_box = BlackBox::<256>::new(RETENTION);
     let armed = FlightStatus { armed: true, ..Default::default() }.to_words();
     let config = VehicleConfig::default();
-    let nothing =
-        block_on(dump(|| Ok(black_box.records().next()), |sink, at| open(sink, at, &config, ""), async |_| Ok(())));
+    let nothing = block_on(dump(
+        || Ok(black_box.records().next()),
+        |sink, at| open::<Runnables, _>(sink, at, "stampfly", &config, ""),
+        async |_| Ok(()),
+    ));
     assert_eq!(nothing, Err(DumpError::Empty));
     black_box.note(Id::flight_status as usize, Instant::from_micros(1), 1, &armed);
     let (mut cursor, mut asked) = (black_box.begin(), 0);
@@ -183,6 +190,7 @@ fn a_flight_that_begins_while_the_last_is_told_ends_it() {
         }
         black_box.next(&mut cursor)
     };
-    let outcome = block_on(dump(next, |sink, at| open(sink, at, &config, ""), async |_| Ok(())));
+    let outcome =
+        block_on(dump(next, |sink, at| open::<Runnables, _>(sink, at, "stampfly", &config, ""), async |_| Ok(())));
     assert!(matches!(outcome, Err(DumpError::Changed(_))), "{outcome:?}");
 }

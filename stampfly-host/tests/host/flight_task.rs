@@ -85,7 +85,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
         to_imu.publish(at, data);
     };
     let sensing = run_sensor(async || imu.next().await, publish, clock.clone(), Backoff::CRITICAL, imu_health);
-    let write_motors = |_, _: &FlightLoop<'_, Runnables>| {
+    let write_motors = |_, _: &mut FlightLoop<'_, Runnables>| {
         if duties.has_new()
             && let Some(output) = duties.latest()
         {

@@ -63,3 +63,112 @@ fn tables_and_mcap_hold_what_the_log_holds() {
     let value = sample["gyro"][1].as_f64().expect("a number") as f32;
     assert_eq!(f64::from(value), series.columns[place].values[999]);
 }
+
+mod again {
+    use super::Instant;
+    use stampfly_board::simulation::StampFly;
+    use stampfly_host::flown::fly;
+    use stampfly_host::log::refly::{Reflown, ReflyError, facts, refly};
+    use stampfly_lab::flight::Series;
+    use stampfly_lab::flight_log;
+    use stampfly_sim::recorder::Recorder;
+    use stampfly_sim::vehicle::change::ChangeError;
+    use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
+    use stampfly_types::Duration;
+
+    const FROM: Instant = Instant::from_millis(9_000);
+
+    /// As `stampfly fly` writes it.
+    fn log_of(options: &Options) -> Vec<u8> {
+        let setup = StampFly::setup(options, 3).expect("options");
+        let mut recorder = Recorder::<StampFly>::with_log(&setup, &facts::<StampFly>(options, 3).expect("options"));
+        let outcome = fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {}).outcome;
+        assert!(outcome.succeeded());
+        recorder.log().to_vec()
+    }
+
+    fn options() -> Options {
+        let mission = Some("arm; takeoff 0.5; hover 2; goto 1 0 0.7; land".into());
+        Options { mission, param: vec!["eskf.gate=4.5".into()], gust: Some(0.2), ..Options::default() }
+    }
+
+    fn again(log: &[u8], parameter: &str) -> Result<Reflown<<StampFly as Vehicle>::Outcome>, ReflyError> {
+        refly::<StampFly>(log, FROM, &[parameter.to_owned()])
+    }
+
+    #[test]
+    fn the_same_value_is_the_recorded_flight_bit_for_bit() {
+        for options in [options(), Options { fault: vec!["tof-stuck@move".into()], ..options() }] {
+            let setup = StampFly::setup(&options, 3).expect("options");
+            let mut recorder =
+                Recorder::<StampFly>::with_log(&setup, &facts::<StampFly>(&options, 3).expect("options"));
+            fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {});
+            let same = StampFly::parameters(StampFly::config(&setup));
+            let same = same.iter().find(|setting| setting.name == "position.pos.kp").expect("a parameter").value as f32;
+            let reflown = again(recorder.log(), &format!("position.pos.kp={same}")).expect("flies");
+            assert!(reflown.log == recorder.log(), "other bits");
+            assert_eq!((reflown.apart.since_s, reflown.apart.farthest_m), (None, 0.0));
+        }
+    }
+
+    #[test]
+    fn another_value_changes_what_comes_after_and_nothing_before() {
+        let log = log_of(&options());
+        let reflown = again(&log, "position.pos.kp=0.4").expect("flies");
+        assert!(
+            reflown.changed_at >= FROM && reflown.changed_at < Instant::from_millis(9_010),
+            "{}",
+            reflown.changed_at
+        );
+        let [before, now] = [&log, &reflown.log].map(|log| flight_log::parse(log).expect("a log").flight);
+        let mut differing = 0;
+        for (topic, old) in &before.topics {
+            let new = &now.topics[topic];
+            // A sample has the stamp of what made it due, which is a little before the moment of rest.
+            let before = |at: &Instant| FROM.since(*at) > Duration::from_millis(5);
+            let until = |series: &Series| series.at.partition_point(before);
+            assert!(old.at[..until(old)] == new.at[..until(new)], "{topic}");
+            for (old_column, new_column) in old.columns.iter().zip(&new.columns) {
+                let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+                let rows = until(old);
+                assert!(bits(&old_column.values[..rows]) == bits(&new_column.values[..rows]), "{topic}");
+                differing += usize::from(bits(&old_column.values) != bits(&new_column.values));
+            }
+        }
+        assert!(differing > 20, "{differing} columns");
+        assert!(
+            reflown.apart.since_s.is_some_and(|since| since > 9.0) && reflown.apart.farthest_m > 0.02,
+            "{}",
+            reflown
+        );
+        let page = std::env::temp_dir().join(format!("stampfly-refly-{}.html", std::process::id()));
+        reflown.write_report::<StampFly>(&page).expect("written");
+        let text = std::fs::read_to_string(&page).expect("a page");
+        std::fs::remove_file(&page).expect("removed");
+        assert!(text.contains("as it flew") && text.contains("position.pos.kp=0.4"));
+    }
+
+    #[test]
+    fn what_cannot_be_flown_again_is_refused_with_the_reason() {
+        let log = log_of(&options());
+        let refused = |parameter: &str| again(&log, parameter).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused("position.tilt.max=0.7").contains("failsafe.tip.tilt"), "a combination that cannot fly");
+        assert!(refused("position.tilt.max=7").contains("must be from"));
+        for parameter in ["estimator.type=1", "controller.type=1"] {
+            let Err(error) = again(&log, parameter) else { panic!("{parameter} is another component") };
+            assert!(matches!(error, ReflyError::Change(ChangeError::OtherComponents)), "{parameter}: {error}");
+        }
+        let from_start =
+            refly::<StampFly>(&log, Instant::ZERO, &["estimator.type=1".into()]).expect("any component may begin");
+        assert!(from_start.log != log && crate::replay::replay(&from_start.log).expect("a log").difference.is_none());
+        let error = refly::<StampFly>(&log, Instant::from_secs(1_000), &["eskf.gate=4".into()]).expect_err("over");
+        assert!(matches!(error, ReflyError::Over), "{error}");
+        let error = again(&super::log(), "eskf.gate=4").expect_err("as a board's own log, it names no world");
+        assert!(matches!(error, ReflyError::NoWorld) && error.to_string().contains("stampfly replay"), "{error}");
+        let mut other = log.clone();
+        let place = other.windows(5).position(|bytes| bytes == b"seed3").expect("a fact") + 4;
+        other[place] = b'4';
+        let error = again(&other, "eskf.gate=4").err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("not the recorded flight"), "{error}");
+    }
+}

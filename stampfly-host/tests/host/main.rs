@@ -2,9 +2,11 @@
 //! `cargo test -p stampfly-host --test host replay` runs one file.
 
 mod black_box;
+mod calibrate;
 mod cameras;
 mod chips;
 mod command_line;
+mod connect;
 mod controllers;
 mod determinism;
 mod doctor;
@@ -20,16 +22,22 @@ mod held;
 mod hil;
 mod impact;
 mod in_flight;
+mod live_parameters;
 mod log_tools;
 mod losses;
 mod made_up;
 mod missions;
+mod plane;
+mod program;
+mod record;
+mod record_by_radio;
 mod reference;
 mod replay;
 mod report;
 mod rover;
 mod safety_mode;
 mod safety_sensors;
+mod stm32_quad;
 mod swap;
 mod tunes;
 

@@ -1,5 +1,6 @@
 //! The rover as people meet it: drives, their logs, and `stampfly serve`, driven by the Python package over UDP.
 
+use super::program::{self, stampfly};
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
@@ -11,20 +12,9 @@ use stampfly_rover::com::{Body, MAX};
 use stampfly_rover::messages::{LogRecord, OperatorCommand, Subscription, SystemState};
 use stampfly_types::Instant;
 
-/// An empty folder of this test's own.
+/// An empty folder of the test's own.
 fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rover").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the target folder can be written");
-    folder
-}
-
-/// Runs the program in a folder. Returns what it prints.
-fn stampfly(folder: &Path, arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_stampfly")).current_dir(folder).args(arguments).output();
-    let output = output.expect("it runs");
-    assert!(output.status.success(), "{arguments:?}: {output:?}");
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    program::folder("rover", name)
 }
 
 #[test]

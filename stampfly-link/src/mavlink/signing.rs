@@ -56,6 +56,12 @@ impl fmt::Debug for SigningKey {
     }
 }
 
+/// The time of a signature at this instant, if it is `epoch` at the clock's zero, in units of 10 µs.
+#[must_use]
+pub const fn time(epoch: u64, now: Instant) -> u64 {
+    epoch.saturating_add(now.as_micros() / TICK_US)
+}
+
 /// Signs frames.
 ///
 /// Its time never stands still and never goes back, whatever the clock does. Over a restart of the vehicle that is the caller's
@@ -83,7 +89,7 @@ impl Signer {
     }
 
     pub(super) fn sign(&mut self, now: Instant, frame: &[u8]) -> Signature {
-        let clock = self.epoch.saturating_add(now.as_micros() / TICK_US);
+        let clock = time(self.epoch, now);
         self.time = clock.max(self.time.saturating_add(1)).min(LATEST);
         Signature { link: self.link, time: self.time, digest: self.key.digest(frame, self.link, self.time) }
     }

@@ -17,6 +17,15 @@ pub const MAX_FRAME: usize = 250;
 /// Length of the longest body, bytes.
 pub const MAX_BODY: usize = MAX_FRAME - MIN_FRAME;
 
+/// Copies bytes to the front of a frame's room. `None` when they are too many.
+#[must_use]
+pub fn put<'r>(room: &'r mut [u8; MAX_FRAME], bytes: &[u8]) -> Option<&'r [u8]> {
+    let place = room.get_mut(..bytes.len())?;
+    // As long as the bytes; spelled so that no panic is linked for other lengths.
+    place.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+    Some(place)
+}
+
 /// Which end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sender {
@@ -44,6 +53,10 @@ pub enum Kind {
     WriteParameter = 0x21,
     /// A line for the console.
     Line = 0x30,
+    /// Messages of a topic are to be sent.
+    Watch = 0x40,
+    /// The flight record is to be sent.
+    Record = 0x41,
     /// Handshake: a vehicle offers a session.
     Announcement = 0x81,
     /// Handshake: a vehicle has taken a station in.
@@ -56,13 +69,15 @@ pub enum Kind {
     Reply = 0xB0,
     /// A message of a topic.
     Sample = 0xC0,
+    /// A chunk of the flight record.
+    Chunk = 0xC1,
     /// A frame of the station has been taken, or what is in it refused.
     Acknowledgement = 0xD0,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 18] = [
         Self::Join,
         Self::Ready,
         Self::Sticks,
@@ -71,12 +86,15 @@ impl Kind {
         Self::ReadParameter,
         Self::WriteParameter,
         Self::Line,
+        Self::Watch,
+        Self::Record,
         Self::Announcement,
         Self::Welcome,
         Self::Telemetry,
         Self::Parameter,
         Self::Reply,
         Self::Sample,
+        Self::Chunk,
         Self::Acknowledgement,
     ];
 

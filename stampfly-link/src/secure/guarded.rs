@@ -104,6 +104,11 @@ impl Guarded {
         }
     }
 
+    /// A key was made: from now on there is a secure session.
+    pub fn set_vehicle(&mut self, vehicle: Vehicle) {
+        self.vehicle = Some(vehicle);
+    }
+
     /// What may be used from now on.
     pub const fn set_policy(&mut self, policy: Policy) {
         self.policy = policy;
@@ -138,17 +143,40 @@ impl Guarded {
     /// # Errors
     /// When it is refused; the link that it is for has counted it.
     pub fn receive<'f>(&mut self, at: Instant, source: Address, bytes: &'f mut [u8]) -> Result<Heard<'f>, NotTaken> {
-        if let Some(vehicle) = self.vehicle.as_mut().filter(|_| bytes.len() >= MIN_FRAME) {
-            let received = vehicle.receive(at, bytes).map_err(NotTaken::Secure)?;
-            self.station = Some(source);
-            self.is_claimed |= self.armed && received.is_some();
-            return Ok(received.map_or(Heard::Handshake, Heard::Authentic));
+        if self.vehicle.is_some() && bytes.len() >= MIN_FRAME {
+            return self.receive_sealed(at, source, bytes);
         }
         if !self.is_open(at) {
             self.forbidden = self.forbidden.wrapping_add(1);
             return Err(NotTaken::Forbidden);
         }
         self.session.receive(at, source, bytes).map(Heard::Unauthenticated).map_err(NotTaken::Unauthenticated)
+    }
+
+    /// Takes what has come over a network, where there is nothing but sealed frames.
+    ///
+    /// # Errors
+    /// When it is none of a station with the key, or the vehicle has no key.
+    pub fn receive_sealed<'f>(
+        &mut self,
+        at: Instant,
+        source: Address,
+        bytes: &'f mut [u8],
+    ) -> Result<Heard<'f>, NotTaken> {
+        let Some(vehicle) = &mut self.vehicle else {
+            self.forbidden = self.forbidden.wrapping_add(1);
+            return Err(NotTaken::Forbidden);
+        };
+        let received = vehicle.receive(at, bytes).map_err(NotTaken::Secure)?;
+        self.station = Some(source);
+        self.is_claimed |= self.armed && received.is_some();
+        Ok(received.map_or(Heard::Handshake, Heard::Authentic))
+    }
+
+    /// Where the newest authentic frame came from.
+    #[must_use]
+    pub const fn station(&self) -> Option<Address> {
+        self.station
     }
 
     /// May packets that authenticate nobody be used now?

@@ -92,7 +92,7 @@ mod vehicle;
 
 pub use budget::Budget;
 pub use clock::MAX_AGE;
-pub use frame::{Kind, MAX_BODY, MAX_FRAME, MIN_FRAME, key_id};
+pub use frame::{Kind, MAX_BODY, MAX_FRAME, MIN_FRAME, key_id, put};
 pub use guarded::{Guarded, Heard, NotTaken, Policy};
 pub use key::{Key, KeyError, Uri};
 pub use payload::{Payload, Sample};

@@ -8,10 +8,13 @@
 //! | 20 read parameter | station | u16 place in the vehicle's table |
 //! | 21 write parameter | station | u16 place; f32 value, finite |
 //! | 30 line | station | text |
+//! | 40 watch | station | u16 topic; u16 period, ms; 0 ends it |
+//! | 41 record | station | u8 whether the flight record is wanted; said again every second |
 //! | 90 telemetry | vehicle | a [`TelemetryPacket`], with its checksum |
 //! | A0 parameter | vehicle | u16 place; f32 value; u8 whether a write was taken |
 //! | B0 reply | vehicle | u8 whether it is the last; text |
 //! | C0 sample | vehicle | u16 topic; u64 instant, µs; the words of the message, u32 each |
+//! | C1 chunk | vehicle | a chunk of the flight record, with its number and check sum |
 //! | D0 acknowledgement | vehicle | u32 counter of a frame of the station; u8 whether it was taken |
 //!
 //! Numbers of kinds are hexadecimal. A body has exactly the length of its kind. Numbers are finite and in their range; −0 and
@@ -59,6 +62,18 @@ pub enum Payload<'f> {
     },
     /// A line for the console, from the station. Not with motors armed.
     Line(&'f str),
+    /// Messages of a topic are to be sent as [samples](Self::Sample), the newest of them, from the station.
+    Watch {
+        /// Place in the vehicle's topic table.
+        topic: u16,
+        /// Between two of them, at least, ms. Zero: none any more.
+        period: u16,
+    },
+    /// The flight record is wanted as [chunks](Self::Chunk), or not any more, from the station. It is said again as long as that is so.
+    Record {
+        /// Is it?
+        wanted: bool,
+    },
     /// The vehicle's state.
     Telemetry(TelemetryPacket),
     /// The value of a parameter, from the vehicle.
@@ -79,6 +94,8 @@ pub enum Payload<'f> {
     },
     /// A message of one of the vehicle's topics.
     Sample(Sample<'f>),
+    /// A chunk of the flight record, from the vehicle.
+    Chunk(&'f [u8]),
     /// What became of a frame of the station, from the vehicle.
     Acknowledgement {
         /// The frame's counter.
@@ -99,10 +116,13 @@ impl<'f> Payload<'f> {
             Self::ReadParameter { .. } => Kind::ReadParameter,
             Self::WriteParameter { .. } => Kind::WriteParameter,
             Self::Line(_) => Kind::Line,
+            Self::Watch { .. } => Kind::Watch,
+            Self::Record { .. } => Kind::Record,
             Self::Telemetry(_) => Kind::Telemetry,
             Self::Parameter { .. } => Kind::Parameter,
             Self::Reply { .. } => Kind::Reply,
             Self::Sample(_) => Kind::Sample,
+            Self::Chunk(_) => Kind::Chunk,
             Self::Acknowledgement { .. } => Kind::Acknowledgement,
         }
     }
@@ -153,6 +173,12 @@ impl<'f> Payload<'f> {
                 to.number(*value, f32::MAX)?;
             }
             Self::Line(text) => to.text(text)?,
+            Self::Watch { topic, period } => {
+                to.bytes(&topic.to_le_bytes())?;
+                to.bytes(&period.to_le_bytes())?;
+            }
+            Self::Record { wanted } => to.truth(*wanted)?,
+            Self::Chunk(chunk) => to.bytes(chunk)?,
             Self::Telemetry(packet) => to.bytes(&packet.to_bytes())?,
             Self::Parameter { index, value, taken } => {
                 to.bytes(&index.to_le_bytes())?;
@@ -205,6 +231,12 @@ impl<'f> Payload<'f> {
                 Self::WriteParameter { index, value }
             }
             Kind::Line => Self::Line(from.text()?),
+            Kind::Watch => {
+                let topic = u16::from_le_bytes(from.bytes()?);
+                Self::Watch { topic, period: u16::from_le_bytes(from.bytes()?) }
+            }
+            Kind::Record => Self::Record { wanted: from.truth()? },
+            Kind::Chunk => Self::Chunk(core::mem::take(&mut from.0)),
             Kind::Telemetry => Self::Telemetry(TelemetryPacket::decode(&from.bytes::<22>()?).ok()?),
             Kind::Parameter => {
                 let (index, value) = (u16::from_le_bytes(from.bytes()?), from.number(f32::MAX)?);

@@ -43,6 +43,7 @@ impl Channels {
     }
 
     /// Least significant bit first.
+    #[inline]
     pub(super) fn unpack(bytes: &[u8; Self::PACKED]) -> Self {
         // Five channels are in eight bytes, wherever they begin in the first one.
         let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v] = *bytes;

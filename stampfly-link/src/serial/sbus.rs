@@ -87,6 +87,7 @@ impl SbusFrame {
     ///
     /// # Errors
     /// When it is none.
+    #[inline]
     pub fn decode(bytes: &[u8; Self::LENGTH]) -> Result<Self, SbusError> {
         let [start, packed @ .., flags, end] = bytes;
         if *start != START {
@@ -169,9 +170,14 @@ impl SbusDecoder {
     #[inline]
     pub fn feed(&mut self, at: Instant, byte: u8) -> Option<SbusFrame> {
         self.pause(at);
-        if self.heard.put_inside(byte) {
-            return None;
-        }
+        if self.heard.put_inside(byte) { None } else { self.first_or_last(byte) }
+    }
+
+    /// The first byte or the last one of what may be a frame.
+    // Apart, so that the other 23 fall through to the loop that feeds them.
+    #[cold]
+    #[inline(never)]
+    fn first_or_last(&mut self, byte: u8) -> Option<SbusFrame> {
         // What does not begin as a frame is none.
         if self.heard.is_empty() && byte != START {
             self.heard.skip(1);
@@ -218,11 +224,17 @@ impl SbusDecoder {
     fn pause(&mut self, at: Instant) {
         // Bytes that came together have one time.
         if at != self.newest {
-            if at.since(self.newest) >= PAUSE {
-                self.heard.discard_all();
-            }
-            self.newest = at;
+            self.goes_on(at);
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn goes_on(&mut self, at: Instant) {
+        if at.since(self.newest) >= PAUSE {
+            self.heard.discard_all();
+        }
+        self.newest = at;
     }
 
     /// The frame that all bytes are, or those from the next one on that may begin one.

@@ -1,30 +1,33 @@
 //! Which message goes where.
 
 use super::commands::{self, Turn};
+use super::heard::Heard;
 use super::identity::{AUTOPILOT, Own};
 use super::unreadable::Unreadable;
 use super::{parameters, streams};
-use crate::mission::Origin;
-use stampfly_link::mavlink::dialects::common::{MavMessage, MavMissionType, TIMESYNC_DATA};
+use stampfly_link::mavlink::dialects::common::{MavMissionType, TIMESYNC_DATA};
+use stampfly_types::Origin;
 use stampfly_types::messages::{FlightMode, PilotInput};
 
 /// Answers one message of a client's system. Returns where on Earth the vehicle is, if it was told.
-pub(super) fn message<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, system: u8, message: &MavMessage) -> Option<Origin> {
+pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
+    turn: Turn<'_, '_, C, ITEMS>,
+    system: u8,
+    message: &Heard,
+) -> Option<Origin> {
     let (now, own, seat) = (turn.now, turn.own, turn.seat);
     match message {
-        MavMessage::HEARTBEAT(_) => sign_of_life(turn),
-        MavMessage::COMMAND_LONG(command) if own.is_meant(command.target_system, command.target_component) => {
+        Heard::Heartbeat => sign_of_life(turn),
+        Heard::CommandLong(command) if own.is_meant(command.target_system, command.target_component) => {
             commands::obey(turn, &commands::Command::from(command));
         }
-        MavMessage::COMMAND_INT(command) if own.is_meant(command.target_system, command.target_component) => {
+        Heard::CommandInt(command) if own.is_meant(command.target_system, command.target_component) => {
             commands::obey(turn, &commands::Command::from(command));
         }
-        MavMessage::SET_POSITION_TARGET_LOCAL_NED(target)
-            if own.is_meant(target.target_system, target.target_component) =>
-        {
+        Heard::SetPositionTargetLocalNed(target) if own.is_meant(target.target_system, target.target_component) => {
             commands::go_to(turn, target);
         }
-        MavMessage::MANUAL_CONTROL(sticks) if own.is_meant(sticks.target, AUTOPILOT) => {
+        Heard::ManualControl(sticks) if own.is_meant(sticks.target, AUTOPILOT) => {
             let share = |axis: i16| if axis == i16::MAX { 0.0 } else { f32::from(axis) / 1000.0 };
             let input = PilotInput {
                 pitch: share(sticks.x),
@@ -38,24 +41,24 @@ pub(super) fn message<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, system: u8, me
             };
             _ = turn.cockpit.steer(now, seat, &input.cleaned());
         }
-        MavMessage::PARAM_REQUEST_LIST(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::ParamRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
             turn.client.next_parameter = Some(0);
         }
-        MavMessage::PARAM_REQUEST_READ(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::ParamRequestRead(request) if own.is_meant(request.target_system, request.target_component) => {
             parameters::read(turn.client, request, turn.cockpit.parameters(), turn.put);
         }
-        MavMessage::PARAM_SET(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::ParamSet(request) if own.is_meant(request.target_system, request.target_component) => {
             parameters::set(turn.client, request, turn.cockpit, turn.put);
         }
-        MavMessage::SET_GPS_GLOBAL_ORIGIN(request) if own.is_meant(request.target_system, AUTOPILOT) => {
+        Heard::SetGpsGlobalOrigin(request) if own.is_meant(request.target_system, AUTOPILOT) => {
             return set_origin(
                 turn,
                 Origin { latitude: request.latitude, longitude: request.longitude, altitude: request.altitude },
             );
         }
-        MavMessage::TIMESYNC(sync) if sync.tc1 == 0 => {
+        Heard::Timesync(sync) if sync.tc1 == 0 => {
             let answer = TIMESYNC_DATA { tc1: (now.as_micros() as i64).saturating_mul(1000), ..sync.clone() };
-            turn.client.send(&MavMessage::TIMESYNC(answer), turn.put);
+            turn.client.send(&answer.into(), turn.put);
         }
         _ => mission(turn, system, message),
     }
@@ -63,50 +66,50 @@ pub(super) fn message<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, system: u8, me
 }
 
 /// The messages of the mission protocol.
-fn mission<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, system: u8, message: &MavMessage) {
+fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, system: u8, message: &Heard) {
     let Turn { now, own, client, missions, put, .. } = turn;
     match message {
-        MavMessage::MISSION_COUNT(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::MissionCount(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.count(now, client, system, request, put);
         }
-        MavMessage::MISSION_ITEM_INT(item) if own.is_meant(item.target_system, item.target_component) => {
+        Heard::MissionItemInt(item) if own.is_meant(item.target_system, item.target_component) => {
             missions.item(now, client, own, system, (item.seq, item.mission_type, Some(item.into())), put);
         }
-        MavMessage::MISSION_ITEM(item) if own.is_meant(item.target_system, item.target_component) => {
+        Heard::MissionItem(item) if own.is_meant(item.target_system, item.target_component) => {
             missions.item(now, client, own, system, (item.seq, item.mission_type, Some(item.into())), put);
         }
-        MavMessage::MISSION_REQUEST_LIST(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::MissionRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.list(client, system, request.mission_type, put);
         }
-        MavMessage::MISSION_REQUEST_INT(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::MissionRequestInt(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.request(client, system, (request.seq, request.mission_type), put);
         }
         // Older programs ask so, and read both kinds of item.
-        MavMessage::MISSION_REQUEST(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::MissionRequest(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.request(client, system, (request.seq, request.mission_type), put);
         }
-        MavMessage::MISSION_CLEAR_ALL(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::MissionClearAll(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.clear(client, system, request.mission_type, put);
         }
-        MavMessage::MISSION_SET_CURRENT(request) if own.is_meant(request.target_system, request.target_component) => {
+        Heard::MissionSetCurrent(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.set_current(usize::from(request.seq));
             client.send(&missions.state(), put);
         }
-        MavMessage::MISSION_ACK(ack) if own.is_meant(ack.target_system, ack.target_component) => {
+        Heard::MissionAck(ack) if own.is_meant(ack.target_system, ack.target_component) => {
             missions.acknowledged(client, ack);
         }
         _ => {}
     }
 }
 
-fn sign_of_life<C>(turn: Turn<'_, '_, C>) {
+fn sign_of_life<C, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>) {
     turn.cockpit.alive(turn.now, turn.seat);
     turn.missions.runner.alive(turn.now, turn.seat);
 }
 
 /// A station says where on Earth the vehicle is. Not while a mission with places on Earth is flown, which would be elsewhere then; and not to a vehicle
 /// that knows.
-fn set_origin<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, origin: Origin) -> Option<Origin> {
+fn set_origin<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, origin: Origin) -> Option<Origin> {
     let Turn { now, own, client, missions, cockpit, put, .. } = turn;
     let moves = missions.is_global() && missions.runner.is_running();
     let taken = (origin.is_sound() && !moves && cockpit.origin().is_none()).then_some(origin);
@@ -121,7 +124,11 @@ fn set_origin<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, origin: Origin) -> Opt
 }
 
 /// What cannot be read is answered so that nobody waits for it.
-pub(super) fn unreadable<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, system: u8, message: Unreadable) {
+pub(super) fn unreadable<C: Copy + PartialEq, const ITEMS: usize>(
+    turn: Turn<'_, '_, C, ITEMS>,
+    system: u8,
+    message: Unreadable,
+) {
     let own = turn.own;
     match message {
         Unreadable::Heartbeat => sign_of_life(turn),

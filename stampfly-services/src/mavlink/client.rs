@@ -1,13 +1,20 @@
 //! One client: what it was heard to send, what it wants and how often.
 
+use super::heard::Heard;
 use super::identity::{AUTOPILOT, Own};
+use super::said::Said;
 use super::streams::STREAMS;
 use super::unreadable::Unreadable;
 use crate::view::View;
-use stampfly_link::mavlink::dialects::common::MavMessage;
-use stampfly_link::mavlink::signing::{Signer, SigningKey, Verifier};
-use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
+use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity, STATUSTEXT_DATA};
+use stampfly_link::mavlink::signing::{Signer, SigningKey, Untrusted, Verifier};
+use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
 use stampfly_types::{Duration, Instant};
+
+/// A client whose clock is behind is told the vehicle's time so often.
+const TIME: Duration = Duration::from_secs(1);
+/// Characters of a text for people in one message.
+const PIECE: usize = 50;
 
 /// Where frames go.
 pub(super) type Put<'p, C> = &'p mut dyn FnMut(&C, &[u8]);
@@ -21,14 +28,15 @@ pub(super) struct Due {
 }
 
 /// What a byte has ended.
-#[expect(clippy::large_enum_variant, reason = "it is looked at once and gone, and nothing here allocates")]
 pub(super) enum Fed {
-    /// A message of this system.
-    Message(u8, MavMessage),
+    /// A message of this system that is for a vehicle.
+    Message(u8, Heard),
     /// A message of this system that the dialect cannot read, but that wants an answer.
     Unreadable(u8, Unreadable),
+    /// Bytes of another protocol, of this system.
+    Tunnel(u8, Tunnel),
     /// A frame that is not signed as it must be.
-    Untrusted,
+    Untrusted(Untrusted),
 }
 
 /// Who may be believed, when frames must be signed.
@@ -50,6 +58,8 @@ pub(super) struct Client<C> {
     /// It has sent a frame that was believed.
     pub believed: bool,
     now: Instant,
+    /// When it was told the vehicle's time.
+    told: Option<Instant>,
     decoder: MavlinkDecoder<MavMessage>,
     writer: MavlinkWriter,
     /// Frames to it are signed, and its own must be.
@@ -71,6 +81,7 @@ impl<C> Client<C> {
             stays,
             believed: false,
             now,
+            told: None,
             decoder: MavlinkDecoder::new(),
             writer: MavlinkWriter::new(system, AUTOPILOT),
             signer: guard.map(|guard| Signer::new(guard.key.clone(), 0, guard.epoch)),
@@ -90,32 +101,59 @@ impl<C> Client<C> {
         self.stays || self.believed
     }
 
+    /// The time of the last signature to it.
+    pub fn signed(&self) -> Option<u64> {
+        self.signer.as_ref().map(Signer::time)
+    }
+
+    /// May it be told the vehicle's time? Once a second.
+    pub fn may_be_told(&mut self, now: Instant) -> bool {
+        let may = self.told.is_none_or(|at| now.since(at) >= TIME);
+        if may {
+            self.told = Some(now);
+        }
+        may
+    }
+
     /// Takes a byte. Returns the message that it ends. What is no message of the dialect and wants no answer is passed over.
     pub fn feed(&mut self, byte: u8, guard: Option<&mut Guard>) -> Option<Fed> {
         let frame = self.decoder.feed(byte)?;
-        if self.signer.is_some() && guard.is_none_or(|guard| guard.verifier.verify(&frame).is_err()) {
-            return Some(Fed::Untrusted);
+        if self.signer.is_some() {
+            let judged = guard.map_or(Err(Untrusted::Unsigned), |guard| guard.verifier.verify(&frame));
+            if let Err(why) = judged {
+                return Some(Fed::Untrusted(why));
+            }
         }
         (self.believed, self.heard) = (true, self.now);
-        match frame.message() {
-            Ok(message) => Some(Fed::Message(frame.system, message)),
-            Err(_) => Some(Fed::Unreadable(frame.system, Unreadable::of(frame.id, frame.payload)?)),
+        if frame.id == Tunnel::ID {
+            return Some(Fed::Tunnel(frame.system, Tunnel::read(frame.payload)?));
         }
+        Some(match Heard::read(&frame)? {
+            Ok(message) => Fed::Message(frame.system, message),
+            Err(message) => Fed::Unreadable(frame.system, message),
+        })
     }
 
     /// Sends a message. In version 2, which every program reads that is not older than 2017.
-    pub fn send(&mut self, message: &MavMessage, put: Put<'_, C>) {
-        let mut buffer = [0; LONGEST];
-        let frame = match &mut self.signer {
-            Some(signer) => self.writer.write_signed(self.now, message, signer, &mut buffer),
-            None => self.writer.write(MavlinkVersion::V2, message, &mut buffer),
-        };
-        if let Some(frame) = frame {
-            put(&self.id, frame);
+    pub fn send(&mut self, message: &Said, put: Put<'_, C>) {
+        self.send_payload(message.id, message.payload(), put);
+    }
+
+    /// Says a sentence of any length: in pieces of 50 bytes, which a station that knows them puts together again.
+    pub fn say(&mut self, severity: MavSeverity, sentence: &str, put: Put<'_, C>) {
+        let pieces = sentence.as_bytes().chunks(PIECE);
+        // A number that the last sentence did not have; zero is for one of a single piece.
+        let id = if pieces.len() > 1 { (self.now.as_micros() / 1_000) as u16 | 1 } else { 0 };
+        for (chunk_seq, piece) in (0..).zip(pieces) {
+            let mut text = [0; PIECE];
+            text.iter_mut().zip(piece).for_each(|(to, from)| *to = *from);
+            self.send(&STATUSTEXT_DATA { severity, text: text.into(), id, chunk_seq }.into(), put);
         }
     }
 
     /// Sends a message by its number and fields.
+    // Called wherever something is said: its room for a frame is on the stack once.
+    #[inline(never)]
     pub fn send_payload(&mut self, id: u32, payload: &[u8], put: Put<'_, C>) {
         let mut buffer = [0; LONGEST];
         let frame = match &mut self.signer {

@@ -4,6 +4,7 @@
 //! denied at once, with the reasons as texts. What a program may ask for while another one commands is the
 //! [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
 
+use super::calibration::Calibrating;
 use super::client::{Client, Put};
 use super::identity::Own;
 use super::missions::Missions;
@@ -33,8 +34,13 @@ impl From<&COMMAND_LONG_DATA> for Command {
 
 impl From<&COMMAND_INT_DATA> for Command {
     fn from(command: &COMMAND_INT_DATA) -> Self {
-        let COMMAND_INT_DATA { param1, param2, param3, param4, z, command: kind, .. } = *command;
-        Self { kind, parameters: [param1, param2, param3, param4, f32::NAN, f32::NAN, z] }
+        let COMMAND_INT_DATA { param1, param2, param3, param4, x, y, z, command: kind, .. } = *command;
+        // A calibration has no position, so they are what they are.
+        let [x, y] = match kind {
+            MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION => [x as f32, y as f32],
+            _ => [f32::NAN; 2],
+        };
+        Self { kind, parameters: [param1, param2, param3, param4, x, y, z] }
     }
 }
 
@@ -44,21 +50,31 @@ fn whole(number: f32) -> Option<u32> {
 }
 
 /// What a command meets: the vehicle, who asks, and where answers go.
-pub(super) struct Turn<'t, 'p, C> {
+pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub now: Instant,
     pub own: &'t Own,
     pub client: &'t mut Client<C>,
-    pub missions: &'t mut Missions<C>,
+    pub missions: &'t mut Missions<C, ITEMS>,
+    pub calibrating: &'t mut Calibrating<C>,
     pub seat: Seat,
     pub cockpit: &'t mut dyn Cockpit,
     pub put: Put<'p, C>,
 }
 
 /// Does what is asked, and acknowledges it.
-pub(super) fn obey<C: Copy + PartialEq>(mut turn: Turn<'_, '_, C>, command: &Command) {
-    let result = turn.outcome(command);
+pub(super) fn obey<C: Copy + PartialEq, const ITEMS: usize>(mut turn: Turn<'_, '_, C, ITEMS>, command: &Command) {
+    let result = if command.kind == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION {
+        let Turn { now, client, calibrating, cockpit, put, .. } = &mut turn;
+        // What takes longer is acknowledged there.
+        let Err(result) = calibrating.ask(*now, client, &command.parameters, &mut **cockpit, &mut **put) else {
+            return;
+        };
+        result
+    } else {
+        turn.outcome(command)
+    };
     let ack = COMMAND_ACK_DATA { command: command.kind, result, ..Default::default() };
-    turn.client.send(&MavMessage::COMMAND_ACK(ack), turn.put);
+    turn.client.send(&ack.into(), turn.put);
 }
 
 /// Says that a command that this dialect does not have is not supported.
@@ -68,7 +84,7 @@ pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, put: Put<'_, C>) {
     client.send_payload(COMMAND_ACK_DATA::ID, &payload, put);
 }
 
-impl<C: Copy + PartialEq> Turn<'_, '_, C> {
+impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     fn outcome(&mut self, Command { kind, parameters: [p1, p2, p3, .., p7] }: &Command) -> MavResult {
         let status = self.cockpit.view().state();
         match kind {
@@ -241,7 +257,10 @@ fn set_interval<C>(now: Instant, client: &mut Client<C>, id: f32, interval_us: f
 }
 
 /// Sends the vehicle to a place. Programs repeat the same target many times a second: only a new one is passed on.
-pub(super) fn go_to<C: Copy + PartialEq>(turn: Turn<'_, '_, C>, target: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
+pub(super) fn go_to<C: Copy + PartialEq, const ITEMS: usize>(
+    turn: Turn<'_, '_, C, ITEMS>,
+    target: &SET_POSITION_TARGET_LOCAL_NED_DATA,
+) {
     let Turn { now, client, missions, seat, cockpit, .. } = turn;
     type Mask = PositionTargetTypemask;
     let place = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE

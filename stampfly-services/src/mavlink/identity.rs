@@ -1,7 +1,7 @@
 //! What a vehicle is in MAVLink, and which messages are for it.
 
-use crate::mission::Origin;
 use stampfly_link::mavlink::dialects::common::MavType;
+use stampfly_types::Origin;
 
 /// An autopilot, in MAVLink's numbering.
 pub(super) const AUTOPILOT: u8 = 1;
@@ -15,6 +15,9 @@ pub struct Identity {
     pub kind: MavType,
     /// Height that a take-off without one climbs to, m.
     pub take_off_height: f32,
+    /// A place of a mission is reached within this distance unless its item says another, m: a little more than the one at which the vehicle itself
+    /// takes the next way-point. An aeroplane is told of the next one before it turns.
+    pub reach: f32,
     /// What a number without a name is worth in a version: major, minor, patch.
     pub version: [u8; 3],
 }

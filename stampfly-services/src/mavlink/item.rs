@@ -3,9 +3,11 @@
 //! Items are kept as they were uploaded, so that a download gives back the same. Whether a vehicle can do what an item says is decided when it is uploaded: the
 //! answer is the result that the protocol has for it.
 
-use crate::mission::{Origin, Step};
+use super::said::Said;
+use crate::mission::Step;
 use core::f32::consts::TAU;
 use stampfly_link::mavlink::dialects::common::*;
+use stampfly_types::Origin;
 use stampfly_types::{Duration, Vec3};
 
 /// Nobody means a place farther away than this, m: the same limit as for every guided command.
@@ -70,9 +72,9 @@ const fn kind(frame: MavFrame) -> Option<Frame> {
 
 impl Item {
     /// As it is downloaded by this system and component.
-    pub fn message(&self, seq: u16, current: bool, [target_system, target_component]: [u8; 2]) -> MavMessage {
+    pub fn message(&self, seq: u16, current: bool, [target_system, target_component]: [u8; 2]) -> Said {
         let Self { command, frame, parameters: [param1, param2, param3, param4], x, y, z, autocontinue } = *self;
-        MavMessage::MISSION_ITEM_INT(MISSION_ITEM_INT_DATA {
+        let data = MISSION_ITEM_INT_DATA {
             param1,
             param2,
             param3,
@@ -88,7 +90,8 @@ impl Item {
             current: current.into(),
             autocontinue,
             mission_type: MavMissionType::MAV_MISSION_TYPE_MISSION,
-        })
+        };
+        data.into()
     }
 
     /// Is its position one on Earth?

@@ -5,8 +5,9 @@
 //! flown. Geofences and rally points are kinds of missions that this vehicle does not have: their lists are empty, and uploads of them refused.
 
 use super::client::{Client, Put};
-use super::identity::Own;
+use super::identity::{Identity, Own};
 use super::item::Item;
+use super::said::Said;
 use super::streams::text;
 use crate::cockpit::Cockpit;
 use crate::mission::{Event, Runner, Step};
@@ -15,7 +16,7 @@ use heapless::{String, Vec};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::{Duration, Instant};
 
-/// Items of a mission.
+/// Items of a mission, unless a vehicle has room for another number.
 pub const ITEMS: usize = 64;
 /// An item that has not come is asked for again after this long, and so many times: the protocol's own figures.
 const AGAIN: Duration = Duration::from_millis(250);
@@ -27,7 +28,7 @@ const MISSION: Kind = Kind::MAV_MISSION_TYPE_MISSION;
 
 /// An upload that is going on.
 #[derive(Clone, Debug)]
-struct Upload<C> {
+struct Upload<C, const ITEMS: usize> {
     from: C,
     /// System and component that uploads.
     target: [u8; 2],
@@ -39,9 +40,9 @@ struct Upload<C> {
 
 /// The mission, who uploads the next one, and how far it is flown.
 #[derive(Clone, Debug)]
-pub(super) struct Missions<C> {
+pub(super) struct Missions<C, const ITEMS: usize> {
     items: Vec<Item, ITEMS>,
-    upload: Option<Upload<C>>,
+    upload: Option<Upload<C, ITEMS>>,
     pub runner: Runner,
     /// A number that changes with the mission; zero is none.
     id: u32,
@@ -55,18 +56,18 @@ fn acknowledge<C>(
 ) {
     let [target_system, target_component] = target;
     let data = MISSION_ACK_DATA { target_system, target_component, mavtype, mission_type, opaque_id: id };
-    client.send(&MavMessage::MISSION_ACK(data), put);
+    client.send(&data.into(), put);
 }
 
 fn ask<C>(client: &mut Client<C>, [target_system, target_component]: [u8; 2], seq: usize, put: Put<'_, C>) {
     let seq = u16::try_from(seq).unwrap_or(u16::MAX);
     let data = MISSION_REQUEST_INT_DATA { seq, target_system, target_component, mission_type: MISSION };
-    client.send(&MavMessage::MISSION_REQUEST_INT(data), put);
+    client.send(&data.into(), put);
 }
 
-impl<C: Copy + PartialEq> Missions<C> {
-    pub const fn new(take_off_height: f32) -> Self {
-        Self { items: Vec::new(), upload: None, runner: Runner::new(take_off_height), id: 0 }
+impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
+    pub const fn new(identity: &Identity) -> Self {
+        Self { items: Vec::new(), upload: None, runner: Runner::new(identity.take_off_height, identity.reach), id: 0 }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -97,7 +98,10 @@ impl<C: Copy + PartialEq> Missions<C> {
         let refusal = match request.mission_type {
             Kind::MAV_MISSION_TYPE_MISSION if self.runner.is_running() || busy => Answer::MAV_MISSION_DENIED,
             Kind::MAV_MISSION_TYPE_MISSION if count > ITEMS => Answer::MAV_MISSION_NO_SPACE,
-            Kind::MAV_MISSION_TYPE_MISSION if count == 0 => return self.replace(client, target, Vec::new(), put),
+            Kind::MAV_MISSION_TYPE_MISSION if count == 0 => {
+                self.items.clear();
+                return self.replace(client, target, put);
+            }
             Kind::MAV_MISSION_TYPE_MISSION => {
                 let from = client.id;
                 self.upload = Some(Upload { from, target, count, items: Vec::new(), asked: now, retries: 0 });
@@ -142,16 +146,16 @@ impl<C: Copy + PartialEq> Missions<C> {
         if next < upload.count {
             return ask(client, target, next, put);
         }
-        let items = core::mem::take(&mut upload.items);
-        self.upload = None;
-        match self.runner.is_running() {
-            true => acknowledge(client, target, (Answer::MAV_MISSION_DENIED, MISSION, 0), put),
-            false => self.replace(client, target, items, put),
+        if self.runner.is_running() {
+            acknowledge(client, target, (Answer::MAV_MISSION_DENIED, MISSION, 0), put);
+        } else {
+            core::mem::swap(&mut self.items, &mut upload.items);
+            self.replace(client, target, put);
         }
+        self.upload = None;
     }
 
-    fn replace(&mut self, client: &mut Client<C>, target: [u8; 2], items: Vec<Item, ITEMS>, put: Put<'_, C>) {
-        self.items = items;
+    fn replace(&mut self, client: &mut Client<C>, target: [u8; 2], put: Put<'_, C>) {
         self.runner.reset();
         self.id = if self.items.is_empty() { 0 } else { self.id.wrapping_add(1).max(1) };
         acknowledge(client, target, (Answer::MAV_MISSION_ACCEPTED, MISSION, self.id), put);
@@ -168,7 +172,7 @@ impl<C: Copy + PartialEq> Missions<C> {
             mission_type: kind,
             opaque_id: if is_mission { self.id } else { 0 },
         };
-        client.send(&MavMessage::MISSION_COUNT(data), put);
+        client.send(&data.into(), put);
     }
 
     /// A station wants one.
@@ -189,7 +193,8 @@ impl<C: Copy + PartialEq> Missions<C> {
                 acknowledge(client, [from, 0], (Answer::MAV_MISSION_DENIED, kind, 0), put);
             }
             Kind::MAV_MISSION_TYPE_MISSION | Kind::MAV_MISSION_TYPE_ALL => {
-                (self.items, self.upload, self.id) = (Vec::new(), None, 0);
+                self.items.clear();
+                (self.upload, self.id) = (None, 0);
                 self.runner.reset();
                 acknowledge(client, [from, 0], (Answer::MAV_MISSION_ACCEPTED, kind, 0), put);
             }
@@ -216,7 +221,7 @@ impl<C: Copy + PartialEq> Missions<C> {
     }
 
     /// How far it is flown.
-    pub fn state(&self) -> MavMessage {
+    pub fn state(&self) -> Said {
         let last = self.items.len().saturating_sub(1);
         let (mission_state, mission_mode) = match &self.runner {
             _ if self.items.is_empty() => (MissionState::MISSION_STATE_NO_MISSION, 2),
@@ -225,14 +230,15 @@ impl<C: Copy + PartialEq> Missions<C> {
             runner if runner.is_halted() => (MissionState::MISSION_STATE_PAUSED, 2),
             _ => (MissionState::MISSION_STATE_NOT_STARTED, 2),
         };
-        MavMessage::MISSION_CURRENT(MISSION_CURRENT_DATA {
+        let data = MISSION_CURRENT_DATA {
             seq: self.runner.current().min(last) as u16,
             total: self.items.len() as u16,
             mission_state,
             mission_mode,
             mission_id: self.id,
             ..Default::default()
-        })
+        };
+        data.into()
     }
 
     /// Asks again for items that did not come, flies on, and tells everybody. Call it about fifty times a second.
@@ -260,8 +266,8 @@ impl<C: Copy + PartialEq> Missions<C> {
         let items = &self.items;
         let Some(event) = self.runner.poll(now, cockpit, &|place| Self::step(items, own, place)) else { return };
         let mut words = String::<50>::new();
-        let told = match event {
-            Event::Reached(place) => MavMessage::MISSION_ITEM_REACHED(MISSION_ITEM_REACHED_DATA { seq: place as u16 }),
+        let told: Said = match event {
+            Event::Reached(place) => MISSION_ITEM_REACHED_DATA { seq: place as u16 }.into(),
             Event::Finished => text(MavSeverity::MAV_SEVERITY_INFO, "mission complete", ""),
             // What does not fit is cut off.
             Event::Halted(why) => {

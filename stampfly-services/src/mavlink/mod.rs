@@ -4,9 +4,11 @@
 //! |---|---|
 //! | `identity.rs` | what a vehicle is, and which messages are for it |
 //! | `client.rs` | one client: what it was heard to send, what it wants and how often, whether it must sign |
+//! | `heard.rs`, `said.rs` | the messages that a vehicle takes, and those that it sends: a few of the dialect's two hundred |
 //! | `answer.rs` | which message goes where |
 //! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`](crate::View) |
 //! | `commands.rs` | commands, and what becomes of each |
+//! | `calibration.rs` | calibrations, which take longer than a command |
 //! | `unreadable.rs` | commands and items that this dialect does not have, which are answered too |
 //! | `parameters.rs` | the parameter protocol; names of at most 16 characters |
 //! | `missions.rs` | the mission protocol |
@@ -24,17 +26,21 @@
 #![allow(deprecated, reason = "programs speak what the protocol has superseded for years after")]
 
 mod answer;
+mod calibration;
 mod client;
 mod commands;
+mod heard;
 mod identity;
 mod item;
 mod missions;
 mod parameters;
+mod said;
 mod streams;
 mod unreadable;
 
 use crate::cockpit::Cockpit;
 use crate::refusal::Seat;
+use calibration::Calibrating;
 use client::{Client, Fed, Guard, Put};
 use commands::Turn;
 use core::fmt::Write;
@@ -44,28 +50,36 @@ use identity::Own;
 pub use missions::ITEMS;
 use missions::Missions;
 pub use parameters::short_name;
-use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity};
-use stampfly_link::mavlink::signing::{SigningKey, Verifier};
+use said::Said;
+use stampfly_link::mavlink::Tunnel;
+use stampfly_link::mavlink::dialects::common::MavSeverity;
+use stampfly_link::mavlink::signing::{self, SigningKey, Untrusted, Verifier};
 use stampfly_types::{Duration, Instant};
 
 /// Clients that can be connected at once.
 pub const CLIENTS: usize = 8;
 /// A client of datagrams that was not heard for this long is forgotten, unless the vehicle was told to send to it.
 const FORGOTTEN: Duration = Duration::from_secs(30);
+/// The number of `HEARTBEAT`.
+const HEARTBEAT: u32 = 0;
+/// And after this long, when there is no room for another. Stations send a heartbeat a second.
+const QUIET: Duration = Duration::from_secs(5);
 /// Stations are told so often how far a mission is.
 const TOLD: Duration = Duration::from_secs(1);
 /// And at most so often of frames that were not believed.
 const COUNTED: Duration = Duration::from_secs(5);
 
-/// The vehicle's end of MAVLink. `C` tells its clients apart: an address, a number.
+/// The vehicle's end of MAVLink. `C` tells its clients apart: an address, a number. A mission has at most `ITEMS` items, of which memory is taken twice: for the one in
+/// force and for one that is uploaded.
 ///
 /// Give it what is heard with [`hear`](Self::hear) and call [`poll`](Self::poll) about fifty times a second; it hands what is to be sent to
 /// `put`. `stampfly-board`'s simulation connects it to sockets.
 #[derive(Clone, Debug)]
-pub struct Mavlink<C> {
+pub struct Mavlink<C, const N: usize = CLIENTS, const ITEMS: usize = { missions::ITEMS }> {
     own: Own,
-    clients: Vec<Client<C>, CLIENTS>,
-    missions: Missions<C>,
+    clients: Vec<Client<C>, N>,
+    missions: Missions<C, ITEMS>,
+    calibrating: Calibrating<C>,
     notices: streams::Notices,
     guard: Option<Guard>,
     refused: u32,
@@ -76,13 +90,22 @@ pub struct Mavlink<C> {
 }
 
 impl<C: Copy + PartialEq> Mavlink<C> {
-    /// A vehicle with this identity.
+    /// A vehicle with this identity, for [`CLIENTS`] clients.
     #[must_use]
     pub const fn new(identity: Identity) -> Self {
+        Self::for_clients(identity)
+    }
+}
+
+impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEMS> {
+    /// A vehicle with this identity, for `N` clients at once and missions of `ITEMS` items.
+    #[must_use]
+    pub const fn for_clients(identity: Identity) -> Self {
         Self {
             own: Own { identity, origin: None },
             clients: Vec::new(),
-            missions: Missions::new(identity.take_off_height),
+            missions: Missions::new(&identity),
+            calibrating: Calibrating::new(),
             notices: streams::Notices::new(),
             guard: None,
             refused: 0,
@@ -113,6 +136,21 @@ impl<C: Copy + PartialEq> Mavlink<C> {
         self.untrusted
     }
 
+    /// The latest time of a signature that was believed or made, in units of 10 µs since 2015. `None` without a key. Keep it over a restart: what was signed before must not be
+    /// believed after it.
+    #[must_use]
+    pub fn signature_time(&self, now: Instant) -> Option<u64> {
+        let Guard { epoch, verifier, .. } = self.guard.as_ref()?;
+        let made = self.clients.iter().filter_map(Client::signed).max().unwrap_or_default();
+        Some(verifier.time().max(made).max(signing::time(*epoch, now)))
+    }
+
+    /// Has this client sent a frame that was believed?
+    #[must_use]
+    pub fn is_believed(&self, client: C) -> bool {
+        self.clients.iter().any(|known| known.id == client && known.believed)
+    }
+
     /// Somebody is there to be sent to, whether or not it says anything. With `stays` it is never forgotten.
     pub fn open(&mut self, now: Instant, client: C, stays: bool) {
         let guarded = self.guard.is_some();
@@ -128,11 +166,13 @@ impl<C: Copy + PartialEq> Mavlink<C> {
         if self.clients.iter().any(|known| known.id == client) {
             return;
         }
-        if self.clients.is_full()
-            && let Some(place) = self.clients.iter().position(|known| !known.is_served())
-        {
-            // Strangers must not keep a station out.
-            self.clients.swap_remove(place);
+        if self.clients.is_full() {
+            // Strangers must not keep a station out, nor must one that was there before and has begun again at another place.
+            let stranger = self.clients.iter().position(|known| !known.is_served());
+            let gone = || self.clients.iter().position(|known| !known.stays && now.since(known.heard) >= QUIET);
+            if let Some(place) = stranger.or_else(gone) {
+                self.clients.swap_remove(place);
+            }
         }
         let guard = self.guard.as_ref().filter(|_| guarded);
         if self.clients.push(Client::new(self.own.identity.system, client, now, stays, guard)).is_err() {
@@ -147,16 +187,44 @@ impl<C: Copy + PartialEq> Mavlink<C> {
 
     /// Takes what a client has sent, and answers.
     pub fn hear(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        self.hear_tunnels(now, from, bytes, cockpit, put, &mut |_, _| {});
+    }
+
+    /// The same, which hands every `TUNNEL` for this vehicle to `tunnel`, with the system that sent it.
+    pub fn hear_tunnels(
+        &mut self,
+        now: Instant,
+        from: C,
+        bytes: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: Put<'_, C>,
+        tunnel: &mut dyn FnMut(u8, Tunnel),
+    ) {
         self.open(now, from, false);
         self.own.origin = cockpit.origin().or(self.own.origin);
-        let Self { own, clients, missions, guard, untrusted, .. } = self;
+        let Self { own, clients, missions, calibrating, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now);
         for byte in bytes {
             let (system, said) = match client.feed(*byte, guard.as_mut()) {
                 None => continue,
-                Some(Fed::Untrusted) => {
+                Some(Fed::Untrusted(why)) => {
                     *untrusted = untrusted.wrapping_add(1);
+                    // It has the key, and its clock is behind the vehicle's: stations take over the time of whatever is signed with their key. One that sends again what others have
+                    // said gets a heartbeat for it.
+                    if why == Untrusted::Old
+                        && !client.believed
+                        && let Some(heartbeat) = streams::make(HEARTBEAT, now, own, &cockpit.view())
+                        && client.may_be_told(now)
+                    {
+                        client.send(&heartbeat, put);
+                    }
+                    continue;
+                }
+                Some(Fed::Tunnel(system, heard)) => {
+                    if own.is_meant(heard.target[0], heard.target[1]) {
+                        tunnel(system, heard);
+                    }
                     continue;
                 }
                 Some(Fed::Message(system, message)) => (system, Ok(message)),
@@ -167,6 +235,7 @@ impl<C: Copy + PartialEq> Mavlink<C> {
                 own: &*own,
                 client: &mut *client,
                 missions: &mut *missions,
+                calibrating: &mut *calibrating,
                 seat: Seat::Mavlink(system),
                 cockpit: &mut *cockpit,
                 put: &mut *put,
@@ -175,6 +244,13 @@ impl<C: Copy + PartialEq> Mavlink<C> {
                 Ok(message) => own.origin = answer::message(turn, system, &message).or(own.origin),
                 Err(message) => answer::unreadable(turn, system, message),
             }
+        }
+    }
+
+    /// Sends a client a message by its number and fields. Nothing happens to one that is not connected.
+    pub fn send_payload(&mut self, to: C, id: u32, payload: &[u8], put: Put<'_, C>) {
+        if let Some(client) = self.clients.iter_mut().find(|known| known.id == to) {
+            client.send_payload(id, payload, put);
         }
     }
 
@@ -193,17 +269,21 @@ impl<C: Copy + PartialEq> Mavlink<C> {
             if !client.is_served() {
                 continue;
             }
-            for notice in notices.iter().chain(&not_believed).chain(&mission) {
-                client.send(notice, put);
+            for notice in &notices {
+                client.send(&notice.text(), put);
+            }
+            for said in not_believed.iter().chain(&mission) {
+                client.send(said, put);
             }
             client.send_due(now, &self.own, &cockpit.view(), put);
             parameters::send_next(client, cockpit.parameters(), put);
         }
         self.missions.poll(now, &self.own, &mut self.clients, cockpit, put);
+        self.calibrating.poll(now, &mut self.clients, cockpit, put);
     }
 
     /// Says to those who are believed that others are not.
-    fn not_believed(&mut self, now: Instant) -> Option<MavMessage> {
+    fn not_believed(&mut self, now: Instant) -> Option<Said> {
         let (told, at) = self.counted;
         let new = self.untrusted.wrapping_sub(told);
         let is_heard = self.clients.iter().any(Client::is_served);

@@ -1,14 +1,15 @@
 //! The parameter protocol: a list, one by number or name, and setting.
 //!
 //! MAVLink's names have at most 16 characters; a longer one is [shortened](short_name). A parameter that is set answers with the
-//! value that it has then, which is how a client learns that it was refused.
+//! value that it has then, which is how a client learns that it was refused. On an armed vehicle one that may not change in flight is taken, too, and a text says that
+//! it waits.
 
 use super::client::{Client, Put};
-use super::streams::text;
+use super::said::Said;
 use crate::cockpit::Cockpit;
 use core::fmt::Write;
 use heapless::String;
-use stampfly_flight::parameters::{self, Parameters};
+use stampfly_flight::parameters::{self, ParameterError, Parameters};
 use stampfly_link::mavlink::dialects::common::*;
 
 /// Characters of a name.
@@ -55,17 +56,18 @@ fn find(parameters: &dyn Parameters, id: &[u8; NAME]) -> Option<usize> {
     all.position(|info| info.name == wanted || short_name(info.name) == wanted)
 }
 
-fn value(parameters: &dyn Parameters, index: usize) -> Option<MavMessage> {
+fn value(parameters: &dyn Parameters, index: usize) -> Option<Said> {
     let (info, value) = (parameters.describe(index)?, parameters.get(index)?);
     let mut id = [0; NAME];
     id.iter_mut().zip(short_name(info.name).bytes()).for_each(|(to, from)| *to = from);
-    Some(MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
+    let data = PARAM_VALUE_DATA {
         param_value: value,
         param_count: count(parameters) as u16,
         param_index: index as u16,
         param_id: id.into(),
         param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
-    }))
+    };
+    Some(data.into())
 }
 
 /// Sends the next ones of a list that was asked for.
@@ -104,17 +106,27 @@ pub(super) fn set<C>(client: &mut Client<C>, request: &PARAM_SET_DATA, cockpit: 
     let parameters = cockpit.parameters();
     let Some(index) = find(parameters, &request.param_id.into()) else { return };
     let name: String<64> = parameters.describe(index).and_then(|info| info.name.try_into().ok()).unwrap_or_default();
-    let mut why = String::<50>::new();
-    // What does not fit is cut off.
-    if armed {
-        _ = why.write_str("not while armed");
-    } else if let Err(error) = parameters::set(parameters, &name, request.param_value) {
-        _ = write!(why, "{name}: {error}");
-    }
+    let waits = armed && parameters.describe(index).is_some_and(|info| !info.in_flight);
+    // Two names and a sentence.
+    let mut text = String::<200>::new();
+    let severity = match parameters::set_at(parameters, index, request.param_value) {
+        Ok(()) => {
+            _ = if waits { write!(text, "{name}: {}", parameters::WAITS) } else { Ok(()) };
+            MavSeverity::MAV_SEVERITY_NOTICE
+        }
+        Err(error) => {
+            // A conflict names both parameters.
+            _ = match error {
+                ParameterError::Conflict { .. } => write!(text, "{error}"),
+                _ => write!(text, "{name}: {error}"),
+            };
+            MavSeverity::MAV_SEVERITY_ERROR
+        }
+    };
     if let Some(message) = value(parameters, index) {
         client.send(&message, put);
     }
-    if !why.is_empty() {
-        client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "", &why), put);
+    if !text.is_empty() {
+        client.say(severity, &text, put);
     }
 }

@@ -2,7 +2,6 @@
 //!
 //! | file | what it does |
 //! |---|---|
-//! | `origin.rs` | where on Earth the local frame begins, and what follows for a place |
 //! | `step.rs` | what a mission is made of, and what happens in it |
 //! | `runner.rs` | which step it is, and the commands that it takes |
 //!
@@ -10,10 +9,8 @@
 //! told apart by nothing here. Who uploads it, and in which format, is another module's business ([`mavlink`](crate::mavlink) has one). Not for a
 //! path that has to be followed to the centimetre: a step ends when the vehicle is near its place.
 
-mod origin;
 mod runner;
 mod step;
 
-pub use origin::Origin;
 pub use runner::Runner;
 pub use step::{Event, Halt, Step, Steps};

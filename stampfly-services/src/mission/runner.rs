@@ -10,9 +10,6 @@ use crate::refusal::{Refusal, Seat};
 use stampfly_types::messages::{CommandSource, FlightPhase, GuidedCommand, GuidedKind, StateEstimate, Validity};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
-/// A place is reached within this distance unless the step says another, m: a little more than the distance at which vehicles of this kind
-/// take the next way-point themselves.
-const NEAR: f32 = 0.25;
 /// So long a command may take to be seen in the vehicle's state.
 const SEEN: Duration = Duration::from_millis(500);
 
@@ -46,13 +43,15 @@ enum State {
 ///
 /// ```
 /// use stampfly_services::mission::Runner;
-/// let runner = Runner::new(0.5);
+/// let runner = Runner::new(0.5, 0.25);
 /// assert_eq!((runner.current(), runner.is_running(), runner.is_finished()), (0, false, false));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Runner {
     /// Height that it takes off to when the mission does not say one, m.
     take_off_height: f32,
+    /// A place is reached within this distance unless the step says another, m.
+    reach: f32,
     current: usize,
     state: State,
     seat: Seat,
@@ -65,11 +64,13 @@ pub struct Runner {
 }
 
 impl Runner {
-    /// One that is not flying. A mission that does not begin with a take-off takes off to this height, m.
+    /// One that is not flying. A mission that does not begin with a take-off takes off to this height, m; a place is reached within
+    /// `reach`, m, unless its step says another distance.
     #[must_use]
-    pub const fn new(take_off_height: f32) -> Self {
+    pub const fn new(take_off_height: f32, reach: f32) -> Self {
         Self {
             take_off_height,
+            reach,
             current: 0,
             state: State::Idle,
             seat: Seat::Console,
@@ -258,7 +259,8 @@ impl Runner {
             (Stage::Begin, Step::Land(None)) => self.land(now, cockpit)?,
             (Stage::Going(place, since), _) => {
                 let Some(estimate) = usable(cockpit) else { return Ok(false) };
-                let radius = if let Step::GoTo { radius, .. } = step { radius.unwrap_or(NEAR) } else { NEAR };
+                let radius =
+                    if let Step::GoTo { radius, .. } = step { radius.unwrap_or(self.reach) } else { self.reach };
                 let since = since.or(((estimate.position - place).norm() <= radius).then_some(now));
                 match (since, step) {
                     (Some(_), Step::Land(_)) => self.land(now, cockpit)?,

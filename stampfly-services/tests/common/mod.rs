@@ -1,8 +1,12 @@
 //! A vehicle that publishes what a test says and notes what services ask of it.
 #![allow(dead_code, reason = "each test uses a part")]
 
+use core::fmt;
+use stampfly_bus::TopicInfo;
+use stampfly_flight::console::{self, CommandError, SensorLine};
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
+use stampfly_flight::profile::Rows;
 use stampfly_services::{Cockpit, Lease, Places, Refusal, Request, Seat, View};
 use stampfly_types::messages::{FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity};
 use stampfly_types::{Instant, Message};
@@ -29,12 +33,14 @@ pub mod topics {
         setpoint: Setpoint = latest @ 400 Hz from stack => [services];
         /// Duties.
         actuator_motor: MotorOutput = latest @ 400 Hz from stack => [services];
+        /// A calibration.
+        calibration_report: CalibrationReport = latest @ on event from stack => [services];
     }
 }
 
 pub use topics::Id;
 
-type Newest = NewestSamples<{ topics::COUNT }, { longest_message(&topics::TOPICS) }>;
+pub type Newest = NewestSamples<{ topics::COUNT }, { longest_message(&topics::TOPICS) }>;
 
 /// Two parameters, one with a name that MAVLink has no room for.
 #[derive(Debug)]
@@ -45,17 +51,65 @@ const NAMES: [&str; 2] = ["gain", "a.name.that.is.longer.than.sixteen"];
 impl Parameters for Two {
     fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
         let name = NAMES.get(index)?;
-        Some(ParameterInfo { name, unit: "1", min: 0.0, max: 10.0, meaning: "" })
+        Some(ParameterInfo { name, unit: "1", min: 0.0, max: 10.0, meaning: "", in_flight: index == 0 })
     }
     fn get(&self, index: usize) -> Option<f32> {
         self.0.get(index).copied()
     }
     fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
+        let parameter = self.0.get_mut(index).ok_or(ParameterError::Unknown)?;
         if !(0.0..=10.0).contains(&value) {
             return Err(ParameterError::OutOfRange { min: 0.0, max: 10.0 });
         }
-        self.0[index] = value;
+        *parameter = value;
         Ok(())
+    }
+    fn check(&self, _: Option<usize>) -> Result<(), ParameterError> {
+        let conflict =
+            ParameterError::Conflict { parameters: NAMES, reason: "seven and nine never fly together, on no day" };
+        if self.0 == [7.0, 9.0] { Err(conflict) } else { Ok(()) }
+    }
+}
+
+/// The console of the vehicle: parameters, and a command that only the board can do.
+pub struct Board<'b>(pub &'b mut Two, pub bool);
+
+impl console::Vehicle for Board<'_> {
+    type Command = core::convert::Infallible;
+    type Request = core::convert::Infallible;
+    const COMMANDS: &'static [(&'static str, &'static str)] = &[];
+    const TOPICS: &'static [TopicInfo] = &topics::TOPICS;
+    fn is_armed(&self) -> Option<bool> {
+        Some(self.1)
+    }
+    fn version(&self) -> &str {
+        "µ 1.0"
+    }
+    fn status(&self, _: Instant, reply: &mut dyn fmt::Write) -> fmt::Result {
+        (0..40).try_for_each(|line| write!(reply, "line {line} of µ\r\n"))
+    }
+    fn newest(&self, _: usize) -> Option<(Instant, &[u32])> {
+        None
+    }
+    fn sensors(&self) -> &[SensorLine<'_>] {
+        &[]
+    }
+    fn profile(&self) -> Rows<'_> {
+        Rows::default()
+    }
+    fn parameters(&mut self) -> &mut dyn Parameters {
+        self.0
+    }
+    fn parse(_: &[&str]) -> Result<Self::Command, CommandError> {
+        Err(CommandError::Unknown)
+    }
+    fn answer(
+        &mut self,
+        command: Self::Command,
+        _: Instant,
+        _: &mut dyn fmt::Write,
+    ) -> Result<Option<Self::Request>, fmt::Error> {
+        match command {}
     }
 }
 
@@ -95,6 +149,11 @@ impl Vehicle {
         let mut vehicle = Self::standing();
         vehicle.status(|status| (status.phase, status.armed) = (FlightPhase::Flying, true));
         vehicle
+    }
+
+    /// A copy of what it has published.
+    pub fn samples(&self) -> Newest {
+        self.newest.clone()
     }
 
     pub fn publish<M: Message>(&mut self, id: Id, message: &M) {

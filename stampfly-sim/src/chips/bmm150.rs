@@ -160,7 +160,7 @@ impl Bmm150 {
         let mut noise = Noise::stream(seed, Stream::Mag);
         let pace = Schedule::new(clock.now(), RATE, 0.02, &mut noise).period() * RATE * 1e-6;
         Self {
-            physics: MagPhysics::new(world, noise),
+            physics: MagPhysics::new(world, noise, seed),
             // The Hall resistance has a stream of its own: the field is to be the model's.
             noise: Noise::new(seed, 103),
             pace,

@@ -26,10 +26,12 @@ pub struct Faults {
 #[non_exhaustive]
 pub enum Flaw {
     /// Soldered otherwise, or another variant of the part: where each axis that it reports points, as rows of the body's
-    /// axes where the board's layout has the identity. BMI270, BMM150, PMW3901.
+    /// axes where the board's layout has the identity. BMI270, BMM150, MPU-6000, PMW3901.
     Mounting([[i8; 3]; 3]),
-    /// Its conversions repeat the last. BMP280, BMM150.
+    /// Its conversions repeat the last. BMP280, BMM150, MPU-6000.
     Stuck,
+    /// It stays asleep at so many requests to wake after a reset. MPU-6000.
+    Sleepy(u32),
     /// It measures longer by this, m: a cover glass, a sensor that was pressed in. VL53L3CX.
     Offset(f64),
     /// Something lies this far in front of it, m. VL53L3CX.

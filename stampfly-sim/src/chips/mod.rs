@@ -8,8 +8,8 @@
 //!
 //! The emulators follow the makers' data sheets, as far as those are publicly quoted, and none of this project's
 //! drivers, so that a misreading is not made twice. Every register table names its section. What no public source
-//! confirms is marked *unverified*; so are all section and table numbers except BMP280 3.11 and 8, and INA3221 8.4
-//! and 8.6, which have been compared with the sheets.
+//! confirms is marked *unverified*; so are all section and table numbers except BMP280 3.11 and 8, INA3221 8.4
+//! and 8.6, and the nRF24L01+'s table 20 and the last part of its table of registers, which have been compared with the sheets.
 //!
 //! | emulator | bus | address or clock | data sheet |
 //! |---|---|---|---|
@@ -19,6 +19,8 @@
 //! | [`Bmm150`] | [`I2cBus`], or [`SpiBus`] | 0x10, or up to 10 MHz | BST-BMM150-DS001 |
 //! | [`Pmw3901`] | [`SpiBus`] | up to 2 MHz | PixArt PMW3901MB |
 //! | [`Vl53l3cx`] | [`I2cBus`] | 0x29, can be moved | ST DS13204 |
+//! | [`Mpu6000`] | [`SpiBus`] | up to 1 MHz, its data 20 MHz | InvenSense RM-MPU-6000A, PS-MPU-6000A |
+//! | [`Nrf24l01`] | [`SpiBus`], and the [`Air`] | up to 10 MHz | Nordic nRF24L01+ v1.0 |
 //!
 //! | fault | where |
 //! |---|---|
@@ -27,6 +29,7 @@
 //! | soldered otherwise, covered, another shunt | [`Flaw`] |
 //! | data line held low by a chip, or shorted to ground | [`I2cBus::hold_sda`], [`I2cBus::short_sda`] |
 //! | data line from the chips stuck | [`SpiBus::hold_miso`] |
+//! | packets lost, channels jammed | [`Air`] |
 //! | chip select that nobody drives yet | [`SpiBus::attach_floating`] |
 //! | clock at the wrong level, wrong mode, wrong order of bits | [`SpiBus::set_controller`], [`SpiPort::with_mode`], [`SpiPort::with_order`] |
 //! | software that takes its time | [`SpiBus::set_latency`], [`I2cBus::set_latency`] |
@@ -40,6 +43,8 @@ mod i2c;
 mod ina3221;
 mod latency;
 mod lines;
+pub(crate) mod mpu6000;
+mod nrf24l01;
 mod pmw3901;
 mod spi;
 mod vl53l3cx;
@@ -53,6 +58,8 @@ pub use i2c::I2cBus;
 pub use ina3221::Ina3221;
 pub use latency::Latency;
 pub use lines::{ClockLine, DataLine};
+pub use mpu6000::Mpu6000;
+pub use nrf24l01::{Air, AirPacket, AirRate, ChipEnable, Nrf24l01, RadioInterrupt};
 pub use pmw3901::Pmw3901;
 pub use spi::{Analyser, BitOrder, Controller, Seen, SpiBus, SpiPort};
 pub use vl53l3cx::{ShutdownPin, Vl53l3cx};

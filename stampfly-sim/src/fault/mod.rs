@@ -196,6 +196,13 @@ impl Fault {
         Self { kind, value: kind.value.default(), when, lasts: None }
     }
 
+    /// These, and every other of the table [on demand](Self::on_demand): what somebody who watches a flight can break.
+    #[must_use]
+    pub fn and_on_demand(faults: &[Self], table: &'static [FaultKind]) -> Vec<Self> {
+        let others = table.iter().filter(|kind| faults.iter().all(|fault| fault.kind != *kind));
+        faults.iter().copied().chain(others.map(Self::on_demand)).collect()
+    }
+
     /// The worst end that is acceptable.
     #[must_use]
     pub fn expected(&self) -> Class {
@@ -284,6 +291,16 @@ mod tests {
         FaultKind::number("bias", ("m", 0.5, -1.0, 1.0), Class::Degraded, "It is off.").above(0.8, Class::Landed),
         FaultKind::or_last("stuck", ("m", 0.0, 2.0), Class::Degraded, "It stays."),
     ];
+
+    #[test]
+    fn what_can_be_broken_on_demand_is_whatever_was_not_asked_for() {
+        let asked = Fault::parse("bias=0.25@3", TABLE).expect("a fault");
+        let all = Fault::and_on_demand(&[asked], TABLE);
+        let names: Vec<_> = all.iter().map(|fault| fault.kind.name).collect();
+        assert_eq!((all[0], &names[..]), (asked, &["bias", "silent", "stuck"][..]));
+        let injector = Injector::new(stampfly_types::Instant::ZERO, &all);
+        assert!(!injector.is_active(1, stampfly_types::Instant::from_secs(86_400)), "nobody has demanded it");
+    }
 
     #[test]
     fn a_fault_survives_its_text() {

@@ -3,12 +3,41 @@
 //! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that acts slowly.
 //! Temperature and ageing are left out; set the resistances and the capacity instead.
 
-use super::PlantParameters;
-
 /// Open-circuit voltage of a LiHV cell at 0, 10, …, 100 % of charge (typical discharge curve at rest).
 const OPEN_CIRCUIT: [f64; 11] = [3.20, 3.58, 3.67, 3.72, 3.76, 3.81, 3.88, 3.97, 4.08, 4.20, 4.35];
 
+/// What a battery is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BatterySpec {
+    /// In series.
+    pub cells: f64,
+    /// At the start, 0 to 1.
+    pub charge: f64,
+    /// A·h.
+    pub capacity: f64,
+    /// That acts at once, Ω.
+    pub resistance: f64,
+    /// That acts with the time constant, Ω.
+    pub polarisation: f64,
+    /// s.
+    pub time_constant: f64,
+}
+
+impl BatterySpec {
+    /// A full cell of 1 A·h, of no maker.
+    pub const CELL: Self =
+        Self { cells: 1.0, charge: 1.0, capacity: 1.0, resistance: 0.02, polarisation: 0.01, time_constant: 10.0 };
+}
+
 /// The battery.
+///
+/// ```
+/// use stampfly_sim::plant::{Battery, BatterySpec};
+/// let mut battery = Battery::new(&BatterySpec { cells: 3.0, ..BatterySpec::CELL }, 0.2);
+/// let rested = battery.voltage();
+/// battery.step(1.0, 5.0);
+/// assert!(battery.voltage() < rested);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Battery {
     /// Coulombs drawn since the start.
@@ -25,25 +54,44 @@ pub struct Battery {
 }
 
 impl Battery {
-    pub(crate) fn new(parameters: &PlantParameters) -> Self {
+    /// A full cell from which nothing is ever drawn: of a vehicle whose battery does not matter.
+    pub const UNUSED: Self = {
+        let BatterySpec { cells, charge, capacity, resistance, polarisation, time_constant } = BatterySpec::CELL;
+        Self {
+            drawn: 0.0,
+            current: 0.0,
+            polarisation: 0.0,
+            voltage: cells * OPEN_CIRCUIT[10],
+            cells,
+            initial: charge,
+            capacity: capacity * 3600.0,
+            resistance,
+            slow_resistance: polarisation,
+            time_constant,
+        }
+    };
+
+    /// A battery from which `current` amperes are drawn already.
+    #[must_use]
+    pub fn new(spec: &BatterySpec, current: f64) -> Self {
         let mut battery = Self {
             drawn: 0.0,
             current: 0.0,
             polarisation: 0.0,
             voltage: 0.0,
-            cells: parameters.battery_cells,
-            initial: parameters.battery_charge,
-            capacity: parameters.battery_capacity * 3600.0,
-            resistance: parameters.battery_resistance,
-            slow_resistance: parameters.battery_polarisation,
-            time_constant: parameters.battery_time_constant,
+            cells: spec.cells,
+            initial: spec.charge,
+            capacity: spec.capacity * 3600.0,
+            resistance: spec.resistance,
+            slow_resistance: spec.polarisation,
+            time_constant: spec.time_constant,
         };
-        battery.step(0.0, parameters.board_current);
+        battery.step(0.0, current);
         battery
     }
 
     /// Draws `current` amperes for `dt` seconds.
-    pub(crate) fn step(&mut self, dt: f64, current: f64) {
+    pub fn step(&mut self, dt: f64, current: f64) {
         self.current = current;
         self.drawn += current * dt;
         self.polarisation += (current * self.slow_resistance - self.polarisation) * (dt / self.time_constant);
@@ -88,11 +136,19 @@ impl Battery {
 mod tests {
     use super::*;
 
+    const SPEC: BatterySpec = BatterySpec {
+        cells: 1.0,
+        charge: 1.0,
+        capacity: 0.35,
+        resistance: 0.05,
+        polarisation: 0.02,
+        time_constant: 10.0,
+    };
+
     #[test]
     fn voltage_sags_at_once_then_slowly_and_comes_back() {
-        let parameters = PlantParameters { board_current: 0.0, ..PlantParameters::EXAMPLE };
-        let (at_once, slowly) = (4.0 * parameters.battery_resistance, 4.0 * parameters.battery_polarisation);
-        let mut battery = Battery::new(&parameters);
+        let (at_once, slowly) = (4.0 * SPEC.resistance, 4.0 * SPEC.polarisation);
+        let mut battery = Battery::new(&SPEC, 0.0);
         assert_eq!(battery.voltage(), 4.35);
         battery.step(0.001, 4.0);
         assert!((battery.voltage() - (4.35 - at_once)).abs() < 1e-3, "{}", battery.voltage());
@@ -110,7 +166,7 @@ mod tests {
 
     #[test]
     fn an_empty_battery_stays_empty() {
-        let mut battery = Battery::new(&PlantParameters { battery_charge: 0.01, ..PlantParameters::EXAMPLE });
+        let mut battery = Battery::new(&BatterySpec { charge: 0.01, ..SPEC }, 0.2);
         for _ in 0..1_000 {
             battery.step(1.0, 4.0);
         }
@@ -119,9 +175,13 @@ mod tests {
     }
 
     #[test]
+    fn the_unused_one_is_a_new_one() {
+        assert_eq!(Battery::UNUSED, Battery::new(&BatterySpec::CELL, 0.0));
+    }
+
+    #[test]
     fn cells_add_up() {
-        let battery =
-            Battery::new(&PlantParameters { battery_cells: 3.0, board_current: 0.0, ..PlantParameters::EXAMPLE });
+        let battery = Battery::new(&BatterySpec { cells: 3.0, ..SPEC }, 0.0);
         assert!((battery.voltage() - 3.0 * 4.35).abs() < 1e-9);
     }
 }

@@ -1,4 +1,12 @@
-//! The vehicle as a body: six degrees of freedom, four rotors, a battery, a floor and the air.
+//! Vehicles as bodies: six degrees of freedom, motors, a battery, the ground and the air.
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`Plant`], [`PlantParameters`] | a quadrotor in X with brushed motors, indoors |
+//! | [`Body`], [`Airframe`] | what a [`World`](crate::World) can hold, and the numbers of which it is made |
+//! | [`Aeroplane`], [`AeroplaneParameters`] | a conventional aeroplane with one electric propeller, outdoors |
+//! | [`Battery`], [`Wind`] | of every body |
+//! | [`Scene`] | what stands around a quadrotor |
 //!
 //! The equations are the textbook's (Newton in the world frame, Euler in the body frame, with the rotors' angular
 //! momentum); the step is fixed at [`STEP`] and explicit, of second order for position, attitude and the gyroscopic
@@ -6,19 +14,27 @@
 //!
 //! Use [`Plant`] alone to study the vehicle; use [`Simulation`](crate::Simulation) to fly it.
 
+mod aeroplane;
 mod battery;
+mod body;
 mod ground;
+mod motion;
 mod motor;
 mod parameters;
 mod scene;
+mod table;
 mod wind;
 
-pub use battery::Battery;
+pub use aeroplane::{Aeroplane, AeroplaneParameters, Gear, Propeller, SURFACES, Surface, Trim, TrimError};
+pub use battery::{Battery, BatterySpec};
+pub use body::{Airframe, Body, Disturbance};
 pub use ground::Ground;
+pub use motion::Motion;
 pub use motor::{ROTORS, RotorFault, Rotors};
-pub use parameters::{ParameterError, ParameterInfo, PlantParameters};
+pub use parameters::PlantParameters;
 pub use scene::{Beyond, Hand, Scene};
-pub use wind::{Wind, WindConfig};
+pub use table::{ParameterError, ParameterInfo};
+pub use wind::{Wind, WindConfig, WindProfile};
 
 use crate::noise::{Noise, Stream};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -30,71 +46,8 @@ pub const STEP: Duration = Duration::from_micros(625);
 /// [`STEP`] in seconds.
 pub(crate) const DT: f64 = 625e-6;
 
-/// Where the vehicle is and how it moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
-    /// World NED, m. The floor is at z = 0.
-    pub position: Vector3<f64>,
-    /// World NED, m/s.
-    pub velocity: Vector3<f64>,
-    /// Body FRD → world NED.
-    pub attitude: UnitQuaternion<f64>,
-    /// Body FRD, rad/s.
-    pub rate: Vector3<f64>,
-    /// What an ideal accelerometer at the centre of mass measures, body FRD, m/s².
-    pub specific_force: Vector3<f64>,
-    /// Body FRD, rad/s².
-    pub angular_acceleration: Vector3<f64>,
-    /// Rotor speeds, rad/s.
-    pub rotor_speed: [f64; ROTORS],
-    /// Battery current, A.
-    pub current: f64,
-}
-
-impl Motion {
-    /// The motion `dt` seconds later, for times shorter than a step: rotors and forces as they are.
-    #[inline]
-    #[must_use]
-    pub(crate) fn after(&self, dt: f64, gravity: f64) -> Self {
-        let mut later = *self;
-        later.advance(dt, gravity);
-        later
-    }
-
-    /// As [`after`](Self::after), in place. Inlined, so that what a step has just computed need not go through memory.
-    #[inline(always)]
-    fn advance(&mut self, dt: f64, gravity: f64) {
-        let mean_rate = self.rate + self.angular_acceleration * (0.5 * dt);
-        self.position = self.position_after(dt, gravity);
-        self.velocity += self.acceleration(gravity) * dt;
-        self.attitude = turn(&self.attitude, &(mean_rate * dt));
-        self.rate = self.rate_after(dt);
-    }
-
-    /// The position alone, as in [`after`](Self::after).
-    pub(crate) fn position_after(&self, dt: f64, gravity: f64) -> Vector3<f64> {
-        self.position + self.velocity * dt + self.acceleration(gravity) * (0.5 * dt * dt)
-    }
-
-    /// The rate alone, as in [`after`](Self::after).
-    pub(crate) fn rate_after(&self, dt: f64) -> Vector3<f64> {
-        self.rate + self.angular_acceleration * dt
-    }
-
-    fn acceleration(&self, gravity: f64) -> Vector3<f64> {
-        self.attitude * self.specific_force + Vector3::new(0.0, 0.0, gravity)
-    }
-}
-
-/// The attitude after a small turn `angle` (rotation vector, body frame).
-///
-/// Sine and cosine by their series up to the third order: at 2000 °/s a step turns by 0.02 rad, where what is
-/// left out is below 1e-10.
-fn turn(attitude: &UnitQuaternion<f64>, angle: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let square = 0.25 * angle.norm_squared();
-    let vector = angle * (0.5 * (1.0 - square / 6.0));
-    UnitQuaternion::new_normalize(attitude.quaternion() * Quaternion::from_parts(1.0 - 0.5 * square, vector))
-}
+/// Standard gravity, m/s²: of a [`Body`] that says nothing else.
+pub const GRAVITY: f64 = 9.806_65;
 
 /// How the vehicle is placed at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,7 +64,7 @@ pub struct Pose {
     pub rotors: f64,
 }
 
-/// The vehicle in its surroundings.
+/// A quadrotor in its surroundings.
 ///
 /// ```
 /// use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
@@ -162,7 +115,7 @@ impl Plant {
             inertia: Vector3::new(p.inertia_x, p.inertia_y, p.inertia_z),
             motion,
             rotors,
-            battery: Battery::new(p),
+            battery: Battery::new(&p.battery(), p.board_current),
             ground: Ground::new(p),
             wind: Wind::new(wind, DT, Noise::stream(seed, Stream::Wind)),
             parameters: p.clone(),

@@ -3,91 +3,8 @@
 //! A vehicle's crate writes down its own [`PlantParameters`], with the sources of its numbers. There is no default, since a
 //! simulation of some other vehicle would look right and be wrong.
 
-use core::fmt;
-
-/// One line of the table of [`PlantParameters`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ParameterInfo {
-    /// The field's name.
-    pub name: &'static str,
-    /// The present value.
-    pub value: f64,
-    /// SI unit, `"1"` where there is none.
-    pub unit: &'static str,
-    /// What it is.
-    pub description: &'static str,
-    /// The smallest and largest value that make sense.
-    pub range: (f64, f64),
-}
-
-/// A parameter could not be set.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum ParameterError {
-    /// There is no parameter of this name.
-    Unknown(String),
-    /// The value is no number, or outside the range that makes sense.
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// The smallest and largest value accepted.
-        range: (f64, f64),
-    },
-}
-
-impl fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown(name) => write!(f, "there is no plant parameter {name:?}"),
-            Self::OutOfRange { name, range: (low, high) } => write!(f, "{name} must lie between {low} and {high}"),
-        }
-    }
-}
-
-impl std::error::Error for ParameterError {}
-
-macro_rules! parameters {
-    ($(#[$meta:meta])* $Name:ident { $($field:ident = $example:literal [$unit:literal] in $low:literal ..= $high:literal, $description:literal;)* }) => {
-        $(#[$meta])*
-        #[derive(Clone, Debug, PartialEq)]
-        pub struct $Name {
-            $(#[doc = concat!($description, " Unit: ", $unit, ".")] pub $field: f64,)*
-        }
-
-        impl $Name {
-            /// A quadrotor of 50 g that nobody built, in round numbers: for examples and tests.
-            pub const EXAMPLE: Self = Self { $($field: $example),* };
-
-            /// Sets a parameter by name.
-            ///
-            /// # Errors
-            /// When there is no such parameter or the value makes no sense; nothing changes then.
-            pub fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-                match name {
-                    $(stringify!($field) => {
-                        if !($low..=$high).contains(&value) {
-                            return Err(ParameterError::OutOfRange { name: stringify!($field), range: ($low, $high) });
-                        }
-                        self.$field = value;
-                    })*
-                    _ => return Err(ParameterError::Unknown(name.to_owned())),
-                }
-                Ok(())
-            }
-
-            /// Every parameter, in the order of the table.
-            pub fn iter(&self) -> impl Iterator<Item = ParameterInfo> {
-                [$(ParameterInfo {
-                    name: stringify!($field),
-                    value: self.$field,
-                    unit: $unit,
-                    description: $description,
-                    range: ($low, $high),
-                }),*].into_iter()
-            }
-        }
-    };
-}
+use super::battery::BatterySpec;
+use super::table::parameters;
 
 parameters! {
     /// Airframe, motors, propellers, battery, ground and air of a quadrotor in X.
@@ -102,7 +19,9 @@ parameters! {
     /// assert!(plant.iter().any(|p| p.name == "mass" && p.unit == "kg" && p.value == 0.040));
     /// # Ok::<(), stampfly_sim::plant::ParameterError>(())
     /// ```
-    PlantParameters {
+    PlantParameters,
+    /// A quadrotor of 50 g that nobody built, in round numbers: for examples and tests.
+    EXAMPLE {
         mass = 0.05 ["kg"] in 0.01 ..= 2.0, "Take-off mass, battery included.";
         inertia_x = 2.0e-5 ["kg*m^2"] in 1e-6 ..= 0.1, "Moment of inertia about body x.";
         inertia_y = 2.5e-5 ["kg*m^2"] in 1e-6 ..= 0.1, "Moment of inertia about body y.";
@@ -140,9 +59,23 @@ parameters! {
     }
 }
 
+impl PlantParameters {
+    pub(super) fn battery(&self) -> BatterySpec {
+        BatterySpec {
+            cells: self.battery_cells,
+            charge: self.battery_charge,
+            capacity: self.battery_capacity,
+            resistance: self.battery_resistance,
+            polarisation: self.battery_polarisation,
+            time_constant: self.battery_time_constant,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::ParameterError;
 
     #[test]
     fn the_example_lies_in_every_range_and_every_name_can_be_set() {

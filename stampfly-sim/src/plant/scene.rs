@@ -99,6 +99,17 @@ pub struct Scene {
 const OVERHANG: f64 = 0.05;
 
 impl Scene {
+    /// A flat floor at rest and nothing else, as by default.
+    pub const LEVEL: Self = Self {
+        edge: None,
+        slope: [0.0; 2],
+        pivot: [0.0; 2],
+        floor_velocity: [0.0; 2],
+        ceiling: None,
+        wall: None,
+        hand: None,
+    };
+
     /// The floor's z at a place, world NED, m.
     #[must_use]
     pub fn floor(&self, place: &Vector3<f64>) -> f64 {

@@ -8,27 +8,66 @@ use crate::normals::Normals;
 use nalgebra::Vector3;
 use stampfly_types::Vec3;
 
+/// How the wind grows with the height above the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WindProfile {
+    /// Air that a room's floor holds back: half of the wind is left at 0.3 m, a tenth at a foot's height.
+    Room,
+    /// The logarithmic law over open ground (WMO, Guide to Instruments and Methods of Observation, part I, 5): the wind is the one that
+    /// was asked for at 10 m. For heights up to some 100 m.
+    Open {
+        /// Roughness length, m: 0.005 over snow or tarmac, 0.03 over short grass, 0.1 over low crops (Davenport's classification).
+        roughness: f64,
+    },
+}
+
+impl WindProfile {
+    /// Share of the wind at `height` metres.
+    fn share(self, height: f64) -> f64 {
+        let height = height.max(0.0);
+        match self {
+            Self::Room => height / (height + BOUNDARY_LAYER),
+            Self::Open { roughness } if height > roughness => {
+                libm::log(height / roughness) / libm::log(10.0 / roughness)
+            }
+            Self::Open { .. } => 0.0,
+        }
+    }
+}
+
 /// How the air moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindConfig {
-    /// Constant part high above the floor, world NED, m/s: where the air goes to.
+    /// Constant part where the [profile](Self::profile) has its full strength, world NED, m/s: where the air goes to.
     pub mean: Vec3,
     /// Standard deviation of the gusts along north and east, m/s; down has half of it.
     pub gust: f32,
     /// Correlation time of the gusts, s.
     pub correlation: f32,
+    /// What the ground does to all of it.
+    pub profile: WindProfile,
 }
 
 impl Default for WindConfig {
     /// A room with people in it: no constant wind, gusts of 0.5 m/s lasting about 1.5 s.
     fn default() -> Self {
-        Self { mean: Vec3::zeros(), gust: 0.5, correlation: 1.5 }
+        Self { mean: Vec3::zeros(), gust: 0.5, correlation: 1.5, profile: WindProfile::Room }
     }
 }
 
 impl WindConfig {
     /// Still air.
-    pub const CALM: Self = Self { mean: Vec3::new(0.0, 0.0, 0.0), gust: 0.0, correlation: 1.5 };
+    pub const CALM: Self =
+        Self { mean: Vec3::new(0.0, 0.0, 0.0), gust: 0.0, correlation: 1.5, profile: WindProfile::Room };
+
+    /// A calm summer day over short grass: gusts of 0.5 m/s. They last 5 s, so that they are some 75 m long at 15 m/s (MIL-F-8785C has 50
+    /// to 200 m near the ground).
+    pub const MEADOW: Self = Self {
+        mean: Vec3::new(0.0, 0.0, 0.0),
+        gust: 0.5,
+        correlation: 5.0,
+        profile: WindProfile::Open { roughness: 0.03 },
+    };
 }
 
 /// Physics steps between two steps of the gusts: they are slow.
@@ -46,6 +85,7 @@ pub struct Wind {
     keep: f64,
     drive: Vector3<f64>,
     countdown: u32,
+    profile: WindProfile,
 }
 
 impl Wind {
@@ -56,7 +96,15 @@ impl Wind {
         let gust = deviation.component_mul(&noise.normal3());
         // This drive keeps the variance where it starts.
         let drive = deviation * (1.0 - keep * keep).sqrt();
-        Self { noise: noise.into(), mean: Vector3::from(config.mean).cast(), gust, keep, drive, countdown: DECIMATION }
+        Self {
+            noise: noise.into(),
+            mean: Vector3::from(config.mean).cast(),
+            gust,
+            keep,
+            drive,
+            countdown: DECIMATION,
+            profile: config.profile,
+        }
     }
 
     pub(crate) fn step(&mut self) {
@@ -69,13 +117,10 @@ impl Wind {
         }
     }
 
-    /// Velocity of the air at `height` metres above the floor, world NED, m/s.
-    ///
-    /// The floor holds the air back: at a foot's height a tenth of the wind is left.
+    /// Velocity of the air at `height` metres above the ground, which holds it back, world NED, m/s.
     #[must_use]
     pub fn velocity(&self, height: f64) -> Vector3<f64> {
-        let height = height.max(0.0);
-        (self.mean + self.gust) * (height / (height + BOUNDARY_LAYER))
+        (self.mean + self.gust) * self.profile.share(height)
     }
 }
 
@@ -98,6 +143,17 @@ mod tests {
         }
         assert!((sum.sqrt() - 0.5).abs() < 0.05, "{}", sum.sqrt());
         assert!((lagged / sum - (-1f64).exp()).abs() < 0.08, "{}", lagged / sum);
+    }
+
+    #[test]
+    fn over_grass_the_wind_grows_with_the_logarithm_of_the_height() {
+        let config = WindConfig { mean: Vec3::x() * 5.0, gust: 0.0, ..WindConfig::MEADOW };
+        let wind = Wind::new(&config, 0.001, Noise::new(5, 0));
+        let speeds = [0.0, 0.03, 1.0, 10.0, 30.0].map(|height| wind.velocity(height).x);
+        // 5 m/s · ln(h / 0.03 m) / ln(10 m / 0.03 m).
+        for (speed, expected) in speeds.into_iter().zip([0.0, 0.0, 3.0182, 5.0, 5.9456]) {
+            assert!((speed - expected).abs() < 1e-4, "{speeds:?}");
+        }
     }
 
     #[test]

@@ -20,8 +20,7 @@ pub(crate) const DEVIATION: f64 = 0.7;
 const RESOLUTION: f64 = 0.16;
 /// Drift by weather and warming, Pa/√s.
 const DRIFT: f64 = 0.12;
-/// Pressure change in the propellers' wash at hover, Pa, and how much more of it near the floor.
-const WASH: f64 = 2.5;
+/// How much more of the pressure in the propellers' wash there is near the floor.
 const WASH_FLOOR: f64 = 2.0;
 /// Height over which the floor's share fades, m.
 const WASH_HEIGHT: f64 = 0.2;
@@ -49,12 +48,12 @@ impl BaroPhysics {
     /// One conversion at `at`, Pa, `period` seconds after the one before, with noise of this standard deviation.
     pub(crate) fn pressure(&mut self, at: Instant, period: f64, deviation: f64) -> f64 {
         let motion = self.world.motion_at(at);
-        let hover = self.world.inspect(|plant| plant.rotors().hover_speed());
+        let (hover, wash) = self.world.inspect(|body| (body.nominal_rotor_speed(), body.disturbance().wash));
         let height = -motion.position.z;
         // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa per metre.
         let still = FLOOR_PRESSURE - 11.77 * height;
         let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
-        let wash = WASH * thrust * (1.0 + WASH_FLOOR * libm::exp(-height.max(0.0) / WASH_HEIGHT));
+        let wash = wash * thrust * (1.0 + WASH_FLOOR * libm::exp(-height.max(0.0) / WASH_HEIGHT));
         self.drift += DRIFT * period.sqrt() * self.noise.normal();
         still + wash + self.drift + deviation * self.noise.normal()
     }

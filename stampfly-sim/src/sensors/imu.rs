@@ -36,6 +36,11 @@ const GYRO_BIAS: f64 = 0.017_453;
 /// Wander of the offsets, per √s.
 const ACCEL_WALK: f64 = 3e-4;
 const GYRO_WALK: f64 = 2e-5;
+/// Change of the offsets with temperature, bounds per axis: 0.25 mg and 0.015 °/s a kelvin (BMI270's data sheet, tables 2 and 3).
+const ACCEL_DRIFT: f64 = 2.45e-3;
+const GYRO_DRIFT: f64 = 2.6e-4;
+/// The drift is none at this temperature, °C.
+const REFERENCE: f64 = 25.0;
 
 /// What reaches the chip and what the chip makes of it, shared by the model and the register-level emulator.
 #[derive(Debug)]
@@ -51,6 +56,8 @@ pub(crate) struct ImuPhysics {
     /// Misalignment and scale.
     accel_matrix: Matrix3<f64>,
     gyro_matrix: Matrix3<f64>,
+    /// Of accelerometer and gyro, per kelvin; `None` of a sensor that has none.
+    drift: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl ImuPhysics {
@@ -61,8 +68,15 @@ impl ImuPhysics {
         // Half a degree between the axes, half a per cent of scale.
         let mut matrix = || Matrix3::identity() + Matrix3::from_fn(|_, _| noise.within(0.005));
         let (accel_matrix, gyro_matrix) = (matrix(), matrix());
-        let hover_speed = world.inspect(|plant| plant.rotors().hover_speed());
+        let hover_speed = world.inspect(|body| body.nominal_rotor_speed());
+        let strength = world.imperfections();
+        let drift = (strength > 0.0).then(|| {
+            let mut noise = Noise::stream(seed, Stream::Drift);
+            let mut within = |bound: f64| Vector3::from_fn(|_, _| noise.within(bound * strength));
+            (within(ACCEL_DRIFT), within(GYRO_DRIFT))
+        });
         let physics = Self {
+            drift,
             vibration: Vibration::new(
                 vibration,
                 schedule.period() * 1e-6,
@@ -78,6 +92,11 @@ impl ImuPhysics {
             noise: noise.into(),
             world: world.clone(),
         };
+        world.note_specimen(|specimen| {
+            specimen.accel_matrix = physics.accel_matrix;
+            (specimen.accel_bias, specimen.gyro_bias) = (physics.accel_bias, physics.gyro_bias);
+            (specimen.accel_drift, specimen.gyro_drift) = drift.unwrap_or_default();
+        });
         (physics, schedule)
     }
 
@@ -85,8 +104,13 @@ impl ImuPhysics {
     pub(crate) fn sample(&mut self, at: Instant) -> [f64; 6] {
         let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
-        let accel = self.accel_matrix * motion.specific_force + self.accel_bias;
-        let gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
+        let mut accel = self.accel_matrix * motion.specific_force + self.accel_bias;
+        let mut gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
+        if let Some((of_accel, of_gyro)) = &self.drift {
+            let warmer = f64::from(self.temperature(at)) - REFERENCE;
+            accel += of_accel * warmer;
+            gyro += of_gyro * warmer;
+        }
         let per_sample = (RATE / 2.0).sqrt();
         let noise: [f64; 6] = self.noise.next();
         let sample = core::array::from_fn(|channel| {
@@ -106,10 +130,10 @@ impl ImuPhysics {
         sample
     }
 
-    /// Temperature of the die, °C: it warms by ten degrees within a few minutes.
+    /// Temperature of the die, °C: it warms by ten degrees within a few minutes, and by what somebody does to it.
     pub(crate) fn temperature(&self, at: Instant) -> f32 {
         let minutes = at.since(self.start).seconds() / 60.0;
-        25.0 + 10.0 * minutes / (minutes + 2.0)
+        25.0 + 10.0 * minutes / (minutes + 2.0) + self.world.warmth_at(at) as f32
     }
 }
 

@@ -5,23 +5,21 @@ use crate::noise::{Noise, Stream};
 use crate::time::Clock;
 use crate::world::World;
 use core::convert::Infallible;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use stampfly_drivers::{Magnetometer, Sample};
 use stampfly_types::messages::MagData;
 use stampfly_types::{Duration, Instant};
 
 pub(crate) const RATE: f64 = 25.0;
 const READ_OUT: Duration = Duration::from_micros(300);
-/// The Earth's field in Kanazawa, world NED, µT (World Magnetic Model, rounded): 49° of dip, 8° west.
-const FIELD: [f64; 3] = [30.8, -4.3, 36.4];
 /// Standard deviation of one sample, µT (static records).
 const DEVIATION: f64 = 0.65;
 /// Resolution, µT.
 const RESOLUTION: f64 = 0.3;
 /// Standard deviation of the hard-iron offset per axis, µT.
 const HARD_IRON: f64 = 12.0;
-/// Field per ampere of battery current, body, µT/A: what a flight record shows between standing and hovering.
-const PER_AMPERE: [f64; 3] = [-13.0, 20.0, -7.0];
+/// Bound of what soft iron and unequal gains add to each element of the symmetric matrix.
+const SOFT_IRON: f64 = 0.06;
 /// Share of the motors' field that flickers with the commutation.
 const FLICKER: f64 = 0.2;
 
@@ -31,14 +29,34 @@ pub(crate) struct MagPhysics {
     world: World,
     noise: Noise,
     hard_iron: Vector3<f64>,
+    /// `None` of a sensor without.
+    soft_iron: Option<Matrix3<f64>>,
     idle_current: f64,
+    /// World NED, µT.
+    earth: Vector3<f64>,
+    /// Of the motors, body, µT/A.
+    per_ampere: Vector3<f64>,
 }
 
 impl MagPhysics {
-    pub(crate) fn new(world: &World, mut noise: Noise) -> Self {
+    pub(crate) fn new(world: &World, mut noise: Noise, seed: u64) -> Self {
+        let hard_iron = noise.normal3() * HARD_IRON;
+        let strength = world.imperfections();
+        let soft_iron = (strength > 0.0).then(|| {
+            let mut noise = Noise::stream(seed, Stream::SoftIron);
+            let half = Matrix3::from_fn(|_, _| noise.within(0.5 * SOFT_IRON * strength));
+            Matrix3::identity() + half + half.transpose()
+        });
+        world.note_specimen(|specimen| {
+            specimen.hard_iron = hard_iron;
+            specimen.soft_iron = soft_iron.unwrap_or_else(Matrix3::identity);
+        });
         Self {
-            hard_iron: noise.normal3() * HARD_IRON,
-            idle_current: world.inspect(|plant| plant.parameters().board_current),
+            hard_iron,
+            soft_iron,
+            idle_current: world.inspect(|body| body.idle_current()),
+            earth: world.field(),
+            per_ampere: world.inspect(|body| body.disturbance().field).into(),
             noise,
             world: world.clone(),
         }
@@ -48,9 +66,10 @@ impl MagPhysics {
     pub(crate) fn field(&mut self, at: Instant) -> Vector3<f64> {
         let motion = self.world.motion_at(at);
         let motors = (motion.current - self.idle_current).max(0.0) * (1.0 + FLICKER * self.noise.normal());
-        motion.attitude.inverse_transform_vector(&Vector3::from(FIELD))
+        let field = motion.attitude.inverse_transform_vector(&self.earth);
+        self.soft_iron.map_or(field, |iron| iron * field)
             + self.hard_iron
-            + Vector3::from(PER_AMPERE) * motors
+            + self.per_ampere * motors
             + self.noise.normal3() * DEVIATION
     }
 }
@@ -68,7 +87,7 @@ impl MagModel {
         let mut noise = Noise::stream(seed, Stream::Mag);
         Self {
             schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
-            physics: MagPhysics::new(world, noise),
+            physics: MagPhysics::new(world, noise, seed),
             clock: clock.clone(),
         }
     }

@@ -14,24 +14,37 @@
 //! | [`BaroModel`] | BMP280 | 13.5 Hz | `Barometer` |
 //! | [`PowerModel`] | INA3221 | 10 Hz | `PowerMonitor` |
 //! | [`CameraModel`] | a room full of cameras | 100 Hz | `MotionCapture` |
+//! | [`Mpu6000Model`] | MPU-6000, of other vehicles | 4 kHz | `Imu` |
+//! | [`GnssModel`] | a satellite receiver like a u-blox M8, of other vehicles | 5 Hz | `Gnss` |
+//! | [`AirspeedModel`] | a pitot tube with an SDP33, of other vehicles | 50 Hz | `Airspeed` |
+//!
+//! Actuators: [`MotorModel`] (`MotorOutputs`), [`ServoModel`] (`ServoOutputs`, of aeroplanes), [`IndicatorRecorder`], [`ButtonModel`].
 
 mod actuators;
+mod airspeed;
 pub(crate) mod baro;
 mod cameras;
 pub(crate) mod flow;
+mod gnss;
 pub mod imu;
 pub(crate) mod mag;
+mod mpu6000;
 pub(crate) mod power;
 pub(crate) mod schedule;
+mod servos;
 pub mod tof;
 
 pub use actuators::{ButtonModel, IndicatorRecorder, MotorModel};
+pub use airspeed::AirspeedModel;
 pub use baro::BaroModel;
 pub use cameras::CameraModel;
 pub use flow::FlowModel;
+pub use gnss::{GnssConfig, GnssModel};
 pub use imu::ImuModel;
 pub use mag::MagModel;
+pub use mpu6000::Mpu6000Model;
 pub use power::PowerModel;
+pub use servos::ServoModel;
 pub use tof::{Mount, RangeModel};
 
 use crate::time::Clock;

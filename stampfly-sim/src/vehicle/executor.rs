@@ -8,9 +8,11 @@
 //! must still replay.
 
 use super::processor::{Here, Processor};
+use super::recording::{RecordRing, Taker};
 use super::remote::{Remote, RemoteError, There};
 use super::{Around, Outside, Surroundings, Witness};
 use crate::time::{Clock, Tasks};
+use serde::Serialize;
 use stampfly_bus::{Schedule, Taps, TopicTable};
 use stampfly_flight::Assembled;
 use stampfly_types::{Duration, Instant};
@@ -42,16 +44,24 @@ const REPORT_PERIOD: Duration = Duration::from_millis(100);
 
 /// Flies until the surroundings say that it is over, or the limit is reached. `report` is called about ten times a
 /// simulated second with the progress.
-pub fn fly<R: Schedule, S: Surroundings<Runnables = R>>(
+pub fn fly<R: Schedule + Serialize, S: Surroundings<Runnables = R>>(
     config: &R::Config,
     options: &FlightOptions,
     surroundings: &mut S,
     witness: &mut dyn Witness<R>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Ended<S::Outcome> {
+    let taker = match (witness.record_of(), surroundings.record_of()) {
+        (Some(name), _) => Some((Taker::Witness, name)),
+        (None, name) => name.map(|name| (Taker::Around, name)),
+    };
+    let mut ring = taker.map(|taker| (Box::new(RecordRing::new()), taker));
     let mut bus = R::Topics::new();
     let Assembled { flight_loop, outside, taps } = Assembled::<R>::new(&mut bus, None, config, options.start);
-    let here = Here::new(flight_loop, options.jitter);
+    let mut here = Here::new(flight_loop, options.jitter);
+    if let Some((ring, taker)) = &mut ring {
+        here = here.recorded(ring, *taker);
+    }
     match fly_on(here, outside, taps, options, surroundings, witness, report) {
         Ok(ended) => ended,
         Err(never) => match never {},
@@ -207,7 +217,10 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
         around.show(now);
         drain(taps, processor, around, witness);
         witness.lost(now, taps.lost());
-        if let Some(flight_loop) = processor.at_rest() {
+        if let Some((flight_loop, mut record)) = processor.at_rest() {
+            if around.tend(flight_loop, &mut record) {
+                witness.replaced(now);
+            }
             witness.at_rest(now, flight_loop);
         }
         self.is_over = self.around.is_over(now) || now >= self.limit;

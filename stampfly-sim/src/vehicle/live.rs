@@ -67,6 +67,25 @@ impl fmt::Debug for Signing {
 }
 
 impl PortSpec {
+    /// The page of a ground station.
+    pub const PAGE: Self =
+        Self { transport: Transport::Page, ..Self::tcp("http", 8_080, "the ground station, in a browser") };
+    /// Where ground stations expect MAVLink to be sent to.
+    pub const MAVLINK_UDP: Self = Self {
+        transport: Transport::UdpTo,
+        signed: true,
+        ..Self::udp("mavlink-udp", 14_550, "MAVLink, for ground stations")
+    };
+    /// Where programs connect for MAVLink.
+    pub const MAVLINK_TCP: Self =
+        Self { signed: true, ..Self::tcp("mavlink-tcp", 5_760, "MAVLink, for programs that connect") };
+
+    /// Where configurators connect for MSP.
+    pub const MSP: Self = Self::tcp("msp", 5_761, "MSP, for configurators");
+    /// The same for programs that open a serial port.
+    pub const MSP_SERIAL: Self =
+        Self { transport: Transport::Terminal, ..Self::tcp("msp-serial", 0, "the same, at a serial port") };
+
     /// A port that datagrams come to.
     #[must_use]
     pub const fn udp(name: &'static str, number: u16, meaning: &'static str) -> Self {

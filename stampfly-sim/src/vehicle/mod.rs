@@ -9,19 +9,23 @@
 //! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
 //! | [`Scenario`] | what to command and what must be true, as text |
 //! | [`Live`], [`Ports`], [`Link`] | other programs fly it, in real time |
+//! | [`change`] | other parameters for a vehicle in flight |
 //! | [`Witness`] | is told everything that happens: a log, a hash, a test |
 //!
 //! A program that flies vehicles (missions, campaigns, replay, report) knows them through [`Vehicle`] alone, so a new
 //! vehicle is a type that implements it.
 
+pub mod change;
 mod executor;
 mod jitter;
 mod live;
 mod page;
 mod processor;
+mod recording;
 mod remote;
 mod scenario;
 mod scripted;
+pub mod table;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, Flying, fly, fly_remote};
@@ -32,10 +36,16 @@ pub use scenario::Scenario;
 pub use scripted::{Following, Script, Scripted};
 pub use witness::Witness;
 
+use crate::SimulationConfig;
+use crate::ask;
 use crate::fault::{Fault, FaultKind};
+use crate::plant::Airframe;
 use crate::time::{Clock, Tasks};
+use core::fmt;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use stampfly_bus::{Band, Schedule, TopicTable};
+use stampfly_flight::compact::Chunks;
+use stampfly_flight::{FlightLoop, flight_loop};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_types::Instant;
 
@@ -49,12 +59,18 @@ pub trait Surroundings {
     /// How a flight went.
     type Outcome;
     /// What the executor calls while it flies.
-    type Around<'a>: Around<Outcome = Self::Outcome>
+    type Around<'a>: Around<Runnables = Self::Runnables, Outcome = Self::Outcome>
     where
         Self: 'a;
 
     /// The clock that everything here shares.
     fn clock(&self) -> Clock;
+
+    /// May somebody there want the compact record of the flight, as at a vehicle's port, and what is the vehicle's name in it? Asked before the flight. A
+    /// [witness](Witness::record_of) that wants it has it alone.
+    fn record_of(&self) -> Option<&'static str> {
+        None
+    }
 
     /// Starts the tasks of drivers, links and pilots, and hands each the ends it owns.
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: Outside<'a, Self::Runnables>) -> Self::Around<'a>;
@@ -62,6 +78,8 @@ pub trait Surroundings {
 
 /// What is around a vehicle, as the executor sees it during a flight.
 pub trait Around {
+    /// The vehicle's runnables.
+    type Runnables: Schedule;
     /// How the flight went.
     type Outcome;
 
@@ -78,6 +96,18 @@ pub trait Around {
 
     /// A sample was published, by whomever.
     fn published(&mut self, _topic: usize, _at: Instant, _words: &[u32]) {}
+
+    /// A moment of rest: puts into the vehicle what somebody has changed of it, and tells the observer. Was there something? A log says so. Nothing by default.
+    fn tend(
+        &mut self,
+        _flight_loop: &mut FlightLoop<'_, Self::Runnables>,
+        _observer: &mut dyn flight_loop::Observer,
+    ) -> bool {
+        false
+    }
+
+    /// The compact record, at the end of every turn, if it [may be wanted](Surroundings::record_of): whoever takes it says so there.
+    fn stream(&mut self, _now: Instant, _chunks: &mut dyn Chunks) {}
 
     /// Everything published so far has been passed on. Hands samples that belong into the log but are on no topic (the
     /// truth) to `record`: place in [`Vehicle::BESIDE`], instant, generation, words.
@@ -199,6 +229,29 @@ impl Options {
         faults.collect::<Result<_, _>>().map_err(|error| format!("--fault {error}"))
     }
 
+    /// Changes of the world what these options say of it: vibration, wind, gusts, the simulated vehicle.
+    ///
+    /// # Errors
+    /// When a number makes no sense, or has no name.
+    pub fn change<A: Airframe>(&self, simulation: &mut SimulationConfig<A>) -> Result<(), SetupError> {
+        if let Some(vibration) = self.vibration {
+            simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
+        }
+        if let Some(gust) = self.gust {
+            simulation.wind.gust = within("--gust", gust, 0.0, 20.0)?;
+        }
+        if let Some([north, east]) = self.wind {
+            within("--wind north", north, -20.0, 20.0)?;
+            within("--wind east", east, -20.0, 20.0)?;
+            simulation.wind.mean = [north, east, 0.0].into();
+        }
+        for text in &self.plant {
+            let (name, value) = assignment(text)?;
+            simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+        }
+        Ok(())
+    }
+
     /// Names and values of [`param`](Self::param).
     ///
     /// # Errors
@@ -210,6 +263,18 @@ impl Options {
         });
         pairs.collect()
     }
+}
+
+/// The value, if it is a number in its range.
+fn within<T: PartialOrd + fmt::Display>(name: &str, value: T, low: T, high: T) -> Result<T, SetupError> {
+    if low <= value && value <= high { Ok(value) } else { Err(format!("{name} {value} is not from {low} to {high}")) }
+}
+
+/// Splits `name=value`.
+fn assignment(text: &str) -> Result<(&str, f64), SetupError> {
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
+    let value = value.trim().parse().map_err(|_| format!("'{text}': '{value}' is no number"))?;
+    Ok((name.trim(), value))
 }
 
 /// One number that options can change.
@@ -232,11 +297,13 @@ pub struct Variety {
     pub modes: &'static [&'static str],
     /// Missions, as [`Options::mission`] takes them; the first is short and has every moment at which a fault can begin.
     pub missions: &'static [&'static str],
+    /// Can the real drivers run over emulated chips?
+    pub chips: bool,
 }
 
 impl Variety {
     /// Nothing is varied.
-    pub const NONE: Self = Self { modes: &[], missions: &[] };
+    pub const NONE: Self = Self { modes: &[], missions: &[], chips: false };
 }
 
 /// A vehicle's golden flight: how it is flown, and how its record is judged.
@@ -268,6 +335,8 @@ pub trait Vehicle: 'static {
     const VARIETY: Variety = Variety::NONE;
     /// Where other programs reach it while it is live. Nowhere by default.
     const PORTS: &'static [PortSpec] = &[];
+    /// What a page may ask of it while it is live, of [`ask::NAMES`]. Everything by default.
+    const ASKS: &'static [&'static str] = ask::NAMES;
     /// What a page about a flight shows of it. By default a plot per topic and unit.
     const PAGE: Page = Page::EMPTY;
     /// Its runnables. Serialisable, so that a log can hold key frames.
@@ -287,6 +356,15 @@ pub trait Vehicle: 'static {
     #[must_use]
     fn again(_setup: &Self::Setup, _outcome: &Self::Outcome) -> Option<Self::Setup> {
         None
+    }
+
+    /// The same flight in options that do not depend on files, for a log: whoever has the log can fly it again. By default the
+    /// options as they are.
+    ///
+    /// # Errors
+    /// As [`setup`](Self::setup).
+    fn settled(options: &Options, _seed: u64) -> Result<Options, SetupError> {
+        Ok(options.clone())
     }
 
     /// How the executor flies it.
@@ -335,6 +413,15 @@ pub trait Vehicle: 'static {
     /// Lowest and highest value of a parameter, for people who choose one; `None` where the vehicle does not say.
     fn parameter_range(_name: &str) -> Option<[f64; 2]> {
         None
+    }
+
+    /// Do both configurations fly with the same components? One that begins has no state, so it cannot take over in flight. They do by default;
+    /// components that the runnables' structure shows need no word here.
+    fn has_same_components(
+        _one: &<Self::Runnables as Schedule>::Config,
+        _other: &<Self::Runnables as Schedule>::Config,
+    ) -> bool {
+        true
     }
 
     /// Its golden flight, if it has one.

@@ -3,6 +3,8 @@
 //! All of it is data that names topics and columns. What a flight does not have is left out; topics that no line of this
 //! names get a plot per unit, so that a page is never empty.
 
+use stampfly_types::messages::CalibrationKind;
+
 /// What a page shows of a vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Page {
@@ -16,14 +18,23 @@ pub struct Page {
     pub bands: &'static [(&'static str, &'static str, &'static str)],
     /// The topic and column of a set of alerts.
     pub alerts: Option<(&'static str, &'static str)>,
+    /// Calibrations that it offers, and the console line that begins each.
+    pub calibrations: &'static [(CalibrationKind, &'static str)],
     /// What the vehicle looks like.
     pub body: Body,
 }
 
 impl Page {
     /// A plot per topic and unit.
-    pub const EMPTY: Self =
-        Self { observers: &[], setpoint: None, panels: &[], bands: &[], alerts: None, body: Body::NONE };
+    pub const EMPTY: Self = Self {
+        observers: &[],
+        setpoint: None,
+        panels: &[],
+        bands: &[],
+        alerts: None,
+        calibrations: &[],
+        body: Body::NONE,
+    };
 }
 
 /// A topic that says where the vehicle is.

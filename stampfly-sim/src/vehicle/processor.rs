@@ -1,9 +1,11 @@
 //! What runs the runnables of a flight: a flight loop here, or a vehicle at the other end of a line.
 
 use super::jitter::Jitter;
+use super::recording::{RecordRing, Recording, Taker};
 use super::{Around, Witness};
+use serde::Serialize;
 use stampfly_bus::{Band, Schedule};
-use stampfly_flight::{FlightLoop, Pending};
+use stampfly_flight::{FlightLoop, Observer, Pending};
 use stampfly_types::{Duration, Instant};
 use std::convert::Infallible;
 
@@ -22,8 +24,8 @@ pub(super) trait Processor<'b, R: Schedule> {
     fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>)
     -> Result<(), Self::Error>;
 
-    /// The vehicle, when nothing is pending and its state is known here.
-    fn at_rest(&self) -> Option<&FlightLoop<'b, R>>;
+    /// The vehicle, when nothing is pending and its state is known here, and what is told when something of it is replaced.
+    fn at_rest(&mut self) -> Option<(&mut FlightLoop<'b, R>, impl Observer)>;
 
     /// The flight is over. Was something pending, which has been finished?
     fn end(&mut self, witness: &mut dyn Witness<R>) -> bool;
@@ -35,11 +37,21 @@ pub(super) struct Here<'b, R: Schedule> {
     jitter: Jitter,
     flight_at: Option<Instant>,
     interrupted: Option<(Instant, Pending)>,
+    recording: Option<Recording<'b, R>>,
 }
 
 impl<'b, R: Schedule> Here<'b, R> {
     pub(super) fn new(flight_loop: FlightLoop<'b, R>, jitter: Option<u64>) -> Self {
-        Self { flight_loop, jitter: Jitter::new(jitter), flight_at: None, interrupted: None }
+        Self { flight_loop, jitter: Jitter::new(jitter), flight_at: None, interrupted: None, recording: None }
+    }
+
+    /// The same, with a compact record of the flight under this name.
+    pub(super) fn recorded(self, ring: &'b mut RecordRing, taker: (Taker, &'static str)) -> Self
+    where
+        R: Serialize,
+    {
+        let recording = Recording::new(ring, self.flight_loop.heads(), taker);
+        Self { recording: Some(recording), ..self }
     }
 }
 
@@ -60,7 +72,10 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
     fn published(&mut self, _: usize, _: Instant, _: &[u32]) {}
 
     fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>) -> Result<(), Infallible> {
-        let Self { flight_loop, jitter, flight_at, interrupted } = self;
+        let Self { flight_loop, jitter, flight_at, interrupted, recording } = self;
+        let outer = witness;
+        let mut observers = (recording.as_ref().map(Recording::watching), &mut *outer);
+        let witness = &mut observers;
         let held_up = around.is_held_up(Band::Flight, now);
         if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
             *flight_at = Some(now + jitter.flight());
@@ -85,15 +100,27 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
                 }
             }
         }
+        if let Some(recording) = recording {
+            recording.take(interrupted.is_none().then_some(flight_loop));
+            match recording.taker() {
+                Taker::Witness => recording.pass_on(&mut |chunk| outer.recorded(chunk)),
+                Taker::Around => around.stream(now, recording.chunks()),
+            }
+        }
         Ok(())
     }
 
-    fn at_rest(&self) -> Option<&FlightLoop<'b, R>> {
-        self.interrupted.is_none().then_some(&self.flight_loop)
+    fn at_rest(&mut self) -> Option<(&mut FlightLoop<'b, R>, impl Observer)> {
+        let Self { flight_loop, recording, interrupted, .. } = self;
+        interrupted.is_none().then(|| (flight_loop, recording.as_ref().map(Recording::watching)))
     }
 
     fn end(&mut self, witness: &mut dyn Witness<R>) -> bool {
         let pending = self.interrupted.take();
-        pending.map(|(_, pending)| self.flight_loop.finish(pending, witness)).is_some()
+        let was_pending = pending.map(|(_, pending)| self.flight_loop.finish(pending, witness)).is_some();
+        if let Some(recording) = &mut self.recording {
+            recording.end(&mut |chunk| witness.recorded(chunk));
+        }
+        was_pending
     }
 }

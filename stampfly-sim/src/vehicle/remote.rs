@@ -8,11 +8,11 @@
 use super::processor::Processor;
 use super::{Around, Witness};
 use stampfly_bus::{Band, Schedule, TopicTable, Trigger};
-use stampfly_flight::FlightLoop;
 use stampfly_flight::golden::tables;
 use stampfly_flight::hil::{
     Bands, Decoder, Entries, Entry, LONGEST, LONGEST_FRAME, Log, Refusal, Reply, Request, VERSION,
 };
+use stampfly_flight::{FlightLoop, Observer};
 use stampfly_types::Instant;
 use std::fmt;
 use std::io;
@@ -344,8 +344,8 @@ impl<'b, R: Schedule> Processor<'b, R> for There<'_, '_, 'b, R> {
         Ok(())
     }
 
-    fn at_rest(&self) -> Option<&FlightLoop<'b, R>> {
-        None
+    fn at_rest(&mut self) -> Option<(&mut FlightLoop<'b, R>, impl Observer)> {
+        None::<(_, ())>
     }
 
     fn end(&mut self, _: &mut dyn Witness<R>) -> bool {

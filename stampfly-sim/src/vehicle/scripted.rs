@@ -69,6 +69,7 @@ pub struct Following<'a, S: Script> {
 }
 
 impl<S: Script> Around for Following<'_, S> {
+    type Runnables = S::Runnables;
     type Outcome = S::Outcome;
 
     fn drive(&mut self, _: Instant) {}

@@ -20,11 +20,22 @@ pub trait Witness<R: Schedule>: Observer {
     /// The surroundings have a sample for the log: its place in [`Vehicle::BESIDE`](super::Vehicle::BESIDE).
     fn beside(&mut self, _place: usize, _at: Instant, _generation: u32, _words: &[u32]) {}
 
-    /// Nothing is pending, and everything published has been passed on: the moment for a key frame.
-    fn at_rest(&mut self, _clock: Instant, _flight_loop: &FlightLoop<'_, R>) {}
+    /// Nothing is pending, and everything published has been passed on: the moment for a key frame, or to change something.
+    fn at_rest(&mut self, _clock: Instant, _flight_loop: &mut FlightLoop<'_, R>) {}
+
+    /// Something of the vehicle's state was replaced from outside, as by a change of parameters: a replay goes on from a key frame.
+    fn replaced(&mut self, _clock: Instant) {}
 
     /// The log's taps have lost so many samples so far.
     fn lost(&mut self, _clock: Instant, _samples: u32) {}
+
+    /// Does somebody want the compact record of the flight, and what is the vehicle's name in there? Asked before the flight.
+    fn record_of(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// The next chunk of that record.
+    fn recorded(&mut self, _chunk: &[u8]) {}
 
     /// The flight is over.
     fn ends(&mut self) {}
@@ -54,14 +65,28 @@ impl<R: Schedule, A: Witness<R>, B: Witness<R>> Witness<R> for (A, B) {
         self.1.beside(place, at, generation, words);
     }
 
-    fn at_rest(&mut self, clock: Instant, flight_loop: &FlightLoop<'_, R>) {
+    fn at_rest(&mut self, clock: Instant, flight_loop: &mut FlightLoop<'_, R>) {
         self.0.at_rest(clock, flight_loop);
         self.1.at_rest(clock, flight_loop);
+    }
+
+    fn replaced(&mut self, clock: Instant) {
+        self.0.replaced(clock);
+        self.1.replaced(clock);
     }
 
     fn lost(&mut self, clock: Instant, samples: u32) {
         self.0.lost(clock, samples);
         self.1.lost(clock, samples);
+    }
+
+    fn record_of(&self) -> Option<&'static str> {
+        self.0.record_of().or_else(|| self.1.record_of())
+    }
+
+    fn recorded(&mut self, chunk: &[u8]) {
+        self.0.recorded(chunk);
+        self.1.recorded(chunk);
     }
 
     fn ends(&mut self) {

@@ -10,6 +10,8 @@ mod floating_select;
 mod ina3221;
 mod interrupt_pin;
 mod latency;
+mod mpu6000;
+mod nrf24l01;
 mod pmw3901;
 mod vl53l3cx;
 mod wire;

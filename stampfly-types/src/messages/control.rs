@@ -28,3 +28,16 @@ message! {
         unmet: [f32; 4],
     }
 }
+
+/// The largest number of servos a message can carry.
+pub const MAX_SERVOS: usize = 8;
+
+message! {
+    /// What is sent to the servos of control surfaces.
+    pub struct ServoOutput {
+        /// Deflection per servo as a share of the largest, −1 to 1; a positive one is trailing edge down, for a fin trailing edge left.
+        deflection: [f32; MAX_SERVOS],
+        /// How many of them exist.
+        count: u8,
+    }
+}

@@ -147,3 +147,19 @@ message! {
         restarts: u32,
     }
 }
+
+message! {
+    /// The air, as pitot tube and satellite receiver show it together.
+    pub struct AirState {
+        /// True airspeed.
+        airspeed: f32 ["m/s"],
+        /// What a pitot tube at sea level would show: what wings and surfaces feel.
+        indicated: f32 ["m/s"],
+        /// Velocity of the air, north and east: where it goes.
+        wind: [f32; 2] ["m/s"],
+        /// One standard deviation of the wind's worse component.
+        wind_sigma: f32 ["m/s"],
+        /// Is the airspeed the pitot tube's? Otherwise it is the velocity over the ground less the wind that was last known.
+        measured: bool,
+    }
+}

@@ -2,14 +2,16 @@
 //!
 //! | group | messages |
 //! |---|---|
-//! | [`sensor`] | [`ImuData`] [`TofData`] [`FlowData`] [`MagData`] [`BaroData`] [`ExternalPose`] [`PowerData`] |
-//! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] |
+//! | [`sensor`] | [`ImuData`] [`TofData`] [`FlowData`] [`MagData`] [`BaroData`] [`ExternalPose`] [`PowerData`] [`GnssData`] [`AirspeedData`] |
+//! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] [`AirState`] |
+//! | [`calibration`] | [`CalibrationRequest`] [`CalibrationReport`] |
 //! | [`command`] | [`PilotInput`] [`GuidedCommand`] [`ButtonEvent`] [`CommandSetpoint`] [`Setpoint`] |
-//! | [`control`] | [`ControlOutput`] [`MotorOutput`] |
+//! | [`control`] | [`ControlOutput`] [`MotorOutput`] [`ServoOutput`] |
 //! | [`system`] | [`FlightStatus`] [`ArmRefusals`] [`SystemAlert`] [`LandDetected`] [`SelfTest`] [`Signal`] |
 //!
 //! No message carries a time stamp: the bus stamps every sample with the instant its data is valid for.
 
+pub mod calibration;
 pub mod command;
 pub mod control;
 pub mod estimate;
@@ -17,13 +19,18 @@ mod garbled;
 pub mod sensor;
 pub mod system;
 
+pub use calibration::{CalibrationHint, CalibrationKind, CalibrationReport, CalibrationRequest, CalibrationStage};
 pub use command::{
     ButtonEvent, ButtonGesture, CommandSetpoint, FlipDirection, GuidedCommand, GuidedKind, PilotInput, Setpoint,
     SetpointAxes, stick,
 };
-pub use control::{ControlOutput, MAX_MOTORS, MotorOutput};
-pub use estimate::{CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity};
-pub use sensor::{BaroData, ExternalPose, FlowData, ImuData, MagData, PowerData, TofData};
+pub use control::{ControlOutput, MAX_MOTORS, MAX_SERVOS, MotorOutput, ServoOutput};
+pub use estimate::{
+    AirState, CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity,
+};
+pub use sensor::{
+    AirspeedData, BaroData, ExternalPose, FlowData, GnssData, GnssFix, ImuData, MagData, PowerData, TofData,
+};
 pub use system::{
     Alerts, ArmBlocks, ArmRefusals, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected,
     SelfTest, SelfTestVerdict, Signal, SystemAlert, Tone,

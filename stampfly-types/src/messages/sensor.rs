@@ -3,7 +3,7 @@
 //! Chip axes, scales and register quirks end in the driver; from here inward a sample means the same for every
 //! vehicle.
 
-use crate::{Quat, Vec3, message};
+use crate::{Quat, Vec3, message, message_enum};
 
 message! {
     /// One inertial sample.
@@ -101,5 +101,55 @@ message! {
         position_sigma: f32 ["m"],
         /// Standard deviation of the attitude, per axis; zero when there is none.
         attitude_sigma: f32 ["rad"],
+    }
+}
+
+message_enum! {
+    /// What a satellite receiver knows.
+    pub enum GnssFix {
+        /// Nothing.
+        #[default]
+        None = 0,
+        /// Where it is on the map, but not how high.
+        TwoDimensional = 2,
+        /// Where it is.
+        ThreeDimensional = 3,
+    }
+}
+
+message! {
+    /// One fix of a satellite receiver (GNSS). Its stamp is the instant for which it is valid; receivers report it 50 to 300 ms later.
+    ///
+    /// An accuracy is one standard deviation, as the receiver estimates it. What the fix does not know is marked by [`GnssFix`], not by a
+    /// number.
+    pub struct GnssData {
+        /// What is known.
+        fix: GnssFix,
+        /// Satellites in use.
+        satellites: u8,
+        /// Latitude in ten-millionths of a degree, north is positive.
+        latitude: i32 ["1e-7 deg"],
+        /// Longitude in ten-millionths of a degree, east is positive.
+        longitude: i32 ["1e-7 deg"],
+        /// Above mean sea level.
+        altitude: f32 ["m"],
+        /// World NED, from the signals' Doppler shift.
+        velocity: Vec3 ["m/s"],
+        /// Along each of north and east.
+        horizontal_accuracy: f32 ["m"],
+        /// Along down.
+        vertical_accuracy: f32 ["m"],
+        /// Of the velocity, per axis.
+        speed_accuracy: f32 ["m/s"],
+    }
+}
+
+message! {
+    /// One sample of a pitot tube.
+    pub struct AirspeedData {
+        /// Total pressure less static pressure, the sensor's zero taken away; below zero in air that comes from behind, and by noise.
+        pressure: f32 ["Pa"],
+        /// Of the air at the sensor.
+        temperature: f32 ["degC"],
     }
 }

@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # The parts
 //! A rover made from the StampFly flight stack: the second vehicle of the family, a software-defined vehicle in the
 //! architecture of AUTOSAR (software components over a runtime environment, pure models below).
 //!

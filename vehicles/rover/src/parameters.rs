@@ -1,6 +1,5 @@
-//! The parameters: one line each with default, range and unit, in one group per component.
-//!
-//! The defaults of engine, brake, steering and vehicle are the architecture document's.
+//! The parameters: one line each with default, range and unit, in one group per component. The defaults of engine, brake, steering and
+//! vehicle are the architecture document's.
 //!
 //! ```
 //! use stampfly_param::{ParameterError, ParameterTable};
@@ -18,9 +17,10 @@ use stampfly_types::Duration;
 pub const PROBATION: Duration = Duration::from_secs(1);
 
 parameters! {
-    /// Every parameter of the rover. While degraded it must not be faster than when it works.
-    pub struct Parameters, consistent if |p| p.input.degraded_speed <= p.vehicle.max_speed;
-
+    /// Every parameter of the rover.
+    pub struct Parameters, where p:
+    "input.degraded_speed" "vehicle.max_speed" p.input.degraded_speed <= p.vehicle.max_speed => "it would be faster degraded than when it works";
+    "vehicle.wheel_radius" "vehicle.wheelbase" 2.0 * p.vehicle.wheel_radius < p.vehicle.wheelbase => "the wheels would touch one another";
     /// Engine.
     engine: EngineParameters {
         /// Acceleration at full throttle.

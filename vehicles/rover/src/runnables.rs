@@ -96,15 +96,10 @@ impl Runnable for NvmSwc {
     type Ends<'b> = NvmEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut NvmEnds<'_>) {
-        let (now, before) = (activation.now(), self.0.status());
-        for request in ends.parameter_request.iter() {
-            // A refusal is in the status.
-            let _ = self.0.request(&request.data);
-        }
+        let now = activation.now();
         let healthy = ends.diag_status.iter().all(|status| status.data.faults.is_empty());
-        let parameters = self.0.step(now, healthy);
-        let status = self.0.status();
-        if status != before || ends.parameters.generation() == 0 {
+        let requests = ends.parameter_request.iter().map(|request| request.data);
+        if let Some((parameters, status)) = self.0.period(now, healthy, requests) {
             ends.parameters.publish(now, &parameters);
             ends.parameter_status.publish(now, &status);
         }

@@ -17,17 +17,34 @@ const SECONDS: &str = "120";
 /// djitellopy cannot be told to take any port that is free: these are asked for first.
 const FREE: usize = 3;
 
-/// A script, its arguments with the names of ports in braces, and options of `serve`.
-const SCRIPTS: [(&str, &[&str], &[&str]); 8] = [
+/// A script, its arguments with the names of ports in braces, and options of `serve`. With `--vehicle` first it is another vehicle.
+const SCRIPTS: [(&str, &[&str], &[&str]); 15] = [
     ("mavlink_square.py", &["tcp:{mavlink-tcp}"], &[]),
     ("mavlink_square.py", &["udpin:{mavlink-udp}"], &[]),
+    ("mavlink_square.py", &["{usb}"], &[]),
     ("mavsdk_mission.py", &["udpin://{mavlink-udp}"], &[]),
+    ("mavlink_calibrate.py", &["tcp:{mavlink-tcp}"], &[]),
     ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{key}"], &["--key", "{key}", "--sign-all"]),
     ("yamspy_tune.py", &["{msp-serial}"], &[]),
     ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"], &[]),
     ("read_streams.py", &["{telemetry#}", "{stream}"], &[]),
     ("console.py", &["{console}"], &[]),
+    ("yamspy_quad.py", &["{msp-serial}"], &["--vehicle", "stm32-quad"]),
+    ("mavlink_quad.py", &["tcp:{mavlink-tcp}"], &["--vehicle", "stm32-quad"]),
+    ("mavlink_quad.py", &["udpin:{mavlink-udp}"], &["--vehicle", "stm32-quad"]),
+    (
+        "mavlink_signed.py",
+        &["tcp:{mavlink-tcp}", "{key}", "roll.p"],
+        &["--vehicle", "stm32-quad", "--key", "{key}", "--sign-all"],
+    ),
+    // Two flights of five minutes each, and no fix in the first one.
+    ("mavlink_plane.py", &["tcp:{mavlink-tcp}"], &["--vehicle", "plane", "--speed", "10", "--fault", "gnss-lost@0+60"]),
 ];
+/// Ports that are asked for at any number, those that every vehicle has first, and then that of all but the aircraft.
+const PORTS: [&str; 7] = ["http", "mavlink-tcp", "msp", "tello", "stream", "console", "usb-tcp"];
+const EVERYBODYS: usize = 2;
+/// The one that is said last.
+const LAST: &str = "http";
 /// As `openssl rand -hex 32` makes one. Not a secret: it is good for the vehicle of a test.
 const KEY: &str = "5f1d2c8e90b34a67f8e0c1b2a39485760718293a4b5c6d7e8f90a1b2c3d4e5f6\n";
 
@@ -53,7 +70,40 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
             return Err(format!("{script} succeeds without a vehicle"));
         }
     }
-    Ok(())
+    the_firmwares_ports(repository, &python)
+}
+
+/// What the firmware has at its ports, on this computer's sockets: only the sockets are others.
+fn the_firmwares_ports(repository: &Repository, python: &Path) -> Result<(), Failure> {
+    let script = "mavlink_ports.py";
+    let example = ["-p", "stampfly-services", "--features", "mavlink", "--example", "ports"];
+    run_program(repository.cargo().args(["build", "--quiet", "--release"]).args(example))?;
+    let folder = repository.target("clients");
+    let key = folder.join("ports-key");
+    let digits: String = (0..32).map(|byte| format!("{byte:02x}")).collect();
+    std::fs::write(&key, digits).map_err(|error| format!("{}: {error}", key.display()))?;
+    let program = repository.target("release").join("examples/ports");
+    let process = Command::new(&program).arg(SECONDS).stdout(Stdio::piped()).spawn();
+    let mut process = process.map_err(|error| format!("{program:?}: {error}"))?;
+    let stdout = process.stdout.take().ok_or("no standard output")?;
+    let mut vehicle = Vehicle { process, ports: vec![("key".into(), key.to_string_lossy().into_owned())] };
+    for line in BufReader::new(stdout).lines() {
+        let line = line.map_err(|error| error.to_string())?;
+        let (name, place) = line.split_once(' ').ok_or("no port")?;
+        vehicle.ports.push((name.to_owned(), place.to_owned()));
+        if name == "mavlink-tcp" {
+            break;
+        }
+    }
+    let arguments = ["udpout:{mavlink-udp}", "tcp:{mavlink-tcp}", "{key}"];
+    let said = script_with(repository, python, script, &arguments, &vehicle)?;
+    print!("{script}\n{}", indented(&said));
+    drop(vehicle.process.kill());
+    _ = vehicle.process.wait();
+    match script_with(repository, python, script, &arguments, &vehicle) {
+        Ok(_) => Err(format!("{script} succeeds without a vehicle")),
+        Err(_) => Ok(()),
+    }
 }
 
 /// Where others can reach it, MAVLink is not opened without a key.
@@ -126,11 +176,21 @@ impl Vehicle {
         let free = free_ports()?;
         let [state, telemetry, mavlink] = free;
         let mut command = Command::new(program);
-        command.args(["serve", "--for", SECONDS, "--out"]).arg(out);
-        for name in ["http", "mavlink-tcp", "tello", "stream", "console", "msp"] {
+        // In the vehicle's seconds, which pass faster for some.
+        let speed = options.iter().skip_while(|option| **option != "--speed").nth(1);
+        let seconds = speed.and_then(|speed| Some(speed.parse::<u32>().ok()? * SECONDS.parse::<u32>().ok()?));
+        let seconds = seconds.map_or(SECONDS.to_owned(), |seconds| seconds.to_string());
+        command.args(["serve", "--for", &seconds, "--out"]).arg(out);
+        let (most, sends) = match options {
+            ["--vehicle", "plane", ..] => (EVERYBODYS, 1),
+            ["--vehicle", ..] => (EVERYBODYS + 1, 1),
+            _ => (usize::MAX, usize::MAX),
+        };
+        for name in PORTS.iter().take(most) {
             command.args(["--port", &format!("{name}=0")]);
         }
-        for (name, number) in [("tello-state", state), ("telemetry", telemetry), ("mavlink-udp", mavlink)] {
+        let sent_to = [("mavlink-udp", mavlink), ("tello-state", state), ("telemetry", telemetry)];
+        for (name, number) in sent_to.iter().take(sends) {
             command.args(["--port", &format!("{name}={number}")]);
         }
         command.args(options.iter().map(|option| option.replace("{key}", &key)));
@@ -142,10 +202,11 @@ impl Vehicle {
             let line = line.map_err(|error| error.to_string())?;
             let mut words = line.split_whitespace();
             let name = words.next().unwrap_or_default().to_owned();
-            if name == "http" {
+            let is_last = name == LAST;
+            vehicle.ports.push((name, words.next_back().unwrap_or_default().to_owned()));
+            if is_last {
                 return Ok(vehicle);
             }
-            vehicle.ports.push((name, words.next_back().unwrap_or_default().to_owned()));
         }
         Err("stampfly serve ended".into())
     }

@@ -6,7 +6,7 @@
 //! | S3, a wrong pin | that the check above refuses one | |
 //! | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
 //! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
-//! | C6, image | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
+//! | C6, image, also with the feature `wifi` | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
 //! | S3, memory ([`s3_memory`](super::s3_memory)) | that the S3's first core is left a stack | to the byte: code differs |
 //!
 //! No stock compiler has inline assembly for Xtensa yet, so the first two present a 32-bit architecture that has it under
@@ -41,13 +41,19 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let config = repository.root.join(PACKAGE).join(".cargo/config.toml");
     flashes_fast(&fs::read_to_string(&config).map_err(|e| format!("{}: {e}", config.display()))?)?;
     let target = stand_in(repository)?;
-    run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples", "--features", "hil"]))?;
+    for features in ["hil,record", "hil,wifi"] {
+        run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples", "--features", features]))?;
+    }
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let scripts = s3_scripts(repository)?;
     esp32_link::heap(repository, &scripts)?;
-    let program = c6(repository)?;
-    s3_memory::stack(repository, &program, &scripts)?;
-    image(repository, &program)
+    for variant in [Variant::Default, Variant::Wifi] {
+        println!("{}:", variant.name());
+        let program = c6(repository, variant)?;
+        s3_memory::stack(repository, &program, &scripts)?;
+        image(repository, &program)?;
+    }
+    Ok(())
 }
 
 /// What `cargo run` hands to espflash, whose own defaults are two wires at 40 MHz: a pass of the flight band would then take longer than
@@ -130,8 +136,34 @@ fn is_about_the_pin(said: &str) -> Result<(), Failure> {
     }
 }
 
+/// The firmware, as it is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// What is flashed without further words.
+    Default,
+    /// With UDP and TCP in a Wi-Fi network.
+    Wifi,
+}
+
+impl Variant {
+    /// For people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default features",
+            Self::Wifi => "with the feature wifi",
+        }
+    }
+
+    const fn features(self) -> &'static str {
+        match self {
+            Self::Default => "esp32c6,bmi270-config",
+            Self::Wifi => "esp32c6,bmi270-config,wifi",
+        }
+    }
+}
+
 /// Builds for the ESP32-C6 and returns the program.
-pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
+pub fn c6(repository: &Repository, variant: Variant) -> Result<PathBuf, Failure> {
     provide(repository, &[&COMPILER, &LINKER])?;
     let mut cargo = firmware(repository, "build");
     // Not in the package's folder: its settings of cargo are the S3's, and the C6's layer of hardware refuses that of the data cache.
@@ -141,9 +173,16 @@ pub fn c6(repository: &Repository) -> Result<PathBuf, Failure> {
     cargo.env("RUSTFLAGS", "-Clinker-flavor=ld.lld -Cforce-frame-pointers -Csymbol-mangling-version=v0");
     // One example is enough to see that they link.
     cargo.args(["--bins", "--example", "bmi270"]);
-    cargo.args(["--release", "--no-default-features", "--features", "esp32c6,bmi270-config", "--target", C6]);
+    cargo.args(["--release", "--no-default-features", "--features", variant.features(), "--target", C6]);
     run_program(&mut cargo)?;
-    Ok(repository.target("esp32").join(C6).join("release/stampfly-esp32s3"))
+    let built = repository.target("esp32").join(C6).join("release/stampfly-esp32s3");
+    if variant == Variant::Default {
+        return Ok(built);
+    }
+    // The next build of another variant takes its place.
+    let kept = built.with_file_name("stampfly-esp32s3-wifi");
+    fs::copy(&built, &kept).map_err(|e| format!("{}: {e}", kept.display()))?;
+    Ok(kept)
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.

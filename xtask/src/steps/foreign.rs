@@ -21,7 +21,7 @@ const ESPFLASH: (&str, &str) = ("espflash", "4.7.0");
 const ROM: &str = "esp32c6_rev0_rom.elf";
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    let firmware = esp32::c6(repository)?;
+    let firmware = esp32::c6(repository, esp32::Variant::Default)?;
     let mut python = python_tool(repository, LABWIRED, "python")?;
     python.env("PYTHONDONTWRITEBYTECODE", "1").arg(repository.root.join(FOLDER).join("stages.py"));
     python.arg(firmware).arg(rom(repository)?).arg(repository.root.join(RECORD));

@@ -2,7 +2,8 @@
 //!
 //! Debian's Chromium, without a window, is led by Playwright's Python package (`xtask/ground/page.py`). It arms, takes off, clicks
 //! on the ground, lands, changes a parameter, injects a fault, kills, downloads the log and moves through it. Nothing may be
-//! written to the browser's console, and no request may leave this machine. `-- --pictures FOLDER` keeps what it saw.
+//! written to the browser's console, and no request may leave this machine. `-- --pictures FOLDER` keeps what it saw. Then the same of `stampfly connect`, whose
+//! vehicle is at the other end of a pseudo-terminal (`xtask/ground/connect.py`), and is unplugged.
 
 use crate::arguments::Arguments;
 use crate::machine::{BROWSER, provide};
@@ -10,17 +11,9 @@ use crate::repository::{Failure, Repository, python_tool, run as run_program};
 
 pub const PLAYWRIGHT: &str = "playwright==1.65.2";
 const SCRIPT: &str = "xtask/ground/page.py";
+const CONNECTED: &str = "xtask/ground/connect.py";
 /// Any free port for the page; nobody else is to be found here.
-const PORTS: [&str; 8] = [
-    "http=0",
-    "mavlink-udp=off",
-    "mavlink-tcp=off",
-    "tello=off",
-    "tello-state=off",
-    "telemetry=off",
-    "stream=off",
-    "console=off",
-];
+const PORTS: [&str; 2] = ["http=0", "others=off"];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&BROWSER])?;
@@ -31,5 +24,8 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     for port in PORTS {
         script.args(["--port", port]);
     }
-    run_program(script.arg("--out").arg(repository.target("ground")))
+    run_program(script.arg("--out").arg(repository.target("ground")))?;
+    let mut script = python_tool(repository, PLAYWRIGHT, "python3")?;
+    script.arg("-B").arg(repository.root.join(CONNECTED)).arg(repository.target("release/stampfly"));
+    run_program(script.arg(repository.target("ground")))
 }

@@ -67,7 +67,7 @@ fn lists_every_chip(repository: &Repository, folder: &Path, board: &str) -> Resu
 }
 
 /// Debian's compiler, which builds its own core library.
-fn of_debian(repository: &Repository, target: &str) -> Command {
+pub(super) fn of_debian(repository: &Repository, target: &str) -> Command {
     let mut cargo = debian_cargo(repository);
     cargo.args(["-Zbuild-std=core,alloc", "--config", &format!("target.{target}.linker=\"ld.lld-22\"")]);
     cargo.args(["--config", &format!("target.{target}.rustflags=[\"-Clinker-flavor=ld.lld\"]")]);

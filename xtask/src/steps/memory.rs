@@ -7,15 +7,21 @@
 //! Stack is a bound, not a measurement: frames and calls come from the machine code. Interrupts come on top of it, which is
 //! why half of a stack is kept free. `--fix` commits to what there is now, as far as the bounds allow.
 
-use super::{esp32, s3_memory};
+use super::esp32::{self, Variant};
+use super::s3_memory;
 use crate::arguments::Arguments;
 use crate::elf::stack::{Behind, Stack};
 use crate::elf::{C, CONSTANTS, Program, Sizes};
 use crate::ratchet::Budget;
 use crate::repository::{Failure, Repository};
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
-const BUDGET: &str = "stampfly-board/esp32s3/memory.toml";
+/// The committed figures of each variant of the firmware.
+const BUDGETS: [(Variant, &str); 2] = [
+    (Variant::Default, "stampfly-board/esp32s3/memory.toml"),
+    (Variant::Wifi, "stampfly-board/esp32s3/memory-wifi.toml"),
+];
 /// What is called through pointers, by whom: the scheduler asks topics for their newest, a drained bus hands messages to a closure, formatted text asks each value to write
 /// itself, executors run tasks, all other callers wake them or run the scheduler.
 const POINTERS: &[Behind<'_>] = &[
@@ -34,12 +40,26 @@ const ROM: u64 = 512;
 const SHARE: f64 = 0.5;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
-    let program = Program::read(&path)?;
+    if let Some(file) = &arguments.file {
+        let [(_, budget), _] = BUDGETS;
+        return measure(repository, file, budget, arguments.fix);
+    }
+    let measured = BUDGETS.map(|(variant, budget)| {
+        println!("{}:", variant.name());
+        measure(repository, &esp32::c6(repository, variant)?, budget, arguments.fix)
+            .map_err(|failure| format!("{}: {failure}", variant.name()))
+    });
+    let failures: Vec<Failure> = measured.into_iter().filter_map(Result::err).collect();
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n")) }
+}
+
+/// Measures a program, and compares it with its budget.
+fn measure(repository: &Repository, path: &Path, file: &'static str, fix: bool) -> Result<(), Failure> {
+    let program = Program::read(path)?;
     // What this program leaves of the S3's memory, not of the larger one it was built for.
-    let ground = s3_memory::stack(repository, &path, &esp32::s3_scripts(repository)?)?;
-    let budget = Budget::read(repository, BUDGET)?;
-    let mut ledger = Ledger { budget, fix: arguments.fix, held: BTreeSet::new(), failures: Vec::new() };
+    let ground = s3_memory::stack(repository, path, &esp32::s3_scripts(repository)?)?;
+    let budget = Budget::read(repository, file)?;
+    let mut ledger = Ledger { budget, file, fix, held: BTreeSet::new(), failures: Vec::new() };
     sizes(&program, &mut ledger)?;
     stacks(ground, &program, &mut ledger)?;
     ledger.close()
@@ -51,6 +71,8 @@ const TABLES: [&str; 3] = ["flash", "memory", "stack"];
 /// The committed figures beside the measured ones. Says all that is wrong at once: a change moves many of them.
 struct Ledger {
     budget: Budget,
+    /// Where they are.
+    file: &'static str,
     /// Commit to what is measured instead of comparing it.
     fix: bool,
     /// Figures compared so far.
@@ -73,7 +95,7 @@ impl Ledger {
                 if self.fix {
                     self.budget.remove(table, &name);
                 } else {
-                    self.failures.push(format!("{table}.{name}: in {BUDGET}, but not in the program"));
+                    self.failures.push(format!("{table}.{name}: in {}, but not in the program", self.file));
                 }
             }
         }

@@ -49,6 +49,7 @@ pub mod search;
 pub mod semver;
 pub mod shards;
 pub mod soak;
+pub mod stm32;
 pub mod test;
 pub mod ulog;
 pub mod vectors;

@@ -32,7 +32,7 @@ const CONTROL: &str = "stampfly_esp32s3::cutoff::__esp_hal_internal_look";
 const FIRMWARE: &str = "stampfly_esp32s3";
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository), Ok)?;
+    let path = arguments.file.clone().map_or_else(|| esp32::c6(repository, esp32::Variant::Default), Ok)?;
     let libraries = repository.libraries()?.into_iter().filter(|library| library.bare_metal);
     let flight = libraries.map(|library| library.name).filter(|name| !NOT_FLIGHT.contains(&name.as_str()));
     let program = Program::read(&path)?;

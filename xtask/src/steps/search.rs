@@ -1,49 +1,93 @@
-//! `search`: libFuzzer with the address sanitizer, each fuzz target for some seconds.
+//! `search`: libFuzzer with the address sanitizer, each fuzz target for some seconds, two at a time.
 //!
 //! It needs no nightly compiler: libFuzzer's counters are a pass of LLVM, and the sanitizer's library comes with the stable compiler, which only has
-//! to be told that unstable options are meant. That takes a C++ compiler; cargo-fuzz is built when it is missing. Inputs that are found go to
-//! `target/search/corpus`, where the next search begins with them, and those that fail to `fuzz/artifacts`: a failure is kept as a file of
-//! `fuzz/corpus`, which [`fuzz`](super::fuzz) replays ever after.
+//! to be told that unstable options are meant. The options are cargo-fuzz's, but for its single codegen unit a crate, which takes longer
+//! to build. It needs a C++ compiler. Inputs that are found go to `target/search/corpus`, where the next search begins with them, their number is added to
+//! `target/search/executions`, and those that fail go to `fuzz/artifacts`: a failure is kept as a file of `fuzz/corpus`, which [`fuzz`](super::fuzz) replays ever after.
 
 use super::fuzz::PACKAGE;
 use crate::arguments::Arguments;
-use crate::cargo_tool::cargo_tool;
-use crate::repository::{Failure, Repository, run as run_program};
+use crate::repository::{Failure, Repository, capture, in_ci, run as run_program};
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use std::sync::Mutex;
+use std::thread;
 
-const CARGO_FUZZ: &str = "0.13.2";
 /// How long a target is searched with unless a time is given.
 const SECONDS: u64 = 20;
+/// Shortest and longest limit of an input's length, bytes.
+const LENGTHS: [u64; 2] = [128, 4096];
+/// Counters for each branch, operands of comparisons, the sanitizer; arithmetic and slices are checked, too.
+const FLAGS: &[&str] = &[
+    "--cfg=fuzzing",
+    "-Zsanitizer=address",
+    "-Cpasses=sancov-module",
+    "-Cllvm-args=-sanitizer-coverage-level=4",
+    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
+    "-Cllvm-args=-sanitizer-coverage-pc-table",
+    "-Cllvm-args=-sanitizer-coverage-trace-compares",
+    "-Cdebug-assertions",
+];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let seconds = arguments.seconds.unwrap_or(SECONDS);
-    run_program(&mut cargo_fuzz(repository, "build")?)?;
-    let (mut failed, mut total) = (Vec::new(), 0);
-    for target in targets(repository)? {
-        let output = search(repository, &target, seconds)?;
-        let said = String::from_utf8_lossy(&output.stderr);
-        let executions = executions(&said);
-        total += executions;
-        println!("{target:<18} {executions:>12} executions");
-        // A search that did nothing found nothing either.
-        if !output.status.success() || executions == 0 {
-            eprintln!("{said}");
-            failed.push(target);
+    let programs = build(repository)?;
+    let waiting = Mutex::new(targets(repository)?);
+    let next = || waiting.lock().ok().and_then(|mut targets| targets.pop());
+    let search_all = || -> Result<(u64, Vec<String>), Failure> {
+        let (mut total, mut failed) = (0, Vec::new());
+        while let Some(target) = next() {
+            let output = search(repository, &programs.join(&target), &target, seconds)?;
+            let said = String::from_utf8_lossy(&output.stderr);
+            let executions = executions(&said);
+            total += executions;
+            println!("{target:<18} {executions:>12} executions");
+            // A search that did nothing found nothing either.
+            if !output.status.success() || executions == 0 {
+                eprintln!("{said}");
+                failed.push(target);
+            }
         }
+        Ok((total, failed))
+    };
+    let done = thread::scope(|scope| {
+        let searches = [scope.spawn(search_all), scope.spawn(search_all)];
+        searches.map(|search| search.join().unwrap_or_else(|_| Err("a search panicked".to_owned())))
+    });
+    let (mut total, mut failed) = (0, Vec::new());
+    for result in done {
+        let (executions, failures) = result?;
+        total += executions;
+        failed.extend(failures);
     }
     println!("{:<18} {total:>12} executions, {seconds} s each", "all");
+    println!("{:<18} {:>12} executions", "with those before", tally(repository, total)?);
     if failed.is_empty() { Ok(()) } else { Err(format!("fails: {}", failed.join(", "))) }
 }
 
-/// A subcommand of cargo-fuzz.
-fn cargo_fuzz(repository: &Repository, subcommand: &str) -> Result<Command, Failure> {
-    let mut fuzz = cargo_tool(repository, "cargo-fuzz", CARGO_FUZZ)?;
-    fuzz.current_dir(repository.root.join(PACKAGE)).args(["fuzz", subcommand, "--sanitizer", "address"]);
-    fuzz.arg("--target-dir").arg(place(repository));
-    fuzz.env("RUSTC_BOOTSTRAP", "1");
-    Ok(fuzz)
+/// Adds to what searches from this corpus have executed so far. Returns the sum.
+fn tally(repository: &Repository, total: u64) -> Result<u64, Failure> {
+    let path = place(repository).join("executions");
+    let before = fs::read_to_string(&path).ok().and_then(|number| number.trim().parse().ok()).unwrap_or(0);
+    let sum = before + total;
+    fs::write(&path, format!("{sum}\n")).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(sum)
+}
+
+/// Builds all targets. Returns their folder.
+fn build(repository: &Repository) -> Result<PathBuf, Failure> {
+    // With a target, build scripts and macros are built without the options.
+    let (said, _) = capture(repository.command("rustc").arg("-vV"))?;
+    let host =
+        said.lines().find_map(|line| line.strip_prefix("host: ")).ok_or("rustc does not say what its host is")?;
+    let mut cargo = repository.cargo();
+    cargo.current_dir(repository.root.join(PACKAGE)).args(["build", "--release", "--bins", "--target", host]);
+    cargo.arg("--target-dir").arg(place(repository));
+    cargo.env("RUSTC_BOOTSTRAP", "1").env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\u{1f}"));
+    cargo.env("CARGO_PROFILE_RELEASE_DEBUG", "line-tables-only").env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "2");
+    run_program(&mut cargo)?;
+    Ok(place(repository).join(host).join("release"))
 }
 
 /// Where all of it is built.
@@ -62,14 +106,34 @@ fn targets(repository: &Repository) -> Result<Vec<String>, Failure> {
 }
 
 /// Searches with one target.
-fn search(repository: &Repository, target: &str, seconds: u64) -> Result<Output, Failure> {
+fn search(repository: &Repository, program: &Path, target: &str, seconds: u64) -> Result<Output, Failure> {
+    let io = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
     // The first folder takes what is found, the others are read.
     let found = place(repository).join("corpus").join(target);
-    fs::create_dir_all(&found).map_err(|error| format!("{}: {error}", found.display()))?;
-    let mut run = cargo_fuzz(repository, "run")?;
-    run.arg(target).arg(&found).arg(repository.root.join(PACKAGE).join("corpus").join(target));
-    run.args(["--", "-max_len=4096", "-timeout=10", "-print_final_stats=1"]).arg(format!("-max_total_time={seconds}"));
-    run.output().map_err(|error| format!("cargo fuzz: {error}"))
+    let artifacts = repository.root.join(PACKAGE).join("artifacts").join(target);
+    let seeds = repository.root.join(PACKAGE).join("corpus").join(target);
+    for folder in [&found, &artifacts] {
+        fs::create_dir_all(folder).map_err(|error| io(folder, error))?;
+    }
+    let mut run = repository.command(&program.to_string_lossy());
+    // libFuzzer and the sanitizer define some of the same symbols.
+    run.env("ASAN_OPTIONS", "detect_odr_violation=0");
+    run.arg(&found).arg(&seeds);
+    run.arg(format!("-max_len={}", longest_input(&seeds)?));
+    run.args(["-timeout=10", "-print_final_stats=1"]).arg(format!("-max_total_time={seconds}"));
+    run.arg(format!("-artifact_prefix={}/", artifacts.display()));
+    if in_ci() {
+        // The same search each time, as far as it comes: a change is not refused for what another one's luck has found.
+        run.arg("-seed=1");
+    }
+    run.output().map_err(|error| io(program, error))
+}
+
+/// Longest input to try, bytes: twice the longest seed. Two frames find what one leaves behind; forty only take forty times as long.
+fn longest_input(seeds: &Path) -> Result<u64, Failure> {
+    let entries = fs::read_dir(seeds).map_err(|error| format!("{}: {error}", seeds.display()))?;
+    let lengths = entries.filter_map(|entry| entry.ok()?.metadata().ok()).map(|metadata| metadata.len());
+    Ok((2 * lengths.max().unwrap_or_default()).clamp(LENGTHS[0], LENGTHS[1]))
 }
 
 /// What libFuzzer counts at its end.

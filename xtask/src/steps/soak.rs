@@ -9,17 +9,14 @@ use crate::repository::{Failure, Repository, python_tool, run as run_program};
 const WEBSOCKETS: &str = "websockets==17.4";
 const SCRIPT: &str = "xtask/ground/soak.py";
 const SECONDS: &str = "1800";
-/// Only the page is watched.
-const OFF: [&str; 7] = ["mavlink-udp", "mavlink-tcp", "tello", "tello-state", "telemetry", "stream", "console"];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
     let mut script = python_tool(repository, WEBSOCKETS, "python3")?;
     script.arg("-B").arg(repository.root.join(SCRIPT));
     script.arg(arguments.rest.first().map_or(SECONDS, String::as_str));
-    script.arg(repository.target("release/stampfly")).args(["serve", "--count", "10", "--port", "http=0"]);
-    for port in OFF {
-        script.args(["--port", &format!("{port}=off")]);
-    }
+    script.arg(repository.target("release/stampfly"));
+    // Only the page is watched.
+    script.args(["serve", "--count", "10", "--port", "http=0", "--port", "others=off"]);
     run_program(script.arg("--out").arg(repository.target("soak")))
 }

@@ -1,27 +1,38 @@
-//! The flight core's compact record: what it holds at the end is printed, and replayed on a PC. `cargo xtask record`.
+//! The flight core's compact record: what it streams is printed at the end, and replayed on a PC. `cargo xtask record`.
 
 use crate::machine::{self, Ticks};
 use core::cell::{Cell, RefCell};
-use stampfly_board::schedule::{ACTIVATIONS, Runnables};
-use stampfly_board::topics::{COUNT, Id, TOPICS};
+use stampfly_board::schedule::Runnables;
+use stampfly_board::topics::Id;
 use stampfly_bus::{Activation, Band};
-use stampfly_flight::compact::{Compact, Ring, Watching};
-use stampfly_flight::{FlightLoop, Observer, key_frame};
+use stampfly_flight::compact::{Compact, Kept, MAGIC, Ring, Streamer, Watching};
+use stampfly_flight::flight_loop::{Ended, Positions};
+use stampfly_flight::{FlightLoop, Observer};
 use stampfly_types::{Duration, Instant};
 use static_cell::StaticCell;
 
-/// Bytes that the emulated board has for it.
-const MEMORY: usize = 1024 * 1024;
-/// Room for a key frame.
-const FRAME: usize = 64 * 1024;
-/// Between two key frames.
-const PERIOD: Duration = Duration::from_secs(6);
+/// Words between the core that flies and the one that streams, as in the firmware: a key frame, and a tenth of a second beside it.
+const WORDS: usize = 4 * 1024;
+/// Bytes that the emulated board keeps of what was streamed.
+const MEMORY: usize = 2 * 1024 * 1024;
+/// A datagram.
+const CHUNK: usize = 1024;
 /// Bytes in a printed line.
 const LINE: usize = 64;
+/// One sample in so many passes of what runnables publish is kept for comparison.
+const KEPT: Kept<'_> = Kept {
+    topics: &[
+        Id::actuator_motor as usize,
+        Id::control_output as usize,
+        Id::flight_status as usize,
+        Id::estimate_state as usize,
+    ],
+    every: 80,
+    key_frames: Duration::from_secs(10),
+};
 
-type Record = Compact<Ring<'static>, COUNT, { ACTIVATIONS.len() }>;
+type Record = Compact<'static, 'static, Runnables, WORDS>;
 
-static RECORD: StaticCell<RefCell<Record>> = StaticCell::new();
 static SHARED: Shared = Shared { record: Cell::new(None), cost: Cost::new() };
 
 /// What is printed at the end.
@@ -32,40 +43,48 @@ struct Shared {
 
 /// Instructions.
 struct Cost {
-    /// For the record, since the pass began, and in all passes.
+    /// For the record, in this pass of the flight band, and altogether, the background's and looking for nothing included.
     recording: Cell<u64>,
     recordings: Cell<u64>,
+    /// The most for the record in a pass of the flight band, key frames apart.
+    most: Cell<u64>,
     /// Passes of the flight band, without the record.
     chain: Cell<u64>,
     passes: Cell<u64>,
     /// When the pass began.
     begun: Cell<Option<Ticks>>,
-    /// The dearest key frame.
+    /// Key frames, and the dearest.
+    frames: Cell<u64>,
     frame: Cell<u64>,
+    bytes: Cell<usize>,
+    /// What looking at the counter takes by itself.
+    looking: Cell<u64>,
 }
 
 impl Cost {
     const fn new() -> Self {
-        let [recording, recordings, chain, passes, frame] = [const { Cell::new(0) }; 5];
-        Self { recording, recordings, chain, passes, begun: Cell::new(None), frame }
+        let [recording, recordings, most, chain, passes, frames, frame, looking] = [const { Cell::new(0) }; 8];
+        let (begun, bytes) = (Cell::new(None), Cell::new(0));
+        Self { recording, recordings, most, chain, passes, begun, frames, frame, bytes, looking }
     }
 
     fn of_record<T>(&self, what: impl FnOnce() -> T) -> T {
         let begun = machine::ticks();
         let result = what();
-        self.recording.set(self.recording.get() + begun.until(machine::ticks()));
+        let ticks = begun.until(machine::ticks()).saturating_sub(self.looking.get());
+        self.recording.set(self.recording.get() + ticks);
+        self.recordings.set(self.recordings.get() + ticks);
         result
     }
 
     /// A pass is over, of the record too.
     fn pass(&self) {
-        let recording = self.recording.take();
         if let Some(begun) = self.begun.take() {
-            let all = begun.until(machine::ticks());
+            let (all, recording) = (begun.until(machine::ticks()), self.recording.get());
             self.chain.set(self.chain.get() + all.saturating_sub(recording));
             self.passes.set(self.passes.get() + 1);
+            self.most.set(self.most.get().max(recording));
         }
-        self.recordings.set(self.recordings.get() + recording);
     }
 }
 
@@ -74,22 +93,24 @@ impl Cost {
 pub struct Counted(pub &'static RefCell<Record>);
 
 impl Observer for Counted {
-    fn starts(&mut self, _: usize) {
-        if SHARED.cost.begun.get().is_none() {
+    fn pass_begins(&mut self, band: Band, clock: Instant) {
+        if band == Band::Flight {
+            SHARED.cost.recording.set(0);
             SHARED.cost.begun.set(Some(machine::ticks()));
         }
-    }
-
-    fn has_read(&mut self, activation: &Activation) {
-        SHARED.cost.of_record(|| Watching(self.0).has_read(activation));
+        SHARED.cost.of_record(|| Watching(self.0).pass_begins(band, clock));
     }
 
     fn finished(&mut self, activation: &Activation) {
         SHARED.cost.of_record(|| Watching(self.0).finished(activation));
-        // Background activations are no part of the chain.
-        if ACTIVATIONS.get(usize::from(activation.record().index)).is_some_and(|info| info.band == Band::Background) {
-            SHARED.cost.begun.set(None);
-        }
+    }
+
+    fn pass_ends(&mut self, band: Band, ended: Ended, positions: &mut dyn Positions) {
+        SHARED.cost.of_record(|| Watching(self.0).pass_ends(band, ended, positions));
+    }
+
+    fn resumes(&mut self, index: usize) {
+        Watching(self.0).resumes(index);
     }
 }
 
@@ -97,30 +118,34 @@ impl Observer for Counted {
 #[expect(unsafe_code, reason = "one core, no interrupts")]
 unsafe impl Sync for Shared {}
 
-/// Writes the record.
+/// The flight core's half.
 pub struct Writer {
     record: &'static RefCell<Record>,
-    frame: &'static mut [u8; FRAME],
-    due: Instant,
 }
 
-/// One in so many samples that a runnable publishes is kept for comparison.
-fn every(topic: usize) -> u32 {
-    match Id::ALL.get(topic) {
-        Some(Id::actuator_motor | Id::control_output | Id::flight_status) => 40,
-        Some(Id::estimate_state) => 200,
-        _ => 0,
-    }
+/// The other core's half: takes the record out of the ring.
+pub struct Reader {
+    streamer: Streamer<'static, WORDS>,
+    bytes: &'static mut [u8; MEMORY],
+    used: usize,
 }
 
 /// At power-on.
-pub fn begin() -> Writer {
+pub fn begin(flight_loop: &FlightLoop<'static, Runnables>) -> (Writer, Reader) {
+    static RING: StaticCell<Ring<WORDS>> = StaticCell::new();
+    static RECORD: StaticCell<RefCell<Record>> = StaticCell::new();
     static BYTES: StaticCell<[u8; MEMORY]> = StaticCell::new();
-    static SCRATCH: StaticCell<[u8; FRAME]> = StaticCell::new();
-    let ring = Ring::new(BYTES.init_with(|| [0; MEMORY]));
-    let record = RECORD.init_with(|| RefCell::new(Compact::new(ring, &TOPICS, every)));
+    let (writer, reader) = RING.init_with(Ring::new).split();
+    let record = RECORD.init_with(|| RefCell::new(Compact::new(writer, flight_loop.heads(), "stampfly", KEPT)));
     SHARED.record.set(Some(record));
-    Writer { record, frame: SCRATCH.init_with(|| [0; FRAME]), due: Instant::ZERO }
+    let look = |_| machine::ticks().until(machine::ticks());
+    SHARED.cost.looking.set((0..16).map(look).min().unwrap_or(0));
+    let bytes = BYTES.init_with(|| [0; MEMORY]);
+    if let Some(magic) = bytes.first_chunk_mut() {
+        *magic = MAGIC;
+    }
+    let reader = Reader { streamer: Streamer::new(reader), bytes, used: MAGIC.len() };
+    (Writer { record }, reader)
 }
 
 impl Writer {
@@ -130,45 +155,65 @@ impl Writer {
     }
 
     /// A pass is over.
-    pub fn pass(&mut self, now: Instant, flight_loop: &FlightLoop<'_, Runnables>) {
+    pub fn pass(&mut self, flight_loop: &FlightLoop<'_, Runnables>) {
+        let cost = &SHARED.cost;
+        cost.pass();
         let mut record = self.record.borrow_mut();
-        SHARED.cost.of_record(|| record.pass(flight_loop.heads()));
-        SHARED.cost.pass();
-        if now >= self.due {
-            self.due = now + PERIOD;
+        if record.wants_key_frame() {
             let begun = machine::ticks();
-            if let Ok(length) = key_frame::encode(flight_loop, now, self.frame) {
-                record.key_frame(self.frame.get(..length).unwrap_or_default());
-            }
-            SHARED.cost.frame.set(SHARED.cost.frame.get().max(begun.until(machine::ticks())));
+            let length = record.key_frame(flight_loop);
+            let ticks = begun.until(machine::ticks());
+            cost.frames.set(cost.frames.get() + ticks);
+            cost.frame.set(cost.frame.get().max(ticks));
+            cost.bytes.set(length.unwrap_or(cost.bytes.get()));
         }
     }
 }
 
-/// Prints it.
-pub fn print() {
-    let Some(record) = SHARED.record.get() else { return };
-    let record = record.borrow();
-    let ring = record.store();
-    let mut line = heapless::String::<{ 2 * LINE }>::new();
-    for (place, byte) in ring.bytes().enumerate() {
-        for digit in [byte >> 4, byte & 15] {
-            _ = line.push(char::from_digit(digit.into(), 16).unwrap_or('?'));
-        }
-        if place % LINE == LINE - 1 {
-            outln!("record {line}");
-            line.clear();
+impl Reader {
+    /// Takes what fills a datagram.
+    pub fn take(&mut self, least: usize) {
+        while let Some((head, room)) = self.bytes.get_mut(self.used..).and_then(<[u8]>::split_first_chunk_mut::<2>) {
+            let room = room.get_mut(..CHUNK).unwrap_or_default();
+            let Some(length) = self.streamer.chunk(room, least) else { break };
+            *head = (length as u16).to_le_bytes();
+            self.used += 2 + length;
         }
     }
-    outln!("record {line}");
-    let Cost { recordings, chain, passes, frame, .. } = &SHARED.cost;
-    let of = |all: &Cell<u64>| machine::instructions(all.get()) / passes.get().max(1);
-    outln!(
-        "instructions of a pass: chain {} record {} of {} passes, key frame at most {}",
-        of(chain),
-        of(recordings),
-        passes.get(),
-        machine::instructions(frame.get())
-    );
-    outln!("compact: {} bytes kept of {}, {} lost", ring.len(), ring.taken(), record.lost());
+
+    /// What fills most of a datagram.
+    pub fn take_datagrams(&mut self) {
+        self.take(CHUNK / 2);
+    }
+
+    /// Prints it all.
+    pub fn print(&mut self) {
+        self.take(1);
+        let bytes = self.bytes.get(..self.used).unwrap_or_default();
+        let mut line = heapless::String::<{ 2 * LINE }>::new();
+        for (place, byte) in bytes.iter().enumerate() {
+            for digit in [byte >> 4, byte & 15] {
+                _ = line.push(char::from_digit(digit.into(), 16).unwrap_or('?'));
+            }
+            if place % LINE == LINE - 1 {
+                outln!("record {line}");
+                line.clear();
+            }
+        }
+        outln!("record {line}");
+        let Some(record) = SHARED.record.get() else { return };
+        let Cost { recordings, most, chain, passes, frames, frame, bytes: frame_bytes, .. } = &SHARED.cost;
+        let of = |all: u64| machine::instructions(all) / passes.get().max(1);
+        outln!(
+            "instructions of a pass: chain {} record {} of {} passes; of it key frames {}; record at most {}, key frame of {} bytes at most {}",
+            of(chain.get()),
+            of(recordings.get() + frames.get()),
+            passes.get(),
+            of(frames.get()),
+            machine::instructions(most.get()),
+            frame_bytes.get(),
+            machine::instructions(frame.get())
+        );
+        outln!("compact: {} bytes, {} lost", self.used, record.borrow().lost());
+    }
 }

@@ -76,12 +76,16 @@ struct Parts {
     health: &'static [SensorHealth; 2],
     profile: &'static Profile,
     watchdog: &'static Watchdog,
+    #[cfg(feature = "core1-compact")]
+    compact: compact::Writer,
 }
 
 /// Flies until the script ends. As the firmware's `flight::run`.
 #[embassy_executor::task]
 async fn flight(parts: Parts) {
-    let Parts { flight_loop, mut imu, mut flow, mut duties, hardware, image, health, profile, watchdog } = parts;
+    #[cfg(feature = "core1-compact")]
+    let mut compact_writer = parts.compact;
+    let Parts { flight_loop, mut imu, mut flow, mut duties, hardware, image, health, profile, watchdog, .. } = parts;
     let time = Clock(hardware);
     let mut slots = Slots::new(time, devices::RHYTHM);
     let (imu_chip, flow_chip) = (Chip { hardware, number: 0 }, Chip { hardware, number: 1 });
@@ -104,12 +108,10 @@ async fn flight(parts: Parts) {
     );
     let clock = || time.now();
     #[cfg(feature = "core1-compact")]
-    let mut compact_writer = compact::begin();
-    #[cfg(feature = "core1-compact")]
     let record = compact_writer.shared();
-    let write = |_now, _flight_loop: &FlightLoop<'_, Runnables>| {
+    let write = |_now, _flight_loop: &mut FlightLoop<'_, Runnables>| {
         #[cfg(feature = "core1-compact")]
-        compact_writer.pass(_now, _flight_loop);
+        compact_writer.pass(_flight_loop);
         if duties.actuator_motor.has_new()
             && let Some(output) = duties.actuator_motor.latest()
         {
@@ -159,6 +161,8 @@ fn run() -> bool {
         link: outside.link,
         button: outside.button_pin,
     };
+    #[cfg(feature = "core1-compact")]
+    let (compact, mut reader) = compact::begin(flight_loop);
     let executor = EXECUTOR.init_with(|| Executor::new(core::ptr::null_mut()));
     let parts = Parts {
         flight_loop,
@@ -170,6 +174,8 @@ fn run() -> bool {
         health: &HEALTH,
         profile: &PROFILE,
         watchdog: &WATCHDOG,
+        #[cfg(feature = "core1-compact")]
+        compact,
     };
     let Ok(task) = flight(parts) else {
         outln!("no room for the task");
@@ -188,6 +194,8 @@ fn run() -> bool {
             hash.publish(topic as u16, generation, at, words);
             messages += 1;
         });
+        #[cfg(feature = "core1-compact")]
+        reader.take_datagrams();
         marks::aside_ends();
         if !hardware.sleep(|sample| other_core.publish(sample)) {
             break;
@@ -205,7 +213,7 @@ fn run() -> bool {
         waits.periods
     );
     #[cfg(feature = "core1-compact")]
-    compact::print();
+    reader.print();
     if hardware.was_left() {
         outln!("a driver says something else than on the PC");
     }

@@ -2,12 +2,12 @@
 //!
 //! Then one bit of one sample is changed after the other, and the replay has to name what differs.
 
+use stampfly_board::VehicleConfig;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics::{Id, TOPICS};
-use stampfly_board::{VehicleConfig, black_box};
-use stampfly_flight::Recorder;
-use stampfly_flight::compact;
+use stampfly_flight::compact::{self, Contents, Samples};
 use stampfly_flight::replay::{Replay, ReplayOptions, replay};
+use stampfly_flight::{Recorder, black_box};
 use stampfly_log::ulog::{Message, Reader};
 use stampfly_sim::recorder::Memory;
 use stampfly_types::{Duration, Instant};
@@ -23,12 +23,13 @@ fn record(said: &str) -> Option<Vec<u8>> {
     (0..digits.len() / 2).map(|at| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok()).collect()
 }
 
-/// The record as a log.
-fn log(record: &[u8]) -> Result<Vec<u8>, String> {
-    let log = black_box::open(Memory::default(), Instant::ZERO, &VehicleConfig::default(), "emulated board");
+/// The record as a log, and what was in it.
+fn log(record: &[u8]) -> Result<(Vec<u8>, Contents), String> {
+    let config = VehicleConfig::default();
+    let log = black_box::open(Memory::default(), Instant::ZERO, "stampfly", &config, "emulated board");
     let mut log = Recorder::<Runnables, _>::new(log.map_err(|_| "no head")?);
-    compact::read(record, &mut log).map_err(|error| error.to_string())?;
-    Ok(log.into_sink().0)
+    let contents = compact::read(record, &config, Samples::Recorded, &mut log).map_err(|error| error.to_string())?;
+    Ok((log.into_sink().0, contents))
 }
 
 fn again(log: &[u8]) -> Result<Replay, String> {
@@ -58,22 +59,20 @@ fn change(log: &mut [u8], topic: Id, share: f64) -> Option<Instant> {
     Some(at)
 }
 
-/// Bytes of each kind of entry.
-fn shares(record: &[u8]) -> String {
-    compact::shares::<Runnables>(record).iter().map(|(name, bytes)| format!("{name} {bytes}; ")).collect()
-}
-
 fn run(path: &str) -> Result<(), String> {
     let said = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
     let record = record(&said).filter(|record| !record.is_empty()).ok_or("no record")?;
-    println!("{}", shares(&record));
-    let log = log(&record)?;
+    let (log, contents) = log(&record)?;
+    println!("{contents:?}");
     let replayed = again(&log)?;
     println!("{replayed:?}");
     let rate = record.len() as f64 / replayed.duration.seconds_f64();
     println!("{} bytes of record, {rate:.0} bytes per second; {} as a log", record.len(), log.len());
     if let Some(difference) = replayed.difference {
         return Err(difference.to_string());
+    }
+    if contents.gaps > 0 || contents.lost > 0 || contents.idle_since.is_some() {
+        return Err(format!("something is missing: {contents:?}"));
     }
     if replayed.duration < LEAST || replayed.gaps > 0 || replayed.key_frames == 0 {
         return Err(format!("replayed {} with {} gaps; at least {LEAST} is the bar", replayed.duration, replayed.gaps));

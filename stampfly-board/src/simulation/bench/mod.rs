@@ -108,8 +108,15 @@ pub fn with_vehicle<T>(defect: Option<&Defect>, seed: u64, examine: impl FnOnce(
     let mut bus = topics::Bus::new();
     let Assembled { flight_loop, outside, taps } = Assembled::new(&mut bus, None, &config, clock.now());
     let mut tasks = Tasks::new(clock.clone());
-    let Others { motors, indicator, button, link, self_test, console, .. } =
-        sensing::start_drivers(&mut tasks, &clock, (board, &mut shared), (sensors, &wrong), outside, false, &health);
+    let Others { motors, indicator, button, link, self_test, console, .. } = sensing::start_drivers(
+        &mut tasks,
+        &clock,
+        (board, &mut shared),
+        (sensors, &wrong),
+        outside,
+        (false, &config.corrections),
+        &health,
+    );
     let mut publisher = self_test.self_test;
     publisher.publish(clock.now(), &tested.message());
     let session = Session::new(VEHICLE, 1, Some(TRANSMITTER));
@@ -244,6 +251,7 @@ impl Bench<'_> {
             health: self.health,
             profile: self.profile,
             facts: &facts,
+            beside: None,
         };
         let ends = (&mut self.config, &mut self.console);
         self.terminal.send(self.clock.now(), keys, &desk, ends, |_, _| "not on this bench");

@@ -14,7 +14,7 @@ use stampfly_bus::Band;
 use stampfly_sim::World;
 use stampfly_sim::chips::{AttachedChips, Faults};
 use stampfly_sim::fault::{Fault, Injector, Line};
-use stampfly_sim::plant::RotorFault;
+use stampfly_sim::plant::{Plant, RotorFault};
 use stampfly_types::{Instant, Message};
 use std::vec;
 use std::vec::Vec;
@@ -60,7 +60,7 @@ impl Wrong {
 
     /// Switches what acts beside the bus on and off. Call it every turn.
     pub fn act(&mut self, now: Instant, world: &World, chips: Option<&AttachedChips>) {
-        let strikes = world.inspect(|plant| plant.ground().strikes());
+        let strikes = world.inspect_as(|plant: &Plant| plant.ground().strikes()).unwrap_or_default();
         let struck = strikes > self.strikes;
         self.strikes = strikes;
         for ((place, act), in_force) in self.acts.iter().zip(&mut self.in_force) {

@@ -4,6 +4,7 @@
 //! vehicle's own values are in the middle of what a byte holds.
 
 use stampfly_services::msp::{Card, PidRow, PidTerm, Scale};
+use stampfly_services::version;
 
 const fn times(parameter: &'static str, factor: f32) -> Option<PidTerm> {
     Some(PidTerm { parameter, scale: Scale::Times(factor) })
@@ -36,14 +37,15 @@ const ROWS: &[PidRow] = &[
 ];
 
 /// What a configurator is told.
-pub(super) const CARD: Card = Card {
+pub(super) static CARD: Card = Card {
     variant: *b"SFLY",
     board: *b"SFLY",
-    version: [0, 2, 0],
+    version: version(crate::VERSION),
     name: "StampFly",
     kind: 3,
     motors: 4,
     cycle: 2_500,
     long_analog: true,
     rows: ROWS,
+    misc: None,
 };

@@ -4,60 +4,77 @@
 //! |---|---|
 //! | [`PORTS`] | where programs find it, and what is spoken there |
 //! | `services.rs` | bytes of each port → the service that speaks its language |
+//! | `cable.rs` | what is spoken on USB, as by the firmware |
+//! | `handling.rs` | what somebody does to it with their hands |
 //! | `configurator.rs` | what it is for programs that speak MSP |
-//! | `page.rs` | what the ground station's page asks for |
-//! | `seats.rs` | what services see of the vehicle and may ask for: its `Cockpit` |
+//! | `seats.rs` | what services may ask of the vehicle: its `Hands` |
+//!
+//! MAVLink, MSP and the page are the same for every vehicle: [`stampfly_sim::ground`].
 //!
 //! Services publish on the topics of the vehicle's link and console, as the firmware's do, so that the log of such a flight
 //! replays without the programs.
 
+mod cable;
 mod configurator;
-mod page;
+mod handling;
 mod seats;
 mod services;
 
+pub(super) use handling::Handling;
 pub(super) use services::Services;
 
 use crate::VehicleConfig;
 use crate::console::Newest;
+use crate::simulation::faults::FAULTS;
 use crate::topics::{Id, TOPICS};
 use stampfly_drivers::chip::pmw3901;
-use stampfly_services::{DataStream, Places, Telemetry, View};
+use stampfly_flight::compact::Chunks;
+use stampfly_flight::live::Change;
+use stampfly_link::mavlink::dialects::common::MavType;
+use stampfly_services::cable::BODY;
+use stampfly_services::{DataStream, Places, Tape, Telemetry, View, version};
+use stampfly_sim::ground::About;
 use stampfly_sim::vehicle::{Client, PortSpec, Transport};
-use stampfly_types::{Duration, Instant};
+use stampfly_types::Instant;
 use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::vec::Vec;
 
 /// Where programs find it. The places in this table are the constants below.
 pub const PORTS: &[PortSpec] = &[
-    PortSpec { transport: Transport::Page, ..PortSpec::tcp("http", 8_080, "the ground station, in a browser") },
-    PortSpec {
-        transport: Transport::UdpTo,
-        signed: true,
-        ..PortSpec::udp("mavlink-udp", 14_550, "MAVLink, for ground stations")
-    },
-    PortSpec { signed: true, ..PortSpec::tcp("mavlink-tcp", 5_760, "MAVLink, for programs that connect") },
+    PortSpec::PAGE,
+    PortSpec::MAVLINK_UDP,
+    PortSpec::MAVLINK_TCP,
     PortSpec::udp("tello", 8_889, "text commands of a Tello"),
     PortSpec { transport: Transport::UdpTo, ..PortSpec::udp("tello-state", 8_890, "its state, to whoever commands") },
     PortSpec { transport: Transport::UdpTo, ..PortSpec::udp("telemetry", 5_005, "a packet in 20 ms, for displays") },
     PortSpec::udp("stream", 8_890, "every control cycle, for who asks"),
     PortSpec::tcp("console", 2_323, "the command line: nc, telnet"),
-    PortSpec::tcp("msp", 5_761, "MSP, for configurators"),
-    PortSpec { transport: Transport::Terminal, ..PortSpec::tcp("msp-serial", 0, "the same, at a serial port") },
+    PortSpec::MSP,
+    PortSpec::MSP_SERIAL,
+    PortSpec { transport: Transport::Terminal, ..PortSpec::tcp("usb", 0, "what a board speaks on USB") },
+    PortSpec::tcp("usb-tcp", 5_763, "the same, for programs that connect"),
 ];
 
-const PAGE: usize = 0;
-const MAVLINK_UDP: usize = 1;
-const MAVLINK_TCP: usize = 2;
 const TELLO: usize = 3;
 const TELLO_STATE: usize = 4;
 const TELEMETRY: usize = 5;
 const STREAM: usize = 6;
 const CONSOLE: usize = 7;
-const MSP: usize = 8;
-const MSP_SERIAL: usize = 9;
+const USB: usize = 10;
+const USB_TCP: usize = 11;
 
-/// Between two looks at the ports: what is heard waits for so long at most.
-pub(super) const PERIOD: Duration = Duration::from_millis(5);
+/// What it is for programs at its ports.
+const ABOUT: About = About {
+    kind: MavType::MAV_TYPE_QUADROTOR,
+    version: version(crate::VERSION),
+    take_off_height: 0.5,
+    reach: 0.25,
+    card: Some(&configurator::CARD),
+    ports: PORTS,
+    faults: FAULTS,
+    topics: &TOPICS,
+};
 
 /// What services collect while the vehicle flies, sample by sample.
 #[derive(Debug)]
@@ -68,6 +85,11 @@ pub(super) struct Seen {
     pub stream: RefCell<DataStream<Client>>,
     /// Parameters that were kept for the next start.
     pub kept: RefCell<Option<VehicleConfig>>,
+    /// Parameters that have changed, for the moment when the vehicle is at rest and disarmed.
+    pub changed: RefCell<Option<Change<VehicleConfig>>>,
+    /// Who is sent the flight record, and what of it waits to be sent.
+    pub tape: RefCell<Tape<Client>>,
+    pub chunks: RefCell<VecDeque<Vec<u8>>>,
     /// Somebody has asked for a restart.
     pub restarts: Cell<bool>,
 }
@@ -81,12 +103,33 @@ impl Default for Seen {
             telemetry: RefCell::new(Telemetry::new(count)),
             stream: RefCell::new(DataStream::new(count)),
             kept: RefCell::default(),
+            changed: RefCell::default(),
+            tape: RefCell::new(Tape::new()),
+            chunks: RefCell::default(),
             restarts: Cell::new(false),
         }
     }
 }
 
+/// Chunks that wait for the cable's turn. What there is no room for stays in the ring.
+const WAITING: usize = 64;
+/// Bytes of the record that make a chunk: as much as a flight has in the time of a turn.
+const LEAST: usize = 256;
+
 impl Seen {
+    /// Takes of the flight record what somebody wants of it.
+    pub fn stream(&self, now: Instant, chunks: &mut dyn Chunks) {
+        let (mut tape, mut waiting) = (self.tape.borrow_mut(), self.chunks.borrow_mut());
+        tape.poll(now, chunks);
+        let Some(line) = tape.line() else { return waiting.clear() };
+        let mut room = [0; BODY];
+        while waiting.len() < WAITING
+            && let Some(chunk) = tape.chunk(line, chunks, &mut room, LEAST)
+        {
+            waiting.push_back(chunk.to_vec());
+        }
+    }
+
     /// A sample was published.
     pub fn note(&self, id: Id, at: Instant, words: &[u32]) {
         self.newest.borrow_mut().note(id as usize, at, words);

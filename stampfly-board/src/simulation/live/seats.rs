@@ -1,100 +1,105 @@
-//! What services see of the simulated StampFly, and what they may ask of it.
+//! What services may ask of the simulated StampFly.
 
 use super::Seen;
 use crate::VehicleConfig;
-use crate::console::{Command, Newest, TEST_DUTY};
+use crate::console::Command;
+use crate::messages::ParameterChange;
+use crate::parameters;
 use crate::simulation::radio::Radio;
 use crate::topics::ConsoleEnds;
+use stampfly_flight::console;
+use stampfly_flight::console::calibrate::Calibrate;
+use stampfly_flight::live::Told;
 use stampfly_flight::parameters::Parameters;
-use stampfly_services::{Cockpit, Lease, Places, Refusal, Request, Seat, View};
+use stampfly_services::{Hands, Refusal, Request};
+use stampfly_sim::ground::Ground;
+use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
-use stampfly_types::{Duration, Instant};
-
-/// A transmitter that was not heard for this long is off; then somebody else may take the sticks.
-const TRANSMITTER: Duration = Duration::from_millis(500);
 
 /// What lives as long as the vehicle is on.
-pub(super) struct Controls<'b> {
+pub(super) type Controls<'b> = Ground<Board<'b>>;
+
+/// Its radio, console and flash.
+pub(super) struct Board<'b> {
     pub radio: Radio<'b>,
     pub console: ConsoleEnds<'b>,
-    pub lease: Lease,
-    pub places: Places,
-    /// The configuration of the next start.
+    /// The configuration of the next start, and of this one as far as runnables hold it, as soon as the vehicle is disarmed.
     pub config: VehicleConfig,
-    /// Who has the sticks, and when they were last heard.
-    pub sticks: Option<(Seat, Instant)>,
+    /// What of it was told.
+    pub told: Told<VehicleConfig>,
+    pub seen: &'b Seen,
 }
 
-impl Controls<'_> {
-    /// What is to be done now and then, whoever is connected.
-    pub fn poll(&mut self, now: Instant, newest: &Newest) {
-        if !View::new(newest, &self.places).state().armed {
-            self.lease.release();
-        }
-        if self.lease.is_sign_due(now) {
-            // A vehicle whose queue is full hears enough.
-            _ = self.radio.command(GuidedCommand::default());
-        }
-    }
-}
-
-/// The vehicle, for one call of a service.
-pub(super) struct Seats<'s, 'b> {
-    pub controls: &'s mut Controls<'b>,
-    pub newest: &'s Newest,
-    pub seen: &'s Seen,
-}
-
-impl Cockpit for Seats<'_, '_> {
-    fn view(&self) -> View<'_> {
-        View::new(self.newest, &self.controls.places)
+impl Hands for Board<'_> {
+    fn command(&mut self, _: Instant, command: GuidedCommand) -> Result<(), Refusal> {
+        self.radio.command(command).then_some(()).ok_or(Refusal::Full)
     }
 
-    fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand) -> Result<(), Refusal> {
-        self.controls.lease.ask(now, seat, &command)?;
-        if self.controls.radio.command(command) { Ok(()) } else { Err(Refusal::Full) }
-    }
-
-    fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
-        let other = self.controls.sticks.filter(|(other, at)| *other != seat && now.since(*at) < TRANSMITTER);
-        // A kill is everybody's.
-        if other.is_some() && !input.kill {
-            return Err(Refusal::PilotFlies);
-        }
-        if other.is_none() {
-            self.controls.sticks = Some((seat, now));
-        }
-        self.controls.radio.sticks(&input.cleaned());
+    fn sticks(&mut self, _: Instant, input: &PilotInput) -> Result<(), Refusal> {
+        self.radio.sticks(input);
         Ok(())
     }
 
-    fn alive(&mut self, now: Instant, seat: Seat) {
-        self.controls.lease.alive(now, seat);
-    }
-
     fn parameters(&mut self) -> &mut dyn Parameters {
-        &mut self.controls.config
+        &mut self.config
     }
 
     fn request(&mut self, now: Instant, request: Request) -> Result<(), Refusal> {
         let command = match request {
             Request::StopMotor => Command::StopMotor,
-            _ if self.view().state().armed => return Err(Refusal::Armed),
-            Request::TestMotor { motor: motor @ 1..=4, duty } if (0.0..=TEST_DUTY).contains(&duty) => {
-                Command::TestMotor { motor, duty }
-            }
-            Request::TestMotor { .. } => return Err(Refusal::Range),
+            Request::TestMotor { motor, duty } => Command::test(motor, duty).ok_or(Refusal::Range)?,
             Request::SaveParameters => {
-                self.seen.kept.replace(Some(self.controls.config.clone()));
+                self.seen.kept.replace(Some(self.config.clone()));
                 return Ok(());
             }
             Request::Restart => {
                 self.seen.restarts.set(true);
                 return Ok(());
             }
+            Request::Calibrate(kind) => Command::Calibrate(Calibrate::Begin(kind)),
+            Request::AcceptCalibration(report) if self.config.corrections.accept(&report) => {
+                self.seen.kept.replace(Some(self.config.clone()));
+                return Ok(());
+            }
+            Request::AcceptCalibration(_) => return Err(Refusal::Range),
             _ => return Err(Refusal::Unsupported),
         };
-        command.publish(now, &mut self.controls.console);
+        command.publish(now, &mut self.console);
         Ok(())
+    }
+
+    /// Tells what of the parameters has changed, whoever has changed it.
+    fn poll(&mut self, now: Instant, _: bool) {
+        let Self { told, config, console, seen, .. } = self;
+        let lines = |name: &str| parameters::holders(name).iter().map(|line| *line as usize);
+        let change = told.changes(config, lines, &mut |index, value| {
+            console.parameter_change.publish(now, &ParameterChange { index: index as u32, value });
+        });
+        if let Some(change) = change {
+            let earlier = seen.changed.take();
+            seen.changed.replace(Some(match &earlier {
+                Some(earlier) => change.after(earlier),
+                None => change,
+            }));
+        }
+    }
+}
+
+/// What a board would do, as far as a simulated one does it. The console hands it out only while the vehicle is disarmed.
+pub(super) fn obey(request: &console::Request<Command>, seen: &Seen, config: &VehicleConfig) -> &'static str {
+    match request {
+        console::Request::SaveParameters => {
+            seen.kept.replace(Some(config.clone()));
+            "saved, for the next start"
+        }
+        console::Request::ResetParameters => {
+            seen.kept.replace(Some(VehicleConfig::default()));
+            "erased; the next start has the vehicle's own"
+        }
+        console::Request::Reboot => {
+            seen.restarts.set(true);
+            "restarting"
+        }
+        _ => "not of a simulated vehicle",
     }
 }

@@ -1,53 +1,46 @@
 //! The services of the simulated StampFly, each at its port.
 
-use super::configurator::CARD;
-use super::seats::{Controls, Seats};
-use super::{CONSOLE, MAVLINK_TCP, MAVLINK_UDP, MSP, MSP_SERIAL, PAGE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE};
+use super::cable::Cable;
+use super::handling::Handling;
+use super::seats::{Board, Controls, obey};
+use super::{ABOUT, CONSOLE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE, USB, USB_TCP};
 use crate::VehicleConfig;
-use crate::console::{Command, Newest, Profile};
+use crate::console::{Newest, Profile};
 use crate::simulation::radio::Radio;
 use crate::simulation::sensing::{Healths, Sensing};
 use crate::simulation::terminal::{Desk, Terminal};
 use crate::topics::ConsoleEnds;
-use stampfly_flight::console::Request;
-use stampfly_link::mavlink::dialects::common::MavType;
-use stampfly_link::mavlink::signing::SigningKey;
-use stampfly_services::mavlink::{Identity, Mavlink};
-use stampfly_services::msp::Msp;
+use stampfly_flight::live::Told;
 use stampfly_services::tello::Destination;
-use stampfly_services::{Lease, Tello, View};
-use stampfly_sim::ask::{Ask, Asked};
+use stampfly_services::{Tello, View};
+use stampfly_sim::World;
+use stampfly_sim::ask::Reply;
 use stampfly_sim::fault::Injector;
-use stampfly_sim::vehicle::{Client, Heard, Link, Live, Ports, Put, Speed};
+use stampfly_sim::ground::{Ground, TURN};
+use stampfly_sim::vehicle::{Client, Heard, Link, Live, Put};
 use stampfly_types::Instant;
-use std::sync::Arc;
+use std::rc::Rc;
 use std::vec::Vec;
 
-/// What is answered to what only a board can do.
-const NOT_SIMULATED: &str = "not of a simulated vehicle";
 /// What the simulated vehicle calls itself.
 const VERSION: &str = concat!("stampfly ", env!("CARGO_PKG_VERSION"), ", simulated");
-/// Ticks between two turns of the services that send by themselves: 20 ms.
-const TURN: u32 = 4;
+/// Ticks between two turns of a cable: 10 ms.
+const CABLE: u32 = 2;
 
 /// The services.
 pub struct Services<'b> {
-    pub(super) controls: Controls<'b>,
-    pub(super) seen: &'b Seen,
+    controls: Controls<'b>,
+    seen: &'b Seen,
     sensing: Sensing,
     health: &'b Healths,
     profile: &'b Profile,
-    mavlink: Mavlink<Client>,
-    /// Tells which ports are this machine's alone.
-    ports: Arc<dyn Ports>,
-    msp: Vec<(Client, Msp)>,
+    cables: Vec<(Client, Cable)>,
     tello: Tello<Client>,
     /// Number of the port that a Tello's state is sent to.
     tello_state: Option<u16>,
     telemetry: Option<Client>,
     terminals: Vec<(Client, Terminal)>,
-    pub(super) faults: Injector,
-    pub(super) speed: Option<Speed>,
+    handling: Rc<Handling>,
 }
 
 impl<'b> Services<'b> {
@@ -57,50 +50,51 @@ impl<'b> Services<'b> {
         radio: Radio<'b>,
         console: ConsoleEnds<'b>,
         (config, sensing): (&VehicleConfig, Sensing),
-        faults: &Injector,
+        (faults, world): (&Injector, &World),
         (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
     ) -> Self {
-        let identity = Identity {
-            system: u8::try_from(live.number + 1).unwrap_or(u8::MAX),
-            kind: MavType::MAV_TYPE_QUADROTOR,
-            take_off_height: 0.5,
-            version: [0, 2, 0],
-        };
-        let controls = Controls {
-            radio,
-            console,
-            lease: Lease::new(),
-            places: seen.places.clone(),
-            config: config.clone(),
-            sticks: None,
-        };
+        let hands = Board { radio, console, config: config.clone(), told: Told::new(config.clone()), seen };
         Self {
-            controls,
+            controls: Ground::new(&ABOUT, live, faults, hands),
             seen,
             sensing,
             health,
             profile,
-            mavlink: match live.ports.signing() {
-                Some(signing) => Mavlink::new(identity).with_key(SigningKey::new(signing.key), signing.time),
-                None => Mavlink::new(identity),
-            },
-            ports: live.ports.clone(),
-            msp: Vec::new(),
+            cables: Vec::new(),
             tello: Tello::new(),
             tello_state: None,
             telemetry: None,
             terminals: Vec::new(),
-            faults: faults.clone(),
-            speed: live.speed.clone(),
+            handling: Rc::new(Handling::new(world)),
         }
     }
 
     /// What every command line of the vehicle shares.
-    pub(super) fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
+    fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
     where
         Self: 'd,
     {
-        Desk { version: VERSION, newest, sensing: self.sensing, health: self.health, profile: self.profile, facts: &[] }
+        let Self { sensing, health, profile, ref handling, .. } = *self;
+        let beside = Some(handling.clone());
+        Desk { version: VERSION, newest, sensing, health, profile, facts: &[], beside }
+    }
+
+    /// A cable's turn: what has come over it, or what is due.
+    fn plug(&mut self, now: Instant, from: Client, bytes: Option<&[u8]>, put: Put<'_>) {
+        let seen = self.seen;
+        let newest = seen.newest.borrow();
+        let desk = self.desk(&newest);
+        let Some((_, cable)) = self.cables.iter_mut().find(|(client, _)| *client == from) else { return };
+        // One write a turn, however many frames.
+        let mut sent = Vec::new();
+        let mut send = |bytes: &[u8]| sent.extend_from_slice(bytes);
+        match bytes {
+            Some(bytes) => cable.hear(now, bytes, &mut self.controls, &desk, &mut send),
+            None => cable.poll(now, from, &mut self.controls, &desk, &mut send),
+        }
+        if !sent.is_empty() {
+            put(&from, &sent);
+        }
     }
 
     fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
@@ -108,49 +102,19 @@ impl<'b> Services<'b> {
         let newest = seen.newest.borrow();
         let desk = self.desk(&newest);
         let Some((_, terminal)) = self.terminals.iter_mut().find(|(client, _)| *client == from) else { return };
-        let Controls { config, console, .. } = &mut self.controls;
+        let Board { config, console, .. } = &mut self.controls.hands;
         terminal.send(now, keys, &desk, (config, console), |request, config| obey(request, seen, config));
         put(&from, core::mem::take(&mut terminal.screen).as_bytes());
-    }
-}
-
-/// What a board would do, as far as a simulated one does it. The console hands it out only while the vehicle is disarmed.
-pub(super) fn obey(request: &Request<Command>, seen: &Seen, config: &VehicleConfig) -> &'static str {
-    match request {
-        Request::SaveParameters => {
-            seen.kept.replace(Some(config.clone()));
-            "saved, for the next start"
-        }
-        Request::ResetParameters => {
-            seen.kept.replace(Some(VehicleConfig::default()));
-            "erased; the next start has the vehicle's own"
-        }
-        Request::Reboot => {
-            seen.restarts.set(true);
-            "restarting"
-        }
-        _ => NOT_SIMULATED,
     }
 }
 
 impl Link for Services<'_> {
     fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
         let newest = self.seen.newest.borrow();
-        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest, seen: self.seen };
         match (from.port, heard) {
-            (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) if self.ports.is_local(from.port) => {
-                self.mavlink.open_local(now, from, true);
-            }
-            (MAVLINK_UDP | MAVLINK_TCP, Heard::Opened) => self.mavlink.open(now, from, true),
-            (MAVLINK_UDP | MAVLINK_TCP, Heard::Bytes(bytes)) => {
-                if self.ports.is_local(from.port) {
-                    self.mavlink.open_local(now, from, false);
-                }
-                self.mavlink.hear(now, from, bytes, &mut cockpit, put);
-            }
-            (MAVLINK_UDP | MAVLINK_TCP, Heard::Closed) => self.mavlink.close(from),
             (TELLO, Heard::Bytes(text)) => {
                 let tello_state = self.tello_state;
+                let mut cockpit = self.controls.seated(&*newest);
                 self.tello.hear(now, from, text, &mut cockpit, &mut |to, what, bytes| {
                     put(&destination(*to, what, tello_state), bytes);
                 });
@@ -168,41 +132,64 @@ impl Link for Services<'_> {
                 drop(newest);
                 self.type_in(now, from, keys, put);
             }
-            (PAGE, Heard::Bytes(text)) => {
+            (USB | USB_TCP, Heard::Opened) => {
+                let config = &self.controls.hands.config;
+                self.cables.push((from, Cable::new(self.controls.identity(), config)));
+            }
+            (USB | USB_TCP, Heard::Bytes(bytes)) => {
                 drop(newest);
-                let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
-                let Some(asked) = asked else { return };
-                let answer = self.page(now, &asked.ask);
-                // What is said again and again needs no answer.
-                if !matches!(asked.ask, Ask::Sticks(_) | Ask::Alive {}) {
-                    put(&from, asked.answered(answer).as_bytes());
-                }
+                self.plug(now, from, Some(bytes), put);
             }
-            (MSP | MSP_SERIAL, Heard::Opened) => self.msp.push((from, Msp::new(&CARD))),
-            (MSP | MSP_SERIAL, Heard::Bytes(bytes)) => {
-                if let Some((_, msp)) = self.msp.iter_mut().find(|(client, _)| *client == from) {
-                    msp.hear(now, bytes, &mut cockpit, &mut |frame| put(&from, frame));
-                }
+            (USB | USB_TCP, Heard::Closed) => {
+                self.seen.tape.borrow_mut().ask(now, from, false);
+                self.cables.retain(|(client, _)| *client != from);
             }
-            (MSP | MSP_SERIAL, Heard::Closed) => self.msp.retain(|(client, _)| *client != from),
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
-            _ => {}
+            (_, heard) => {
+                let (desk, seen) = (self.desk(&newest), self.seen);
+                let console = &mut |Board { config, console, .. }: &mut Board<'_>, line: &str| {
+                    let mut terminal = Terminal::new();
+                    let keys = std::format!("{line}\r");
+                    let board = |request: &_, config: &_| obey(request, seen, config);
+                    terminal.send(now, keys.as_bytes(), &desk, (config, console), board);
+                    // Without the echo and the prompt.
+                    let screen = terminal.screen.strip_prefix(line).unwrap_or(&terminal.screen);
+                    Ok(Reply::text(screen.trim_end_matches("> ").trim()))
+                };
+                self.controls.hear(now, from, heard, &*newest, console, put);
+            }
         }
     }
 
     fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
         let newest = self.seen.newest.borrow();
-        self.controls.poll(now, &newest);
+        self.controls.poll(now, &*newest);
+        self.handling.poll(now);
+        for (client, terminal) in &mut self.terminals {
+            terminal.tell(&newest);
+            if !terminal.screen.is_empty() {
+                put(client, core::mem::take(&mut terminal.screen).as_bytes());
+            }
+        }
         let view = View::new(&*newest, &self.seen.places);
         self.seen.stream.borrow_mut().poll(now, &view, put);
         if let Some(to) = &self.telemetry {
             self.seen.telemetry.borrow_mut().poll(now, &view, &mut |packet| put(to, packet));
         }
+        if tick.is_multiple_of(CABLE) {
+            drop(newest);
+            for place in 0..self.cables.len() {
+                if let Some(client) = self.cables.get(place).map(|(client, _)| *client) {
+                    self.plug(now, client, None, put);
+                }
+            }
+        }
         if !tick.is_multiple_of(TURN) {
             return;
         }
-        let mut cockpit = Seats { controls: &mut self.controls, newest: &newest, seen: self.seen };
-        self.mavlink.poll(now, &mut cockpit, put);
+        let newest = self.seen.newest.borrow();
+        self.controls.answer(now, &*newest, put);
+        let mut cockpit = self.controls.seated(&*newest);
         let tello_state = self.tello_state;
         self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| put(&destination(*to, what, tello_state), bytes));
     }

@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};
 use stampfly_host::campaign::shard::Shard;
+use stampfly_host::connect::Place;
 use stampfly_host::serve::PortOption;
 use stampfly_host::vehicles;
 use stampfly_lab::dataset::Kind;
@@ -34,6 +35,8 @@ pub enum Command {
     Fly(FlyOptions),
     /// Simulate a vehicle in real time for other programs, which fly it over UDP.
     Serve(ServeOptions),
+    /// Serve the ground station's page, and MAVLink, for a vehicle at a serial port or behind TCP.
+    Connect(ConnectOptions),
     /// Write a page that has a vehicle and its world inside: one file, no server (`cargo xtask demo` does all of it).
     Demo(DemoOptions),
     /// Fly a log again, bit for bit, from what came from outside.
@@ -217,12 +220,43 @@ pub struct ServeOptions {
     /// The same as `--port listen=ADDRESS`.
     #[arg(long, value_name = "ADDRESS")]
     pub listen: Option<SocketAddr>,
+    /// Send the compact record of the flight there, a datagram a chunk, while it is flown: `127.0.0.1:5006`. Of the n-th vehicle ten
+    /// numbers higher each. `stampfly log receive` writes it to a file.
+    #[arg(long, value_name = "ADDRESS")]
+    pub record: Option<SocketAddr>,
     /// For how long, in the vehicle's seconds. Without this: until Ctrl-C.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     pub seconds: Option<f32>,
     /// How fast its time passes, 0.1 to 100; 1 is real time. Slower gives busy machines and debuggers time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub speed: f32,
+}
+
+/// Options of `connect`.
+#[derive(Clone, Debug, Args)]
+pub struct ConnectOptions {
+    /// The vehicle's serial port, such as /dev/ttyACM0, or tcp:HOST:PORT. Without this: the only one that looks like a vehicle's. One
+    /// that is not there, or not any more, is waited for.
+    #[arg(value_name = "PATH|tcp:HOST:PORT")]
+    pub place: Option<Place>,
+    #[command(flatten)]
+    pub vehicle: VehicleOption,
+    /// Where a port is to be, or not at all: `http=8081`, `mavlink-tcp=off`; may be repeated. Number 0 is any that is free. Whoever
+    /// reaches the page can fly the vehicle: leave it on this machine, or in a network of your own.
+    #[arg(long, value_name = "NAME=ADDRESS")]
+    pub port: Vec<PortOption>,
+    /// Speed of the serial port, baud. USB has none.
+    #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(1200..=10_000_000))]
+    pub baud: u32,
+    /// Asks the vehicle for its compact flight record, and writes it into this file: everything that a replay needs. `stampfly replay` and `stampfly log` read it.
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Folder for the logs of what has come over the line.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// For how long. Without this: until Ctrl-C.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    pub seconds: Option<f32>,
 }
 
 /// Options of `demo`.
@@ -240,7 +274,7 @@ pub struct DemoOptions {
 pub enum LogCommand {
     /// Vehicle, length, topics with their rates, gaps.
     Info {
-        /// A ULog file.
+        /// A ULog file, or a compact flight record.
         file: PathBuf,
         /// Print one JSON object on standard output.
         #[arg(long)]
@@ -248,7 +282,7 @@ pub enum LogCommand {
     },
     /// A table a topic.
     Csv {
-        /// A ULog file.
+        /// A ULog file, or a compact flight record.
         file: PathBuf,
         /// Only this topic; may be repeated.
         #[arg(long, value_name = "NAME")]
@@ -259,7 +293,7 @@ pub enum LogCommand {
     },
     /// MCAP, for Foxglove and PlotJuggler.
     Mcap {
-        /// A ULog file.
+        /// A ULog file, or a compact flight record.
         file: PathBuf,
         /// Only this topic; may be repeated.
         #[arg(long, value_name = "NAME")]
@@ -268,9 +302,26 @@ pub enum LogCommand {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+    /// Write a compact flight record to a file as it arrives, in datagrams, until none has come for three seconds.
+    Receive {
+        /// Where it arrives: `127.0.0.1:5006`.
+        address: SocketAddr,
+        /// The file to write.
+        out: PathBuf,
+        /// Not longer than this many seconds.
+        #[arg(long = "for", value_name = "SECONDS", default_value_t = 86_400)]
+        seconds: u32,
+    },
+    /// A compact flight record as a ULog, with everything that is published when it is run again.
+    Ulog {
+        /// A compact flight record.
+        file: PathBuf,
+        /// The file to write.
+        out: PathBuf,
+    },
     /// A part of a flight, which replays from its first key frame on.
     Cut {
-        /// A ULog file.
+        /// A ULog file, or a compact flight record.
         file: PathBuf,
         /// From when on, seconds since power-on.
         #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
@@ -281,6 +332,23 @@ pub enum LogCommand {
         /// The file to write.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
+    },
+    /// A simulated flight again, with other parameters from an instant on, and both courses beside one another.
+    Refly {
+        /// The log of a flight of `stampfly fly`.
+        file: PathBuf,
+        /// From when on, seconds since power-on.
+        #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+        from: f64,
+        /// Change a parameter; may be repeated.
+        #[arg(long, value_name = "NAME=VALUE", required = true)]
+        param: Vec<String>,
+        /// The report to write; the new flight's log is written beside it. Without this: beside the log.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+        /// Print one JSON object on standard output.
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -387,7 +455,7 @@ pub enum Engine {
 /// Options of `replay`.
 #[derive(Clone, Debug, Args)]
 pub struct ReplayOptions {
-    /// The log.
+    /// The log, or a compact flight record.
     pub file: PathBuf,
     /// The vehicle, for a log that does not name its own.
     #[arg(long, value_name = "NAME")]

@@ -8,6 +8,7 @@ use stampfly_bus::Schedule;
 use stampfly_host::campaign;
 use stampfly_host::campaign::row::Row;
 use stampfly_host::flown::{Flown, fly};
+use stampfly_host::log::refly;
 use stampfly_host::recorder::{Recorder, Timing};
 use stampfly_host::report::{Metric, Report};
 use stampfly_host::vehicles::{self, ForVehicle};
@@ -124,11 +125,7 @@ pub(crate) fn fly_and_write<V: Vehicle>(
     fly: impl FnOnce(&V::Setup, Recorder<V>, Progress<'_>) -> Result<(Flown<V::Outcome>, Recorder<V>), Failure>,
 ) -> Result<(Flown<V::Outcome>, Recorder<V>), Failure> {
     std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
-    let facts = [
-        ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        ("seed".to_owned(), seed.to_string()),
-        ("mission".to_owned(), flight.mission.clone().unwrap_or_else(|| "default".into())),
-    ];
+    let facts = refly::facts::<V>(flight, seed)?;
     let recorder = Recorder::<V>::with_log(setup, &facts);
     let bar = terminal::bar(1000, "{msg:<11} {wide_bar:.cyan} {percent:>3} % of the mission");
     let flown = fly(setup, recorder, &mut |done, word| {

@@ -7,6 +7,7 @@ macro_rules! outln {
 
 mod arguments;
 mod campaign;
+mod connect;
 mod demo;
 mod doctor;
 mod engine;
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Log(command) => log::run(&command),
         Command::Fly(options) => fly::run(&options),
         Command::Serve(options) => serve::run(&options),
+        Command::Connect(options) => connect::run(&options),
         Command::Replay(options) => replay::run(&options),
         Command::Topics(options) => topics::run(&options),
         Command::Schedule(options) => schedule::run(&options),

@@ -2,8 +2,11 @@
 
 use crate::arguments::ReplayOptions;
 use crate::failure::Failure;
+use crate::log::told;
 use serde_json::json;
+use stampfly_flight::compact::Samples;
 use stampfly_flight::{Replay, replay};
+use stampfly_host::log::record;
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;
@@ -11,10 +14,24 @@ use std::process::ExitCode;
 
 pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
     let path = options.file.display();
-    let bytes = std::fs::read(&options.file).map_err(|error| format!("{path}: {error}"))?;
+    let mut bytes = std::fs::read(&options.file).map_err(|error| format!("{path}: {error}"))?;
+    let mut from = options.from.map(|seconds| Instant::from_micros((seconds.max(0.0) * 1e6) as u64));
+    let contents = if record::is_record(&bytes) {
+        let again = record::run_again(&bytes, options.vehicle.as_deref(), Samples::Recorded);
+        let (log, contents) = again.map_err(|error| format!("{path}: {error}"))?;
+        // It begins with a key frame, not at power-on.
+        (bytes, from) = (log, from.or(Some(Instant::ZERO)));
+        Some(contents)
+    } else {
+        None
+    };
+    if let Some(since) = contents.as_ref().and_then(|contents| contents.idle_since) {
+        return Err(
+            format!("{path}: another program's record: nothing is due here at {since}, when something ran").into()
+        );
+    }
     let named = options.vehicle.as_deref().or_else(|| replay::vehicle_name(&bytes)).unwrap_or(vehicles::DEFAULT);
-    let from = options.from.map(|seconds| Instant::from_micros((seconds.max(0.0) * 1e6) as u64));
-    let task = Again { bytes: &bytes, options: replay::ReplayOptions { from, ..Default::default() } };
+    let task = Again { bytes: &bytes, options: replay::ReplayOptions { from, is_thinned: contents.is_some() } };
     let result = vehicles::with(named, task)?.map_err(|error| format!("{path}: {error}"))?;
     if options.json {
         let difference = result.difference.as_ref().map(|difference| {
@@ -41,6 +58,9 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
                 result.key_frames
             ),
             Some(difference) => outln!("{path}: differs: {difference}"),
+        }
+        if let Some(contents) = contents {
+            outln!("a compact record: {}", told(&contents));
         }
         if result.skipped > 0 {
             outln!("{} activations were not repeated: before the start, or in {} gaps", result.skipped, result.gaps);

@@ -8,20 +8,18 @@ use crate::failure::Failure;
 use crate::fly::{figures, write_report};
 use serde_json::Value;
 use stampfly_host::flown::{Flown, fly};
-use stampfly_host::ground::{Client, Hub, Limits, Server, VehicleCard, Watch, ask};
+use stampfly_host::ground::{Client, Hub, Limits, Server, VehicleCard, Watch};
+use stampfly_host::log_file::LogFile;
 use stampfly_host::recorder::Recorder;
-use stampfly_host::serve::{Key, OpenPorts, Page, PortOption};
+use stampfly_host::serve::{Key, OpenPorts, Page, PortOption, RecordOut};
 use stampfly_host::vehicles::{self, ForVehicle};
-use stampfly_log::ulog::Sink;
 use stampfly_sim::vehicle::{Live, Options, Speed, Transport, Vehicle, Verdict};
 use stampfly_types::Duration;
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::net::{Ipv6Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 /// A log of more bytes has no report: a browser would not open it. Some ten minutes of one vehicle.
@@ -90,7 +88,7 @@ fn hub<V: Vehicle>(options: &ServeOptions) -> Result<Arc<Hub>, Failure> {
     for number in 0..options.count {
         let setup = options.scene.setup::<V>(options.seed + u64::from(number), None, None)?;
         let name = format!("{} {}", V::NAME, number + 1);
-        let mut card = VehicleCard::of::<V>(&name, V::config(&setup)).offering(ask::NAMES);
+        let mut card = VehicleCard::of::<V>(&name, V::config(&setup)).offering(V::ASKS);
         let [column, row] = [number % COLUMNS, number / COLUMNS].map(|place| f32::from(place) * APART);
         card.place = [-row, column];
         cards.push(card);
@@ -140,10 +138,7 @@ fn open<V: Vehicle>(options: &ServeOptions, hub: &Arc<Hub>) -> Result<Vec<Arc<Op
     }
     let listen = options.listen.map(|address| PortOption { name: "listen".into(), address: Some(address) });
     let wanted: Vec<_> = options.port.iter().cloned().chain(listen).collect();
-    if let Some(unknown) = wanted.iter().find(|wanted| V::PORTS.iter().all(|port| port.name != wanted.name)) {
-        let names: Vec<_> = V::PORTS.iter().map(|port| port.name).collect();
-        return Err(format!("{} has no port '{}'; it has {}", V::NAME, unknown.name, names.join(", ")).into());
-    }
+    PortOption::check(&wanted, V::PORTS, V::NAME)?;
     let which = |number: usize| if options.count == 1 { String::new() } else { format!("vehicle {}  ", number + 1) };
     let key = options.key.as_deref().map(Key::read).transpose()?.map(|key| key.everywhere(options.sign_all));
     let mut all = Vec::new();
@@ -161,24 +156,6 @@ fn open<V: Vehicle>(options: &ServeOptions, hub: &Arc<Hub>) -> Result<Vec<Arc<Op
     Ok(all)
 }
 
-/// A log on the disk. Shared with those who want to read it during the flight.
-#[derive(Clone)]
-struct LogFile(Arc<Mutex<BufWriter<File>>>);
-
-impl LogFile {
-    fn lock(&self) -> MutexGuard<'_, BufWriter<File>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Sink for LogFile {
-    type Error = std::io::Error;
-
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        self.lock().write_all(bytes)
-    }
-}
-
 /// A flight that is over: how it went, its hash, its log.
 type Over<V> = (Flown<<V as Vehicle>::Outcome>, u64, PathBuf);
 
@@ -192,6 +169,7 @@ struct Flight<'s, V: Vehicle> {
     recorder: Recorder<V, LogFile>,
     log: PathBuf,
     watch: Watch,
+    record: RecordOut,
 }
 
 impl<'s, V: Vehicle> Flight<'s, V> {
@@ -223,34 +201,37 @@ impl<'s, V: Vehicle> Flight<'s, V> {
         let again = if restarts == 0 { String::new() } else { format!("-restart-{restarts}") };
         let log = options.out.join(format!("flight{which}{again}.ulg"));
         let failed = |error| format!("{}: {error}", log.display());
-        let file = LogFile(Arc::new(Mutex::new(BufWriter::new(File::create(&log).map_err(failed)?))));
+        let file = LogFile::create(log.clone()).map_err(failed)?;
         let facts = [
             ("ver_sw".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
             ("seed".to_owned(), (options.seed + number as u64).to_string()),
             ("mission".to_owned(), "other programs".to_owned()),
         ];
-        let (so_far, path) = (file.clone(), log.clone());
-        hub.provide_log(number, move || {
-            // What is still in memory goes to the disk first.
-            _ = so_far.lock().flush();
-            std::fs::read(&path).unwrap_or_default()
-        });
+        let so_far = file.clone();
+        hub.provide_log(number, move || so_far.so_far());
         let watch = hub.witness(number).ok_or("the ground station does not know this vehicle")?;
         let recorder =
             Recorder::with_sink(file, &setup, &facts).map_err(|error| format!("{}: {error:?}", log.display()))?;
-        Ok(Self { options, number, ports, hub, setup, recorder, log, watch })
+        let record = options.record.map_or_else(
+            || Ok(RecordOut::nowhere()),
+            |to| {
+                let port = to.port().saturating_add(10 * number as u16);
+                RecordOut::datagrams(V::NAME, (to.ip(), port).into()).map_err(|error| format!("{to}: {error}"))
+            },
+        )?;
+        Ok(Self { options, number, ports, hub, setup, recorder, log, watch, record })
     }
 
     /// Flies, again after each restart that somebody asks the vehicle for.
     fn fly_all(self) -> Result<Vec<Over<V>>, String> {
         let (mut over, mut next) = (Vec::new(), Some(self));
         while let Some(flight) = next.take() {
-            let Self { options, number, ports, hub, setup, recorder, log, watch } = flight;
-            let mut witnesses = (recorder, watch);
+            let Self { options, number, ports, hub, setup, recorder, log, watch, record } = flight;
+            let mut witnesses = (recorder, (watch, record));
             let flown = fly::<V>(&setup, &mut witnesses, &mut |_, _| {});
             let (recorder, _) = witnesses;
             // The page may still hold the file.
-            _ = recorder.written().map(|file| file.lock().flush());
+            _ = recorder.written().map(LogFile::flush);
             if let Some(setup) = V::again(&setup, &flown.outcome) {
                 next = Some(Self::prepare(options, number, ports, hub, setup, over.len() + 1)?);
                 ports.reopen();

@@ -1,4 +1,4 @@
-// Calibration: what to do with the vehicle, drawn, and the button that begins each step.
+// Calibration: what to do with the vehicle, drawn; how far it is; and what takes what was found.
 
 const SVG = 'http://www.w3.org/2000/svg';
 const draw = (parent, kind, attributes) => {
@@ -47,38 +47,101 @@ const picture = (parent, { axes }, title) => {
   return svg;
 };
 
+/** Faces in the order of the report's bits, and how a simulated vehicle is held so. */
+const FACES = [['-x', 'nose-down'], ['+x', 'tail-down'], ['-y', 'right-down'], ['+y', 'left-down'], ['-z', 'level'], ['+z', 'upside-down']];
+const faces = FACES.map(([side, hold]) => [hold, SIDES[side]]);
+
+/** Kind, its name in the report, title, what to do, pictures: how a simulated vehicle is brought there, and the shape. */
 const KINDS = [
-  ['gyro', 'Gyro', 'Put it down and do not touch it.', [['', SIDES['-z'], 'Lying still']]],
-  ['level', 'Level', 'Stand it on a table that a spirit level calls level.', [['', SIDES['-z'], 'Standing level']]],
-  ['six_positions', 'Accelerometer, six positions', 'Hold it still on each of its sides, in any order. The coloured line is its nose.',
-    Object.entries(SIDES).map(([side, shape]) => [side, shape, shape.title])],
-  ['compass', 'Compass', 'Turn it slowly through every attitude, away from iron.', [['', SIDES['+y'], 'Turning']]],
+  ['temperature', 'Temperature', 'Temperature', 'Put it down cold and leave it alone while it warms up, by eight degrees. First of all.', [['warm 12 60', SIDES['-z'], 'Lying still']]],
+  ['six_positions', 'SixPositions', 'Accelerometer, six positions', 'Lay it on each of its sides, in any order, two seconds each, and on one of them again. The coloured line is its nose.',
+    faces.map(([hold, shape]) => [`hold ${hold}`, shape, shape.title])],
+  ['level', 'Level', 'Level', 'Stand it on a table that a spirit level calls level, and leave it alone. After the six positions.', [['down', SIDES['-z'], 'Standing level']]],
+  ['compass', 'Magnetometer', 'Compass', 'Away from iron, turn it slowly through every attitude: the nose all around, and every side down.', [['turn', SIDES['+y'], 'Turning']]],
 ];
+
+const calibration = { vehicle: null, rows: [], told: '' };
+
+/** What was taken is in the parameters, which are read again. */
+const readCalibration = async (vehicle) => {
+  for (const parameter of vehicle.card.parameters.filter(({ name }) => name.startsWith('calibration.'))) {
+    const reply = await ask(vehicle.number, { do: 'param_get', name: parameter.name });
+    if (!reply.ok) continue;
+    parameter.value = reply.value;
+    vehicle.rows?.find((row) => row.parameter === parameter)?.show();
+  }
+};
 
 const buildCalibration = (vehicle) => {
   const root = element('calibrations');
   root.replaceChildren();
+  [calibration.vehicle, calibration.rows, calibration.told] = [vehicle, [], ''];
   const offer = (kind) => (vehicle.isLog ? undefined : vehicle.card.calibrations.find((calibration) => calibration.kind === kind));
+  const isSimulated = !vehicle.isLog && vehicle.card.offers.includes('fault');
   const sorted = [...KINDS.filter(([kind]) => offer(kind)), ...KINDS.filter(([kind]) => !offer(kind))];
-  for (const [kind, title, text, steps] of sorted) {
+  for (const [kind, name, title, text, pictures] of sorted) {
     const offered = offer(kind);
     const section = make('section', root, offered ? '' : 'absent');
+    section.dataset.kind = kind;
     make('h3', section, '', title);
     make('p', section, 'dim', offered ? text : `${text} `);
     if (!offered) make('em', section.lastChild, '', vehicle.isLog ? 'A recorded flight.' : 'Not offered by this vehicle.');
     const row = make('div', section, 'steps');
-    for (const [side, shape, name] of steps) {
+    const steps = pictures.map(([hold, shape, caption]) => {
       const button = make('button', row, 'step');
       button.type = 'button';
-      button.disabled = !offered;
-      picture(button, shape, name);
-      const caption = make('span', button, '', name);
+      button.disabled = !offered || !isSimulated;
+      if (!button.disabled) button.title = 'In the simulation, a click does this.';
+      picture(button, shape, caption);
+      make('span', button, '', caption);
+      button.addEventListener('click', () => command({ do: 'console', line: `world ${hold}` }, caption.toLowerCase()));
+      return button;
+    });
+    if (!offered) continue;
+    const buttons = make('p', section, 'buttons');
+    const click = (label, line) => {
+      const button = make('button', buttons, '', label);
+      button.type = 'button';
       button.addEventListener('click', async () => {
-        caption.textContent = `${name} …`;
-        const reply = await command({ do: 'console', line: offered.line.replaceAll('{side}', side) }, `${title.toLowerCase()}, ${name}`);
-        caption.textContent = `${name} ${reply.ok ? '✓' : '✗'}`;
+        await command({ do: 'console', line }, `${title.toLowerCase()}, ${label.toLowerCase()}`);
+        calibration.told = '';
+        if (line === 'calibrate accept') readCalibration(vehicle);
       });
-    }
+      return button;
+    };
+    const begin = click('Begin', offered.line), cancel = click('Cancel', 'calibrate cancel'), accept = click('Take and keep', 'calibrate accept');
+    const bar = make('progress', buttons);
+    bar.max = 1;
+    bar.setAttribute('aria-label', `${title}, progress`);
+    const said = make('p', section, 'said');
+    said.setAttribute('role', 'status');
+    calibration.rows.push({ name, steps, begin, cancel, accept, bar, said });
   }
 };
 
+/** Ten times a second: what the vehicle reports of it. Its own words are asked for when it has changed. */
+const writeCalibration = (vehicle) => {
+  if (calibration.vehicle !== vehicle || vehicle.isLog || element('calibrations').closest('[hidden]')) return;
+  const of = (name) => field(vehicle, 'calibration_report', name);
+  const [kind, stage] = ['kind', 'stage'].map((name) => named(vehicle, 'calibration_report', name));
+  const [held] = of('faces') ?? [0], [progress] = of('progress') ?? [0];
+  for (const row of calibration.rows) {
+    const isThis = row.name === kind, isRunning = isThis && stage === 'Running';
+    row.begin.disabled = isRunning || isArmed(vehicle);
+    row.cancel.hidden = !isRunning;
+    row.accept.hidden = !(isThis && stage === 'Done');
+    row.bar.hidden = !isThis;
+    row.bar.value = isThis ? progress : 0;
+    row.steps.forEach((step, place) => {
+      const isDone = isThis && (row.steps.length > 1 ? (held & (1 << place)) !== 0 : stage === 'Done');
+      step.classList.toggle('done', isDone);
+    });
+    if (!isThis) setText(row.said, '');
+  }
+  const known = vehicle.topics.get('calibration_report');
+  const news = `${known?.values?.slice(0, 5).map((value) => value.toFixed(1))}`;
+  const row = calibration.rows.find(({ name }) => name === kind);
+  if (!row || news === calibration.told) return;
+  calibration.told = news;
+  ask(vehicle.number, { do: 'console', line: 'calibrate status' }).then((reply) => { if (reply.ok) setText(row.said, reply.text); });
+};

@@ -100,5 +100,10 @@ const offer = (vehicle) => {
     node.disabled = !offers;
     node.title = offers ? '' : vehicle.isLog ? 'A recorded flight' : 'Not offered by this vehicle';
   }
+  // What no real vehicle can do is not shown for one.
+  for (const node of document.querySelectorAll('[data-only]')) {
+    node.hidden = !vehicle.isLog && !vehicle.card.offers.includes(node.dataset.only);
+    if (node.hidden && node.getAttribute('aria-selected') === 'true') element('tab-fly').click();
+  }
 };
 

@@ -80,6 +80,9 @@ on('event', (event) => {
   } else if (event.kind === 'speed') {
     element('speed').value = String(event.factor);
     log(`time ×${event.factor}`);
+  } else if (event.kind === 'link') {
+    vehicle.away = event.up ? '' : event.text;
+    log(`${vehicle.card.name}: ${event.text}`, event.up ? '' : 'bad');
   } else {
     if (event.kind === 'ended') vehicle.ended = event.text;
     log(`${vehicle.card.name}, ${event.at.toFixed(1)} s: ${event.text}`, event.kind === 'ended' ? 'bad' : '');
@@ -103,13 +106,14 @@ const buildTabs = () => {
     stopMotor();
     subscribeAgain();
   };
-  tabs.forEach((tab, index) => {
+  tabs.forEach((tab) => {
     tab.addEventListener('click', () => show(tab));
     tab.addEventListener('keydown', (event) => {
       const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
       if (!by) return;
       event.preventDefault();
-      const next = tabs[(index + by + tabs.length) % tabs.length];
+      const shown = tabs.filter((other) => !other.hidden);
+      const next = shown[(shown.indexOf(tab) + by + shown.length) % shown.length];
       show(next);
       next.focus();
     });
@@ -132,6 +136,7 @@ const frame = (now) => {
       writeStatus(vehicle);
       writeStrips(vehicle);
       writeTopic(vehicle);
+      writeCalibration(vehicle);
     }
   }
   requestAnimationFrame(frame);

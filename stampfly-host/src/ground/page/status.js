@@ -23,8 +23,9 @@ const phaseOf = (vehicle) => named(vehicle, 'flight_status', 'phase');
 
 const writeStatus = (vehicle) => {
   const [phase, mode] = [phaseOf(vehicle), named(vehicle, 'flight_status', 'mode')];
-  setText(element('phase'), vehicle.ended ? 'flight over' : phase ? (PHASES[phase] ?? plain(phase)) : 'no state yet');
-  setText(element('armed'), phase === null ? '' : isArmed(vehicle) ? 'ARMED' : 'disarmed');
+  setText(element('phase'), vehicle.ended ? 'flight over' : vehicle.away ? 'not heard' : phase ? (PHASES[phase] ?? plain(phase)) : 'no state yet');
+  element('phase').classList.toggle('bad', Boolean(vehicle.away));
+  setText(element('armed'), phase === null || vehicle.away ? '' : isArmed(vehicle) ? 'ARMED' : 'disarmed');
   element('armed').className = isArmed(vehicle) ? 'chip armed' : 'chip';
   setText(element('mode'), mode ? MODES[mode] ?? plain(mode) : '');
   // What comes next stands out.
@@ -33,7 +34,7 @@ const writeStatus = (vehicle) => {
   const commander = named(vehicle, 'flight_status', 'commander');
   setText(element('commander'), commander && commander !== 'None' ? `by ${plain(commander)}` : '');
   const blocks = named(vehicle, 'flight_status', 'blocks') ?? [];
-  const isIdle = !isArmed(vehicle) && phase !== null;
+  const isIdle = !isArmed(vehicle) && phase !== null && !vehicle.away;
   setList(element('blocks'), isIdle ? blocks.map((name) => words.blocks[name] ?? plain(name)) : []);
   element('ready').hidden = !(isIdle && blocks.length === 0 && !vehicle.isLog);
   element('blocked').hidden = !(isIdle && blocks.length > 0);

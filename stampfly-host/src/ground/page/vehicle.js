@@ -17,7 +17,7 @@ const makeVehicle = (card, number) => {
   const topics = new Map(card.topics.map((topic) => [topic.name, {
     ...topic, places: layout(topic.fields), at: 0, count: 0, values: null, rate: 0,
   }]));
-  const vehicle = { card, number, topics, list: [...topics.values()], clock: 0, times: [], columns: new Map(), goal: null, ended: '' };
+  const vehicle = { card, number, topics, list: [...topics.values()], clock: 0, times: [], columns: new Map(), goal: null, ended: '', away: '' };
   vehicle.plots = plotsOf(vehicle);
   for (const getter of Object.entries(motionOf(vehicle))) vehicle.columns.set(getter[0], { get: getter[1], values: [] });
   for (const plot of vehicle.plots) for (const line of plot.lines) vehicle.columns.set(line.key, { get: line.get, values: [] });
@@ -129,7 +129,7 @@ const topicsOf = (card) => [...new Set([
   ...card.page.observers.map((observer) => observer.topic), card.page.setpoint, card.page.alerts?.[0],
   ...card.page.bands.map(([topic]) => topic),
   ...card.page.panels.filter((panel) => ['Voltage', 'Motor duty'].includes(panel.title)).map((panel) => panel.topic),
-  'sensor_power', 'flight_status', 'arm_refusals', 'estimate_status',
+  'sensor_power', 'flight_status', 'arm_refusals', 'estimate_status', 'calibration_report',
 ])].filter((name) => card.topics.some((topic) => topic.name === name));
 
 /** Keeps a frame of now. */

@@ -278,6 +278,7 @@ struct Watch<'a> {
 }
 
 impl vehicle::Around for Watch<'_> {
+    type Runnables = Runnables;
     type Outcome = Seen;
 
     fn drive(&mut self, now: Instant) {

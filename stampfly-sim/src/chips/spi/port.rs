@@ -67,16 +67,14 @@ impl SpiBus {
         self.0.floating.set(self.0.floating.get() + u32::from(floating));
         let chip = Rc::new(RefCell::new(chip));
         let attached = Attached::new(&self.0.clock, chip.clone());
-        let byte = 8_000_000_000 / u64::from(frequency.max(1));
-        let garbled = if frequency > C::HIGHEST_CLOCK { TOO_FAST } else { 0.0 };
         (
             SpiPort {
                 bus: self.clone(),
                 number: self.0.chips.replace(self.0.chips.get() + 1),
                 chip,
                 attached: attached.clone(),
-                byte,
-                garbled,
+                byte: byte_time(frequency),
+                garbled: garbled::<C>(frequency),
                 mode: MODE_3,
                 order: BitOrder::MostFirst,
                 rising: Cell::new(0),
@@ -85,6 +83,15 @@ impl SpiBus {
             attached,
         )
     }
+}
+
+/// Nanoseconds.
+fn byte_time(frequency: u32) -> u64 {
+    8_000_000_000 / u64::from(frequency.max(1))
+}
+
+const fn garbled<C: SpiChip>(frequency: u32) -> f64 {
+    if frequency > C::HIGHEST_CLOCK { TOO_FAST } else { 0.0 }
 }
 
 impl<C: SpiChip> core::fmt::Debug for SpiPort<C> {
@@ -133,6 +140,11 @@ impl<C> SpiPort<C> {
 }
 
 impl<C: SpiChip> SpiPort<C> {
+    /// Another clock from the next transfer on, Hz: for chips with two.
+    pub fn set_frequency(&mut self, frequency: u32) {
+        (self.byte, self.garbled) = (byte_time(frequency), garbled::<C>(frequency));
+    }
+
     /// Takes the bus.
     fn begin(&self, operations: &[Operation<'_, u8>]) -> Transfer {
         self.park();

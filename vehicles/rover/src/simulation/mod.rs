@@ -14,7 +14,7 @@ use stampfly_log::ulog::ParameterValue;
 use stampfly_param::ParameterTable;
 use stampfly_sim::Noise;
 use stampfly_sim::vehicle::{
-    self, Ended, FlightOptions, Options, Page, PortSpec, Script, Scripted, Setting, SetupError, Vehicle, Witness,
+    self, Ended, FlightOptions, Options, Page, PortSpec, Script, Scripted, Setting, SetupError, Vehicle, Witness, table,
 };
 use stampfly_types::{Duration, Instant};
 use std::prelude::v1::*;
@@ -53,10 +53,7 @@ impl Vehicle for Rover {
             let value = row.get(&parameters) * (1.0 + noise.within(SHARE)) as f32;
             Self::set_parameter(&mut parameters, name, value.into())?;
         }
-        for (name, value) in options.parameters()? {
-            Self::set_parameter(&mut parameters, name, value.into())?;
-        }
-        parameters.validate().map_err(|error| error.to_string())?;
+        table::change(&mut parameters, options)?;
         let driver = match live {
             Some(live) => Driver::Live(live.clone()),
             None => Driver::named(mission.as_deref().unwrap_or("course"))?,
@@ -87,12 +84,10 @@ impl Vehicle for Rover {
     }
 
     fn parameters(config: &Parameters) -> Vec<Setting> {
-        let rows = Parameters::TABLE.iter().map(|row| (row, row.get(config).into()));
-        rows.map(|(row, value)| Setting { name: row.name, value, unit: row.unit, meaning: row.meaning }).collect()
+        table::settings(config)
     }
 
     fn set_parameter(config: &mut Parameters, name: &str, value: ParameterValue) -> Result<(), SetupError> {
-        let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
-        Parameters::find(name).and_then(|row| row.set(config, value)).map_err(|error| format!("{name}: {error}"))
+        table::set(config, name, value)
     }
 }

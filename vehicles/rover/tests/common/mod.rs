@@ -41,6 +41,10 @@ impl Schedule for Mortal {
         Self { runnables: Runnables::new(parameters), dead: Components::NONE, is_unsupervised: false }
     }
 
+    fn renew(&mut self, index: usize, config: &Parameters) {
+        self.runnables.renew(index, config);
+    }
+
     fn states(start: Instant) -> Self::States {
         Runnables::states(start)
     }

@@ -1,4 +1,4 @@
-//! The first example of each README, in a program that added that crate alone.
+//! The first example of each README, in a program that added that crate alone; and the vehicle of the page for people with a vehicle of their own.
 //!
 //! The program is made as its reader makes it: `cargo new`, `cargo add`, paste, `cargo run`. What it gets is the archive that would be
 //! published, from a folder that stands for the registry. So it shows an example that does not compile, a crate whose signatures need
@@ -11,12 +11,16 @@ use std::path::{Path, PathBuf};
 /// Libraries that nobody adds by themselves: the macros come with the bus, the others belong to the program.
 const NOT_ALONE: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab"];
 
+/// The page that says how a vehicle of one's own is made, and its program.
+const VEHICLE: (&str, &str) = ("docs/your-own-vehicle.md", "examples/examples/own_vehicle.rs");
+
 /// Runs them all, from the archives in this folder.
 pub fn run(repository: &Repository, archives: &Path, libraries: &[Library]) -> Result<(), Failure> {
     let place = std::env::temp_dir().join(format!("stampfly-first-examples-{}", std::process::id()));
     let outcome = registry(repository, archives, &place, libraries).and_then(|registry| {
         let mut alone = libraries.iter().filter(|library| !NOT_ALONE.contains(&library.name.as_str()));
-        alone.try_for_each(|library| program(repository, library, &registry, &place))
+        alone.try_for_each(|library| first(repository, library, &registry, &place))?;
+        vehicle(repository, &registry, &place)
     });
     // Nothing depends on its removal.
     let _ = fs::remove_dir_all(&place);
@@ -68,25 +72,55 @@ fn archive(archives: &Path, library: &Library) -> Result<Archive, Failure> {
     archives.next().ok_or_else(|| format!("`{}` has no archive", library.name))
 }
 
-fn program(repository: &Repository, library: &Library, registry: &Path, place: &Path) -> Result<(), Failure> {
+fn first(repository: &Repository, library: &Library, registry: &Path, place: &Path) -> Result<(), Failure> {
     let name = library.name.as_str();
     let readme = repository.root.join(&library.folder).join("README.md");
-    let text = fs::read_to_string(&readme).map_err(|e| format!("{}: {e}", readme.display()))?;
+    let text = read(&readme)?;
     let example =
         first_example(&text).ok_or_else(|| format!("{} has no example with a `fn main`", readme.display()))?;
-    let folder = place.join(name);
+    eprintln!("first example of {name}");
+    program(repository, registry, &place.join(name), &example, &[vec!["add", name]])
+}
+
+/// The program of the page, with the crates that the page says to add.
+fn vehicle(repository: &Repository, registry: &Path, place: &Path) -> Result<(), Failure> {
+    let (page, source) = VEHICLE;
+    let (text, source) = (read(&repository.root.join(page))?, read(&repository.root.join(source))?);
+    let additions = additions(&text);
+    if additions.is_empty() {
+        return Err(format!("{page} adds no crate"));
+    }
+    eprintln!("the program of {page}");
+    program(repository, registry, &place.join("vehicle"), &source, &additions)
+}
+
+/// Makes a program of this source, after these calls of cargo, and runs it.
+fn program(
+    repository: &Repository,
+    registry: &Path,
+    folder: &Path,
+    main: &str,
+    additions: &[Vec<&str>],
+) -> Result<(), Failure> {
     let source = "[source.crates-io]\nreplace-with = \"here\"\n\n[source.here]\n";
     write(&folder.join(".cargo/config.toml"), &format!("{source}directory = {registry:?}\n"))?;
     write(&folder.join("Cargo.toml"), "[package]\nname = \"first-example\"\nedition = \"2024\"\n\n[workspace]\n")?;
-    write(&folder.join("src/main.rs"), &example)?;
-    eprintln!("first example of {name}");
+    write(&folder.join("src/main.rs"), main)?;
     let cargo = |arguments: &[&str]| {
         let mut cargo = repository.cargo();
-        cargo.current_dir(&folder).env("CARGO_PROFILE_DEV_DEBUG", "false").arg("--quiet").args(arguments);
+        cargo.current_dir(folder).env("CARGO_PROFILE_DEV_DEBUG", "false").arg("--quiet").args(arguments);
         cargo
     };
-    run_program(&mut cargo(&["add", name]))?;
+    for addition in additions {
+        run_program(&mut cargo(addition))?;
+    }
     run_program(cargo(&["run", "--target-dir"]).arg(repository.target("first-examples")))
+}
+
+/// The calls of `cargo add` that a page says to make.
+fn additions(page: &str) -> Vec<Vec<&str>> {
+    let commands = page.lines().filter_map(|line| line.strip_prefix("$ cargo "));
+    commands.filter(|command| command.starts_with("add ")).map(|command| command.split_whitespace().collect()).collect()
 }
 
 /// The first Rust block of a page, if it is a program.
@@ -94,6 +128,10 @@ fn first_example(page: &str) -> Option<String> {
     let (_, rest) = page.split_once("\n```rust\n")?;
     let (code, _) = rest.split_once("\n```")?;
     code.contains("fn main()").then(|| format!("{code}\n"))
+}
+
+fn read(path: &Path) -> Result<String, Failure> {
+    fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
@@ -104,7 +142,7 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::first_example;
+    use super::{additions, first_example};
 
     #[test]
     fn only_a_whole_program_is_an_example() {
@@ -112,5 +150,10 @@ mod tests {
         assert_eq!(first_example(page).as_deref(), Some("fn main() {}\n"));
         assert_eq!(first_example("# A\n\n```rust\nassert!(true);\n```\n"), None);
         assert_eq!(first_example("# A\n"), None);
+    }
+    #[test]
+    fn a_page_says_which_crates_to_add() {
+        let page = "```console\n$ cargo new robot\n$ cargo add a b\n$ cargo add c --features d\n$ cargo run\n```\n";
+        assert_eq!(additions(page), [vec!["add", "a", "b"], vec!["add", "c", "--features", "d"]]);
     }
 }

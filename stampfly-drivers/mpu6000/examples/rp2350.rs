@@ -1,0 +1,49 @@
+//! An MPU-6000 on a Raspberry Pi Pico 2: SCK at GP18, SDI at GP19, SDO at GP16, chip select at GP17. Shows acceleration and angular rate
+//! through the debug probe.
+//!
+//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example mpu6000` there.
+
+#![no_std]
+#![no_main]
+
+use defmt::{info, warn};
+use defmt_rtt as _;
+use embassy_executor::Spawner;
+use embassy_rp::bind_interrupts;
+use embassy_rp::gpio::{Level, Output};
+use embassy_rp::peripherals::{DMA_CH0, DMA_CH1};
+use embassy_rp::{dma, spi};
+use embassy_time::{Delay, Timer};
+use embedded_hal_bus::spi::ExclusiveDevice;
+use panic_probe as _;
+use stampfly_mpu6000::{AxisMap, Config, EmbassyClock, Imu, Mpu6000};
+
+bind_interrupts!(struct Interrupts {
+    DMA_IRQ_0 => dma::InterruptHandler<DMA_CH0>, dma::InterruptHandler<DMA_CH1>;
+});
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let board = embassy_rp::init(Default::default());
+    let mut config = spi::Config::default();
+    config.frequency = 1_000_000;
+    config.phase = spi::Phase::CaptureOnSecondTransition;
+    config.polarity = spi::Polarity::IdleHigh;
+    let (clock, out, into) = (board.PIN_18, board.PIN_19, board.PIN_16);
+    let bus = spi::Spi::new(board.SPI0, clock, out, into, board.DMA_CH0, board.DMA_CH1, Interrupts, config);
+    let select = Output::new(board.PIN_17, Level::High);
+    let Ok(device) = ExclusiveDevice::new(bus, select, Delay);
+    let mut imu = Mpu6000::new(device, EmbassyClock, AxisMap::IDENTITY, Config::default());
+    loop {
+        match imu.next().await {
+            Ok(sample) => {
+                let (accel, gyro) = (sample.data.accel, sample.data.gyro);
+                info!("{} {} {} m/s², {} {} {} rad/s", accel.x, accel.y, accel.z, gyro.x, gyro.y, gyro.z);
+            }
+            Err(error) => {
+                warn!("{}", error);
+                Timer::after_millis(100).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! An MPU-6000 on an STM32F411 (a "Black Pill"): SCK at PA5, SDI at PA7, SDO at PA6, chip select at PA4. Shows acceleration and angular rate
+//! through the debug probe.
+//!
+//! `stampfly-drivers/boards/stm32` has the versions of the crates and the linker's settings: `cargo run --release --example mpu6000` there.
+
+#![no_std]
+#![no_main]
+
+use defmt::{info, warn};
+use defmt_rtt as _;
+use embassy_executor::Spawner;
+use embassy_stm32::bind_interrupts;
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::peripherals::{DMA2_CH2, DMA2_CH3};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{dma, spi};
+use embassy_time::{Delay, Timer};
+use embedded_hal_bus::spi::ExclusiveDevice;
+use panic_probe as _;
+use stampfly_mpu6000::{AxisMap, BusClock, Config, EmbassyClock, Imu, Mpu6000};
+
+bind_interrupts!(struct Interrupts {
+    DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
+    DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
+});
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let board = embassy_stm32::init(Default::default());
+    let mut config = spi::Config::default();
+    config.frequency = Hertz(1_000_000);
+    config.mode = spi::MODE_3;
+    let (clock, out, into) = (board.PA5, board.PA7, board.PA6);
+    let bus = spi::Spi::new(board.SPI1, clock, out, into, board.DMA2_CH3, board.DMA2_CH2, Interrupts, config);
+    let select = Output::new(board.PA4, Level::High, Speed::VeryHigh);
+    let Ok(device) = ExclusiveDevice::new(bus, select, Delay);
+    let imu = Mpu6000::new(device, EmbassyClock, AxisMap::IDENTITY, Config::default());
+    // Its data may be read faster than its settings.
+    let mut imu = imu.with_bus_clock(move |device, clock| {
+        config.frequency = match clock {
+            BusClock::Setup => Hertz(1_000_000),
+            BusClock::Data => Hertz(20_000_000),
+        };
+        // A frequency that it cannot do stays as it was.
+        let _ = device.bus_mut().set_config(&config);
+    });
+    loop {
+        match imu.next().await {
+            Ok(sample) => {
+                let (accel, gyro) = (sample.data.accel, sample.data.gyro);
+                info!("{} {} {} m/s², {} {} {} rad/s", accel.x, accel.y, accel.z, gyro.x, gyro.y, gyro.z);
+            }
+            Err(error) => {
+                warn!("{}", error);
+                Timer::after_millis(100).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! `stampfly connect`: the ground station's page for a real vehicle, and MAVLink's ports.
+
+use crate::arguments::ConnectOptions;
+use crate::doctor::port_of;
+use crate::failure::Failure;
+use stampfly_host::connect::{Bridge, PORTS, Place};
+use stampfly_host::ground::{Hub, Limits, Server, VehicleCard};
+use stampfly_host::serve::{OpenPorts, PortOption};
+use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_sim::vehicle::{Transport, Vehicle};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Exit code of a wrong command line.
+const USAGE: u8 = 2;
+/// What a real vehicle can be asked: everything but what a world does.
+const OFFERS: &[&str] =
+    &["guided", "sticks", "alive", "param_set", "param_get", "param_save", "console", "motor_test", "motor_stop"];
+
+pub fn run(options: &ConnectOptions) -> Result<ExitCode, Failure> {
+    let place = match &options.place {
+        Some(place) => place.clone(),
+        None => match port_of(None) {
+            Some(path) => Place::Serial(path),
+            None => return Ok(ExitCode::from(USAGE)),
+        },
+    };
+    vehicles::with(&options.vehicle.name, Connect(options, place))?
+}
+
+struct Connect<'o>(&'o ConnectOptions, Place);
+
+impl ForVehicle for Connect<'_> {
+    type Output = Result<ExitCode, Failure>;
+
+    fn run<V: Vehicle>(self) -> Self::Output {
+        let Self(options, place) = self;
+        PortOption::check(&options.port, PORTS, "a connected vehicle")?;
+        std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
+        let hub = Hub::new(vec![VehicleCard {
+            faults: &[],
+            missions: Vec::new(),
+            ..VehicleCard::of::<V>(V::NAME, &V::default_config()).offering(OFFERS)
+        }]);
+        let is_public = |wanted: &&PortOption| wanted.address.is_some_and(|address| !address.ip().is_loopback());
+        if let Some(public) = options.port.iter().filter(|wanted| wanted.name != "http").find(is_public) {
+            let why = "what a vehicle says on its cable is not signed, so programs on this machine alone may have it";
+            return Err(format!("port '{}': {why}; '--port {0}=NUMBER' leaves it here", public.name).into());
+        }
+        let ports = Arc::new(OpenPorts::open(PORTS, &options.port, 0, None)?);
+        let mut server = None;
+        for (port, address) in ports.places() {
+            let does = match port.transport {
+                Transport::Page => {
+                    let started = Server::start(hub.clone(), *address, Limits::default()).map_err(|error| {
+                        format!("port '{}' at {address}: {error}; '--port {0}=NUMBER' chooses another", port.name)
+                    })?;
+                    let does = format!("open http://{} in a browser", started.address());
+                    server = Some(started);
+                    does
+                }
+                Transport::UdpTo => format!("sending to {address}"),
+                _ => format!("listening on {address}"),
+            };
+            outln!("{:<12} {:<42} {does}", port.name, port.meaning);
+        }
+        outln!("{:<12} {:<42} at {place}", "vehicle", V::NAME);
+        let closing = ports.clone();
+        ctrlc::set_handler(move || closing.close())?;
+        let until = options.seconds.map(|seconds| Instant::now() + Duration::from_secs_f32(seconds));
+        let bridge = Bridge::<V>::new(place, options.baud, hub, ports, options.out.clone());
+        let mut bridge = bridge.ok_or("the ground station does not know this vehicle")?;
+        if let Some(file) = &options.record {
+            let failed = |error| format!("{}: {error}", file.display());
+            bridge = bridge.recording(file.clone()).map_err(failed)?;
+        }
+        let carried = bridge.run(until);
+        drop(server);
+        if let Some((file, counts)) = options.record.as_ref().zip(carried.record) {
+            let [chunks, missing] = counts.map_err(|error| format!("{}: {error}", file.display()))?;
+            outln!("{}: {chunks} chunks, {missing} missing", file.display());
+        }
+        Ok(if carried.was_heard { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+}

@@ -1,0 +1,358 @@
+//! `stampfly connect`: the ground station of a real vehicle, at a serial port or behind TCP.
+//!
+//! | part | what it does |
+//! |---|---|
+//! | [`Place`] | where the line is, and how it is opened |
+//! | [`station`] | what pages ask → frames; frames → samples and answers |
+//! | [`Bridge`] | a thread between the line, the page's hub and MAVLink's ports |
+//!
+//! A line that is gone is opened again, for as long as it takes: vehicles are restarted, and cables pulled out. Pages are told.
+
+mod log;
+mod place;
+mod record;
+pub mod station;
+
+pub use place::{Line, Place, PlaceError};
+
+use crate::serve::OpenPorts;
+use log::Log;
+use record::Record;
+use stampfly_bus::{Schedule, TopicInfo, TopicTable};
+use stampfly_ground::ask::Ask;
+use stampfly_ground::{Event, Hub, Watch};
+use stampfly_link::mavlink::MavlinkDecoder;
+use stampfly_link::mavlink::dialects::common::MavMessage;
+use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports as _, Setting, Vehicle};
+use station::{Said, Station};
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Where other programs find the vehicle.
+pub const PORTS: &[PortSpec] = &[PortSpec::PAGE, PortSpec::MAVLINK_UDP, PortSpec::MAVLINK_TCP];
+/// The vehicle's page and hub have one vehicle.
+const ONLY: usize = 0;
+/// A line that cannot be opened is tried again after this long.
+const AGAIN: Duration = Duration::from_millis(500);
+/// A vehicle that says nothing for this long is not there.
+const SILENCE: Duration = Duration::from_secs(2);
+/// How often it is looked what pages show.
+const LOOK: Duration = Duration::from_millis(200);
+/// What pages do not show any more is sent for so long still: they draw in bursts.
+const SHOWN: Duration = Duration::from_secs(2);
+/// How often the vehicle is told again what to send: it may have been restarted.
+const TOLD: Duration = Duration::from_secs(1);
+/// Of a topic, between two samples, ms.
+const PERIOD: u16 = 40;
+/// Bytes of the line read at once.
+const PART: usize = 4096;
+
+/// How the line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// Not open.
+    Away,
+    /// Open, and silent.
+    Silent,
+    /// The vehicle is heard.
+    Up,
+}
+
+/// What is made of what the vehicle says.
+struct Ends<V: Vehicle> {
+    hub: Arc<Hub>,
+    watch: Watch,
+    ports: Arc<OpenPorts>,
+    /// Who is connected at MAVLink's ports, and the frame each is in the middle of.
+    programs: HashMap<Client, MavlinkDecoder<MavMessage>>,
+    /// As the vehicle says, as far as it has.
+    settings: Vec<Setting>,
+    known: Vec<bool>,
+    folder: PathBuf,
+    log: Option<Log<V>>,
+    logs: usize,
+    /// The flight record, if it is wanted.
+    record: Option<Record>,
+    /// The vehicle's newest instant.
+    clock: stampfly_types::Instant,
+    /// It has started anew.
+    restarted: bool,
+}
+
+/// What there was.
+#[derive(Debug)]
+pub struct Carried {
+    /// Was the vehicle ever heard?
+    pub was_heard: bool,
+    /// Chunks of the flight record that have come, and that are missing between them, if it was wanted; or why it is not in the file.
+    pub record: Option<std::io::Result<[u64; 2]>>,
+}
+
+/// Between a line, pages and programs.
+pub struct Bridge<V: Vehicle> {
+    place: Place,
+    baud: u32,
+    station: Station,
+    ends: Ends<V>,
+    state: State,
+    /// The topics that are shown, and when they were last.
+    shown: BTreeMap<usize, Instant>,
+}
+
+fn topics<V: Vehicle>() -> &'static [TopicInfo] {
+    <<V::Runnables as Schedule>::Topics as TopicTable>::TOPICS
+}
+
+/// The vehicle is started anew when its clock goes back by more than samples may pass each other.
+const BACK: stampfly_types::Duration = stampfly_types::Duration::from_millis(500);
+
+impl<V: Vehicle> Ends<V> {
+    fn take(&mut self, said: Said<'_>) {
+        match said {
+            Said::Sample(topic, at, words) => self.sample(topic, at, words),
+            Said::Answer(client, asked, answer) => {
+                // What is said again and again needs no answer.
+                if !matches!(asked.ask, Ask::Sticks(_) | Ask::Alive {}) {
+                    self.hub.answer(client, &asked, answer);
+                }
+            }
+            Said::Parameter(index, value) => self.parameter(index, value),
+            Said::Chunk(chunk) => self.chunk(chunk),
+            Said::Frame(frame) => self.programs.keys().for_each(|client| self.ports.send(client, frame)),
+            Said::Text(text) => self.hub.tell_all(ONLY, &Event::Text { text }),
+            Said::Foreign => {
+                let text =
+                    "its firmware is not of this program's version: it can be killed from here, and nothing else";
+                self.hub.tell_all(ONLY, &Event::Link { up: false, text: text.into() });
+            }
+        }
+    }
+
+    fn chunk(&mut self, chunk: &[u8]) {
+        if let Some(record) = &mut self.record
+            && let Err(error) = record.take(chunk)
+        {
+            self.hub.tell_all(ONLY, &Event::Text { text: format!("the flight record: {error}") });
+        }
+    }
+
+    fn sample(&mut self, topic: usize, at: stampfly_types::Instant, words: &[u32]) {
+        if topics::<V>().get(topic).is_none_or(|info| info.words != words.len()) {
+            return;
+        }
+        if at + BACK < self.clock {
+            self.log.take().into_iter().for_each(Log::end);
+            self.watch.restarted();
+            self.known.fill(false);
+            (self.clock, self.restarted) = (at, true);
+        }
+        self.clock = self.clock.max(at);
+        self.watch.note(topic, at, words);
+        if let Some(log) = &mut self.log {
+            log.note(topic, at, words);
+        }
+    }
+
+    fn parameter(&mut self, index: usize, value: f32) {
+        let value = f64::from(value);
+        let Some((setting, known)) = self.settings.get_mut(index).zip(self.known.get_mut(index)) else { return };
+        if !*known || setting.value != value {
+            self.hub.tell_all(ONLY, &Event::Parameter { name: setting.name.to_owned(), value });
+        }
+        (setting.value, *known) = (value, true);
+        // With its parameters, so that the log says how it flew.
+        if self.log.is_none() && self.known.iter().all(|known| *known) {
+            match Log::begin(&self.folder, self.logs, &self.settings, topics::<V>().len()) {
+                Ok(log) => {
+                    let file = log.file.clone();
+                    self.hub.provide_log(ONLY, move || file.so_far());
+                    (self.log, self.logs) = (Some(log), self.logs + 1);
+                }
+                Err(text) => self.hub.tell_all(ONLY, &Event::Text { text }),
+            }
+        }
+    }
+
+    /// What programs say in MAVLink, frame by frame, so that none lies within another.
+    fn programs(&mut self, put: &mut Vec<u8>) {
+        let Self { ports, programs, .. } = self;
+        ports.receive(None, &mut |client, heard| match heard {
+            Heard::Opened => drop(programs.insert(client, MavlinkDecoder::new())),
+            Heard::Closed => drop(programs.remove(&client)),
+            Heard::Bytes(bytes) => {
+                let decoder = programs.entry(client).or_default();
+                for byte in bytes {
+                    if let Some(frame) = decoder.feed(*byte) {
+                        put.extend(frame.bytes());
+                    }
+                }
+            }
+        });
+    }
+}
+
+impl<V: Vehicle> Bridge<V> {
+    /// Of a vehicle whose line is there, for this hub of one vehicle and these open [`PORTS`]. Logs go into the folder.
+    #[must_use]
+    pub fn new(place: Place, baud: u32, hub: Arc<Hub>, ports: Arc<OpenPorts>, folder: PathBuf) -> Option<Self> {
+        let settings = V::parameters(&V::default_config());
+        let watch = hub.witness(ONLY)?;
+        let known = vec![false; settings.len()];
+        let station = Station::new(Instant::now(), topics::<V>(), settings.clone());
+        let ends = Ends {
+            hub,
+            watch,
+            ports,
+            programs: HashMap::new(),
+            settings,
+            known,
+            folder,
+            log: None,
+            logs: 0,
+            record: None,
+            clock: stampfly_types::Instant::ZERO,
+            restarted: false,
+        };
+        Some(Self { place, baud, station, ends, state: State::Up, shown: BTreeMap::new() })
+    }
+
+    /// The same, which asks the vehicle for its compact flight record and writes it into a file.
+    ///
+    /// # Errors
+    /// When there is no such file to be made.
+    pub fn recording(mut self, file: PathBuf) -> std::io::Result<Self> {
+        self.ends.record = Some(Record::create(file)?);
+        Ok(self)
+    }
+
+    /// Carries what is said, until the ports are closed or the time is over.
+    pub fn run(mut self, until: Option<Instant>) -> Carried {
+        let mut was_heard = false;
+        while !self.ends.ports.are_closed() && until.is_none_or(|until| Instant::now() < until) {
+            match self.place.open(self.baud) {
+                Ok(line) => {
+                    let why = self.carry(line, until);
+                    was_heard |= self.station.heard().is_some();
+                    let Some(why) = why else { break };
+                    let Self { station, ends, .. } = &mut self;
+                    station.lost(&mut |said| ends.take(said));
+                    self.change(State::Away, format!("the line at {} is gone: {why}", self.place));
+                }
+                Err(error) => self.change(State::Away, format!("nothing at {}: {error}", self.place)),
+            }
+            self.wait();
+        }
+        self.ends.log.take().into_iter().for_each(Log::end);
+        let record = self.ends.record.map(|mut record| record.flush().map(|()| record.counts()));
+        Carried { was_heard, record }
+    }
+
+    /// Says how the line is, when that is new.
+    fn change(&mut self, state: State, text: String) {
+        if core::mem::replace(&mut self.state, state) != state {
+            self.ends.hub.tell_all(ONLY, &Event::Link { up: state == State::Up, text });
+        }
+    }
+
+    /// Without a line: what is asked is refused.
+    fn wait(&mut self) {
+        let until = Instant::now() + AGAIN;
+        while Instant::now() < until && !self.ends.ports.are_closed() {
+            for (client, asked) in self.ends.hub.asks(ONLY) {
+                self.ends.take(Said::Answer(client, asked, Err("the line to the vehicle is gone".into())));
+            }
+            self.ends.programs(&mut Vec::new());
+            thread::sleep(place::LOOK);
+        }
+    }
+
+    /// Carries what is said over an open line. Returns why it is gone; `None` when it is over.
+    fn carry(&mut self, mut line: Line, until: Option<Instant>) -> Option<std::io::Error> {
+        let opened = Instant::now();
+        let (mut part, mut put) = (vec![0; PART], Vec::new());
+        let (mut looked, mut told) = (opened - LOOK, opened - TOLD);
+        // From now on it is not known what the vehicle does.
+        self.state = State::Silent;
+        while !self.ends.ports.are_closed() && until.is_none_or(|until| Instant::now() < until) {
+            let length = match line.read(&mut part) {
+                Ok(length) => length,
+                Err(error) => return Some(error),
+            };
+            let now = Instant::now();
+            let Self { station, ends, shown, .. } = self;
+            station.hear(now, part.get(..length).unwrap_or_default(), &mut |said| ends.take(said));
+            for (client, asked) in ends.hub.asks(ONLY) {
+                // It may have changed them.
+                if matches!(&asked.ask, Ask::Console { line } if line.starts_with("param") || line.starts_with("autotune"))
+                {
+                    ends.restarted = true;
+                }
+                station.ask(now, client, asked, &mut put, &mut |said| ends.take(said));
+            }
+            ends.programs(&mut put);
+            if now.duration_since(looked) >= LOOK {
+                looked = now;
+                let again = now.duration_since(told) >= TOLD;
+                told = if again { now } else { told };
+                watch::<V>(now, shown, ends, again, &mut |topic, period| station.watch(topic, period, &mut put));
+                if let Some(record) = ends.record.as_mut().filter(|_| again) {
+                    station.record(&mut put);
+                    // What the disk does not take is said with the next chunk.
+                    _ = record.flush();
+                }
+            }
+            let is_up = station.heard().is_some_and(|heard| now.duration_since(heard) < SILENCE);
+            if core::mem::take(&mut ends.restarted) || (is_up && self.state != State::Up) {
+                station.list();
+            }
+            station.poll(now, &mut put, &mut |said| ends.take(said));
+            if is_up {
+                self.change(State::Up, format!("heard at {}", self.place));
+            } else if self.state == State::Up || now.duration_since(opened) >= SILENCE {
+                // Said once: a line that opens begins in this state.
+                if core::mem::replace(&mut self.state, State::Away) != State::Away {
+                    let text = format!("the line at {} is open, and no vehicle answers", self.place);
+                    self.ends.hub.tell_all(ONLY, &Event::Link { up: false, text });
+                }
+            }
+            if !put.is_empty() {
+                if let Err(error) = line.write(&put) {
+                    return Some(error);
+                }
+                put.clear();
+            }
+        }
+        None
+    }
+}
+
+/// Tells the vehicle what to send: what pages show, and what every page shows of this vehicle.
+fn watch<V: Vehicle>(
+    now: Instant,
+    shown: &mut BTreeMap<usize, Instant>,
+    ends: &Ends<V>,
+    again: bool,
+    tell: &mut dyn FnMut(usize, u16),
+) {
+    let named = |name: &str| topics::<V>().iter().position(|topic| topic.name == name);
+    let page = const { &V::PAGE };
+    let always =
+        page.observers.iter().map(|observer| observer.topic).chain(page.panels.iter().map(|panel| panel.topic));
+    let always = always.chain(["flight_status"]).filter_map(named);
+    let looked = ends.hub.looked_at(ONLY).into_iter().filter(|topic| *topic < topics::<V>().len());
+    for topic in looked.chain(always) {
+        if shown.insert(topic, now).is_none() || again {
+            tell(topic, PERIOD);
+        }
+    }
+    shown.retain(|topic, at| {
+        let stays = now.duration_since(*at) < SHOWN;
+        if !stays {
+            tell(*topic, 0);
+        }
+        stays
+    });
+}

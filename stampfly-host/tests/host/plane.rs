@@ -1,0 +1,28 @@
+//! The fixed-wing aircraft as people meet it: flights and their logs, and campaigns with faults.
+
+use super::program::{folder, stampfly};
+
+const PLANE: [&str; 4] = ["--vehicle", "plane", "--mission", "hop"];
+
+#[test]
+fn a_flight_is_replayed_bit_for_bit() {
+    let folder = folder("plane", "flight");
+    let options = [
+        &["--seed", "3"][..],
+        &["--seed", "4", "--jitter", "2", "--wind", "0,3"],
+        &["--seed", "5", "--jitter", "7", "--fault", "pitot-blocked@move", "--fault", "gnss-lost@40+30"],
+    ];
+    for options in options {
+        stampfly(&folder, &[&["fly"][..], &PLANE, options].concat());
+        assert!(stampfly(&folder, &["replay", "flight.ulg"]).contains("identical"), "{options:?}");
+        assert!(stampfly(&folder, &["replay", "flight.ulg", "--from", "30"]).contains("identical"), "{options:?}");
+        assert!(folder.join("flight.html").exists());
+    }
+}
+
+#[test]
+fn campaigns_succeed() {
+    let folder = folder("plane", "campaign");
+    let printed = stampfly(&folder, &[&["campaign", "--flights", "6"][..], &PLANE].concat());
+    assert!(printed.contains("6 of 6 flights succeeded"), "{printed}");
+}

@@ -1,0 +1,58 @@
+//! The program, as a process that ends with its test.
+
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+/// An empty folder of the test's own.
+pub fn folder(of: &str, name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(of).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    folder
+}
+
+/// Runs the program to its end in a folder. Returns what it prints.
+pub fn stampfly(folder: &Path, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_stampfly")).current_dir(folder).args(arguments).output();
+    let output = output.expect("it runs");
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// It runs.
+pub struct Program(pub Child);
+
+impl Program {
+    pub fn start(folder: &Path, arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stampfly"));
+        let command = command.current_dir(folder).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped());
+        Self(command.spawn().expect("the program starts"))
+    }
+
+    /// `serve` with one port, and where that is.
+    pub fn serve(folder: &Path, port: &str, more: &[&str]) -> (Self, String) {
+        let mut program = Self::start(folder, &[&["serve", "--port", "others=off", "--port", port], more].concat());
+        let (name, _) = port.split_once('=').expect("a port");
+        let place = program.said(name, "listening on ");
+        (program, place)
+    }
+
+    /// What it says behind this word, to the next white space.
+    pub fn said(&mut self, line: &str, word: &str) -> String {
+        let lines = BufReader::new(self.0.stdout.as_mut().expect("a pipe")).lines().map_while(Result::ok);
+        for said in lines {
+            if let Some((_, rest)) = said.split_once(word).filter(|_| said.starts_with(line)) {
+                return rest.split_whitespace().next().unwrap_or_default().to_owned();
+            }
+        }
+        panic!("it says nothing of {line}");
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        _ = self.0.kill();
+        _ = self.0.wait();
+    }
+}

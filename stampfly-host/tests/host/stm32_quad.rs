@@ -1,0 +1,43 @@
+//! The STM32 quadcopter as people meet it: flights and their logs, campaigns, and a serial line in real time.
+
+use super::program::{Program, folder, stampfly};
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::Duration;
+
+const QUAD: [&str; 3] = ["--vehicle", "stm32-quad", "--mission"];
+
+#[test]
+fn a_flight_is_replayed_bit_for_bit() {
+    let folder = folder("stm32_quad", "flight");
+    for options in
+        [&["--seed", "3"][..], &["--seed", "4", "--jitter", "2"], &["--pilot", "--mode", "acro", "--wind", "0,2"]]
+    {
+        stampfly(&folder, &[&["fly"][..], &QUAD, &["0,0,1,2"], options].concat());
+        assert!(stampfly(&folder, &["replay", "flight.ulg"]).contains("identical"), "{options:?}");
+        assert!(stampfly(&folder, &["replay", "flight.ulg", "--from", "3"]).contains("identical"), "{options:?}");
+        assert!(folder.join("flight.html").exists());
+    }
+}
+
+#[test]
+fn campaigns_succeed() {
+    let folder = folder("stm32_quad", "campaign");
+    let printed = stampfly(&folder, &[&["campaign", "--flights", "6"][..], &QUAD, &["0,0,1,1"]].concat());
+    assert!(printed.contains("6 of 6 flights succeeded"), "{printed}");
+}
+
+#[test]
+fn a_configurator_reads_its_gains() {
+    let folder = folder("stm32_quad", "serve");
+    let (_program, place) = Program::serve(&folder, "msp=0", &["--vehicle", "stm32-quad", "--for", "20"]);
+    let mut line = TcpStream::connect(place).expect("it listens");
+    line.set_read_timeout(Some(Duration::from_secs(10))).expect("a time limit");
+    // MSP_PID.
+    line.write_all(b"$M<\x00\x70\x70").expect("it takes a question");
+    let mut answer = [0; 5 + 30 + 1];
+    line.read_exact(&mut answer).expect("it answers");
+    assert_eq!(answer[..5], *b"$M>\x1E\x70");
+    // 0.2, 0.02 and 0.002 about roll and pitch.
+    assert_eq!(answer[5..11], [20; 6]);
+}

@@ -1,0 +1,220 @@
+//! Everything that is spoken on a vehicle's serial line: a person's text, MAVLink for any ground station, and this family's own ground station in tunnels
+//! of MAVLink.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `split.rs` | which bytes are text, and which are frames |
+//! | `envelope.rs` | payloads of the secure link in `TUNNEL` |
+//! | `watches.rs` | the topics that the station wants to see |
+//!
+//! The vehicle says nothing in MAVLink until it has heard a frame, and no more [30 s](crate::mavlink) after the last: a terminal shows text alone. For lines whose
+//! other end is in reach, such as USB: nobody is authenticated.
+
+mod envelope;
+mod split;
+mod watches;
+
+pub use envelope::{Assembly, BODY, Envelope, PART, TUNNEL, TYPE, fingerprint};
+pub use split::{PAUSE, Part, Split};
+pub use watches::Watches;
+
+use crate::cockpit::Cockpit;
+use crate::desk::{Answer, Desk, Room};
+use crate::mavlink::{Identity, Mavlink};
+use crate::refusal::Seat;
+use crate::view::Samples;
+use stampfly_flight::console::{Request, Vehicle};
+use stampfly_link::mavlink::Tunnel;
+use stampfly_link::secure::{Payload, Sample};
+use stampfly_types::messages::{GuidedCommand, GuidedKind};
+use stampfly_types::{Duration, Instant};
+
+/// A station that was not heard for this long is sent no topics any more.
+const SILENCE: Duration = Duration::from_secs(5);
+/// Answers that are made at once.
+const AT_ONCE: usize = 4;
+/// Words of the longest message that is sent.
+const WORDS: usize = 64;
+
+/// Where frames go. Each is handed over whole.
+pub type Put<'p> = &'p mut dyn FnMut(&[u8]);
+
+/// One serial line, at which a station may watch up to `WATCHED` topics and upload a mission of up to `ITEMS` items.
+///
+/// Give it what is heard with [`hear`](Self::hear), which hands what a person types to a terminal; call [`poll`](Self::poll) and [`answer`](Self::answer) about a
+/// hundred times a second.
+#[derive(Clone, Debug)]
+pub struct Cable<const WATCHED: usize, const ITEMS: usize = { crate::mavlink::ITEMS }> {
+    split: Split,
+    mavlink: Mavlink<(), 1, ITEMS>,
+    desk: Desk,
+    watches: Watches<WATCHED>,
+    table: u16,
+    /// When the station was heard, and its system.
+    station: Option<(Instant, u8)>,
+    foreign: u32,
+    /// Chunks of the flight record that were sent.
+    chunks: u16,
+}
+
+impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
+    /// A line of a vehicle with this identity and [fingerprint].
+    #[must_use]
+    pub const fn new(identity: Identity, table: u16) -> Self {
+        Self {
+            split: Split::new(),
+            mavlink: Mavlink::for_clients(identity),
+            desk: Desk::new(),
+            watches: Watches::new(),
+            table,
+            station: None,
+            foreign: 0,
+            chunks: 0,
+        }
+    }
+
+    /// Envelopes of a station with other tables, which did nothing but kill. Wraps around.
+    #[must_use]
+    pub const fn foreign(&self) -> u32 {
+        self.foreign
+    }
+
+    /// Does a program speak in frames here?
+    #[must_use]
+    pub fn is_spoken(&self, now: Instant) -> bool {
+        self.station.is_some_and(|(at, _)| now.since(at) < SILENCE)
+    }
+
+    /// Takes what has come. `typed` is given what a person has typed.
+    pub fn hear(
+        &mut self,
+        now: Instant,
+        bytes: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: Put<'_>,
+        typed: &mut dyn FnMut(u8),
+    ) {
+        for byte in bytes {
+            if self.split.feed(now, *byte) == Part::Text {
+                typed(*byte);
+                continue;
+            }
+            // A byte ends one frame at most.
+            let mut tunnel = None;
+            let mut keep = |system: u8, heard: Tunnel| tunnel = Some((system, heard));
+            self.mavlink.hear_tunnels(now, (), &[*byte], cockpit, &mut |(), frame| put(frame), &mut keep);
+            if let Some((system, tunnel)) = tunnel.filter(|(_, tunnel)| tunnel.kind == TYPE) {
+                self.open(now, system, &tunnel.bytes, cockpit, put);
+            }
+        }
+    }
+
+    /// Opens an envelope.
+    fn open(&mut self, now: Instant, system: u8, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_>) {
+        // What a station says is short: one part.
+        let Some((envelope, body)) = Envelope::read(bytes) else { return };
+        let Some(payload) = Payload::decode(envelope.kind, body) else { return };
+        self.station = Some((now, system));
+        let (seat, number) = (Seat::Mavlink(system), envelope.number);
+        if envelope.table != self.table && !payload.is_kill() {
+            self.foreign = self.foreign.wrapping_add(1);
+            return self.say(
+                number,
+                &Payload::Reply { text: "station and vehicle are of different versions", last: true },
+                put,
+            );
+        }
+        let command = match payload {
+            Payload::Guided(GuidedCommand { kind: GuidedKind::None, .. }) => return cockpit.alive(now, seat),
+            Payload::Guided(command) => command,
+            Payload::Kill => GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() },
+            // They come again and again, and are not answered.
+            Payload::Sticks(input) => {
+                _ = cockpit.steer(now, seat, &input);
+                return;
+            }
+            Payload::Watch { topic, period } => {
+                let taken = self.watches.watch(now, topic, period);
+                return self.say(number, &Payload::Acknowledgement { counter: number.into(), taken }, put);
+            }
+            question => {
+                if !self.desk.ask(number, &question) {
+                    self.say(number, &Payload::Reply { text: "one question after the other", last: true }, put);
+                }
+                return;
+            }
+        };
+        match cockpit.guide(now, seat, command) {
+            Ok(()) => self.say(number, &Payload::Acknowledgement { counter: number.into(), taken: true }, put),
+            Err(refusal) => {
+                let mut words = heapless::String::<96>::new();
+                _ = core::fmt::Write::write_fmt(&mut words, format_args!("{refusal}"));
+                self.say(number, &Payload::Reply { text: &words, last: true }, put);
+            }
+        }
+    }
+
+    /// Sends what is due: MAVLink's streams fifty times a second at most, and the station's topics.
+    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, samples: &dyn Samples, put: Put<'_>) {
+        self.mavlink.poll(now, cockpit, &mut |(), frame| put(frame));
+        if !self.is_spoken(now) {
+            self.watches.clear();
+            self.desk.clear();
+            return;
+        }
+        let Self { watches, mavlink, table, .. } = self;
+        watches.poll(now, samples, &mut |topic, number, at, words| {
+            let mut bytes = [[0; 4]; WORDS];
+            bytes.iter_mut().zip(words).for_each(|(to, word)| *to = word.to_le_bytes());
+            let words = bytes.get(..words.len()).unwrap_or_default();
+            send(mavlink, *table, number, &Payload::Sample(Sample::new(topic, at, words)), put);
+        });
+    }
+
+    /// Makes the next answers. Returns what only the board can do, which then [reports](Self::report).
+    pub fn answer<V: Vehicle>(&mut self, now: Instant, vehicle: &mut V, put: Put<'_>) -> Request<V::Request> {
+        let mut room = Room::default();
+        for _ in 0..AT_ONCE {
+            let Some(Answer { number, payload, request }) = self.desk.answer(now, vehicle, &mut room) else { break };
+            send(&mut self.mavlink, self.table, number, &payload, put);
+            if !matches!(request, Request::Nothing) {
+                return request;
+            }
+        }
+        Request::Nothing
+    }
+
+    /// What the station has said last of the flight record: that it is wanted, or is not; once. See [`Tape`](crate::Tape).
+    pub const fn record(&mut self) -> Option<bool> {
+        self.desk.record()
+    }
+
+    /// Sends a chunk of the flight record, of at most [`BODY`] bytes.
+    pub fn send_chunk(&mut self, chunk: &[u8], put: Put<'_>) {
+        self.chunks = self.chunks.wrapping_add(1);
+        self.say(self.chunks, &Payload::Chunk(chunk), put);
+    }
+
+    /// The board has done what it was asked for, or not.
+    pub fn report(&mut self, what: &dyn core::fmt::Display) {
+        self.desk.report(what);
+    }
+
+    fn say(&mut self, number: u16, payload: &Payload<'_>, put: Put<'_>) {
+        send(&mut self.mavlink, self.table, number, payload, put);
+    }
+}
+
+fn send<const ITEMS: usize>(
+    mavlink: &mut Mavlink<(), 1, ITEMS>,
+    table: u16,
+    number: u16,
+    payload: &Payload<'_>,
+    put: Put<'_>,
+) {
+    Envelope::write(table, number, payload, &mut |part| {
+        if let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) {
+            mavlink.send_payload((), Tunnel::ID, &tunnel.payload(), &mut |(), frame| put(frame));
+        }
+    });
+}

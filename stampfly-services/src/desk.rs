@@ -1,0 +1,221 @@
+//! What a station asks besides flying: parameters by their place, and lines of the console, each answered in turn.
+//!
+//! The other end of [`Payload`]'s kinds 20, 21, 30 and 41, for the radio and for a cable. Everything that waits has a bound, and an answer is made when there is room
+//! to send it: a long reply part by part. Not for terminals, which have a [`LineEditor`](stampfly_flight::console::LineEditor).
+
+use core::fmt;
+use heapless::{Deque, String};
+use stampfly_flight::console::{Piece, Request, Vehicle, answer};
+use stampfly_flight::parameters;
+use stampfly_link::secure::Payload;
+use stampfly_types::Instant;
+
+/// Bytes of a line.
+pub const LINE: usize = 80;
+/// Bytes of a reply's part: with its frame it fits into ESP-NOW and into a tunnel of MAVLink.
+pub const PIECE: usize = 120;
+/// Questions for parameters that wait.
+const QUESTIONS: usize = 8;
+
+#[derive(Clone, Copy, Debug)]
+enum Question {
+    Read { index: u16 },
+    Write { index: u16, value: f32 },
+}
+
+/// How far a line is.
+#[derive(Clone, Debug)]
+enum Stage {
+    /// So many bytes of its reply are sent.
+    Answering(usize),
+    /// The board does what was asked.
+    Board,
+    /// It has said what came of it.
+    Done(String<PIECE>),
+}
+
+/// A reply's part, as it is made: without carriage returns, which are for terminals.
+#[derive(Clone, Debug, Default)]
+pub struct Room(Piece<PIECE>);
+
+impl fmt::Write for Room {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        text.split('\r').try_for_each(|part| self.0.write_str(part))
+    }
+}
+
+/// What is to be sent, and what the board is to do then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer<'r, R> {
+    /// Number of the question.
+    pub number: u16,
+    /// The answer.
+    pub payload: Payload<'r>,
+    /// What only the board can do; it [reports](Desk::report) what came of it.
+    pub request: Request<R>,
+}
+
+/// A payload that waits to be sent: on a radio, sealing and sending are one, so that no frame overtakes another.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Letter {
+    /// A parameter.
+    Parameter {
+        /// Its place.
+        index: u16,
+        /// Its value.
+        value: f32,
+        /// Was it changed as it was asked for?
+        taken: bool,
+    },
+    /// A reply's part, and whether it is the last.
+    Reply(String<PIECE>, bool),
+}
+
+impl Letter {
+    /// A copy of what a desk has answered. `None` of anything else.
+    #[must_use]
+    pub fn of(payload: &Payload<'_>) -> Option<Self> {
+        match *payload {
+            Payload::Parameter { index, value, taken } => Some(Self::Parameter { index, value, taken }),
+            Payload::Reply { text, last } => Some(Self::Reply(String::try_from(text).ok()?, last)),
+            _ => None,
+        }
+    }
+
+    /// What is to be sent.
+    #[must_use]
+    pub fn payload(&self) -> Payload<'_> {
+        match self {
+            Self::Parameter { index, value, taken } => {
+                Payload::Parameter { index: *index, value: *value, taken: *taken }
+            }
+            Self::Reply(text, last) => Payload::Reply { text, last: *last },
+        }
+    }
+}
+
+/// Questions of one station.
+///
+/// Give it what is asked with [`ask`](Self::ask), and send what [`answer`](Self::answer) returns as long as there is room for more. `stampfly-board`'s tests have
+/// it on both ends of the air.
+#[derive(Clone, Debug, Default)]
+pub struct Desk {
+    questions: Deque<(u16, Question), QUESTIONS>,
+    line: Option<(u16, String<LINE>, Stage)>,
+    record: Option<bool>,
+}
+
+impl Desk {
+    /// Nothing is asked.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { questions: Deque::new(), line: None, record: None }
+    }
+
+    /// Takes a question. `false` when it is none, or as many wait as there is room for; one line at a time.
+    pub fn ask(&mut self, number: u16, payload: &Payload<'_>) -> bool {
+        match *payload {
+            Payload::ReadParameter { index } => self.questions.push_back((number, Question::Read { index })).is_ok(),
+            Payload::WriteParameter { index, value } => {
+                self.questions.push_back((number, Question::Write { index, value })).is_ok()
+            }
+            Payload::Line(text) if self.line.is_none() => {
+                self.line = String::try_from(text).ok().map(|line| (number, line, Stage::Answering(0)));
+                self.line.is_some()
+            }
+            Payload::Record { wanted } => {
+                self.record = Some(wanted);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// What was said last of the flight record: that it is wanted, or is not; once. It is answered with chunks.
+    pub const fn record(&mut self) -> Option<bool> {
+        self.record.take()
+    }
+
+    /// Whoever has asked is gone.
+    pub fn clear(&mut self) {
+        self.questions.clear();
+        (self.line, self.record) = (None, None);
+    }
+
+    /// The next answer. `None` when nothing waits, or the board is to say something first.
+    pub fn answer<'r, V: Vehicle>(
+        &mut self,
+        now: Instant,
+        vehicle: &mut V,
+        room: &'r mut Room,
+    ) -> Option<Answer<'r, V::Request>> {
+        if let Some((number, question)) = self.questions.pop_front() {
+            let payload = parameter(vehicle, question)?;
+            return Some(Answer { number, payload, request: Request::Nothing });
+        }
+        let (number, line, stage) = self.line.as_mut()?;
+        let number = *number;
+        let sent = match stage {
+            Stage::Board => return None,
+            Stage::Answering(sent) => *sent,
+            Stage::Done(report) => {
+                room.0.start_at(0);
+                _ = fmt::Write::write_str(room, report);
+                self.line = None;
+                return Some(Answer { number, payload: reply(room, true)?.0, request: Request::Nothing });
+            }
+        };
+        room.0.start_at(sent);
+        // An error is the end of the part. Longer replies than one only show something: those lines are answered again.
+        let request = answer(line, now, vehicle, room).unwrap_or(Request::Nothing);
+        let is_cut = room.0.is_cut();
+        let (payload, length) = reply(room, !is_cut && request_is_nothing(&request))?;
+        if is_cut {
+            *stage = Stage::Answering(sent + length);
+        } else if request_is_nothing(&request) {
+            self.line = None;
+        } else {
+            *stage = Stage::Board;
+        }
+        Some(Answer { number, payload, request })
+    }
+
+    /// The board has done what it was asked for, or not.
+    pub fn report(&mut self, what: &dyn fmt::Display) {
+        if let Some((_, _, stage @ Stage::Board)) = &mut self.line {
+            let mut text = String::new();
+            // What is too long is cut.
+            _ = fmt::Write::write_fmt(&mut text, format_args!("{what}"));
+            *stage = Stage::Done(text);
+        }
+    }
+}
+
+fn request_is_nothing<R>(request: &Request<R>) -> bool {
+    matches!(request, Request::Nothing)
+}
+
+/// What is in the room, up to its last whole character, and how long that is.
+fn reply(room: &Room, last: bool) -> Option<(Payload<'_>, usize)> {
+    let bytes = room.0.bytes();
+    let whole = match core::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => core::str::from_utf8(bytes.get(..error.valid_up_to())?).ok()?,
+    };
+    Some((Payload::Reply { text: whole, last }, whole.len()))
+}
+
+fn parameter<'r, V: Vehicle>(vehicle: &mut V, question: Question) -> Option<Payload<'r>> {
+    let is_disarmed = vehicle.is_armed() == Some(false);
+    let parameters = vehicle.parameters();
+    let (index, taken) = match question {
+        Question::Read { index } => (index, true),
+        Question::Write { index, value } => {
+            let may = is_disarmed || parameters.describe(index.into()).is_some_and(|info| info.in_flight);
+            (index, may && parameters::set_at(parameters, index.into(), value).is_ok())
+        }
+    };
+    // Behind the last there is none: its value is zero, and nothing was taken.
+    let value = parameters.get(index.into());
+    Some(Payload::Parameter { index, value: value.unwrap_or_default(), taken: taken && value.is_some() })
+}

@@ -1,0 +1,347 @@
+//! What every vehicle that is served has at its ports: MAVLink, MSP, and the page of the ground station.
+//!
+//! A vehicle writes its [`Hands`], says in an [`About`] what it is, and lists in its [`PORTS`](crate::vehicle::Vehicle::PORTS) which of
+//! [`PortSpec::PAGE`], [`PortSpec::MAVLINK_UDP`], [`PortSpec::MAVLINK_TCP`], [`PortSpec::MSP`] and [`PortSpec::MSP_SERIAL`] it opens; the constant is what
+//! tells which language a port speaks. [`Served`] is all it hands to [`Live::serve`]. A vehicle that speaks more than these holds a [`Ground`] in a [`Link`]
+//! of its own. Not for vehicles with a protocol of their own and nothing else: they need neither.
+//!
+//! With feature `ground`.
+//!
+//! ```
+//! use core::cell::RefCell;
+//! use stampfly_flight::newest::{NewestSamples, longest_message};
+//! use stampfly_flight::parameters::Parameters;
+//! use stampfly_services::{Hands, Refusal, Request};
+//! use stampfly_services::link::mavlink::dialects::common::MavType;
+//! use stampfly_sim::fault::Injector;
+//! use stampfly_sim::ground::{About, Served};
+//! use stampfly_sim::vehicle::{Client, Heard, Link, Live, PortSpec, Ports};
+//! use stampfly_types::{Duration, Instant, messages::{GuidedCommand, PilotInput}};
+//! # use stampfly_services::Requested;
+//! # use std::sync::Arc;
+//! # mod topics {
+//! #     use stampfly_types::messages::FlightStatus;
+//! #     stampfly_bus::topics! {
+//! #         outside mode, display;
+//! #         /// What it does.
+//! #         flight_status: FlightStatus = latest @ 50 Hz from mode => [display];
+//! #     }
+//! # }
+//! # stampfly_param::parameters! {
+//! #     /// A buoy.
+//! #     pub struct Numbers, where buoy:
+//! #     /// Its lamp.
+//! #     lamp: Lamp {
+//! #         /// Brightness.
+//! #         level = 0.5 in [0.0, 1.0] "1";
+//! #     }
+//! # }
+//! # #[derive(Debug)]
+//! # struct Closed;
+//! # impl Ports for Closed {
+//! #     fn receive(&self, _: Option<std::time::Instant>, _: &mut dyn FnMut(Client, Heard<'_>)) {}
+//! #     fn send(&self, _: &Client, _: &[u8]) {}
+//! #     fn are_closed(&self) -> bool { true }
+//! # }
+//! /// A buoy with a lamp: it has parameters, and goes nowhere.
+//! struct Buoy(Requested<Numbers, 8>);
+//!
+//! impl Hands for Buoy {
+//!     fn command(&mut self, _: Instant, _: GuidedCommand) -> Result<(), Refusal> { Err(Refusal::Unsupported) }
+//!     fn sticks(&mut self, _: Instant, _: &PilotInput) -> Result<(), Refusal> { Err(Refusal::Unsupported) }
+//!     fn parameters(&mut self) -> &mut dyn Parameters { &mut self.0 }
+//!     fn request(&mut self, _: Instant, _: Request) -> Result<(), Refusal> { Err(Refusal::Unsupported) }
+//! }
+//!
+//! const PORTS: &[PortSpec] = &[PortSpec::PAGE, PortSpec::MAVLINK_UDP, PortSpec::MAVLINK_TCP];
+//! const ABOUT: About = About {
+//!     kind: MavType::MAV_TYPE_SURFACE_BOAT,
+//!     version: [1, 0, 0],
+//!     take_off_height: 0.0,
+//!     reach: 2.0,
+//!     card: None,
+//!     ports: PORTS,
+//!     faults: &[],
+//!     topics: &topics::TOPICS,
+//! };
+//!
+//! # fn main() {
+//! # let live = Live { ports: Arc::new(Closed), number: 0, limit: Duration::from_secs(1), speed: None };
+//! # let newest = RefCell::new(NewestSamples::<{ topics::COUNT }, { longest_message(&topics::TOPICS) }>::new());
+//! # let none = Injector::new(Instant::ZERO, &[]);
+//! let mut served = Served::new(&ABOUT, &live, &none, Buoy(Requested::new(Numbers::default())), &newest);
+//! let page = Client { port: 0, address: ([127, 0, 0, 1], 1).into() };
+//! let mut ask = |text: &str| {
+//!     let mut answer = String::new();
+//!     let heard = Heard::Bytes(text.as_bytes());
+//!     served.hear(Instant::ZERO, page, heard, &mut |_, said| answer = String::from_utf8_lossy(said).into_owned());
+//!     answer
+//! };
+//! assert!(ask(r#"{"vehicle":0,"id":1,"do":"param_set","name":"lamp.level","value":0.75}"#).contains("\"ok\":true"));
+//! assert!(ask(r#"{"vehicle":0,"id":2,"do":"param_get","name":"lamp.level"}"#).contains("\"value\":0.75"));
+//! assert!(ask(r#"{"vehicle":0,"id":3,"do":"guided","kind":"arm"}"#).contains("this vehicle does not do that"));
+//! # }
+//! ```
+
+use crate::ask::{Ask, Asked, Guided, Reply};
+use crate::fault::{Fault, FaultKind, Injector, When};
+use crate::vehicle::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed};
+use core::cell::RefCell;
+use stampfly_bus::TopicInfo;
+use stampfly_flight::parameters;
+use stampfly_services::link::mavlink::dialects::common::MavType;
+use stampfly_services::link::mavlink::signing::SigningKey;
+use stampfly_services::mavlink::{Identity, Mavlink};
+use stampfly_services::msp::{Card, Msp};
+use stampfly_services::{Cockpit as _, Hands, Helm, Places, Refusal, Request, Samples, Seat, Seated, View};
+use stampfly_types::{Duration, Instant};
+use std::sync::Arc;
+
+/// Between two looks at the ports: what is heard waits for so long at most.
+pub const PERIOD: Duration = Duration::from_millis(5);
+/// Ticks between two turns of the services that send by themselves: 20 ms.
+pub const TURN: u32 = 4;
+
+/// What a vehicle is for programs at its ports.
+#[derive(Clone, Copy, Debug)]
+pub struct About {
+    /// Its kind in MAVLink.
+    pub kind: MavType,
+    /// Its version: major, minor, patch.
+    pub version: [u8; 3],
+    /// Height that a take-off without one climbs to, m.
+    pub take_off_height: f32,
+    /// A place of a mission is reached within this distance, m, unless its item says another.
+    pub reach: f32,
+    /// What a configurator is told. A vehicle without one has no port for configurators, or one that is silent.
+    pub card: Option<&'static Card>,
+    /// Its ports, in the order of [`Vehicle::PORTS`](crate::vehicle::Vehicle::PORTS).
+    pub ports: &'static [PortSpec],
+    /// The faults that a page may name.
+    pub faults: &'static [FaultKind],
+    /// Its topics.
+    pub topics: &'static [TopicInfo],
+}
+
+/// The services that are the same for every vehicle, and the vehicle's hands.
+pub struct Ground<H> {
+    about: About,
+    identity: Identity,
+    mavlink: Mavlink<Client>,
+    msp: Vec<(Client, Msp)>,
+    helm: Helm,
+    places: Places,
+    /// Tells which ports are this machine's alone.
+    ports: Arc<dyn Ports>,
+    speed: Option<Speed>,
+    faults: Injector,
+    /// What the vehicle does for them.
+    pub hands: H,
+}
+
+/// What the console says to a line that the page has sent.
+pub type Console<'c, H> = &'c mut dyn FnMut(&mut H, &str) -> Result<Reply, String>;
+
+impl<H: Hands> Ground<H> {
+    /// Those of a vehicle with these hands, which can be broken by these faults.
+    #[must_use]
+    pub fn new(about: &About, live: &Live, faults: &Injector, hands: H) -> Self {
+        let identity = Identity {
+            system: u8::try_from(live.number + 1).unwrap_or(u8::MAX),
+            kind: about.kind,
+            take_off_height: about.take_off_height,
+            reach: about.reach,
+            version: about.version,
+        };
+        Self {
+            about: *about,
+            identity,
+            mavlink: match live.ports.signing() {
+                Some(signing) => Mavlink::new(identity).with_key(SigningKey::new(signing.key), signing.time),
+                None => Mavlink::new(identity),
+            },
+            msp: Vec::new(),
+            helm: Helm::new(),
+            places: Places::of(about.topics),
+            ports: live.ports.clone(),
+            speed: live.speed.clone(),
+            faults: faults.clone(),
+            hands,
+        }
+    }
+
+    /// What it is in MAVLink.
+    #[must_use]
+    pub const fn identity(&self) -> Identity {
+        self.identity
+    }
+
+    /// The vehicle, for one call of a service.
+    pub fn seated<'s>(&'s mut self, samples: &'s dyn Samples) -> Seated<'s> {
+        let Self { helm, places, hands, .. } = self;
+        Seated { helm, hands, view: View::new(samples, places) }
+    }
+
+    /// Something was heard at one of the ports that are the same for every vehicle. Nothing happens at another.
+    pub fn hear(
+        &mut self,
+        now: Instant,
+        from: Client,
+        heard: Heard<'_>,
+        samples: &dyn Samples,
+        console: Console<'_, H>,
+        put: Put<'_>,
+    ) {
+        let Some(spec) = self.about.ports.get(from.port) else { return };
+        match (*spec, heard) {
+            (PortSpec::PAGE, Heard::Bytes(text)) => {
+                let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
+                let Some(asked) = asked else { return };
+                let answer = self.page(now, &asked.ask, samples, console);
+                // What is said again and again needs no answer.
+                if !matches!(asked.ask, Ask::Sticks(_) | Ask::Alive {}) {
+                    put(&from, asked.answered(answer).as_bytes());
+                }
+            }
+            (PortSpec::MAVLINK_UDP | PortSpec::MAVLINK_TCP, heard) => self.mavlink(now, from, heard, samples, put),
+            (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Opened) => {
+                self.msp.extend(self.about.card.map(|card| (from, Msp::new(card))));
+            }
+            (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Bytes(bytes)) => {
+                let Self { helm, places, hands, msp, .. } = self;
+                let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
+                if let Some((_, msp)) = msp.iter_mut().find(|(client, _)| *client == from) {
+                    msp.hear(now, bytes, &mut cockpit, &mut |frame| put(&from, frame));
+                }
+            }
+            (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Closed) => self.msp.retain(|(client, _)| *client != from),
+            _ => {}
+        }
+    }
+
+    fn mavlink(&mut self, now: Instant, from: Client, heard: Heard<'_>, samples: &dyn Samples, put: Put<'_>) {
+        let Self { helm, places, hands, mavlink, ports, .. } = self;
+        let is_local = ports.is_local(from.port);
+        match heard {
+            Heard::Opened if is_local => mavlink.open_local(now, from, true),
+            Heard::Opened => mavlink.open(now, from, true),
+            Heard::Bytes(bytes) => {
+                if is_local {
+                    mavlink.open_local(now, from, false);
+                }
+                let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
+                mavlink.hear(now, from, bytes, &mut cockpit, put);
+            }
+            Heard::Closed => mavlink.close(from),
+        }
+    }
+
+    /// Does what a page asks for. A line for the console is `console`'s.
+    fn page(
+        &mut self,
+        now: Instant,
+        ask: &Ask,
+        samples: &dyn Samples,
+        console: Console<'_, H>,
+    ) -> Result<Reply, String> {
+        let mut cockpit = self.seated(samples);
+        cockpit.alive(now, Seat::Page);
+        let said = |result: Result<(), Refusal>| match result {
+            Ok(()) => Ok(Reply::text("")),
+            Err(refusal) => Err(refusal.to_string()),
+        };
+        match ask {
+            // A click on the map says where to be, not where to be after everything else.
+            Ask::Guided(go_to @ Guided::GoTo { .. }) => said(cockpit.fly_to(now, Seat::Page, (*go_to).into())),
+            Ask::Guided(guided) => said(cockpit.guide(now, Seat::Page, (*guided).into())),
+            Ask::Sticks(sticks) => said(cockpit.steer(now, Seat::Page, &(*sticks).into())),
+            Ask::MotorTest { motor, duty } => {
+                said(cockpit.request(now, Request::TestMotor { motor: *motor, duty: *duty }))
+            }
+            Ask::MotorStop {} => said(cockpit.request(now, Request::StopMotor)),
+            Ask::ParamGet { name } => {
+                let config = cockpit.parameters();
+                let value = parameters::find(config, name).ok().and_then(|index| config.get(index));
+                value.map(|value| Reply::value(value.into())).ok_or_else(|| "there is no such parameter".into())
+            }
+            Ask::ParamSet { name, value } => {
+                let armed = cockpit.view().state().armed;
+                let config = cockpit.parameters();
+                let info = parameters::find(config, name).ok().and_then(|index| config.describe(index));
+                if armed && info.is_some_and(|info| !info.in_flight) {
+                    return Err(Refusal::Armed.to_string());
+                }
+                match parameters::set(config, name, *value) {
+                    Ok(_) => Ok(Reply::value((*value).into())),
+                    Err(error) => Err(error.to_string()),
+                }
+            }
+            Ask::ParamSave {} => said(cockpit.request(now, Request::SaveParameters)),
+            Ask::Console { line } => console(&mut self.hands, line),
+            Ask::Fault { text } => self.break_something(now, text),
+            Ask::FaultClear {} => {
+                (0..self.faults.faults().count()).for_each(|place| self.faults.end(place, now));
+                Ok(Reply::text(""))
+            }
+            Ask::Speed { factor } => {
+                let speed = self.speed.as_ref().ok_or("time is somebody else's here")?;
+                speed.set(*factor);
+                Ok(Reply::value((*factor).into()))
+            }
+            Ask::Alive {} => Ok(Reply::default()),
+        }
+    }
+
+    fn break_something(&self, now: Instant, text: &str) -> Result<Reply, String> {
+        let fault = Fault::parse(text, self.about.faults).map_err(|error| error.to_string())?;
+        let same = |other: &Fault| other.kind == fault.kind && other.value == fault.value;
+        let place = self.faults.faults().position(same).ok_or("in flight, only with its usual value")?;
+        match fault.when {
+            // A moment of the flight may have passed, a time that has is now.
+            When::Moment(_) => return Err("in flight, only now: @0".into()),
+            When::After(_) => self.faults.begin(place, now, fault.lasts),
+        }
+        Ok(Reply::text(text))
+    }
+
+    /// What is to be done at every tick, whoever is connected. Before [`answer`](Self::answer).
+    pub fn poll(&mut self, now: Instant, samples: &dyn Samples) {
+        let armed = View::new(samples, &self.places).state().armed;
+        self.helm.poll(now, armed, &mut self.hands);
+    }
+
+    /// Sends what is due. Call it at every turn.
+    pub fn answer(&mut self, now: Instant, samples: &dyn Samples, put: Put<'_>) {
+        let Self { helm, places, hands, mavlink, .. } = self;
+        mavlink.poll(now, &mut Seated { helm, hands, view: View::new(samples, places) }, put);
+    }
+}
+
+/// All that a vehicle has at its ports, when it has nothing else there: hand it to [`Live::serve`] with [`PERIOD`].
+pub struct Served<'n, H, S> {
+    ground: Ground<H>,
+    newest: &'n RefCell<S>,
+}
+
+impl<'n, H: Hands, S: Samples> Served<'n, H, S> {
+    /// As [`Ground::new`], of a vehicle whose newest samples are noted there.
+    #[must_use]
+    pub fn new(about: &About, live: &Live, faults: &Injector, hands: H, newest: &'n RefCell<S>) -> Self {
+        Self { ground: Ground::new(about, live, faults, hands), newest }
+    }
+}
+
+impl<H: Hands, S: Samples> Link for Served<'_, H, S> {
+    fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
+        let console: Console<'_, H> = &mut |_, _| Err("this vehicle has no console".into());
+        self.ground.hear(now, from, heard, &*self.newest.borrow(), console, put);
+    }
+
+    fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>) {
+        let newest = self.newest.borrow();
+        self.ground.poll(now, &*newest);
+        if tick.is_multiple_of(TURN) {
+            self.ground.answer(now, &*newest, put);
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Other parameters for a vehicle in flight, as if they had been changed at that instant.
+//!
+//! For tools that ask what would have come of it: the simulator flies up to an instant with some parameters, and on with others.
+//! The states stay: attitude, biases, integrals, phases. What a runnable holds of its configuration, or of what follows from it, is
+//! found by comparing the runnables at power-on with either configuration: where they differ, and the vehicle still has
+//! what it had at power-on, it gets the new value. Whatever has moved since then is a state, and stays.
+//!
+//! Not for a vehicle: it serialises all of its state.
+
+use super::Witness;
+use ciborium::Value;
+use core::fmt;
+use serde::{Serialize, de::DeserializeOwned};
+use stampfly_bus::Schedule;
+use stampfly_flight::{FlightLoop, Observer};
+use stampfly_types::Instant;
+
+/// Why the parameters of a vehicle in flight were not changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// It chooses a component, which would begin without a state: the runnables have another structure with it, or the
+    /// [vehicle](super::Vehicle::has_same_components) says so.
+    OtherComponents,
+    /// It decides only how the vehicle begins: nothing in flight depends on it.
+    NothingDepends,
+    /// The runnables do not survive being written down.
+    NotSerialisable,
+}
+
+impl fmt::Display for ChangeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::OtherComponents => "it chooses a component, which cannot begin in flight; change it from 0 on",
+            Self::NothingDepends => "nothing in flight depends on it; change it from 0 on",
+            Self::NotSerialisable => "the state of this vehicle cannot be written down",
+        })
+    }
+}
+
+impl std::error::Error for ChangeError {}
+
+/// The runnables with the parameters of `new` instead of `old`, and their states. The same runnables bit for bit when both are
+/// the same.
+///
+/// # Errors
+/// When the change cannot be made in flight.
+pub fn carry_over<R: Schedule + Serialize + DeserializeOwned>(
+    flying: &R,
+    old: &R::Config,
+    new: &R::Config,
+) -> Result<R, ChangeError> {
+    let value = |runnables: &R| Value::serialized(runnables).map_err(|_| ChangeError::NotSerialisable);
+    let (mut tree, old, new) = (value(flying)?, value(&R::new(old))?, value(&R::new(new))?);
+    if patch(&mut tree, &old, &new)? == 0 && !same(&old, &new) {
+        return Err(ChangeError::NothingDepends);
+    }
+    tree.deserialized().map_err(|_| ChangeError::NotSerialisable)
+}
+
+/// Returns how many values have changed.
+fn patch(flying: &mut Value, old: &Value, new: &Value) -> Result<usize, ChangeError> {
+    if same(old, new) {
+        return Ok(0);
+    }
+    match (old, new) {
+        (Value::Array(olds), Value::Array(news)) if olds.len() == news.len() => {
+            // A list that has grown since is a state.
+            let Value::Array(parts) = flying else { return Ok(0) };
+            if parts.len() != olds.len() {
+                return Ok(0);
+            }
+            parts.iter_mut().zip(olds.iter().zip(news)).map(|(part, (old, new))| patch(part, old, new)).sum()
+        }
+        (Value::Map(olds), Value::Map(news)) if keys(olds).eq(keys(news)) => {
+            let Value::Map(parts) = flying else { return Ok(0) };
+            if !keys(parts).eq(keys(olds)) {
+                return Ok(0);
+            }
+            parts
+                .iter_mut()
+                .zip(olds.iter().zip(news))
+                .map(|(part, (old, new))| patch(&mut part.1, &old.1, &new.1))
+                .sum()
+        }
+        (Value::Array(_) | Value::Map(_), _) | (_, Value::Array(_) | Value::Map(_)) => {
+            Err(ChangeError::OtherComponents)
+        }
+        _ if same(flying, old) => {
+            *flying = new.clone();
+            Ok(1)
+        }
+        _ => Ok(0),
+    }
+}
+
+fn keys(map: &[(Value, Value)]) -> impl Iterator<Item = &Value> {
+    map.iter().map(|(key, _)| key)
+}
+
+/// Bit for bit: what is no number is the same as itself.
+fn same(one: &Value, other: &Value) -> bool {
+    match (one, other) {
+        (Value::Float(one), Value::Float(other)) => one.to_bits() == other.to_bits(),
+        (Value::Array(one), Value::Array(other)) => {
+            one.len() == other.len() && one.iter().zip(other).all(|(one, other)| same(one, other))
+        }
+        (Value::Map(one), Value::Map(other)) => {
+            one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.0 == b.0 && same(&a.1, &b.1))
+        }
+        _ => one == other,
+    }
+}
+
+/// Changes the configuration of a vehicle in flight at an instant. A [`Witness`] like a recorder: put it behind one.
+pub struct Change<R: Schedule> {
+    at: Instant,
+    old: R::Config,
+    new: R::Config,
+    made: Option<Result<Instant, ChangeError>>,
+}
+
+impl<R: Schedule> Change<R> {
+    /// From the first moment of rest at or after `at`, the vehicle that flew with `old` flies with `new`.
+    #[must_use]
+    pub fn new(at: Instant, old: R::Config, new: R::Config) -> Self {
+        Self { at, old, new, made: None }
+    }
+
+    /// When it was made, or why not; `None` when the flight was over before.
+    #[must_use]
+    pub const fn made(&self) -> Option<Result<Instant, ChangeError>> {
+        self.made
+    }
+}
+
+impl<R: Schedule> Observer for Change<R> {}
+
+impl<R: Schedule + Serialize + DeserializeOwned> Witness<R> for Change<R> {
+    fn at_rest(&mut self, clock: Instant, flight_loop: &mut FlightLoop<'_, R>) {
+        if clock < self.at || self.made.is_some() {
+            return;
+        }
+        let changed = carry_over(flight_loop.runnables(), &self.old, &self.new);
+        self.made = Some(changed.map(|runnables| {
+            flight_loop.set_runnables(runnables);
+            clock
+        }));
+    }
+}

@@ -1,0 +1,48 @@
+//! A vehicle's parameters by name, for vehicles whose configuration is a table of `stampfly-param`.
+//!
+//! A [`Vehicle`](super::Vehicle) hands its functions about parameters here. Not for a configuration that is more than a table, as the StampFly's.
+
+use super::{Setting, SetupError};
+use crate::plant::Airframe;
+use stampfly_log::ulog::ParameterValue;
+use stampfly_param::ParameterTable;
+
+/// Every parameter of a configuration.
+#[must_use]
+pub fn settings<P: ParameterTable>(config: &P) -> Vec<Setting> {
+    let rows = P::TABLE.iter().map(|row| (row, row.get(config).into()));
+    rows.map(|(row, value)| Setting { name: row.name, value, unit: row.unit, meaning: row.meaning }).collect()
+}
+
+/// Changes a parameter.
+///
+/// # Errors
+/// When there is no such parameter, or the value is no number or out of range.
+pub fn set<P: ParameterTable>(config: &mut P, name: &str, value: ParameterValue) -> Result<(), SetupError> {
+    let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
+    P::find(name).and_then(|row| row.set(config, value)).map_err(|error| format!("{name}: {error}"))
+}
+
+/// Changes parameters as options ask for, [`Options::parameters`](super::Options::parameters), and looks whether all of them together may be flown.
+///
+/// # Errors
+/// As [`set`], and when they may not.
+pub fn change<P: ParameterTable>(config: &mut P, options: &super::Options) -> Result<(), SetupError> {
+    for (name, value) in options.parameters()? {
+        set(config, name, ParameterValue::Float(value)).map_err(|error| format!("--param {error}"))?;
+    }
+    config.validate().map_err(|error| error.to_string())
+}
+
+/// Lowest and highest value of a parameter; `None` when there is no such.
+#[must_use]
+pub fn range<P: ParameterTable>(name: &str) -> Option<[f64; 2]> {
+    P::find(name).ok().map(|row| [row.min.into(), row.max.into()])
+}
+
+/// Every number of a simulated airframe.
+#[must_use]
+pub fn airframe(airframe: &impl Airframe) -> Vec<Setting> {
+    let rows = airframe.list().into_iter();
+    rows.map(|row| Setting { name: row.name, value: row.value, unit: row.unit, meaning: row.description }).collect()
+}

@@ -1,0 +1,72 @@
+//! What programs at the other end of the link may do: command it, change its parameters, ask where home is.
+
+use crate::messages::Home;
+use crate::parameters::Parameters;
+use crate::topics::{COUNT, LinkEnds, TOPICS};
+use stampfly_flight::newest::{NewestSamples, longest_message};
+use stampfly_flight::parameters::Parameters as ByNumber;
+use stampfly_services::{Hands, Refusal, Request, Requested};
+use stampfly_types::messages::{GuidedCommand, PilotInput};
+use stampfly_types::{Instant, Origin};
+
+/// The newest sample of every topic.
+pub type Newest = NewestSamples<COUNT, { longest_message(&TOPICS) }>;
+
+/// The aircraft's end of the link. It is flown by commands alone: there are no sticks.
+pub struct Board<'b> {
+    parameters: Requested<Parameters, 64>,
+    /// As a new vehicle has them.
+    defaults: Parameters,
+    home: Home,
+    ends: LinkEnds<'b>,
+}
+
+impl<'b> Board<'b> {
+    /// With the parameters at power-on, and those of a new vehicle.
+    #[must_use]
+    pub fn new(parameters: &Parameters, defaults: &Parameters, ends: LinkEnds<'b>) -> Self {
+        Self { parameters: Requested::new(*parameters), defaults: *defaults, home: Home::default(), ends }
+    }
+}
+
+impl Hands for Board<'_> {
+    fn command(&mut self, now: Instant, command: GuidedCommand) -> Result<(), Refusal> {
+        self.ends.command_guided.publish(now, command).map(|_| ()).map_err(|_| Refusal::Full)
+    }
+
+    fn sticks(&mut self, _: Instant, _: &PilotInput) -> Result<(), Refusal> {
+        Err(Refusal::Unsupported)
+    }
+
+    fn parameters(&mut self) -> &mut dyn ByNumber {
+        &mut self.parameters
+    }
+
+    fn origin(&self) -> Option<Origin> {
+        self.home.origin()
+    }
+
+    fn request(&mut self, _: Instant, request: Request) -> Result<(), Refusal> {
+        match request {
+            Request::ResetParameters => self.parameters.set_all(&self.defaults).map_err(|_| Refusal::Range),
+            _ => Err(Refusal::Unsupported),
+        }
+    }
+
+    /// Changes of an armed aircraft wait until it is disarmed.
+    fn poll(&mut self, now: Instant, armed: bool) {
+        let Self { parameters, ends, home, .. } = self;
+        if let Some(newest) = ends.home.has_new().then(|| ends.home.latest()).flatten() {
+            *home = newest.data;
+        }
+        if !armed {
+            for request in parameters.take() {
+                // When it is full, what is shown next is what is in use.
+                let _ = ends.parameter_request.publish(now, request);
+            }
+        }
+        if let Some(newest) = ends.parameters.has_new().then(|| ends.parameters.latest()).flatten() {
+            parameters.adopt(newest.data);
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! The path manager: a cycle of states, one of which executes whatever mode is current. None of them knows which.
+//!
+//! | state | what it does |
+//! |---|---|
+//! | comms with attitude | takes what the estimator says |
+//! | comms with telemetry | hands commands, changes of the way-points and the watch's troubles to the [orders](crate::orders) |
+//! | sensor fusion | makes of it what stages are told |
+//! | mode executor | the one call, [`Selector::execute`] |
+//! | coordinate turn, elevation | hands the demand to the autopilot, which flies it at its own rate |
+//! | fatal failure | entered when anything fails, never left: throttle closed, a gentle turn, a glide |
+
+use crate::Parameters;
+use crate::messages::*;
+use crate::modes::{Order, Plane, Report, Seen, report};
+use crate::orders::{Circumstances, Orders};
+use serde::{Deserialize, Serialize};
+use stampfly_control::fixed_wing::runway::Runway;
+use stampfly_mode::stage::Selector;
+use stampfly_types::messages::{ArmBlocks, GuidedCommand, GuidedKind, StateEstimate, Validity};
+use stampfly_types::{Duration, Instant, frame, math};
+
+/// Slower than this over the ground, m/s, the course is the nose's.
+const MOVES: f32 = 2.0;
+/// It stands on its wheels when it has been slow, low and level for this long, s.
+const SETTLED: f32 = 0.5;
+/// It is disarmed after a landing when it has stood with its brakes on for this long, s.
+const PARKED: f32 = 2.0;
+/// After a failure it is down within this time, from the fence's height, and disarmed then.
+const DOWN: Duration = Duration::from_secs(120);
+/// Without an attitude nothing glides it: it is disarmed after this time. A gap of some samples is glided through.
+const GONE: Duration = Duration::from_secs(1);
+
+/// What a cycle is given.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensed<'a> {
+    /// What the estimator says.
+    pub estimate: &'a StateEstimate,
+    /// The air.
+    pub air: &'a AirState,
+    /// Where the local frame begins.
+    pub home: &'a Home,
+    /// What is wrong.
+    pub safety: &'a Safety,
+    /// Speeds, heights and so on.
+    pub parameters: &'a Parameters,
+    /// What somebody has asked for since the last cycle.
+    pub commands: &'a [GuidedCommand],
+    /// The same, of the way-points.
+    pub edits: &'a [WayPointEdit],
+}
+
+/// The states.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum State {
+    /// Takes what the estimator says.
+    #[default]
+    CommsWithAttitude,
+    /// Takes commands.
+    CommsWithTelemetry,
+    /// Makes of both what stages are told.
+    SensorFusion,
+    /// Executes the current mode.
+    ModeExecutor,
+    /// Hands over the demand.
+    CoordinateTurnElevation,
+    /// Something has failed.
+    FatalFailure,
+}
+
+/// The path manager.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PathManager {
+    state: State,
+    selector: Selector<Plane>,
+    orders: Orders,
+    runway: Option<Runway>,
+    /// For how long it has been still on its wheels, and stood with its brakes on, s.
+    settled: f32,
+    parked: f32,
+    failed: Option<Instant>,
+    last: Option<Instant>,
+    /// Take-offs that were given up, as far as orders know.
+    given_up: u32,
+    demand: Demand,
+    status: PathStatus,
+}
+
+impl PathManager {
+    /// One whole cycle: what the autopilot is to do.
+    pub fn cycle(&mut self, now: Instant, sensed: &Sensed<'_>) -> Demand {
+        // Five states, and the one that ends it.
+        for _ in 0..5 {
+            if self.step(now, sensed) != CycleStatus::InCycle {
+                break;
+            }
+        }
+        self.demand
+    }
+
+    /// One state.
+    pub fn step(&mut self, now: Instant, sensed: &Sensed<'_>) -> CycleStatus {
+        self.state = match self.state {
+            State::CommsWithAttitude if sensed.safety.troubles.contains(Troubles::ATTITUDE) && self.orders.armed => {
+                State::FatalFailure
+            }
+            State::CommsWithAttitude => State::CommsWithTelemetry,
+            State::CommsWithTelemetry => {
+                let circumstances = Circumstances {
+                    position: position(sensed.estimate),
+                    may_arm: Self::blocks(sensed).is_empty(),
+                    on_ground: self.settled > SETTLED,
+                };
+                sensed.commands.iter().for_each(|command| self.orders.obey(command, &circumstances));
+                let origin = sensed.home.origin();
+                sensed.edits.iter().for_each(|edit| self.orders.edit(edit, origin.as_ref()));
+                let dt = self.last.map_or(0.0, |last| now.since(last).seconds());
+                self.orders.overrule(dt, sensed.safety, circumstances.position.is_some(), sensed.parameters);
+                State::SensorFusion
+            }
+            State::SensorFusion => {
+                self.settle(now, sensed);
+                State::ModeExecutor
+            }
+            State::ModeExecutor => self.execute(now, sensed),
+            State::CoordinateTurnElevation => State::CommsWithAttitude,
+            State::FatalFailure => {
+                let stops = |command: &GuidedCommand| matches!(command.kind, GuidedKind::Disarm | GuidedKind::Kill);
+                let most = if sensed.safety.troubles.contains(Troubles::ATTITUDE) { GONE } else { DOWN };
+                if now.since(*self.failed.get_or_insert(now)) > most || sensed.commands.iter().any(stops) {
+                    self.orders.disarm();
+                }
+                State::FatalFailure
+            }
+        };
+        self.status.cycle = match self.state {
+            State::CommsWithAttitude => CycleStatus::CompletedCycle,
+            State::FatalFailure => CycleStatus::FailureMode,
+            _ => CycleStatus::InCycle,
+        };
+        if self.state == State::FatalFailure {
+            // A wide turn with a closed throttle: it comes down near where it failed, as slowly as it glides.
+            self.demand = Demand { bank: 0.15, bank_max: 0.3, pitch: -0.03, ..Demand::default() };
+        }
+        self.status.cycle
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// Mode, stage, way-points.
+    #[must_use]
+    pub const fn status(&self) -> &PathStatus {
+        &self.status
+    }
+
+    /// May the propeller turn?
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.orders.armed
+    }
+
+    /// Does the watch fly it?
+    #[must_use]
+    pub const fn is_overruled(&self) -> bool {
+        self.orders.failsafe
+    }
+
+    /// Why it would not arm.
+    #[must_use]
+    pub fn blocks(sensed: &Sensed<'_>) -> ArmBlocks {
+        let Sensed { estimate, home, safety, .. } = sensed;
+        let is_placed =
+            home.known && estimate.valid.contains(Validity::TILT | Validity::VELOCITY_Z | Validity::POSITION_Z);
+        // One that knows where north is knows where it is, or has no receiver any more; the heading alone comes with the roll.
+        let is_lost = estimate.valid.contains(Validity::HEADING) && position(estimate).is_none();
+        [
+            (ArmBlocks::ESTIMATE, !is_placed || is_lost),
+            (ArmBlocks::ATTITUDE, safety.troubles.contains(Troubles::ATTITUDE)),
+            (ArmBlocks::LOW_BATTERY, safety.troubles.contains(Troubles::BATTERY)),
+            (ArmBlocks::SENSOR, safety.troubles.contains(Troubles::AIRSPEED)),
+        ]
+        .iter()
+        .fold(ArmBlocks::NONE, |all, (block, holds)| all.set(*block, *holds))
+    }
+
+    /// Notices the strip, and that it stands.
+    fn settle(&mut self, now: Instant, sensed: &Sensed<'_>) {
+        let Sensed { estimate, air, parameters: p, home, .. } = sensed;
+        let dt = self.last.map_or(0.0, |last| now.since(last).seconds());
+        self.last = Some(now);
+        let field = self.runway.map_or(0.0, |strip| strip.height);
+        let low = -estimate.position.z - field < 3.0 && estimate.velocity.z.abs() < 0.4;
+        let slow = air.airspeed < p.speed.rotation || self.orders.order == Order::Stand;
+        self.settled = if low && slow { self.settled + dt } else { 0.0 };
+        let speed = estimate.velocity.horizontal().norm();
+        let is_slow = speed < 0.5 || !estimate.valid.contains(Validity::VELOCITY_XY);
+        let comes_down = matches!(self.orders.order, Order::Land | Order::Down);
+        let stands = self.demand.brake && self.demand.on_ground && is_slow && comes_down;
+        self.parked = if stands { self.parked + dt } else { 0.0 };
+        if self.parked > PARKED {
+            self.orders.disarm();
+            self.orders.failsafe = false;
+        }
+        let heading = frame::yaw(&estimate.attitude);
+        if self.orders.order == Order::Fly && self.runway.is_none() && estimate.valid.contains(Validity::HEADING) {
+            let placed = position(estimate).zip(home.origin());
+            self.runway = placed.map(|(here, origin)| Runway::at(&origin, here, -estimate.position.z, heading));
+        }
+    }
+
+    fn execute(&mut self, now: Instant, sensed: &Sensed<'_>) -> State {
+        let Sensed { estimate, air, home, parameters, .. } = *sensed;
+        let [north, east, _] = estimate.velocity.to_array();
+        let ground_speed = math::sqrt(north * north + east * east);
+        let heading = frame::yaw(&estimate.attitude);
+        let seen = Seen {
+            parameters,
+            origin: home.origin().unwrap_or_default(),
+            runway: self.runway,
+            way_points: &self.orders.way_points,
+            order: if self.orders.armed { self.orders.order } else { Order::Stand },
+            hold: self.orders.hold,
+            position: position(estimate),
+            height: -estimate.position.z,
+            airspeed: air.airspeed,
+            wind: air.wind,
+            ground_speed,
+            course: if ground_speed > MOVES { math::atan2(east, north) } else { heading },
+            heading,
+            on_ground: self.settled > SETTLED,
+        };
+        let demand = self.selector.execute(now, &seen);
+        let Report { place, way_point, remaining, landings, given_up } = report(&self.selector, &seen);
+        if given_up != self.given_up {
+            // It is not tried again before somebody arms it again.
+            (self.given_up, self.orders.order) = (given_up, Order::Land);
+        }
+        let Orders { refusal, refused, .. } = self.orders;
+        self.status = PathStatus { place, way_point, remaining, landings, refusal, refused, ..self.status };
+        match demand {
+            Ok(demand) => {
+                self.demand = demand;
+                State::CoordinateTurnElevation
+            }
+            Err(_) => State::FatalFailure,
+        }
+    }
+}
+
+fn position(estimate: &StateEstimate) -> Option<[f32; 2]> {
+    let [north, east, _] = estimate.position.to_array();
+    estimate.valid.contains(Validity::POSITION_XY | Validity::HEADING).then_some([north, east])
+}

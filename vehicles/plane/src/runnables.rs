@@ -1,0 +1,193 @@
+//! What the schedule runs: each reads its topics, steps a component, publishes.
+//!
+//! What decides or computes is in [`navigation`](crate::navigation), [`autopilot`], [`watch`](crate::watch) and
+//! [`path_manager`](crate::path_manager); change it there.
+
+use crate::autopilot;
+use crate::family;
+use crate::messages::Home;
+use crate::navigation::{Navigation, Samples};
+use crate::parameters::Parameters;
+use crate::path_manager::{PathManager, Sensed};
+use crate::topics::*;
+use crate::watch::{Watch, Watched};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+use stampfly_bus::{Activation, Runnable};
+use stampfly_control::fixed_wing::{Autopilot, AutopilotConfig, Flown};
+use stampfly_control::timing::StepTimer;
+use stampfly_param::ParameterSet;
+use stampfly_types::{Duration, Instant};
+
+/// An estimate that is older is none: ten samples were missed.
+const OLD: Duration = Duration::from_millis(25);
+/// A battery that is not measured any more.
+const UNMEASURED: Duration = Duration::from_secs(2);
+
+/// Sensors to state.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Estimation {
+    navigation: Navigation,
+    home: Home,
+}
+
+impl Estimation {
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        Self { navigation: Navigation::new(parameters), home: Home::default() }
+    }
+}
+
+impl Runnable for Estimation {
+    type Ends<'b> = EstimationEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
+        let now = activation.now();
+        let samples = Samples {
+            imu: &ends.sensor_imu,
+            mag: &ends.sensor_mag,
+            baro: &ends.sensor_baro,
+            gnss: &ends.sensor_gnss,
+            airspeed: &ends.sensor_airspeed,
+        };
+        self.navigation.step(now, &samples, !ends.flight_status.get().armed);
+        ends.estimate_state.publish(now, &self.navigation.estimate());
+        ends.estimate_status.publish(now, &self.navigation.status());
+        ends.air.publish(now, &self.navigation.air());
+        if *self.navigation.home() != self.home {
+            self.home = *self.navigation.home();
+            ends.home.publish(now, &self.home);
+        }
+    }
+}
+
+/// Demand and state to surfaces and throttle.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Control {
+    autopilot: Autopilot,
+    config: AutopilotConfig,
+    timer: StepTimer,
+}
+
+impl Control {
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        let config = autopilot::config(parameters);
+        Self { autopilot: Autopilot::default(), config, timer: StepTimer::default() }
+    }
+}
+
+impl Runnable for Control {
+    type Ends<'b> = ControlEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut ControlEnds<'_>) {
+        let now = activation.now();
+        let dt = self.timer.step(now);
+        if ends.parameters.is_new() {
+            self.config = autopilot::config(ends.parameters.get());
+        }
+        let demand = ends.demand.get();
+        let (motor, servos) = match ends.estimate_state.fresh(now, OLD) {
+            Some(state) => {
+                let flown = self.autopilot.step(dt, demand, state, ends.air.get(), &self.config);
+                autopilot::outputs(&flown, demand.brake, ends.flight_status.get().armed)
+            }
+            // Without a state to fly by: a loop on a state that stands still would wind up.
+            None => autopilot::outputs(&Flown::default(), false, false),
+        };
+        ends.actuator_motor.publish(now, &motor);
+        ends.actuator_servo.publish(now, &servos);
+    }
+}
+
+/// What is wrong.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Watching(Watch);
+
+impl Watching {
+    pub(crate) fn new(_: &Parameters) -> Self {
+        Self(Watch::default())
+    }
+}
+
+impl Runnable for Watching {
+    type Ends<'b> = WatchEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut WatchEnds<'_>) {
+        let now = activation.now();
+        let heard = ends.path_status.get().heard;
+        let watched = Watched {
+            estimate: ends.estimate_state.fresh(now, OLD),
+            air: ends.air.get(),
+            power: ends.sensor_power.fresh(now, UNMEASURED),
+            heard: (heard > Instant::ZERO).then_some(heard),
+            parameters: ends.parameters.get(),
+        };
+        ends.safety.publish(now, &self.0.step(now, &watched));
+    }
+}
+
+/// The path manager.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Path {
+    manager: PathManager,
+    heard: Instant,
+}
+
+impl Path {
+    pub(crate) fn new(_: &Parameters) -> Self {
+        Self { manager: PathManager::default(), heard: Instant::ZERO }
+    }
+}
+
+impl Runnable for Path {
+    type Ends<'b> = PathEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut PathEnds<'_>) {
+        let now = activation.now();
+        let commands: Vec<_, 32> = ends.command_guided.iter().map(|command| command.data).collect();
+        let edits: Vec<_, 16> = ends.way_point_edit.iter().map(|edit| edit.data).collect();
+        if !commands.is_empty() || !edits.is_empty() {
+            self.heard = now;
+        }
+        let sensed = Sensed {
+            estimate: ends.estimate_state.get(),
+            air: ends.air.get(),
+            home: ends.home.get(),
+            safety: ends.safety.get(),
+            parameters: ends.parameters.get(),
+            commands: &commands,
+            edits: &edits,
+        };
+        let demand = self.manager.cycle(now, &sensed);
+        ends.demand.publish(now, &demand);
+        let mut status = *self.manager.status();
+        status.heard = self.heard;
+        ends.path_status.publish(now, &status);
+        ends.flight_status.publish(now, &family::status(&self.manager, &sensed));
+    }
+}
+
+/// Requests to the parameters in use.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Storage(ParameterSet<Parameters>);
+
+impl Storage {
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        // A vehicle that is given values it would refuse starts with the table's.
+        Self(ParameterSet::new(*parameters, Duration::ZERO).unwrap_or_default())
+    }
+}
+
+impl Runnable for Storage {
+    type Ends<'b> = StorageEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut StorageEnds<'_>) {
+        let now = activation.now();
+        // In the air nothing but what the ground has tried: changes wait for the ground.
+        let on_ground = !ends.flight_status.get().armed;
+        let requests = ends.parameter_request.iter().map(|request| request.data);
+        if let Some((parameters, status)) = self.0.period(now, on_ground, requests) {
+            ends.parameters.publish(now, &parameters);
+            ends.parameter_status.publish(now, &status);
+        }
+    }
+}

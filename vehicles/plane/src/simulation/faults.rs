@@ -1,0 +1,80 @@
+//! What can go wrong in a flight of the aircraft, and where it acts.
+
+use core::cell::Cell;
+use stampfly_sim::World;
+use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
+use stampfly_sim::plant::{Aeroplane, Surface};
+use stampfly_types::{Duration, Instant, Message};
+use std::prelude::v1::*;
+use std::rc::Rc;
+
+/// Every fault.
+pub const FAULTS: &[FaultKind] = &[
+    FaultKind::plain("gnss-lost", Class::Landed, "The receiver has no fix."),
+    FaultKind::plain("gnss-silent", Class::Landed, "The receiver says nothing."),
+    FaultKind::plain("pitot-blocked", Class::Degraded, "The pitot tube shows no pressure."),
+    FaultKind::plain("pitot-silent", Class::Degraded, "The pressure sensor of the pitot tube says nothing."),
+    FaultKind::plain("mag-silent", Class::Degraded, "The compass says nothing."),
+    FaultKind::plain("baro-silent", Class::Degraded, "The barometer says nothing."),
+    FaultKind::plain("imu-silent", Class::Cut, "No inertial sample arrives."),
+    FaultKind::number("gyro-bias", ("rad/s", 0.02, -0.5, 0.5), Class::Degraded, "The roll rate is too high by this."),
+    FaultKind::plain("link-lost", Class::Landed, "Nobody is heard."),
+    FaultKind::plain("aileron-jammed", Class::Degraded, "The right aileron stays in its middle."),
+];
+
+/// What is wrong in one flight.
+#[derive(Clone)]
+pub(super) struct Wrong {
+    pub injector: Injector,
+    /// Nothing gets through on the link.
+    pub silent: Rc<Cell<bool>>,
+}
+
+impl Wrong {
+    pub fn new(faults: &[Fault], start: Instant) -> Self {
+        Self { injector: Injector::new(start, faults), silent: Rc::default() }
+    }
+
+    /// The way of a sensor's samples to the bus; the sensor's word is what its faults begin with.
+    pub fn line<M: Message>(&self, sensor: &str, seed: u64) -> Line<M> {
+        let effect = |fault: &Fault| {
+            let value = fault.value.unwrap_or_default() as f32;
+            let name = fault.kind.name;
+            // A gyro is in the inertial sensor.
+            let gyro = name.strip_prefix("gyro").filter(|_| sensor == "imu");
+            match name.strip_prefix(sensor).or(gyro)? {
+                "-silent" => Some(Distortion::SILENT),
+                "-lost" => Some(Distortion::of(&["fix"], Effect::Word(0))),
+                "-blocked" => Some(Distortion::of(&["pressure"], Effect::Set(0.0))),
+                "-bias" => Some(Distortion::of(&["gyro[0]"], Effect::Add(value))),
+                _ => None,
+            }
+        };
+        let acts = self.injector.faults().enumerate();
+        let acts: Vec<_> = acts.filter_map(|(place, fault)| Some((place, effect(fault)?))).collect();
+        Line::new(&self.injector, &acts, seed)
+    }
+
+    /// Switches what acts beside the bus on and off.
+    pub fn act(&self, now: Instant, world: &World) {
+        let mut silent = false;
+        for (place, fault) in self.injector.faults().enumerate() {
+            let active = self.injector.is_active(place, now);
+            match fault.kind.name {
+                "link-lost" => silent |= active,
+                "aileron-jammed" => {
+                    let at = active.then_some(0.0);
+                    world.change(now, |plane: &mut Aeroplane| plane.jam(Surface::RightAileron, at));
+                }
+                _ => continue,
+            }
+            if active {
+                self.injector.note_change(place);
+            }
+        }
+        self.silent.set(silent);
+    }
+}
+
+/// After a fault has begun there are this many seconds to land in.
+pub(super) const PATIENCE: Duration = Duration::from_secs(400);

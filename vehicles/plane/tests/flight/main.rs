@@ -1,0 +1,5 @@
+//! Whole flights: in winds from anywhere, and with faults.
+
+mod faults;
+mod recorded;
+mod winds;

@@ -1,0 +1,134 @@
+//! The quadcopter for programs that fly vehicles: `stampfly fly`, `campaign`, `replay` and `serve` with `--vehicle stm32-quad`.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`plant`] | the frame as a body |
+//! | [`pilot`] | who flies it with a transmitter |
+//! | [`radio`] | the transmitter's frames through the air |
+//! | [`serial`] | its ports, for other programs |
+//! | [`faults`] | what can go wrong |
+//! | [`Setup`], [`flight`], [`Outcome`] | what decides a flight, one flight, and how it went |
+
+pub mod faults;
+pub mod flight;
+pub mod outcome;
+mod page;
+pub mod pilot;
+pub mod plant;
+pub mod radio;
+pub mod serial;
+mod setup;
+
+pub use outcome::{Measured, Outcome};
+pub use setup::Setup;
+
+use crate::parameters::Parameters;
+use crate::schedule::Runnables;
+use stampfly_log::ulog::{ParameterValue, Topic};
+use stampfly_sim::fault::FaultKind;
+use stampfly_sim::sight::Places;
+use stampfly_sim::vehicle::{
+    self, Ended, FlightOptions, Options, Page, PortSpec, Setting, SetupError, Variety, Vehicle, Witness, table,
+};
+use stampfly_sim::{SimulationConfig, Truth};
+use stampfly_types::{Duration, Message};
+use std::prelude::v1::*;
+
+/// The quadcopter, for programs that fly vehicles.
+#[derive(Clone, Copy, Debug)]
+pub struct Stm32Quad;
+
+/// Strength of vibration, of what brushed motors of the StampFly do: brushless ones with balanced propellers shake less.
+const VIBRATION: f64 = 0.3;
+/// No flight is longer.
+const LIMIT: Duration = Duration::from_secs(600);
+
+/// Missions by name.
+const MISSIONS: [(&str, &str); 2] =
+    [("hover", "0,0,1.5,20"), ("square", "0,0,1.5,2; 3,0,1.5,2; 3,3,2,2; 0,3,1.5,2; 0,0,1.5,2")];
+
+fn mission_of(text: &str) -> Result<Places, SetupError> {
+    let places = MISSIONS.iter().find(|(name, _)| *name == text).map_or(text, |(_, places)| places);
+    places.parse().map_err(|error| format!("--mission {text}: hover, square, or places: {error}"))
+}
+
+impl Vehicle for Stm32Quad {
+    const NAME: &'static str = "stm32-quad";
+    const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
+    const FAULTS: &'static [FaultKind] = faults::FAULTS;
+    const VARIETY: Variety = Variety { modes: &["angle", "acro"], missions: &["hover", "square"], chips: true };
+    const PORTS: &'static [PortSpec] = serial::PORTS;
+    const ASKS: &'static [&'static str] = serial::ASKS;
+    const PAGE: Page = page::PAGE;
+    type Runnables = Runnables;
+    type Setup = Setup;
+    type Outcome = Outcome;
+
+    fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
+        let Options { mission, chips, cameras, jitter, live, pilot, .. } = options;
+        if *cameras {
+            return Err("this vehicle has no cameras".into());
+        }
+        let mut simulation = SimulationConfig { seed, vibration: VIBRATION, ..SimulationConfig::new(plant::PLANT) };
+        options.change(&mut simulation)?;
+        let mut parameters = plant::parameters();
+        table::change(&mut parameters, options)?;
+        let acro = match pilot.as_deref() {
+            None | Some("" | "angle") => false,
+            Some("acro") => true,
+            Some(other) => return Err(format!("--mode '{other}' is none of angle, acro")),
+        };
+        // In live hands it stands with its transmitter on, unless somebody is to fly it.
+        let mission = match (mission.as_deref(), live) {
+            (None, Some(_)) => Places::default(),
+            (name, _) => mission_of(name.unwrap_or("hover"))?,
+        };
+        Ok(Setup {
+            simulation,
+            parameters,
+            mission,
+            acro,
+            faults: options.faults(Self::FAULTS)?,
+            jitter: *jitter,
+            chips: *chips,
+            live: live.clone(),
+        })
+    }
+
+    fn options(setup: &Setup) -> FlightOptions {
+        FlightOptions { start: setup.simulation.start, limit: LIMIT, jitter: setup.jitter }
+    }
+
+    fn config(setup: &Setup) -> &Parameters {
+        &setup.parameters
+    }
+
+    fn fly(
+        setup: &Setup,
+        witness: &mut dyn Witness<Runnables>,
+        report: &mut dyn FnMut(f32, &'static str),
+    ) -> Ended<Outcome> {
+        let mut surroundings = flight::Surroundings::new(setup);
+        vehicle::fly(&setup.parameters, &Self::options(setup), &mut surroundings, witness, report)
+    }
+
+    fn default_config() -> Parameters {
+        plant::parameters()
+    }
+
+    fn parameters(config: &Parameters) -> Vec<Setting> {
+        table::settings(config)
+    }
+
+    fn set_parameter(config: &mut Parameters, name: &str, value: ParameterValue) -> Result<(), SetupError> {
+        table::set(config, name, value)
+    }
+
+    fn parameter_range(name: &str) -> Option<[f64; 2]> {
+        table::range::<Parameters>(name)
+    }
+
+    fn plant(setup: &Setup) -> Vec<Setting> {
+        table::airframe(&setup.simulation.plant)
+    }
+}
