@@ -83,7 +83,7 @@
 //! assert_eq!(rover.execute(Instant::from_secs(2), &1.0), Ok(0.5), "its time is over");
 //! ```
 //!
-//! A vehicle with several modes is a mode whose stages are modes: [`Active`]. The aircraft in `vehicles/plane/src/modes` is one.
+//! A vehicle with several modes is a mode whose stages are modes: [`Active`]. The aircraft in `stampfly-fixed-wing/src/modes` is one.
 
 mod active;
 mod macros;

@@ -1,8 +1,8 @@
 //! What programs at the other end of the link may do: command it, change its parameters, ask where home is.
 
-use crate::messages::Home;
 use crate::parameters::Parameters;
 use crate::topics::{COUNT, LinkEnds, TOPICS};
+use stampfly_fixed_wing::messages::Home;
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_flight::parameters::Parameters as ByNumber;
 use stampfly_services::{Hands, Refusal, Request, Requested};

@@ -4,13 +4,12 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`topics`], [`schedule`], [`runnables`] | the two tables, and what runs |
-//! | [`path_manager`], [`modes`] | what it does: the cycle, and the modes with their stages |
-//! | [`orders`] | what is wanted, by whom, and where to |
+//! | [`stampfly_fixed_wing`] | what it does: path manager, modes with their stages, what is wrong and what follows |
+//! | [`behaviour`] | its speeds, heights and limits there |
 //! | [`navigation`] | where it is, and how the air moves |
 //! | [`autopilot`] | gains, surfaces and throttle |
-//! | [`watch`] | what is wrong |
 //! | [`ground`] | what programs at the other end of the link may do |
-//! | [`parameters`], [`messages`], [`family`] | numbers, what travels on the topics, and the same in the words of the family |
+//! | [`parameters`] | its numbers |
 #![no_std]
 
 #[cfg(feature = "simulation")]
@@ -18,22 +17,19 @@
 extern crate std;
 
 pub mod autopilot;
-pub mod family;
+pub mod behaviour;
 pub mod ground;
-pub mod messages;
-pub mod modes;
 pub mod navigation;
-pub mod orders;
 pub mod parameters;
-pub mod path_manager;
 pub mod runnables;
 pub mod schedule;
 #[cfg(feature = "simulation")]
 pub mod simulation;
 pub mod topics;
-pub mod watch;
 
 pub use parameters::Parameters;
 pub use schedule::Runnables;
+/// What travels on the topics, beside the family's own messages.
+pub use stampfly_fixed_wing::messages;
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;

@@ -4,12 +4,12 @@
 //! decimetres in a flight where a receiver's does by metres; a receiver's height is used while there is no barometer.
 
 use crate::Parameters;
-use crate::messages::{AirState, Home};
 use crate::parameters::CompassParameters;
 use serde::{Deserialize, Serialize};
 use stampfly_eskf::aid::field;
 use stampfly_eskf::calibration::{IronCorrection, StillCalibration};
 use stampfly_eskf::{Air, Eskf, EskfConfig, Estimator, Measurements, StartHeading, feed};
+use stampfly_fixed_wing::messages::{AirState, Home};
 use stampfly_types::messages::*;
 use stampfly_types::{Duration, Instant, Stamped, Vec3};
 

@@ -1,21 +1,19 @@
 //! What the schedule runs: each reads its topics, steps a component, publishes.
 //!
-//! What decides or computes is in [`navigation`](crate::navigation), [`autopilot`], [`watch`](crate::watch) and
-//! [`path_manager`](crate::path_manager); change it there.
+//! What decides or computes is in [`navigation`](crate::navigation), [`autopilot`] and [`stampfly_fixed_wing`]; change it there.
 
 use crate::autopilot;
-use crate::family;
-use crate::messages::Home;
+use crate::behaviour;
 use crate::navigation::{Navigation, Samples};
 use crate::parameters::Parameters;
-use crate::path_manager::{PathManager, Sensed};
 use crate::topics::*;
-use crate::watch::{Watch, Watched};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::fixed_wing::{Autopilot, AutopilotConfig, Flown};
 use stampfly_control::timing::StepTimer;
+use stampfly_fixed_wing::messages::Home;
+use stampfly_fixed_wing::{Config, PathManager, Sensed, Watch, Watched};
 use stampfly_param::ParameterSet;
 use stampfly_types::{Duration, Instant};
 
@@ -100,11 +98,14 @@ impl Runnable for Control {
 
 /// What is wrong.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Watching(Watch);
+pub struct Watching {
+    watch: Watch,
+    config: Config,
+}
 
 impl Watching {
-    pub(crate) fn new(_: &Parameters) -> Self {
-        Self(Watch::default())
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        Self { watch: Watch::default(), config: behaviour::config(parameters) }
     }
 }
 
@@ -113,15 +114,18 @@ impl Runnable for Watching {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut WatchEnds<'_>) {
         let now = activation.now();
+        if ends.parameters.is_new() {
+            self.config = behaviour::config(ends.parameters.get());
+        }
         let heard = ends.path_status.get().heard;
         let watched = Watched {
             estimate: ends.estimate_state.fresh(now, OLD),
             air: ends.air.get(),
             power: ends.sensor_power.fresh(now, UNMEASURED),
             heard: (heard > Instant::ZERO).then_some(heard),
-            parameters: ends.parameters.get(),
+            config: &self.config,
         };
-        ends.safety.publish(now, &self.0.step(now, &watched));
+        ends.safety.publish(now, &self.watch.step(now, &watched));
     }
 }
 
@@ -129,12 +133,13 @@ impl Runnable for Watching {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Path {
     manager: PathManager,
+    config: Config,
     heard: Instant,
 }
 
 impl Path {
-    pub(crate) fn new(_: &Parameters) -> Self {
-        Self { manager: PathManager::default(), heard: Instant::ZERO }
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        Self { manager: PathManager::default(), config: behaviour::config(parameters), heard: Instant::ZERO }
     }
 }
 
@@ -148,12 +153,15 @@ impl Runnable for Path {
         if !commands.is_empty() || !edits.is_empty() {
             self.heard = now;
         }
+        if ends.parameters.is_new() {
+            self.config = behaviour::config(ends.parameters.get());
+        }
         let sensed = Sensed {
             estimate: ends.estimate_state.get(),
             air: ends.air.get(),
             home: ends.home.get(),
             safety: ends.safety.get(),
-            parameters: ends.parameters.get(),
+            config: &self.config,
             commands: &commands,
             edits: &edits,
         };
@@ -162,7 +170,7 @@ impl Runnable for Path {
         let mut status = *self.manager.status();
         status.heard = self.heard;
         ends.path_status.publish(now, &status);
-        ends.flight_status.publish(now, &family::status(&self.manager, &sensed));
+        ends.flight_status.publish(now, &stampfly_fixed_wing::status(&self.manager, &sensed));
     }
 }
 

@@ -1,7 +1,7 @@
 //! Who publishes what for whom.
 
 use crate::Parameters;
-use crate::messages::*;
+use stampfly_fixed_wing::messages::*;
 use stampfly_param::{ParameterRequest, ParameterStatus};
 use stampfly_types::messages::*;
 

@@ -9,7 +9,7 @@ use crate::repository::{Failure, Repository, capture};
 use std::fs;
 
 /// Folders, what in them does not count, the word that a line has to name, the most lines, and the most files.
-const LIMITS: [Limit; 5] = [
+const LIMITS: [Limit; 6] = [
     Limit {
         folders: &["stampfly-board/src"],
         without: &["/simulation/", "/tests"],
@@ -18,7 +18,8 @@ const LIMITS: [Limit; 5] = [
         files: None,
     },
     Limit { folders: &["vehicles/rover"], without: &["/tests/"], word: None, lines: 1_500, files: None },
-    // With what is around it in simulation.
+    // These two with what is around them in simulation.
+    Limit { folders: &["vehicles/plane/src"], without: &[], word: None, lines: 1_700, files: None },
     Limit { folders: &["vehicles/stm32-quad/src"], without: &[], word: None, lines: 2_500, files: None },
     // What a vehicle asks of someone who begins, comments included.
     Limit { folders: &["examples/examples/own_vehicle.rs"], without: &[], word: None, lines: 200, files: None },

@@ -8,7 +8,6 @@ use super::services;
 use super::setup::Setup;
 use crate::autopilot;
 use crate::ground::{Board, Newest};
-use crate::messages::{Demand, PathStatus, Place, Vertical};
 use crate::schedule::Runnables;
 use crate::topics::{self, Id, TOPICS};
 use core::cell::RefCell;
@@ -18,6 +17,7 @@ use stampfly_drivers::{
     Airspeed as _, Barometer as _, Gnss as _, Imu as _, Magnetometer as _, MotorOutputs as _, PowerMonitor as _,
     ServoOutputs as _,
 };
+use stampfly_fixed_wing::messages::{Demand, PathStatus, Place, Vertical};
 use stampfly_flight::newest::message;
 use stampfly_sim::fault::{Fault, Moment};
 use stampfly_sim::ground;

@@ -1,8 +1,8 @@
 //! Faults in flight: what the aircraft does, as its topics and the truth show it.
 
 use crate::recorded::{Flown, Row};
+use stampfly_fixed_wing::messages::{Lateral, Place, Troubles};
 use stampfly_plane::Parameters;
-use stampfly_plane::messages::{Lateral, Place, Troubles};
 use stampfly_sim::fault::Class;
 use stampfly_sim::vehicle::{Options, Verdict};
 use stampfly_types::messages::CommandSource;

@@ -1,10 +1,10 @@
 //! A flight with everything that its topics have said, for tests that ask what happened when.
 
 use stampfly_bus::{Activation, Band};
+use stampfly_fixed_wing::messages::{AirState, Demand, Home, PathStatus, Place, Safety, Troubles};
 use stampfly_flight::Observer;
 use stampfly_flight::newest::message;
 use stampfly_plane::Runnables;
-use stampfly_plane::messages::{AirState, Demand, Home, PathStatus, Place, Safety, Troubles};
 use stampfly_plane::simulation::{Outcome, Plane};
 use stampfly_plane::topics::Id;
 use stampfly_sim::Truth;

@@ -1,7 +1,7 @@
 //! Whole flights, many of them. With `--nocapture` it prints each, and the worst of all. `FLIGHTS` and `MISSION` fly others.
 
 use crate::recorded::Flown;
-use stampfly_plane::messages::Place;
+use stampfly_fixed_wing::messages::Place;
 use stampfly_plane::simulation::{Outcome, Plane};
 use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
 use std::thread;

@@ -1,9 +1,9 @@
 //! The path manager alone: its cycle, changes of the way-points, and commands.
 
-use stampfly_plane::Parameters;
-use stampfly_plane::messages::*;
-use stampfly_plane::modes::CAPACITY;
-use stampfly_plane::path_manager::{PathManager, Sensed, State};
+use stampfly_fixed_wing::Config;
+use stampfly_fixed_wing::messages::*;
+use stampfly_fixed_wing::modes::CAPACITY;
+use stampfly_fixed_wing::path_manager::{PathManager, Sensed, State};
 use stampfly_types::messages::{GuidedCommand, GuidedKind, StateEstimate, Validity};
 use stampfly_types::{Duration, Instant, Vec3};
 
@@ -18,7 +18,7 @@ struct Desk {
     air: AirState,
     home: Home,
     safety: Safety,
-    parameters: Parameters,
+    config: Config,
 }
 
 impl Desk {
@@ -36,7 +36,7 @@ impl Desk {
             air: AirState { measured: true, ..AirState::default() },
             home: Home { latitude: 365_600_000, longitude: 1_367_000_000, altitude: 30_000, known: true },
             safety: Safety::default(),
-            parameters: Parameters::default(),
+            config: Config::default(),
         }
     }
 
@@ -46,7 +46,7 @@ impl Desk {
             air: &self.air,
             home: &self.home,
             safety: &self.safety,
-            parameters: &self.parameters,
+            config: &self.config,
             commands,
             edits,
         };
@@ -239,7 +239,7 @@ fn the_watch_brings_it_home_and_lands_when_nobody_wants_anything_else() {
     assert!(!taken.manager.is_overruled());
     taken.cycles(100.0);
     assert_eq!(taken.place(), Place::CruisingCruise);
-    desk.cycles(desk.parameters.link.land - 29.0);
+    desk.cycles(desk.config.limits.link_land - 29.0);
     assert_eq!(desk.place(), Place::LandingTransition);
 }
 

@@ -5,8 +5,8 @@ mod bench;
 use bench::Bench;
 use serde_json::Value;
 use stampfly_control::fixed_wing::runway::{AHEAD, Geodetic, SlopePoints, faces, slope_altitude};
-use stampfly_plane::messages::{Demand, Lateral, Place, Thrust, Vertical};
-use stampfly_plane::modes::{Order, PlaneMode};
+use stampfly_fixed_wing::messages::{Demand, Lateral, Place, Thrust, Vertical};
+use stampfly_fixed_wing::modes::{Order, PlaneMode};
 
 /// Degrees: a tenth of a millimetre.
 const NEAR: f64 = 1e-9;

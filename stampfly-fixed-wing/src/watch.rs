@@ -2,17 +2,17 @@
 //!
 //! | trouble | what the aircraft does |
 //! |---|---|
-//! | the link is silent for `link.lost` | comes home and circles, and after `link.land` lands, also when the link is back, unless somebody wants something else |
+//! | the link is silent for `limits.link_lost` | comes home and circles, and after `limits.link_land` lands, also when the link is back, unless somebody wants something else |
 //! | outside of the fence | the same |
-//! | no position, ten seconds after the last fix | circles at its height, with the wind, and goes round if it lands; does not arm; after `path.blind`, or when it has to land, comes down where it is, against the wind |
+//! | no position, ten seconds after the last fix | circles at its height, with the wind, and goes round if it lands; does not arm; after `limits.blind`, or when it has to land, comes down where it is, against the wind |
 //! | airspeed not to be believed | flies by the velocity less the last wind; a take-off whose tube shows less than half of the speed over the ground is given up, and it parks |
 //! | battery at its warning level for five seconds | lands |
 //! | attitude not known | closes the throttle within 35 ms and glides in a wide turn, for good; disarmed by command, a second later if there is none again, or after two minutes |
 
-use crate::Parameters;
+use crate::Config;
 use crate::messages::{AirState, Safety, Troubles};
-use serde::{Deserialize, Serialize};
 use stampfly_types::messages::{PowerData, StateEstimate, Validity};
+use stampfly_types::text::is_finite;
 use stampfly_types::{Duration, Instant};
 
 /// A battery that was under its level for so long is, s: a climb's load is not it.
@@ -21,7 +21,7 @@ const SAGGED: f32 = 5.0;
 /// What it looks at.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<'a> {
-    /// The estimate; `None` when it is old.
+    /// The estimate; `None` when it is old. One with a number that is none is as good as none.
     pub estimate: Option<&'a StateEstimate>,
     /// The air.
     pub air: &'a AirState,
@@ -30,11 +30,12 @@ pub struct Watched<'a> {
     /// When somebody was last heard.
     pub heard: Option<Instant>,
     /// The limits.
-    pub parameters: &'a Parameters,
+    pub config: &'a Config,
 }
 
 /// The watch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Watch {
     /// Since when the position is not known.
     lost: Option<Instant>,
@@ -46,21 +47,22 @@ pub struct Watch {
 impl Watch {
     /// Looks.
     pub fn step(&mut self, now: Instant, watched: &Watched<'_>) -> Safety {
-        let Watched { estimate, air, power, heard, parameters: p } = *watched;
+        let Watched { estimate, air, power, heard, config: p } = *watched;
         let dt = self.last.map_or(0.0, |last| now.since(last).seconds());
         self.last = Some(now);
+        let estimate = estimate.filter(|estimate| is_finite(*estimate));
         let valid = estimate.map_or(Validity::NONE, |estimate| estimate.valid);
         let position = estimate.filter(|_| valid.contains(Validity::POSITION_XY | Validity::HEADING));
         self.lost = if position.is_some() { None } else { self.lost.or(Some(now)) };
-        let low = power.is_some_and(|power| power.voltage < p.battery.warning);
+        let low = power.is_some_and(|power| power.voltage < p.limits.battery);
         self.sagged = if low { self.sagged + dt } else { 0.0 };
         let silence = heard.map_or(Duration::ZERO, |at| now.since(at)).seconds();
         let is_outside = position.is_some_and(|estimate| {
             let away = estimate.position.horizontal().norm();
-            away > p.fence.radius || -estimate.position.z > p.fence.height
+            away > p.limits.fence_radius || -estimate.position.z > p.limits.fence_height
         });
         let troubles = [
-            (Troubles::LINK, silence > p.link.lost),
+            (Troubles::LINK, silence > p.limits.link_lost),
             (Troubles::FENCE, is_outside),
             (Troubles::POSITION, position.is_none()),
             (Troubles::AIRSPEED, !air.measured),
@@ -69,7 +71,7 @@ impl Watch {
         ];
         Safety {
             troubles: troubles.iter().fold(Troubles::NONE, |all, (trouble, holds)| all.set(*trouble, *holds)),
-            link: (silence - p.link.lost).max(0.0),
+            link: (silence - p.limits.link_lost).max(0.0),
             position: self.lost.map_or(0.0, |since| now.since(since).seconds()),
         }
     }

@@ -1,25 +1,19 @@
 //! Taxiing: stop, turn off, park; and back to the strip when somebody wants it to fly again.
 //!
-//! The document leaves this mode open. It is also the first one: an aircraft that is switched on is parked.
+//! ZeroPilot leaves this mode open. It is also the first one: an aircraft that is switched on is parked.
 
 use super::seen::{Aircraft, Order, Seen};
 use crate::messages::Demand;
-use serde::{Deserialize, Serialize};
 use stampfly_control::fixed_wing::runway::{self, Runway};
 use stampfly_mode::stage::{Duration, Instant, Limit, Mode, Stage, Step};
 use stampfly_types::math;
 
 /// Rolling slower than this it stands, m/s.
 const STANDS: f32 = 0.7;
-/// How far beside the strip it parks, m.
-const BESIDE: f32 = 20.0;
-/// It turns into the strip this far before the point where it takes off, m.
-const BEFORE: f32 = 35.0;
-/// A point is reached within this distance, m: a turn's radius.
-const REACHED: f32 = 4.0;
 
 /// On the ground.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Taxiing;
 
 /// How taxiing ends.
@@ -42,7 +36,7 @@ impl Mode for Taxiing {
 
 stampfly_mode::stages! {
     /// The stages.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum TaxiingStage for Taxiing {
         /// Brakes.
         Stop: Stop,
@@ -56,12 +50,12 @@ stampfly_mode::stages! {
         LineUp: LineUp,
     }
     /// The current one, with what it remembers.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum TaxiingMemory;
 }
 
 fn drive(demand: Demand, seen: &Seen<'_>) -> Step<Taxiing> {
-    Step::Stay(demand.rolling(seen.parameters.speed.taxi, seen.ground_speed))
+    Step::Stay(demand.rolling(seen.config.ground.speed, seen.ground_speed))
 }
 
 /// To a point, straight.
@@ -69,13 +63,14 @@ fn to(point: [f32; 2], here: [f32; 2]) -> Demand {
     Demand::nose(math::atan2(point[1] - here[1], point[0] - here[0]))
 }
 
-fn is_near(one: [f32; 2], other: [f32; 2]) -> bool {
-    let [north, east] = [one[0] - other[0], one[1] - other[1]];
-    north * north + east * east < REACHED * REACHED
+fn is_near(one: [f32; 2], other: [f32; 2], seen: &Seen<'_>) -> bool {
+    let ([north, east], reached) = ([one[0] - other[0], one[1] - other[1]], seen.config.ground.reached);
+    north * north + east * east < reached * reached
 }
 
 /// Brakes, straight ahead.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stop {
     course: f32,
 }
@@ -100,7 +95,8 @@ impl Stage<Taxiing> for Stop {
 }
 
 /// Off the strip, to the right.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TurnOff {
     goal: Option<[f32; 2]>,
 }
@@ -109,8 +105,9 @@ impl Stage<Taxiing> for TurnOff {
     fn enter(_: &mut Taxiing, _: Instant, seen: &Seen<'_>) -> Self {
         let ahead = |here, strip: Runway| {
             let [_, aside] = runway::along(strip.local, here, seen.heading);
-            let forward = runway::ahead(here, seen.heading, BESIDE);
-            runway::ahead(forward, seen.heading + math::FRAC_PI_2, BESIDE - aside)
+            let beside = seen.config.ground.beside;
+            let forward = runway::ahead(here, seen.heading, beside);
+            runway::ahead(forward, seen.heading + math::FRAC_PI_2, beside - aside)
         };
         Self { goal: seen.position.zip(seen.runway).map(|(here, strip)| ahead(here, strip)) }
     }
@@ -121,14 +118,15 @@ impl Stage<Taxiing> for TurnOff {
 
     fn execute(&mut self, _: &mut Taxiing, _: Instant, seen: &Seen<'_>) -> Step<Taxiing> {
         match (self.goal, seen.position) {
-            (Some(goal), Some(here)) if !is_near(goal, here) => drive(to(goal, here), seen),
+            (Some(goal), Some(here)) if !is_near(goal, here, seen) => drive(to(goal, here), seen),
             _ => Step::Stage(TaxiingStage::Park),
         }
     }
 }
 
 /// It stands until somebody wants it to fly.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Park {
     course: f32,
 }
@@ -148,14 +146,15 @@ impl Stage<Taxiing> for Park {
         }
         // Where it was put it takes off; from elsewhere it returns.
         match seen.runway.zip(seen.position) {
-            Some((strip, here)) if !is_near(strip.local, here) => Step::Stage(TaxiingStage::Return),
+            Some((strip, here)) if !is_near(strip.local, here, seen) => Step::Stage(TaxiingStage::Return),
             _ => Step::End(TaxiingEnd::Ready),
         }
     }
 }
 
 /// To a point before the one where it takes off.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Return;
 
 impl Stage<Taxiing> for Return {
@@ -172,13 +171,14 @@ impl Stage<Taxiing> for Return {
         let (Order::Fly, Some(strip), Some(here)) = (seen.order, seen.runway, seen.position) else {
             return Step::Stage(TaxiingStage::Stop);
         };
-        let goal = runway::ahead(strip.local, strip.heading, -BEFORE);
-        if is_near(goal, here) { Step::Stage(TaxiingStage::LineUp) } else { drive(to(goal, here), seen) }
+        let goal = runway::ahead(strip.local, strip.heading, -seen.config.ground.before);
+        if is_near(goal, here, seen) { Step::Stage(TaxiingStage::LineUp) } else { drive(to(goal, here), seen) }
     }
 }
 
 /// Along the strip to where it takes off.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LineUp;
 
 impl Stage<Taxiing> for LineUp {
@@ -195,7 +195,7 @@ impl Stage<Taxiing> for LineUp {
             return Step::Stage(TaxiingStage::Stop);
         };
         let [ahead, _] = runway::along(strip.local, here, strip.heading);
-        if ahead > -REACHED {
+        if ahead > -seen.config.ground.reached {
             return Step::End(TaxiingEnd::Ready);
         }
         drive(seen.along(strip.local, strip.heading), seen)

@@ -5,20 +5,16 @@
 
 use super::seen::{Aircraft, Seen};
 use crate::messages::Demand;
-use serde::{Deserialize, Serialize};
 use stampfly_control::fixed_wing::runway::{self, Runway};
 use stampfly_control::fixed_wing::{Approach, ApproachConfig, Follower, WayPoint, WayPoints};
 use stampfly_mode::stage::{Duration, Instant, Limit, Mode, Stage, Step};
 
-/// So far from the line a landing at the beginning of its flare is missed, m: half a strip.
-const MISSED: f32 = 8.0;
 /// On the way to the slope it is so much faster than on it, m/s.
 const FASTER: f32 = 2.0;
-/// A touchdown is over when it rolls this slowly, m/s.
-const ROLLS: f32 = 4.0;
 
 /// Down to the strip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Landing(Approach);
 
 /// How a landing ends.
@@ -39,7 +35,7 @@ impl Mode for Landing {
     fn enter(_: Instant, seen: &Seen<'_>) -> Self {
         // Without a strip, ahead and around home.
         let strip = seen.runway.unwrap_or_else(|| Runway::at(&seen.origin, [0.0; 2], 0.0, seen.course));
-        let p = seen.parameters;
+        let p = seen.config;
         let config = ApproachConfig {
             speed: p.speed.stall * p.speed.approach_share,
             height: p.height.approach,
@@ -55,7 +51,7 @@ impl Mode for Landing {
 
 stampfly_mode::stages! {
     /// The stages.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum LandingStage for Landing {
         /// To the beginning of the slope.
         Transition: Transition,
@@ -69,7 +65,7 @@ stampfly_mode::stages! {
         Touchdown: Touchdown,
     }
     /// The current one, with what it remembers.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum LandingMemory;
 }
 
@@ -85,7 +81,8 @@ impl Landing {
 }
 
 /// To the beginning of the slope.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Transition {
     way: WayPoints<4>,
     follower: Follower,
@@ -107,7 +104,7 @@ impl Stage<Landing> for Transition {
     }
 
     fn execute(&mut self, Landing(approach): &mut Landing, _: Instant, seen: &Seen<'_>) -> Step<Landing> {
-        let p = seen.parameters;
+        let p = seen.config;
         let Some(here) = seen.position else { return Step::End(LandingEnd::Missed) };
         let followed = self.follower.follow(&self.way, here, seen.course, p.path.radius);
         let faces = runway::faces(seen.course, approach.heading());
@@ -123,7 +120,8 @@ impl Stage<Landing> for Transition {
 }
 
 /// Down the slope.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Slope;
 
 impl Stage<Landing> for Slope {
@@ -137,8 +135,8 @@ impl Stage<Landing> for Slope {
 
     fn execute(&mut self, mode: &mut Landing, _: Instant, seen: &Seen<'_>) -> Step<Landing> {
         let Some(here) = seen.position else { return Step::End(LandingEnd::Missed) };
-        if mode.above(seen) <= seen.parameters.height.flare {
-            let is_beside = mode.0.aside(here).abs() > MISSED;
+        if mode.above(seen) <= seen.config.height.flare {
+            let is_beside = mode.0.aside(here).abs() > seen.config.flare.missed;
             return if is_beside { Step::End(LandingEnd::Missed) } else { Step::Stage(LandingStage::Flare) };
         }
         Step::Stay(mode.0.slope(here, seen.ground_speed))
@@ -146,7 +144,8 @@ impl Stage<Landing> for Slope {
 }
 
 /// The throttle closes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Flare;
 
 impl Stage<Landing> for Flare {
@@ -160,7 +159,7 @@ impl Stage<Landing> for Flare {
     }
 
     fn execute(&mut self, mode: &mut Landing, _: Instant, seen: &Seen<'_>) -> Step<Landing> {
-        if mode.above(seen) <= seen.parameters.height.decrab {
+        if mode.above(seen) <= seen.config.height.decrab {
             return Step::Stage(LandingStage::Decrab);
         }
         Step::Stay(mode.flare(seen))
@@ -168,7 +167,8 @@ impl Stage<Landing> for Flare {
 }
 
 /// The nose turns from the wind to the strip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Decrab;
 
 impl Stage<Landing> for Decrab {
@@ -181,7 +181,7 @@ impl Stage<Landing> for Decrab {
     }
 
     fn execute(&mut self, mode: &mut Landing, _: Instant, seen: &Seen<'_>) -> Step<Landing> {
-        if mode.above(seen) <= seen.parameters.height.touchdown {
+        if mode.above(seen) <= seen.config.height.touchdown {
             return Step::Stage(LandingStage::Touchdown);
         }
         Step::Stay(Demand { aligned: true, ..mode.flare(seen) })
@@ -189,7 +189,8 @@ impl Stage<Landing> for Decrab {
 }
 
 /// Until it rolls slowly.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Touchdown;
 
 impl Stage<Landing> for Touchdown {
@@ -202,7 +203,7 @@ impl Stage<Landing> for Touchdown {
     }
 
     fn execute(&mut self, mode: &mut Landing, _: Instant, seen: &Seen<'_>) -> Step<Landing> {
-        if seen.ground_speed < ROLLS {
+        if seen.ground_speed < seen.config.ground.rolls {
             return Step::End(LandingEnd::Landed);
         }
         Step::Stay(Demand { aligned: true, on_ground: seen.on_ground, ..mode.flare(seen) })

@@ -2,7 +2,6 @@
 
 use super::seen::{Aircraft, Order, Seen};
 use crate::messages::{Demand, Lateral, Vertical};
-use serde::{Deserialize, Serialize};
 use stampfly_control::fixed_wing::runway::SLOPE;
 use stampfly_control::fixed_wing::{Follower, Track};
 use stampfly_mode::stage::{Instant, Limit, Mode, Stage, Step};
@@ -12,7 +11,8 @@ use stampfly_types::math;
 const AGAINST_WIND: f32 = 25.0;
 
 /// Along the way-points.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Cruising;
 
 /// How a cruise ends.
@@ -37,18 +37,19 @@ impl Mode for Cruising {
 
 stampfly_mode::stages! {
     /// The stage.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum CruisingStage for Cruising {
         /// There is only one.
         Cruise: Cruise,
     }
     /// The same, with what it remembers.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum CruisingMemory;
 }
 
 /// From way-point to way-point.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Cruise {
     follower: Follower,
     /// Where it holds when nothing else is to be done, and at which height.
@@ -76,7 +77,7 @@ impl Stage<Cruising> for Cruise {
     }
 
     fn execute(&mut self, _: &mut Cruising, _: Instant, seen: &Seen<'_>) -> Step<Cruising> {
-        let p = seen.parameters;
+        let p = seen.config;
         let Some(here) = seen.position else {
             if seen.order == Order::Down {
                 return come_down(seen);
@@ -112,7 +113,7 @@ impl Stage<Cruising> for Cruise {
 
 /// Down without knowing where it is: in a circle, the last metres straight against the last wind, as a landing does them. Fields are taken to be flat.
 fn come_down(seen: &Seen<'_>) -> Step<Cruising> {
-    let p = seen.parameters;
+    let p = seen.config;
     // No wing carries it so slowly.
     if seen.airspeed < 0.7 * p.speed.stall {
         return Step::End(CruisingEnd::Down);

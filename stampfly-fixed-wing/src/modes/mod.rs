@@ -20,13 +20,13 @@ use core::convert::Infallible;
 use cruising::{Cruising, CruisingEnd, CruisingMemory, CruisingStage};
 use landing::{Landing, LandingEnd, LandingStage};
 pub use seen::{Aircraft, CAPACITY, Order, Seen};
-use serde::{Deserialize, Serialize};
 use stampfly_mode::stage::{Active, HandOver, Instant, Mode, Selector};
 use take_off::{TakeOff, TakeOffEnd, TakeOffStage};
 use taxiing::{Taxiing, TaxiingEnd, TaxiingStage};
 
 /// All that it does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plane {
     /// Landings so far, and take-offs that were given up: what outlives the modes.
     pub landings: u32,
@@ -47,7 +47,7 @@ impl Mode for Plane {
 
 stampfly_mode::stages! {
     /// The modes.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum PlaneMode for Plane {
         /// From standstill to cruising height.
         TakeOff: Active<TakeOff>,
@@ -59,7 +59,7 @@ stampfly_mode::stages! {
         Taxiing: Active<Taxiing>,
     }
     /// The current one, with what it remembers.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum PlaneMemory;
 }
 

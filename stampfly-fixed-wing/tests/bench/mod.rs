@@ -3,16 +3,16 @@
 
 use stampfly_control::fixed_wing::runway::Runway;
 use stampfly_control::fixed_wing::{Track, TrackConfig, WayPoints};
+use stampfly_fixed_wing::Config;
+use stampfly_fixed_wing::messages::{Demand, Lateral, Place};
+use stampfly_fixed_wing::modes::{CAPACITY, Order, Plane, PlaneMode, Seen, place};
 use stampfly_mode::stage::{Duration, Instant, Selector};
-use stampfly_plane::Parameters;
-use stampfly_plane::messages::{Demand, Lateral, Place};
-use stampfly_plane::modes::{CAPACITY, Order, Plane, PlaneMode, Seen, place};
 use stampfly_types::{Origin, math};
 
-/// An aircraft that somebody moves by hand, with the document's own numbers as parameters.
+/// An aircraft that somebody moves by hand, with the document's own numbers.
 pub struct Bench {
     pub now: Instant,
-    pub parameters: Parameters,
+    pub config: Config,
     pub origin: Origin,
     pub way_points: WayPoints<CAPACITY>,
     pub selector: Selector<Plane>,
@@ -26,14 +26,14 @@ pub struct Bench {
 
 impl Bench {
     pub fn new() -> Self {
-        let mut parameters = Parameters::default();
-        parameters.speed.rotation = 7.0;
-        parameters.speed.climb = 15.0;
-        parameters.height.climbed = 40.0;
-        (parameters.height.flare, parameters.height.decrab, parameters.height.touchdown) = (10.0, 5.0, 2.0);
+        let mut config = Config::default();
+        config.speed.rotation = 7.0;
+        config.speed.climb = 15.0;
+        config.height.climbed = 40.0;
+        (config.height.flare, config.height.decrab, config.height.touchdown) = (10.0, 5.0, 2.0);
         Self {
             now: Instant::ZERO,
-            parameters,
+            config,
             origin: Origin { latitude: 434_700_000, longitude: -805_400_000, altitude: 0 },
             way_points: WayPoints::default(),
             selector: Selector::new(),
@@ -48,7 +48,7 @@ impl Bench {
 
     fn seen(&self) -> Seen<'_> {
         Seen {
-            parameters: &self.parameters,
+            config: &self.config,
             origin: self.origin,
             runway: Some(Runway::at(&self.origin, [0.0; 2], 0.0, 0.0)),
             way_points: &self.way_points,

@@ -2,12 +2,12 @@
 
 use super::seen::{Aircraft, Order, Seen};
 use crate::messages::{Demand, Vertical};
-use serde::{Deserialize, Serialize};
 use stampfly_control::fixed_wing::runway::{self, AHEAD};
 use stampfly_mode::stage::{Duration, Instant, Limit, Mode, Stage, Step};
 
 /// From standstill to cruising height.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TakeOff {
     /// A point far ahead, made once: m north and east of home, and the direction to it.
     ahead: Option<([f32; 2], f32)>,
@@ -39,7 +39,7 @@ impl Mode for TakeOff {
 
 stampfly_mode::stages! {
     /// The stages.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum TakeOffStage for TakeOff {
         /// Along the strip.
         Roll: Roll,
@@ -47,7 +47,7 @@ stampfly_mode::stages! {
         Climb: Climb,
     }
     /// The current one, with what it remembers.
-    #[derive(Serialize, Deserialize)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub enum TakeOffMemory;
 }
 
@@ -66,7 +66,8 @@ impl TakeOff {
 }
 
 /// Along the strip, at full throttle, with the rudder.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Roll;
 
 impl Stage<TakeOff> for Roll {
@@ -79,10 +80,10 @@ impl Stage<TakeOff> for Roll {
     }
 
     fn execute(&mut self, mode: &mut TakeOff, _: Instant, seen: &Seen<'_>) -> Step<TakeOff> {
-        if seen.airspeed > seen.parameters.speed.rotation {
+        if seen.airspeed > seen.config.speed.rotation {
             return Step::Stage(TakeOffStage::Climb);
         }
-        if seen.ground_speed > seen.parameters.speed.rotation && seen.airspeed < 0.5 * seen.ground_speed {
+        if seen.ground_speed > seen.config.speed.rotation && seen.airspeed < 0.5 * seen.ground_speed {
             return Step::End(TakeOffEnd::TooSlow);
         }
         if seen.order != Order::Fly {
@@ -93,7 +94,8 @@ impl Stage<TakeOff> for Roll {
 }
 
 /// Off the ground and straight ahead. The autopilot lowers the nose before it becomes too slow.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Climb;
 
 impl Stage<TakeOff> for Climb {
@@ -106,14 +108,14 @@ impl Stage<TakeOff> for Climb {
     }
 
     fn execute(&mut self, mode: &mut TakeOff, _: Instant, seen: &Seen<'_>) -> Step<TakeOff> {
-        let p = seen.parameters;
+        let p = seen.config;
         let field = seen.runway.map_or(0.0, |strip| strip.height);
         if seen.height > field + p.height.climbed {
             return Step::End(TakeOffEnd::Climbed);
         }
         // Wings near the ground stay almost level.
         let bank_max = p.path.bank_low;
-        let demand = Demand { vertical: Vertical::Pitch, pitch: p.climb.pitch, ..mode.straight(seen) };
+        let demand = Demand { vertical: Vertical::Pitch, pitch: p.path.climb_pitch, ..mode.straight(seen) };
         Step::Stay(Demand { bank_max, ..demand.fast(p.speed.climb) })
     }
 }

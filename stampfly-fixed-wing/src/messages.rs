@@ -1,4 +1,4 @@
-//! What travels on the aircraft's topics, beside the family's own messages.
+//! What travels on an aircraft's topics, beside the family's own messages.
 
 use stampfly_types::{Instant, Origin, message, message_enum, message_flags};
 
@@ -22,7 +22,7 @@ message! {
 message_flags! {
     /// What is wrong, as long as it is.
     pub struct Troubles {
-        /// Nobody has been heard for longer than `link.lost`.
+        /// Nobody has been heard for longer than [`Limits::link_lost`](crate::config::Limits).
         LINK = 0,
         /// Outside of the fence.
         FENCE = 1,

@@ -1,17 +1,17 @@
 //! What every stage is told, and what it demands.
 
-use crate::Parameters;
-use serde::{Deserialize, Serialize};
+use crate::Config;
 use stampfly_control::fixed_wing::runway::Runway;
 use stampfly_control::fixed_wing::{Demand, Track, WayPoints};
 use stampfly_mode::stage::Vehicle;
 use stampfly_types::Origin;
 
-/// Way-points that fit, as in the document's path manager.
+/// Way-points that fit, as in ZeroPilot's path manager.
 pub const CAPACITY: usize = 100;
 
 /// What somebody wants of the aircraft.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
     /// To stand.
     #[default]
@@ -28,7 +28,7 @@ pub enum Order {
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// Speeds, heights and so on.
-    pub parameters: &'a Parameters,
+    pub config: &'a Config,
     /// Where the local frame begins.
     pub origin: Origin,
     /// The strip, as soon as it is known.
@@ -61,7 +61,7 @@ impl Seen<'_> {
     /// Along a line, with the largest bank.
     #[must_use]
     pub fn along(&self, through: [f32; 2], course: f32) -> Demand {
-        Demand::track(Track::Line { through, course }, self.parameters.path.bank_max)
+        Demand::track(Track::Line { through, course }, self.config.path.bank_max)
     }
 }
 

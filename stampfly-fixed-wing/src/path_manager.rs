@@ -7,16 +7,16 @@
 //! | sensor fusion | makes of it what stages are told |
 //! | mode executor | the one call, [`Selector::execute`] |
 //! | coordinate turn, elevation | hands the demand to the autopilot, which flies it at its own rate |
-//! | fatal failure | entered when anything fails, never left: throttle closed, a gentle turn, a glide |
+//! | fatal failure | entered when anything fails or a demand would be no number, never left: throttle closed, a gentle turn, a glide |
 
-use crate::Parameters;
+use crate::Config;
 use crate::messages::*;
 use crate::modes::{Order, Plane, Report, Seen, report};
 use crate::orders::{Circumstances, Orders};
-use serde::{Deserialize, Serialize};
 use stampfly_control::fixed_wing::runway::Runway;
 use stampfly_mode::stage::Selector;
 use stampfly_types::messages::{ArmBlocks, GuidedCommand, GuidedKind, StateEstimate, Validity};
+use stampfly_types::text::is_finite;
 use stampfly_types::{Duration, Instant, frame, math};
 
 /// Slower than this over the ground, m/s, the course is the nose's.
@@ -42,7 +42,7 @@ pub struct Sensed<'a> {
     /// What is wrong.
     pub safety: &'a Safety,
     /// Speeds, heights and so on.
-    pub parameters: &'a Parameters,
+    pub config: &'a Config,
     /// What somebody has asked for since the last cycle.
     pub commands: &'a [GuidedCommand],
     /// The same, of the way-points.
@@ -50,7 +50,8 @@ pub struct Sensed<'a> {
 }
 
 /// The states.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum State {
     /// Takes what the estimator says.
     #[default]
@@ -68,7 +69,8 @@ pub enum State {
 }
 
 /// The path manager.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PathManager {
     state: State,
     selector: Selector<Plane>,
@@ -99,6 +101,10 @@ impl PathManager {
 
     /// One state.
     pub fn step(&mut self, now: Instant, sensed: &Sensed<'_>) -> CycleStatus {
+        // What is no number is not known.
+        let (unknown, calm) = (StateEstimate::default(), AirState::default());
+        let estimate = if is_finite(sensed.estimate) { sensed.estimate } else { &unknown };
+        let sensed = &Sensed { estimate, air: if is_finite(sensed.air) { sensed.air } else { &calm }, ..*sensed };
         self.state = match self.state {
             State::CommsWithAttitude if sensed.safety.troubles.contains(Troubles::ATTITUDE) && self.orders.armed => {
                 State::FatalFailure
@@ -114,7 +120,7 @@ impl PathManager {
                 let origin = sensed.home.origin();
                 sensed.edits.iter().for_each(|edit| self.orders.edit(edit, origin.as_ref()));
                 let dt = self.last.map_or(0.0, |last| now.since(last).seconds());
-                self.orders.overrule(dt, sensed.safety, circumstances.position.is_some(), sensed.parameters);
+                self.orders.overrule(dt, sensed.safety, circumstances.position.is_some(), sensed.config);
                 State::SensorFusion
             }
             State::SensorFusion => {
@@ -188,7 +194,7 @@ impl PathManager {
 
     /// Notices the strip, and that it stands.
     fn settle(&mut self, now: Instant, sensed: &Sensed<'_>) {
-        let Sensed { estimate, air, parameters: p, home, .. } = sensed;
+        let Sensed { estimate, air, config: p, home, .. } = sensed;
         let dt = self.last.map_or(0.0, |last| now.since(last).seconds());
         self.last = Some(now);
         let field = self.runway.map_or(0.0, |strip| strip.height);
@@ -212,12 +218,12 @@ impl PathManager {
     }
 
     fn execute(&mut self, now: Instant, sensed: &Sensed<'_>) -> State {
-        let Sensed { estimate, air, home, parameters, .. } = *sensed;
+        let Sensed { estimate, air, home, config, .. } = *sensed;
         let [north, east, _] = estimate.velocity.to_array();
         let ground_speed = math::sqrt(north * north + east * east);
         let heading = frame::yaw(&estimate.attitude);
         let seen = Seen {
-            parameters,
+            config,
             origin: home.origin().unwrap_or_default(),
             runway: self.runway,
             way_points: &self.orders.way_points,
@@ -241,11 +247,11 @@ impl PathManager {
         let Orders { refusal, refused, .. } = self.orders;
         self.status = PathStatus { place, way_point, remaining, landings, refusal, refused, ..self.status };
         match demand {
-            Ok(demand) => {
+            Ok(demand) if is_finite(&demand) => {
                 self.demand = demand;
                 State::CoordinateTurnElevation
             }
-            Err(_) => State::FatalFailure,
+            _ => State::FatalFailure,
         }
     }
 }

@@ -3,11 +3,11 @@
 mod bench;
 
 use bench::Bench;
+use stampfly_fixed_wing::Config;
+use stampfly_fixed_wing::messages::{AirState, CycleStatus, Demand, Home, Lateral, Place, Safety, Thrust, Troubles};
+use stampfly_fixed_wing::modes::{Order, PlaneMode};
+use stampfly_fixed_wing::path_manager::{PathManager, Sensed, State};
 use stampfly_mode::stage::{Duration, Instant};
-use stampfly_plane::Parameters;
-use stampfly_plane::messages::{AirState, CycleStatus, Demand, Home, Lateral, Place, Safety, Thrust, Troubles};
-use stampfly_plane::modes::{Order, PlaneMode};
-use stampfly_plane::path_manager::{PathManager, Sensed, State};
 use stampfly_types::messages::{GuidedCommand, GuidedKind, StateEstimate, Validity};
 
 /// The aircraft as it is for so long: the places it goes through.
@@ -111,7 +111,7 @@ fn a_path_manager_without_an_attitude_glides_for_good_and_no_mode_is_asked() {
             air: &AirState::default(),
             home: &Home { latitude: 434_700_000, longitude: -805_400_000, altitude: 0, known: true },
             safety: &Safety { troubles, ..Safety::default() },
-            parameters: &Parameters::default(),
+            config: &Config::default(),
             commands,
             edits: &[],
         };

@@ -2,16 +2,16 @@
 //!
 //! The path manager asks it once in a cycle. What becomes of an order, and in which mode, is not its business.
 
-use crate::Parameters;
+use crate::Config;
 use crate::messages::{EditRefusal, Safety, Troubles, WayPointEdit};
 use crate::modes::{CAPACITY, Order};
-use serde::{Deserialize, Serialize};
 use stampfly_control::fixed_wing::{EditError, WayPoint, WayPoints};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Origin, Vec3};
 
 /// Orders, and the way-points that belong to them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Orders {
     /// What is wanted.
     pub order: Order,
@@ -114,14 +114,14 @@ impl Orders {
     }
 
     /// What is wrong goes before what is wanted. `dt` seconds after the last time; `is_placed`: does it know where it is?
-    pub fn overrule(&mut self, dt: f32, safety: &Safety, is_placed: bool, p: &Parameters) {
+    pub fn overrule(&mut self, dt: f32, safety: &Safety, is_placed: bool, p: &Config) {
         self.overruled = if self.failsafe { self.overruled + dt } else { 0.0 };
         let comes_home = safety.troubles.contains(Troubles::LINK) || safety.troubles.contains(Troubles::FENCE);
         if self.order != Order::Stand && comes_home {
             (self.hold, self.failsafe) = (Some([0.0; 2]), true);
         }
-        let has_to_land = safety.troubles.contains(Troubles::BATTERY) || self.overruled > p.link.land;
-        let is_blind = safety.position > p.path.blind || !is_placed && has_to_land;
+        let has_to_land = safety.troubles.contains(Troubles::BATTERY) || self.overruled > p.limits.link_land;
+        let is_blind = safety.position > p.limits.blind || !is_placed && has_to_land;
         match self.order {
             Order::Stand => {}
             _ if is_blind => (self.order, self.failsafe) = (Order::Down, true),
