@@ -4,7 +4,7 @@
 //! drops the handler and the program links; one index that it cannot bound, anywhere in what is called here, and the
 //! linker misses the function. What is called, with data the compiler knows nothing about: every runnable with everything
 //! behind it, whichever estimator and controller the parameters choose; the bus with its taps; the black box; the self
-//! test; the radio's packets and session; the secure session at both ends; the decoders of every chip and the motors.
+//! test; every runnable of the fixed-wing aircraft and of the STM32 quadcopter; the radio's packets and session; the secure session at both ends; the decoders of every chip and the motors.
 //!
 //! Not here: the drivers' waiting. An `async` function may be polled once too often only by an executor that is broken.
 //!
@@ -45,6 +45,8 @@ extern "C" fn flight() {
         return;
     }
     vehicle();
+    aeroplane();
+    stm32_quad();
     sealed();
     chips();
     let _ = black_box(golden::self_test(&mut MaybeUninit::uninit(), &mut topics::Bus::new()));
@@ -91,6 +93,49 @@ fn vehicle() {
         black_box(outside.storage.link_peer.latest());
         taps.drain(&mut |topic, at, generation, words| memory.note(topic, at, generation, words));
         black_box(memory.records().count());
+    }
+}
+
+/// The fixed-wing aircraft, from its sensors to its servos.
+fn aeroplane() {
+    use stampfly_plane::{Parameters, Runnables, topics};
+    let mut bus = topics::Bus::new();
+    let parameters: Parameters = black_box(Parameters::default());
+    let vehicle = Assembled::<Runnables>::new(&mut bus, None, &parameters, black_box(Instant::ZERO));
+    let Assembled { mut flight_loop, mut outside, .. } = vehicle;
+    while black_box(true) {
+        let at: Instant = black_box(Instant::ZERO);
+        outside.imu.sensor_imu.publish(at, &black_box(Default::default()));
+        outside.mag.sensor_mag.publish(at, &black_box(Default::default()));
+        outside.baro.sensor_baro.publish(at, &black_box(Default::default()));
+        outside.gnss.sensor_gnss.publish(at, &black_box(Default::default()));
+        outside.pitot.sensor_airspeed.publish(at, &black_box(Default::default()));
+        outside.battery.sensor_power.publish(at, &black_box(Default::default()));
+        let _ = outside.link.command_guided.publish(at, black_box(Default::default()));
+        let _ = outside.link.way_point_edit.publish(at, black_box(Default::default()));
+        let _ = outside.link.parameter_request.publish(at, black_box(Default::default()));
+        flight_loop.run_band(Band::Flight, black_box(at), &mut ());
+        flight_loop.run_band(Band::Background, black_box(at), &mut ());
+        black_box((outside.motor.actuator_motor.latest(), outside.servos.actuator_servo.latest()));
+    }
+}
+
+/// The STM32 quadcopter, from its sensors to its motors.
+fn stm32_quad() {
+    use stampfly_stm32_quad::{Parameters, Runnables, topics};
+    let mut bus = topics::Bus::new();
+    let parameters: Parameters = black_box(Parameters::default());
+    let vehicle = Assembled::<Runnables>::new(&mut bus, None, &parameters, black_box(Instant::ZERO));
+    let Assembled { mut flight_loop, mut outside, .. } = vehicle;
+    while black_box(true) {
+        let at: Instant = black_box(Instant::ZERO);
+        outside.imu.sensor_imu.publish(at, &black_box(Default::default()));
+        outside.battery.battery_sample.publish(at, &black_box(Default::default()));
+        outside.receiver.receiver_input.publish(at, &black_box(Default::default()));
+        let _ = outside.link.parameter_request.publish(at, black_box(Default::default()));
+        flight_loop.run_band(Band::Flight, black_box(at), &mut ());
+        flight_loop.run_band(Band::Background, black_box(at), &mut ());
+        black_box((outside.motors.actuator_motor.latest(), outside.lights.lights.latest()));
     }
 }
 

@@ -60,15 +60,13 @@ impl Axes {
 
 /// Finite where it counts: every axis that is given, and no deviation that is no number.
 fn is_given(values: &Vec3, sigma: &Vec3) -> [f32; 3] {
-    core::array::from_fn(|axis| {
-        if sigma[axis].is_nan() {
-            f32::NAN
-        } else if sigma[axis].is_infinite() {
-            0.0
-        } else {
-            values[axis]
-        }
-    })
+    let given = |value: f32, sigma: f32| match sigma {
+        _ if sigma.is_nan() => f32::NAN,
+        _ if sigma.is_infinite() => 0.0,
+        _ => value,
+    };
+    let ([north, east, down], [of_north, of_east, of_down]) = (values.to_array(), sigma.to_array());
+    [given(north, of_north), given(east, of_east), given(down, of_down)]
 }
 
 impl Eskf {

@@ -123,8 +123,9 @@ fn come_down(seen: &Seen<'_>) -> Step<Cruising> {
     let sink = p.flare.sink + height.max(0.0) / p.flare.time;
     let climb = -sink.min(seen.ground_speed.max(p.speed.stall) * math::tan(SLOPE));
     let against = 0.8 * math::wrap_angle(math::atan2(-east, -north) - seen.heading);
-    let bank =
-        if height > AGAINST_WIND { p.path.bank_lost } else { against.clamp(-p.path.bank_lost, p.path.bank_lost) };
+    let most = p.path.bank_lost;
+    // `clamp` panics when a limit is no number.
+    let bank = if height > AGAINST_WIND { most } else { math::larger(math::smaller(against, most), -most) };
     let down = Demand { bank, bank_max: p.path.bank_max, vertical: Vertical::Climb, climb, ..Demand::default() };
     if height < p.height.flare {
         // The throttle is closed, and a wing must not touch first.

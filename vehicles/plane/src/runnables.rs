@@ -15,7 +15,7 @@ use stampfly_control::timing::StepTimer;
 use stampfly_fixed_wing::messages::Home;
 use stampfly_fixed_wing::{Config, PathManager, Sensed, Watch, Watched};
 use stampfly_param::ParameterSet;
-use stampfly_types::{Duration, Instant};
+use stampfly_types::{Duration, Instant, Stamped};
 
 /// An estimate that is older is none: ten samples were missed.
 const OLD: Duration = Duration::from_millis(25);
@@ -148,8 +148,8 @@ impl Runnable for Path {
 
     fn run(&mut self, activation: &mut Activation, ends: &mut PathEnds<'_>) {
         let now = activation.now();
-        let commands: Vec<_, 32> = ends.command_guided.iter().map(|command| command.data).collect();
-        let edits: Vec<_, 16> = ends.way_point_edit.iter().map(|edit| edit.data).collect();
+        let commands: Vec<_, 32> = data(&ends.command_guided);
+        let edits: Vec<_, 16> = data(&ends.way_point_edit);
         if !commands.is_empty() || !edits.is_empty() {
             self.heard = now;
         }
@@ -172,6 +172,15 @@ impl Runnable for Path {
         ends.path_status.publish(now, &status);
         ends.flight_status.publish(now, &stampfly_fixed_wing::status(&self.manager, &sensed));
     }
+}
+
+/// What came without its stamps. The room is the queue's, so all of it fits; `collect` would panic if not.
+fn data<M: Copy, const N: usize>(samples: &[Stamped<M>]) -> Vec<M, N> {
+    let mut all = Vec::new();
+    for sample in samples {
+        let _ = all.push(sample.data);
+    }
+    all
 }
 
 /// Requests to the parameters in use.

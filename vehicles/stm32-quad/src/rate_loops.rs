@@ -9,7 +9,7 @@
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 use stampfly_control::filter::LowPass;
-use stampfly_types::{Duration, Vec3};
+use stampfly_types::{Duration, Vec3, math};
 
 /// Time between two samples, and between two steps of the controller.
 pub const PERIOD: Duration = Duration::from_micros(250);
@@ -109,7 +109,8 @@ impl RateLoops {
             if !error.is_finite() {
                 continue;
             }
-            single.sum = (single.sum + error).clamp(-limit, limit);
+            // `clamp` panics when the limit is no number.
+            single.sum = math::larger(math::smaller(single.sum + error, limit), -limit);
             let difference = single.difference.step(error - single.before);
             single.before = error;
             *term = Terms { setpoint, error, parts: [p * error, i * single.sum / RATE, d * difference * RATE] };
