@@ -1,13 +1,13 @@
 //! Airspeed and wind from a pitot tube beside an estimator, and whether the tube is to be believed.
 //!
 //! A tube that is blocked, iced or wet shows some pressure or other, and an aircraft that believes it dives or stalls. Beside a satellite receiver it can be judged: the velocity over the ground less the wind that was learnt is the
-//! airspeed, too. While a tube is not believed, that is what counts, and the wind stays as it was. On the ground there is nothing to compare it with.
+//! airspeed, too, as long as the receiver has a fix. While a tube is not believed, that is what counts, and the wind stays as it was. On the ground there is nothing to compare it with.
 //!
 //! Use it for whatever flies fast enough for a tube. Not for a multirotor.
 
 use crate::aid::airspeed::Wind;
 use crate::estimator::Estimator;
-use stampfly_types::messages::{AirState, AirspeedData, StateEstimate, Validity};
+use stampfly_types::messages::{AirState, AirspeedData, SensorMask, StateEstimate, Validity};
 use stampfly_types::{Duration, Instant, Stamped, Vec3, math};
 
 /// A tube that has been silent for longer is none.
@@ -104,16 +104,19 @@ impl Air {
             (self.believed, self.doubt) = (heard.is_some(), 0.0);
             return;
         }
-        let disagrees = match (heard, self.through_air(&estimate)) {
-            (None, _) => true,
+        // A velocity that nobody corrects drifts, and would condemn the one sensor that still holds it.
+        let is_judge = estimate.sensors.contains(SensorMask::EXTERNAL);
+        let agrees = match (heard, self.through_air(&estimate).filter(|_| is_judge)) {
+            (None, _) => Some(false),
             // A tube that hardly moves feels the wind along the nose alone.
-            (Some(speed), Some(other)) if speed.max(other) > FLIES => match self.wind.sigma() < KNOWN_WIND {
-                true => (speed - other).abs() > (DISAGREES.0 * other).max(DISAGREES.1),
-                false => speed < NO_WIND * other,
-            },
-            _ => false,
+            (Some(speed), Some(other)) if speed.max(other) > FLIES => Some(match self.wind.sigma() < KNOWN_WIND {
+                true => (speed - other).abs() <= (DISAGREES.0 * other).max(DISAGREES.1),
+                false => speed >= NO_WIND * other,
+            }),
+            // Nothing to compare it with: that is no reason to believe it again, nor to doubt it.
+            _ => None,
         };
-        let changes = disagrees == self.believed;
+        let changes = agrees.is_some_and(|agrees| agrees != self.believed);
         self.doubt = if changes { self.doubt + dt } else { 0.0 };
         if heard.is_none() || self.doubt > if self.believed { DOUBT } else { TRUST } {
             (self.believed, self.doubt) = (heard.is_some() && !self.believed, 0.0);

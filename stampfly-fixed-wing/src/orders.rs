@@ -123,6 +123,8 @@ impl Orders {
         let has_to_land = safety.troubles.contains(Troubles::BATTERY) || self.overruled > p.limits.link_land;
         let is_blind = safety.position > p.limits.blind || !is_placed && has_to_land;
         match self.order {
+            // Armed, standing, and nobody there: its propeller starts for nobody else.
+            Order::Stand if safety.troubles.contains(Troubles::LINK) => self.disarm(),
             Order::Stand => {}
             _ if is_blind => (self.order, self.failsafe) = (Order::Down, true),
             Order::Down => self.order = Order::Land,

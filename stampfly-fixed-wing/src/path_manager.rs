@@ -23,6 +23,8 @@ use stampfly_types::{Duration, Instant, frame, math};
 const MOVES: f32 = 2.0;
 /// It stands on its wheels when it has been slow, low and level for this long, s.
 const SETTLED: f32 = 0.5;
+/// And this long, s, where nothing shows that it is slow.
+const RESTED: f32 = 5.0;
 /// It is disarmed after a landing when it has stood with its brakes on for this long, s.
 const PARKED: f32 = 2.0;
 /// After a failure it is down within this time, from the fence's height, and disarmed then.
@@ -200,7 +202,10 @@ impl PathManager {
         let field = self.runway.map_or(0.0, |strip| strip.height);
         let low = -estimate.position.z - field < 3.0 && estimate.velocity.z.abs() < 0.4;
         let slow = air.airspeed < p.speed.rotation || self.orders.order == Order::Stand;
-        self.settled = if low && slow { self.settled + dt } else { 0.0 };
+        // Down without an airspeed: what flies with a closed throttle sinks, and what has not sunk for a while stands.
+        let rests = self.orders.order == Order::Down && !air.measured && self.demand.thrust == Thrust::Throttle;
+        let pace = if slow { 1.0 } else { SETTLED / RESTED };
+        self.settled = if low && (slow || rests) { self.settled + pace * dt } else { 0.0 };
         let speed = estimate.velocity.horizontal().norm();
         let is_slow = speed < 0.5 || !estimate.valid.contains(Validity::VELOCITY_XY);
         let comes_down = matches!(self.orders.order, Order::Land | Order::Down);
@@ -232,6 +237,7 @@ impl PathManager {
             position: position(estimate),
             height: -estimate.position.z,
             airspeed: air.airspeed,
+            is_measured: air.measured,
             wind: air.wind,
             ground_speed,
             course: if ground_speed > MOVES { math::atan2(east, north) } else { heading },

@@ -2,8 +2,8 @@
 //!
 //! | trouble | what the aircraft does |
 //! |---|---|
-//! | the link is silent for `limits.link_lost` | comes home and circles, and after `limits.link_land` lands, also when the link is back, unless somebody wants something else |
-//! | outside of the fence | the same |
+//! | the link is silent for `limits.link_lost` | comes home and circles, and after `limits.link_land` lands, also when the link is back, unless somebody wants something else; armed and standing, it disarms |
+//! | outside of the fence | comes home and lands in the same way |
 //! | no position, ten seconds after the last fix | circles at its height, with the wind, and goes round if it lands; does not arm; after `limits.blind`, or when it has to land, comes down where it is, against the wind |
 //! | airspeed not to be believed | flies by the velocity less the last wind; a take-off whose tube shows less than half of the speed over the ground is given up, and it parks |
 //! | battery at its warning level for five seconds | lands |

@@ -22,7 +22,7 @@ fn kind() -> impl Strategy<Value = GuidedKind> {
 
 fn edit() -> impl Strategy<Value = WayPointEdit> {
     use EditKind::*;
-    let kinds = prop::sample::select(vec![Append, Insert, Update, Delete]);
+    let kinds = prop::sample::select(vec![Append, Insert, Update, Delete, Init, Nuke]);
     (kinds, any::<[u32; 2]>(), any::<[i32; 2]>(), number()).prop_map(
         |(kind, [id, before], [latitude, longitude], height)| WayPointEdit {
             kind,
@@ -72,7 +72,12 @@ fn period() -> impl Strategy<Value = Period> {
     });
     let command =
         (kind(), vector()).prop_map(|(kind, position)| GuidedCommand { kind, position, ..Default::default() });
-    let troubles = prop::option::of(prop::sample::select(vec![Troubles::NONE, Troubles::FENCE, Troubles::BATTERY]));
+    let troubles = prop::option::of(prop::sample::select(vec![
+        Troubles::NONE,
+        Troubles::FENCE,
+        Troubles::BATTERY,
+        Troubles::LINK,
+    ]));
     (
         0u64..30_000,
         estimate,

@@ -158,6 +158,17 @@ fn an_attitude_that_is_lost_while_armed_is_a_failure_for_ever() {
 }
 
 #[test]
+fn an_armed_aircraft_that_stands_and_hears_nobody_is_disarmed() {
+    let mut desk = Desk::new();
+    desk.cycles(0.1);
+    desk.command(GuidedKind::Arm);
+    assert!(desk.manager.is_armed());
+    desk.safety.troubles = Troubles::LINK;
+    desk.cycles(0.1);
+    assert!(!desk.manager.is_armed());
+}
+
+#[test]
 fn way_points_are_appended_inserted_moved_and_taken_out() {
     let mut desk = Desk::flying();
     assert_eq!(desk.edit(EditKind::Init, 10, 0, 5), EditRefusal::None);

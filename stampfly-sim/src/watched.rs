@@ -3,7 +3,7 @@
 //! [`Watched`] is a vehicle's `Outcome`, a [`Spectator`] looks for it. What a vehicle measures besides, and when that is too much, is its [`Measured`]. Not for vehicles with a judge of
 //! their own, which looks at alerts and phases.
 
-use crate::fault::{Class, Fault, Injector};
+use crate::fault::{Class, Fault, Injector, Moment};
 use crate::time::Clock;
 use crate::vehicle::{Figure, Verdict};
 use crate::{Truth, World};
@@ -18,6 +18,28 @@ const HARD: f32 = 2.5;
 const TAIL: Duration = Duration::from_secs(1);
 /// A vehicle that stands more tilted than this lies, rad.
 const LIES: f32 = 0.5;
+/// So long after its take-off it has flown for a while: [`Moment::Hover`].
+const FLOWN: Duration = Duration::from_secs(1);
+
+/// How a vehicle is at a look, beside the truth: what only it can say of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shown {
+    /// It stands and may be armed.
+    pub ready: bool,
+    /// It is armed.
+    pub armed: bool,
+    /// Above where it stood, m.
+    pub height: f64,
+    /// It stays at a place, where a touch of the ground is no landing.
+    pub stays: bool,
+    /// It flies to another place.
+    pub moves: bool,
+    /// It sinks, in order to land.
+    pub lands: bool,
+}
+
+/// The invariant that every fault began and changed something: a flight without that says nothing.
+const FAULT_ACTED: &str = "I12";
 
 /// What one kind of vehicle measures of its flights.
 pub trait Measured {
@@ -38,9 +60,10 @@ pub trait Measured {
 ///
 /// ```
 /// use stampfly_sim::Truth;
-/// use stampfly_sim::fault::Class;
+/// use stampfly_sim::fault::{Class, Injector};
 /// use stampfly_sim::vehicle::Figure;
-/// use stampfly_sim::watched::{Measured, Watched};
+/// use stampfly_sim::watched::{Measured, Shown, Watched};
+/// use stampfly_types::Instant;
 /// # #[derive(Default)]
 /// struct Nothing;
 /// impl Measured for Nothing {
@@ -49,9 +72,12 @@ pub trait Measured {
 /// }
 /// let mut watched = Watched::<Nothing>::default();
 /// let (air, ground) = (Truth::default(), Truth { contact: true, ..Truth::default() });
-/// assert!(!watched.look(true, 0.0, false, &ground), "it stands");
-/// assert!(watched.look(true, 1.5, false, &air), "it has taken off");
-/// assert!(!watched.look(true, 0.0, false, &ground), "it has landed");
+/// let injector = Injector::new(Instant::ZERO, &[]);
+/// for (second, height, truth) in [(1, 0.0, &ground), (2, 1.5, &air), (9, 0.0, &ground)] {
+///     let shown = Shown { armed: true, height, ..Shown::default() };
+///     watched.look(Instant::from_secs(second), &shown, truth, &injector);
+/// }
+/// assert!(watched.flown);
 /// watched.end(&[], None, ground, true);
 /// assert_eq!(watched.class(), Class::KeptOn, "still armed");
 /// ```
@@ -71,7 +97,7 @@ pub struct Watched<M> {
     pub cut: bool,
     /// Other programs flew it.
     pub live: bool,
-    /// Speed at the last touch after flight, m/s.
+    /// Speed at the hardest touch after flight, m/s: a bounce does not make it a soft one.
     pub touchdown: f32,
     /// Largest tilt, rad.
     pub tilt: f32,
@@ -83,6 +109,10 @@ pub struct Watched<M> {
     pub expected: Option<Class>,
     /// What the vehicle measures besides.
     pub measured: M,
+    /// When it left the ground for the first time.
+    left: Option<Instant>,
+    /// It touched the ground at the last look.
+    touched: bool,
 }
 
 /// Somebody beside the field: looks at the truth at regular times, writes it down, and sees when a flight is over.
@@ -151,25 +181,48 @@ impl Spectator {
 struct Findings {
     outcome: &'static str,
     expected: Option<&'static str>,
+    as_expected: bool,
+    violations: Vec<&'static str>,
     faults: Vec<String>,
 }
 
+impl<M: Measured + Default> Watched<M> {
+    /// Before a flight of so many legs.
+    #[must_use]
+    pub fn new(legs: usize) -> Self {
+        Self { legs: [0, legs], ..Self::default() }
+    }
+}
+
 impl<M: Measured> Watched<M> {
-    /// Looks at the truth: is it armed, how high above where it stood, m, and does it stay at a place, where a touch is no landing? Has it taken off with
-    /// this look?
-    pub fn look(&mut self, armed: bool, height: f64, stays: bool, truth: &Truth) -> bool {
+    /// Looks at the truth and at what the vehicle shows, and tells the injector which moments have come.
+    pub fn look(&mut self, now: Instant, shown: &Shown, truth: &Truth, injector: &Injector) {
+        let Shown { ready, armed, height, stays, moves, lands } = *shown;
         let is_clear = height > CLEAR;
         self.armed |= armed;
-        let takes_off = armed && is_clear && !self.flown;
-        self.flown |= takes_off;
+        if armed && is_clear && self.left.is_none() {
+            (self.flown, self.left) = (true, Some(now));
+        }
         self.cut |= !armed && is_clear && self.flown;
-        if truth.contact && self.flown && self.touchdown == 0.0 && !is_clear && !stays {
-            self.touchdown = M::touch(truth);
-        } else if is_clear {
-            self.touchdown = 0.0;
+        let touches = truth.contact && !self.touched && self.flown && !is_clear && !stays;
+        self.touched = truth.contact;
+        if touches {
+            self.touchdown = self.touchdown.max(M::touch(truth));
         }
         self.tilt = self.tilt.max(frame::tilt(&truth.attitude));
-        takes_off
+        let has_flown = self.left.is_some_and(|left| now.since(left) >= FLOWN);
+        let moments = [
+            (Moment::Ground, ready && !armed),
+            (Moment::Spool, armed),
+            (Moment::TakeOff, self.flown),
+            (Moment::Hover, has_flown),
+            (Moment::Move, has_flown && moves),
+            (Moment::Landing, has_flown && lands),
+            (Moment::Touch, touches),
+        ];
+        for (moment, _) in moments.iter().filter(|(_, has_come)| *has_come) {
+            injector.reached(*moment, now);
+        }
     }
 
     /// The flight is over: with these faults, of which the injector knows what each has changed. What people break on purpose is not judged.
@@ -190,7 +243,9 @@ impl<M: Measured> Watched<M> {
     /// Which end it is.
     #[must_use]
     pub fn class(&self) -> Class {
-        if !self.disarmed {
+        if !self.armed {
+            Class::Refused
+        } else if !self.disarmed {
             Class::KeptOn
         } else if self.cut {
             Class::Cut
@@ -219,7 +274,14 @@ impl<M: Measured> Verdict for Watched<M> {
 
     fn findings(&self) -> impl Serialize {
         let faults = self.faults.iter().map(|(fault, _)| fault.clone()).collect();
-        Findings { outcome: self.class().name(), expected: self.expected.map(Class::name), faults }
+        let acted = self.faults.iter().all(|(_, changes)| *changes > 0);
+        Findings {
+            outcome: self.class().name(),
+            expected: self.expected.map(Class::name),
+            as_expected: self.succeeded(),
+            violations: if acted { Vec::new() } else { vec![FAULT_ACTED] },
+            faults,
+        }
     }
 
     fn facts(&self) -> Vec<(&'static str, bool)> {

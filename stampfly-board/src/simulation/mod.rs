@@ -70,7 +70,7 @@ impl Vehicle for StampFly {
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
     const VARIETY: Variety =
-        Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"], chips: true };
+        Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"], times: [3, 12], chips: true };
     const PORTS: &'static [PortSpec] = live::PORTS;
     const PAGE: Page = PAGE;
     type Runnables = Runnables;

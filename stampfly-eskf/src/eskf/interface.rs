@@ -218,8 +218,10 @@ impl Estimator for Eskf {
         let recent = |sensor| self.gates.is_recent(sensor, self.now);
         let stationary = self.anchor.is_some();
         let sound = self.initialized && !self.status.diverged;
-        let [level, down] = [self.is_aided_outside(Sensor::Level), self.is_aided_outside(Sensor::Down)];
+        let down = self.is_aided_outside(Sensor::Down);
         let [range, air] = [self.is_range_aided(), recent(Sensor::Baro)];
+        // Not what aids from inside: an airspeed, a model of wheels.
+        let outside = [Sensor::Position, Sensor::Velocity, Sensor::Attitude].into_iter().any(recent);
         let north = self.is_north_known();
         let horizontal = sound && north && self.is_velocity_aided();
         let drifts = horizontal || (sound && self.feels_drag() && self.is_velocity_certain() && self.height() > LEVEL);
@@ -240,7 +242,7 @@ impl Estimator for Eskf {
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
             .set(SensorMask::STATIONARY, stationary)
-            .set(SensorMask::EXTERNAL, level || down || recent(Sensor::Attitude));
+            .set(SensorMask::EXTERNAL, outside);
         let p = &self.covariance;
         StateEstimate {
             attitude: self.state.quat(),

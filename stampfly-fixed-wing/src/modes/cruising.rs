@@ -114,8 +114,8 @@ impl Stage<Cruising> for Cruise {
 /// Down without knowing where it is: in a circle, the last metres straight against the last wind, as a landing does them. Fields are taken to be flat.
 fn come_down(seen: &Seen<'_>) -> Step<Cruising> {
     let p = seen.config;
-    // No wing carries it so slowly.
-    if seen.airspeed < 0.7 * p.speed.stall {
+    // No wing carries it so slowly; and where nobody knows how slow it is, it has not sunk for a while.
+    if seen.airspeed < 0.7 * p.speed.stall || seen.on_ground && !seen.is_measured {
         return Step::End(CruisingEnd::Down);
     }
     let height = seen.height - seen.runway.map_or(0.0, |strip| strip.height);

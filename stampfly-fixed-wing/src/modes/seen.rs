@@ -45,6 +45,8 @@ pub struct Seen<'a> {
     pub height: f32,
     /// True airspeed, m/s.
     pub airspeed: f32,
+    /// Does a pitot tube show it?
+    pub is_measured: bool,
     /// Of the air, m/s north and east.
     pub wind: [f32; 2],
     /// Speed over the ground, m/s.

@@ -57,6 +57,7 @@ impl Bench {
             position: self.position,
             height: self.height,
             airspeed: self.airspeed,
+            is_measured: true,
             wind: [0.0; 2],
             ground_speed: self.airspeed,
             course: self.course,

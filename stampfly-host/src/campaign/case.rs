@@ -7,6 +7,7 @@
 //! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults.
 //! With [`Plan::only`], the cells are of these faults alone, and all flights walk through them, again and again with other seeds.
 
+use crate::vehicles::DEFAULT;
 use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
 use stampfly_sim::fault::{Fault, FaultKind, FaultValue, Moment, When};
@@ -21,9 +22,6 @@ const STREAM: u64 = 1_100;
 const VALUES: [f64; 2] = [0.25, 1.0];
 /// Shortest and longest duration, s.
 const LASTS: [f64; 2] = [0.05, 10.0];
-/// Faults that begin at a time begin within these, s since power-on: before the vehicle is armed, and when the shortest mission
-/// is about to land.
-const TIMES: [f64; 2] = [3.0, 12.0];
 /// Strongest gusts, m/s: half more than in the reference mission.
 const GUST: f64 = 0.8;
 
@@ -45,6 +43,8 @@ pub struct Plan {
 /// One flight of a campaign.
 #[derive(Clone, Debug)]
 pub struct Case {
+    /// Name of the vehicle.
+    pub vehicle: String,
     /// Its number in the campaign, from zero.
     pub index: u64,
     /// Its seed.
@@ -59,10 +59,12 @@ type Cell = (String, Moment, Option<&'static str>);
 /// The flights of a campaign.
 #[derive(Clone, Debug)]
 pub struct Cases {
+    vehicle: &'static str,
     plan: Plan,
     faults: &'static [FaultKind],
     modes: &'static [&'static str],
     missions: &'static [&'static str],
+    times: [u16; 2],
     chips: bool,
     cells: Vec<Cell>,
 }
@@ -87,8 +89,8 @@ impl Cases {
                 cells.extend(walked.iter().enumerate().map(|(place, fault)| (fault.clone(), moment(place), mode)));
             }
         }
-        let Variety { missions, chips, .. } = V::VARIETY;
-        Self { cells, plan: plan.clone(), faults, modes, missions, chips }
+        let Variety { missions, times, chips, .. } = V::VARIETY;
+        Self { vehicle: V::NAME, cells, plan: plan.clone(), faults, modes, missions, times, chips }
     }
 
     /// How many flights walk through the cells: every cell is flown in a campaign that has as many.
@@ -113,18 +115,18 @@ impl Cases {
             }
             None => self.draw(&mut options, seed),
         }
-        Case { index, seed, options }
+        Case { vehicle: self.vehicle.to_owned(), index, seed, options }
     }
 
     /// Anything at all.
     fn draw(&self, options: &mut Options, seed: u64) {
         let mut dice = Dice(Noise::new(seed, STREAM));
         let Some(first) = dice.one(self.faults) else { return };
-        options.fault = vec![dice.fault(first).to_string()];
+        options.fault = vec![dice.fault(first, self.times).to_string()];
         if self.plan.pairs && dice.0.chance(0.5) {
             // Two of a kind would be one.
             let others: Vec<_> = self.faults.iter().filter(|kind| kind.name != first.name).collect();
-            options.fault.extend(dice.one(&others).map(|kind| dice.fault(kind).to_string()));
+            options.fault.extend(dice.one(&others).map(|kind| dice.fault(kind, self.times).to_string()));
         }
         // As often under a program's commands as in any one mode.
         let mode = dice.below(self.modes.len() + 1);
@@ -159,7 +161,7 @@ impl Dice {
     }
 
     /// This fault, some time.
-    fn fault(&mut self, kind: &'static FaultKind) -> Fault {
+    fn fault(&mut self, kind: &'static FaultKind, times: [u16; 2]) -> Fault {
         let value = match kind.value {
             FaultValue::None => None,
             FaultValue::Number { default, range: [low, high], .. } => {
@@ -172,7 +174,8 @@ impl Dice {
         let when = if self.0.chance(0.8) {
             When::Moment(Moment::ALL[self.below(Moment::ALL.len())])
         } else {
-            When::After(seconds(self.round(TIMES[0], TIMES[1])))
+            let [first, last] = times.map(f64::from);
+            When::After(seconds(self.round(first, last)))
         };
         // Evenly over orders of magnitude.
         let lasts = self.0.chance(0.5).then(|| seconds(LASTS[0] * (LASTS[1] / LASTS[0]).powf(self.0.unit())));
@@ -189,7 +192,7 @@ impl Case {
     /// The arguments of `stampfly` that fly it.
     #[must_use]
     pub fn arguments(&self) -> Vec<String> {
-        let Self { seed, options, .. } = self;
+        let Self { vehicle, seed, options, .. } = self;
         let Options { mission, pilot, fault, gust, chips, jitter, vibration, .. } = options;
         let mut arguments: Vec<String> = vec!["fly".into(), "--seed".into(), seed.to_string()];
         let mut add = |name: &str, value: Option<String>| {
@@ -197,6 +200,7 @@ impl Case {
                 arguments.extend([format!("--{name}"), value]);
             }
         };
+        add("vehicle", Some(vehicle.clone()).filter(|name| name != DEFAULT));
         add("mission", mission.clone());
         fault.iter().for_each(|fault| add("fault", Some(fault.clone())));
         add("gust", gust.map(|gust| gust.to_string()));

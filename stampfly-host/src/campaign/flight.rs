@@ -1,7 +1,7 @@
 //! Flies one flight of a campaign and makes its row.
 
 use super::case::Case;
-use super::row::{FAULT_ACTED, IDLE, PANICKED, PASSED, Row};
+use super::row::{FAULT_ACTED, IDLE, PANICKED, PASSED, Row, UNJUDGED};
 use crate::flown::{Flown, fly};
 use crate::recorder::Recorder;
 use serde::Deserialize;
@@ -11,11 +11,11 @@ use stampfly_types::Instant;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What a vehicle says of a flight with faults: the fields of [`Verdict::findings`] that campaigns know.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
+/// Without the first four there is no judgement.
+#[derive(Clone, Debug, Deserialize)]
 struct Findings {
     outcome: String,
-    expected: String,
+    expected: Option<String>,
     as_expected: bool,
     violations: Vec<String>,
     max_height_m: Option<f64>,
@@ -23,6 +23,7 @@ struct Findings {
     touch_speed_mps: Option<f64>,
     cut_after_s: Option<f64>,
     cut_height_m: Option<f64>,
+    #[serde(default)]
     alerts: Vec<Named>,
 }
 
@@ -55,13 +56,15 @@ pub fn fly_case<V: Vehicle>(case: &Case) -> Result<Row, SetupError> {
 pub fn finished<O: Verdict>(row: Row, flown: &Flown<O>, hash: u64) -> Row {
     // Numbers and texts always have a JSON form.
     let findings = serde_json::to_value(flown.outcome.findings()).unwrap_or_default();
-    let findings: Findings = serde_json::from_value(findings).unwrap_or_default();
+    let Ok(findings) = serde_json::from_value::<Findings>(findings) else {
+        return Row { verdict: UNJUDGED.into(), ..row };
+    };
     let names: Vec<_> = findings.alerts.iter().map(|alert| alert.name.as_str()).collect();
     Row {
         verdict: verdict(&findings),
         violations: findings.violations.join(" "),
         outcome: findings.outcome,
-        expected: findings.expected,
+        expected: findings.expected.unwrap_or_default(),
         as_expected: findings.as_expected,
         max_height_m: findings.max_height_m,
         max_distance_m: findings.max_distance_m,

@@ -134,6 +134,7 @@ macro_rules! row {
 }
 
 row! {
+    vehicle: String = "Name of the vehicle.";
     index: u64 = "Number of the flight in its campaign, from 0.";
     seed: u64 = "Seed of everything random in the flight.";
     mission: Option<String> = "The mission, as `--mission` takes it; nothing is the vehicle's usual one.";
@@ -148,7 +149,7 @@ row! {
     settings: String = "Other options of the flight, as on the command line.";
     parameter_digest: String = "Hash over every parameter of the flight stack and of the simulated vehicle.";
     version: String = "Version of the program.";
-    verdict: String = "`passed`; `idle`: the fault changed nothing, so the flight says nothing; else what is wrong: an end that is not acceptable, invariants, `panicked`.";
+    verdict: String = "`passed`; `idle`: the fault changed nothing, so the flight says nothing; else what is wrong: an end that is not acceptable, invariants, `panicked`, `unjudged` where the vehicle does not say how its flights end.";
     outcome: String = "How the flight ended.";
     expected: String = "The worst end that is acceptable.";
     as_expected: bool = "Is the end no worse than that?";
@@ -167,6 +168,8 @@ row! {
 pub const PASSED: &str = "passed";
 /// The verdict of a flight whose fault changed nothing.
 pub const IDLE: &str = "idle";
+/// The verdict of a flight of a vehicle that does not say how its flights end.
+pub const UNJUDGED: &str = "unjudged";
 /// The verdict and outcome of a flight that was not flown to its end because the program had a defect.
 pub const PANICKED: &str = "panicked";
 /// The invariant that every fault began and changed something. It is about the campaign, not about the vehicle.
@@ -208,10 +211,11 @@ impl Row {
     /// The columns that say what was flown.
     #[must_use]
     pub fn of(case: &Case) -> Self {
-        let Case { index, seed, options } = case;
+        let Case { vehicle, index, seed, options } = case;
         let joined =
             |part: &dyn Fn(&str) -> String| options.fault.iter().map(|text| part(text)).collect::<Vec<_>>().join("+");
         Self {
+            vehicle: vehicle.clone(),
             index: *index,
             seed: *seed,
             mission: options.mission.clone(),
@@ -255,7 +259,7 @@ impl Row {
                 other => return Err(format!("settings: {other} is none of --plant, --param, --wind, --cameras")),
             }
         }
-        Ok(Case { index: self.index, seed: self.seed, options })
+        Ok(Case { vehicle: self.vehicle.clone(), index: self.index, seed: self.seed, options })
     }
 }
 

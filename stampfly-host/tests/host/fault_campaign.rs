@@ -189,7 +189,7 @@ fn passing() -> Case {
         jitter: Some(5),
         ..Options::default()
     };
-    Case { index: 0, seed: 31, options }
+    Case { vehicle: "stampfly".into(), index: 0, seed: 31, options }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The fixed-wing aircraft as people meet it: flights and their logs, and campaigns with faults.
 
-use super::program::{folder, stampfly};
+use super::program::{campaign_of_faults, folder, stampfly};
 
 const PLANE: [&str; 4] = ["--vehicle", "plane", "--mission", "hop"];
 
@@ -18,6 +18,13 @@ fn a_flight_is_replayed_bit_for_bit() {
         assert!(stampfly(&folder, &["replay", "flight.ulg", "--from", "30"]).contains("identical"), "{options:?}");
         assert!(folder.join("flight.html").exists());
     }
+}
+
+/// The flights of its first cells: each fault twice, the moments in turn.
+#[test]
+fn a_campaign_of_faults_judges_its_flights_and_repeats_them() {
+    let folder = folder("plane", "faults");
+    campaign_of_faults(&folder, "plane", 20);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The STM32 quadcopter as people meet it: flights and their logs, campaigns, and a serial line in real time.
 
-use super::program::{Program, folder, stampfly};
+use super::program::{Program, campaign_of_faults, folder, stampfly};
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Duration;
@@ -18,6 +18,12 @@ fn a_flight_is_replayed_bit_for_bit() {
         assert!(stampfly(&folder, &["replay", "flight.ulg", "--from", "3"]).contains("identical"), "{options:?}");
         assert!(folder.join("flight.html").exists());
     }
+}
+
+#[test]
+fn a_campaign_of_faults_judges_its_flights_and_repeats_them() {
+    let folder = folder("stm32_quad", "faults");
+    campaign_of_faults(&folder, "stm32-quad", 42);
 }
 
 #[test]

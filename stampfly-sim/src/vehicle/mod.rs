@@ -297,13 +297,15 @@ pub struct Variety {
     pub modes: &'static [&'static str],
     /// Missions, as [`Options::mission`] takes them; the first is short and has every moment at which a fault can begin.
     pub missions: &'static [&'static str],
+    /// Faults that begin at a time begin within these, s since power-on: from before the vehicle is armed until the shortest mission is about to land.
+    pub times: [u16; 2],
     /// Can the real drivers run over emulated chips?
     pub chips: bool,
 }
 
 impl Variety {
     /// Nothing is varied.
-    pub const NONE: Self = Self { modes: &[], missions: &[], chips: false };
+    pub const NONE: Self = Self { modes: &[], missions: &[], times: [3, 12], chips: false };
 }
 
 /// A vehicle's golden flight: how it is flown, and how its record is judged.

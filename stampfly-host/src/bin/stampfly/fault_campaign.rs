@@ -13,7 +13,6 @@ use stampfly_host::campaign::shard::Shard;
 use stampfly_host::campaign::shrink::shrink;
 use stampfly_host::campaign::summary::Summary;
 use stampfly_host::campaign::{file, page, parallel};
-use stampfly_host::vehicles;
 use stampfly_log::FlightHash;
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;
@@ -283,7 +282,7 @@ impl<'o> Campaign<'o> {
     /// What an engine's tasks run, but for the shard.
     fn job<V: Vehicle>(&self) -> Job {
         let Plan { seed, flights, pairs, only, options } = &self.plan;
-        let common = Case { index: 0, seed: *seed, options: options.clone() };
+        let common = Case { vehicle: V::NAME.to_owned(), index: 0, seed: *seed, options: options.clone() };
         let mut arguments = vec!["campaign".to_owned(), "--faults".into()];
         // After the name of the command.
         arguments.extend(common.arguments().into_iter().skip(1));
@@ -292,7 +291,6 @@ impl<'o> Campaign<'o> {
         if !only.is_empty() {
             arguments.extend(["--only".into(), only.join(",")]);
         }
-        arguments.extend((V::NAME != vehicles::DEFAULT).then(|| format!("--vehicle={}", V::NAME)));
         arguments.extend(["--out".into(), self.out.display().to_string()]);
         arguments.extend(self.options.of_faults.again.then(|| "--again".into()));
         Job { arguments, out: self.out.clone() }

@@ -34,7 +34,8 @@ fn again(options: &FlyOptions, file: &Path, row: usize) -> Result<ExitCode, Fail
     let rows = contents.rows.len();
     let row = contents.rows.into_iter().nth(row);
     let row = row.ok_or_else(|| format!("{} has rows 0 to {}", file.display(), rows.saturating_sub(1)))?;
-    vehicles::with(&options.scene.vehicle.name, Again(options, row))?
+    let vehicle = row.vehicle.clone();
+    vehicles::with(&vehicle, Again(options, row))?
 }
 
 struct Again<'o>(&'o FlyOptions, Row);

@@ -12,8 +12,8 @@ use std::rc::Rc;
 pub const FAULTS: &[FaultKind] = &[
     FaultKind::plain("gnss-lost", Class::Landed, "The receiver has no fix."),
     FaultKind::plain("gnss-silent", Class::Landed, "The receiver says nothing."),
-    FaultKind::plain("pitot-blocked", Class::Degraded, "The pitot tube shows no pressure."),
-    FaultKind::plain("pitot-silent", Class::Degraded, "The pressure sensor of the pitot tube says nothing."),
+    FaultKind::plain("pitot-blocked", Class::Landed, "The pitot tube shows no pressure."),
+    FaultKind::plain("pitot-silent", Class::Landed, "The pressure sensor of the pitot tube says nothing."),
     FaultKind::plain("mag-silent", Class::Degraded, "The compass says nothing."),
     FaultKind::plain("baro-silent", Class::Degraded, "The barometer says nothing."),
     FaultKind::plain("imu-silent", Class::Cut, "No inertial sample arrives."),
@@ -76,5 +76,5 @@ impl Wrong {
     }
 }
 
-/// After a fault has begun there are this many seconds to land in.
-pub(super) const PATIENCE: Duration = Duration::from_secs(400);
+/// After a fault has begun there is this much time to land in: twice round the field, and some more.
+pub(super) const PATIENCE: Duration = Duration::from_secs(900);

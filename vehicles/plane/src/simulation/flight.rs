@@ -19,7 +19,7 @@ use stampfly_drivers::{
 };
 use stampfly_fixed_wing::messages::{Demand, PathStatus, Place, Vertical};
 use stampfly_flight::newest::message;
-use stampfly_sim::fault::{Fault, Moment};
+use stampfly_sim::fault::Fault;
 use stampfly_sim::ground;
 use stampfly_sim::plant::Surface;
 use stampfly_sim::sensors::{AirspeedModel, GnssModel, MotorModel, Sensors, ServoModel};
@@ -27,7 +27,7 @@ use stampfly_sim::sight::Progress;
 use stampfly_sim::station::Station;
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle;
-use stampfly_sim::watched::Spectator;
+use stampfly_sim::watched::{Shown, Spectator};
 use stampfly_sim::{Simulation, Truth, World};
 use stampfly_types::messages::{FlightStatus, StateEstimate};
 use stampfly_types::{Duration, Instant, frame, math};
@@ -132,7 +132,7 @@ impl vehicle::Surroundings for Surroundings {
             deflections: outside.servos.actuator_servo,
             seen: Seen::default(),
             spectator: Spectator::new(clock, world, LOOK),
-            outcome: Outcome { legs: [0, setup.mission.items()], ..Outcome::default() },
+            outcome: Outcome::new(setup.mission.items()),
         }
     }
 }
@@ -144,6 +144,8 @@ struct Seen {
     demand: Demand,
     path: PathStatus,
     armed: bool,
+    /// It may be armed.
+    ready: bool,
 }
 
 /// The world during a flight, and what is watched of it.
@@ -165,15 +167,16 @@ pub struct Around<'a> {
 impl Around<'_> {
     fn look(&mut self, now: Instant, truth: &Truth) {
         let height = self.world.height_at(now) - self.setup.simulation.plant.gear_height;
-        let Seen { estimate, demand, path, armed } = &self.seen;
-        if self.outcome.look(*armed, height, false, truth) {
-            self.wrong.injector.reached(Moment::TakeOff, now);
-        }
-        match path.place {
-            Place::CruisingCruise => self.wrong.injector.reached(Moment::Move, now),
-            Place::LandingSlope => self.wrong.injector.reached(Moment::Landing, now),
-            _ => {}
-        }
+        let Seen { estimate, demand, path, armed, ready } = &self.seen;
+        let shown = Shown {
+            ready: *ready,
+            armed: *armed,
+            height,
+            stays: false,
+            moves: path.place == Place::CruisingCruise,
+            lands: path.place == Place::LandingSlope,
+        };
+        self.outcome.look(now, &shown, truth, &self.wrong.injector);
         let Measured { beside, height: heights, heading, position, .. } = &mut self.outcome.measured;
         if *armed {
             heading.add(math::wrap_angle(frame::yaw(&estimate.attitude) - frame::yaw(&truth.attitude)).into());
@@ -197,12 +200,8 @@ impl vehicle::Around for Around<'_> {
     type Runnables = Runnables;
     type Outcome = Outcome;
 
-    fn drive(&mut self, now: Instant) {
+    fn drive(&mut self, _: Instant) {
         if let Some(output) = self.duties.has_new().then(|| self.duties.latest()).flatten() {
-            if output.data.armed && !self.outcome.armed {
-                self.outcome.armed = true;
-                self.wrong.injector.reached(Moment::Spool, now);
-            }
             let Ok(()) = self.motors.write(&output.data);
         }
         if let Some(output) = self.deflections.has_new().then(|| self.deflections.latest()).flatten() {
@@ -221,7 +220,10 @@ impl vehicle::Around for Around<'_> {
             Some(Id::estimate_state) => seen.estimate = message(words).unwrap_or(seen.estimate),
             Some(Id::demand) => seen.demand = message(words).unwrap_or(seen.demand),
             Some(Id::path_status) => seen.path = message(words).unwrap_or(seen.path),
-            Some(Id::flight_status) => seen.armed = message(words).map_or(seen.armed, |now: FlightStatus| now.armed),
+            Some(Id::flight_status) => {
+                let status: FlightStatus = message(words).unwrap_or_default();
+                (seen.armed, seen.ready) = (status.armed, status.blocks.is_empty());
+            }
             _ => {}
         }
     }

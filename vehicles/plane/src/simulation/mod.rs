@@ -46,7 +46,8 @@ impl Vehicle for Plane {
     const NAME: &'static str = "plane";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety = Variety { modes: &[], missions: &["round", "twice"], chips: false };
+    const VARIETY: Variety =
+        Variety { modes: &[], missions: &["hop", "round", "twice"], times: [3, 120], chips: false };
     const PORTS: &'static [PortSpec] = services::PORTS;
     const PAGE: Page = page::PAGE;
     type Runnables = Runnables;

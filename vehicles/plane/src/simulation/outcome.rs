@@ -10,6 +10,8 @@ use std::prelude::v1::*;
 /// How a flight went.
 pub type Outcome = Watched<Measured>;
 
+/// Half of the strip's width, m.
+const STRIP_HALF: f32 = 8.0;
 /// From the aiming point to where the aircraft stops, m.
 const ROLLING: f32 = 10.0;
 
@@ -37,7 +39,8 @@ impl Default for Measured {
 
 impl watched::Measured for Measured {
     fn is_degraded(&self) -> bool {
-        self.beside.value().is_some_and(|rms| rms > 6.0)
+        let beside_strip = self.touchdowns.all().iter().any(|touch| touch.across.abs() > STRIP_HALF);
+        beside_strip || self.beside.value().is_some_and(|rms| rms > 6.0)
     }
 
     /// A landing is fast over the ground; what breaks an aircraft is the sink.

@@ -21,10 +21,10 @@ pub const FAULTS: &[FaultKind] = &[
     FaultKind::plain("link-lost", Class::Cut, "No packet arrives."),
     FaultKind::number("link-loss", ("", 0.3, 0.0, 1.0), Class::Transparent, "This share of packets is lost."),
     FaultKind::number(
-        "motor-thrust",
-        ("", 0.8, 0.0, 1.0),
+        "motor-weak",
+        ("", 0.2, 0.0, 1.0),
         Class::Degraded,
-        "The first motor's propeller has this share of its thrust.",
+        "The first motor's propeller lacks this share of its thrust.",
     ),
 ];
 
@@ -66,8 +66,8 @@ impl Wrong {
                 "link-lost" if active => loss = 1.0,
                 "link-loss" if active => loss = loss.max(value),
                 // The document's first motor is the plant's second.
-                "motor-thrust" => {
-                    let fault = if active { RotorFault { thrust: value, duty: None } } else { RotorFault::NONE };
+                "motor-weak" => {
+                    let fault = if active { RotorFault { thrust: 1.0 - value, duty: None } } else { RotorFault::NONE };
                     world.set_rotor_fault(now, 1, fault);
                 }
                 _ => continue,
@@ -80,5 +80,5 @@ impl Wrong {
     }
 }
 
-/// After a fault has begun there are this many seconds to land in.
-pub(super) const PATIENCE: Duration = Duration::from_secs(30);
+/// After a fault has begun there is this much time to land in: the longest mission, and some more.
+pub(super) const PATIENCE: Duration = Duration::from_secs(90);

@@ -20,15 +20,15 @@ use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Imu, MotorOutputs as _};
 use stampfly_flight::newest::message;
 use stampfly_sim::chips::{self, Air, SpiBus};
-use stampfly_sim::fault::{Fault, Line, Moment};
+use stampfly_sim::fault::{Fault, Line};
 use stampfly_sim::ground;
 use stampfly_sim::sensors::{MotorModel, Mpu6000Model};
 use stampfly_sim::sight::Progress;
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle;
-use stampfly_sim::watched::Spectator;
+use stampfly_sim::watched::{Shown, Spectator};
 use stampfly_sim::{Simulation, Truth, World};
-use stampfly_types::messages::{ImuData, MotorOutput};
+use stampfly_types::messages::{FlightStatus, ImuData, MotorOutput};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 use std::prelude::v1::*;
 
@@ -37,6 +37,9 @@ const LOOK: Duration = Duration::from_millis(5);
 /// SPI clocks of the inertial sensor, Hz: for its settings, and for samples.
 const SETUP: u32 = 1_000_000;
 const DATA: u32 = 20_000_000;
+/// Horizontal speed of a vehicle that flies to another place, and rate of sink of one that lands, m/s.
+const MOVES: f32 = 0.25;
+const SINKS: f32 = 0.1;
 /// The converter's period.
 const CONVERSION: Duration = Duration::from_millis(125);
 /// The plant's motors, from the front right clockwise, in the order of the document: rear right, front right, rear left, front left.
@@ -122,7 +125,7 @@ impl vehicle::Surroundings for Surroundings {
             duties: outside.motors.actuator_motor,
             seen: Seen::default(),
             spectator: Spectator::new(clock, world, LOOK),
-            outcome: Outcome { legs: [0, setup.mission.0.len()], ..Outcome::default() },
+            outcome: Outcome::new(setup.mission.0.len()),
         }
     }
 }
@@ -153,6 +156,8 @@ async fn convert(clock: Clock, world: World, parameters: BatteryParameters, mut 
 struct Seen {
     attitude: Attitude,
     state: ControlState,
+    /// It may be armed.
+    ready: bool,
     input: ReceiverInput,
     /// Packets while it was armed, and for how long, looks.
     packets: u32,
@@ -175,11 +180,17 @@ pub struct Around<'a> {
 
 impl Around<'_> {
     fn look(&mut self, now: Instant, truth: &Truth) {
-        let height = self.world.height_at(now) - self.setup.simulation.plant.ground_height;
         let (state, stays) = (self.seen.state, self.progress.stays.get());
-        if self.outcome.look(state.armed, height, stays, truth) {
-            self.wrong.injector.reached(Moment::TakeOff, now);
-        }
+        let is_last = self.progress.legs.get() == self.outcome.legs[1];
+        let shown = Shown {
+            ready: self.seen.ready,
+            armed: state.armed,
+            height: self.world.height_at(now) - self.setup.simulation.plant.ground_height,
+            stays,
+            moves: truth.velocity.horizontal().norm() > MOVES,
+            lands: is_last && truth.velocity.z > SINKS,
+        };
+        self.outcome.look(now, &shown, truth, &self.wrong.injector);
         let Measured { attitude, estimate, position, .. } = &mut self.outcome.measured;
         let [roll, pitch, _] = frame::roll_pitch_yaw(&truth.attitude);
         if state.armed {
@@ -189,7 +200,6 @@ impl Around<'_> {
             estimate.add((angle.y - pitch).into());
         }
         if stays && state.armed {
-            self.wrong.injector.reached(Moment::Hover, now);
             let leg = self.setup.mission.0.get(self.progress.legs.get()).map_or(Vec3::zeros(), |leg| leg.place);
             position.add((truth.position - leg).horizontal().norm().into());
             if state.angle_mode {
@@ -205,14 +215,10 @@ impl vehicle::Around for Around<'_> {
     type Runnables = Runnables;
     type Outcome = Outcome;
 
-    fn drive(&mut self, now: Instant) {
+    fn drive(&mut self, _: Instant) {
         if self.duties.has_new()
             && let Some(output) = self.duties.latest()
         {
-            if output.data.armed && !self.outcome.armed {
-                self.outcome.armed = true;
-                self.wrong.injector.reached(Moment::Spool, now);
-            }
             // As pulses, which a speed controller measures.
             let protocol = esc::Protocol::Oneshot125;
             let mut sent = MotorOutput { armed: output.data.armed, count: 4, ..MotorOutput::default() };
@@ -235,6 +241,9 @@ impl vehicle::Around for Around<'_> {
         match Id::ALL.get(topic) {
             Some(Id::attitude) => seen.attitude = message(words).unwrap_or(seen.attitude),
             Some(Id::control_state) => seen.state = message(words).unwrap_or(seen.state),
+            Some(Id::flight_status) => {
+                seen.ready = message(words).is_some_and(|status: FlightStatus| status.blocks.is_empty());
+            }
             Some(Id::receiver_input) => {
                 seen.input = message(words).unwrap_or(seen.input);
                 seen.packets += u32::from(seen.state.armed);

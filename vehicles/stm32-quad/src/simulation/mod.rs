@@ -56,7 +56,8 @@ impl Vehicle for Stm32Quad {
     const NAME: &'static str = "stm32-quad";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety = Variety { modes: &["angle", "acro"], missions: &["hover", "square"], chips: true };
+    const VARIETY: Variety =
+        Variety { modes: &["angle", "acro"], missions: &["square", "hover"], times: [3, 20], chips: true };
     const PORTS: &'static [PortSpec] = serial::PORTS;
     const ASKS: &'static [&'static str] = serial::ASKS;
     const PAGE: Page = page::PAGE;
