@@ -1,9 +1,12 @@
 //! The estimator under any stream of samples, in any order, at any times.
 
 use crate::Input;
+use stampfly_eskf::aid::Row;
+use stampfly_eskf::aid::airspeed::Wind;
+use stampfly_eskf::filter::{N, NominalState};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData};
-use stampfly_types::{Duration, Instant, Vec3};
+use stampfly_types::{Duration, Instant, Quat, Vec3};
 
 /// Samples, each with a kind and a time step. The first byte says whether the estimator is initialised.
 pub fn estimator_stream(data: &[u8]) {
@@ -14,7 +17,7 @@ pub fn estimator_stream(data: &[u8]) {
     if input.byte() & 1 == 1 {
         eskf.initialize(Instant::ZERO, &calibration);
     }
-    let mut now = Instant::ZERO;
+    let (mut now, mut wind) = (Instant::ZERO, Wind::default());
     while !input.is_empty() {
         let (kind, step) = (input.byte(), input.byte());
         now = match step {
@@ -24,7 +27,8 @@ pub fn estimator_stream(data: &[u8]) {
             253 => Instant::ZERO,
             _ => now + Duration::from_micros(100 * u64::from(step)),
         };
-        match kind % 8 {
+        // The rarer ones have numbers of their own, so that older inputs mean what they did.
+        match if kind >= 248 { kind } else { kind % 8 } {
             0 => eskf
                 .predict(now, &ImuData { gyro: input.vector(35.0), accel: input.vector(80.0), ..Default::default() }),
             1 => {
@@ -46,6 +50,21 @@ pub fn estimator_stream(data: &[u8]) {
                 eskf.command(now, &EstimatorCommand { on_ground, flying, origin_resets, full_resets });
             }
             6 => eskf.initialize(now, &calibration),
+            248 => _ = eskf.fuse_position(now, &input.vector(20.0), &input.vector(1.0)),
+            249 => {
+                let ([w, x, y, z], sigma) = ([(); 4].map(|()| input.number(1.0)), input.number(0.1));
+                _ = eskf.fuse_attitude(now, &Quat::new_unchecked(w, x, y, z), sigma);
+            }
+            250 => {
+                let [speed, sigma] = [input.number(20.0), input.number(1.0)];
+                _ = eskf.fuse_airspeed(now, speed, sigma, &mut wind);
+            }
+            251 => {
+                let numbers: [f32; N] = [(); N].map(|()| input.number(1.0));
+                let (measured, variance, gate) = (input.number(5.0), input.number(1.0), input.number(5.0));
+                let model = |_: &NominalState| [Row { predicted: 0.0, jacobian: numbers }];
+                _ = eskf.fuse(now, model, [measured], [variance], gate);
+            }
             _ => {
                 let velocity = input.vector(5.0);
                 _ = eskf.fuse_velocity(now, &velocity, &input.vector(1.0));

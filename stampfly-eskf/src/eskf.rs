@@ -433,22 +433,27 @@ impl Eskf {
         Fusion::Fused { ratio }
     }
 
+    /// Updates with what others have measured. What it takes from a variance that is all but certain may be more than there is, by its last digit, or by far
+    /// when inputs that contradict one another have left covariances that cannot be. Such a state has learnt nothing but what a position or a velocity
+    /// learns from its own measurement, of the variance `measured`.
+    #[inline(never)]
+    fn learn<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32, measured: f32) -> Fusion {
+        let before: [f32; N] = core::array::from_fn(|state| self.covariance.get(state, state));
+        let fusion = self.update(innovation, ratio);
+        for (state, before) in before.into_iter().enumerate() {
+            if self.covariance.get(state, state) <= 0.0 {
+                let variance = if state < ATTITUDE { math::smaller(before, measured) } else { before };
+                self.covariance.reset(state, variance);
+            }
+        }
+        fusion
+    }
+
     /// Updates state and covariance with a pseudo-measurement, without a gate.
     fn constrain<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
         let innovation = self.innovation(&self.current_state(), rows, values, [sigma * sigma; M]);
         let ratio = self.test_ratio(&innovation);
-        _ = self.update(&innovation, ratio);
-        self.leave_some_variance(sigma * sigma);
-    }
-
-    /// Much less nearly all of it may be less than nothing, by its last digit: what is left of a position or velocity then is the variance of
-    /// what has measured it.
-    fn leave_some_variance(&mut self, measured: f32) {
-        for state in (VELOCITY..VELOCITY + 3).chain(POSITION..POSITION + 3) {
-            if self.covariance.get(state, state) <= 0.0 {
-                self.covariance.reset(state, measured);
-            }
-        }
+        _ = self.learn(&innovation, ratio, sigma * sigma);
     }
 
     /// What became of a sensor's measurements since this filter was made, restarts included.

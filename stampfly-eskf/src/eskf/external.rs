@@ -88,9 +88,7 @@ impl Eskf {
         match self.test_external(Sensor::Velocity, ratio) {
             GateResult::Fuse => {
                 self.aided(&axes.given);
-                let fusion = self.update(&innovation, ratio);
-                self.leave_some_variance(LEAST_VELOCITY);
-                Ok(fusion)
+                Ok(self.learn(&innovation, ratio, LEAST_VELOCITY))
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
@@ -139,7 +137,7 @@ impl Eskf {
             }
             GateResult::Fuse => {
                 self.aided(&axes.given);
-                Ok(self.update(&innovation, ratio))
+                Ok(self.learn(&innovation, ratio, LEAST_POSITION))
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
@@ -169,7 +167,8 @@ impl Eskf {
             self.covariance.inflate(POSITION + axis, TAKEN_BACK * (floor - prior).max(0.0));
         }
         let before = self.state.position;
-        let fusion = self.update(&self.innovation(delayed, axes.rows, axes.measured, variances), ratio);
+        let innovation = self.innovation(delayed, axes.rows, axes.measured, variances);
+        let fusion = self.learn(&innovation, ratio, LEAST_POSITION);
         self.wander.moved((self.state.position - before).into());
         fusion
     }
@@ -245,7 +244,7 @@ impl Eskf {
         let verdict =
             if self.is_north_known() { self.test_external(Sensor::Attitude, ratio) } else { GateResult::Reset };
         match verdict {
-            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
+            GateResult::Fuse => Ok(self.learn(&innovation, ratio, f32::INFINITY)),
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
@@ -348,7 +347,7 @@ impl Eskf {
         // No number is not below the gate either.
         if ratio <= 1.0 {
             self.aided(&given);
-            Ok(self.update(&innovation, ratio))
+            Ok(self.learn(&innovation, ratio, f32::INFINITY))
         } else {
             Ok(Fusion::Gated { ratio })
         }
