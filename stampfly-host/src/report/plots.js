@@ -141,11 +141,13 @@ const drawPanel = (panel, area) => {
   context.clip();
   context.lineJoin = 'round';
   // The estimate is drawn last and lies on top.
-  for (const line of [...panel.lines].reverse()) drawLine(context, area, line, y);
+  // An angle that leaves at one end comes back at the other: that is no line.
+  const jump = panel.unit === '°' ? 180 : Infinity;
+  for (const line of [...panel.lines].reverse()) drawLine(context, area, line, y, jump);
   context.restore();
 };
 
-const drawLine = (context, area, line, y) => {
+const drawLine = (context, area, line, y, jump) => {
   const values = channels[line.channel];
   const first = Math.max(indexAt(state.from) - 1, 0), last = Math.min(indexAt(state.to) + 1, data.points - 1);
   context.strokeStyle = color(variable(line.role));
@@ -170,6 +172,10 @@ const drawLine = (context, area, line, y) => {
       if (dense) flush();
       drawing = false;
       continue;
+    }
+    if (Math.abs(value - values[i - 1]) > jump) {
+      if (dense) flush();
+      drawing = false;
     }
     const x = area.x(data.start + i * data.step);
     if (!dense) {

@@ -1,0 +1,74 @@
+//! Many flights: `campaign`.
+
+use super::SceneOptions;
+use clap::{Args, ValueEnum};
+use stampfly_host::campaign::shard::Shard;
+use std::num::NonZero;
+use std::path::PathBuf;
+
+/// Options of `campaign`.
+#[derive(Clone, Debug, Args)]
+pub struct CampaignOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// Compare the estimator's errors and innovations with its covariance (NEES, NIS), and judge by that. Meant for
+    /// `--mission random --flights 500`.
+    #[arg(long)]
+    pub consistency: bool,
+    /// How many flights; 2000 with `--faults`.
+    #[arg(long, value_name = "N", default_value_t = 100, default_value_if("faults", "true", "2000"), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub flights: u64,
+    /// Seed of the first flight; the others count up from there.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Fly through what can go wrong: every fault at every moment in every mode, then faults, values, moments, missions and
+    /// surroundings at random. Every flight must end as its fault allows (`stampfly faults`).
+    #[arg(long, conflicts_with_all = ["consistency", "fault", "pilot"])]
+    pub faults: bool,
+    #[command(flatten)]
+    pub of_faults: FaultCampaignOptions,
+}
+
+/// Options of `campaign --faults`.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Campaign of faults")]
+pub struct FaultCampaignOptions {
+    /// Let half of the random flights have two faults.
+    #[arg(long, requires = "faults")]
+    pub pairs: bool,
+    /// Confine all flights to these faults: each at every moment in every mode, again and again with other seeds.
+    #[arg(long, value_name = "NAME[=VALUE],…", value_delimiter = ',', requires = "faults", conflicts_with = "pairs")]
+    pub only: Vec<String>,
+    /// Folder for the flights (Parquet) and the tables (HTML, CSV). Flights that are already there are not flown again.
+    #[arg(long, value_name = "DIR", default_value = "campaign", requires = "faults")]
+    pub out: PathBuf,
+    /// Fly every flight again, whatever is in the folder.
+    #[arg(long, requires = "faults")]
+    pub again: bool,
+    /// Divide the campaign into so many files.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "faults", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub shards: u64,
+    /// Fly only shard I of N, with I from 0 to N - 1, and write its file. `auto/N` takes I from HQ_TASK_ID (HyperQueue),
+    /// SLURM_ARRAY_TASK_ID (Slurm) or JOB_COMPLETION_INDEX (Kubernetes). Exit code 0 when the file is written, whatever
+    /// became of the flights; the same command with `--shards N` sums up.
+    #[arg(long, value_name = "I/N", requires = "faults", conflicts_with = "shards")]
+    pub shard: Option<Shard>,
+    /// What flies: this program; HyperQueue's server, one task a shard; or Slurm, by a script that is written into DIR.
+    #[arg(long, value_enum, default_value_t = Engine::Local, requires = "faults", conflicts_with = "shard")]
+    pub engine: Engine,
+    /// Fly on so many cores instead of all.
+    #[arg(long, value_name = "N", requires = "faults")]
+    pub threads: Option<NonZero<usize>>,
+}
+
+/// What flies a campaign of faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Engine {
+    /// This program.
+    #[default]
+    Local,
+    /// HyperQueue.
+    Hq,
+    /// Slurm.
+    Slurm,
+}

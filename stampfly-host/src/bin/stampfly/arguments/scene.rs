@@ -1,0 +1,118 @@
+//! What decides a simulated flight: `fly`, and what others take from it.
+
+use super::VehicleOption;
+use crate::failure::Failure;
+use clap::Args;
+use stampfly_sim::vehicle::{Live, Options, Vehicle};
+use std::path::PathBuf;
+
+/// What decides a simulated flight.
+#[derive(Clone, Debug, Default, Args)]
+pub struct SceneOptions {
+    #[command(flatten)]
+    pub vehicle: VehicleOption,
+    /// Mission to fly: a file, its text with `;` between steps (StampFly: `arm; takeoff 0.5; land`), or one that the vehicle
+    /// knows by name (StampFly: `square`, `hover`, `random`; rover: `course`, and its CSV logs).
+    #[arg(long, value_name = "FILE")]
+    pub mission: Option<String>,
+    /// Change a number of the simulated vehicle or its surroundings (see `--list`).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub plant: Vec<String>,
+    /// Change a parameter of the flight stack (see `--list`).
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub param: Vec<String>,
+    /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
+    #[arg(long, value_name = "K")]
+    pub vibration: Option<f64>,
+    /// Standard deviation of gusts, m/s.
+    #[arg(long, value_name = "M/S")]
+    pub gust: Option<f32>,
+    /// Mean wind towards north and east, m/s.
+    #[arg(long, value_name = "N,E", value_parser = north_and_east, allow_hyphen_values = true)]
+    pub wind: Option<[f32; 2]>,
+    /// Run the real drivers over emulated chips instead of sensor models.
+    #[arg(long)]
+    pub chips: bool,
+    /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
+    #[arg(long)]
+    pub cameras: bool,
+    /// Let something go wrong; may be repeated. WHEN is ground, spool, takeoff, hover, move, landing, touch, or a number of
+    /// seconds; +SECONDS is how long it lasts (see `stampfly faults`).
+    #[arg(long, value_name = "NAME[=VALUE]@WHEN[+SECONDS]")]
+    pub fault: Vec<String>,
+    /// Fly the mission with the sticks of a simulated pilot.
+    #[arg(long)]
+    pub pilot: bool,
+    /// The pilot's flight mode (StampFly: stabilize, acro, althold, poshold).
+    #[arg(long, value_name = "MODE", requires = "pilot")]
+    pub mode: Option<String>,
+    /// Delay and interrupt the executor, by this seed.
+    #[arg(long, value_name = "SEED")]
+    pub jitter: Option<u64>,
+    /// Show what `--plant` and `--param` can change, and their values.
+    #[arg(long)]
+    pub list: bool,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `fly`.
+#[derive(Clone, Debug, Args)]
+pub struct FlyOptions {
+    #[command(flatten)]
+    pub scene: SceneOptions,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for `flight.ulg` and `flight.html`.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// Fly a flight of a campaign again, and compare its hash: exit code 1 when it is another.
+    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "jitter", "seed"])]
+    pub from: Option<PathBuf>,
+    /// Which one: its row in the file, from 0.
+    #[arg(long, value_name = "N", requires = "from")]
+    pub row: Option<usize>,
+}
+
+impl Default for FlyOptions {
+    fn default() -> Self {
+        Self { scene: SceneOptions::default(), seed: 1, out: ".".into(), from: None, row: None }
+    }
+}
+
+/// Reads `N,E`.
+fn north_and_east(text: &str) -> Result<[f32; 2], String> {
+    let parse = |part: &str| part.trim().parse().map_err(|_| format!("'{part}' is no number"));
+    let (north, east) = text.split_once(',').ok_or("a wind has a part towards north and one towards east")?;
+    Ok([parse(north)?, parse(east)?])
+}
+
+impl SceneOptions {
+    /// The flight these options describe.
+    pub fn setup<V: Vehicle>(&self, seed: u64, jitter: Option<u64>, live: Option<Live>) -> Result<V::Setup, Failure> {
+        let options = Options { live, ..self.options(jitter) };
+        Ok(V::setup(&options, seed)?)
+    }
+
+    /// The same as a vehicle takes them.
+    pub fn options(&self, jitter: Option<u64>) -> Options {
+        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } =
+            self.clone();
+        let pilot = pilot.then(|| mode.unwrap_or_default());
+        Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live: None }
+    }
+
+    /// Prints what can be changed.
+    pub fn print_list<V: Vehicle>(&self, seed: u64) -> Result<(), Failure> {
+        let setup = self.setup::<V>(seed, self.jitter, None)?;
+        for (title, settings) in [("--param", V::parameters(V::config(&setup))), ("\n--plant", V::plant(&setup))] {
+            outln!("{title}");
+            for row in settings {
+                outln!("  {:<30} {:>12} {:<18} {}", row.name, row.value, row.unit, row.meaning);
+            }
+        }
+        Ok(())
+    }
+}
